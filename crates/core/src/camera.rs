@@ -1,0 +1,298 @@
+use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
+
+use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+
+/// Lens distortion, as in `sensor_msgs/CameraInfo`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Distortion {
+    /// An ideal or an already rectified image.
+    #[default]
+    None,
+    /// `plumb_bob`: k1, k2, p1, p2, k3.
+    PlumbBob([f64; 5]),
+    /// `rational_polynomial`: k1, k2, p1, p2, k3, k4, k5, k6.
+    Rational([f64; 8]),
+}
+
+impl Distortion {
+    /// Ideal normalised coordinates to distorted ones (OpenCV's model).
+    fn apply(&self, x: f64, y: f64) -> (f64, f64) {
+        let (k, p1, p2) = match self {
+            Self::None => return (x, y),
+            Self::PlumbBob([k1, k2, p1, p2, k3]) => ([*k1, *k2, *k3, 0.0, 0.0, 0.0], *p1, *p2),
+            Self::Rational([k1, k2, p1, p2, k3, k4, k5, k6]) => {
+                ([*k1, *k2, *k3, *k4, *k5, *k6], *p1, *p2)
+            }
+        };
+        let r2 = x * x + y * y;
+        let radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2])))
+            / (1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5])));
+        (
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        )
+    }
+
+    /// Distorted normalised coordinates to ideal ones, by fixed-point iteration.
+    fn remove(&self, x_distorted: f64, y_distorted: f64) -> (f64, f64) {
+        if *self == Self::None {
+            return (x_distorted, y_distorted);
+        }
+        let (mut x, mut y) = (x_distorted, y_distorted);
+        for _ in 0..20 {
+            let (xd, yd) = self.apply(x, y);
+            x += x_distorted - xd;
+            y += y_distorted - yd;
+        }
+        (x, y)
+    }
+}
+
+/// A perspective lens. Pixel (0, 0) is the **centre** of the upper left pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    /// Focal length along columns, pixels.
+    pub fx: f64,
+    /// Focal length along rows, pixels.
+    pub fy: f64,
+    /// Principal point, column.
+    pub cx: f64,
+    /// Principal point, row.
+    pub cy: f64,
+    /// Distortion of the image as it is delivered.
+    pub distortion: Distortion,
+}
+
+/// How directions become pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Lens {
+    /// Perspective, with optional distortion.
+    Pinhole(Pinhole),
+}
+
+/// A camera: its lens, its image size, and where it sits on the robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// The lens.
+    pub lens: Lens,
+    /// Image columns.
+    pub width: usize,
+    /// Image rows.
+    pub height: usize,
+    /// Pose of the camera (x right, y down, z forward) in the robot frame.
+    pub robot_from_camera: Isometry3<f64>,
+}
+
+impl Camera {
+    /// A pinhole camera at `height_m` above the floor, above the robot's
+    /// origin, looking forward and `pitch_down_rad` downwards, with its right
+    /// side raised by `roll_rad`.
+    ///
+    /// ```
+    /// use nalgebra::{Point2, Point3};
+    /// use tagalong_core::{Camera, Distortion, Pinhole};
+    /// let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    /// let camera = Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0);
+    /// let pixel = camera.project(&Point3::new(2.0, 0.0, 1.2)).unwrap();
+    /// assert!((pixel - Point2::new(319.5, 239.5)).norm() < 1e-9);
+    /// ```
+    pub fn mounted(
+        lens: Pinhole,
+        width: usize,
+        height: usize,
+        height_m: f64,
+        pitch_down_rad: f64,
+        roll_rad: f64,
+    ) -> Self {
+        let level = nalgebra::Rotation3::from_matrix_unchecked(Matrix3::new(
+            0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0,
+        ));
+        let pitch = nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), -pitch_down_rad);
+        let roll = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), -roll_rad);
+        let rotation = nalgebra::UnitQuaternion::from_rotation_matrix(&(level * pitch * roll));
+        Self {
+            lens: Lens::Pinhole(lens),
+            width,
+            height,
+            robot_from_camera: Isometry3::from_parts(
+                Vector3::new(0.0, 0.0, height_m).into(),
+                rotation,
+            ),
+        }
+    }
+
+    /// Pixels per metre at one metre of depth, along columns.
+    pub fn focal_px(&self) -> f64 {
+        match &self.lens {
+            Lens::Pinhole(lens) => lens.fx,
+        }
+    }
+
+    /// The pixel of a point in the robot frame; `None` behind the camera. The
+    /// pixel may lie outside the image.
+    pub fn project(&self, point_in_robot: &Point3<f64>) -> Option<Point2<f64>> {
+        self.project_from_camera(&self.robot_from_camera.inverse_transform_point(point_in_robot))
+    }
+
+    /// The pixel of a point in the camera frame; `None` behind the camera.
+    pub fn project_from_camera(&self, point_in_camera: &Point3<f64>) -> Option<Point2<f64>> {
+        let Lens::Pinhole(lens) = &self.lens;
+        if point_in_camera.z <= 1e-6 {
+            return None;
+        }
+        let (x, y) = lens
+            .distortion
+            .apply(point_in_camera.x / point_in_camera.z, point_in_camera.y / point_in_camera.z);
+        Some(Point2::new(lens.fx * x + lens.cx, lens.fy * y + lens.cy))
+    }
+
+    /// The viewing ray of a pixel in the camera frame, scaled to depth 1.
+    pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
+        let Lens::Pinhole(lens) = &self.lens;
+        let (x, y) =
+            lens.distortion.remove((pixel.x - lens.cx) / lens.fx, (pixel.y - lens.cy) / lens.fy);
+        Vector3::new(x, y, 1.0)
+    }
+
+    /// The point in the robot frame that a pixel with a depth shows.
+    pub fn back_project(&self, pixel: Point2<f64>, depth_m: f64) -> Point3<f64> {
+        self.robot_from_camera * Point3::from(self.ray(pixel) * depth_m)
+    }
+
+    /// Depth (along the optical axis) of a point in the robot frame, metres.
+    pub fn depth_of(&self, point_in_robot: &Point3<f64>) -> f64 {
+        self.robot_from_camera.inverse_transform_point(point_in_robot).z
+    }
+
+    /// Height of the camera above the floor, metres.
+    pub fn height_m(&self) -> f64 {
+        self.robot_from_camera.translation.z
+    }
+
+    /// How far the optical axis points below the horizon, radians.
+    pub fn pitch_down_rad(&self) -> f64 {
+        let forward = self.robot_from_camera.rotation * Vector3::z();
+        (-forward.z).clamp(-1.0, 1.0).asin()
+    }
+
+    /// Angle between the image's upward direction and the projected vertical,
+    /// radians; positive when the camera's right side is higher.
+    pub fn roll_rad(&self) -> f64 {
+        let up = self.robot_from_camera.rotation.inverse() * Vector3::z();
+        up.x.atan2(-up.y)
+    }
+
+    /// The upper-body square of a person whose head centre is at `head`: side
+    /// [`UPPER_BODY_SIDE_M`] at the depth of the face, its upper edge
+    /// [`HEAD_BELOW_TOP_M`] above the head centre, its middle column that of
+    /// the shoulders. It is amodal and may reach beyond the image; empty when
+    /// the head is behind the camera.
+    pub fn upper_body(&self, head: &Point3<f64>) -> Rect {
+        let depth = self.depth_of(head) - HEAD_RADIUS_M;
+        let chest = head - Vector3::new(0.0, 0.0, SHOULDERS_BELOW_HEAD_M);
+        let (Some(centre), Some(chest)) = (self.project(head), self.project(&chest)) else {
+            return Rect::default();
+        };
+        if depth <= 0.05 {
+            return Rect::default();
+        }
+        let scale = self.focal_px() / depth;
+        let side = UPPER_BODY_SIDE_M * scale;
+        Rect::new(chest.x - 0.5 * side, centre.y - HEAD_BELOW_TOP_M * scale, side, side)
+    }
+
+    /// The head centre of the person that an upper-body square at the given
+    /// depth of the face shows: the inverse of [`Camera::upper_body`], by
+    /// fixed-point iteration.
+    pub fn head_of(&self, upper_body: &Rect, face_depth_m: f64) -> Point3<f64> {
+        let depth = face_depth_m + HEAD_RADIUS_M;
+        let mut pixel = upper_body.centre();
+        for _ in 0..8 {
+            let shown = self.upper_body(&self.back_project(pixel, depth));
+            pixel.x += upper_body.x - shown.x;
+            pixel.y += upper_body.y - shown.y;
+        }
+        self.back_project(pixel, depth)
+    }
+
+    /// Covariance in the robot frame of a point seen at `pixel` and `depth_m`
+    /// with the given standard deviations (first order, `algorithms`: stereo
+    /// covariance with depth in place of disparity).
+    pub fn covariance(
+        &self,
+        pixel: Point2<f64>,
+        depth_m: f64,
+        sigma_px: f64,
+        sigma_depth_m: f64,
+    ) -> Matrix3<f64> {
+        let ray = self.ray(pixel);
+        let lateral = depth_m * sigma_px / self.focal_px();
+        let across =
+            Matrix3::from_diagonal(&Vector3::new(lateral * lateral, lateral * lateral, 0.0));
+        let in_camera = across + ray * ray.transpose() * (sigma_depth_m * sigma_depth_m);
+        let rotation = self.robot_from_camera.rotation.to_rotation_matrix();
+        let in_robot = rotation.matrix() * in_camera * rotation.matrix().transpose();
+        0.5 * (in_robot + in_robot.transpose())
+    }
+}
+
+/// The column of the upper-body square is that of the body this far below the
+/// head centre. Measured: with it, squares of a camera rolled by 11 degrees
+/// agree with hand-annotated ones to about a pixel.
+const SHOULDERS_BELOW_HEAD_M: f64 = 0.25;
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn tilted(pitch: f64, roll: f64, distortion: Distortion) -> Camera {
+        let lens = Pinhole { fx: 530.0, fy: 528.0, cx: 310.0, cy: 243.0, distortion };
+        Camera::mounted(lens, 640, 480, 2.4, pitch, roll)
+    }
+
+    #[test]
+    fn mounting_angles_are_recovered() {
+        let camera = tilted(0.48, 0.19, Distortion::None);
+        assert!((camera.pitch_down_rad() - 0.48).abs() < 1e-12);
+        assert!((camera.roll_rad() - 0.19).abs() < 1e-9, "{}", camera.roll_rad());
+        let right_side = camera.robot_from_camera.rotation * Vector3::x();
+        assert!(right_side.z > 0.0, "positive roll raises the right side");
+    }
+
+    proptest! {
+        #[test]
+        fn projecting_and_back_projecting_agree(
+            x in 1.0..6.0f64, y in -2.0..2.0f64, z in 0.0..2.0f64,
+            pitch in -0.5..0.6f64, roll in -0.3..0.3f64, k1 in -0.1..0.1f64,
+        ) {
+            let camera = tilted(pitch, roll, Distortion::PlumbBob([k1, 0.01, 1e-3, -1e-3, 0.0]));
+            let point = Point3::new(x, y, z);
+            if let Some(pixel) = camera.project(&point) {
+                let inside = Rect::new(0.0, 0.0, 640.0, 480.0).contains(pixel);
+                let back = camera.back_project(pixel, camera.depth_of(&point));
+                prop_assert!(!inside || (back - point).norm() < 1e-6);
+            }
+        }
+
+        #[test]
+        fn head_of_inverts_upper_body(
+            x in 1.5..6.0f64, y in -0.6..0.6f64, z in 1.0..1.9f64, roll in -0.2..0.2f64,
+        ) {
+            let camera = tilted(0.1, roll, Distortion::None);
+            let head = Point3::new(x, y, z);
+            let region = camera.upper_body(&head);
+            let back = camera.head_of(&region, camera.depth_of(&head) - HEAD_RADIUS_M);
+            prop_assert!((back - head).norm() < 0.002, "{back} {head}");
+        }
+
+        #[test]
+        fn covariance_is_symmetric_and_positive(u in 0.0..640.0f64, v in 0.0..480.0f64, d in 0.5..8.0f64) {
+            let c = tilted(0.4, 0.1, Distortion::None).covariance(Point2::new(u, v), d, 2.0, 0.05);
+            prop_assert_eq!(c, c.transpose());
+            prop_assert!(c.cholesky().is_some());
+        }
+    }
+}

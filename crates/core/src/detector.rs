@@ -1,0 +1,82 @@
+use nalgebra::Point3;
+
+use crate::{Detection, Frame, Funnel, Person, Result, Track};
+
+/// What a detector is asked.
+#[derive(Clone, Copy)]
+pub enum Search<'a> {
+    /// *Discover*: who is in the image? `occupied` are the people already found
+    /// in this frame; they need not be found again.
+    Everywhere {
+        /// Already found in this frame.
+        occupied: &'a [Detection],
+    },
+    /// *Follow*: where is this person now? The track is predicted to this frame.
+    Near(&'a Track),
+}
+
+/// Answers one or more of three questions about an image: who is here
+/// (*discover*), where is this one now (*follow*), and, through its
+/// [`Likelihood`], how well an imagined scene explains what is seen (*weigh*).
+pub trait Detector: Send {
+    /// Finds people. What a test drops is counted in `funnel` under the name of
+    /// the test. For [`Search::Near`] the best sighting comes first and lies
+    /// within the track's uncertainty.
+    ///
+    /// # Errors
+    /// [`crate::Error::MissingImage`] if the frame lacks what the detector needs.
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>>;
+
+    /// Adapts appearance models to the tracks of this frame, all of them, so
+    /// that models of people who left can be forgotten.
+    ///
+    /// # Errors
+    /// As [`Detector::detect`].
+    fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
+        let _ = (frame, tracks);
+        Ok(())
+    }
+
+    /// The scene likelihood that goes with this detector, if it has one.
+    fn likelihood(&self) -> Option<&dyn Likelihood> {
+        None
+    }
+}
+
+/// Weighs imagined scenes against an image (P3: overlapping silhouettes).
+pub trait Likelihood: Send + Sync {
+    /// Log-likelihood ratio of the scene against the empty background. Nearer
+    /// people hide farther ones; the order of `scene` does not matter.
+    ///
+    /// # Errors
+    /// [`crate::Error::MissingImage`] if the frame lacks what is needed.
+    fn log_likelihood(&self, frame: &Frame, scene: &[Person]) -> Result<f64>;
+}
+
+/// Doubts detections (P4, II-C: an SVM on the intensity patch).
+pub trait Verifier: Send {
+    /// Log-odds that the candidate is a person; negative is "no". The same
+    /// candidate in the same frame always gets the same answer.
+    ///
+    /// # Errors
+    /// [`crate::Error::MissingImage`] if the frame lacks what is needed.
+    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64>;
+}
+
+impl<'a> Search<'a> {
+    /// True if `position` is of a person that was already found in this frame
+    /// (nearer than `within_m` on the floor).
+    pub fn is_occupied(&self, position: &Point3<f64>, within_m: f64) -> bool {
+        match self {
+            Self::Everywhere { occupied } => {
+                occupied.iter().any(|d| (d.position.xy() - position.xy()).norm() < within_m)
+            }
+            Self::Near(_) => false,
+        }
+    }
+}

@@ -1,0 +1,161 @@
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, SMatrix, Vector2};
+
+use crate::{Camera, Detection, Frame, Likelihood, Motion, Rect, Result, TrackId};
+
+/// A person in the robot frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Person {
+    /// Centre of the head, m.
+    pub position: Point3<f64>,
+    /// Velocity over ground (not relative to the robot), in robot axes, m/s.
+    pub velocity: Vector2<f64>,
+}
+
+/// What a filter believes of a person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// The mean.
+    pub person: Person,
+    /// Covariance of (x, y, z, vx, vy).
+    pub covariance: SMatrix<f64, 5, 5>,
+    /// The expected upper-body square in the image.
+    pub region: Rect,
+}
+
+impl Estimate {
+    /// True if every number is finite and no variance is negative.
+    pub fn is_sane(&self) -> bool {
+        self.person.position.iter().all(|v| v.is_finite())
+            && self.person.velocity.iter().all(|v| v.is_finite())
+            && self.covariance.iter().all(|v| v.is_finite())
+            && self.covariance.diagonal().iter().all(|v| *v >= 0.0)
+            && self.region.is_sane()
+    }
+}
+
+/// A detection that the association gave to a track.
+#[derive(Clone, Copy)]
+pub struct Matched<'a> {
+    /// The track.
+    pub id: TrackId,
+    /// Its detection.
+    pub detection: &'a Detection,
+}
+
+/// Everything that one frame says about the people a filter believes in.
+pub struct Evidence<'a> {
+    /// The frame.
+    pub frame: &'a Frame,
+    /// Detections with their track; a track appears at most once.
+    pub matched: &'a [Matched<'a>],
+    /// Detections that the association left alone.
+    pub unmatched: &'a [Detection],
+    /// Weighs scenes, where the pipeline has a detector that can.
+    pub likelihood: Option<&'a dyn Likelihood>,
+}
+
+/// How the evidence of one frame supports one track.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Support {
+    /// Normalised innovation squared and its degrees of freedom, from filters
+    /// that have an innovation. Its mean over a consistent filter's run equals
+    /// the degrees of freedom.
+    pub nis: Option<(f64, u32)>,
+}
+
+/// Holds the beliefs about **all** people at once, so that a joint filter is
+/// nothing special. Filters for one person are lifted by [`PerPerson`].
+pub trait Filter: Send {
+    /// Starts a belief. `id` is new.
+    fn start(&mut self, id: TrackId, detection: &Detection);
+
+    /// Moves every belief into the robot's new frame and forward in time.
+    fn predict(&mut self, motion: &Motion);
+
+    /// Takes in the evidence of a frame and returns whom it supports.
+    ///
+    /// # Errors
+    /// [`crate::Error::MissingImage`] if a scene cannot be weighed.
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>>;
+
+    /// All beliefs, as the camera would see them.
+    fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate>;
+
+    /// Forgets a person.
+    fn stop(&mut self, id: TrackId);
+
+    /// True if the filter cannot work without a [`Likelihood`]; checked when
+    /// the pipeline is built.
+    fn weighs_scenes(&self) -> bool {
+        false
+    }
+}
+
+/// A filter of one person.
+pub trait PersonFilter: Send {
+    /// What is believed of a person.
+    type Belief: Send;
+
+    /// The belief after the first sighting.
+    fn start(&self, detection: &Detection) -> Self::Belief;
+
+    /// Into the robot's new frame and forward in time.
+    fn predict(&self, belief: &mut Self::Belief, motion: &Motion);
+
+    /// Corrects the belief by a sighting.
+    fn correct(&self, belief: &mut Self::Belief, detection: &Detection, camera: &Camera)
+    -> Support;
+
+    /// The belief in the common form.
+    fn estimate(&self, belief: &Self::Belief, camera: &Camera) -> Estimate;
+}
+
+/// Makes a [`Filter`] of a [`PersonFilter`] by keeping one belief a person.
+pub struct PerPerson<F: PersonFilter> {
+    filter: F,
+    beliefs: BTreeMap<TrackId, F::Belief>,
+}
+
+impl<F: PersonFilter> PerPerson<F> {
+    /// Lifts `filter`.
+    pub fn new(filter: F) -> Self {
+        Self { filter, beliefs: BTreeMap::new() }
+    }
+}
+
+impl<F: PersonFilter> Filter for PerPerson<F> {
+    fn start(&mut self, id: TrackId, detection: &Detection) {
+        self.beliefs.insert(id, self.filter.start(detection));
+    }
+
+    fn predict(&mut self, motion: &Motion) {
+        for belief in self.beliefs.values_mut() {
+            self.filter.predict(belief, motion);
+        }
+    }
+
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+        let mut supported = BTreeMap::new();
+        for matched in evidence.matched {
+            if let Some(belief) = self.beliefs.get_mut(&matched.id) {
+                let support =
+                    self.filter.correct(belief, matched.detection, &evidence.frame.camera);
+                supported.insert(matched.id, support);
+            }
+        }
+        Ok(supported)
+    }
+
+    fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
+        self.beliefs
+            .iter()
+            .map(|(id, belief)| (*id, self.filter.estimate(belief, camera)))
+            .collect()
+    }
+
+    fn stop(&mut self, id: TrackId) {
+        self.beliefs.remove(&id);
+    }
+}

@@ -1,0 +1,176 @@
+use std::any::{Any, TypeId};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use crate::{Camera, DepthImage, Error, GreyImage, Motion, Result, RgbImage, Stamp};
+
+/// The images that one moment delivered. All have the size of the camera's
+/// image, and show the same view unless the name says otherwise.
+#[derive(Clone, Debug, Default)]
+pub struct Images {
+    /// Colour.
+    pub colour: Option<Arc<RgbImage>>,
+    /// Intensity, where the log carries no colour.
+    pub grey: Option<Arc<GreyImage>>,
+    /// Depth, registered to the colour image.
+    pub depth: Option<Arc<DepthImage>>,
+    /// The right-hand image of a rectified stereo pair.
+    pub right: Option<Arc<GreyImage>>,
+}
+
+/// Something computed from a frame that several plugins want; see
+/// [`Frame::derived`].
+pub trait Derived: Send + Sync + Sized + 'static {
+    /// Computes it.
+    ///
+    /// # Errors
+    /// If the frame lacks an image that it needs.
+    fn derive(frame: &Frame) -> Result<Self>;
+}
+
+/// One moment of a log: images, camera, and how the robot moved since the
+/// frame before. A frame is immutable; what plugins derive from it is computed
+/// once, on first use.
+pub struct Frame {
+    /// 1-based index of the image in the log.
+    pub index: u64,
+    /// When the image was captured.
+    pub stamp: Stamp,
+    /// The camera that all images share.
+    pub camera: Arc<Camera>,
+    /// The robot's motion since the previous frame.
+    pub motion: Motion,
+    images: Images,
+    grey: OnceLock<Arc<GreyImage>>,
+    derived: Mutex<BTreeMap<TypeId, Arc<OnceLock<Result<Arc<dyn Any + Send + Sync>>>>>>,
+}
+
+impl Frame {
+    /// A frame.
+    pub fn new(
+        index: u64,
+        stamp: Stamp,
+        camera: Arc<Camera>,
+        motion: Motion,
+        images: Images,
+    ) -> Self {
+        Self {
+            index,
+            stamp,
+            camera,
+            motion,
+            images,
+            grey: OnceLock::new(),
+            derived: Mutex::default(),
+        }
+    }
+
+    /// The images as they came.
+    pub fn images(&self) -> &Images {
+        &self.images
+    }
+
+    /// The colour image.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] where the log carries none.
+    pub fn colour(&self) -> Result<&RgbImage> {
+        self.images.colour.as_deref().ok_or(Error::MissingImage { what: "colour" })
+    }
+
+    /// The depth image: metres along the optical axis, NaN = no reading.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] where the log carries none.
+    pub fn depth(&self) -> Result<&DepthImage> {
+        self.images.depth.as_deref().ok_or(Error::MissingImage { what: "depth" })
+    }
+
+    /// The right image of a stereo pair.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] where the log carries none.
+    pub fn right(&self) -> Result<&GreyImage> {
+        self.images.right.as_deref().ok_or(Error::MissingImage { what: "right stereo" })
+    }
+
+    /// The intensity image, made from colour where the log carries only that.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] where the log carries neither.
+    pub fn grey(&self) -> Result<&GreyImage> {
+        if let Some(grey) = &self.images.grey {
+            return Ok(grey);
+        }
+        let colour =
+            self.images.colour.as_ref().ok_or(Error::MissingImage { what: "grey or colour" })?;
+        Ok(self.grey.get_or_init(|| Arc::new(colour.to_grey())))
+    }
+
+    /// The derived thing `T` of this frame, computed by whoever asks first and
+    /// shared with everybody after that.
+    ///
+    /// # Errors
+    /// What [`Derived::derive`] returned.
+    pub fn derived<T: Derived>(&self) -> Result<Arc<T>> {
+        let slot = {
+            let mut slots = self.derived.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(slots.entry(TypeId::of::<T>()).or_default())
+        };
+        let shared = slot.get_or_init(|| Ok(Arc::new(T::derive(self)?))).clone()?;
+        shared.downcast::<T>().map_err(|_| Error::Other("a derived image changed its type".into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::{Distortion, Pinhole};
+
+    static COMPUTED: AtomicUsize = AtomicUsize::new(0);
+
+    struct Mean(f64);
+
+    impl Derived for Mean {
+        fn derive(frame: &Frame) -> Result<Self> {
+            COMPUTED.fetch_add(1, Ordering::Relaxed);
+            let depth = frame.depth()?.pixels();
+            Ok(Self(depth.iter().map(|d| f64::from(*d)).sum::<f64>() / depth.len() as f64))
+        }
+    }
+
+    fn frame(images: Images) -> Frame {
+        let lens = Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
+    }
+
+    #[test]
+    fn derived_things_are_computed_once() {
+        let depth = Some(Arc::new(DepthImage::filled(4, 4, 2.0)));
+        let frame = frame(Images { depth, ..Images::default() });
+        assert_eq!(frame.derived::<Mean>().unwrap().0, 2.0);
+        assert_eq!(frame.derived::<Mean>().unwrap().0, 2.0);
+        assert_eq!(COMPUTED.load(Ordering::Relaxed), 1);
+    }
+
+    #[test]
+    fn a_missing_image_is_named() {
+        let frame = frame(Images::default());
+        assert_eq!(
+            frame.depth().unwrap_err().to_string(),
+            "needs a depth image, which this log does not carry"
+        );
+        assert!(frame.colour().is_err() && frame.right().is_err());
+        assert!(frame.grey().unwrap_err().to_string().contains("grey or colour"));
+    }
+
+    #[test]
+    fn grey_comes_from_colour() {
+        let colour = Some(Arc::new(RgbImage::filled(4, 4, [255, 0, 0])));
+        let frame = frame(Images { colour, ..Images::default() });
+        assert_eq!(frame.grey().unwrap().get(0, 0), Some(76));
+    }
+}

@@ -1,0 +1,74 @@
+//! The words of Tagalong and the four kinds of plugin.
+//!
+//! Everything that two crates of the workspace say to each other is defined
+//! here and nowhere else: a [`Frame`] goes in, a [`Detector`] finds people in
+//! it as [`Detection`]s, a [`Verifier`] doubts them, a [`Filter`] believes in
+//! [`Track`]s, a [`Controller`] steers after one of them.
+//!
+//! # Why a person is described twice
+//!
+//! A detection is an image region *and* a place in the robot's world. Stereo,
+//! RGB-D and panorama cameras then speak the same language, and a filter may
+//! think in pixels or in metres as it likes. The [`Camera`] translates. What is
+//! not known (the height of a person seen by a panorama) is a large variance,
+//! never a missing field.
+//!
+//! # Conventions
+//!
+//! * SI units. Stamps are nanoseconds ([`Stamp`]).
+//! * **Robot frame**: X forward, Y left, Z up, origin on the floor midway
+//!   between the wheels (REP 103). **Camera frame**: x right, y down, z forward.
+//! * Depth is the coordinate along the optical axis, in metres; NaN is "no
+//!   reading". It is never the Euclidean range.
+//! * The position of a person is the **centre of the head**
+//!   ([`HEAD_RADIUS_M`] behind the surface that a depth camera sees).
+//! * No clocks and no global randomness in plugins: time comes from the frame,
+//!   seeds from [`Context`]. Same log, same config, same seed: same bytes.
+
+mod camera;
+mod control;
+mod detection;
+mod detector;
+mod error;
+mod filter;
+mod frame;
+mod funnel;
+mod image;
+mod motion;
+mod names;
+mod rect;
+mod registry;
+mod settings;
+mod time;
+mod track;
+
+pub use camera::{Camera, Distortion, Lens, Pinhole};
+pub use control::{Controller, Scene, WheelSpeeds};
+pub use detection::Detection;
+pub use detector::{Detector, Likelihood, Search, Verifier};
+pub use error::{Error, Result};
+pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Support};
+pub use frame::{Derived, Frame, Images};
+pub use funnel::{Dropped, Funnel};
+pub use image::{DepthImage, GreyImage, Image, RgbImage};
+pub use motion::{Motion, Wheels, planar_pose};
+pub use names::nearest;
+pub use rect::Rect;
+pub use registry::{Context, Kind, PluginInfo, Registry};
+pub use settings::{ConfigError, Settings, Value, commented_defaults, parse_settings};
+pub use time::Stamp;
+pub use track::{Track, TrackId};
+
+/// Distance from the visible surface of a head to its centre, in metres.
+///
+/// Annotated heads carry the surface; beliefs carry the centre, because that
+/// point stays where it is when the robot drives around the person.
+pub const HEAD_RADIUS_M: f64 = 0.08;
+
+/// Side of the upper-body square (head and shoulders) at the person, in metres
+/// (the upper-body template of Jafari et al., ICRA 2014, spans the same 0.57 m).
+pub const UPPER_BODY_SIDE_M: f64 = 0.57;
+
+/// The centre of the head lies this far below the upper edge of the
+/// upper-body square, in metres (2.5 cm of air and half a head).
+pub const HEAD_BELOW_TOP_M: f64 = 0.14;

@@ -1,0 +1,145 @@
+use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Vector2, Vector3};
+
+/// The robot's own motion between two image stamps, in its frame at the first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Time between the images, s; never negative.
+    pub dt: f64,
+    /// Displacement along the first heading, m.
+    pub forward: f64,
+    /// Displacement to the left of the first heading, m.
+    pub left: f64,
+    /// Change of heading, rad, counter-clockwise.
+    pub turn: f64,
+    /// Covariance of (forward, left, turn).
+    pub covariance: Matrix3<f64>,
+}
+
+/// A differential drive. The wheels are `2 * half_separation_m` apart, as in
+/// P1, section 2.3.1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wheels {
+    /// Half the distance between the wheels, m.
+    pub half_separation_m: f64,
+    /// Slip: standard deviation of a wheel's travel as a fraction of it.
+    pub slip: f64,
+}
+
+impl Motion {
+    /// A robot at rest for `dt` seconds.
+    pub fn at_rest(dt: f64) -> Self {
+        Self { dt, forward: 0.0, left: 0.0, turn: 0.0, covariance: Matrix3::zeros() }
+    }
+
+    /// Dead reckoning from wheel speeds held for `dt` seconds (P1, section
+    /// 2.3.1). The chord is `v dt sinc(turn / 2)`, which has no singularity at
+    /// equal speeds; the printed form divides by their difference.
+    pub fn from_wheels(left_mps: f64, right_mps: f64, wheels: &Wheels, dt: f64) -> Self {
+        let d = wheels.half_separation_m;
+        let turn = (right_mps - left_mps) / (2.0 * d) * dt;
+        let chord = 0.5 * (right_mps + left_mps) * dt * sinc(0.5 * turn);
+        let (sin, cos) = (0.5 * turn).sin_cos();
+        let (sl, sr) = (wheels.slip * left_mps * dt, wheels.slip * right_mps * dt);
+        let by_left = Vector3::new(0.5, 0.0, -0.5 / d);
+        let by_right = Vector3::new(0.5, 0.0, 0.5 / d);
+        let covariance =
+            by_left * by_left.transpose() * (sl * sl) + by_right * by_right.transpose() * (sr * sr);
+        Self { dt, forward: chord * cos, left: chord * sin, turn, covariance }
+    }
+
+    /// The motion from one odometry pose to the next. `sigma_fraction` is the
+    /// standard deviation of each component as a fraction of the travel.
+    pub fn between(
+        before: &Isometry2<f64>,
+        after: &Isometry2<f64>,
+        dt: f64,
+        sigma_fraction: f64,
+    ) -> Self {
+        let step = before.inverse() * after;
+        let (forward, left, turn) = (step.translation.x, step.translation.y, step.rotation.angle());
+        let travel = sigma_fraction * forward.hypot(left);
+        let rotation = sigma_fraction * turn.abs();
+        let covariance = Matrix3::from_diagonal(&Vector3::new(
+            travel * travel,
+            travel * travel,
+            rotation * rotation + 0.01 * travel * travel,
+        ));
+        Self { dt, forward, left, turn, covariance }
+    }
+
+    /// Where a point that is fixed in the world is after the motion.
+    pub fn apply_to_point(&self, point_in_robot: Point2<f64>) -> Point2<f64> {
+        self.isometry().inverse_transform_point(&point_in_robot)
+    }
+
+    /// How a velocity over ground looks after the motion: it is only rotated.
+    pub fn apply_to_velocity(&self, velocity: Vector2<f64>) -> Vector2<f64> {
+        self.isometry().inverse_transform_vector(&velocity)
+    }
+
+    /// The motion as a pose change: `odom_from_robot * isometry()` is the new pose.
+    pub fn isometry(&self) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(self.forward, self.left), self.turn)
+    }
+
+    /// The motion followed by another one; the covariances are added in the
+    /// axes of the first (first order, for short steps).
+    pub fn then(&self, next: &Self) -> Self {
+        let whole = self.isometry() * next.isometry();
+        Self {
+            dt: self.dt + next.dt,
+            forward: whole.translation.x,
+            left: whole.translation.y,
+            turn: self.turn + next.turn,
+            covariance: self.covariance + next.covariance,
+        }
+    }
+}
+
+/// The pose on the floor of a 3-D pose: position and heading.
+pub fn planar_pose(pose: &Isometry3<f64>) -> Isometry2<f64> {
+    let forward = pose.rotation * Vector3::x();
+    Isometry2::new(Vector2::new(pose.translation.x, pose.translation.y), forward.y.atan2(forward.x))
+}
+
+/// sin(x) / x, with its Taylor branch near zero.
+fn sinc(x: f64) -> f64 {
+    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+
+    #[test]
+    fn equal_speeds_drive_straight() {
+        let motion = Motion::from_wheels(0.5, 0.5, &WHEELS, 0.1);
+        assert_eq!((motion.forward, motion.left, motion.turn), (0.05, 0.0, 0.0));
+    }
+
+    proptest! {
+        #[test]
+        fn wheels_agree_with_small_steps(l in -0.9..0.9f64, r in -0.9..0.9f64, dt in 0.01..0.5f64) {
+            let mut pose = Isometry2::<f64>::identity();
+            for _ in 0..2000 {
+                let (v, w) = (0.5 * (l + r), (r - l) / (2.0 * WHEELS.half_separation_m));
+                let h = dt / 2000.0;
+                pose *= Isometry2::new(Vector2::new(v * h, 0.0), w * h);
+            }
+            let motion = Motion::from_wheels(l, r, &WHEELS, dt).isometry();
+            prop_assert!((motion.translation.vector - pose.translation.vector).norm() < 1e-3);
+            prop_assert!((motion.rotation.inverse() * pose.rotation).angle().abs() < 1e-9);
+        }
+
+        #[test]
+        fn a_fixed_point_stays_fixed(x in -5.0..5.0f64, y in -5.0..5.0f64, f in -1.0..1.0f64, t in -1.0..1.0f64) {
+            let motion = Motion { forward: f, turn: t, ..Motion::at_rest(0.1) };
+            let seen = motion.apply_to_point(Point2::new(x, y));
+            prop_assert!((motion.isometry() * seen - Point2::new(x, y)).norm() < 1e-12);
+        }
+    }
+}

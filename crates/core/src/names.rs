@@ -1,0 +1,33 @@
+/// The name among `available` that a mistyped `wanted` most likely meant, if
+/// any is near: fewer than half of its letters differ.
+///
+/// ```
+/// use tagalong_core::nearest;
+/// assert_eq!(nearest("kalmann", ["ekf", "kalman"]), Some("kalman"));
+/// assert_eq!(nearest("zebra", ["ekf", "kalman"]), None);
+/// ```
+pub fn nearest<'a>(wanted: &str, available: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let wanted = wanted.to_lowercase();
+    available
+        .into_iter()
+        .map(|name| (edit_distance(&wanted, &name.to_lowercase()), name))
+        .filter(|(distance, name)| 2 * distance < name.chars().count().max(wanted.chars().count()))
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, name)| name)
+}
+
+/// Levenshtein distance, one row at a time.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(ca != *cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}

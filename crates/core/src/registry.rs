@@ -1,0 +1,301 @@
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::PathBuf;
+
+use toml::Spanned;
+
+use crate::{
+    ConfigError, Controller, Detector, Filter, Result, Settings, Value, Verifier, Wheels,
+    commented_defaults, nearest, parse_settings,
+};
+
+/// The four kinds of plugin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Finds people in images.
+    Detector,
+    /// Doubts what a detector found.
+    Verifier,
+    /// Believes in people over time.
+    Filter,
+    /// Steers after one of them.
+    Controller,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Detector => "detector",
+            Self::Verifier => "verifier",
+            Self::Filter => "filter",
+            Self::Controller => "controller",
+        })
+    }
+}
+
+/// What a plugin may know when it is built.
+#[derive(Clone, Debug)]
+pub struct Context {
+    /// The seed of the run, already mixed with the plugin's place in the config.
+    pub seed: u64,
+    /// The directory against which paths in the config are resolved.
+    pub base_dir: PathBuf,
+    /// The drive of the robot.
+    pub wheels: Wheels,
+}
+
+type Build<P> =
+    Box<dyn Fn(Option<Value<'_>>, &Context) -> std::result::Result<P, ConfigError> + Send + Sync>;
+
+enum Maker {
+    Detector(Build<Box<dyn Detector>>),
+    Verifier(Build<Box<dyn Verifier>>),
+    Filter(Build<Box<dyn Filter>>),
+    Controller(Build<Box<dyn Controller>>),
+}
+
+/// One line of `tagalong list`, and what `tagalong config` prints.
+pub struct PluginInfo {
+    /// The name used in configs.
+    pub name: &'static str,
+    /// What kind of plugin it is.
+    pub kind: Kind,
+    /// One line of what it does.
+    pub summary: &'static str,
+    defaults: fn() -> String,
+    schema: fn() -> serde_json::Value,
+    maker: Maker,
+}
+
+impl PluginInfo {
+    /// Its default settings as commented TOML.
+    pub fn defaults(&self) -> String {
+        (self.defaults)()
+    }
+
+    /// The JSON schema of its settings.
+    pub fn schema(&self) -> serde_json::Value {
+        (self.schema)()
+    }
+}
+
+/// All plugins of a program. There is no life before `main`: each plugin crate
+/// has a `register` function, and the program calls it.
+///
+/// ```
+/// # use tagalong_core::*;
+/// #[derive(Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+/// #[serde(default, deny_unknown_fields)]
+/// struct Config {}
+/// struct Trusting;
+/// impl Verifier for Trusting {
+///     fn margin(&mut self, _: &Frame, _: &Detection) -> Result<f64> { Ok(1.0) }
+/// }
+/// let mut registry = Registry::default();
+/// registry.verifier("trusting", "believes everything", |_: Config, _| Ok(Trusting));
+/// assert_eq!(registry.plugins().count(), 1);
+/// ```
+#[derive(Default)]
+pub struct Registry {
+    plugins: BTreeMap<&'static str, PluginInfo>,
+}
+
+impl Registry {
+    /// Registers a detector.
+    ///
+    /// # Panics
+    /// If the name is taken: that is a mistake in the program, not in its input.
+    pub fn detector<C: Settings, P: Detector + 'static>(
+        &mut self,
+        name: &'static str,
+        summary: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        let maker = Maker::Detector(boxed(build, |plugin| Box::new(plugin)));
+        self.add::<C>(name, Kind::Detector, summary, maker);
+    }
+
+    /// Registers a verifier.
+    ///
+    /// # Panics
+    /// As [`Registry::detector`].
+    pub fn verifier<C: Settings, P: Verifier + 'static>(
+        &mut self,
+        name: &'static str,
+        summary: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        let maker = Maker::Verifier(boxed(build, |plugin| Box::new(plugin)));
+        self.add::<C>(name, Kind::Verifier, summary, maker);
+    }
+
+    /// Registers a filter.
+    ///
+    /// # Panics
+    /// As [`Registry::detector`].
+    pub fn filter<C: Settings, P: Filter + 'static>(
+        &mut self,
+        name: &'static str,
+        summary: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        let maker = Maker::Filter(boxed(build, |plugin| Box::new(plugin)));
+        self.add::<C>(name, Kind::Filter, summary, maker);
+    }
+
+    /// Registers a controller.
+    ///
+    /// # Panics
+    /// As [`Registry::detector`].
+    pub fn controller<C: Settings, P: Controller + 'static>(
+        &mut self,
+        name: &'static str,
+        summary: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        let maker = Maker::Controller(boxed(build, |plugin| Box::new(plugin)));
+        self.add::<C>(name, Kind::Controller, summary, maker);
+    }
+
+    fn add<C: Settings>(
+        &mut self,
+        name: &'static str,
+        kind: Kind,
+        summary: &'static str,
+        maker: Maker,
+    ) {
+        let info = PluginInfo {
+            name,
+            kind,
+            summary,
+            defaults: commented_defaults::<C>,
+            schema: || schemars::schema_for!(C).to_value(),
+            maker,
+        };
+        let previous = self.plugins.insert(name, info);
+        assert!(previous.is_none(), "two plugins are called `{name}`");
+    }
+
+    /// All plugins, by name.
+    pub fn plugins(&self) -> impl Iterator<Item = &PluginInfo> {
+        self.plugins.values()
+    }
+
+    /// The plugin called `name`.
+    ///
+    /// # Errors
+    /// If there is none: names the nearest one and all that there are.
+    pub fn find(&self, name: &str) -> std::result::Result<&PluginInfo, ConfigError> {
+        self.plugins.get(name).ok_or_else(|| {
+            ConfigError::new(unknown("plugin", name, self.plugins.keys().copied().collect()))
+        })
+    }
+
+    /// Builds a detector from its settings.
+    ///
+    /// # Errors
+    /// An unknown name, a plugin of another kind, or bad settings.
+    pub fn build_detector(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn Detector>, ConfigError> {
+        match &self.of_kind(name, Kind::Detector)?.maker {
+            Maker::Detector(build) => build(config, context),
+            _ => Err(self.wrong_kind(name, Kind::Detector)),
+        }
+    }
+
+    /// Builds a verifier from its settings.
+    ///
+    /// # Errors
+    /// As [`Registry::build_detector`].
+    pub fn build_verifier(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn Verifier>, ConfigError> {
+        match &self.of_kind(name, Kind::Verifier)?.maker {
+            Maker::Verifier(build) => build(config, context),
+            _ => Err(self.wrong_kind(name, Kind::Verifier)),
+        }
+    }
+
+    /// Builds a filter from its settings.
+    ///
+    /// # Errors
+    /// As [`Registry::build_detector`].
+    pub fn build_filter(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn Filter>, ConfigError> {
+        match &self.of_kind(name, Kind::Filter)?.maker {
+            Maker::Filter(build) => build(config, context),
+            _ => Err(self.wrong_kind(name, Kind::Filter)),
+        }
+    }
+
+    /// Builds a controller from its settings.
+    ///
+    /// # Errors
+    /// As [`Registry::build_detector`].
+    pub fn build_controller(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn Controller>, ConfigError> {
+        match &self.of_kind(name, Kind::Controller)?.maker {
+            Maker::Controller(build) => build(config, context),
+            _ => Err(self.wrong_kind(name, Kind::Controller)),
+        }
+    }
+
+    fn of_kind(&self, name: &str, kind: Kind) -> std::result::Result<&PluginInfo, ConfigError> {
+        match self.plugins.get(name) {
+            Some(info) if info.kind == kind => Ok(info),
+            _ => Err(self.wrong_kind(name, kind)),
+        }
+    }
+
+    fn wrong_kind(&self, name: &str, kind: Kind) -> ConfigError {
+        let of_kind: Vec<_> =
+            self.plugins.values().filter(|p| p.kind == kind).map(|p| p.name).collect();
+        let message = match self.plugins.get(name) {
+            Some(info) => {
+                let list = of_kind.join(", ");
+                format!("`{name}` is a {}, not a {kind}; available {kind}s: {list}", info.kind)
+            }
+            None => unknown(&format!("{kind} plugin"), name, of_kind),
+        };
+        ConfigError::new(message)
+    }
+}
+
+fn boxed<C: Settings, P, B>(
+    build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    boxed: fn(P) -> B,
+) -> Build<B>
+where
+    P: 'static,
+    B: 'static,
+{
+    Box::new(move |value, context| {
+        let span = value.as_ref().map(Spanned::span);
+        let config = parse_settings::<C>(value)?;
+        build(config, context)
+            .map(boxed)
+            .map_err(|error| ConfigError { message: error.to_string(), span })
+    })
+}
+
+/// "unknown thing `x`; did you mean `y`? available: a, b".
+fn unknown(thing: &str, name: &str, available: Vec<&str>) -> String {
+    let hint = nearest(name, available.iter().copied())
+        .map_or(String::new(), |better| format!(" did you mean `{better}`?"));
+    format!("unknown {thing} `{name}`;{hint} available: {}", available.join(", "))
+}

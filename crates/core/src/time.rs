@@ -1,0 +1,41 @@
+use std::fmt;
+
+/// A moment: nanoseconds since the epoch of the log.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug)]
+pub struct Stamp(u64);
+
+impl Stamp {
+    /// A stamp from nanoseconds.
+    pub const fn from_nanos(nanos: u64) -> Self {
+        Self(nanos)
+    }
+
+    /// Nanoseconds since the epoch.
+    pub const fn nanos(self) -> u64 {
+        self.0
+    }
+
+    /// Seconds from `earlier` to `self`; negative when `self` is the earlier one.
+    ///
+    /// ```
+    /// use tagalong_core::Stamp;
+    /// let (a, b) = (Stamp::from_nanos(1_000_000_000), Stamp::from_nanos(1_250_000_000));
+    /// assert_eq!(b.seconds_since(a), 0.25);
+    /// assert_eq!(a.seconds_since(b), -0.25);
+    /// ```
+    pub fn seconds_since(self, earlier: Self) -> f64 {
+        (i128::from(self.0) - i128::from(earlier.0)) as f64 * 1e-9
+    }
+
+    /// The stamp `seconds` later (earlier if negative), saturating at both ends.
+    pub fn plus_seconds(self, seconds: f64) -> Self {
+        let nanos = i128::from(self.0) + (seconds * 1e9) as i128;
+        Self(nanos.clamp(0, i128::from(u64::MAX)) as u64)
+    }
+}
+
+impl fmt::Display for Stamp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{:09}", self.0 / 1_000_000_000, self.0 % 1_000_000_000)
+    }
+}
