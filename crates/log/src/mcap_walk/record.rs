@@ -1,0 +1,112 @@
+//! The records of MCAP that matter here, read with every length checked.
+
+pub(super) const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
+
+/// Bytes of a message record before its payload.
+pub(super) const MESSAGE_HEAD: usize = 22;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Opcode {
+    Footer,
+    Schema,
+    Channel,
+    Message,
+    Chunk,
+    Attachment,
+    Statistics,
+    DataEnd,
+    /// The header, indexes, metadata: nothing that is needed here.
+    Harmless,
+    Unknown,
+}
+
+impl From<u8> for Opcode {
+    fn from(byte: u8) -> Self {
+        match byte {
+            0x02 => Self::Footer,
+            0x03 => Self::Schema,
+            0x04 => Self::Channel,
+            0x05 => Self::Message,
+            0x06 => Self::Chunk,
+            0x09 => Self::Attachment,
+            0x0b => Self::Statistics,
+            0x0f => Self::DataEnd,
+            0x01 | 0x07 | 0x08 | 0x0a | 0x0c | 0x0d | 0x0e => Self::Harmless,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+/// Little-endian number at a place that the caller has checked to be there.
+pub(super) fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+/// See [`u16_at`].
+pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from(u16_at(bytes, at)) | u32::from(u16_at(bytes, at + 2)) << 16
+}
+
+/// See [`u16_at`].
+pub(super) fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+}
+
+/// Takes values off the front of a record.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.bytes(2).map(|b| u16_at(b, 0))
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.bytes(4).map(|b| u32_at(b, 0))
+    }
+
+    fn string(&mut self) -> Option<String> {
+        let length = self.u32()? as usize;
+        std::str::from_utf8(self.bytes(length)?).ok().map(str::to_owned)
+    }
+}
+
+pub(super) struct Schema {
+    pub(super) id: u16,
+    pub(super) name: String,
+    pub(super) encoding: String,
+}
+
+pub(super) fn schema(body: &[u8]) -> Option<Schema> {
+    let mut fields = Fields(body);
+    let schema =
+        Schema { id: fields.u16()?, name: fields.string()?, encoding: fields.string()? };
+    let definition = fields.u32()? as usize;
+    fields.bytes(definition)?;
+    (schema.id != 0).then_some(schema)
+}
+
+pub(super) struct RawChannel {
+    pub(super) id: u16,
+    pub(super) schema_id: u16,
+    pub(super) topic: String,
+    pub(super) encoding: String,
+}
+
+pub(super) fn channel(body: &[u8]) -> Option<RawChannel> {
+    let mut fields = Fields(body);
+    let channel = RawChannel {
+        id: fields.u16()?,
+        schema_id: fields.u16()?,
+        topic: fields.string()?,
+        encoding: fields.string()?,
+    };
+    let metadata = fields.u32()? as usize;
+    fields.bytes(metadata)?;
+    Some(channel)
+}

@@ -1,0 +1,98 @@
+//! The file, read front to back, with its position and running checksum.
+
+use std::io::{BufReader, Read};
+
+/// Memory is taken in steps of this size, so that a length that lies costs
+/// nothing but what is really there.
+const STEP: usize = 1 << 20;
+
+pub(super) struct Source<R> {
+    reader: BufReader<R>,
+    position: u64,
+    crc: crc32fast::Hasher,
+    scratch: Vec<u8>,
+}
+
+impl<R: Read> Source<R> {
+    pub(super) fn new(reader: R) -> Self {
+        Self {
+            reader: BufReader::with_capacity(1 << 16, reader),
+            position: 0,
+            crc: crc32fast::Hasher::new(),
+            scratch: Vec::new(),
+        }
+    }
+
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    pub(super) fn crc(&self) -> u32 {
+        self.crc.clone().finalize()
+    }
+
+    pub(super) fn into_inner(self) -> R {
+        self.reader.into_inner()
+    }
+
+    /// Fills `out` as far as the file goes; returns how far that was.
+    pub(super) fn fill(&mut self, out: &mut [u8]) -> usize {
+        let mut got = 0;
+        while got < out.len() {
+            match self.read(&mut out[got..]) {
+                Ok(0) | Err(_) => break,
+                Ok(count) => got += count,
+            }
+        }
+        got
+    }
+
+    /// Replaces the contents of `out` by the next `length` bytes, or what is there.
+    pub(super) fn read_into(&mut self, out: &mut Vec<u8>, length: u64) -> u64 {
+        out.clear();
+        while (out.len() as u64) < length {
+            let from = out.len();
+            let step = STEP.max(from).min((length - from as u64).min(usize::MAX as u64) as usize);
+            out.resize(from + step, 0);
+            let got = self.fill(&mut out[from..]);
+            out.truncate(from + got);
+            if got < step {
+                break;
+            }
+        }
+        out.len() as u64
+    }
+
+    /// Passes over `length` bytes; returns how many there were.
+    pub(super) fn skip(&mut self, length: u64) -> u64 {
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.resize(1 << 16, 0);
+        let mut done = 0;
+        while done < length {
+            let step = (length - done).min(scratch.len() as u64) as usize;
+            let got = self.fill(&mut scratch[..step]);
+            done += got as u64;
+            if got < step {
+                break;
+            }
+        }
+        self.scratch = scratch;
+        done
+    }
+}
+
+impl<R: Read> Read for Source<R> {
+    /// An interrupted read is tried again; another error ends the file like
+    /// its end would, and whoever asked notices what is missing.
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let count = loop {
+            match self.reader.read(out) {
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                other => break other?,
+            }
+        };
+        self.crc.update(&out[..count]);
+        self.position += count as u64;
+        Ok(count)
+    }
+}

@@ -1,0 +1,100 @@
+//! The ROS 2 messages that Tagalong reads and writes, as they lie in CDR.
+//!
+//! The structs have the fields of the ROS definitions, in their order. CDR has
+//! no names: the order *is* the format. [`decode`] looks at the encapsulation
+//! header and reads either byte order; [`encode`] writes little endian.
+//!
+//! Image payloads are borrowed from the message, so that decoding an image
+//! message costs nothing but its header.
+
+mod common;
+mod geometry;
+mod sensor;
+mod vision;
+
+pub use common::{Header, StringMsg, Time};
+pub use geometry::{
+    Odometry, Point, Pose, PoseStamped, PoseWithCovariance, Quaternion, TFMessage, Transform,
+    TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
+};
+use re_cdr::{BigEndian, LittleEndian};
+pub use sensor::{CameraInfo, CompressedImage, Image, RegionOfInterest};
+use serde::{Deserialize, Serialize};
+pub use vision::{
+    BoundingBox3D, Detection3D, Detection3DArray, ObjectHypothesis, ObjectHypothesisWithPose,
+};
+
+/// A message type that can be a channel of a log.
+pub trait Message {
+    /// The ROS name, for example `sensor_msgs/msg/Image`.
+    const TYPE: &'static str;
+    /// The definition with all it contains, in the concatenated `ros2msg` form.
+    const DEFINITION: &'static str;
+}
+
+macro_rules! message {
+    ($type:ty, $name:literal, $file:literal) => {
+        impl $crate::msgs::Message for $type {
+            const TYPE: &'static str = $name;
+            const DEFINITION: &'static str = include_str!(concat!("../../msgs/", $file));
+        }
+    };
+}
+use message;
+
+/// Why a message could not be read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CdrError {
+    /// No encapsulation header, or one of another representation than plain CDR.
+    #[error("not a CDR message: it starts with {0:02x?}; expected 00 00 or 00 01")]
+    Encapsulation(Vec<u8>),
+    /// The bytes end early or do not fit the type.
+    #[error("the message does not fit its type: {0}")]
+    Content(String),
+}
+
+/// Reads a message with its four-byte encapsulation header.
+///
+/// # Errors
+/// [`CdrError`]. Bytes after the message are allowed: some writers pad.
+///
+/// ```
+/// use tagalong_log::msgs::{StringMsg, decode, encode};
+/// let sent = StringMsg { data: "hello".into() };
+/// assert_eq!(decode::<StringMsg>(&encode(&sent)).unwrap(), sent);
+/// ```
+pub fn decode<'de, T: Deserialize<'de>>(message: &'de [u8]) -> Result<T, CdrError> {
+    let (header, body) = message
+        .split_at_checked(4)
+        .ok_or_else(|| CdrError::Encapsulation(message.to_vec()))?;
+    let read = match header[..2] {
+        [0, 0] => re_cdr::from_bytes::<T, BigEndian>(body),
+        [0, 1] => re_cdr::from_bytes::<T, LittleEndian>(body),
+        _ => return Err(CdrError::Encapsulation(header.to_vec())),
+    };
+    read.map(|(value, _)| value).map_err(|error| CdrError::Content(error.to_string()))
+}
+
+/// Writes a message with its encapsulation header, little endian.
+pub fn encode<T: Serialize>(message: &T) -> Vec<u8> {
+    framed([0, 1], re_cdr::to_vec::<T, LittleEndian>(message))
+}
+
+/// Writes a message big endian, as some bridges do.
+pub fn encode_big_endian<T: Serialize>(message: &T) -> Vec<u8> {
+    framed([0, 0], re_cdr::to_vec::<T, BigEndian>(message))
+}
+
+#[expect(clippy::expect_used, reason = "writing to memory fails only for types CDR cannot express")]
+fn framed(representation: [u8; 2], body: re_cdr::Result<Vec<u8>>) -> Vec<u8> {
+    let body = body.expect("the structs of this module are expressible in CDR");
+    let mut out = Vec::with_capacity(body.len() + 4);
+    out.extend_from_slice(&representation);
+    out.extend_from_slice(&[0, 0]);
+    out.extend_from_slice(&body);
+    out
+}
+
+#[cfg(test)]
+mod tests;
