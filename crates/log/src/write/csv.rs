@@ -1,0 +1,132 @@
+use std::io::{self, Write};
+
+use super::record::{FrameRecord, probability};
+
+/// The header line of `tracks-metres.csv`.
+pub const METRES_HEADER: &str = "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,\
+y_odom_m,z_odom_m,vx_robot_mps,vy_robot_mps,var_xx_m2,cov_xy_m2,cov_xz_m2,var_yy_m2,cov_yz_m2,\
+var_zz_m2,seen";
+
+/// Writes the lines of `tracks.csv` for one frame: the ten columns of the
+/// MOTChallenge, `frame,id,x,y,w,h,score,-1,-1,-1`.
+///
+/// `frame` is the 1-based index of the colour image; the box is the upper-body
+/// square clipped to the image, in pixels with (0, 0) at the upper left corner;
+/// `score` is a probability. Confirmed tracks, unless unseen for longer than
+/// `report_unseen_s`.
+pub(super) fn boxes(
+    out: &mut impl Write,
+    record: &FrameRecord<'_>,
+    report_unseen_s: f64,
+) -> io::Result<()> {
+    for track in record.confirmed() {
+        let shown = track.seen || (track.unseen_s <= report_unseen_s && report_unseen_s > 0.0);
+        let Some(region) = record.visible_region(track).filter(|_| shown) else { continue };
+        writeln!(
+            out,
+            "{},{},{},{},{},{},{},-1,-1,-1",
+            record.index,
+            track.id,
+            Decimal(region.x, 2),
+            Decimal(region.y, 2),
+            Decimal(region.width, 2),
+            Decimal(region.height, 2),
+            Decimal(probability(track.score), 6),
+        )?;
+    }
+    Ok(())
+}
+
+/// Writes the lines of `tracks-metres.csv` for one frame, all confirmed tracks.
+pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Result<()> {
+    for track in record.confirmed() {
+        let person = &track.estimate.person;
+        let covariance = &track.estimate.covariance;
+        write!(out, "{},{},{}", record.stamp.nanos(), record.index, track.id)?;
+        let places = [person.position, record.head_in_odom(track)];
+        for value in places.iter().flat_map(|p| p.iter()).chain(person.velocity.iter()) {
+            write!(out, ",{}", Decimal(*value, 4))?;
+        }
+        for (row, column) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+            write!(out, ",{}", Decimal(covariance[(row, column)], 6))?;
+        }
+        writeln!(out, ",{}", u8::from(track.seen))?;
+    }
+    Ok(())
+}
+
+/// A number with fixed decimals that never prints a negative zero.
+struct Decimal(f64, usize);
+
+impl std::fmt::Display for Decimal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let half = 0.5 * 10f64.powi(-(self.1 as i32));
+        let value = if self.0.abs() < half { 0.0 } else { self.0 };
+        write!(f, "{value:.*}", self.1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry2, Vector2};
+
+    use super::super::testing::{camera, track};
+    use super::*;
+
+    fn lines(tracks: &[tagalong_core::Track], unseen_s: f64) -> (String, String) {
+        let record = FrameRecord {
+            index: 7,
+            stamp: tagalong_core::Stamp::from_nanos(1_500_000_000),
+            camera: &camera(),
+            odom_from_robot: &Isometry2::new(Vector2::new(1.0, 2.0), std::f64::consts::FRAC_PI_2),
+            tracks,
+            target: None,
+            command: None,
+        };
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        boxes(&mut a, &record, unseen_s).unwrap();
+        metres(&mut b, &record).unwrap();
+        (String::from_utf8(a).unwrap(), String::from_utf8(b).unwrap())
+    }
+
+    #[test]
+    fn boxes_have_ten_columns_and_stay_in_the_image() {
+        let mut one = track(12);
+        one.estimate.region = tagalong_core::Rect::new(-10.0, 400.0, 100.0, 100.0);
+        one.score = 0.0;
+        let (text, _) = lines(&[one], 0.0);
+        assert_eq!(text, "7,12,0.00,400.00,90.00,80.00,0.500000,-1,-1,-1\n");
+    }
+
+    #[test]
+    fn only_confirmed_and_recently_seen_tracks_have_boxes() {
+        let mut tentative = track(1);
+        tentative.confirmed = false;
+        let mut coasting = track(2);
+        (coasting.seen, coasting.unseen_s) = (false, 0.4);
+        let mut outside = track(3);
+        outside.estimate.region = tagalong_core::Rect::new(700.0, 0.0, 50.0, 50.0);
+        let tracks = [tentative, coasting, outside];
+        assert_eq!(lines(&tracks, 0.0).0, "");
+        assert!(lines(&tracks, 0.5).0.starts_with("7,2,"), "a coasting track may be asked for");
+        assert_eq!(lines(&tracks, 0.5).0.lines().count(), 1);
+        assert_eq!(lines(&tracks, 0.0).1.lines().count(), 2, "metres list coasting tracks");
+    }
+
+    #[test]
+    fn metres_are_given_in_both_frames() {
+        let (_, text) = lines(&[track(4)], 0.0);
+        let cells: Vec<&str> = text.trim_end().split(',').collect();
+        assert_eq!(cells.len(), METRES_HEADER.split(',').count());
+        assert_eq!(cells[..3], ["1500000000", "7", "4"]);
+        assert_eq!(cells[3..6], ["3.0000", "0.5000", "1.6000"]);
+        assert_eq!(cells[6..9], ["0.5000", "5.0000", "1.6000"], "turned left, then moved");
+        assert_eq!(cells[17], "1");
+    }
+
+    #[test]
+    fn no_number_is_a_negative_zero() {
+        assert_eq!(Decimal(-0.001, 2).to_string(), "0.00");
+        assert_eq!(Decimal(-0.006, 2).to_string(), "-0.01");
+    }
+}

@@ -1,0 +1,159 @@
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, Compression, McapResult, WriteOptions, Writer};
+use tagalong_core::{Stamp, TrackId};
+
+use super::messages;
+use super::record::FrameRecord;
+use crate::msgs::{Detection3DArray, Message, PoseStamped, StringMsg, TFMessage, encode};
+
+/// More pose topics than this are not opened: a file has 65,535 channels, and
+/// nobody looks at so many. Further people are still in the other topics.
+const MAX_POSE_TOPICS: usize = 10_000;
+
+/// Names of the frames that the messages use.
+#[derive(Clone, Debug)]
+pub struct FrameNames {
+    /// The robot frame, for example `base_link`.
+    pub base: String,
+    /// The odometry frame, for example `odom`.
+    pub odom: String,
+}
+
+/// The writer of `tracks.mcap`.
+pub(super) struct McapTracks<W: Write + Seek> {
+    writer: Writer<W>,
+    frames: FrameNames,
+    tracks: Channel,
+    json: Channel,
+    tf: Channel,
+    target: Option<Channel>,
+    people: BTreeMap<TrackId, Channel>,
+}
+
+/// A topic, and how many messages it has.
+struct Channel {
+    id: u16,
+    sequence: u32,
+}
+
+impl<W: Write + Seek> McapTracks<W> {
+    /// Starts the file; the resolved config becomes the attachment
+    /// `config.toml`.
+    pub fn new(out: W, frames: FrameNames, config: &str) -> McapResult<Self> {
+        // One compression thread: with none the files differ from those with
+        // any number, and more bring nothing for so little data.
+        let mut writer = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("tagalong ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_threads(1)
+            .create(out)?;
+        writer.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: "config.toml".into(),
+            media_type: "application/toml".into(),
+            data: Cow::Borrowed(config.as_bytes()),
+        })?;
+        let tracks = open::<Detection3DArray, W>(&mut writer, "/people/tracks")?;
+        let json = open::<StringMsg, W>(&mut writer, "/people/tracks_json")?;
+        let tf = open::<TFMessage, W>(&mut writer, "/tf")?;
+        Ok(Self { writer, frames, tracks, json, tf, target: None, people: BTreeMap::new() })
+    }
+
+    /// Writes one frame.
+    pub fn write(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
+        let at = record.stamp;
+        let detections = encode(&messages::detections(record, &self.frames.base));
+        self.tracks.send(&mut self.writer, at, &detections)?;
+        let json = encode(&StringMsg { data: messages::json(record) });
+        self.json.send(&mut self.writer, at, &json)?;
+        let tf = encode(&messages::transforms(record, &self.frames));
+        self.tf.send(&mut self.writer, at, &tf)?;
+        self.write_poses(record)
+    }
+
+    fn write_poses(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
+        for track in record.confirmed() {
+            let pose = encode(&messages::pose(record, track, &self.frames.odom));
+            if let Some(channel) = self.person(track.id)? {
+                channel.sequence += 1;
+                let (id, sequence) = (channel.id, channel.sequence);
+                write_to(&mut self.writer, id, sequence, record.stamp, &pose)?;
+            }
+            if record.target == Some(track.id) {
+                let mut channel = match self.target.take() {
+                    Some(channel) => channel,
+                    None => open::<PoseStamped, W>(&mut self.writer, "/people/target_pose")?,
+                };
+                channel.send(&mut self.writer, record.stamp, &pose)?;
+                self.target = Some(channel);
+            }
+        }
+        Ok(())
+    }
+
+    /// The pose topic of a person, opened on first use.
+    fn person(&mut self, id: TrackId) -> McapResult<Option<&mut Channel>> {
+        if !self.people.contains_key(&id) && self.people.len() < MAX_POSE_TOPICS {
+            let topic = format!("/people/person_{id}");
+            let channel = open::<PoseStamped, W>(&mut self.writer, &topic)?;
+            self.people.insert(id, channel);
+        }
+        Ok(self.people.get_mut(&id))
+    }
+
+    #[cfg(test)]
+    pub fn topics(&self) -> usize {
+        self.people.len()
+    }
+
+    /// Closes the chunk and hands everything to the operating system.
+    pub fn flush(&mut self) -> McapResult<()> {
+        self.writer.flush()
+    }
+
+    /// Writes the end of the file. Without it readers have to recover it.
+    pub fn finish(mut self, about: BTreeMap<String, String>) -> McapResult<()> {
+        self.writer.write_metadata(&Metadata { name: "tagalong".into(), metadata: about })?;
+        self.writer.finish()?;
+        self.writer.into_inner().flush()?;
+        Ok(())
+    }
+}
+
+impl Channel {
+    fn send<W: Write + Seek>(
+        &mut self,
+        writer: &mut Writer<W>,
+        at: Stamp,
+        message: &[u8],
+    ) -> McapResult<()> {
+        self.sequence += 1;
+        write_to(writer, self.id, self.sequence, at, message)
+    }
+}
+
+fn write_to<W: Write + Seek>(
+    writer: &mut Writer<W>,
+    channel_id: u16,
+    sequence: u32,
+    at: Stamp,
+    message: &[u8],
+) -> McapResult<()> {
+    let (log_time, publish_time) = (at.nanos(), at.nanos());
+    writer.write_to_known_channel(
+        &MessageHeader { channel_id, sequence, log_time, publish_time },
+        message,
+    )
+}
+
+fn open<M: Message, W: Write + Seek>(writer: &mut Writer<W>, topic: &str) -> McapResult<Channel> {
+    let schema = writer.add_schema(M::TYPE, "ros2msg", M::DEFINITION.as_bytes())?;
+    let about = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
+    Ok(Channel { id: writer.add_channel(schema, topic, "cdr", &about)?, sequence: 0 })
+}

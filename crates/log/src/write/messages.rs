@@ -1,0 +1,168 @@
+//! One frame's tracks as ROS 2 messages.
+
+use nalgebra::{Isometry3, Point3, SMatrix, UnitQuaternion, Vector3};
+use serde::Serialize;
+use tagalong_core::{Track, WheelSpeeds};
+
+use super::mcap_tracks::FrameNames;
+use super::record::{FrameRecord, probability};
+use crate::msgs::{
+    BoundingBox3D, Detection3D, Detection3DArray, Header, ObjectHypothesis,
+    ObjectHypothesisWithPose, Point, Pose, PoseStamped, PoseWithCovariance, TFMessage,
+    TransformStamped,
+};
+
+/// What is not known has a variance above 99,999, by the convention of
+/// `spencer_tracking_msgs`.
+const UNKNOWN_VARIANCE: f64 = 1e6;
+
+/// Below this speed over ground a person has no heading, m/s.
+const MIN_HEADING_SPEED_MPS: f64 = 0.2;
+
+/// Width and depth of the box around a person, m.
+const PERSON_WIDTH_M: f64 = 0.6;
+
+/// The crown lies this far above the centre of the head, m.
+const CROWN_ABOVE_HEAD_M: f64 = 0.115;
+
+/// Confirmed tracks in the robot frame, most certain first, as
+/// `vision_msgs/Detection3DArray` asks.
+pub(super) fn detections(record: &FrameRecord<'_>, base_frame: &str) -> Detection3DArray {
+    let header = Header::new(record.stamp, base_frame);
+    let mut tracks: Vec<&Track> = record.confirmed().collect();
+    tracks.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.id.cmp(&b.id)));
+    let detections = tracks.into_iter().map(|track| detection(track, &header)).collect();
+    Detection3DArray { header, detections }
+}
+
+fn detection(track: &Track, header: &Header) -> Detection3D {
+    let head = track.estimate.person.position;
+    let pose = PoseWithCovariance {
+        pose: Pose::from(&Isometry3::from(head)),
+        covariance: pose_covariance(&track.estimate.covariance),
+    };
+    let hypothesis =
+        ObjectHypothesis { class_id: "person".into(), score: probability(track.score) };
+    Detection3D {
+        header: header.clone(),
+        results: vec![ObjectHypothesisWithPose { hypothesis, pose }],
+        bbox: standing_box(&head),
+        id: track.id.to_string(),
+    }
+}
+
+/// The box from the floor to the crown.
+fn standing_box(head: &Point3<f64>) -> BoundingBox3D {
+    let height = (head.z + CROWN_ABOVE_HEAD_M).max(0.1);
+    let centre = Point3::new(head.x, head.y, 0.5 * height);
+    BoundingBox3D {
+        center: Pose::from(&Isometry3::from(centre)),
+        size: Point { x: PERSON_WIDTH_M, y: PERSON_WIDTH_M, z: height },
+    }
+}
+
+/// Position variances where they are known; the rotation is not.
+fn pose_covariance(state: &SMatrix<f64, 5, 5>) -> [[f64; 6]; 6] {
+    let mut covariance = [[0.0; 6]; 6];
+    for (row, line) in covariance.iter_mut().enumerate() {
+        for (column, value) in line.iter_mut().enumerate() {
+            *value = match (row < 3 && column < 3, row == column) {
+                (true, _) => state[(row, column)],
+                (false, true) => UNKNOWN_VARIANCE,
+                (false, false) => 0.0,
+            };
+        }
+    }
+    covariance
+}
+
+/// A person in the odometry frame, facing where they walk.
+pub(super) fn pose(record: &FrameRecord<'_>, track: &Track, odom_frame: &str) -> PoseStamped {
+    PoseStamped {
+        header: Header::new(record.stamp, odom_frame),
+        pose: Pose::from(&odom_from_person(record, track)),
+    }
+}
+
+fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isometry3<f64> {
+    let velocity = track.estimate.person.velocity;
+    let walks = velocity.norm() >= MIN_HEADING_SPEED_MPS;
+    let heading = if walks { velocity.y.atan2(velocity.x) } else { 0.0 };
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
+    let head = track.estimate.person.position.coords;
+    record.odom_from_robot() * Isometry3::from_parts(head.into(), turn)
+}
+
+/// The robot and all confirmed people in the odometry frame.
+pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMessage {
+    let stamped = |child: String, pose: &Isometry3<f64>| TransformStamped {
+        header: Header::new(record.stamp, frames.odom.as_str()),
+        child_frame_id: child,
+        transform: pose.into(),
+    };
+    let mut transforms = vec![stamped(frames.base.clone(), &record.odom_from_robot())];
+    transforms.extend(record.confirmed().map(|track| {
+        stamped(format!("person_{}", track.id), &odom_from_person(record, track))
+    }));
+    TFMessage { transforms }
+}
+
+/// What the standard messages have no place for, one object a frame.
+#[derive(Serialize)]
+struct FrameJson {
+    stamp_ns: u64,
+    frame: u64,
+    target: Option<u32>,
+    wheel_speeds_mps: Option<[f64; 2]>,
+    tracks: Vec<TrackJson>,
+}
+
+#[derive(Serialize)]
+struct TrackJson {
+    id: u32,
+    confirmed: bool,
+    seen: bool,
+    occluded: bool,
+    age_frames: u32,
+    unseen_s: f64,
+    probability: f64,
+    head_robot_m: [f64; 3],
+    head_odom_m: [f64; 3],
+    velocity_robot_mps: [f64; 2],
+    upper_body_px: [f64; 4],
+}
+
+/// All tracks of a frame, tentative ones too, with velocity, age and occlusion.
+pub(super) fn json(record: &FrameRecord<'_>) -> String {
+    let frame = FrameJson {
+        stamp_ns: record.stamp.nanos(),
+        frame: record.index,
+        target: record.target.map(|id| id.0),
+        wheel_speeds_mps: record.command.map(|WheelSpeeds { left, right }| [left, right]),
+        tracks: record.tracks.iter().map(|track| track_json(record, track)).collect(),
+    };
+    serde_json::to_string(&frame).unwrap_or_default()
+}
+
+fn track_json(record: &FrameRecord<'_>, track: &Track) -> TrackJson {
+    let person = &track.estimate.person;
+    let region = track.estimate.region;
+    TrackJson {
+        id: track.id.0,
+        confirmed: track.confirmed,
+        seen: track.seen,
+        occluded: track.occluded,
+        age_frames: track.age,
+        unseen_s: rounded(track.unseen_s),
+        probability: rounded(probability(track.score)),
+        head_robot_m: person.position.coords.map(rounded).into(),
+        head_odom_m: record.head_in_odom(track).coords.map(rounded).into(),
+        velocity_robot_mps: person.velocity.map(rounded).into(),
+        upper_body_px: [region.x, region.y, region.width, region.height].map(rounded),
+    }
+}
+
+/// Six decimals: a micrometre, and short enough to read.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6 + 0.0
+}

@@ -1,0 +1,122 @@
+//! The files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`,
+//! `report.json` and `timings.json`.
+//!
+//! All are written under partial names and get their final names together when
+//! the run ends; what a crash leaves behind is never mistaken for a result.
+//! At least once per second of log time everything written so far is handed to
+//! the operating system, so that a killed run loses no more than that.
+//! Nothing here depends on the time of day: the same frames give the same bytes.
+
+mod csv;
+mod error;
+mod mcap_tracks;
+mod messages;
+mod record;
+mod run_dir;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+pub use csv::METRES_HEADER;
+pub use error::WriteError;
+pub use mcap_tracks::FrameNames;
+use mcap_tracks::McapTracks;
+pub use record::{FrameRecord, OutputSettings};
+pub use run_dir::RunDir;
+use tagalong_core::Stamp;
+
+/// Log time after which everything written is flushed, s.
+const FLUSH_EVERY_S: f64 = 1.0;
+
+/// Writes the tracks of a run, frame by frame.
+pub struct TrackLog {
+    dir: RunDir,
+    output: OutputSettings,
+    mcap: McapTracks<BufWriter<File>>,
+    boxes: BufWriter<File>,
+    metres: BufWriter<File>,
+    flushed: Option<Stamp>,
+}
+
+impl TrackLog {
+    /// Opens the files. `config` is the resolved config, attached to the log.
+    ///
+    /// # Errors
+    /// [`WriteError`], which names the file.
+    pub fn create(
+        mut dir: RunDir,
+        frames: FrameNames,
+        output: OutputSettings,
+        config: &str,
+    ) -> Result<Self, WriteError> {
+        let mcap = McapTracks::new(dir.open("tracks.mcap")?, frames, config)
+            .map_err(WriteError::mcap(&dir.path().join("tracks.mcap")))?;
+        let boxes = dir.open("tracks.csv")?;
+        let mut metres = dir.open("tracks-metres.csv")?;
+        writeln!(metres, "{METRES_HEADER}").map_err(WriteError::io(dir.path()))?;
+        Ok(Self { dir, output, mcap, boxes, metres, flushed: None })
+    }
+
+    /// The directory of the run.
+    pub fn dir(&self) -> &RunDir {
+        &self.dir
+    }
+
+    /// Writes one frame.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the log must not be used after one.
+    pub fn write(&mut self, record: &FrameRecord<'_>) -> Result<(), WriteError> {
+        self.mcap.write(record).map_err(WriteError::mcap(&self.file("tracks.mcap")))?;
+        csv::boxes(&mut self.boxes, record, self.output.report_unseen_s)
+            .map_err(WriteError::io(&self.file("tracks.csv")))?;
+        csv::metres(&mut self.metres, record)
+            .map_err(WriteError::io(&self.file("tracks-metres.csv")))?;
+        let due = self
+            .flushed
+            .is_none_or(|last| record.stamp.seconds_since(last).abs() >= FLUSH_EVERY_S);
+        if due { self.flush(record.stamp) } else { Ok(()) }
+    }
+
+    fn flush(&mut self, now: Stamp) -> Result<(), WriteError> {
+        self.flushed = Some(now);
+        self.mcap.flush().map_err(WriteError::mcap(&self.file("tracks.mcap")))?;
+        self.flush_text()
+    }
+
+    fn flush_text(&mut self) -> Result<(), WriteError> {
+        self.boxes.flush().map_err(WriteError::io(&self.file("tracks.csv")))?;
+        self.metres.flush().map_err(WriteError::io(&self.file("tracks-metres.csv")))
+    }
+
+    /// Ends the files, adds the report, the timings and `about` (as metadata
+    /// of the log), and gives everything its final name. Returns the directory.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the partial files stay.
+    pub fn finish(
+        mut self,
+        about: BTreeMap<String, String>,
+        report: &str,
+        timings: &str,
+    ) -> Result<PathBuf, WriteError> {
+        self.flush_text()?;
+        let mcap = self.file("tracks.mcap");
+        self.mcap.finish(about).map_err(WriteError::mcap(&mcap))?;
+        self.dir.put("report.json", report.as_bytes())?;
+        self.dir.put("timings.json", timings.as_bytes())?;
+        let path = self.dir.path().to_owned();
+        self.dir.publish()?;
+        Ok(path)
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        Path::new(self.dir.path()).join(run_dir::partial(name))
+    }
+}

@@ -1,0 +1,189 @@
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::WriteError;
+
+/// The directory of one run.
+///
+/// Files are written under `NAME.partial` and get their names together, when
+/// the run ends: a file that has its final name is whole.
+#[derive(Debug)]
+pub struct RunDir {
+    path: PathBuf,
+    pending: Vec<String>,
+}
+
+/// The names that a run gives to its files; only these are ever removed.
+const OWN_FILES: [&str; 5] =
+    ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json", "timings.json"];
+
+/// The folder of overlay pictures.
+const OVERLAY: &str = "overlay";
+
+impl RunDir {
+    /// Refuses what [`RunDir::create`] would refuse, and touches nothing.
+    ///
+    /// # Errors
+    /// [`WriteError::Exists`] if the directory is not empty and `overwrite` is
+    /// not set, [`WriteError::InputInside`] if `input` lies in it,
+    /// [`WriteError::NotADirectory`].
+    pub fn check(path: &Path, overwrite: bool, input: &Path) -> Result<(), WriteError> {
+        if path.exists() && !path.is_dir() {
+            return Err(WriteError::NotADirectory { path: path.to_owned() });
+        }
+        if let (Ok(output), Ok(log)) = (path.canonicalize(), input.canonicalize())
+            && log.starts_with(&output)
+        {
+            return Err(WriteError::InputInside { input: input.to_owned(), output: path.to_owned() });
+        }
+        let empty = !path.exists()
+            || fs::read_dir(path).map_err(WriteError::io(path))?.next().is_none();
+        if empty || overwrite {
+            return Ok(());
+        }
+        Err(WriteError::Exists { path: path.to_owned() })
+    }
+
+    /// Makes the directory, or clears it of the files of an earlier run;
+    /// foreign files stay.
+    ///
+    /// # Errors
+    /// As [`RunDir::check`], and [`WriteError::Io`].
+    pub fn create(path: &Path, overwrite: bool, input: &Path) -> Result<Self, WriteError> {
+        Self::check(path, overwrite, input)?;
+        fs::create_dir_all(path).map_err(WriteError::io(path))?;
+        for name in OWN_FILES {
+            remove(&path.join(name))?;
+            remove(&path.join(partial(name)))?;
+        }
+        clear_overlay(&path.join(OVERLAY))?;
+        Ok(Self { path: path.to_owned(), pending: Vec::new() })
+    }
+
+    /// The directory.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The folder for overlay pictures, made when first asked for.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn overlay(&self) -> Result<PathBuf, WriteError> {
+        let path = self.path.join(OVERLAY);
+        fs::create_dir_all(&path).map_err(WriteError::io(&path))?;
+        Ok(path)
+    }
+
+    /// Opens `name` under its partial name.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn open(&mut self, name: &str) -> Result<BufWriter<File>, WriteError> {
+        let path = self.path.join(partial(name));
+        let file = File::create(&path).map_err(WriteError::io(&path))?;
+        self.pending.push(name.to_owned());
+        Ok(BufWriter::new(file))
+    }
+
+    /// Writes a whole small file under its partial name.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn put(&mut self, name: &str, bytes: &[u8]) -> Result<(), WriteError> {
+        let mut file = self.open(name)?;
+        let path = self.path.join(partial(name));
+        file.write_all(bytes).and_then(|()| file.flush()).map_err(WriteError::io(&path))
+    }
+
+    /// Gives every file its final name.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn publish(self) -> Result<(), WriteError> {
+        for name in &self.pending {
+            let (from, to) = (self.path.join(partial(name)), self.path.join(name));
+            fs::rename(&from, &to).map_err(WriteError::io(&to))?;
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn partial(name: &str) -> String {
+    format!("{name}.partial")
+}
+
+fn remove(path: &Path) -> Result<(), WriteError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::Io { path: path.to_owned(), source: error })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Removes the numbered pictures of an earlier run.
+fn clear_overlay(folder: &Path) -> Result<(), WriteError> {
+    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let numbered = name.to_str().and_then(|n| n.strip_suffix(".png"));
+        if numbered.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit())) {
+            remove(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(dir: &Path, name: &str) {
+        fs::write(dir.join(name), "x").unwrap();
+    }
+
+    #[test]
+    fn files_get_their_names_at_the_end() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("a/b");
+        let mut run = RunDir::create(&out, false, &home.path().join("log.mcap")).unwrap();
+        run.put("report.json", b"{}").unwrap();
+        assert!(out.join("report.json.partial").exists() && !out.join("report.json").exists());
+        run.publish().unwrap();
+        assert!(!out.join("report.json.partial").exists());
+        assert_eq!(fs::read(out.join("report.json")).unwrap(), b"{}");
+    }
+
+    #[test]
+    fn a_full_directory_is_refused_and_overwriting_removes_only_our_own() {
+        let home = tempfile::tempdir().unwrap();
+        let log = home.path().join("elsewhere.mcap");
+        let out = home.path().join("out");
+        fs::create_dir_all(out.join("overlay")).unwrap();
+        for name in ["notes.txt", "tracks.csv", "overlay/000001.png", "overlay/mine.png"] {
+            write(&out, name);
+        }
+        let error = RunDir::create(&out, false, &log).unwrap_err();
+        assert!(error.is_refusal() && error.to_string().contains("--overwrite"), "{error}");
+        assert!(out.join("tracks.csv").exists());
+        RunDir::create(&out, true, &log).unwrap();
+        assert!(!out.join("tracks.csv").exists() && !out.join("overlay/000001.png").exists());
+        assert!(out.join("notes.txt").exists() && out.join("overlay/mine.png").exists());
+    }
+
+    #[test]
+    fn the_log_is_never_in_danger() {
+        let home = tempfile::tempdir().unwrap();
+        write(home.path(), "tracks.mcap");
+        let log = home.path().join("tracks.mcap");
+        for overwrite in [false, true] {
+            let error = RunDir::create(home.path(), overwrite, &log).unwrap_err();
+            assert!(matches!(error, WriteError::InputInside { .. }), "{error}");
+            let error = RunDir::create(&log, overwrite, &log).unwrap_err();
+            assert!(matches!(error, WriteError::NotADirectory { .. }), "{error}");
+        }
+        assert!(log.exists());
+    }
+}

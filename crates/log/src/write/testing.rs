@@ -1,0 +1,28 @@
+//! A camera and a track for the tests of the writers.
+
+use nalgebra::{Point3, SMatrix, Vector2};
+use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, Track, TrackId};
+
+pub(super) fn camera() -> Camera {
+    let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+}
+
+/// A confirmed person three metres ahead and half a metre to the left.
+pub(super) fn track(id: u32) -> Track {
+    let person =
+        Person { position: Point3::new(3.0, 0.5, 1.6), velocity: Vector2::new(0.5, -0.25) };
+    let region = camera().upper_body(&person.position);
+    let estimate =
+        Estimate { person, covariance: SMatrix::<f64, 5, 5>::identity() * 0.01, region };
+    Track {
+        id: TrackId(id),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 9,
+        unseen_s: 0.0,
+        score: 2.0,
+    }
+}

@@ -1,0 +1,172 @@
+use std::collections::BTreeMap;
+use std::io::{self, Cursor, Seek, SeekFrom, Write};
+
+use nalgebra::{Isometry2, Vector2};
+use tagalong_core::{Stamp, Track, WheelSpeeds};
+
+use super::mcap_tracks::McapTracks;
+use super::testing::{camera, track};
+use super::*;
+use crate::msgs::{Detection3DArray, PoseStamped, StringMsg, TFMessage, decode};
+
+fn names() -> FrameNames {
+    FrameNames { base: "base_link".into(), odom: "odom".into() }
+}
+
+/// Hands a record of frame `index` (ten a second) to `use_it`.
+fn with_record<T>(index: u64, tracks: &[Track], use_it: impl FnOnce(&FrameRecord<'_>) -> T) -> T {
+    use_it(&FrameRecord {
+        index,
+        stamp: Stamp::from_nanos(1_700_000_000_000_000_000 + index * 100_000_000),
+        camera: &camera(),
+        odom_from_robot: &Isometry2::new(Vector2::new(0.1 * index as f64, 0.0), 0.0),
+        tracks,
+        target: tracks.first().map(|track| track.id),
+        command: Some(WheelSpeeds { left: 0.25, right: 0.5 }),
+    })
+}
+
+fn log(dir: &Path, frames: u64, finish: bool) {
+    let run = RunDir::create(dir, true, Path::new("nowhere.mcap")).unwrap();
+    let mut log = TrackLog::create(run, names(), OutputSettings::default(), "seed = 1\n").unwrap();
+    let mut tentative = track(13);
+    tentative.confirmed = false;
+    for index in 1..=frames {
+        with_record(index, &[track(12), tentative.clone()], |r| log.write(r)).unwrap();
+    }
+    if finish {
+        log.finish(BTreeMap::from([("seed".into(), "1".into())]), "{}\n", "{}\n").unwrap();
+    } else {
+        std::mem::forget(log);
+    }
+}
+
+fn read(bytes: &[u8], topic: &str) -> Vec<Vec<u8>> {
+    let options = [mcap::read::Options::IgnoreEndMagic];
+    mcap::MessageStream::new_with_options(bytes, options.into_iter().collect())
+        .unwrap()
+        .map_while(Result::ok)
+        .filter(|message| message.channel.topic == topic)
+        .map(|message| message.data.into_owned())
+        .collect()
+}
+
+#[test]
+fn the_log_carries_tracks_poses_transforms_and_the_config() {
+    let home = tempfile::tempdir().unwrap();
+    log(home.path(), 3, true);
+    let bytes = std::fs::read(home.path().join("tracks.mcap")).unwrap();
+    let arrays = read(&bytes, "/people/tracks");
+    assert_eq!(arrays.len(), 3);
+    let array: Detection3DArray = decode(&arrays[0]).unwrap();
+    assert_eq!(array.header.frame_id, "base_link");
+    let [person] = &array.detections[..] else { panic!("tentative tracks are not people") };
+    assert_eq!((person.id.as_str(), person.results[0].hypothesis.class_id.as_str()), ("12", "person"));
+    assert_eq!(person.results[0].pose.covariance[1][1], 0.01);
+    assert!(person.results[0].pose.covariance[5][5] > 99_999.0, "the heading is unknown");
+    let pose: PoseStamped = decode(&read(&bytes, "/people/person_12")[2]).unwrap();
+    assert_eq!((pose.header.frame_id.as_str(), pose.pose.position.x), ("odom", 3.3));
+    assert_eq!(read(&bytes, "/people/target_pose").len(), 3);
+    let tf: TFMessage = decode(&read(&bytes, "/tf")[0]).unwrap();
+    let children: Vec<_> = tf.transforms.iter().map(|t| t.child_frame_id.as_str()).collect();
+    assert_eq!(children, ["base_link", "person_12"]);
+    let text: StringMsg = decode(&read(&bytes, "/people/tracks_json")[0]).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text.data).unwrap();
+    assert_eq!(json["tracks"][1]["confirmed"], false);
+    assert_eq!(json["wheel_speeds_mps"], serde_json::json!([0.25, 0.5]));
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    assert_eq!(summary.attachment_indexes[0].name, "config.toml");
+    assert_eq!(summary.metadata_indexes[0].name, "tagalong");
+}
+
+#[test]
+fn two_runs_give_the_same_bytes() {
+    let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    log(a.path(), 25, true);
+    log(b.path(), 25, true);
+    for name in ["tracks.mcap", "tracks.csv", "tracks-metres.csv"] {
+        let read = |home: &tempfile::TempDir| std::fs::read(home.path().join(name)).unwrap();
+        assert_eq!(read(&a), read(&b), "{name}");
+    }
+}
+
+#[test]
+fn a_killed_run_loses_at_most_a_second() {
+    let home = tempfile::tempdir().unwrap();
+    log(home.path(), 35, false);
+    assert!(!home.path().join("tracks.mcap").exists(), "a final name is a whole file");
+    let bytes = std::fs::read(home.path().join("tracks.mcap.partial")).unwrap();
+    let kept = read(&bytes, "/people/tracks").len();
+    assert!((26..=35).contains(&kept), "kept {kept} of 35");
+    let csv = std::fs::read_to_string(home.path().join("tracks.csv.partial")).unwrap();
+    assert!(csv.lines().count() >= 26 && csv.ends_with('\n'), "{csv}");
+}
+
+#[test]
+fn a_clock_that_jumps_back_still_flushes() {
+    let home = tempfile::tempdir().unwrap();
+    let run = RunDir::create(home.path(), false, Path::new("nowhere.mcap")).unwrap();
+    let mut log = TrackLog::create(run, names(), OutputSettings::default(), "").unwrap();
+    for index in [100, 10, 11, 12] {
+        with_record(index, &[track(1)], |r| log.write(r)).unwrap();
+    }
+    std::mem::forget(log);
+    let csv = std::fs::read_to_string(home.path().join("tracks.csv.partial")).unwrap();
+    assert_eq!(csv.lines().count(), 2);
+}
+
+/// A disk that is full after `room` bytes.
+struct SmallDisk {
+    room: usize,
+    file: Cursor<Vec<u8>>,
+}
+
+impl Write for SmallDisk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.file.position() as usize + bytes.len() > self.room {
+            return Err(io::Error::from(io::ErrorKind::StorageFull));
+        }
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for SmallDisk {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+/// The length of the file, or the error that a full disk causes.
+fn write_to_disk(room: usize) -> mcap::McapResult<usize> {
+    let disk = SmallDisk { room, file: Cursor::default() };
+    let mut log = McapTracks::new(disk, names(), "seed = 1\n")?;
+    for index in 1..=12 {
+        with_record(index, &[track(index as u32)], |r| log.write(r))?;
+        log.flush()?;
+    }
+    log.finish(BTreeMap::new())?;
+    Ok(0)
+}
+
+#[test]
+fn a_full_disk_is_an_error_wherever_it_fills() {
+    assert!(write_to_disk(1 << 20).is_ok());
+    let smallest = (0..1 << 20).step_by(37).find(|room| write_to_disk(*room).is_ok()).unwrap();
+    assert!(smallest > 5_000, "the file is longer than {smallest} bytes");
+    for room in (0..smallest).step_by(37 * 16) {
+        assert!(write_to_disk(room).is_err(), "{room} bytes of room were enough");
+    }
+}
+
+#[test]
+fn people_beyond_the_limit_of_topics_are_still_in_the_list() {
+    let mut log = McapTracks::new(Cursor::new(Vec::new()), names(), "").unwrap();
+    let many: Vec<Track> = (0..10_010).map(track).collect();
+    with_record(1, &many, |r| log.write(r)).unwrap();
+    assert_eq!(log.topics(), 10_000);
+    log.finish(BTreeMap::new()).unwrap();
+}
