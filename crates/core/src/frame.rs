@@ -28,6 +28,9 @@ pub trait Derived: Send + Sync + Sized + 'static {
     fn derive(frame: &Frame) -> Result<Self>;
 }
 
+/// A derived thing, or why it could not be computed.
+type Slot = OnceLock<Result<Arc<dyn Any + Send + Sync>>>;
+
 /// One moment of a log: images, camera, and how the robot moved since the
 /// frame before. A frame is immutable; what plugins derive from it is computed
 /// once, on first use.
@@ -42,7 +45,7 @@ pub struct Frame {
     pub motion: Motion,
     images: Images,
     grey: OnceLock<Arc<GreyImage>>,
-    derived: Mutex<BTreeMap<TypeId, Arc<OnceLock<Result<Arc<dyn Any + Send + Sync>>>>>>,
+    derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
 }
 
 impl Frame {

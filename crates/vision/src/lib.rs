@@ -1,3 +1,7 @@
 //! Image arithmetic that several plugins share.
 //!
 //! Each fast kernel here has a slow, obvious twin in its tests.
+
+mod row_sums;
+
+pub use row_sums::{RowSums, Sums};

@@ -1,0 +1,192 @@
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::body::{Relief, render};
+
+/// The body directions that have a template (P4: three). A frontal silhouette
+/// equals one from behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Direction {
+    /// Facing the camera or turning the back to it.
+    Along,
+    /// Facing left as seen from the camera.
+    Left,
+    /// Facing right as seen from the camera.
+    Right,
+}
+
+impl Direction {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Along, Self::Left, Self::Right];
+
+    fn yaw_rad(self) -> f64 {
+        match self {
+            Self::Along => PI,
+            Self::Left => FRAC_PI_2,
+            Self::Right => -FRAC_PI_2,
+        }
+    }
+}
+
+/// The person in one row of a template: a single run of pixels. What is beside
+/// it within the window is background.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemplateRow {
+    /// Row relative to the head centre, pixels.
+    pub dy: i64,
+    /// First pixel of the person, relative to the head centre.
+    pub from: i64,
+    /// One past the last pixel; equal to `from` in a row without a person.
+    pub to: i64,
+    /// How far the person lies behind the face in this row, m.
+    pub relief_m: f64,
+}
+
+/// A silhouette at one scale, as runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Template {
+    /// Some or all rows, top to bottom.
+    pub rows: Vec<TemplateRow>,
+    /// The window reaches this many pixels left and right of the head centre.
+    pub half_width: i64,
+}
+
+/// Which silhouette: how the person is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Pose {
+    direction: Direction,
+    pitch: i8,
+    roll: i8,
+    px_per_m: u16,
+}
+
+impl Pose {
+    /// The nearest pose in the bank: a viewing ray that points `pitch_rad`
+    /// downwards, a person whose upward direction leans `roll_rad` to the right
+    /// in the image, and a scale in pixels per metre.
+    pub fn nearest(direction: Direction, pitch_rad: f64, roll_rad: f64, px_per_m: f64) -> Self {
+        let pitch = (pitch_rad.to_degrees() / PITCH_STEP_DEG).round().clamp(-1.0, 4.0);
+        let roll = (roll_rad.to_degrees() / ROLL_STEP_DEG).round().clamp(-15.0, 15.0);
+        let px_per_m = px_per_m.round().clamp(1.0, 4000.0);
+        Self { direction, pitch: pitch as i8, roll: roll as i8, px_per_m: px_per_m as u16 }
+    }
+}
+
+/// Silhouettes in all body directions, viewing angles and scales. They are
+/// rendered from the body model, not typed in; each is made when first asked
+/// for and kept.
+pub struct Bank {
+    reliefs: BTreeMap<(Direction, i8), Relief>,
+    templates: BTreeMap<Pose, Template>,
+    max_rows: usize,
+}
+
+const PITCH_STEP_DEG: f64 = 15.0;
+const ROLL_STEP_DEG: f64 = 6.0;
+/// The window around the head centre, m: to each side, above, below.
+const HALF_WIDTH_M: f64 = 0.33;
+const ABOVE_M: f64 = 0.20;
+const BELOW_M: f64 = 0.43;
+
+impl Bank {
+    /// A bank whose templates have at most `max_rows` rows each: of a larger
+    /// silhouette every second, third, ... row is used.
+    pub fn new(max_rows: usize) -> Self {
+        Self { reliefs: BTreeMap::new(), templates: BTreeMap::new(), max_rows: max_rows.max(1) }
+    }
+
+    /// The template of a pose.
+    pub fn template(&mut self, pose: Pose) -> &Template {
+        let Self { reliefs, templates, max_rows } = self;
+        templates.entry(pose).or_insert_with(|| {
+            let relief = reliefs.entry((pose.direction, pose.pitch)).or_insert_with(|| {
+                let pitch = f64::from(pose.pitch) * PITCH_STEP_DEG;
+                render(pose.direction.yaw_rad(), pitch.to_radians())
+            });
+            cut(relief, pose, *max_rows)
+        })
+    }
+}
+
+/// Cuts a relief into runs at the scale and roll of `pose`.
+fn cut(relief: &Relief, pose: Pose, max_rows: usize) -> Template {
+    let scale = f64::from(pose.px_per_m);
+    let (first, last) = ((-ABOVE_M * scale).round() as i64, (BELOW_M * scale).round() as i64);
+    let half_width = (HALF_WIDTH_M * scale).round() as i64;
+    let step = ((last - first + 1) as usize).div_ceil(max_rows).max(1);
+    let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
+    let face = relief.at(0.0, 0.0);
+    let row = |dy: i64| {
+        let seen = (-half_width..=half_width).filter_map(|dx| {
+            let (x, y) = (dx as f64 / scale, dy as f64 / scale);
+            let behind = relief.at(x * cos + y * sin, y * cos - x * sin);
+            behind.is_finite().then_some((dx, behind))
+        });
+        let (mut from, mut to, mut sum, mut count) = (0, 0, 0.0, 0.0);
+        for (dx, behind) in seen {
+            if count == 0.0 {
+                from = dx;
+            }
+            to = dx + 1;
+            sum += behind - face;
+            count += 1.0;
+        }
+        TemplateRow { dy, from, to, relief_m: if count > 0.0 { sum / count } else { 0.0 } }
+    };
+    Template { rows: (first..=last).step_by(step).map(row).collect(), half_width }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widths(direction: Direction, roll_deg: f64) -> Template {
+        let pose = Pose::nearest(direction, 0.0, f64::to_radians(roll_deg), 100.0);
+        Bank::new(1000).template(pose).clone()
+    }
+
+    #[test]
+    fn the_head_is_narrower_than_the_shoulders() {
+        let template = widths(Direction::Along, 0.0);
+        let width = |dy| template.rows.iter().find(|r| r.dy == dy).map(|r| r.to - r.from).unwrap();
+        assert_eq!(width(-18), 0, "air above the head");
+        assert!((15..=20).contains(&width(0)), "head {}", width(0));
+        assert!((40..=52).contains(&width(38)), "shoulders {}", width(38));
+    }
+
+    #[test]
+    fn left_and_right_are_mirror_images() {
+        let (left, right) = (widths(Direction::Left, 0.0), widths(Direction::Right, 0.0));
+        for (a, b) in left.rows.iter().zip(&right.rows).filter(|(a, _)| a.to > a.from) {
+            assert!(
+                (a.from + b.to - 1).abs() <= 1 && (a.to + b.from - 1).abs() <= 1,
+                "{a:?} {b:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_person_leaning_right_has_the_shoulders_on_the_left() {
+        let middle = |t: &Template| {
+            let row = t.rows.iter().find(|r| r.dy == 35).unwrap();
+            row.from + row.to
+        };
+        assert!(
+            middle(&widths(Direction::Along, 12.0)) < middle(&widths(Direction::Along, 0.0)) - 8
+        );
+    }
+
+    #[test]
+    fn from_above_the_shoulders_are_behind_the_head() {
+        let pose = Pose::nearest(Direction::Along, f64::to_radians(30.0), 0.0, 100.0);
+        let mut bank = Bank::new(1000);
+        let row = bank.template(pose).rows.iter().find(|r| r.dy == 30).copied().unwrap();
+        assert!((0.08..0.35).contains(&row.relief_m), "{row:?}");
+    }
+
+    #[test]
+    fn rows_are_thinned_out() {
+        let pose = Pose::nearest(Direction::Along, 0.0, 0.0, 300.0);
+        assert!(Bank::new(24).template(pose).rows.len() <= 24);
+    }
+}

@@ -1,0 +1,93 @@
+use tagalong_vision::RowSums;
+
+use crate::config::DepthTemplateConfig;
+use crate::view::Local;
+
+/// The names under which the tests count what they drop.
+pub mod tests_named {
+    /// Outside of the heights and depths where heads are.
+    pub const VOLUME: &str = "detection volume";
+    /// The scene left, right and above is not farther away (P4).
+    pub const BOUNDARY: &str = "boundary points";
+    /// Wider or narrower than a head.
+    pub const WIDTH: &str = "head width";
+    /// Nothing like a body below.
+    pub const BODY: &str = "body below";
+    /// The silhouette does not fit.
+    pub const COST: &str = "template cost";
+    /// Too few cells agree.
+    pub const SIZE: &str = "component size";
+    /// Somebody already found in this frame.
+    pub const OCCUPIED: &str = "occupied";
+    /// Outside of the window around the prediction.
+    pub const WINDOW: &str = "search window";
+}
+
+/// P4's boundary points: left of, right of and above the head the scene must be
+/// farther away. A point without a reading, or nearer than the head (somebody
+/// in front), says nothing; one at the head's own depth contradicts.
+pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
+    let (d, margin) = (config.boundary_distance_m, config.boundary_margin_m);
+    let (mut passed, mut contradicted) = (0, 0);
+    for (right, down) in [(-d, 0.0), (d, 0.0), (0.0, -d)] {
+        let (x, y) = local.offset(right, down);
+        if let Some(z) = rows.depth_m(x, y) {
+            passed += u32::from(z > local.depth_m + margin);
+            contradicted += u32::from((z - local.depth_m).abs() <= margin);
+        }
+    }
+    passed >= config.boundary_min_passed || contradicted == 0
+}
+
+/// Depth steps smaller than this belong to the same head, m.
+const SAME_HEAD_M: f64 = 0.20;
+/// How far to look for the edge of a head, m.
+const EDGE_REACH_M: f64 = 0.30;
+
+/// Width of what the head belongs to at its own height, m.
+pub fn head_width_m(rows: &RowSums, local: &Local) -> f64 {
+    let reach = |side: f64| {
+        let steps = (EDGE_REACH_M * local.px_per_m) as i64 + 1;
+        let allowed_holes = (0.03 * local.px_per_m).max(1.0) as i64;
+        let (mut last, mut holes) = (0, 0);
+        for step in 1..=steps {
+            let (x, y) = local.offset(side * step as f64 / local.px_per_m, 0.0);
+            match rows.value(x, y) {
+                None => return last.max((0.1 * local.px_per_m) as i64),
+                Some(0) if holes < allowed_holes => holes += 1,
+                Some(v)
+                    if v > 0
+                        && (RowSums::UNITS / f64::from(v) - local.depth_m).abs() < SAME_HEAD_M =>
+                {
+                    last = step;
+                }
+                Some(_) => break,
+            }
+        }
+        last
+    };
+    (reach(-1.0) + reach(1.0) + 1) as f64 / local.px_per_m
+}
+
+/// Part of the probes on the chest and belly that show a body under the head;
+/// 1 where too few of them are visible to tell.
+pub fn body_below(rows: &RowSums, local: &Local) -> f64 {
+    let (sin, cos) = local.pitch_rad.sin_cos();
+    let (mut shown, mut asked) = (0u32, 0u32);
+    for drop in (0..8).map(|i| 0.30 + 0.06 * f64::from(i)) {
+        let expected_m = local.depth_m + drop * sin;
+        let shrink = local.depth_m / expected_m;
+        for right in [-0.08, 0.0, 0.08] {
+            let (x, y) = local.offset(right * shrink, drop * cos * shrink);
+            let behind = match rows.value(x, y) {
+                None => continue,
+                Some(0) => f64::INFINITY,
+                Some(v) => RowSums::UNITS / f64::from(v) - expected_m,
+            };
+            let hidden = behind < -0.4;
+            asked += u32::from(!hidden);
+            shown += u32::from(!hidden && behind < 0.30);
+        }
+    }
+    if asked < 4 { 1.0 } else { f64::from(shown) / f64::from(asked) }
+}

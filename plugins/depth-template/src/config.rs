@@ -1,0 +1,117 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How a silhouette is compared with the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cost {
+    /// Any background that is farther than the person is fine, errors are
+    /// limited per run, missing readings are masked. 0 to 1.
+    Robust,
+    /// Squared difference in inverse depth against one background value (the
+    /// percentile of the frame), as a root mean square over the valid pixels, 1/m.
+    Squared,
+    /// As `squared`, with the size of the window outside of the root as P3
+    /// prints it, so that the value shrinks with the person.
+    Printed,
+}
+
+/// Settings of `depth-template`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DepthTemplateConfig {
+    /// Nearest and farthest face, m of depth (P4: 0.5 to 5.5).
+    pub min_depth_m: f64,
+    /// Farthest face, m of depth.
+    pub max_depth_m: f64,
+    /// Lowest head centre above the floor, m (P4: 0.7; a standing adult's is
+    /// above 1.3, a monitor on a desk reaches 1.15).
+    pub min_head_height_m: f64,
+    /// Highest head centre above the floor, m (P4: 2.0).
+    pub max_head_height_m: f64,
+    /// A boundary point passes if it is this much farther than the head, m
+    /// (P4: 1.0, which loses people in front of walls).
+    pub boundary_margin_m: f64,
+    /// Distance of the boundary points left, right and above from the head
+    /// centre, m.
+    pub boundary_distance_m: f64,
+    /// Boundary points that must pass when one of them contradicts.
+    pub boundary_min_passed: u32,
+    /// Narrowest head, m; narrower things are lamps and poles.
+    pub min_head_width_m: f64,
+    /// Widest head, m; wider things are walls and furniture.
+    pub max_head_width_m: f64,
+    /// Part of the probes below the head that must show a body, 0 to 1.
+    pub min_body: f64,
+    /// How silhouettes are compared.
+    pub cost: Cost,
+    /// Weight of the person's pixels against those beside the person, 0 to 1.
+    pub foreground_weight: f64,
+    /// Depth error of the person that costs nothing, m.
+    pub relief_free_m: f64,
+    /// Depth error of the person at which the cost is full, m.
+    pub relief_full_m: f64,
+    /// Part of the person's pixels that must have a reading, 0 to 1.
+    pub min_foreground_valid: f64,
+    /// Largest cost of a newcomer.
+    pub discover_cost: f64,
+    /// Largest cost of somebody already tracked.
+    pub follow_cost: f64,
+    /// Cost at which person and no person are equally likely; the score is the
+    /// distance to it times `score_per_cost`.
+    pub even_cost: f64,
+    /// Log-odds per unit of cost.
+    pub score_per_cost: f64,
+    /// Two people are at least this far apart on the floor, m.
+    pub min_separation_m: f64,
+    /// A head found by this few qualifying cells is dropped.
+    pub min_cells: u32,
+    /// Followed people are searched within this radius of the prediction, m,
+    /// or three standard deviations, whichever is smaller.
+    pub follow_radius_m: f64,
+    /// Background of the frame as a percentile of its depths, for the costs
+    /// `squared` and `printed` (P3, P4: 90).
+    pub background_percentile: f64,
+    /// Rows of a template that are evaluated at most.
+    pub max_rows: usize,
+    /// Standard deviation of the head's place across the viewing ray, m.
+    pub sigma_across_m: f64,
+    /// Standard deviation of the head's depth at 0 m ...
+    pub sigma_depth_m: f64,
+    /// ... and what is added per square metre of depth, 1/m.
+    pub sigma_depth_per_m2: f64,
+}
+
+impl Default for DepthTemplateConfig {
+    fn default() -> Self {
+        Self {
+            min_depth_m: 0.5,
+            max_depth_m: 5.5,
+            min_head_height_m: 1.2,
+            max_head_height_m: 2.1,
+            boundary_margin_m: 0.35,
+            boundary_distance_m: 0.22,
+            boundary_min_passed: 2,
+            min_head_width_m: 0.09,
+            max_head_width_m: 0.36,
+            min_body: 0.7,
+            cost: Cost::Robust,
+            foreground_weight: 0.3,
+            relief_free_m: 0.15,
+            relief_full_m: 0.30,
+            min_foreground_valid: 0.5,
+            discover_cost: 0.225,
+            follow_cost: 0.32,
+            even_cost: 0.27,
+            score_per_cost: 20.0,
+            min_separation_m: 0.3,
+            min_cells: 2,
+            follow_radius_m: 0.6,
+            background_percentile: 90.0,
+            max_rows: 28,
+            sigma_across_m: 0.03,
+            sigma_depth_m: 0.03,
+            sigma_depth_per_m2: 0.003,
+        }
+    }
+}

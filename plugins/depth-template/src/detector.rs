@@ -1,0 +1,278 @@
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+use tagalong_core::{
+    DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
+    Track,
+};
+use tagalong_vision::RowSums;
+
+use crate::NAME;
+use crate::bank::{Bank, Direction, Pose};
+use crate::candidates::{body_below, boundary, head_width_m, tests_named};
+use crate::config::{Cost, DepthTemplateConfig};
+use crate::matching::{Match, Matcher};
+use crate::people::{Cell, Group, group};
+use crate::view::{Local, View, Working};
+
+/// The detector: discovers people, and follows them near a prediction.
+pub struct DepthTemplate {
+    config: DepthTemplateConfig,
+    bank: Bank,
+    cells: Vec<Cell>,
+}
+
+/// A frame, ready for matching.
+struct Scene<'a> {
+    rows: &'a RowSums,
+    view: View,
+    matcher: Matcher,
+}
+
+impl DepthTemplate {
+    /// A detector.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for ranges that hold nothing.
+    pub fn new(config: DepthTemplateConfig) -> Result<Self> {
+        let ordered = [
+            ("min_depth_m", config.min_depth_m, "max_depth_m", config.max_depth_m),
+            (
+                "min_head_height_m",
+                config.min_head_height_m,
+                "max_head_height_m",
+                config.max_head_height_m,
+            ),
+            ("relief_free_m", config.relief_free_m, "relief_full_m", config.relief_full_m),
+        ];
+        for (low, a, high, b) in ordered {
+            if a.partial_cmp(&b) != Some(Ordering::Less) {
+                return Err(Error::Settings(format!("`{low}` = {a} must be below `{high}` = {b}")));
+            }
+        }
+        Ok(Self { bank: Bank::new(config.max_rows), config, cells: Vec::new() })
+    }
+
+    /// Looks at the cells of a window with the given spacing and keeps those
+    /// that `admit` lets through and where a silhouette fits.
+    fn scan(
+        &mut self,
+        scene: &Scene<'_>,
+        window: &Rect,
+        limit: f64,
+        funnel: &mut Funnel,
+        admit: impl Fn(&Self, &Local) -> std::result::Result<(), &'static str>,
+    ) {
+        let Scene { rows, view, .. } = scene;
+        let inside = window.clipped(rows.width(), rows.height());
+        let (x0, y0) = (inside.x as i64 / 2 * 2, inside.y as i64 / 2 * 2);
+        let (mut outside, mut unfit) = (0, 0);
+        for y in (y0..inside.bottom().ceil() as i64).step_by(2) {
+            for x in (x0..inside.right().ceil() as i64).step_by(2) {
+                let Some(depth_m) = rows.depth_m(x, y) else { continue };
+                let spacing = spacing(view.px_per_m(depth_m));
+                if x % spacing != 0 || y % spacing != 0 {
+                    continue;
+                }
+                let height_m = view.height_m() + view.slope(x, y) * (depth_m + HEAD_RADIUS_M);
+                if !self.in_volume(depth_m, height_m) {
+                    outside += 1;
+                    continue;
+                }
+                let local = view.local(x, y, depth_m);
+                if let Err(test) = admit(self, &local) {
+                    funnel.drop_at(test, region(scene, x as f64, y as f64, depth_m));
+                    continue;
+                }
+                match self.best(scene, &local).filter(|m| m.cost < limit) {
+                    Some(found) => {
+                        let head = view.head(x as f64, y as f64, depth_m);
+                        self.cells.push(Cell { x, y, depth_m, cost: found.cost, head });
+                    }
+                    None => unfit += 1,
+                }
+            }
+        }
+        funnel.drop_many(tests_named::VOLUME, outside);
+        funnel.drop_many(tests_named::COST, unfit);
+    }
+
+    fn in_volume(&self, depth_m: f64, height_m: f64) -> bool {
+        let c = &self.config;
+        (c.min_depth_m..=c.max_depth_m).contains(&depth_m)
+            && (c.min_head_height_m..=c.max_head_height_m).contains(&height_m)
+    }
+
+    /// P4's tests of a newcomer, cheapest first.
+    fn admit_newcomer(
+        &self,
+        rows: &RowSums,
+        local: &Local,
+    ) -> std::result::Result<(), &'static str> {
+        if !boundary(rows, local, &self.config) {
+            return Err(tests_named::BOUNDARY);
+        }
+        let widths = self.config.min_head_width_m..=self.config.max_head_width_m;
+        if !widths.contains(&head_width_m(rows, local)) {
+            return Err(tests_named::WIDTH);
+        }
+        if body_below(rows, local) < self.config.min_body {
+            return Err(tests_named::BODY);
+        }
+        Ok(())
+    }
+
+    /// The best of the three body directions.
+    fn best(&mut self, scene: &Scene<'_>, local: &Local) -> Option<Match> {
+        Direction::ALL
+            .into_iter()
+            .filter_map(|direction| {
+                let pose =
+                    Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
+                let template = self.bank.template(pose);
+                scene.matcher.fit(scene.rows, template, local.x, local.y, local.depth_m)
+            })
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    fn discover(
+        &mut self,
+        frame: &Frame,
+        scene: &Scene<'_>,
+        occupied: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        self.cells.clear();
+        let everywhere = Rect::new(0.0, 0.0, scene.rows.width() as f64, scene.rows.height() as f64);
+        let limit = self.config.discover_cost;
+        self.scan(scene, &everywhere, limit, funnel, |this, l| this.admit_newcomer(scene.rows, l));
+        let mut found = Vec::new();
+        for person in group(&mut self.cells, limit, self.config.min_separation_m) {
+            let at = region(scene, person.x, person.y, person.depth_m);
+            if person.cells < self.config.min_cells {
+                funnel.drop_at(tests_named::SIZE, at);
+                continue;
+            }
+            let detection = self.detection(frame, scene, &person)?;
+            if occupied.is_occupied(&detection.position, self.config.min_separation_m) {
+                funnel.drop_at(tests_named::OCCUPIED, at);
+            } else {
+                found.push(detection);
+            }
+        }
+        Ok(found)
+    }
+
+    fn follow(
+        &mut self,
+        frame: &Frame,
+        scene: &Scene<'_>,
+        track: &Track,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        self.cells.clear();
+        let estimate = &track.estimate;
+        let expected = estimate.person.position;
+        let sigma = estimate.covariance.fixed_view::<2, 2>(0, 0).trace().max(0.0).sqrt();
+        let radius_m = (3.0 * sigma).clamp(0.15, self.config.follow_radius_m);
+        let face_m = frame.camera.depth_of(&expected) - HEAD_RADIUS_M;
+        let Some(centre) = scene.view.reduced_pixel(&expected).filter(|_| face_m > 0.1) else {
+            return Ok(Vec::new());
+        };
+        let reach = radius_m * scene.view.px_per_m(face_m);
+        let window = Rect::new(centre.x - reach, centre.y - reach, 2.0 * reach, 2.0 * reach);
+        let limit = self.config.follow_cost;
+        self.scan(scene, &window, limit, funnel, |_, local| {
+            let head = scene.view.head(local.x as f64, local.y as f64, local.depth_m);
+            let near = (head.xy() - expected.xy()).norm() <= radius_m;
+            if near { Ok(()) } else { Err(tests_named::WINDOW) }
+        });
+        let best = group(&mut self.cells, limit, 2.0 * radius_m).into_iter().next();
+        best.map(|person| self.detection(frame, scene, &person)).into_iter().collect()
+    }
+
+    fn detection(&self, frame: &Frame, scene: &Scene<'_>, person: &Group) -> Result<Detection> {
+        let c = &self.config;
+        let pixel = scene.view.full_pixel(person.x, person.y);
+        let px_per_m = frame.camera.focal_px() / person.depth_m;
+        let depth_m = head_depth_m(frame.depth()?, pixel.x, pixel.y, px_per_m, person.depth_m);
+        let position = frame.camera.back_project(pixel, depth_m + HEAD_RADIUS_M);
+        let sigma_depth_m = c.sigma_depth_m + c.sigma_depth_per_m2 * depth_m * depth_m;
+        let sigma_px = c.sigma_across_m * px_per_m;
+        Ok(Detection {
+            region: frame.camera.upper_body(&position),
+            position,
+            covariance: frame.camera.covariance(pixel, depth_m, sigma_px, sigma_depth_m),
+            score: c.score_per_cost * (c.even_cost - person.cost),
+            source: NAME,
+        })
+    }
+}
+
+impl Detector for DepthTemplate {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        let depth = frame.depth()?;
+        let working = frame.derived::<Working>()?;
+        let rows = &working.0;
+        let background = match self.config.cost {
+            Cost::Robust => 0.0,
+            _ => background(depth, self.config.background_percentile),
+        };
+        let view = View::new(&Arc::clone(&frame.camera), rows.scale());
+        let matcher = Matcher::new(&self.config, background);
+        let scene = Scene { rows, view, matcher };
+        match search {
+            Search::Everywhere { .. } => self.discover(frame, &scene, search, funnel),
+            Search::Near(track) => self.follow(frame, &scene, track, funnel),
+        }
+    }
+}
+
+/// Cells are 2, 4 or 8 pixels apart: about 3 cm at the person.
+fn spacing(px_per_m: f64) -> i64 {
+    match px_per_m * 0.03 {
+        px if px >= 8.0 => 8,
+        px if px >= 4.0 => 4,
+        _ => 2,
+    }
+}
+
+fn region(scene: &Scene<'_>, x: f64, y: f64, depth_m: f64) -> Rect {
+    scene.view.camera().upper_body(&scene.view.head(x, y, depth_m))
+}
+
+/// The inverse depth of the background: a percentile of the valid depths
+/// (P3, P4: the 90th).
+fn background(depth: &DepthImage, percentile: f64) -> f64 {
+    let mut valid: Vec<f32> = depth.pixels().iter().copied().filter(|z| z.is_finite()).collect();
+    if valid.is_empty() {
+        return 0.0;
+    }
+    let rank = ((percentile / 100.0).clamp(0.0, 1.0) * (valid.len() - 1) as f64).round() as usize;
+    let (_, value, _) = valid.select_nth_unstable_by(rank, f32::total_cmp);
+    RowSums::UNITS / f64::from(*value)
+}
+
+/// Median depth of a face (P4, section II-A): over a patch of 12 cm around the
+/// head centre, readings within 0.25 m of `about_m`; `about_m` if there are none.
+fn head_depth_m(depth: &DepthImage, x: f64, y: f64, px_per_m: f64, about_m: f64) -> f64 {
+    let half = (0.06 * px_per_m).max(1.0);
+    let step = (half / 4.0).max(1.0) as usize;
+    let rows = ((y - half) as i64..=(y + half) as i64).step_by(step);
+    let mut readings: Vec<f32> = rows
+        .flat_map(|v| ((x - half) as i64..=(x + half) as i64).step_by(step).map(move |u| (u, v)))
+        .filter_map(|(u, v)| depth.get(u, v))
+        .filter(|z| (f64::from(*z) - about_m).abs() < 0.25)
+        .collect();
+    if readings.is_empty() {
+        return about_m;
+    }
+    let middle = readings.len() / 2;
+    let (_, median, _) = readings.select_nth_unstable_by(middle, f32::total_cmp);
+    f64::from(*median)
+}

@@ -1,0 +1,278 @@
+use tagalong_vision::RowSums;
+
+use crate::bank::Template;
+use crate::config::{Cost, DepthTemplateConfig};
+
+/// How well a silhouette fits at one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Match {
+    /// Dissimilarity; 0 is perfect. The scale depends on [`Cost`].
+    pub cost: f64,
+    /// Fraction of the person's pixels that have a reading.
+    pub foreground_valid: f64,
+}
+
+/// Matches templates against [`RowSums`], a few operations per row.
+#[derive(Clone, Debug)]
+pub struct Matcher {
+    config: DepthTemplateConfig,
+    /// The background value that the papers use: the percentile of the frame.
+    background: f64,
+}
+
+/// What one template collects over its rows.
+#[derive(Default)]
+struct Tally {
+    foreground: f64,
+    foreground_valid: f64,
+    foreground_cost: f64,
+    background: f64,
+    background_valid: f64,
+    background_cost: f64,
+    unknown: f64,
+    outside: f64,
+}
+
+/// A run of pixels of a row, inside the image.
+type Run = (usize, usize, usize);
+
+impl Matcher {
+    /// A matcher for one frame; `background` is the percentile of its inverse
+    /// depths, in [`RowSums::UNITS`].
+    pub fn new(config: &DepthTemplateConfig, background: f64) -> Self {
+        Self { config: config.clone(), background }
+    }
+
+    /// Fits `template` with its head centre on the reduced pixel (`x`, `y`) and
+    /// the face at `depth_m`. `None` if too little of the person has a reading.
+    pub fn fit(
+        &self,
+        rows: &RowSums,
+        template: &Template,
+        x: i64,
+        y: i64,
+        depth_m: f64,
+    ) -> Option<Match> {
+        let mut tally = Tally::default();
+        for row in &template.rows {
+            let (left, right) = (x - template.half_width, x + template.half_width + 1);
+            let (from, to) = (x + row.from, x + row.to);
+            let (person, all) = ((to - from) as f64, (right - left) as f64);
+            tally.foreground += person;
+            tally.background += all - person;
+            let Some(line) = usize::try_from(y + row.dy).ok().filter(|l| *l < rows.height()) else {
+                tally.outside += all - person;
+                continue;
+            };
+            let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
+            let (a, b, c, d) = (inside(left), inside(from), inside(to), inside(right));
+            let beside = if to > from { (b - a) + (d - c) } else { d - a };
+            tally.outside += all - person - beside as f64;
+            self.foreground(&mut tally, rows, (line, b, c), depth_m, row.relief_m);
+            if to > from {
+                self.background(&mut tally, rows, (line, a, b), depth_m);
+                self.background(&mut tally, rows, (line, c, d), depth_m);
+            } else {
+                self.background(&mut tally, rows, (line, a, d), depth_m);
+            }
+        }
+        self.judge(&tally)
+    }
+
+    fn foreground(&self, tally: &mut Tally, rows: &RowSums, run: Run, depth_m: f64, relief_m: f64) {
+        let sums = rows.run(run.0, run.1, run.2);
+        if sums.count == 0 {
+            return;
+        }
+        let count = f64::from(sums.count);
+        tally.foreground_valid += count;
+        let relief_m = if self.config.cost == Cost::Robust { relief_m } else { 0.0 };
+        let expected_m = (depth_m + relief_m).max(0.1);
+        let expected = RowSums::UNITS / expected_m;
+        let error = sums.squared_error(expected);
+        tally.foreground_cost += match self.config.cost {
+            Cost::Robust => {
+                let off = |m: f64| RowSums::UNITS / (expected_m - m).max(0.1) - expected;
+                let free = off(self.config.relief_free_m).powi(2);
+                let full = off(self.config.relief_full_m).powi(2);
+                count * ((error / count - free) / (full - free)).clamp(0.0, 1.0)
+            }
+            Cost::Squared | Cost::Printed => error,
+        };
+    }
+
+    fn background(&self, tally: &mut Tally, rows: &RowSums, run: Run, depth_m: f64) {
+        let sums = rows.run(run.0, run.1, run.2);
+        let count = f64::from(sums.count);
+        tally.unknown += (run.2 - run.1) as f64 - count;
+        if sums.count == 0 {
+            return;
+        }
+        if self.config.cost != Cost::Robust {
+            tally.background_valid += count;
+            let limit = RowSums::UNITS / (depth_m + 1.0);
+            tally.background_cost += sums.squared_error(self.background.min(limit));
+            return;
+        }
+        let margin = self.config.boundary_margin_m;
+        let mean = sums.mean();
+        if mean > RowSums::UNITS / (depth_m - margin).max(0.2) {
+            tally.unknown += count;
+            return;
+        }
+        let expected = mean.min(RowSums::UNITS / (depth_m + margin));
+        let contrast = RowSums::UNITS / depth_m - expected;
+        let error = sums.squared_error(expected) / (contrast * contrast);
+        tally.background_valid += count;
+        tally.background_cost += error.min(count);
+    }
+
+    fn judge(&self, tally: &Tally) -> Option<Match> {
+        let foreground_valid = tally.foreground_valid / tally.foreground.max(1.0);
+        if foreground_valid < self.config.min_foreground_valid {
+            return None;
+        }
+        let valid = tally.foreground_valid + tally.background_valid;
+        let sum = tally.foreground_cost + tally.background_cost;
+        let cost = match self.config.cost {
+            Cost::Robust => {
+                let holes = (0.95 * tally.foreground - tally.foreground_valid).max(0.0);
+                let inside = (tally.foreground_cost + 3.0 * holes) / tally.foreground.max(1.0);
+                let beside = tally.background_cost + 0.2 * tally.unknown + tally.outside;
+                let weight = self.config.foreground_weight;
+                weight * inside + (1.0 - weight) * beside / tally.background.max(1.0)
+            }
+            Cost::Squared => (sum / valid.max(1.0)).sqrt() / RowSums::UNITS,
+            Cost::Printed => sum.sqrt() / valid.max(1.0) / RowSums::UNITS,
+        };
+        Some(Match { cost, foreground_valid })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use tagalong_core::DepthImage;
+
+    use super::*;
+    use crate::bank::{Bank, Direction, Pose};
+
+    /// The robust cost, pixel by pixel, straight from its definition.
+    fn slow(
+        config: &DepthTemplateConfig,
+        rows: &RowSums,
+        t: &Template,
+        x: i64,
+        y: i64,
+        z: f64,
+    ) -> Option<f64> {
+        let units = RowSums::UNITS;
+        let (mut person, mut seen, mut bad, mut beside, mut wrong) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for row in &t.rows {
+            let window = x - t.half_width..x + t.half_width + 1;
+            let is_person = |u: i64| x + row.from <= u && u < x + row.to;
+            let pixel = |u: i64| rows.value(u, y + row.dy);
+            let values = |keep: &dyn Fn(i64) -> bool| -> Vec<f64> {
+                let kept = window.clone().filter(|u| keep(*u));
+                kept.filter_map(|u| pixel(u).filter(|v| *v > 0).map(f64::from)).collect()
+            };
+            let fg = values(&is_person);
+            person += window.clone().filter(|u| is_person(*u)).count() as f64;
+            seen += fg.len() as f64;
+            let e = units / (z + row.relief_m).max(0.1);
+            let off = |m: f64| units / (z + row.relief_m - m).max(0.1) - e;
+            let (free, full) =
+                (off(config.relief_free_m).powi(2), off(config.relief_full_m).powi(2));
+            let mean_error =
+                fg.iter().map(|v| (v - e).powi(2)).sum::<f64>() / fg.len().max(1) as f64;
+            bad += fg.len() as f64 * ((mean_error - free) / (full - free)).clamp(0.0, 1.0);
+            let left = |u: i64| !is_person(u) && (row.to == row.from || u < x + row.from);
+            let right = |u: i64| !is_person(u) && !left(u);
+            for side in [&left as &dyn Fn(i64) -> bool, &right] {
+                beside += window.clone().filter(|u| side(*u)).count() as f64;
+                for u in window.clone().filter(|u| side(*u)) {
+                    wrong += match pixel(u) {
+                        None => 1.0,
+                        Some(0) => 0.2,
+                        Some(_) => 0.0,
+                    };
+                }
+                let bg = values(side);
+                if bg.is_empty() {
+                    continue;
+                }
+                let mean = bg.iter().sum::<f64>() / bg.len() as f64;
+                if mean > units / (z - config.boundary_margin_m).max(0.2) {
+                    wrong += 0.2 * bg.len() as f64;
+                    continue;
+                }
+                let b = mean.min(units / (z + config.boundary_margin_m));
+                let contrast = (units / z - b).powi(2);
+                let error = bg.iter().map(|v| (v - b).powi(2)).sum::<f64>() / contrast;
+                wrong += error.min(bg.len() as f64);
+            }
+        }
+        let inside = (bad + 3.0 * (0.95 * person - seen).max(0.0)) / person.max(1.0);
+        let w = config.foreground_weight;
+        (seen / person.max(1.0) >= config.min_foreground_valid)
+            .then(|| w * inside + (1.0 - w) * wrong / beside.max(1.0))
+    }
+
+    proptest! {
+        #[test]
+        fn runs_equal_pixels(
+            pixels in prop::collection::vec(prop_oneof![Just(f32::NAN), 1.5f32..2.5, 3.0f32..6.0], 48 * 40),
+            x in -4i64..52, y in -4i64..44, z in 1.5f64..4.0, roll in -0.4f64..0.4, which in 0usize..3,
+        ) {
+            let rows = RowSums::new(&DepthImage::from_pixels(48, 40, pixels).unwrap(), 1);
+            let pose = Pose::nearest(Direction::ALL[which], 0.3, roll, 40.0);
+            let mut bank = Bank::new(100);
+            let template = bank.template(pose);
+            let config = DepthTemplateConfig { min_foreground_valid: 0.2, ..Default::default() };
+            let fast = Matcher::new(&config, 300.0).fit(&rows, template, x, y, z).map(|m| m.cost);
+            let slow = slow(&config, &rows, template, x, y, z);
+            prop_assert_eq!(fast.is_some(), slow.is_some());
+            if let (Some(a), Some(b)) = (fast, slow) {
+                prop_assert!((a - b).abs() < 1e-9, "{} {}", a, b);
+            }
+        }
+    }
+
+    /// A square scene: a person of the template's shape at `z`, a wall at `wall`.
+    fn scene(z: f64, wall: f64, scale: f64) -> RowSums {
+        let mut bank = Bank::new(10_000);
+        let template = bank.template(Pose::nearest(Direction::Along, 0.0, 0.0, scale)).clone();
+        let depth = DepthImage::from_fn(160, 160, |x, y| {
+            let row = template.rows.iter().find(|r| r.dy == y as i64 - 70);
+            let dx = x as i64 - 80;
+            if row.is_some_and(|r| r.from <= dx && dx < r.to) { z as f32 } else { wall as f32 }
+        });
+        RowSums::new(&depth, 1)
+    }
+
+    fn cost_of(cost: Cost, z: f64, wall: f64) -> f64 {
+        let scale = 250.0 / z;
+        let config = DepthTemplateConfig { cost, ..Default::default() };
+        let rows = scene(z, wall, scale);
+        let mut bank = Bank::new(1000);
+        let template = bank.template(Pose::nearest(Direction::Along, 0.0, 0.0, scale));
+        let background = RowSums::UNITS / 8.0;
+        Matcher::new(&config, background).fit(&rows, template, 80, 70, z).unwrap().cost
+    }
+
+    #[test]
+    fn a_nearer_wall_does_not_change_the_robust_cost() {
+        let (far, near) = (cost_of(Cost::Robust, 2.0, 8.0), cost_of(Cost::Robust, 2.0, 3.0));
+        assert!(far < 0.02 && near < 0.02, "{far} {near}");
+        let (far, near) = (cost_of(Cost::Squared, 2.0, 8.0), cost_of(Cost::Squared, 2.0, 3.0));
+        assert!(near > 3.0 * far, "one background value for all: {far} {near}");
+    }
+
+    #[test]
+    fn the_printed_normalisation_depends_on_the_range() {
+        // The same wall, so the same error in every background pixel.
+        let ratio = |cost| cost_of(cost, 4.0, 6.0) / cost_of(cost, 2.0, 6.0);
+        assert!((ratio(Cost::Squared) - 1.0).abs() < 0.1, "{}", ratio(Cost::Squared));
+        assert!((ratio(Cost::Printed) - 2.0).abs() < 0.2, "{}", ratio(Cost::Printed));
+    }
+}
