@@ -1,0 +1,266 @@
+//! What detectors promise.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use tagalong_core::{Camera, Detection, Detector, Error, Frame, Funnel, Search};
+
+use crate::figure::Figure;
+use crate::scenes::{bare_frame, drawn, level, mountings, odd_frames, track};
+use crate::subject::{From, Subject};
+use crate::{Check, Verdict, demand};
+
+pub(crate) const CHECKS: &[Check] = &[
+    ("never panics on odd frames", odd_frames_are_survived),
+    ("a missing image is an error that names it", missing_image_is_named),
+    ("same seed, same output", repeatable),
+    ("regions lie in the image", regions_are_in_the_image),
+    ("covariance is symmetric and positive", covariance_is_positive),
+    ("near results lie in the window", near_stays_near),
+    ("an empty scene stays empty", empty_stays_empty),
+    ("one person at 2 m is found", person_is_found),
+    ("a person is found near their track", person_is_followed),
+    ("people who left are forgotten", forgets),
+];
+
+const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
+
+/// The search ran, or the detector wants an image that the drawn world lacks.
+enum Seen {
+    People(Vec<Detection>),
+    Lacks,
+}
+
+fn look(detector: &mut dyn Detector, frame: &Frame, search: &Search<'_>) -> Result<Seen, String> {
+    match detector.detect(frame, search, &mut Funnel::default()) {
+        Ok(people) => Ok(Seen::People(people)),
+        Err(Error::MissingImage { .. }) => Ok(Seen::Lacks),
+        Err(error) => Err(format!("it fails on a drawn frame: {error}")),
+    }
+}
+
+fn people(
+    detector: &mut dyn Detector,
+    frame: &Frame,
+    search: &Search<'_>,
+) -> Result<Vec<Detection>, String> {
+    Ok(match look(detector, frame, search)? {
+        Seen::People(people) => people,
+        Seen::Lacks => Vec::new(),
+    })
+}
+
+fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
+    let mut detector = subject.detector(From::Nothing)?;
+    let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
+    for (name, frame) in odd_frames() {
+        for search in [EVERYWHERE, Search::Near(&lost)] {
+            let outcome = detector.detect(&frame, &search, &mut Funnel::default());
+            demand(outcome.is_ok(), || match &outcome {
+                Err(error) => format!("the {name} frame is an error: {error}"),
+                Ok(_) => String::new(),
+            })?;
+            let sane = outcome.iter().flatten().all(Detection::is_sane);
+            demand(sane, || format!("the {name} frame gives numbers that are not finite"))?;
+        }
+        let learned = detector.learn(&frame, std::slice::from_ref(&lost));
+        learned.map_err(|error| format!("learning from the {name} frame is an error: {error}"))?;
+    }
+    Ok(())
+}
+
+fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
+    let mut detector = subject.detector(From::Nothing)?;
+    let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
+    for search in [EVERYWHERE, Search::Near(&lost)] {
+        match detector.detect(&bare_frame(), &search, &mut Funnel::default()) {
+            Err(Error::MissingImage { what }) if !what.is_empty() => {}
+            Ok(found) if found.is_empty() => {}
+            Err(error) => return Err(format!("the error does not name the image: {error}")),
+            Ok(_) => return Err("it finds people in a frame without images".into()),
+        }
+    }
+    Ok(())
+}
+
+/// Two people, one of them walking aside, over a few frames.
+fn walk(camera: &Arc<Camera>) -> Vec<Frame> {
+    let steps = 0..4u64;
+    steps
+        .map(|i| {
+            let walker = Figure::at(3.0, -0.6 + 0.05 * i as f64);
+            drawn(i + 1, camera, &[Figure::at(2.0, 0.4), walker])
+        })
+        .collect()
+}
+
+/// Everything a detector says while it watches the walk.
+fn record(detector: &mut dyn Detector, frames: &[Frame]) -> Result<Vec<Detection>, String> {
+    let followed = track(1, Figure::at(2.0, 0.4).head, 0.15, &frames[0].camera);
+    let mut all = Vec::new();
+    for frame in frames {
+        all.extend(people(detector, frame, &Search::Near(&followed))?);
+        all.extend(people(detector, frame, &EVERYWHERE)?);
+        let learned = detector.learn(frame, std::slice::from_ref(&followed));
+        learned.map_err(|error| format!("learning is an error: {error}"))?;
+    }
+    Ok(all)
+}
+
+fn repeatable(subject: &Subject<'_>) -> Verdict {
+    let frames = walk(&level());
+    let defaults = subject.info.defaults();
+    let first = record(&mut *subject.detector(From::Nothing)?, &frames)?;
+    let second = record(&mut *subject.detector(From::Text(&defaults))?, &frames)?;
+    demand(first == second, || {
+        format!("two runs differ: {} and {} detections", first.len(), second.len())
+    })
+}
+
+/// All detections of the walk under each mounting.
+fn all_detections(subject: &Subject<'_>) -> Result<Vec<(Arc<Camera>, Detection)>, String> {
+    let mut all = Vec::new();
+    for (_, camera) in mountings() {
+        let detector = &mut *subject.detector(From::Nothing)?;
+        let found = record(detector, &walk(&camera))?;
+        all.extend(found.into_iter().map(|detection| (Arc::clone(&camera), detection)));
+    }
+    Ok(all)
+}
+
+fn regions_are_in_the_image(subject: &Subject<'_>) -> Verdict {
+    for (camera, detection) in all_detections(subject)? {
+        let region = detection.region;
+        let inside = region.clipped(camera.width, camera.height).area();
+        let amodal = 4.0 * (camera.width * camera.height) as f64;
+        demand(region.is_sane() && inside > 0.0 && region.area() <= amodal, || {
+            format!("{region:?} in an image of {}x{}", camera.width, camera.height)
+        })?;
+    }
+    Ok(())
+}
+
+fn covariance_is_positive(subject: &Subject<'_>) -> Verdict {
+    for (_, detection) in all_detections(subject)? {
+        let covariance = detection.covariance;
+        let skew = (covariance - covariance.transpose()).abs().max();
+        let positive = skew <= 1e-9 * covariance.norm() && covariance.cholesky().is_some();
+        demand(positive, || format!("covariance {covariance:?}"))?;
+        demand(detection.is_sane(), || format!("not finite: {detection:?}"))?;
+    }
+    Ok(())
+}
+
+/// Two people 1.6 m apart: a search for one must not answer with the other.
+fn near_stays_near(subject: &Subject<'_>) -> Verdict {
+    let (sigma_m, window_m) = (0.15, 0.8);
+    for (name, camera) in mountings() {
+        let detector = &mut *subject.detector(From::Nothing)?;
+        let couple = [Figure::at(2.6, 0.8), Figure::at(2.6, -0.8)];
+        let frame = drawn(1, &camera, &couple);
+        for wanted in [couple[0].head, couple[1].head, Point3::new(1.8, 0.0, 1.6)] {
+            let search = track(1, wanted, sigma_m, &camera);
+            for found in people(detector, &frame, &Search::Near(&search))? {
+                let away = (found.position.xy() - wanted.xy()).norm();
+                demand(away <= window_m, || {
+                    format!("camera {name}: {away:.2} m away from a track known to {sigma_m} m")
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn empty_stays_empty(subject: &Subject<'_>) -> Verdict {
+    for (name, camera) in mountings() {
+        let detector = &mut *subject.detector(From::Nothing)?;
+        let lost = track(1, Figure::at(2.0, 0.0).head, 0.2, &camera);
+        for index in 1..=3 {
+            let frame = drawn(index, &camera, &[]);
+            let mut found = people(detector, &frame, &EVERYWHERE)?;
+            found.extend(people(detector, &frame, &Search::Near(&lost))?);
+            believed_empty(&found, name)?;
+        }
+    }
+    Ok(())
+}
+
+/// No detection is more likely a person than not.
+fn believed_empty(found: &[Detection], scene: &str) -> Verdict {
+    match found.iter().find(|d| d.score > 0.0) {
+        Some(d) => Err(format!("{scene}: nobody is at {:.2}, score {:.2}", d.position, d.score)),
+        None => Ok(()),
+    }
+}
+
+fn person_is_found(subject: &Subject<'_>) -> Verdict {
+    if !subject.must_discover {
+        return Ok(());
+    }
+    for (name, camera) in mountings() {
+        let detector = &mut *subject.detector(From::Nothing)?;
+        for turned_rad in [0.0, std::f64::consts::FRAC_PI_2, std::f64::consts::PI] {
+            let mut figure = Figure::at(2.0, 0.1);
+            figure.heading_rad += turned_rad;
+            let scene = format!("camera {name}, person turned by {turned_rad:.1} rad");
+            let found = people(detector, &drawn(1, &camera, &[figure]), &EVERYWHERE)?;
+            let believed: Vec<_> = found.into_iter().filter(|d| d.score > 0.0).collect();
+            demand(believed.len() == 1, || format!("{scene}: {} found", believed.len()))?;
+            is_at(&believed[0], &figure, &camera).map_err(|what| format!("{scene}: {what}"))?;
+        }
+    }
+    Ok(())
+}
+
+/// The detection is where the person is, in the world and in the image.
+fn is_at(found: &Detection, figure: &Figure, camera: &Camera) -> Verdict {
+    let error = found.position - figure.head;
+    demand(error.xy().norm() < 0.3 && error.z.abs() < 0.2, || {
+        format!("the head is at {:.2}, found at {:.2}", figure.head, found.position)
+    })?;
+    let truth = camera.upper_body(&figure.head).clipped(camera.width, camera.height);
+    let iou = found.region.clipped(camera.width, camera.height).iou(&truth);
+    demand(iou >= 0.5, || format!("the region overlaps the upper body by {iou:.2} only"))
+}
+
+fn person_is_followed(subject: &Subject<'_>) -> Verdict {
+    if !subject.must_follow {
+        return Ok(());
+    }
+    for (name, camera) in mountings() {
+        let detector = &mut *subject.detector(From::Nothing)?;
+        let figure = Figure::at(2.0, 0.1);
+        let mut followed = track(1, figure.head, 0.15, &camera);
+        // Models of appearance need a frame to learn from.
+        let learned =
+            detector.learn(&drawn(1, &camera, &[figure]), std::slice::from_ref(&followed));
+        learned.map_err(|error| format!("learning is an error: {error}"))?;
+        followed.estimate.person.position.y -= 0.1;
+        followed.estimate.region = camera.upper_body(&followed.estimate.person.position);
+        let found = people(detector, &drawn(2, &camera, &[figure]), &Search::Near(&followed))?;
+        let best = found.first().ok_or_else(|| format!("camera {name}: nobody is found"))?;
+        is_at(best, &figure, &camera).map_err(|what| format!("camera {name}: {what}"))?;
+    }
+    Ok(())
+}
+
+/// Somebody is tracked for some frames and leaves; the track ends.
+fn forgets(subject: &Subject<'_>) -> Verdict {
+    let camera = level();
+    let detector = &mut *subject.detector(From::Nothing)?;
+    let figure = Figure::at(2.0, 0.2);
+    let tracked = track(1, figure.head, 0.1, &camera);
+    for index in 1..=4 {
+        let (people, tracks) = if index <= 3 {
+            (&[figure][..], std::slice::from_ref(&tracked))
+        } else {
+            (&[][..], &[][..])
+        };
+        let learned = detector.learn(&drawn(index, &camera, people), tracks);
+        learned.map_err(|error| format!("learning is an error: {error}"))?;
+    }
+    let frame = drawn(5, &camera, &[]);
+    let mut found = people(detector, &frame, &EVERYWHERE)?;
+    found.extend(people(detector, &frame, &Search::Near(&tracked))?);
+    believed_empty(&found, "after the person has left")
+}

@@ -1,0 +1,234 @@
+//! A small drawn world: people of ellipsoids on a floor in front of a wall, ray
+//! cast into the depth and the colour image of a camera.
+//!
+//! The proportions are those of the head-and-shoulder template measured by
+//! Jafari et al. (ICRA 2014); the head is [`HEAD_RADIUS_M`] deep so that the
+//! visible surface and the centre differ as they do for annotated people.
+
+use std::sync::Arc;
+
+use nalgebra::{Point2, Point3, Rotation3, Vector3};
+use tagalong_core::{Camera, DepthImage, HEAD_RADIUS_M, Images, RgbImage};
+
+use crate::random::Random;
+
+/// A person standing on the floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figure {
+    /// Centre of the head in the robot frame, m.
+    pub head: Point3<f64>,
+    /// Where the person looks, about the vertical of the robot frame, rad.
+    pub heading_rad: f64,
+}
+
+/// What there is to see, in the robot frame.
+#[derive(Clone, Debug, Default)]
+pub struct World {
+    /// The people.
+    pub people: Vec<Figure>,
+    /// Distance of a wall across the forward axis, m; `None` is open space.
+    pub wall_m: Option<f64>,
+    /// Seed of axial depth noise like that of a structured-light camera
+    /// (Nguyen, Izadi & Lovell 2012); `None` draws without noise.
+    pub noise_seed: Option<u64>,
+}
+
+impl Figure {
+    /// A person of ordinary height at a place on the floor, who looks at the robot.
+    pub fn at(x: f64, y: f64) -> Self {
+        Self { head: Point3::new(x, y, 1.6), heading_rad: (-y).atan2(-x) }
+    }
+}
+
+impl World {
+    /// People in front of a wall at 5 m.
+    pub fn with(people: &[Figure]) -> Self {
+        Self { people: people.to_vec(), wall_m: Some(5.0), noise_seed: None }
+    }
+
+    /// The colour and the depth image of the camera. Depth is along the optical
+    /// axis in metres, NaN where nothing is seen.
+    pub fn draw(&self, camera: &Camera) -> Images {
+        let shapes: Vec<Ellipsoid> = self.people.iter().flat_map(body).collect();
+        let eye = camera.robot_from_camera.translation.vector;
+        let mut depth = DepthImage::filled(camera.width, camera.height, f32::NAN);
+        let mut colour = RgbImage::filled(camera.width, camera.height, [20, 24, 32]);
+        let pixels = depth.pixels_mut().iter_mut().zip(colour.pixels_mut());
+        for (index, (depth, colour)) in pixels.enumerate() {
+            let (column, row) = (index % camera.width, index / camera.width);
+            let ray = camera.ray(Point2::new(column as f64, row as f64));
+            let ray = camera.robot_from_camera.rotation * ray;
+            if let Some(hit) = self.cast(&shapes, eye, ray) {
+                *depth = hit.depth_m as f32;
+                *colour = hit.colour;
+            }
+        }
+        self.add_noise(&mut depth);
+        Images { colour: Some(Arc::new(colour)), depth: Some(Arc::new(depth)), ..Images::default() }
+    }
+
+    fn cast(&self, shapes: &[Ellipsoid], eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {
+        let people = shapes.iter().filter_map(|shape| shape.hit(eye, ray));
+        let wall =
+            self.wall_m.and_then(|x| plane(x - eye.x, ray.x, 0.8 + 0.1 * ray.z, [200, 190, 170]));
+        let floor = plane(-eye.z, ray.z, 0.7, [120, 110, 100]);
+        people.chain(wall).chain(floor).min_by(|a, b| a.depth_m.total_cmp(&b.depth_m))
+    }
+
+    fn add_noise(&self, depth: &mut DepthImage) {
+        let Some(seed) = self.noise_seed else { return };
+        let mut random = Random::new(seed);
+        for depth in depth.pixels_mut() {
+            let sigma_m = 0.0012 + 0.0019 * (f64::from(*depth) - 0.4).powi(2);
+            *depth += (sigma_m * random.normal()) as f32;
+        }
+    }
+}
+
+/// What a ray meets first.
+struct Hit {
+    depth_m: f64,
+    colour: [u8; 3],
+}
+
+/// The plane at signed distance `away` along an axis on which the ray advances
+/// by `along` per metre of depth.
+fn plane(away: f64, along: f64, light: f64, colour: [u8; 3]) -> Option<Hit> {
+    let depth_m = away / along;
+    let seen = depth_m.is_finite() && depth_m > 0.01 && depth_m < 50.0;
+    seen.then(|| Hit { depth_m, colour: shade(colour, light) })
+}
+
+fn shade(colour: [u8; 3], light: f64) -> [u8; 3] {
+    colour.map(|c| (f64::from(c) * light.clamp(0.0, 1.0)) as u8)
+}
+
+/// An ellipsoid with one vertical axis.
+struct Ellipsoid {
+    centre: Vector3<f64>,
+    /// Half axes: along the heading, across it, vertical, m.
+    half: Vector3<f64>,
+    /// From the robot's axes to those of the half axes.
+    turn: Rotation3<f64>,
+    colour: [u8; 3],
+}
+
+impl Ellipsoid {
+    /// The nearer intersection of `eye + t * ray`; `t` is the depth because the
+    /// ray is scaled to depth 1.
+    fn hit(&self, eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {
+        let start = (self.turn * (eye - self.centre)).component_div(&self.half);
+        let step = (self.turn * ray).component_div(&self.half);
+        let (a, b, c) = (step.norm_squared(), start.dot(&step), start.norm_squared() - 1.0);
+        let discriminant = b * b - a * c;
+        if discriminant < 0.0 {
+            return None;
+        }
+        let depth_m = (-b - discriminant.sqrt()) / a;
+        let normal = (start + step * depth_m).component_div(&self.half).normalize();
+        let facing = -normal.dot(&(self.turn * ray).normalize());
+        let colour = shade(self.colour, 0.35 + 0.65 * facing);
+        (depth_m > 0.01).then_some(Hit { depth_m, colour })
+    }
+}
+
+/// Along the heading, to the left, below the head; the three half axes; colour.
+type Part = ([f64; 3], [f64; 3], [u8; 3]);
+
+const SKIN: [u8; 3] = [224, 172, 140];
+const SHIRT: [u8; 3] = [60, 90, 170];
+
+/// All parts above the hip, m.
+const UPPER_PARTS: [Part; 6] = [
+    ([0.0, 0.0, 0.0], [HEAD_RADIUS_M, 0.085, 0.115], SKIN),
+    ([-0.01, 0.0, 0.15], [0.06, 0.07, 0.13], SKIN),
+    ([-0.02, 0.0, 0.40], [0.11, 0.24, 0.21], SHIRT),
+    ([-0.01, 0.0, 0.62], [0.12, 0.19, 0.38], SHIRT),
+    ([0.0, 0.22, 0.62], [0.06, 0.05, 0.31], SHIRT),
+    ([0.0, -0.22, 0.62], [0.06, 0.05, 0.31], SHIRT),
+];
+
+/// Distance of the hip below the centre of the head, m.
+const HIP_M: f64 = 0.80;
+
+fn body(figure: &Figure) -> impl Iterator<Item = Ellipsoid> {
+    let half_leg = (0.5 * (figure.head.z - HIP_M)).max(0.1);
+    let leg = |across| -> Part {
+        ([0.0, across, HIP_M + half_leg], [0.09, 0.08, half_leg + 0.03], [50, 50, 60])
+    };
+    let parts = UPPER_PARTS.into_iter().chain([leg(0.09), leg(-0.09)]);
+    let Figure { head, heading_rad } = *figure;
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), heading_rad);
+    parts.map(move |([along, across, below], half, colour)| Ellipsoid {
+        centre: head.coords + turn * Vector3::new(along, across, -below),
+        half: Vector3::from(half),
+        turn: turn.inverse(),
+        colour,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera(pitch_down_rad: f64) -> Camera {
+        let lens =
+            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.2, pitch_down_rad, 0.0)
+    }
+
+    fn depth_at(images: &Images, camera: &Camera, point: Point3<f64>) -> f64 {
+        let pixel = camera.project(&point).unwrap();
+        let depth = images.depth.as_ref().unwrap();
+        f64::from(depth.get(pixel.x.round() as i64, pixel.y.round() as i64).unwrap())
+    }
+
+    #[test]
+    fn the_head_is_seen_a_head_radius_before_its_centre() {
+        let camera = camera(0.0);
+        let head = Point3::new(2.0, 0.0, 1.2);
+        let images = World::with(&[Figure { head, heading_rad: 3.0 }]).draw(&camera);
+        assert!((depth_at(&images, &camera, head) - (2.0 - HEAD_RADIUS_M)).abs() < 0.003);
+    }
+
+    #[test]
+    fn every_pixel_of_an_empty_world_lies_on_the_floor_or_the_wall() {
+        let camera = camera(0.3);
+        let images = World::with(&[]).draw(&camera);
+        let depth = images.depth.unwrap();
+        for (index, depth) in depth.pixels().iter().enumerate().filter(|(_, d)| !d.is_nan()) {
+            let pixel = Point2::new((index % 640) as f64, (index / 640) as f64);
+            let point = camera.back_project(pixel, f64::from(*depth));
+            assert!(point.z.abs() < 1e-4 || (point.x - 5.0).abs() < 1e-4, "{point}");
+        }
+    }
+
+    #[test]
+    fn the_upper_body_square_frames_the_shoulders() {
+        let camera = camera(0.0);
+        let figure = Figure::at(2.0, 0.2);
+        let images = World::with(&[figure]).draw(&camera);
+        let depth = images.depth.unwrap();
+        let square = camera.upper_body(&figure.head);
+        let row = depth.row(square.bottom() as usize - 1);
+        let near = |x: &usize| row[*x] < 3.0;
+        let (left, right) = ((0..640).find(near).unwrap(), (0..640).rfind(near).unwrap());
+        let width = (right - left) as f64 / square.width;
+        assert!((0.75..1.0).contains(&width), "shoulders take {width} of the square");
+    }
+
+    #[test]
+    fn noise_is_seeded_and_small() {
+        let camera = camera(0.0);
+        let drawn =
+            |seed| World { noise_seed: seed, ..World::with(&[]) }.draw(&camera).depth.unwrap();
+        assert_eq!(format!("{:?}", drawn(Some(3))), format!("{:?}", drawn(Some(3))));
+        let (clean, noisy) = (drawn(None), drawn(Some(3)));
+        let both = clean.pixels().iter().zip(noisy.pixels()).filter(|(c, _)| **c < 5.0);
+        let errors: Vec<f64> = both.map(|(c, n)| f64::from(n - c)).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!((0.001..0.05).contains(&rms), "{rms}");
+    }
+}

@@ -1,0 +1,206 @@
+//! What every plugin must do, checked against whatever a [`Registry`] holds.
+//!
+//! A plugin is tested the moment it is listed: the suite builds it from its
+//! default settings, shows it a small drawn world (see [`figure`]) and asks for
+//! the promises that the traits of `tagalong_core` make. A crate outside the
+//! workspace runs the same suite over a registry of its own:
+//!
+//! ```
+//! # fn register(_: &mut tagalong_core::Registry) {}
+//! let mut registry = tagalong_core::Registry::default();
+//! register(&mut registry);
+//! let failures = tagalong_conformance::check_all(&registry);
+//! assert!(failures.is_empty(), "{failures:#?}");
+//! ```
+//!
+//! A panic inside a plugin is caught and becomes a [`Failure`] that names the
+//! plugin and the check. Whether a detector has to find the drawn people is not
+//! to be read off its type (a face detector sees no face in them, a follower
+//! discovers nobody), so that is demanded by name: [`Suite::must_discover`],
+//! [`Suite::must_follow`].
+
+mod controllers;
+mod detectors;
+pub mod figure;
+mod filters;
+mod general;
+mod likelihoods;
+mod random;
+mod scenes;
+mod subject;
+mod verifiers;
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::iter::Chain;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::slice;
+
+use tagalong_core::{Kind, Registry};
+
+use subject::Subject;
+
+/// One promise that one plugin broke.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// The name of the plugin in configs.
+    pub plugin: String,
+    /// The name of the check, for example `empty scene stays empty`.
+    pub check: &'static str,
+    /// What was seen, and what should have been.
+    pub what: String,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "plugin `{}` fails the check \"{}\": {}", self.plugin, self.check, self.what)
+    }
+}
+
+/// A check: its name, and what it does with a plugin. The error is a sentence.
+type Check = (&'static str, fn(&Subject<'_>) -> Verdict);
+type Verdict = Result<(), String>;
+type Checks = Chain<slice::Iter<'static, Check>, slice::Iter<'static, Check>>;
+
+/// The suite over one registry.
+pub struct Suite<'a> {
+    registry: &'a Registry,
+    base_dir: PathBuf,
+    discoverers: BTreeSet<String>,
+    followers: BTreeSet<String>,
+}
+
+impl<'a> Suite<'a> {
+    /// A suite that demands of each plugin what holds for all of its kind.
+    pub fn new(registry: &'a Registry) -> Self {
+        Self {
+            registry,
+            base_dir: PathBuf::from("."),
+            discoverers: BTreeSet::new(),
+            followers: BTreeSet::new(),
+        }
+    }
+
+    /// Resolves model files of default settings against `dir`.
+    pub fn base_dir(mut self, dir: impl Into<PathBuf>) -> Self {
+        self.base_dir = dir.into();
+        self
+    }
+
+    /// Demands that this detector discovers the drawn person.
+    pub fn must_discover(mut self, detector: impl Into<String>) -> Self {
+        self.discoverers.insert(detector.into());
+        self
+    }
+
+    /// Demands that this detector finds the drawn person again near a track.
+    pub fn must_follow(mut self, detector: impl Into<String>) -> Self {
+        self.followers.insert(detector.into());
+        self
+    }
+
+    /// Every broken promise of every plugin; a demand on a detector that is
+    /// not registered is one, too.
+    pub fn check_all(&self) -> Vec<Failure> {
+        let mut failures = self.unmet_demands();
+        for info in self.registry.plugins() {
+            failures.extend(self.check(info.name));
+        }
+        failures
+    }
+
+    /// Every broken promise of one plugin.
+    pub fn check(&self, plugin: &str) -> Vec<Failure> {
+        self.check_where(plugin, |_| true)
+    }
+
+    /// The outcome of one check (see [`check_names`]) on one plugin.
+    pub fn check_one(&self, plugin: &str, check: &str) -> Vec<Failure> {
+        self.check_where(plugin, |name| name == check)
+    }
+
+    fn check_where(&self, plugin: &str, wanted: impl Fn(&str) -> bool) -> Vec<Failure> {
+        let info = match self.registry.find(plugin) {
+            Ok(info) => info,
+            Err(error) => return vec![failure(plugin, "is registered", error.to_string())],
+        };
+        let subject = Subject {
+            registry: self.registry,
+            info,
+            base_dir: &self.base_dir,
+            must_discover: self.discoverers.contains(plugin),
+            must_follow: self.followers.contains(plugin),
+        };
+        let (name, builds) = general::BUILDS;
+        if let Some(broken) = run(&subject, name, builds) {
+            return vec![broken];
+        }
+        let checks = general::CHECKS.iter().chain(checks_of(info.kind));
+        let wanted = checks.filter(|(name, _)| wanted(name));
+        wanted.filter_map(|(name, check)| run(&subject, name, *check)).collect()
+    }
+
+    fn unmet_demands(&self) -> Vec<Failure> {
+        let demanded = self.discoverers.union(&self.followers);
+        demanded
+            .filter_map(|name| match self.registry.find(name) {
+                Ok(info) if info.kind == Kind::Detector => None,
+                Ok(info) => {
+                    let what = format!("is a {}, but must find people", info.kind);
+                    Some(failure(name, "is a detector", what))
+                }
+                Err(error) => Some(failure(name, "is registered", error.to_string())),
+            })
+            .collect()
+    }
+}
+
+/// [`Suite::check_all`] without demands on single detectors.
+pub fn check_all(registry: &Registry) -> Vec<Failure> {
+    Suite::new(registry).check_all()
+}
+
+/// The names of all checks that apply to a kind of plugin.
+pub fn check_names(kind: Kind) -> Vec<&'static str> {
+    let checks = general::CHECKS.iter().chain(checks_of(kind));
+    std::iter::once(general::BUILDS.0).chain(checks.map(|(name, _)| *name)).collect()
+}
+
+fn checks_of(kind: Kind) -> Checks {
+    let (own, more): (&[Check], &[Check]) = match kind {
+        Kind::Detector => (detectors::CHECKS, likelihoods::CHECKS),
+        Kind::Verifier => (verifiers::CHECKS, &[]),
+        Kind::Filter => (filters::CHECKS, &[]),
+        Kind::Controller => (controllers::CHECKS, &[]),
+    };
+    own.iter().chain(more)
+}
+
+fn run(
+    subject: &Subject<'_>,
+    name: &'static str,
+    check: fn(&Subject<'_>) -> Verdict,
+) -> Option<Failure> {
+    let outcome = catch_unwind(AssertUnwindSafe(|| check(subject)));
+    let what = match outcome {
+        Ok(Ok(())) => return None,
+        Ok(Err(what)) => what,
+        Err(panic) => format!("it panicked: {}", panic_text(panic.as_ref())),
+    };
+    Some(failure(subject.info.name, name, what))
+}
+
+fn failure(plugin: &str, check: &'static str, what: String) -> Failure {
+    Failure { plugin: plugin.to_owned(), check, what }
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message")
+}
+
+/// Fails with a sentence unless `holds`.
+fn demand(holds: bool, otherwise: impl FnOnce() -> String) -> Verdict {
+    if holds { Ok(()) } else { Err(otherwise()) }
+}

@@ -1,0 +1,146 @@
+//! Frames, tracks and detections that the checks are made of.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, SMatrix, Vector2};
+use tagalong_core::{
+    Camera, DepthImage, Detection, Distortion, Estimate, Frame, Image, Images, Motion, Person,
+    Pinhole, RgbImage, Stamp, Track, TrackId,
+};
+
+use crate::figure::{Figure, World};
+use crate::random::Random;
+
+/// Time between frames, s.
+pub(crate) const DT_S: f64 = 0.1;
+
+/// A camera of the given width (4:3) and the field of view of a Kinect.
+fn camera(width: usize, height_m: f64, pitch_down_deg: f64, roll_deg: f64) -> Camera {
+    let height = width * 3 / 4;
+    let focal = width as f64 * 0.82;
+    let (cx, cy) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+    let lens = Pinhole { fx: focal, fy: focal, cx, cy, distortion: Distortion::None };
+    let (pitch, roll) = (pitch_down_deg.to_radians(), roll_deg.to_radians());
+    Camera::mounted(lens, width, height, height_m, pitch, roll)
+}
+
+/// A level camera at breast height.
+pub(crate) fn level() -> Arc<Camera> {
+    Arc::new(camera(640, 1.2, 0.0, 0.0))
+}
+
+/// The mountings under which a detector must work: level; looking down from
+/// above with a roll; level at half the resolution.
+pub(crate) fn mountings() -> [(&'static str, Arc<Camera>); 3] {
+    [
+        ("level at 1.2 m", level()),
+        ("at 2.4 m, 27 degrees down, rolled by 11", Arc::new(camera(640, 2.4, 27.0, 11.0))),
+        ("level at 1.2 m, 320x240", Arc::new(camera(320, 1.2, 0.0, 0.0))),
+    ]
+}
+
+/// A frame at rest.
+pub(crate) fn frame(index: u64, camera: &Arc<Camera>, images: Images) -> Frame {
+    moving_frame(index, camera, images, Motion::at_rest(DT_S))
+}
+
+/// A frame after a motion of the robot.
+pub(crate) fn moving_frame(
+    index: u64,
+    camera: &Arc<Camera>,
+    images: Images,
+    motion: Motion,
+) -> Frame {
+    let stamp = Stamp::from_nanos(1_000_000_000).plus_seconds(index as f64 * DT_S);
+    Frame::new(index, stamp, Arc::clone(camera), motion, images)
+}
+
+/// What the camera sees of people before a wall.
+pub(crate) fn drawn(index: u64, camera: &Arc<Camera>, people: &[Figure]) -> Frame {
+    let world = World { noise_seed: Some(index), ..World::with(people) };
+    frame(index, camera, world.draw(camera))
+}
+
+/// Frames that carry nothing useful, with their names.
+pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
+    let flat = |camera: &Arc<Camera>, grey: u8, depth: f32| {
+        let (w, h) = (camera.width, camera.height);
+        let images = Images {
+            colour: Some(Arc::new(RgbImage::filled(w, h, [grey; 3]))),
+            grey: Some(Arc::new(Image::filled(w, h, grey))),
+            depth: Some(Arc::new(DepthImage::filled(w, h, depth))),
+            right: Some(Arc::new(Image::filled(w, h, grey))),
+        };
+        frame(1, camera, images)
+    };
+    let sized = |width: usize, height: usize| {
+        let camera = camera(640, 1.2, 0.0, 0.0);
+        Arc::new(Camera { width, height, ..camera })
+    };
+    vec![
+        ("black", flat(&level(), 0, 2.0)),
+        ("white at zero depth", flat(&level(), 255, 0.0)),
+        ("NaN depth", flat(&level(), 128, f32::NAN)),
+        ("infinite depth", flat(&level(), 128, f32::INFINITY)),
+        ("empty (0x0)", flat(&sized(0, 0), 0, 2.0)),
+        ("one-pixel", flat(&sized(1, 1), 0, 2.0)),
+        ("one row", flat(&sized(640, 1), 9, 2.0)),
+        ("one column", flat(&sized(1, 480), 9, 2.0)),
+    ]
+}
+
+/// A frame of an ordinary camera without any image.
+pub(crate) fn bare_frame() -> Frame {
+    frame(1, &level(), Images::default())
+}
+
+/// A confirmed track at a place, at rest, known to `sigma_m`.
+pub(crate) fn track(id: u32, head: Point3<f64>, sigma_m: f64, camera: &Camera) -> Track {
+    let mut covariance = SMatrix::<f64, 5, 5>::identity() * (sigma_m * sigma_m);
+    covariance[(3, 3)] = 0.05;
+    covariance[(4, 4)] = 0.05;
+    let person = Person { position: head, velocity: Vector2::zeros() };
+    let estimate = Estimate { person, covariance, region: camera.upper_body(&head) };
+    Track {
+        id: TrackId(id),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 20,
+        unseen_s: 0.0,
+        score: 3.0,
+    }
+}
+
+/// What a good detector says of a person there, with an error of `sigma_m`.
+pub(crate) fn sighting(
+    head: &Point3<f64>,
+    camera: &Camera,
+    sigma_m: f64,
+    random: &mut Random,
+) -> Detection {
+    let error = nalgebra::Vector3::from_fn(|_, _| sigma_m * random.normal());
+    let position = head + error;
+    Detection {
+        region: camera.upper_body(&position),
+        position,
+        covariance: nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4),
+        score: 3.0,
+        source: "conformance",
+    }
+}
+
+/// The same images seen in a mirror.
+pub(crate) fn mirrored(images: &Images) -> Images {
+    fn flip<P: Copy>(image: &Arc<Image<P>>) -> Arc<Image<P>> {
+        let (w, h) = (image.width(), image.height());
+        Arc::new(Image::from_fn(w, h, |x, y| image.row(y)[w - 1 - x]))
+    }
+    Images {
+        colour: images.colour.as_ref().map(flip),
+        grey: images.grey.as_ref().map(flip),
+        depth: images.depth.as_ref().map(flip),
+        right: images.right.as_ref().map(flip),
+    }
+}

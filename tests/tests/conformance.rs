@@ -1,0 +1,24 @@
+//! Every plugin of the catalog keeps the promises of its kind.
+
+use tagalong_conformance::Suite;
+use tagalong_core::Registry;
+
+/// Detectors that discover the drawn person in a depth or colour image. A
+/// freshly generated detector finds nobody and is not listed; the one that
+/// works is, and then has to go on working.
+const DISCOVER: &[&str] = &[];
+
+/// Detectors that find the drawn person near a track.
+const FOLLOW: &[&str] = &[];
+
+#[test]
+fn every_plugin_of_the_catalog_conforms() {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let configs = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs");
+    let suite = Suite::new(&registry).base_dir(configs);
+    let suite = DISCOVER.iter().fold(suite, |suite, name| suite.must_discover(*name));
+    let suite = FOLLOW.iter().fold(suite, |suite, name| suite.must_follow(*name));
+    let failures: Vec<String> = suite.check_all().iter().map(ToString::to_string).collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
