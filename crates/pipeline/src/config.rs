@@ -1,0 +1,366 @@
+//! From TOML to a pipeline. The text is parsed once into values that remember
+//! where they stood; each plugin gets its own, so that every mistake is shown
+//! with its line.
+
+use std::ops::Range;
+use std::path::Path;
+
+use tagalong_core::{
+    ConfigError, Context, Filter, Registry, Settings, Value, Verifier, nearest, parse_settings,
+};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::clock::Clock;
+use crate::control::Steering;
+use crate::lifecycle::Lifecycle;
+use crate::pipeline::{DetectorSlot, Pipeline, Slot};
+use crate::settings::{DetectorSettings, PipelineSettings, PluginSettings, RobotSettings, Role};
+
+mod checks;
+mod resolve;
+#[cfg(test)]
+mod tests;
+
+use checks::check;
+use resolve::resolve;
+
+/// Longest config, bytes.
+const MAX_BYTES: usize = 1 << 20;
+/// Deepest nesting of a config.
+const MAX_DEPTH: usize = 32;
+
+const OWN: [&str; 6] = ["seed", "robot", "clock", "association", "occlusion", "lifecycle"];
+const PLUGINS: [&str; 4] = ["detectors", "verifiers", "filter", "controller"];
+
+/// How a config is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Top-level tables that are not the pipeline's. They are left alone; see
+    /// [`RunSettings::table`].
+    pub foreign: Vec<String>,
+    /// A seed in place of the config's.
+    pub seed: Option<u64>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { foreign: vec!["input".into(), "limits".into()], seed: None }
+    }
+}
+
+/// What a config says beside the pipeline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSettings {
+    /// Seed of the run.
+    pub seed: u64,
+    /// The robot.
+    pub robot: RobotSettings,
+    text: String,
+}
+
+impl RunSettings {
+    /// A top-level table that is not the pipeline's; the defaults where the
+    /// config does not have it.
+    ///
+    /// # Errors
+    /// Unknown keys and wrong types, with their place in the config.
+    pub fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
+        parse_settings(parse(&self.text)?.remove(name))
+    }
+}
+
+impl Pipeline {
+    /// Builds the pipeline that a config describes. Paths in it are resolved
+    /// against `base_dir`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the config, with its place in the text; see
+    /// [`ConfigError::render`].
+    pub fn from_toml(
+        text: &str,
+        base_dir: &Path,
+        registry: &Registry,
+    ) -> Result<(Self, RunSettings), ConfigError> {
+        Self::from_toml_with(text, base_dir, registry, &Options::default())
+    }
+
+    /// [`Pipeline::from_toml`] with options.
+    ///
+    /// # Errors
+    /// As [`Pipeline::from_toml`].
+    pub fn from_toml_with(
+        text: &str,
+        base_dir: &Path,
+        registry: &Registry,
+        options: &Options,
+    ) -> Result<(Self, RunSettings), ConfigError> {
+        let mut root = parse(text)?;
+        refuse_unknown(&root, options)?;
+        let settings = own_settings(&root, options)?;
+        let builder = Builder { registry, base_dir, settings: &settings };
+        let (detectors, places) = builder.detectors(root.remove("detectors"))?;
+        let verifiers = builder.verifiers(root.remove("verifiers"))?;
+        let (filter, filter_span) = builder.filter(root.remove("filter"))?;
+        check_detectors(&detectors, &places)?;
+        check_weighing(&filter, &detectors, filter_span)?;
+        let steering = builder.steering(root.remove("controller"))?;
+        let resolved = resolve(text, &settings, registry)?;
+        let run =
+            RunSettings { seed: settings.seed, robot: settings.robot.clone(), text: text.into() };
+        let pipeline = Self {
+            clock: Clock::new(settings.clock.clone()),
+            lifecycle: Lifecycle::new(settings.lifecycle.clone()),
+            settings,
+            detectors,
+            verifiers,
+            filter,
+            steering,
+            resolved,
+            frames: 0,
+            failed: None,
+        };
+        Ok((pipeline, run))
+    }
+}
+
+fn parse(text: &str) -> Result<DeTable<'_>, ConfigError> {
+    if text.len() > MAX_BYTES {
+        let message = format!("the config has {} bytes; at most {MAX_BYTES} are read", text.len());
+        return Err(ConfigError::new(message));
+    }
+    let root = DeTable::parse(text)?.into_inner();
+    for value in root.values() {
+        if depth(value.get_ref()) >= MAX_DEPTH {
+            let message = format!("nested deeper than {MAX_DEPTH} levels");
+            return Err(ConfigError { message, span: Some(value.span()) });
+        }
+    }
+    Ok(root)
+}
+
+/// Levels of nesting below a value. The parser bounds the recursion.
+fn depth(value: &DeValue<'_>) -> usize {
+    match value {
+        DeValue::Array(items) => 1 + items.iter().map(|v| depth(v.get_ref())).max().unwrap_or(0),
+        DeValue::Table(table) => 1 + table.values().map(|v| depth(v.get_ref())).max().unwrap_or(0),
+        _ => 0,
+    }
+}
+
+fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigError> {
+    let foreign = options.foreign.iter().map(String::as_str);
+    let known: Vec<&str> = PLUGINS.into_iter().chain(OWN).chain(foreign).collect();
+    for key in root.keys() {
+        let name: &str = key.get_ref();
+        if !known.contains(&name) {
+            let hint = nearest(name, known.iter().copied())
+                .map_or(String::new(), |better| format!(" did you mean `{better}`?"));
+            let message = format!("unknown key `{name}`;{hint} available: {}", known.join(", "));
+            return Err(ConfigError { message, span: Some(key.span()) });
+        }
+    }
+    Ok(())
+}
+
+fn own_settings(root: &DeTable<'_>, options: &Options) -> Result<PipelineSettings, ConfigError> {
+    let own: DeTable<'_> = root
+        .iter()
+        .filter(|(key, _)| OWN.contains(&key.get_ref().as_ref()))
+        .map(|(key, value)| (key.clone(), value.clone()))
+        .collect();
+    let mut settings: PipelineSettings =
+        parse_settings(Some(Spanned::new(0..0, DeValue::Table(own))))?;
+    settings.seed = options.seed.unwrap_or(settings.seed);
+    check(&settings, root)?;
+    Ok(settings)
+}
+
+/// Where a detector section stands, as a whole and by key.
+struct Place {
+    section: Range<usize>,
+    every: Option<Range<usize>>,
+    offset: Option<Range<usize>>,
+    roles: Option<Range<usize>>,
+}
+
+/// A plugin section taken apart.
+struct Section<'a, T> {
+    settings: T,
+    config: Option<Value<'a>>,
+    table: DeTable<'a>,
+    span: Range<usize>,
+}
+
+impl<'a, T: Settings> Section<'a, T> {
+    fn new(name: &str, value: Value<'a>) -> Result<Self, ConfigError> {
+        let span = value.span();
+        let DeValue::Table(mut table) = value.into_inner() else {
+            let message = format!("`{name}` must be a table with the key `plugin`");
+            return Err(ConfigError { message, span: Some(span) });
+        };
+        let config = table.remove("config");
+        let settings =
+            parse_settings(Some(Spanned::new(span.clone(), DeValue::Table(table.clone()))))?;
+        Ok(Self { settings, config, table, span })
+    }
+
+    fn span_of(&self, key: &str) -> Option<Range<usize>> {
+        self.table.get(key).map(Spanned::span)
+    }
+
+    /// Adds the place of the plugin's name to an error that has none.
+    fn at_plugin<P>(&self, built: Result<P, ConfigError>) -> Result<P, ConfigError> {
+        let place = self.span_of("plugin").unwrap_or_else(|| self.span.clone());
+        built.map_err(|error| error.or_at(Some(place)))
+    }
+}
+
+struct Builder<'a> {
+    registry: &'a Registry,
+    base_dir: &'a Path,
+    settings: &'a PipelineSettings,
+}
+
+impl Builder<'_> {
+    /// The seed depends on the run's and on the plugin's place in the config.
+    fn context(&self, section: usize, index: usize) -> Context {
+        let place = ((section as u64) << 32) + index as u64;
+        Context {
+            seed: mix(mix(self.settings.seed) ^ place),
+            base_dir: self.base_dir.to_owned(),
+            wheels: self.settings.robot.wheels(),
+        }
+    }
+
+    fn detectors(
+        &self,
+        value: Option<Value<'_>>,
+    ) -> Result<(Vec<DetectorSlot>, Vec<Place>), ConfigError> {
+        let mut built = (Vec::new(), Vec::new());
+        for (index, value) in list("detectors", value)?.into_iter().enumerate() {
+            let mut section = Section::<DetectorSettings>::new("detectors", value)?;
+            let config = section.config.take();
+            let context = self.context(0, index);
+            let name = &section.settings.plugin;
+            let plugin = section.at_plugin(self.registry.build_detector(name, config, &context))?;
+            built.1.push(Place {
+                section: section.span.clone(),
+                every: section.span_of("every"),
+                offset: section.span_of("offset"),
+                roles: section.span_of("roles"),
+            });
+            built.0.push(DetectorSlot { settings: section.settings, plugin });
+        }
+        Ok(built)
+    }
+
+    fn verifiers(&self, value: Option<Value<'_>>) -> Result<Vec<Slot<dyn Verifier>>, ConfigError> {
+        let mut built = Vec::new();
+        for (index, value) in list("verifiers", value)?.into_iter().enumerate() {
+            let mut section = Section::<PluginSettings>::new("verifiers", value)?;
+            let config = section.config.take();
+            let context = self.context(1, index);
+            let name = &section.settings.plugin;
+            let plugin = section.at_plugin(self.registry.build_verifier(name, config, &context))?;
+            built.push(Slot { name: section.settings.plugin, plugin });
+        }
+        Ok(built)
+    }
+
+    fn filter(
+        &self,
+        value: Option<Value<'_>>,
+    ) -> Result<(Slot<dyn Filter>, Range<usize>), ConfigError> {
+        let Some(value) = value else {
+            let message = "no filter: add a section [filter] with `plugin = \"...\"`";
+            return Err(ConfigError::new(message));
+        };
+        let mut section = Section::<PluginSettings>::new("filter", value)?;
+        let config = section.config.take();
+        let context = self.context(2, 0);
+        let name = &section.settings.plugin;
+        let plugin = section.at_plugin(self.registry.build_filter(name, config, &context))?;
+        let span = section.span_of("plugin").unwrap_or(section.span);
+        Ok((Slot { name: section.settings.plugin, plugin }, span))
+    }
+
+    fn steering(&self, value: Option<Value<'_>>) -> Result<Option<Steering>, ConfigError> {
+        let Some(value) = value else { return Ok(None) };
+        let mut section = Section::<PluginSettings>::new("controller", value)?;
+        let config = section.config.take();
+        let context = self.context(3, 0);
+        let name = &section.settings.plugin;
+        let plugin = section.at_plugin(self.registry.build_controller(name, config, &context))?;
+        Ok(Some(Steering::new(section.settings.plugin, plugin)))
+    }
+}
+
+/// The sections of an array of tables.
+fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, ConfigError> {
+    let Some(value) = value else { return Ok(Vec::new()) };
+    let span = value.span();
+    match value.into_inner() {
+        DeValue::Array(items) => Ok(items.into_iter().collect()),
+        _ => {
+            let message = format!("`{name}` is a list: write [[{name}]] with double brackets");
+            Err(ConfigError { message, span: Some(span) })
+        }
+    }
+}
+
+/// Mistakes that parse.
+fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), ConfigError> {
+    for (slot, place) in detectors.iter().zip(places) {
+        let DetectorSettings { plugin, roles, every, offset } = &slot.settings;
+        let (message, span) = if *every == 0 {
+            ("`every` must be at least 1".into(), &place.every)
+        } else if offset >= every {
+            let message = format!("`offset` must be below `every`: {offset} is not below {every}");
+            (message, &place.offset)
+        } else if roles.is_empty() {
+            let message = format!("`{plugin}` has no role: name discover, follow or weigh");
+            (message, &place.roles)
+        } else if roles.contains(&Role::Weigh) && slot.plugin.likelihood().is_none() {
+            let message = format!("`{plugin}` cannot weigh scenes: remove the role weigh");
+            (message, &place.roles)
+        } else {
+            continue;
+        };
+        let span = span.clone().or_else(|| Some(place.section.clone()));
+        return Err(ConfigError { message, span });
+    }
+    if !detectors.iter().any(|slot| slot.settings.roles.contains(&Role::Discover)) {
+        let message = "no detector discovers anybody: give one of [[detectors]] the role discover";
+        return Err(ConfigError {
+            message: message.into(),
+            span: places.first().map(|p| p.section.clone()),
+        });
+    }
+    Ok(())
+}
+
+fn check_weighing(
+    filter: &Slot<dyn Filter>,
+    detectors: &[DetectorSlot],
+    span: Range<usize>,
+) -> Result<(), ConfigError> {
+    let weighs = |slot: &DetectorSlot| slot.settings.roles.contains(&Role::Weigh);
+    if !filter.plugin.weighs_scenes() || detectors.iter().any(weighs) {
+        return Ok(());
+    }
+    let message = format!(
+        "`{}` weighs scenes, and no detector does that for it: \
+         add the role weigh to a detector that has a likelihood",
+        filter.name
+    );
+    Err(ConfigError { message, span: Some(span) })
+}
+
+/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+fn mix(seed: u64) -> u64 {
+    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}

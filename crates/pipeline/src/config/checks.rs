@@ -1,0 +1,125 @@
+use tagalong_core::ConfigError;
+use toml::Spanned;
+use toml::de::DeTable;
+
+use crate::PipelineSettings;
+
+/// What a number must be.
+#[derive(Clone, Copy)]
+enum Must {
+    Positive,
+    NotNegative,
+    Fraction,
+    Finite,
+    Number,
+    AtLeast(f64, &'static str),
+    AtMost(f64, &'static str),
+}
+
+impl Must {
+    fn accepts(self, value: f64) -> bool {
+        match self {
+            Self::Positive => value.is_finite() && value > 0.0,
+            Self::NotNegative => value.is_finite() && value >= 0.0,
+            Self::Fraction => value > 0.0 && value <= 1.0,
+            Self::Finite => value.is_finite(),
+            Self::Number => !value.is_nan(),
+            Self::AtLeast(limit, _) => value >= limit,
+            Self::AtMost(limit, _) => value <= limit,
+        }
+    }
+
+    fn words(self) -> String {
+        match self {
+            Self::Positive => "positive".into(),
+            Self::NotNegative => "at least 0".into(),
+            Self::Fraction => "above 0 and at most 1".into(),
+            Self::Finite => "finite".into(),
+            Self::Number => "a number".into(),
+            Self::AtLeast(limit, what) => format!("at least {limit}{what}"),
+            Self::AtMost(limit, what) => format!("at most {limit}{what}"),
+        }
+    }
+}
+
+/// Refuses settings that parse but cannot work.
+pub(super) fn check(settings: &PipelineSettings, root: &DeTable<'_>) -> Result<(), ConfigError> {
+    for (section, key, value, must) in rules(settings) {
+        if !must.accepts(value) {
+            let message = format!("`{section}.{key}` must be {}, not {value}", must.words());
+            let entry = root.get(section).and_then(|t| t.get_ref().as_table()?.get(key));
+            return Err(ConfigError { message, span: entry.map(Spanned::span) });
+        }
+    }
+    if i64::try_from(settings.seed).is_err() {
+        return Err(ConfigError::new(format!("`seed` must be at most {}", i64::MAX)));
+    }
+    Ok(())
+}
+
+type Rule = (&'static str, &'static str, f64, Must);
+
+fn rules(settings: &PipelineSettings) -> Vec<Rule> {
+    let PipelineSettings { robot, clock, occlusion, .. } = settings;
+    let mut rules = vec![
+        ("robot", "wheel_half_separation_m", robot.wheel_half_separation_m, Must::Positive),
+        ("robot", "wheel_slip", robot.wheel_slip, Must::NotNegative),
+        ("robot", "max_speed_mps", robot.max_speed_mps, Must::Positive),
+        ("clock", "max_back_s", clock.max_back_s, Must::NotNegative),
+        ("clock", "max_gap_s", clock.max_gap_s, Must::Positive),
+        ("clock", "reset_gap_s", clock.reset_gap_s, Must::Finite),
+        (
+            "clock",
+            "reset_gap_s",
+            clock.reset_gap_s,
+            Must::AtLeast(clock.max_gap_s, ", as `max_gap_s`"),
+        ),
+        ("occlusion", "min_visible", occlusion.min_visible, Must::Fraction),
+        ("occlusion", "min_gap_m", occlusion.min_gap_m, Must::NotNegative),
+        ("occlusion", "min_gap_sigmas", occlusion.min_gap_sigmas, Must::NotNegative),
+    ];
+    rules.extend(association_rules(settings));
+    rules.extend(lifecycle_rules(settings));
+    rules
+}
+
+fn association_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
+    let s = &settings.association;
+    [
+        ("gate", s.gate, Must::Positive),
+        ("gate_m", s.gate_m, Must::Positive),
+        ("gate_speed_mps", s.gate_speed_mps, Must::NotNegative),
+        ("min_overlap", s.min_overlap, Must::Fraction),
+        ("miss_factor", s.miss_factor, Must::Positive),
+        ("same_person_m", s.same_person_m, Must::NotNegative),
+        ("same_person_iou", s.same_person_iou, Must::Fraction),
+        ("max_detections", s.max_detections as f64, Must::Positive),
+    ]
+    .into_iter()
+    .map(|(key, value, must)| ("association", key, value, must))
+}
+
+fn lifecycle_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
+    let s = &settings.lifecycle;
+    let hits = f64::from(s.confirm_hits);
+    [
+        ("start_score", s.start_score, Must::Finite),
+        ("confirm_hits", hits, Must::Positive),
+        ("confirm_within", f64::from(s.confirm_within), Must::AtMost(32.0, "")),
+        ("confirm_within", f64::from(s.confirm_within), Must::AtLeast(hits, ", as `confirm_hits`")),
+        ("confirm_score", s.confirm_score, Must::Number),
+        ("tentative_misses", f64::from(s.tentative_misses), Must::Positive),
+        ("drop_after_s", s.drop_after_s, Must::NotNegative),
+        ("drop_after_misses", f64::from(s.drop_after_misses), Must::Positive),
+        ("left_drop_after_s", s.left_drop_after_s, Must::NotNegative),
+        ("occluded_drop_after_s", s.occluded_drop_after_s, Must::NotNegative),
+        ("score_weight", s.score_weight, Must::Fraction),
+        ("miss_score", s.miss_score, Must::Finite),
+        ("drop_score", s.drop_score, Must::Number),
+        ("drop_score", s.drop_score, Must::AtMost(s.start_score, ", as `start_score`")),
+        ("duplicate_m", s.duplicate_m, Must::NotNegative),
+        ("max_tracks", s.max_tracks as f64, Must::Positive),
+    ]
+    .into_iter()
+    .map(|(key, value, must)| ("lifecycle", key, value, must))
+}

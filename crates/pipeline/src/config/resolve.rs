@@ -1,0 +1,59 @@
+use tagalong_core::{ConfigError, Registry};
+use toml::{Table, Value};
+
+use crate::settings::{DetectorSettings, PipelineSettings};
+
+/// The config with every default filled in, of the plugins too.
+pub(super) fn resolve(
+    text: &str,
+    settings: &PipelineSettings,
+    registry: &Registry,
+) -> Result<String, ConfigError> {
+    let mut root: Table = toml::from_str(text)?;
+    root.extend(table_of(settings)?);
+    for (name, value) in &mut root {
+        match (name.as_str(), value) {
+            ("detectors", Value::Array(sections)) => {
+                for section in sections {
+                    fill(section, table_of(&DetectorSettings::default())?);
+                    fill_config(section, registry)?;
+                }
+            }
+            ("verifiers", Value::Array(sections)) => {
+                for section in sections {
+                    fill_config(section, registry)?;
+                }
+            }
+            ("filter" | "controller", section) => fill_config(section, registry)?,
+            _ => {}
+        }
+    }
+    toml::to_string(&root).map_err(|error| ConfigError::new(error.to_string()))
+}
+
+fn fill_config(section: &mut Value, registry: &Registry) -> Result<(), ConfigError> {
+    let name = section.get("plugin").and_then(Value::as_str).unwrap_or_default();
+    let defaults = toml::from_str(&registry.find(name)?.defaults())?;
+    if let Value::Table(table) = section {
+        fill(table.entry("config").or_insert_with(|| Value::Table(Table::new())), defaults);
+    }
+    Ok(())
+}
+
+/// Adds what is missing, table by table.
+fn fill(value: &mut Value, defaults: Table) {
+    let Value::Table(table) = value else { return };
+    for (key, default) in defaults {
+        match (table.get_mut(&key), default) {
+            (None, default) => {
+                table.insert(key, default);
+            }
+            (Some(inner), Value::Table(default)) => fill(inner, default),
+            (Some(_), _) => {}
+        }
+    }
+}
+
+fn table_of<T: serde::Serialize>(settings: &T) -> Result<Table, ConfigError> {
+    Table::try_from(settings).map_err(|error| ConfigError::new(error.to_string()))
+}

@@ -1,0 +1,217 @@
+//! When tracks start, count as confirmed, and end.
+
+use std::collections::BTreeMap;
+
+use tagalong_core::{Estimate, Track, TrackId};
+
+use crate::LifecycleSettings;
+
+/// What one frame says of one track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Sight {
+    /// Supported by evidence: score and detector of the detection, if that was it.
+    Seen(Option<(f64, usize)>),
+    /// It should have been seen and was not.
+    Missed,
+    /// The detector that sees it did not work on this frame.
+    NotAsked,
+    /// Hidden behind a nearer person.
+    Hidden,
+    /// Outside the image.
+    Outside,
+}
+
+/// What is kept of a track beside the filter's belief.
+#[derive(Clone, Debug)]
+pub(crate) struct Life {
+    pub(crate) score: f64,
+    pub(crate) confirmed: bool,
+    /// The detector that saw it last.
+    pub(crate) detector: Option<usize>,
+    sight: Sight,
+    age: u32,
+    unseen_s: f64,
+    misses: u32,
+    /// Hits (1) and misses (0) of the last frames, newest in the lowest bit.
+    recent: u32,
+}
+
+/// All tracks of a pipeline.
+pub(crate) struct Lifecycle {
+    settings: LifecycleSettings,
+    lives: BTreeMap<TrackId, Life>,
+    started: u32,
+    /// For pairs that were near each other: in which of the last five frames.
+    near: BTreeMap<(TrackId, TrackId), u8>,
+}
+
+impl Lifecycle {
+    pub(crate) fn new(settings: LifecycleSettings) -> Self {
+        Self { settings, lives: BTreeMap::new(), started: 0, near: BTreeMap::new() }
+    }
+
+    pub(crate) fn settings(&self) -> &LifecycleSettings {
+        &self.settings
+    }
+
+    pub(crate) fn ids(&self) -> Vec<TrackId> {
+        self.lives.keys().copied().collect()
+    }
+
+    pub(crate) fn get(&self, id: TrackId) -> Option<&Life> {
+        self.lives.get(&id)
+    }
+
+    pub(crate) fn tentative_ids(&self) -> Vec<TrackId> {
+        self.lives.iter().filter(|(_, life)| !life.confirmed).map(|(id, _)| *id).collect()
+    }
+
+    /// A new track; `None` when all numbers are used up.
+    pub(crate) fn start(&mut self, score: f64, detector: usize) -> Option<TrackId> {
+        self.started = self.started.checked_add(1)?;
+        let id = TrackId(self.started);
+        let life = Life {
+            score,
+            confirmed: score >= self.settings.confirm_score || self.settings.confirm_hits <= 1,
+            detector: Some(detector),
+            sight: Sight::Seen(Some((score, detector))),
+            age: 0,
+            unseen_s: 0.0,
+            misses: 0,
+            recent: 1,
+        };
+        self.lives.insert(id, life);
+        Some(id)
+    }
+
+    pub(crate) fn end(&mut self, id: TrackId) {
+        self.lives.remove(&id);
+        self.near.retain(|(a, b), _| *a != id && *b != id);
+    }
+
+    /// Time passes for everybody.
+    pub(crate) fn grow_older(&mut self, dt_s: f64) {
+        for life in self.lives.values_mut() {
+            life.age = life.age.saturating_add(1);
+            life.unseen_s += dt_s;
+        }
+    }
+
+    /// Takes in what a frame says of a track; returns the test by which it
+    /// ends, if it does.
+    pub(crate) fn advance(&mut self, id: TrackId, sight: Sight) -> Option<&'static str> {
+        let life = self.lives.get_mut(&id)?;
+        life.sight = sight;
+        match sight {
+            Sight::Seen(detection) => life.see(detection, &self.settings),
+            Sight::Missed => life.miss(&self.settings),
+            Sight::NotAsked | Sight::Hidden | Sight::Outside => {}
+        }
+        life.is_over(&self.settings)
+    }
+
+    /// Tracks that are of the same person as an older one (SPENCER's rule: too
+    /// near in 3 of 5 frames). The older one takes over the confirmation.
+    pub(crate) fn duplicates(&mut self, estimates: &BTreeMap<TrackId, Estimate>) -> Vec<TrackId> {
+        let mut near = BTreeMap::new();
+        let mut doubles: Vec<TrackId> = Vec::new();
+        for (older, a) in estimates {
+            for (younger, b) in
+                estimates.range((std::ops::Bound::Excluded(*older), std::ops::Bound::Unbounded))
+            {
+                let apart = (a.person.position.xy() - b.person.position.xy()).norm();
+                let before = self.near.get(&(*older, *younger)).copied().unwrap_or_default();
+                let now = before << 1 & 0b11111 | u8::from(apart < self.settings.duplicate_m);
+                if now > 0 {
+                    near.insert((*older, *younger), now);
+                }
+                if now.count_ones() >= 3 && !doubles.contains(older) && !doubles.contains(younger) {
+                    self.hand_over(*younger, *older);
+                    doubles.push(*younger);
+                }
+            }
+        }
+        self.near = near;
+        doubles
+    }
+
+    fn hand_over(&mut self, younger: TrackId, older: TrackId) {
+        let confirmed = self.lives.get(&younger).is_some_and(|life| life.confirmed);
+        if let Some(life) = self.lives.get_mut(&older) {
+            life.confirmed |= confirmed;
+        }
+    }
+
+    /// The tracks that are too many, lowest scores first.
+    pub(crate) fn too_many(&self) -> Vec<TrackId> {
+        let mut all: Vec<_> = self.lives.iter().map(|(id, life)| (life.score, *id)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        let excess = all.len().saturating_sub(self.settings.max_tracks);
+        all.into_iter().take(excess).map(|(_, id)| id).collect()
+    }
+
+    /// The track in the common words.
+    pub(crate) fn track(&self, id: TrackId, estimate: Estimate) -> Option<Track> {
+        let life = self.lives.get(&id)?;
+        Some(Track {
+            id,
+            estimate,
+            seen: matches!(life.sight, Sight::Seen(_)),
+            occluded: life.sight == Sight::Hidden,
+            confirmed: life.confirmed,
+            age: life.age,
+            unseen_s: life.unseen_s,
+            score: life.score,
+        })
+    }
+}
+
+impl Life {
+    fn see(&mut self, detection: Option<(f64, usize)>, settings: &LifecycleSettings) {
+        self.unseen_s = 0.0;
+        self.misses = 0;
+        self.remember(true, settings);
+        if let Some((score, detector)) = detection {
+            self.detector = Some(detector);
+            self.score += settings.score_weight * (score - self.score);
+            self.confirmed |= score >= settings.confirm_score;
+        }
+        let is_likely = self.score >= settings.start_score;
+        self.confirmed |= is_likely && self.recent.count_ones() >= settings.confirm_hits;
+    }
+
+    fn miss(&mut self, settings: &LifecycleSettings) {
+        self.misses = self.misses.saturating_add(1);
+        self.remember(false, settings);
+        if self.score > settings.miss_score {
+            self.score += settings.score_weight * (settings.miss_score - self.score);
+        }
+    }
+
+    fn remember(&mut self, hit: bool, settings: &LifecycleSettings) {
+        let window = u32::MAX >> (32 - settings.confirm_within.clamp(1, 32));
+        self.recent = (self.recent << 1 | u32::from(hit)) & window;
+    }
+
+    fn is_over(&self, settings: &LifecycleSettings) -> Option<&'static str> {
+        let longer_than = |limit_s: f64| self.unseen_s > limit_s;
+        if self.score < settings.drop_score {
+            return Some("track: score");
+        }
+        if !self.confirmed && self.misses >= settings.tentative_misses {
+            return Some("track: not confirmed");
+        }
+        let (over, test) = match self.sight {
+            Sight::Seen(_) => (false, ""),
+            Sight::Hidden => {
+                (longer_than(settings.occluded_drop_after_s), "track: hidden too long")
+            }
+            Sight::Outside => (longer_than(settings.left_drop_after_s), "track: left the image"),
+            Sight::Missed | Sight::NotAsked => {
+                let missed = self.misses >= settings.drop_after_misses;
+                (missed && longer_than(settings.drop_after_s), "track: not seen")
+            }
+        };
+        over.then_some(test)
+    }
+}

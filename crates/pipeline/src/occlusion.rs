@@ -1,0 +1,151 @@
+//! Who is hidden behind whom (P4, section III-C): silhouettes are painted at
+//! the predicted places, near over far.
+
+use nalgebra::{Matrix3, Point2, Point3};
+use tagalong_core::{Camera, Rect};
+
+use crate::OcclusionSettings;
+
+/// Points a side at which a silhouette is looked at.
+const SAMPLES: usize = 16;
+
+/// Somebody found in this frame, who may hide others.
+pub(crate) struct Cover {
+    region: Rect,
+    range_m: f64,
+    sigma_m: f64,
+}
+
+/// Why a person may not be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Visibility {
+    /// There is no reason.
+    Visible,
+    /// Hidden behind somebody.
+    Hidden,
+    /// Outside the image.
+    Outside,
+}
+
+impl Cover {
+    pub(crate) fn new(
+        region: Rect,
+        position: &Point3<f64>,
+        covariance: &Matrix3<f64>,
+        camera: &Camera,
+    ) -> Self {
+        let ray = position.coords - camera.robot_from_camera.translation.vector;
+        let direction = ray / ray.norm().max(1e-9);
+        let variance = (direction.transpose() * covariance * direction).x;
+        Self { region, range_m: ray.norm(), sigma_m: variance.max(0.0).sqrt() }
+    }
+}
+
+/// Distance of a point in the robot frame from the camera, m.
+pub(crate) fn range_m(position: &Point3<f64>, camera: &Camera) -> f64 {
+    (position.coords - camera.robot_from_camera.translation.vector).norm()
+}
+
+/// Whether a person at `position`, expected at `region`, can be seen.
+///
+/// The gap in range is held against the uncertainty of the nearer person only:
+/// that of the hidden one grows while they are hidden, which must not end the
+/// occlusion.
+pub(crate) fn visibility(
+    region: &Rect,
+    position: &Point3<f64>,
+    covers: &[Cover],
+    camera: &Camera,
+    settings: &OcclusionSettings,
+) -> Visibility {
+    let range = range_m(position, camera);
+    let in_front: Vec<&Cover> = covers
+        .iter()
+        .filter(|c| range - c.range_m > settings.min_gap_m.max(settings.min_gap_sigmas * c.sigma_m))
+        .collect();
+    let image = Rect::new(0.0, 0.0, camera.width as f64, camera.height as f64);
+    let (mut all, mut inside, mut visible) = (0_u32, 0_u32, 0_u32);
+    for point in silhouette(region) {
+        all += 1;
+        if image.contains(point) {
+            inside += 1;
+            visible += u32::from(!in_front.iter().any(|c| is_on_body(&c.region, point)));
+        }
+    }
+    let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
+    match (all > 0 && enough(inside), enough(visible)) {
+        (false, _) => Visibility::Outside,
+        (true, false) => Visibility::Hidden,
+        (true, true) => Visibility::Visible,
+    }
+}
+
+/// Points spread evenly over head and shoulders.
+fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
+    let region = *region;
+    let step = 1.0 / SAMPLES as f64;
+    let grid = (0..SAMPLES * SAMPLES).map(move |i| {
+        let (u, v) = ((i % SAMPLES) as f64 + 0.5, (i / SAMPLES) as f64 + 0.5);
+        Point2::new(region.x + u * step * region.width, region.y + v * step * region.height)
+    });
+    grid.filter(move |point| is_on_body(&region, *point))
+}
+
+/// True on the silhouette of the person whose upper-body square is `region`:
+/// head and shoulders as wide as the upper-body template of Jafari et al.
+/// (ICRA 2014), and the trunk below them.
+fn is_on_body(region: &Rect, point: Point2<f64>) -> bool {
+    let across = ((point.x - region.x) / region.width - 0.5).abs();
+    let down = (point.y - region.y) / region.height;
+    let half_width = match down {
+        d if d < 0.05 => 0.0,
+        d if d < 0.50 => 0.165,
+        d if d < 0.80 => 0.165 + (d - 0.50) * 0.85,
+        d if d < 2.50 => 0.42,
+        _ => 0.0,
+    };
+    across < half_width
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    }
+
+    fn behind(near: Point3<f64>, sigma_m: f64, far: Point3<f64>) -> Visibility {
+        let camera = camera();
+        let covariance = Matrix3::identity() * (sigma_m * sigma_m);
+        let cover = Cover::new(camera.upper_body(&near), &near, &covariance, &camera);
+        let region = camera.upper_body(&far);
+        visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
+    }
+
+    #[test]
+    fn a_person_behind_another_is_hidden_and_one_beside_is_not() {
+        let near = Point3::new(2.0, 0.0, 1.6);
+        assert_eq!(behind(near, 0.05, Point3::new(3.5, 0.0, 1.6)), Visibility::Hidden);
+        assert_eq!(behind(near, 0.05, Point3::new(3.5, 1.2, 1.6)), Visibility::Visible);
+    }
+
+    #[test]
+    fn nobody_hides_a_person_at_the_same_range_or_nearer() {
+        let near = Point3::new(2.0, 0.0, 1.6);
+        assert_eq!(behind(near, 0.05, Point3::new(2.2, 0.0, 1.6)), Visibility::Visible);
+        assert_eq!(behind(near, 0.05, Point3::new(1.5, 0.0, 1.5)), Visibility::Visible);
+        assert_eq!(behind(near, 0.6, Point3::new(3.5, 0.0, 1.6)), Visibility::Visible);
+    }
+
+    #[test]
+    fn who_left_the_image_is_outside() {
+        let near = Point3::new(2.0, 0.0, 1.6);
+        assert_eq!(behind(near, 0.05, Point3::new(3.0, 3.0, 1.6)), Visibility::Outside);
+        assert_eq!(behind(near, 0.05, Point3::new(-2.0, 0.0, 1.6)), Visibility::Outside);
+    }
+}

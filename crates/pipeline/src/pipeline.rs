@@ -1,0 +1,521 @@
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use tagalong_core::{
+    Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched, Motion,
+    Scene, Search, Support, Track, TrackId, Verifier, WheelSpeeds,
+};
+
+use crate::boundary::{contain, guard};
+use crate::clock::{Clock, Tick};
+use crate::control::{Steering, limited};
+use crate::lifecycle::{Lifecycle, Sight};
+use crate::occlusion::{Cover, Visibility, range_m, visibility};
+use crate::sightings::{Rules, Sighting, Sightings};
+use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role, StepError};
+
+/// Plugins and the rules by which they work together.
+pub struct Pipeline {
+    pub(crate) settings: PipelineSettings,
+    pub(crate) detectors: Vec<DetectorSlot>,
+    pub(crate) verifiers: Vec<Slot<dyn Verifier>>,
+    pub(crate) filter: Slot<dyn Filter>,
+    pub(crate) steering: Option<Steering>,
+    pub(crate) resolved: String,
+    pub(crate) clock: Clock,
+    pub(crate) lifecycle: Lifecycle,
+    /// Processed frames.
+    pub(crate) frames: u64,
+    pub(crate) failed: Option<u64>,
+}
+
+/// A plugin under its name.
+pub(crate) struct Slot<P: ?Sized> {
+    pub(crate) name: String,
+    pub(crate) plugin: Box<P>,
+}
+
+/// A detector and what it is used for.
+pub(crate) struct DetectorSlot {
+    pub(crate) settings: DetectorSettings,
+    pub(crate) plugin: Box<dyn Detector>,
+}
+
+impl DetectorSlot {
+    fn has(&self, role: Role) -> bool {
+        self.settings.roles.contains(&role)
+    }
+
+    fn is_due(&self, frame: u64) -> bool {
+        frame % u64::from(self.settings.every.max(1)) == u64::from(self.settings.offset)
+    }
+}
+
+/// What is known of the frame that is being processed.
+struct Now<'f> {
+    frame: &'f Frame,
+    dt_s: f64,
+    /// All tracks, predicted to this frame, near to far.
+    expected: Vec<Track>,
+    sightings: Sightings,
+    /// Detectors that work on this frame.
+    due: Vec<usize>,
+    supports: BTreeMap<TrackId, Support>,
+    report: FrameReport,
+    lap: Instant,
+}
+
+impl<'f> Now<'f> {
+    fn new(frame: &'f Frame) -> Self {
+        Self {
+            frame,
+            dt_s: 0.0,
+            expected: Vec::new(),
+            sightings: Sightings::default(),
+            due: Vec::new(),
+            supports: BTreeMap::new(),
+            report: FrameReport::new(frame.index, frame.stamp),
+            lap: Instant::now(),
+        }
+    }
+
+    fn lap(&mut self, stage: &'static str) {
+        let now = Instant::now();
+        let spent_ms = (now - self.lap).as_secs_f64() * 1e3;
+        self.report.timings.push((stage, spent_ms));
+        self.lap = now;
+    }
+
+    fn finish(mut self) -> FrameReport {
+        self.report.candidates = self.sightings.into_candidates(&mut self.report.funnel);
+        self.report
+    }
+}
+
+const STAGES: [&str; 8] =
+    ["predict", "follow", "discover", "associate", "update", "life cycle", "learn", "control"];
+
+impl Pipeline {
+    /// Takes one frame through the pipeline.
+    ///
+    /// # Errors
+    /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then:
+    /// each further call fails.
+    pub fn step(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
+        if let Some(failed) = self.failed {
+            return Err(StepError::Stopped { frame: failed });
+        }
+        let report = self.process(frame);
+        if report.is_err() {
+            self.failed = Some(frame.index);
+        }
+        report
+    }
+
+    /// The stages that [`FrameReport::timings`] names, in their order.
+    pub fn stage_names(&self) -> &'static [&'static str] {
+        &STAGES
+    }
+
+    /// The config with every default filled in, as TOML.
+    pub fn resolved(&self) -> String {
+        self.resolved.clone()
+    }
+
+    fn process(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
+        let mut now = Now::new(frame);
+        let motion = match self.clock.tick(frame, &mut now.report.funnel) {
+            Tick::Skip(outcome) => return Ok(FrameReport { outcome, ..now.report }),
+            Tick::Go(outcome, motion) => {
+                now.report.outcome = outcome;
+                motion
+            }
+        };
+        self.break_off(&mut now)?;
+        self.predict(&mut now, motion)?;
+        now.lap(STAGES[0]);
+        self.follow(&mut now)?;
+        now.lap(STAGES[1]);
+        self.discover(&mut now)?;
+        now.lap(STAGES[2]);
+        self.associate(&mut now);
+        now.lap(STAGES[3]);
+        self.update(&mut now)?;
+        now.lap(STAGES[4]);
+        self.live(&mut now)?;
+        now.lap(STAGES[5]);
+        self.learn(&mut now)?;
+        now.lap(STAGES[6]);
+        self.steer(&mut now)?;
+        now.lap(STAGES[7]);
+        self.frames += 1;
+        Ok(now.finish())
+    }
+
+    /// Ends the tracks that a jump of the clock cuts off.
+    fn break_off(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        let (ids, test) = match now.report.outcome {
+            Outcome::ResetBackward { .. } => (self.lifecycle.ids(), "track: clock set back"),
+            Outcome::ResetForward { .. } => (self.lifecycle.ids(), "track: clock jumped ahead"),
+            Outcome::Gap { .. } => (self.lifecycle.tentative_ids(), "track: gap in the log"),
+            _ => return Ok(()),
+        };
+        if !matches!(now.report.outcome, Outcome::Gap { .. })
+            && let Some(steering) = &mut self.steering
+        {
+            steering.reset();
+        }
+        ids.into_iter().try_for_each(|id| self.end(now, id, test))
+    }
+
+    /// Every belief, into the robot's new frame; then whom to expect where.
+    fn predict(&mut self, now: &mut Now<'_>, motion: Option<Motion>) -> Result<(), StepError> {
+        if let Some(motion) = motion {
+            now.dt_s = motion.dt;
+            let Slot { name, plugin: filter } = &mut self.filter;
+            contain(name, now.frame.index, || filter.predict(&motion))?;
+            self.lifecycle.grow_older(motion.dt);
+        }
+        now.due = self.due();
+        let estimates = self.estimates(now)?;
+        now.expected = self.tracks(now.frame, estimates);
+        Ok(())
+    }
+
+    /// Where is each expected person now? Near to far; whoever a found, nearer
+    /// person hides is not looked for.
+    fn follow(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        let followers = self.due_with(now, Role::Follow);
+        if followers.is_empty() {
+            return Ok(());
+        }
+        let mut covers: Vec<Cover> = Vec::new();
+        for track in now.expected.clone() {
+            if self.visibility(now.frame, &track, &covers) != Visibility::Visible {
+                continue;
+            }
+            let Some(found) = self.find(now, &followers, &track)? else { continue };
+            let Detection { region, position, covariance, .. } = &found.detection;
+            covers.push(Cover::new(*region, position, covariance, &now.frame.camera));
+            now.sightings.add(Sighting { fate: Some(Fate::Matched(track.id)), ..found });
+        }
+        Ok(())
+    }
+
+    /// The best sighting of one track.
+    fn find(
+        &mut self,
+        now: &mut Now<'_>,
+        followers: &[usize],
+        track: &Track,
+    ) -> Result<Option<Sighting>, StepError> {
+        let mut best: Option<Sighting> = None;
+        for &index in followers {
+            for sighting in self.detect(now, index, &Search::Near(track))? {
+                let test = self.rules(now).misfit(track, &sighting).or_else(|| {
+                    let better = |b: &Sighting| b.detection.score >= sighting.detection.score;
+                    best.as_ref().is_some_and(better).then_some("not the best sighting")
+                });
+                let dropped = match test {
+                    Some(test) => Some((sighting, test)),
+                    None => best.replace(sighting).map(|worse| (worse, "not the best sighting")),
+                };
+                if let Some((sighting, test)) = dropped {
+                    now.sightings.add(Sighting { fate: Some(Fate::Dropped(test)), ..sighting });
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// Who is here that was not found yet?
+    fn discover(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        let occupied: Vec<Detection> =
+            now.sightings.matched().map(|(_, s)| s.detection.clone()).collect();
+        for index in self.due_with(now, Role::Discover) {
+            let search = Search::Everywhere { occupied: &occupied };
+            for sighting in self.detect(now, index, &search)? {
+                now.sightings.add(sighting);
+            }
+        }
+        now.sightings.limit(self.settings.association.max_detections);
+        Ok(())
+    }
+
+    fn associate(&mut self, now: &mut Now<'_>) {
+        let rules = self.rules(now);
+        now.sightings.merge(&now.expected, &rules);
+        now.sightings.associate(&now.expected, &rules);
+    }
+
+    /// Hands the evidence to the filter.
+    fn update(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        let matched: Vec<Matched<'_>> = now
+            .sightings
+            .matched()
+            .map(|(id, s)| Matched { id, detection: &s.detection })
+            .collect();
+        let unmatched: Vec<Detection> = now
+            .sightings
+            .undecided()
+            .into_iter()
+            .map(|i| now.sightings.get(i).detection.clone())
+            .collect();
+        let likelihood = likelihood(&self.detectors);
+        let evidence =
+            Evidence { frame: now.frame, matched: &matched, unmatched: &unmatched, likelihood };
+        let Slot { name, plugin: filter } = &mut self.filter;
+        now.supports = guard(name, now.frame.index, || filter.update(&evidence))?;
+        self.check_supports(now);
+        Ok(())
+    }
+
+    /// A filter may support only tracks that live, by finite numbers.
+    fn check_supports(&self, now: &mut Now<'_>) {
+        let before = now.supports.len();
+        now.supports.retain(|id, _| self.lifecycle.get(*id).is_some());
+        let unknown = before - now.supports.len();
+        now.report.funnel.drop_many("support of an unknown track", unknown as u64);
+        now.sightings.reject(|id| now.supports.contains_key(&id), "filter");
+        for (id, support) in &now.supports {
+            match support.nis {
+                Some((nis, dof)) if nis.is_finite() => now.report.nis.push((*id, nis, dof)),
+                Some(_) => now.report.funnel.drop_many("nis not finite", 1),
+                None => {}
+            }
+        }
+    }
+
+    /// Newcomers start; who was not seen for too long ends.
+    fn live(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        let newcomers = self.start_newcomers(now)?;
+        let estimates = self.estimates(now)?;
+        let covers: Vec<Cover> = now
+            .supports
+            .keys()
+            .chain(&newcomers)
+            .filter_map(|id| estimates.get(id))
+            .map(|e| cover(e, now.frame))
+            .collect();
+        for track in self.tracks(now.frame, estimates.clone()) {
+            if newcomers.contains(&track.id) {
+                continue;
+            }
+            let sight = self.sight(now, &track, &covers);
+            if let Some(test) = self.lifecycle.advance(track.id, sight) {
+                self.end(now, track.id, test)?;
+            }
+        }
+        self.thin_out(now, &estimates)?;
+        now.report.tracks = self.tracks(now.frame, estimates);
+        Ok(())
+    }
+
+    /// Detections that belong to nobody start tracks.
+    fn start_newcomers(&mut self, now: &mut Now<'_>) -> Result<BTreeSet<TrackId>, StepError> {
+        let mut started = BTreeSet::new();
+        let start_score = self.settings.lifecycle.start_score;
+        for index in now.sightings.undecided() {
+            let sighting = now.sightings.get(index).clone();
+            if sighting.detection.score < start_score {
+                now.sightings.settle(index, Fate::Dropped(sighting.score_test(start_score)));
+                continue;
+            }
+            let Some(id) = self.lifecycle.start(sighting.detection.score, sighting.detector) else {
+                now.sightings.settle(index, Fate::Dropped("no track numbers left"));
+                continue;
+            };
+            let Slot { name, plugin: filter } = &mut self.filter;
+            contain(name, now.frame.index, || filter.start(id, &sighting.detection))?;
+            now.sightings.settle(index, Fate::Started(id));
+            started.insert(id);
+        }
+        Ok(started)
+    }
+
+    /// What this frame says of a track.
+    fn sight(&self, now: &Now<'_>, track: &Track, covers: &[Cover]) -> Sight {
+        if now.supports.contains_key(&track.id) {
+            let sighting = now.sightings.of_track(track.id);
+            return Sight::Seen(sighting.map(|s| (s.detection.score, s.detector)));
+        }
+        match self.visibility(now.frame, track, covers) {
+            Visibility::Hidden => Sight::Hidden,
+            Visibility::Outside => Sight::Outside,
+            Visibility::Visible if self.was_asked(now, track.id) => Sight::Missed,
+            Visibility::Visible => Sight::NotAsked,
+        }
+    }
+
+    /// True if who saw the track last had a look at this frame. The silence of
+    /// a detector on a frame that is another's turn is no miss.
+    fn was_asked(&self, now: &Now<'_>, id: TrackId) -> bool {
+        let detector = self.lifecycle.get(id).and_then(|life| life.detector);
+        self.filter.plugin.weighs_scenes() || detector.is_none_or(|d| now.due.contains(&d))
+    }
+
+    /// Ends duplicates and what exceeds the limit.
+    fn thin_out(
+        &mut self,
+        now: &mut Now<'_>,
+        estimates: &BTreeMap<TrackId, Estimate>,
+    ) -> Result<(), StepError> {
+        let mut alive = estimates.clone();
+        alive.retain(|id, _| self.lifecycle.get(*id).is_some());
+        for id in self.lifecycle.duplicates(&alive) {
+            self.end(now, id, "track: duplicate")?;
+        }
+        for id in self.lifecycle.too_many() {
+            self.end(now, id, "track: too many")?;
+        }
+        Ok(())
+    }
+
+    /// Appearance models adapt.
+    fn learn(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        for slot in &mut self.detectors {
+            let (frame, tracks) = (now.frame, &now.report.tracks);
+            guard(&slot.settings.plugin, frame.index, || slot.plugin.learn(frame, tracks))?;
+        }
+        Ok(())
+    }
+
+    /// Steers after the target; stops without one.
+    fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
+        let Some(steering) = &mut self.steering else { return Ok(()) };
+        let max_speed_mps = self.settings.robot.max_speed_mps;
+        let ready = steering.is_ready();
+        let target = if ready { steering.choose(&now.report.tracks) } else { None };
+        let confirmed: Vec<Track> =
+            now.report.tracks.iter().filter(|t| t.confirmed).cloned().collect();
+        let scene = Scene {
+            frame: now.frame,
+            target,
+            tracks: &confirmed,
+            wheels: self.settings.robot.wheels(),
+            max_speed_mps,
+        };
+        let name = steering.name.clone();
+        let wanted = contain(&name, now.frame.index, || steering.command(&scene))?;
+        let command = limited(wanted, max_speed_mps);
+        now.report.funnel.drop_many("command not finite", u64::from(command.is_none()));
+        let command = command.filter(|_| target.is_some()).unwrap_or(WheelSpeeds::STOP);
+        now.report.target = target.map(|t| t.id);
+        now.report.command = Some(command);
+        Ok(())
+    }
+
+    /// Asks a detector, and the verifiers about its answers.
+    fn detect(
+        &mut self,
+        now: &mut Now<'_>,
+        index: usize,
+        search: &Search<'_>,
+    ) -> Result<Vec<Sighting>, StepError> {
+        let (frame, slot) = (now.frame, &mut self.detectors[index]);
+        let funnel = &mut now.report.funnel;
+        let found = guard(&slot.settings.plugin, frame.index, || {
+            slot.plugin.detect(frame, search, funnel)
+        })?;
+        let mut sightings = Vec::new();
+        for detection in found {
+            if !detection.is_sane() {
+                funnel.drop_many("detection not finite", 1);
+                continue;
+            }
+            if let Some(sighting) = self.verify(frame, Sighting::new(detection, index), funnel)? {
+                sightings.push(sighting);
+            }
+        }
+        Ok(sightings)
+    }
+
+    /// Adds the verifiers' log-odds to the score.
+    fn verify(
+        &mut self,
+        frame: &Frame,
+        mut sighting: Sighting,
+        funnel: &mut Funnel,
+    ) -> Result<Option<Sighting>, StepError> {
+        let mut sum = 0.0;
+        for Slot { name, plugin: verifier } in &mut self.verifiers {
+            sum += guard(name, frame.index, || verifier.margin(frame, &sighting.detection))?;
+        }
+        if !sum.is_finite() {
+            funnel.drop_at("verifier not finite", sighting.detection.region);
+            return Ok(None);
+        }
+        sighting.detection.score += sum;
+        Ok(Some(sighting))
+    }
+
+    /// The beliefs of all tracks. One that is missing or not finite ends its
+    /// track: no such number leaves the pipeline.
+    fn estimates(&mut self, now: &mut Now<'_>) -> Result<BTreeMap<TrackId, Estimate>, StepError> {
+        let Slot { name, plugin: filter } = &mut self.filter;
+        let mut all = contain(name, now.frame.index, || filter.estimates(&now.frame.camera))?;
+        let before = all.len();
+        all.retain(|id, _| self.lifecycle.get(*id).is_some());
+        now.report.funnel.drop_many("estimate of an unknown track", (before - all.len()) as u64);
+        for id in self.lifecycle.ids() {
+            if !all.get(&id).is_some_and(Estimate::is_sane) {
+                all.remove(&id);
+                self.end(now, id, "track: estimate not finite")?;
+            }
+        }
+        Ok(all)
+    }
+
+    fn end(&mut self, now: &mut Now<'_>, id: TrackId, test: &'static str) -> Result<(), StepError> {
+        let Slot { name, plugin: filter } = &mut self.filter;
+        contain(name, now.frame.index, || filter.stop(id))?;
+        self.lifecycle.end(id);
+        now.supports.remove(&id);
+        now.report.nis.retain(|(track, _, _)| *track != id);
+        now.report.funnel.drop_many(test, 1);
+        now.report.ended.push(id);
+        Ok(())
+    }
+
+    /// Living tracks, near to far.
+    fn tracks(&self, frame: &Frame, estimates: BTreeMap<TrackId, Estimate>) -> Vec<Track> {
+        let mut tracks: Vec<Track> = estimates
+            .into_iter()
+            .filter_map(|(id, estimate)| self.lifecycle.track(id, estimate))
+            .collect();
+        let range = |t: &Track| range_m(&t.estimate.person.position, &frame.camera);
+        tracks.sort_by(|a, b| range(a).total_cmp(&range(b)).then(a.id.cmp(&b.id)));
+        tracks
+    }
+
+    fn visibility(&self, frame: &Frame, track: &Track, covers: &[Cover]) -> Visibility {
+        let Estimate { region, person, .. } = &track.estimate;
+        visibility(region, &person.position, covers, &frame.camera, &self.settings.occlusion)
+    }
+
+    fn rules(&self, now: &Now<'_>) -> Rules<'_> {
+        Rules {
+            association: &self.settings.association,
+            start_score: self.lifecycle.settings().start_score,
+            dt_s: now.dt_s,
+        }
+    }
+
+    fn due(&self) -> Vec<usize> {
+        (0..self.detectors.len()).filter(|i| self.detectors[*i].is_due(self.frames)).collect()
+    }
+
+    fn due_with(&self, now: &Now<'_>, role: Role) -> Vec<usize> {
+        now.due.iter().copied().filter(|i| self.detectors[*i].has(role)).collect()
+    }
+}
+
+/// Weighs scenes for the filter, where a detector is used for that.
+fn likelihood(detectors: &[DetectorSlot]) -> Option<&dyn Likelihood> {
+    detectors.iter().find(|slot| slot.has(Role::Weigh))?.plugin.likelihood()
+}
+
+fn cover(estimate: &Estimate, frame: &Frame) -> Cover {
+    let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    Cover::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
+}

@@ -1,0 +1,101 @@
+use tagalong_core::{Detection, Funnel, Stamp, Track, TrackId, WheelSpeeds};
+
+/// What became of a detection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It was given to this track.
+    Matched(TrackId),
+    /// It started this track.
+    Started(TrackId),
+    /// This test dropped it.
+    Dropped(&'static str),
+}
+
+/// A detection and what became of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The detection; its score includes the verifiers' margins.
+    pub detection: Detection,
+    /// What became of it.
+    pub fate: Fate,
+}
+
+/// What the stamp of a frame led to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Outcome {
+    /// An ordinary frame.
+    Tracked,
+    /// The same stamp as the frame before: not processed.
+    Duplicate,
+    /// Slightly older than the frame before: not processed.
+    OutOfOrder,
+    /// After a gap: processed, but tracks that were not confirmed ended.
+    Gap {
+        /// Time since the frame before, s.
+        by_s: f64,
+    },
+    /// The clock was set back: all tracks ended, then the frame was processed.
+    ResetBackward {
+        /// How far, s.
+        by_s: f64,
+    },
+    /// The clock jumped ahead: all tracks ended, then the frame was processed.
+    ResetForward {
+        /// Time since the frame before, s.
+        by_s: f64,
+    },
+}
+
+impl Outcome {
+    /// False for frames that left no trace in the pipeline.
+    pub fn is_processed(&self) -> bool {
+        !matches!(self, Self::Duplicate | Self::OutOfOrder)
+    }
+}
+
+/// Everything that one frame led to.
+#[derive(Clone, Debug)]
+pub struct FrameReport {
+    /// Index of the frame.
+    pub index: u64,
+    /// Stamp of the frame.
+    pub stamp: Stamp,
+    /// What its stamp led to.
+    pub outcome: Outcome,
+    /// All detections, and what became of each.
+    pub candidates: Vec<Candidate>,
+    /// Everything that was dropped, and by which test.
+    pub funnel: Funnel,
+    /// All tracks, confirmed or not, near to far.
+    pub tracks: Vec<Track>,
+    /// The person to follow, where the pipeline has a controller.
+    pub target: Option<TrackId>,
+    /// The controller's command: finite, within the robot's limits, zero
+    /// without a target.
+    pub command: Option<WheelSpeeds>,
+    /// Normalised innovation squared and its degrees of freedom.
+    pub nis: Vec<(TrackId, f64, u32)>,
+    /// Milliseconds per stage. The only part that differs between two runs.
+    pub timings: Vec<(&'static str, f64)>,
+    /// Tracks that ended in this frame.
+    pub ended: Vec<TrackId>,
+}
+
+impl FrameReport {
+    pub(crate) fn new(index: u64, stamp: Stamp) -> Self {
+        Self {
+            index,
+            stamp,
+            outcome: Outcome::Tracked,
+            candidates: Vec::new(),
+            funnel: Funnel::default(),
+            tracks: Vec::new(),
+            target: None,
+            command: None,
+            nis: Vec::new(),
+            timings: Vec::new(),
+            ended: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! The sightings of one frame: what the detectors said, and what became of it.
+
+use tagalong_core::{Detection, Funnel, Track, TrackId};
+
+use crate::association::{Fit, associate, fit, is_same_person};
+use crate::{AssociationSettings, Candidate, Fate};
+
+/// A detection on its way through the pipeline.
+#[derive(Clone, Debug)]
+pub(crate) struct Sighting {
+    pub(crate) detection: Detection,
+    /// Which detector made it.
+    pub(crate) detector: usize,
+    /// Its score before the verifiers.
+    pub(crate) raw_score: f64,
+    /// `None` while nothing is decided.
+    pub(crate) fate: Option<Fate>,
+}
+
+impl Sighting {
+    pub(crate) fn new(detection: Detection, detector: usize) -> Self {
+        Self { raw_score: detection.score, detection, detector, fate: None }
+    }
+
+    /// The test that a score below `start_score` fails.
+    pub(crate) fn score_test(&self, start_score: f64) -> &'static str {
+        if self.raw_score >= start_score { "verifier" } else { "score" }
+    }
+}
+
+/// Rules of one frame for what may belong together.
+pub(crate) struct Rules<'a> {
+    pub(crate) association: &'a AssociationSettings,
+    pub(crate) start_score: f64,
+    pub(crate) dt_s: f64,
+}
+
+impl Rules<'_> {
+    /// How well a sighting and a track fit. A sighting that is probably no
+    /// person still supports a track that probably is one: log-odds add up.
+    pub(crate) fn fit(&self, track: &Track, detection: &Detection) -> Option<Fit> {
+        if self.is_doubtful(track, detection) {
+            return None;
+        }
+        fit(track, detection, self.dt_s, self.association)
+    }
+
+    /// Why a sighting does not fit a track, if it does not.
+    pub(crate) fn misfit(&self, track: &Track, sighting: &Sighting) -> Option<&'static str> {
+        if self.is_doubtful(track, &sighting.detection) {
+            return Some(sighting.score_test(self.start_score));
+        }
+        self.fit(track, &sighting.detection).is_none().then_some("gate")
+    }
+
+    fn is_doubtful(&self, track: &Track, detection: &Detection) -> bool {
+        detection.score < self.start_score && track.score + detection.score < 0.0
+    }
+}
+
+/// All sightings of one frame.
+#[derive(Default)]
+pub(crate) struct Sightings {
+    all: Vec<Sighting>,
+}
+
+impl Sightings {
+    pub(crate) fn add(&mut self, sighting: Sighting) {
+        self.all.push(sighting);
+    }
+
+    /// Sightings that were given to a track.
+    pub(crate) fn matched(&self) -> impl Iterator<Item = (TrackId, &Sighting)> {
+        self.all.iter().filter_map(|s| match s.fate {
+            Some(Fate::Matched(id)) => Some((id, s)),
+            _ => None,
+        })
+    }
+
+    /// The sighting of a track.
+    pub(crate) fn of_track(&self, id: TrackId) -> Option<&Sighting> {
+        self.matched().find(|(track, _)| *track == id).map(|(_, s)| s)
+    }
+
+    /// Sightings about which nothing is decided.
+    pub(crate) fn undecided(&self) -> Vec<usize> {
+        (0..self.all.len()).filter(|i| self.all[*i].fate.is_none()).collect()
+    }
+
+    pub(crate) fn get(&self, index: usize) -> &Sighting {
+        &self.all[index]
+    }
+
+    pub(crate) fn settle(&mut self, index: usize, fate: Fate) {
+        self.all[index].fate = Some(fate);
+    }
+
+    /// Keeps one sighting a person, the one with the best score. One that
+    /// takes the place of a followed person's sighting keeps their track.
+    pub(crate) fn merge(&mut self, expected: &[Track], rules: &Rules<'_>) {
+        let mut order = self.undecided();
+        order.sort_by(|a, b| self.score(*b).total_cmp(&self.score(*a)));
+        let mut kept: Vec<usize> = Vec::new();
+        for index in order {
+            let is_same = |other: usize| {
+                let (a, b) = (&self.all[index].detection, &self.all[other].detection);
+                is_same_person(a, b, rules.association)
+            };
+            let followed = self.followed().find(|(_, f)| is_same(*f));
+            let is_known = kept.iter().any(|k| is_same(*k));
+            if let Some((id, followed)) = followed {
+                self.compete(index, followed, id, expected, rules);
+            } else if is_known {
+                self.settle(index, Fate::Dropped("same person"));
+            } else {
+                kept.push(index);
+            }
+        }
+    }
+
+    fn compete(
+        &mut self,
+        discovered: usize,
+        followed: usize,
+        id: TrackId,
+        expected: &[Track],
+        rules: &Rules<'_>,
+    ) {
+        let fits = expected
+            .iter()
+            .find(|t| t.id == id)
+            .is_some_and(|t| rules.fit(t, &self.all[discovered].detection).is_some());
+        let (best, other) = if fits && self.score(discovered) > self.score(followed) {
+            (discovered, followed)
+        } else {
+            (followed, discovered)
+        };
+        self.settle(best, Fate::Matched(id));
+        self.settle(other, Fate::Dropped("same person"));
+    }
+
+    /// Gives undecided sightings to the tracks that have none yet.
+    pub(crate) fn associate(&mut self, expected: &[Track], rules: &Rules<'_>) {
+        let tracks: Vec<&Track> =
+            expected.iter().filter(|t| self.of_track(t.id).is_none()).collect();
+        let open = self.undecided();
+        let detections: Vec<&Detection> = open.iter().map(|i| &self.all[*i].detection).collect();
+        let columns = associate(&tracks, &detections, |t, d| rules.fit(t, d), rules.association);
+        for (track, column) in tracks.iter().zip(columns) {
+            if let Some(column) = column {
+                self.settle(open[column], Fate::Matched(track.id));
+            }
+        }
+    }
+
+    /// Drops the lowest scores where there are too many.
+    pub(crate) fn limit(&mut self, most: usize) {
+        let mut open = self.undecided();
+        let excess = self.all.len().saturating_sub(most).min(open.len());
+        open.sort_by(|a, b| self.score(*a).total_cmp(&self.score(*b)));
+        for index in open.into_iter().take(excess) {
+            self.settle(index, Fate::Dropped("too many detections"));
+        }
+    }
+
+    /// Drops what was given to a track that it does not support after all.
+    pub(crate) fn reject(&mut self, is_supported: impl Fn(TrackId) -> bool, test: &'static str) {
+        for sighting in &mut self.all {
+            if let Some(Fate::Matched(id)) = sighting.fate
+                && !is_supported(id)
+            {
+                sighting.fate = Some(Fate::Dropped(test));
+            }
+        }
+    }
+
+    /// The candidates of the report; what was dropped is counted.
+    pub(crate) fn into_candidates(self, funnel: &mut Funnel) -> Vec<Candidate> {
+        self.all
+            .into_iter()
+            .map(|sighting| {
+                let fate = sighting.fate.unwrap_or(Fate::Dropped("score"));
+                if let Fate::Dropped(test) = fate {
+                    funnel.drop_at(test, sighting.detection.region);
+                }
+                Candidate { detection: sighting.detection, fate }
+            })
+            .collect()
+    }
+
+    fn followed(&self) -> impl Iterator<Item = (TrackId, usize)> {
+        self.all.iter().enumerate().filter_map(|(index, s)| match s.fate {
+            Some(Fate::Matched(id)) => Some((id, index)),
+            _ => None,
+        })
+    }
+
+    fn score(&self, index: usize) -> f64 {
+        self.all[index].detection.score
+    }
+}

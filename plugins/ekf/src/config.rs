@@ -1,0 +1,71 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// Settings of the filter `ekf`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Spectral density of the person's white acceleration, m²/s³.
+    pub acceleration_noise: f64,
+    /// How fast the height of the head may wander (sitting down, gait),
+    /// m per square root of a second.
+    pub height_noise: f64,
+    /// Variance of each velocity component of a newcomer, m²/s².
+    pub initial_velocity_variance: f64,
+    /// Standard deviation added to that of each detection, m: what detectors
+    /// do not know about themselves.
+    pub extra_sigma_m: f64,
+    /// As printed: subtract the robot's speed from the person's velocity in
+    /// every frame. Biased while the robot moves.
+    pub compat_printed_velocity: bool,
+    /// As printed: process noise on the velocity only, none for height and
+    /// ego-motion, dependent on the frame rate.
+    pub compat_printed_noise: bool,
+    /// As printed: P - KHP in place of the Joseph form.
+    pub compat_printed_update: bool,
+    /// As printed: the same variance for all coordinates of all detections.
+    pub compat_printed_measurement: bool,
+    /// Standard deviation of the printed process noise, m/s².
+    pub printed_sigma_w: f64,
+    /// Standard deviation of the printed measurement noise, m.
+    pub printed_sigma_v_m: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            acceleration_noise: 0.5,
+            height_noise: 0.07,
+            initial_velocity_variance: 2.0,
+            extra_sigma_m: 0.02,
+            compat_printed_velocity: false,
+            compat_printed_noise: false,
+            compat_printed_update: false,
+            compat_printed_measurement: false,
+            printed_sigma_w: 1.0,
+            printed_sigma_v_m: 0.05,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let must = [
+            ("acceleration_noise", self.acceleration_noise, false),
+            ("height_noise", self.height_noise, true),
+            ("initial_velocity_variance", self.initial_velocity_variance, false),
+            ("extra_sigma_m", self.extra_sigma_m, true),
+            ("printed_sigma_w", self.printed_sigma_w, false),
+            ("printed_sigma_v_m", self.printed_sigma_v_m, false),
+        ];
+        for (key, value, may_be_zero) in must {
+            if !value.is_finite() || value < 0.0 || (value == 0.0 && !may_be_zero) {
+                let bound = if may_be_zero { "at least 0" } else { "positive" };
+                return Err(Error::Settings(format!("`{key}` must be {bound}, not {value}")));
+            }
+        }
+        Ok(())
+    }
+}

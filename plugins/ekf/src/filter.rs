@@ -1,0 +1,181 @@
+use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector5};
+use tagalong_core::{Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
+
+use crate::Config;
+
+type Matrix5 = SMatrix<f64, 5, 5>;
+type Matrix5x3 = SMatrix<f64, 5, 3>;
+
+/// A coordinate with a larger variance, m², was not measured.
+const UNMEASURED_M2: f64 = 100.0;
+
+/// What is believed of a person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Belief {
+    /// (x, y, z, vx, vy) in the robot frame: m, m/s over ground.
+    pub mean: SVector<f64, 5>,
+    /// Its covariance.
+    pub covariance: SMatrix<f64, 5, 5>,
+}
+
+/// The filter.
+pub struct Ekf {
+    config: Config,
+}
+
+impl Ekf {
+    /// A filter.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        Ok(Self { config })
+    }
+
+    /// Measurement covariance R, m².
+    fn measurement(&self, detection: &Detection) -> Matrix3<f64> {
+        if self.config.compat_printed_measurement {
+            return Matrix3::identity() * self.config.printed_sigma_v_m.powi(2);
+        }
+        detection.covariance + Matrix3::identity() * self.config.extra_sigma_m.powi(2)
+    }
+
+    /// Process noise. It is isotropic on the floor, so that it is the same in
+    /// the axes before and after the robot's turn.
+    fn process_noise(&self, dt: f64) -> Matrix5 {
+        if self.config.compat_printed_noise {
+            let velocity = (self.config.printed_sigma_w * dt).powi(2);
+            return Matrix5::from_diagonal(&Vector5::new(0.0, 0.0, 0.0, velocity, velocity));
+        }
+        let q = self.config.acceleration_noise;
+        let (position, cross, velocity) = (q * dt.powi(3) / 3.0, q * dt.powi(2) / 2.0, q * dt);
+        let height = self.config.height_noise.powi(2) * dt;
+        let mut noise =
+            Matrix5::from_diagonal(&Vector5::new(position, position, height, velocity, velocity));
+        for axis in 0..2 {
+            noise[(axis, axis + 3)] = cross;
+            noise[(axis + 3, axis)] = cross;
+        }
+        noise
+    }
+
+    /// J M J': what the uncertainty of the robot's own motion adds.
+    fn ego_noise(&self, predicted: &Vector5<f64>, motion: &Motion) -> Matrix5 {
+        if self.config.compat_printed_noise {
+            return Matrix5::zeros();
+        }
+        let jacobian = motion_jacobian(predicted, motion);
+        jacobian * motion.covariance * jacobian.transpose()
+    }
+
+    /// The mean after the motion.
+    pub(crate) fn transition(&self, mean: &Vector5<f64>, motion: &Motion) -> Vector5<f64> {
+        let back = turn_back(motion);
+        let velocity = Vector2::new(mean[3], mean[4]);
+        let moved = Vector2::new(mean[0], mean[1]) + velocity * motion.dt;
+        let position = back * (moved - Vector2::new(motion.forward, motion.left));
+        let mut velocity = back * velocity;
+        if self.config.compat_printed_velocity && motion.dt > 0.0 {
+            velocity.x -= motion.forward.hypot(motion.left).copysign(motion.forward) / motion.dt;
+        }
+        Vector5::new(position.x, position.y, mean[2], velocity.x, velocity.y)
+    }
+}
+
+impl PersonFilter for Ekf {
+    type Belief = Belief;
+
+    fn start(&self, detection: &Detection) -> Belief {
+        let mut covariance = Matrix5::zeros();
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.measurement(detection));
+        covariance[(3, 3)] = self.config.initial_velocity_variance;
+        covariance[(4, 4)] = self.config.initial_velocity_variance;
+        let p = &detection.position;
+        Belief { mean: Vector5::new(p.x, p.y, p.z, 0.0, 0.0), covariance }
+    }
+
+    fn predict(&self, belief: &mut Belief, motion: &Motion) {
+        let f = state_jacobian(motion);
+        belief.mean = self.transition(&belief.mean, motion);
+        let covariance = f * belief.covariance * f.transpose()
+            + self.process_noise(motion.dt)
+            + self.ego_noise(&belief.mean, motion);
+        belief.covariance = symmetric(covariance);
+    }
+
+    /// The update in Joseph form. S = P + R is positive definite as long as P
+    /// is; where rounding has spoilt that, the belief is left as it is.
+    fn correct(&self, belief: &mut Belief, detection: &Detection, _: &Camera) -> Support {
+        let r = self.measurement(detection);
+        let p = belief.covariance;
+        let position = belief.mean.fixed_rows::<3>(0).into_owned();
+        let innovation = detection.position.coords - position;
+        let Some(s) = symmetric3(p.fixed_view::<3, 3>(0, 0) + r).cholesky() else {
+            return Support::default();
+        };
+        let gain: Matrix5x3 = s.solve(&p.fixed_rows::<3>(0).into_owned()).transpose();
+        belief.mean += gain * innovation;
+        belief.covariance = self.corrected(&p, &gain, &r);
+        let variances = detection.covariance.diagonal();
+        let measured = variances.iter().filter(|v| **v < UNMEASURED_M2).count() as u32;
+        Support { nis: Some((innovation.dot(&s.solve(&innovation)), measured)) }
+    }
+
+    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+        let m = &belief.mean;
+        let position = Point3::new(m[0], m[1], m[2]);
+        Estimate {
+            person: Person { position, velocity: Vector2::new(m[3], m[4]) },
+            covariance: belief.covariance,
+            region: camera.upper_body(&position),
+        }
+    }
+}
+
+impl Ekf {
+    fn corrected(&self, p: &Matrix5, gain: &Matrix5x3, r: &Matrix3<f64>) -> Matrix5 {
+        let mut kept = Matrix5::identity();
+        let mut seen = kept.fixed_columns_mut::<3>(0);
+        seen -= gain;
+        if self.config.compat_printed_update {
+            return kept * p;
+        }
+        symmetric(kept * p * kept.transpose() + gain * r * gain.transpose())
+    }
+}
+
+/// From the axes before the robot's turn to those after it.
+fn turn_back(motion: &Motion) -> Matrix2<f64> {
+    let (sin, cos) = motion.turn.sin_cos();
+    Matrix2::new(cos, sin, -sin, cos)
+}
+
+/// Derivative of the transition by the state.
+pub(crate) fn state_jacobian(motion: &Motion) -> Matrix5 {
+    let back = turn_back(motion);
+    let mut f = Matrix5::identity();
+    f.fixed_view_mut::<2, 2>(0, 0).copy_from(&back);
+    f.fixed_view_mut::<2, 2>(0, 3).copy_from(&(back * motion.dt));
+    f.fixed_view_mut::<2, 2>(3, 3).copy_from(&back);
+    f
+}
+
+/// Derivative of the transition by the motion (forward, left, turn), at the
+/// predicted state (x, y, z, vx, vy): turning by a little moves (x, y) by
+/// (y, -x).
+pub(crate) fn motion_jacobian(predicted: &Vector5<f64>, motion: &Motion) -> Matrix5x3 {
+    let mut j = Matrix5x3::zeros();
+    j.fixed_view_mut::<2, 2>(0, 0).copy_from(&-turn_back(motion));
+    let [x, y, _, vx, vy] = [0, 1, 2, 3, 4].map(|i| predicted[i]);
+    j.set_column(2, &Vector5::new(y, -x, 0.0, vy, -vx));
+    j
+}
+
+fn symmetric(m: Matrix5) -> Matrix5 {
+    0.5 * (m + m.transpose())
+}
+
+fn symmetric3(m: Matrix3<f64>) -> Matrix3<f64> {
+    0.5 * (m + m.transpose())
+}
