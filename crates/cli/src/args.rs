@@ -1,0 +1,156 @@
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Finds people in the log of a mobile robot, keeps track of them, and follows
+/// one of them.
+#[derive(Debug, Parser)]
+#[command(name = "tagalong", version, about, after_help = EXIT_CODES, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Examples:
+  tagalong inspect robot.mcap
+  tagalong run configs/depth-ekf.toml robot.mcap --overlay
+  tagalong config depth-template
+
+Results go to stdout, talk goes to stderr.
+Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3 finished but part of the log was lost,
+130 and 143 stopped by Ctrl-C or SIGTERM (the files are valid up to there).";
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Tracks the people of a log
+    #[command(after_help = RUN_HELP)]
+    Run(RunArgs),
+    /// Lists the plugins
+    #[command(after_help = "Example:\n  tagalong list --format json")]
+    List {
+        /// How to print.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
+    },
+    /// Prints the default settings of a plugin, each with its explanation
+    #[command(after_help = CONFIG_HELP)]
+    Config {
+        /// Name of the plugin, or `pipeline` for everything around the plugins.
+        plugin: String,
+    },
+    /// Says whether a config is right, and whether it fits a log
+    #[command(after_help = CHECK_HELP)]
+    Check {
+        /// The config.
+        config: PathBuf,
+        /// A log that the config should work on.
+        log: Option<PathBuf>,
+    },
+    /// Says what a log contains and what a pipeline could use of it
+    #[command(after_help = INSPECT_HELP)]
+    Inspect {
+        /// The log, an MCAP file with ROS 2 messages.
+        log: PathBuf,
+        /// Take the `[input]` and `[limits]` sections of this config.
+        #[arg(long)]
+        config: Option<PathBuf>,
+        /// How to print.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
+    },
+}
+
+const RUN_HELP: &str = "\
+Files: tracks.mcap (open it in Rerun or Foxglove), tracks.csv (MOTChallenge columns, pixels),
+tracks-metres.csv, report.json (what was dropped and why), timings.json, and with --overlay
+overlay/000001.png and so on.
+
+Examples:
+  tagalong run configs/depth-ekf.toml robot.mcap
+  tagalong run configs/depth-ekf.toml robot.mcap -o out --overlay --overwrite
+  tagalong run configs/depth-ekf.toml robot.mcap --format json | jq .funnel";
+
+const CONFIG_HELP: &str = "\
+Examples:
+  tagalong config ekf
+  tagalong config pipeline > my-pipeline.toml";
+
+const CHECK_HELP: &str = "\
+Examples:
+  tagalong check configs/depth-ekf.toml
+  tagalong check configs/depth-ekf.toml robot.mcap";
+
+const INSPECT_HELP: &str = "\
+Examples:
+  tagalong inspect robot.mcap
+  tagalong inspect robot.mcap --format json | jq .topics";
+
+/// The arguments of `tagalong run`.
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    /// The pipeline, a TOML file.
+    pub config: PathBuf,
+    /// The log, an MCAP file with ROS 2 messages.
+    pub log: PathBuf,
+    /// Where the files go [default: runs/<log>-<config>].
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Draw a picture of every frame: boxes, ids, trails, and a view from above.
+    #[arg(long)]
+    pub overlay: bool,
+    /// Replace the files of an earlier run in the same directory.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Fail (exit code 1) if anything of the log was lost or damaged.
+    #[arg(long)]
+    pub strict: bool,
+    /// Threads: 1 does everything in turn, 2 reads ahead, 3 draws aside. The
+    /// results are the same.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub threads: Option<u8>,
+    /// Use this seed instead of the config's.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// How to print what was found.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// How results are printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// For programs.
+    Json,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_shows_an_example() {
+        for command in Cli::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("Example"), "{}", command.get_name());
+        }
+    }
+
+    #[test]
+    fn no_threads_at_all_are_refused() {
+        assert!(Cli::try_parse_from(["tagalong", "run", "a", "b", "--threads", "0"]).is_err());
+        assert!(Cli::try_parse_from(["tagalong", "run", "a", "b", "--threads", "2"]).is_ok());
+    }
+}

@@ -1,0 +1,25 @@
+use std::path::Path;
+
+use crate::args::Format;
+use crate::config_file::{ConfigFile, OuterSettings};
+use crate::outcome::{Ended, Failure, Outcome, print};
+use crate::suggest::check_log_path;
+
+/// `tagalong inspect LOG`.
+///
+/// # Errors
+/// A log that cannot be read at all.
+pub fn inspect(log: &Path, config: Option<&Path>, format: Format) -> Outcome {
+    let outer = match config {
+        Some(config) => ConfigFile::read(config)?.outer()?,
+        None => OuterSettings::default(),
+    };
+    check_log_path(log)?;
+    let found =
+        tagalong_log::inspect(log, &outer.input, &outer.limits).map_err(Failure::failed)?;
+    print(&match format {
+        Format::Text => found.to_string(),
+        Format::Json => serde_json::to_string_pretty(&found).unwrap_or_default() + "\n",
+    })?;
+    Ok(Ended::Well)
+}

@@ -1,0 +1,46 @@
+use std::fmt::Write as _;
+
+use tagalong_core::Registry;
+
+use crate::args::Format;
+use crate::outcome::{Ended, Outcome, print};
+
+/// `tagalong list`.
+///
+/// # Errors
+/// If stdout cannot be written.
+pub fn list(registry: &Registry, format: Format) -> Outcome {
+    print(&match format {
+        Format::Text => as_text(registry),
+        Format::Json => as_json(registry),
+    })?;
+    Ok(Ended::Well)
+}
+
+fn as_text(registry: &Registry) -> String {
+    let mut plugins: Vec<_> = registry.plugins().collect();
+    plugins.sort_by_key(|plugin| (plugin.kind, plugin.name));
+    let width = plugins.iter().map(|plugin| plugin.name.len()).max().unwrap_or(0);
+    let mut out = String::new();
+    for plugin in plugins {
+        // Padding works on strings only.
+        let kind = plugin.kind.to_string();
+        let _ = writeln!(out, "{kind:<10}  {:<width$}  {}", plugin.name, plugin.summary);
+    }
+    out
+}
+
+fn as_json(registry: &Registry) -> String {
+    let plugins: Vec<_> = registry
+        .plugins()
+        .map(|plugin| {
+            serde_json::json!({
+                "name": plugin.name,
+                "kind": plugin.kind.to_string(),
+                "summary": plugin.summary,
+                "schema": plugin.schema(),
+            })
+        })
+        .collect();
+    serde_json::to_string_pretty(&plugins).unwrap_or_default() + "\n"
+}

@@ -1,0 +1,11 @@
+//! The subcommands that answer a question.
+
+mod check;
+mod config;
+mod inspect;
+mod list;
+
+pub use check::check;
+pub use config::config;
+pub use inspect::inspect;
+pub use list::list;

@@ -1,0 +1,133 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use tagalong_core::{ConfigError, Registry, Settings, parse_settings};
+use tagalong_log::write::OutputSettings;
+use tagalong_log::{InputSettings, Limits};
+use tagalong_pipeline::{Options, Pipeline, RunSettings};
+use toml::de::DeTable;
+
+use crate::outcome::Failure;
+use crate::suggest::config_hint;
+
+/// Longest config that is read, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// A config as it lies on disk.
+pub struct ConfigFile {
+    path: PathBuf,
+    text: String,
+}
+
+/// The tables of a config that are not the pipeline's.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OuterSettings {
+    /// `[input]`: where the images come from.
+    pub input: InputSettings,
+    /// `[limits]`: how large a log's parts may be.
+    pub limits: Limits,
+    /// `[output]`: what is written.
+    pub output: OutputSettings,
+}
+
+impl ConfigFile {
+    /// Reads a config.
+    ///
+    /// # Errors
+    /// A file that is missing, unreadable, too long or no text: exit code 2.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let shown = path.display();
+        let size = match fs::metadata(path) {
+            Ok(about) if about.is_dir() => {
+                let message = format!("{shown} is a directory, not a config");
+                return Err(Failure::usage(message + &config_hint(&path.join("x"))));
+            }
+            Ok(about) => about.len(),
+            Err(error) => {
+                let message = format!("cannot read config {shown}: {error}");
+                return Err(Failure::usage(message + &config_hint(path)));
+            }
+        };
+        if size > MAX_BYTES {
+            let message = format!("{shown} has {size} bytes; a config has at most {MAX_BYTES}");
+            return Err(Failure::usage(message));
+        }
+        let bytes = fs::read(path)
+            .map_err(|error| Failure::usage(format!("cannot read config {shown}: {error}")))?;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| Failure::usage(format!("{shown} is not UTF-8 text, so no config")))?;
+        Ok(Self { path: path.to_owned(), text })
+    }
+
+    /// Its name without folder and extension.
+    pub fn stem(&self) -> String {
+        self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Its name without folder.
+    pub fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// SHA-256 of its bytes.
+    pub fn sha256(&self) -> String {
+        let digest = Sha256::digest(self.text.as_bytes());
+        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Builds the pipeline.
+    ///
+    /// # Errors
+    /// A mistake in the config, shown with its line: exit code 2.
+    pub fn pipeline(
+        &self,
+        registry: &Registry,
+        seed: Option<u64>,
+    ) -> Result<(Pipeline, RunSettings), Failure> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let foreign = OuterSettings::TABLES.map(str::to_owned).to_vec();
+        Pipeline::from_toml_with(&self.text, folder, registry, &Options { foreign, seed })
+            .map_err(|error| self.mistake(&error))
+    }
+
+    /// The tables that are not the pipeline's.
+    ///
+    /// # Errors
+    /// As [`ConfigFile::pipeline`].
+    pub fn outer(&self) -> Result<OuterSettings, Failure> {
+        let read = || -> Result<OuterSettings, ConfigError> {
+            Ok(OuterSettings {
+                input: self.table("input")?,
+                limits: self.table("limits")?,
+                output: self.table("output")?,
+            })
+        };
+        let outer = read().map_err(|error| self.mistake(&error))?;
+        outer.output.validate().map_err(|why| self.mistake(&ConfigError::new(why)))?;
+        Ok(outer)
+    }
+
+    /// One top-level table, with places for its mistakes.
+    fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
+        let mut whole = DeTable::parse(&self.text)?;
+        parse_settings(whole.get_mut().remove(name))
+    }
+
+    fn mistake(&self, error: &ConfigError) -> Failure {
+        Failure::usage(error.render(&self.path.display().to_string(), &self.text))
+    }
+}
+
+impl OuterSettings {
+    /// The names of the tables.
+    const TABLES: [&str; 3] = ["input", "limits", "output"];
+
+    /// As TOML, to stand behind the pipeline's resolved config.
+    pub fn resolved(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+}

@@ -1,0 +1,62 @@
+//! The `tagalong` command, as a library, so that plugins outside the workspace
+//! get the same command with one call:
+//!
+//! ```no_run
+//! fn main() -> std::process::ExitCode {
+//!     tagalong_cli::main_with(|registry| {
+//!         tagalong_catalog::register(registry);
+//!         // my_plugin::register(registry);
+//!     })
+//! }
+//! ```
+//!
+//! Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2
+//! wrong usage or config, 3 finished but part of the log was lost, 130 and 143
+//! after SIGINT and SIGTERM.
+
+mod args;
+mod commands;
+mod config_file;
+mod needs;
+mod outcome;
+mod overlay;
+mod run;
+mod signals;
+mod suggest;
+
+use std::process::ExitCode;
+
+use args::{Cli, Command};
+use clap::Parser;
+use outcome::{Outcome, say};
+use tagalong_core::Registry;
+
+/// The whole program: registers plugins, reads the command line, does what it
+/// says.
+pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
+    let mut registry = Registry::default();
+    register(&mut registry);
+    // Wrong usage and --help end in here, with exit codes 2 and 0.
+    let cli = Cli::parse();
+    match dispatch(&cli.command, &registry) {
+        Ok(ended) => ExitCode::from(ended.code()),
+        Err(failure) => {
+            if !failure.message.is_empty() {
+                say(&format!("error: {}", failure.message));
+            }
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+fn dispatch(command: &Command, registry: &Registry) -> Outcome {
+    match command {
+        Command::Run(args) => run::run(args, registry),
+        Command::List { format } => commands::list(registry, *format),
+        Command::Config { plugin } => commands::config(registry, plugin),
+        Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
+        Command::Inspect { log, config, format } => {
+            commands::inspect(log, config.as_deref(), *format)
+        }
+    }
+}

@@ -1,0 +1,70 @@
+use std::fmt::Display;
+use std::io;
+
+/// How a command ended when it did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// All went well.
+    Well,
+    /// Finished, but part of the log was lost or could not be used.
+    WithLoss,
+    /// Stopped by this signal; what was written until then is valid.
+    BySignal(u8),
+}
+
+impl Ended {
+    /// The exit code.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Well => 0,
+            Self::WithLoss => 3,
+            Self::BySignal(signal) => 128u8.saturating_add(signal),
+        }
+    }
+}
+
+/// Why a command failed, as it is told to a person.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// The exit code.
+    pub code: u8,
+    /// What is wrong and what to do; empty if there is nobody to tell.
+    pub message: String,
+}
+
+impl Failure {
+    /// The work failed: exit code 1.
+    pub fn failed(message: impl Display) -> Self {
+        Self { code: 1, message: message.to_string() }
+    }
+
+    /// The user asked for something impossible: exit code 2.
+    pub fn usage(message: impl Display) -> Self {
+        Self { code: 2, message: message.to_string() }
+    }
+
+    /// Nobody reads our output any more (`| head`): end quietly.
+    fn nobody_listens() -> Self {
+        Self { code: 0, message: String::new() }
+    }
+}
+
+/// The result of a command.
+pub type Outcome = Result<Ended, Failure>;
+
+/// Prints to stdout. A closed pipe is a quiet end.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    let written = io::Write::write_all(&mut out, text.as_bytes())
+        .and_then(|()| io::Write::flush(&mut out));
+    written.map_err(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => Failure::nobody_listens(),
+        _ => Failure::failed(format!("cannot write to stdout: {error}")),
+    })
+}
+
+/// Says something to the person at the terminal.
+pub fn say(text: &str) {
+    // If stderr is gone there is nobody to tell.
+    let _ = io::Write::write_all(&mut io::stderr().lock(), format!("{text}\n").as_bytes());
+}

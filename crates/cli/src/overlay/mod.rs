@@ -1,0 +1,97 @@
+//! Pictures of what the pipeline saw and believed, one a frame.
+//!
+//! On the left the camera's image (depth in shades where there is no colour)
+//! with upper-body boxes, ids and trails; what was dropped is drawn faintly with
+//! the test that dropped it. On the right the same people from above.
+
+mod canvas;
+mod image_view;
+mod plan_view;
+mod trails;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use canvas::{Canvas, Ink};
+use nalgebra::Isometry2;
+use tagalong_core::{Camera, Images, RgbImage};
+use tagalong_pipeline::FrameReport;
+use trails::Trails;
+
+/// Everything that a picture of one frame shows.
+pub struct Scene {
+    /// The camera.
+    pub camera: Arc<Camera>,
+    /// The images; shared, not copied.
+    pub images: Images,
+    /// Pose of the robot in the odometry frame.
+    pub odom_from_robot: Isometry2<f64>,
+    /// What the pipeline said.
+    pub report: FrameReport,
+}
+
+/// Draws the pictures of a run into a folder.
+pub struct Overlay {
+    folder: PathBuf,
+    trails: Trails,
+}
+
+impl Overlay {
+    /// Draws into `folder`, which exists.
+    pub fn new(folder: PathBuf) -> Self {
+        Self { folder, trails: Trails::default() }
+    }
+
+    /// Draws one frame as `000001.png` and so on, by the frame's index.
+    ///
+    /// # Errors
+    /// A sentence that names the file.
+    pub fn draw(&mut self, scene: &Scene) -> Result<(), String> {
+        self.trails.follow(scene);
+        let picture = picture(scene, &self.trails);
+        let path = self.folder.join(format!("{:06}.png", scene.report.index));
+        write_png(&path, &picture).map_err(|why| format!("cannot write {}: {why}", path.display()))
+    }
+}
+
+fn picture(scene: &Scene, trails: &Trails) -> RgbImage {
+    let (width, height) = (scene.camera.width, scene.camera.height);
+    let plan_width = plan_view::width_px(height);
+    let mut canvas = Canvas::new(width + plan_width, height, [24, 24, 28]);
+    plan_view::draw(&mut canvas, width, scene, trails);
+    // The image comes second and covers what the plan view drew beyond its part.
+    canvas.paste(image_view::draw(scene, trails).image(), 0);
+    canvas.image().clone()
+}
+
+/// A colour for a track: neighbours in number are far apart in hue.
+fn colour_of(id: u32) -> Ink {
+    const COLOURS: [[u8; 3]; 10] = [
+        [255, 99, 71],
+        [64, 196, 255],
+        [124, 252, 0],
+        [255, 215, 0],
+        [238, 130, 238],
+        [0, 250, 154],
+        [255, 140, 0],
+        [173, 216, 230],
+        [255, 105, 180],
+        [154, 205, 50],
+    ];
+    Ink::solid(COLOURS[id as usize % COLOURS.len()])
+}
+
+fn write_png(path: &Path, image: &RgbImage) -> Result<(), png::EncodingError> {
+    let file = BufWriter::new(File::create(path)?);
+    let mut encoder = png::Encoder::new(file, image.width() as u32, image.height() as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(image.pixels().as_flattened())?;
+    writer.finish()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,121 @@
+use nalgebra::{Matrix2, Point2, Point3, SymmetricEigen, Vector2};
+use tagalong_core::Track;
+
+use super::canvas::{Canvas, Ink};
+use super::trails::Trails;
+use super::{Scene, colour_of};
+
+/// Reach of the view ahead of the robot, m.
+const AHEAD_M: f64 = 8.0;
+
+/// Reach of the view behind the robot, m.
+const BEHIND_M: f64 = 1.0;
+
+const GRID: Ink = Ink::solid([60, 60, 68]);
+const AXIS: Ink = Ink::solid([150, 150, 160]);
+const VIEW: Ink = Ink::solid([110, 130, 170]);
+const TENTATIVE: Ink = Ink::solid([150, 150, 150]);
+
+/// Columns of the view beside an image with `height` rows.
+pub fn width_px(height: usize) -> usize {
+    (height * 4 / 5).max(16)
+}
+
+/// Metres on the floor to pixels: ahead is up, left is left.
+struct Plan {
+    robot: Point2<f64>,
+    px_per_m: f64,
+    left_edge: f64,
+    width: f64,
+}
+
+impl Plan {
+    fn new(left: usize, height: usize) -> Self {
+        let px_per_m = height as f64 / (AHEAD_M + BEHIND_M);
+        let width = width_px(height) as f64;
+        let robot = Point2::new(left as f64 + 0.5 * width, AHEAD_M * px_per_m);
+        Self { robot, px_per_m, left_edge: left as f64, width }
+    }
+
+    fn pixel(&self, forward_m: f64, left_m: f64) -> Point2<f64> {
+        self.robot - Vector2::new(left_m, forward_m) * self.px_per_m
+    }
+
+    fn of(&self, point_in_robot: &Point3<f64>) -> Point2<f64> {
+        self.pixel(point_in_robot.x, point_in_robot.y)
+    }
+}
+
+/// Draws the people from above, to the right of column `left`.
+pub fn draw(canvas: &mut Canvas, left: usize, scene: &Scene, trails: &Trails) {
+    let plan = Plan::new(left, scene.camera.height);
+    draw_grid(canvas, &plan);
+    draw_field_of_view(canvas, &plan, scene);
+    canvas.disc(plan.robot, 4.0, AXIS);
+    for (id, trail) in trails.in_robot(scene) {
+        let points: Vec<_> = trail.iter().map(|p| plan.of(p)).collect();
+        canvas.path(&points, colour_of(id.0).faint(0.7));
+    }
+    for track in scene.report.tracks.iter().rev() {
+        draw_track(canvas, &plan, track, scene.report.target == Some(track.id));
+    }
+}
+
+/// A line every metre, its number every second one.
+fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
+    let sides = (0.5 * plan.width / plan.px_per_m).ceil();
+    for metre in -(sides as i32)..=sides as i32 {
+        let column = plan.pixel(0.0, f64::from(metre)).x;
+        let ends = [plan.pixel(AHEAD_M, 0.0).y, plan.pixel(-BEHIND_M, 0.0).y];
+        canvas.line(Point2::new(column, ends[0]), Point2::new(column, ends[1]), GRID);
+    }
+    for metre in -(BEHIND_M as i32)..=AHEAD_M as i32 {
+        let row = plan.pixel(f64::from(metre), 0.0).y;
+        let right = plan.left_edge + plan.width;
+        canvas.line(Point2::new(plan.left_edge, row), Point2::new(right, row), GRID);
+        if metre > 0 && metre % 2 == 0 {
+            let at = Point2::new(plan.left_edge + 2.0, row - 4.0);
+            canvas.text(at, &format!("{metre}m"), AXIS);
+        }
+    }
+}
+
+/// The two edges of what the camera sees, on the floor plan.
+fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &Scene) {
+    let camera = &scene.camera;
+    let eye = Point3::from(camera.robot_from_camera.translation.vector);
+    for column in [0.0, camera.width as f64 - 1.0] {
+        let ray = camera.ray(Point2::new(column, 0.5 * camera.height as f64));
+        let ray_in_robot = camera.robot_from_camera.rotation * ray;
+        let end = eye + ray_in_robot * 12.0;
+        canvas.line(plan.of(&eye), plan.of(&end), VIEW);
+    }
+}
+
+fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
+    let ink = if track.confirmed { colour_of(track.id.0) } else { TENTATIVE };
+    let person = &track.estimate.person;
+    let at = plan.of(&person.position);
+    let opacity = if track.seen { 1.0 } else { 0.5 };
+    canvas.disc(at, if target { 6.0 } else { 4.0 }, ink.faint(opacity));
+    let soon = person.position.xy() + person.velocity;
+    canvas.line(at, plan.pixel(soon.x, soon.y), ink.faint(opacity));
+    let covariance = track.estimate.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+    canvas.path(&ellipse(plan, &person.position, covariance), ink.faint(0.6));
+    let text = if target { format!("{} target", track.id) } else { track.id.to_string() };
+    canvas.text(at + Vector2::new(8.0, -4.0), &text, ink);
+}
+
+/// Two standard deviations around a place on the floor.
+fn ellipse(plan: &Plan, centre: &Point3<f64>, covariance: Matrix2<f64>) -> Vec<Point2<f64>> {
+    let eigen = SymmetricEigen::new(covariance);
+    let axes = eigen.eigenvectors;
+    let sigma = eigen.eigenvalues.map(|v| 2.0 * v.max(0.0).sqrt());
+    (0..=24)
+        .map(|i| {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+            let offset = axes * Vector2::new(sigma.x * cos, sigma.y * sin);
+            plan.pixel(centre.x + offset.x, centre.y + offset.y)
+        })
+        .collect()
+}

@@ -1,0 +1,41 @@
+use std::collections::{BTreeMap, VecDeque};
+
+use nalgebra::Point3;
+use tagalong_core::TrackId;
+
+use super::Scene;
+
+/// Points kept of a trail.
+const LENGTH: usize = 60;
+
+/// Where the heads of confirmed people were, in the odometry frame.
+#[derive(Default)]
+pub struct Trails {
+    places: BTreeMap<TrackId, VecDeque<Point3<f64>>>,
+}
+
+impl Trails {
+    /// Adds where people are now and forgets tracks that ended.
+    pub fn follow(&mut self, scene: &Scene) {
+        let tracks = &scene.report.tracks;
+        self.places.retain(|id, _| tracks.iter().any(|track| track.id == *id));
+        for track in tracks.iter().filter(|track| track.confirmed) {
+            let trail = self.places.entry(track.id).or_default();
+            let head = track.estimate.person.position;
+            let floor = scene.odom_from_robot * head.xy();
+            trail.push_back(Point3::new(floor.x, floor.y, head.z));
+            if trail.len() > LENGTH {
+                trail.pop_front();
+            }
+        }
+    }
+
+    /// The trails in the robot frame as it is now.
+    pub fn in_robot(&self, scene: &Scene) -> Vec<(TrackId, Vec<Point3<f64>>)> {
+        let into_robot = |p: &Point3<f64>| {
+            let floor = scene.odom_from_robot.inverse_transform_point(&p.xy());
+            Point3::new(floor.x, floor.y, p.z)
+        };
+        self.places.iter().map(|(id, trail)| (*id, trail.iter().map(into_robot).collect())).collect()
+    }
+}

@@ -1,0 +1,287 @@
+//! `tagalong run`: a log and a config go in, a directory of results comes out.
+
+mod frames;
+mod pictures;
+mod progress;
+mod report;
+mod summary;
+mod timings;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use frames::{Frames, Item};
+use pictures::Pictures;
+use progress::Progress;
+use report::{FileFacts, RunReport, Tally};
+use tagalong_core::Registry;
+use tagalong_log::FrameSource;
+use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
+use tagalong_pipeline::{FrameReport, Pipeline, StepError};
+use timings::Timings;
+
+use crate::args::{Format, RunArgs};
+use crate::config_file::{ConfigFile, OuterSettings};
+use crate::needs::needs;
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::overlay::{Overlay, Scene};
+use crate::signals::Signals;
+use crate::suggest::check_log_path;
+
+/// Runs a pipeline over a log.
+///
+/// # Errors
+/// A config, log or output directory that cannot be used; a plugin that fails
+/// on a frame; a disk that fails.
+pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
+    let signals = Signals::listen()
+        .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))?;
+    let job = Job::prepare(args, registry)?;
+    let mut desk = Desk::open(args, &job)?;
+    let threads = args.threads.map_or_else(default_threads, usize::from);
+    let mut pictures = Pictures::new(desk.overlay.take(), threads);
+    let mut frames = Frames::new(job.source, threads);
+    let mut pipeline = job.pipeline;
+    let stopped = work(&mut pipeline, &mut frames, &mut desk, &mut pictures, &signals);
+    pictures.finish()?;
+    let source = frames.finish()?;
+    desk.close(args, job.report, source, stopped?, &signals)
+}
+
+/// Reading ahead pays from the second core on, drawing aside from the third.
+fn default_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Everything that is read and checked before anything is written.
+struct Job {
+    pipeline: Pipeline,
+    outer: OuterSettings,
+    source: FrameSource,
+    resolved: String,
+    folder: PathBuf,
+    report: RunReport,
+}
+
+impl Job {
+    fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
+        let config = ConfigFile::read(&args.config)?;
+        let (pipeline, settings) = config.pipeline(registry, args.seed)?;
+        let outer = config.outer()?;
+        check_log_path(&args.log)?;
+        let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
+        RunDir::check(&folder, args.overwrite, &args.log).map_err(refused)?;
+        let needs = needs(|| Ok(config.pipeline(registry, args.seed)?.0))?;
+        let source = FrameSource::open(&args.log, &outer.input, &outer.limits, needs)
+            .map_err(Failure::failed)?;
+        let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
+        let report = blank_report(args, &config, settings.seed);
+        Ok(Self { pipeline, outer, source, resolved, folder, report })
+    }
+}
+
+/// `runs/<log>-<config>`.
+fn default_folder(args: &RunArgs, config: &ConfigFile) -> PathBuf {
+    let log = args.log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Path::new("runs").join(format!("{log}-{}", config.stem()))
+}
+
+fn blank_report(args: &RunArgs, config: &ConfigFile, seed: u64) -> RunReport {
+    let log = args.log.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    RunReport {
+        tagalong: env!("CARGO_PKG_VERSION"),
+        ended: "complete".into(),
+        config: FileFacts { name: config.name(), sha256: Some(config.sha256()) },
+        seed,
+        log: FileFacts { name: log, sha256: None },
+        data_lost: false,
+        frames: report::Frames::default(),
+        persons: BTreeMap::new(),
+        candidates: report::Candidates::default(),
+        funnel: Vec::new(),
+        counters: BTreeMap::new(),
+        notes: Vec::new(),
+        nis: None,
+    }
+}
+
+/// A directory that cannot be made or filled is the user's choice to change.
+fn refused(error: WriteError) -> Failure {
+    Failure::usage(error)
+}
+
+/// One frame after the other until the log, the pipeline or the user's
+/// patience ends. `Some` is the plugin's mistake that ended it.
+fn work(
+    pipeline: &mut Pipeline,
+    frames: &mut Frames,
+    desk: &mut Desk,
+    pictures: &mut Pictures,
+    signals: &Signals,
+) -> Result<Option<StepError>, Failure> {
+    let progress = Progress::new();
+    loop {
+        let waiting = Instant::now();
+        let Some(item) = frames.next(signals) else { return Ok(None) };
+        desk.timings.add("read", ms_since(waiting));
+        desk.tally.read(item.frame.odom_stale);
+        let report = match pipeline.step(&item.frame.frame) {
+            Ok(report) => report,
+            Err(error) => return Ok(Some(error)),
+        };
+        let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
+        progress.show(item.progress, report.index, people);
+        desk.take(&item, &report)?;
+        pictures.draw(|| scene(&item, report))?;
+    }
+}
+
+fn scene(item: &Item, report: FrameReport) -> Scene {
+    let frame = &item.frame.frame;
+    Scene {
+        camera: frame.camera.clone(),
+        images: frame.images().clone(),
+        odom_from_robot: item.frame.odom_from_robot,
+        report,
+    }
+}
+
+fn ms_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+/// Where results are gathered and written.
+struct Desk {
+    log: TrackLog,
+    overlay: Option<Overlay>,
+    tally: Tally,
+    timings: Timings,
+}
+
+impl Desk {
+    fn open(args: &RunArgs, job: &Job) -> Result<Self, Failure> {
+        let dir = RunDir::create(&job.folder, args.overwrite, &args.log).map_err(refused)?;
+        let overlay = if args.overlay {
+            Some(Overlay::new(dir.overlay().map_err(refused)?))
+        } else {
+            None
+        };
+        let input = &job.outer.input;
+        let names = FrameNames { base: input.base_frame.clone(), odom: input.odom_frame.clone() };
+        let log = TrackLog::create(dir, names, job.outer.output.clone(), &job.resolved)
+            .map_err(refused)?;
+        Ok(Self { log, overlay, tally: Tally::default(), timings: Timings::default() })
+    }
+
+    /// Takes in what the pipeline said of a frame.
+    fn take(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
+        self.tally.add(report);
+        for (stage, ms) in &report.timings {
+            self.timings.add(stage, *ms);
+        }
+        if !report.outcome.is_processed() {
+            return Ok(());
+        }
+        let writing = Instant::now();
+        let record = FrameRecord {
+            index: report.index,
+            stamp: report.stamp,
+            camera: &item.frame.frame.camera,
+            odom_from_robot: &item.frame.odom_from_robot,
+            tracks: &report.tracks,
+            target: report.target,
+            command: report.command,
+        };
+        self.log.write(&record).map_err(Failure::failed)?;
+        self.timings.add("write", ms_since(writing));
+        Ok(())
+    }
+
+    /// Ends the files and says what was found.
+    fn close(
+        self,
+        args: &RunArgs,
+        mut report: RunReport,
+        source: Option<FrameSource>,
+        stopped: Option<StepError>,
+        signals: &Signals,
+    ) -> Outcome {
+        self.tally.fill(&mut report);
+        describe_source(&mut report, source);
+        describe_end(&mut report, stopped.as_ref(), signals);
+        if report.frames.processed == 0 && stopped.is_some() {
+            self.log.discard().map_err(Failure::failed)?;
+            return verdict(args, &report, stopped, signals);
+        }
+        let times = serde_json::to_string_pretty(&self.timings.summary()).unwrap_or_default();
+        let json = report.to_json();
+        let folder =
+            self.log.finish(about(&report), &json, &(times + "\n")).map_err(Failure::failed)?;
+        match args.format {
+            Format::Json => print(&json)?,
+            Format::Text => print(&summary::text(&report, &folder, args.overlay))?,
+        }
+        verdict(args, &report, stopped, signals)
+    }
+}
+
+/// What the reader knows at the end.
+fn describe_source(report: &mut RunReport, source: Option<FrameSource>) {
+    let Some(source) = source else {
+        report.notes.push("the reader was still waiting for its input".into());
+        return;
+    };
+    report.log.sha256 = source.facts().sha256.clone();
+    report.counters =
+        source.counters().iter().map(|(name, count)| ((*name).to_owned(), *count)).collect();
+    report.notes.extend(source.notes().iter().cloned());
+    report.data_lost = source.data_lost();
+}
+
+fn describe_end(report: &mut RunReport, stopped: Option<&StepError>, signals: &Signals) {
+    if let Some(error) = stopped {
+        report.ended = format!("failed: {error}");
+    } else if let Some(signal) = signals.received() {
+        report.ended = format!("stopped by signal {signal}");
+    }
+}
+
+/// What the metadata record of `tracks.mcap` says.
+fn about(report: &RunReport) -> BTreeMap<String, String> {
+    let sha256 = |file: &FileFacts| file.sha256.clone().unwrap_or_default();
+    BTreeMap::from([
+        ("version".into(), report.tagalong.into()),
+        ("seed".into(), report.seed.to_string()),
+        ("config_sha256".into(), sha256(&report.config)),
+        ("log_sha256".into(), sha256(&report.log)),
+    ])
+}
+
+/// The exit code, and the reason for a bad one.
+fn verdict(
+    args: &RunArgs,
+    report: &RunReport,
+    stopped: Option<StepError>,
+    signals: &Signals,
+) -> Outcome {
+    for note in &report.notes {
+        say(&format!("note: {note}"));
+    }
+    match stopped {
+        // The mistake is the plugin's, and what came before it is written.
+        Some(error @ StepError::Panic { .. }) => {
+            return Err(Failure { code: 3, message: error.to_string() });
+        }
+        Some(error) => return Err(Failure::failed(error)),
+        None => {}
+    }
+    if let Some(signal) = signals.received() {
+        return Ok(Ended::BySignal(signal));
+    }
+    match (report.data_lost, args.strict) {
+        (false, _) => Ok(Ended::Well),
+        (true, false) => Ok(Ended::WithLoss),
+        (true, true) => Err(Failure::failed("part of the log was lost, and --strict was given")),
+    }
+}

@@ -1,0 +1,75 @@
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::report::RunReport;
+
+/// Lines of the funnel that are shown.
+const FUNNEL_LINES: usize = 6;
+
+/// Persons that are listed one by one.
+const PERSON_LINES: usize = 12;
+
+/// What a run found, for a person at the terminal.
+pub fn text(report: &RunReport, folder: &Path, overlay: bool) -> String {
+    let mut out = String::new();
+    let frames = &report.frames;
+    let _ = writeln!(
+        out,
+        "{}: {} frames, people in {} of them ({})",
+        report.log.name, frames.read, frames.with_person, report.ended
+    );
+    persons(&mut out, report);
+    funnel(&mut out, report);
+    losses(&mut out, report);
+    files(&mut out, folder, overlay);
+    out
+}
+
+fn persons(out: &mut String, report: &RunReport) {
+    let _ = match report.persons.len() {
+        0 => writeln!(out, "nobody was found; --overlay shows where each test said no"),
+        1 => writeln!(out, "1 person:"),
+        many => writeln!(out, "{many} persons:"),
+    };
+    for (id, person) in report.persons.iter().take(PERSON_LINES) {
+        let _ = writeln!(
+            out,
+            "  {id}: frames {} to {}, seen in {}",
+            person.first_frame, person.last_frame, person.seen_frames
+        );
+    }
+    if report.persons.len() > PERSON_LINES {
+        let _ = writeln!(out, "  and {} more", report.persons.len() - PERSON_LINES);
+    }
+}
+
+/// The tests that dropped most.
+fn funnel(out: &mut String, report: &RunReport) {
+    let mut lines: Vec<_> = report.funnel.iter().collect();
+    lines.sort_by_key(|line| std::cmp::Reverse(line.count));
+    if !lines.is_empty() {
+        let _ = writeln!(out, "candidates dropped by:");
+    }
+    for line in lines.iter().take(FUNNEL_LINES) {
+        let _ = writeln!(out, "  {} {}", line.test, line.count);
+    }
+}
+
+fn losses(out: &mut String, report: &RunReport) {
+    if !report.data_lost {
+        return;
+    }
+    let _ = writeln!(out, "part of the log was lost or could not be used:");
+    for (name, count) in report.counters.iter().filter(|(_, count)| **count > 0) {
+        let _ = writeln!(out, "  {name} {count}");
+    }
+}
+
+fn files(out: &mut String, folder: &Path, overlay: bool) {
+    let shown = folder.display();
+    let _ = writeln!(out, "files in {shown}; to look at them:");
+    let _ = writeln!(out, "  rerun {shown}/tracks.mcap");
+    if overlay {
+        let _ = writeln!(out, "  {shown}/overlay/ has a picture of every frame");
+    }
+}

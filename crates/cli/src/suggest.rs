@@ -1,0 +1,137 @@
+//! What a mistyped or unusable path probably meant.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tagalong_core::nearest;
+
+use crate::outcome::Failure;
+
+/// "; did you mean `configs/depth-ekf.toml`?", if there is such a file.
+pub fn config_hint(wanted: &Path) -> String {
+    let folders = [wanted.parent().unwrap_or(Path::new("")).to_owned(), PathBuf::from("configs")];
+    let files: Vec<PathBuf> = folders.iter().flat_map(|folder| toml_files(folder)).collect();
+    let names: Vec<&str> = files.iter().filter_map(|f| f.file_stem()?.to_str()).collect();
+    let stem = wanted.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
+    let best = nearest(stem, names.iter().copied());
+    match best.and_then(|name| files.iter().find(|f| f.file_stem().is_some_and(|s| s == name))) {
+        Some(file) => format!("; did you mean `{}`?", file.display()),
+        None if names.is_empty() => String::new(),
+        None => format!("; there are: {}", names.join(", ")),
+    }
+}
+
+/// The TOML files of a folder, by name.
+fn toml_files(folder: &Path) -> Vec<PathBuf> {
+    let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let Ok(entries) = fs::read_dir(here) else { return Vec::new() };
+    let mut files: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| folder.join(entry.file_name()))
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .filter(|path| !path.file_name().is_some_and(|n| n == "Cargo.toml"))
+        .collect();
+    files.sort();
+    files
+}
+
+/// Refuses a path that cannot be a log, and says what to do instead.
+///
+/// # Errors
+/// A missing file, a directory, or a bag of another format.
+pub fn check_log_path(path: &Path) -> Result<(), Failure> {
+    let shown = path.display();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if !path.exists() {
+        return Err(Failure::failed(format!("{shown}: no such file{}", log_hint(path))));
+    }
+    if path.is_dir() {
+        let hint = match mcap_files(path).first() {
+            Some(file) => format!("give a file in it, for example {}", file.display()),
+            None => "and it contains no .mcap file".to_owned(),
+        };
+        return Err(Failure::failed(format!("{shown} is a directory; {hint}")));
+    }
+    match extension {
+        "bag" | "db3" => Err(Failure::failed(conversion(path, extension))),
+        _ => Ok(()),
+    }
+}
+
+fn conversion(path: &Path, extension: &str) -> String {
+    let shown = path.display();
+    let stem = path.with_extension("");
+    let stem = stem.display();
+    if extension == "bag" {
+        return format!(
+            "{shown} is a ROS 1 bag, and only MCAP is read; convert it:\n  rosbags-convert --src \
+             {shown} --dst {stem} --dst-storage mcap --dst-typestore ros2_humble"
+        );
+    }
+    let folder = path.parent().filter(|folder| folder.join("metadata.yaml").exists());
+    let source = folder.unwrap_or(path).display();
+    format!(
+        "{shown} is a ROS 2 bag in SQLite, and only MCAP is read; convert it with one of:\n  \
+         rosbags-convert --src {source} --dst {stem}-mcap --dst-storage mcap\n  mcap convert \
+         {shown} {stem}.mcap"
+    )
+}
+
+fn mcap_files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let mut files: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
+        .collect();
+    files.sort();
+    files
+}
+
+fn log_hint(wanted: &Path) -> String {
+    let folder = wanted.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let files = mcap_files(folder);
+    let names: Vec<&str> = files.iter().filter_map(|f| f.file_name()?.to_str()).collect();
+    let name = wanted.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+    nearest(name, names).map_or(String::new(), |best| {
+        format!("; did you mean `{}`?", wanted.with_file_name(best).display())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mistyped_config_is_answered_with_the_nearest_file() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("depth-ekf.toml"), "").unwrap();
+        fs::write(home.path().join("other.toml"), "").unwrap();
+        let hint = config_hint(&home.path().join("dept-ekf.toml"));
+        assert!(hint.contains("did you mean") && hint.contains("depth-ekf.toml"), "{hint}");
+        let hint = config_hint(&home.path().join("zzzzzzzz.toml"));
+        assert!(hint.contains("there are: depth-ekf, other"), "{hint}");
+    }
+
+    #[test]
+    fn bags_of_other_formats_get_the_line_that_converts_them() {
+        let home = tempfile::tempdir().unwrap();
+        for (name, expected) in [("a.bag", "rosbags-convert"), ("b.db3", "mcap convert")] {
+            let path = home.path().join(name);
+            fs::write(&path, "x").unwrap();
+            let failure = check_log_path(&path).unwrap_err();
+            assert!(failure.message.contains(expected), "{}", failure.message);
+        }
+    }
+
+    #[test]
+    fn a_directory_and_a_missing_log_are_answered_with_what_is_there() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("robot.mcap"), "x").unwrap();
+        let failure = check_log_path(home.path()).unwrap_err();
+        assert!(failure.message.contains("robot.mcap"), "{}", failure.message);
+        let failure = check_log_path(&home.path().join("robto.mcap")).unwrap_err();
+        assert!(failure.message.contains("did you mean"), "{}", failure.message);
+        assert_eq!(failure.code, 1);
+    }
+}
