@@ -28,8 +28,9 @@ impl Direction {
     }
 }
 
-/// The person in one row of a template: a single run of pixels. What is beside
-/// it within the window is background.
+/// The person in one row of a template: a single run of pixels. What lies
+/// beside it within the window is background, but for a narrow guard along the
+/// silhouette, where sensors mix foreground and background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemplateRow {
     /// Row relative to the head centre, pixels.
@@ -38,6 +39,10 @@ pub struct TemplateRow {
     pub from: i64,
     /// One past the last pixel; equal to `from` in a row without a person.
     pub to: i64,
+    /// Background ends before this pixel ...
+    pub guard_from: i64,
+    /// ... and goes on with this one.
+    pub guard_to: i64,
     /// How far the person lies behind the face in this row, m.
     pub relief_m: f64,
 }
@@ -87,6 +92,8 @@ const ROLL_STEP_DEG: f64 = 6.0;
 const HALF_WIDTH_M: f64 = 0.33;
 const ABOVE_M: f64 = 0.20;
 const BELOW_M: f64 = 0.43;
+/// Half the width of the guard along the silhouette, m; at least a pixel.
+const GUARD_M: f64 = 0.012;
 
 impl Bank {
     /// A bank whose templates have at most `max_rows` rows each: of a larger
@@ -131,7 +138,18 @@ fn cut(relief: &Relief, pose: Pose, max_rows: usize) -> Template {
             sum += behind - face;
             count += 1.0;
         }
-        TemplateRow { dy, from, to, relief_m: if count > 0.0 { sum / count } else { 0.0 } }
+        if count == 0.0 {
+            return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
+        }
+        let guard = ((GUARD_M * scale).round() as i64).max(1).min((to - from) / 4);
+        TemplateRow {
+            dy,
+            from: from + guard,
+            to: to - guard,
+            guard_from: from - guard,
+            guard_to: to + guard,
+            relief_m: sum / count,
+        }
     };
     Template { rows: (first..=last).step_by(step).map(row).collect(), half_width }
 }
@@ -148,7 +166,7 @@ mod tests {
     #[test]
     fn the_head_is_narrower_than_the_shoulders() {
         let template = widths(Direction::Along, 0.0);
-        let width = |dy| template.rows.iter().find(|r| r.dy == dy).map(|r| r.to - r.from).unwrap();
+        let width = |dy| template.rows.iter().find(|r| r.dy == dy).map(|r| (r.to - r.from + r.guard_to - r.guard_from) / 2).unwrap();
         assert_eq!(width(-18), 0, "air above the head");
         assert!((15..=20).contains(&width(0)), "head {}", width(0));
         assert!((40..=52).contains(&width(38)), "shoulders {}", width(38));

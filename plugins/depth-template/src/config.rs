@@ -57,6 +57,8 @@ pub struct DepthTemplateConfig {
     pub discover_cost: f64,
     /// Largest cost of somebody already tracked.
     pub follow_cost: f64,
+    /// Below this cost the neighbours of a cell are tried, too.
+    pub refine_cost: f64,
     /// Cost at which person and no person are equally likely; the score is the
     /// distance to it times `score_per_cost`.
     pub even_cost: f64,
@@ -102,6 +104,7 @@ impl Default for DepthTemplateConfig {
             min_foreground_valid: 0.5,
             discover_cost: 0.225,
             follow_cost: 0.32,
+            refine_cost: 0.4,
             even_cost: 0.27,
             score_per_cost: 20.0,
             min_separation_m: 0.3,

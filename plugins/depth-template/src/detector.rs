@@ -84,10 +84,10 @@ impl DepthTemplate {
                     funnel.drop_at(test, region(scene, x as f64, y as f64, depth_m));
                     continue;
                 }
-                match self.best(scene, &local).filter(|m| m.cost < limit) {
-                    Some(found) => {
-                        let head = view.head(x as f64, y as f64, depth_m);
-                        self.cells.push(Cell { x, y, depth_m, cost: found.cost, head });
+                match self.refined(scene, local).filter(|(_, fit)| fit.cost < limit) {
+                    Some((at, fit)) => {
+                        let head = view.head(at.x as f64, at.y as f64, depth_m);
+                        self.cells.push(Cell { x: at.x, y: at.y, depth_m, cost: fit.cost, head });
                     }
                     None => unfit += 1,
                 }
@@ -120,6 +120,24 @@ impl DepthTemplate {
             return Err(tests_named::BODY);
         }
         Ok(())
+    }
+
+    /// The best silhouette at a cell, or right beside it: cells lie two and
+    /// more pixels apart, and the edge of a silhouette is sharper than that.
+    fn refined(&mut self, scene: &Scene<'_>, local: Local) -> Option<(Local, Match)> {
+        let mut best = (local, self.best(scene, &local)?);
+        if best.1.cost > self.config.refine_cost {
+            return Some(best);
+        }
+        let step = (spacing(local.px_per_m) / 2).max(1);
+        for (dx, dy) in [(-step, 0), (step, 0), (0, -step), (0, step)] {
+            let (x, y) = (best.0.x + dx, best.0.y + dy);
+            let beside = Local { x, y, ..local };
+            if let Some(fit) = self.best(scene, &beside).filter(|fit| fit.cost < best.1.cost) {
+                best = (beside, fit);
+            }
+        }
+        Some(best)
     }
 
     /// The best of the three body directions.

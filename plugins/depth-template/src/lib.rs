@@ -22,7 +22,7 @@ mod matching;
 mod people;
 mod view;
 
-pub use bank::{Bank, Direction, Template, TemplateRow};
+pub use bank::{Bank, Direction, Pose, Template, TemplateRow};
 pub use body::{Part, Relief, body_parts, render};
 pub use config::{Cost, DepthTemplateConfig};
 pub use detector::DepthTemplate;

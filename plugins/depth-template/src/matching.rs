@@ -54,26 +54,23 @@ impl Matcher {
         depth_m: f64,
     ) -> Option<Match> {
         let mut tally = Tally::default();
+        let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
         for row in &template.rows {
-            let (left, right) = (x - template.half_width, x + template.half_width + 1);
-            let (from, to) = (x + row.from, x + row.to);
-            let (person, all) = ((to - from) as f64, (right - left) as f64);
-            tally.foreground += person;
-            tally.background += all - person;
+            let window = (x - template.half_width, x + template.half_width + 1);
+            let sides = [(window.0, x + row.guard_from), (x + row.guard_to, window.1)];
+            let wanted = sides.map(|(from, to)| (to - from).max(0) as f64);
+            tally.foreground += (row.to - row.from) as f64;
+            tally.background += wanted[0] + wanted[1];
             let Some(line) = usize::try_from(y + row.dy).ok().filter(|l| *l < rows.height()) else {
-                tally.outside += all - person;
+                tally.outside += wanted[0] + wanted[1];
                 continue;
             };
-            let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
-            let (a, b, c, d) = (inside(left), inside(from), inside(to), inside(right));
-            let beside = if to > from { (b - a) + (d - c) } else { d - a };
-            tally.outside += all - person - beside as f64;
-            self.foreground(&mut tally, rows, (line, b, c), depth_m, row.relief_m);
-            if to > from {
-                self.background(&mut tally, rows, (line, a, b), depth_m);
-                self.background(&mut tally, rows, (line, c, d), depth_m);
-            } else {
-                self.background(&mut tally, rows, (line, a, d), depth_m);
+            let person = (line, inside(x + row.from), inside(x + row.to));
+            self.foreground(&mut tally, rows, person, depth_m, row.relief_m);
+            for ((from, to), wanted) in sides.into_iter().zip(wanted) {
+                let run = (line, inside(from), inside(to).max(inside(from)));
+                tally.outside += wanted - (run.2 - run.1) as f64;
+                self.background(&mut tally, rows, run, depth_m);
             }
         }
         self.judge(&tally)
@@ -186,8 +183,8 @@ mod tests {
             let mean_error =
                 fg.iter().map(|v| (v - e).powi(2)).sum::<f64>() / fg.len().max(1) as f64;
             bad += fg.len() as f64 * ((mean_error - free) / (full - free)).clamp(0.0, 1.0);
-            let left = |u: i64| !is_person(u) && (row.to == row.from || u < x + row.from);
-            let right = |u: i64| !is_person(u) && !left(u);
+            let left = |u: i64| u < x + row.guard_from;
+            let right = |u: i64| u >= x + row.guard_to;
             for side in [&left as &dyn Fn(i64) -> bool, &right] {
                 beside += window.clone().filter(|u| side(*u)).count() as f64;
                 for u in window.clone().filter(|u| side(*u)) {

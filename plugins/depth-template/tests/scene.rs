@@ -1,0 +1,139 @@
+//! The detector on painted scenes: a body from the body model in front of a wall.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix5, Point3, Vector2};
+use tagalong_core::{
+    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, HEAD_RADIUS_M, Images,
+    Motion, Person, Pinhole, Search, Stamp, Track, TrackId,
+};
+use tagalong_depth_template::{DepthTemplate, DepthTemplateConfig, render};
+
+const CAMERA_HEIGHT_M: f64 = 1.2;
+
+fn camera(width: usize) -> Arc<Camera> {
+    let (w, h) = (width as f64, 0.75 * width as f64);
+    let f = 0.83 * w;
+    let lens = Pinhole { fx: f, fy: f, cx: 0.5 * (w - 1.0), cy: 0.5 * (h - 1.0), distortion: Distortion::None };
+    Arc::new(Camera::mounted(lens, width, 3 * width / 4, CAMERA_HEIGHT_M, 0.0, 0.0))
+}
+
+/// People, by the centre of their heads, on a floor in front of a wall.
+fn frame(width: usize, wall_m: f64, heads: &[Point3<f64>]) -> Frame {
+    let camera = camera(width);
+    let body = render(std::f64::consts::PI, 0.0);
+    let depth = DepthImage::from_fn(width, 3 * width / 4, |u, v| {
+        let ray = camera.ray(nalgebra::Point2::new(u as f64, v as f64));
+        let floor = if ray.y > 0.0 { CAMERA_HEIGHT_M / ray.y } else { f64::INFINITY };
+        let mut depth = wall_m.min(floor);
+        for head in heads {
+            let plane = head.x;
+            let (right, down) = (ray.x * plane + head.y, ray.y * plane - (CAMERA_HEIGHT_M - head.z));
+            // Legs: the silhouette of the hips, down to the floor.
+            let behind = body.at(right, down.min(0.45));
+            if behind.is_finite() {
+                depth = depth.min((plane + behind).min(floor));
+            }
+        }
+        depth as f32
+    });
+    let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
+    Frame::new(1, Stamp::from_nanos(1), camera, Motion::at_rest(0.1), images)
+}
+
+fn discover(config: DepthTemplateConfig, frame: &Frame) -> (Vec<Detection>, Funnel) {
+    let mut funnel = Funnel::default();
+    let mut detector = DepthTemplate::new(config).unwrap();
+    let found = detector.detect(frame, &Search::Everywhere { occupied: &[] }, &mut funnel).unwrap();
+    (found, funnel)
+}
+
+#[test]
+fn one_person_is_found_where_she_stands_at_any_resolution() {
+    for width in [320, 512, 640, 1280] {
+        for range in [1.5, 2.5, 4.0] {
+            let head = Point3::new(range, 0.2, 1.6);
+            let (found, funnel) = discover(DepthTemplateConfig::default(), &frame(width, 7.0, &[head]));
+            assert_eq!(found.len(), 1, "width {width}, range {range}: {funnel:?}");
+            let error = (found[0].position - head).norm();
+            assert!(error < 0.12, "width {width}, range {range}: {error} m");
+        }
+    }
+}
+
+#[test]
+fn a_person_close_to_a_wall_is_found() {
+    let scene = frame(640, 3.5, &[Point3::new(3.0, 0.0, 1.6)]);
+    assert_eq!(discover(DepthTemplateConfig::default(), &scene).0.len(), 1);
+    let printed = DepthTemplateConfig { boundary_margin_m: 1.0, ..Default::default() };
+    let (found, funnel) = discover(printed, &scene);
+    assert!(found.is_empty(), "P4's margin of 1 m loses this person");
+    assert!(funnel.count("boundary points") > 0);
+}
+
+#[test]
+fn head_height_is_a_setting() {
+    let scene = frame(640, 6.0, &[Point3::new(2.0, 0.0, 1.05)]);
+    assert!(discover(DepthTemplateConfig::default(), &scene).0.is_empty());
+    let low = DepthTemplateConfig { min_head_height_m: 0.9, ..Default::default() };
+    assert_eq!(discover(low, &scene).0.len(), 1);
+}
+
+#[test]
+fn an_empty_room_and_a_wall_stay_empty() {
+    for wall in [1.5, 3.0, 5.0] {
+        let (found, _) = discover(DepthTemplateConfig::default(), &frame(640, wall, &[]));
+        assert!(found.is_empty(), "wall at {wall} m");
+    }
+}
+
+#[test]
+fn people_side_by_side_are_two() {
+    let heads = [Point3::new(2.5, 0.35, 1.6), Point3::new(2.5, -0.35, 1.7)];
+    assert_eq!(discover(DepthTemplateConfig::default(), &frame(640, 6.0, &heads)).0.len(), 2);
+}
+
+#[test]
+fn somebody_already_found_is_not_found_again() {
+    let scene = frame(640, 6.0, &[Point3::new(2.5, 0.0, 1.6)]);
+    let (occupied, _) = discover(DepthTemplateConfig::default(), &scene);
+    let mut detector = DepthTemplate::new(DepthTemplateConfig::default()).unwrap();
+    let mut funnel = Funnel::default();
+    let search = Search::Everywhere { occupied: &occupied };
+    assert!(detector.detect(&scene, &search, &mut funnel).unwrap().is_empty());
+    assert_eq!(funnel.count("occupied"), 1);
+}
+
+fn track_at(position: Point3<f64>, camera: &Camera) -> Track {
+    let person = Person { position, velocity: Vector2::zeros() };
+    let estimate =
+        Estimate { person, covariance: Matrix5::identity() * 0.02, region: camera.upper_body(&position) };
+    Track {
+        id: TrackId(1),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 5,
+        unseen_s: 0.0,
+        score: 1.0,
+    }
+}
+
+#[test]
+fn following_finds_the_person_near_the_prediction_and_nobody_else() {
+    let (near, far) = (Point3::new(2.5, 0.5, 1.6), Point3::new(2.5, -0.7, 1.6));
+    let scene = frame(640, 6.0, &[near, far]);
+    let mut detector = DepthTemplate::new(DepthTemplateConfig::default()).unwrap();
+    let track = track_at(near + nalgebra::Vector3::new(0.1, -0.1, 0.0), &scene.camera);
+    let found = detector.detect(&scene, &Search::Near(&track), &mut Funnel::default()).unwrap();
+    assert_eq!(found.len(), 1);
+    assert!((found[0].position - near).norm() < HEAD_RADIUS_M + 0.05);
+}
+
+#[test]
+fn settings_that_hold_nothing_are_refused() {
+    let wrong = DepthTemplateConfig { min_depth_m: 6.0, ..Default::default() };
+    let message = DepthTemplate::new(wrong).err().unwrap().to_string();
+    assert_eq!(message, "`min_depth_m` = 6 must be below `max_depth_m` = 5.5");
+}
