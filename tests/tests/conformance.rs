@@ -6,10 +6,10 @@ use tagalong_core::Registry;
 /// Detectors that discover the drawn person in a depth or colour image. A
 /// freshly generated detector finds nobody and is not listed; the one that
 /// works is, and then has to go on working.
-const DISCOVER: &[&str] = &[];
+const DISCOVER: &[&str] = &["depth-template"];
 
 /// Detectors that find the drawn person near a track.
-const FOLLOW: &[&str] = &[];
+const FOLLOW: &[&str] = &["depth-template"];
 
 #[test]
 fn every_plugin_of_the_catalog_conforms() {

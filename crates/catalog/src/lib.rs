@@ -8,4 +8,6 @@
 use tagalong_core::Registry;
 
 /// Registers every plugin of the workspace.
-pub fn register(_registry: &mut Registry) {}
+pub fn register(registry: &mut Registry) {
+    tagalong_depth_template::register(registry);
+}
