@@ -166,7 +166,14 @@ mod tests {
     #[test]
     fn the_head_is_narrower_than_the_shoulders() {
         let template = widths(Direction::Along, 0.0);
-        let width = |dy| template.rows.iter().find(|r| r.dy == dy).map(|r| (r.to - r.from + r.guard_to - r.guard_from) / 2).unwrap();
+        let width = |dy| {
+            template
+                .rows
+                .iter()
+                .find(|r| r.dy == dy)
+                .map(|r| (r.to - r.from + r.guard_to - r.guard_from) / 2)
+                .unwrap()
+        };
         assert_eq!(width(-18), 0, "air above the head");
         assert!((15..=20).contains(&width(0)), "head {}", width(0));
         assert!((40..=52).contains(&width(38)), "shoulders {}", width(38));

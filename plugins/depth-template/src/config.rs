@@ -53,9 +53,9 @@ pub struct DepthTemplateConfig {
     pub relief_full_m: f64,
     /// Part of the person's pixels that must have a reading, 0 to 1.
     pub min_foreground_valid: f64,
-    /// Largest cost of a newcomer.
+    /// Largest cost of a newcomer, and of a track that is not confirmed yet.
     pub discover_cost: f64,
-    /// Largest cost of somebody already tracked.
+    /// Largest cost of somebody already tracked and confirmed.
     pub follow_cost: f64,
     /// Below this cost the neighbours of a cell are tried, too.
     pub refine_cost: f64,
@@ -102,10 +102,10 @@ impl Default for DepthTemplateConfig {
             relief_free_m: 0.15,
             relief_full_m: 0.30,
             min_foreground_valid: 0.5,
-            discover_cost: 0.225,
-            follow_cost: 0.32,
+            discover_cost: 0.17,
+            follow_cost: 0.30,
             refine_cost: 0.4,
-            even_cost: 0.27,
+            even_cost: 0.22,
             score_per_cost: 20.0,
             min_separation_m: 0.3,
             min_cells: 2,

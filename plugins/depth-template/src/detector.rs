@@ -20,12 +20,13 @@ pub struct DepthTemplate {
     config: DepthTemplateConfig,
     bank: Bank,
     cells: Vec<Cell>,
+    view: Option<Arc<View>>,
 }
 
 /// A frame, ready for matching.
 struct Scene<'a> {
     rows: &'a RowSums,
-    view: View,
+    view: Arc<View>,
     matcher: Matcher,
 }
 
@@ -50,7 +51,7 @@ impl DepthTemplate {
                 return Err(Error::Settings(format!("`{low}` = {a} must be below `{high}` = {b}")));
             }
         }
-        Ok(Self { bank: Bank::new(config.max_rows), config, cells: Vec::new() })
+        Ok(Self { bank: Bank::new(config.max_rows), config, cells: Vec::new(), view: None })
     }
 
     /// Looks at the cells of a window with the given spacing and keeps those
@@ -65,23 +66,22 @@ impl DepthTemplate {
     ) {
         let Scene { rows, view, .. } = scene;
         let inside = window.clipped(rows.width(), rows.height());
-        let (x0, y0) = (inside.x as i64 / 2 * 2, inside.y as i64 / 2 * 2);
-        let (mut outside, mut unfit) = (0, 0);
-        for y in (y0..inside.bottom().ceil() as i64).step_by(2) {
-            for x in (x0..inside.right().ceil() as i64).step_by(2) {
+        let (x0, y0) = (on_grid(inside.x), on_grid(inside.y));
+        let mut dropped = Tests::default();
+        for y in (y0..inside.bottom().ceil() as i64).step_by(View::GRID as usize) {
+            for x in (x0..inside.right().ceil() as i64).step_by(View::GRID as usize) {
                 let Some(depth_m) = rows.depth_m(x, y) else { continue };
                 let spacing = spacing(view.px_per_m(depth_m));
                 if x % spacing != 0 || y % spacing != 0 {
                     continue;
                 }
-                let height_m = view.height_m() + view.slope(x, y) * (depth_m + HEAD_RADIUS_M);
-                if !self.in_volume(depth_m, height_m) {
-                    outside += 1;
+                if !self.in_volume(depth_m, view.head_height_m(x, y, depth_m)) {
+                    dropped.add(tests_named::VOLUME, x, y, depth_m);
                     continue;
                 }
                 let local = view.local(x, y, depth_m);
                 if let Err(test) = admit(self, &local) {
-                    funnel.drop_at(test, region(scene, x as f64, y as f64, depth_m));
+                    dropped.add(test, x, y, depth_m);
                     continue;
                 }
                 match self.refined(scene, local).filter(|(_, fit)| fit.cost < limit) {
@@ -89,12 +89,19 @@ impl DepthTemplate {
                         let head = view.head(at.x as f64, at.y as f64, depth_m);
                         self.cells.push(Cell { x: at.x, y: at.y, depth_m, cost: fit.cost, head });
                     }
-                    None => unfit += 1,
+                    None => dropped.add(tests_named::COST, x, y, depth_m),
                 }
             }
         }
-        funnel.drop_many(tests_named::VOLUME, outside);
-        funnel.drop_many(tests_named::COST, unfit);
+        dropped.report(view, funnel);
+    }
+
+    /// The view of this frame's camera; it seldom changes.
+    fn view(&mut self, frame: &Frame, rows: &RowSums) -> Arc<View> {
+        match &self.view {
+            Some(view) if view.is_of(&frame.camera, rows) => Arc::clone(view),
+            _ => Arc::clone(self.view.insert(Arc::new(View::new(&frame.camera, rows)))),
+        }
     }
 
     fn in_volume(&self, depth_m: f64, height_m: f64) -> bool {
@@ -132,7 +139,7 @@ impl DepthTemplate {
         let step = (spacing(local.px_per_m) / 2).max(1);
         for (dx, dy) in [(-step, 0), (step, 0), (0, -step), (0, step)] {
             let (x, y) = (best.0.x + dx, best.0.y + dy);
-            let beside = Local { x, y, ..local };
+            let beside = local.moved_to(x, y);
             if let Some(fit) = self.best(scene, &beside).filter(|fit| fit.cost < best.1.cost) {
                 best = (beside, fit);
             }
@@ -166,7 +173,7 @@ impl DepthTemplate {
         self.scan(scene, &everywhere, limit, funnel, |this, l| this.admit_newcomer(scene.rows, l));
         let mut found = Vec::new();
         for person in group(&mut self.cells, limit, self.config.min_separation_m) {
-            let at = region(scene, person.x, person.y, person.depth_m);
+            let at = scene.view.region(person.x, person.y, person.depth_m);
             if person.cells < self.config.min_cells {
                 funnel.drop_at(tests_named::SIZE, at);
                 continue;
@@ -199,7 +206,8 @@ impl DepthTemplate {
         };
         let reach = radius_m * scene.view.px_per_m(face_m);
         let window = Rect::new(centre.x - reach, centre.y - reach, 2.0 * reach, 2.0 * reach);
-        let limit = self.config.follow_cost;
+        let c = &self.config;
+        let limit = if track.confirmed { c.follow_cost } else { c.discover_cost };
         self.scan(scene, &window, limit, funnel, |_, local| {
             let head = scene.view.head(local.x as f64, local.y as f64, local.depth_m);
             let near = (head.xy() - expected.xy()).norm() <= radius_m;
@@ -241,7 +249,7 @@ impl Detector for DepthTemplate {
             Cost::Robust => 0.0,
             _ => background(depth, self.config.background_percentile),
         };
-        let view = View::new(&Arc::clone(&frame.camera), rows.scale());
+        let view = self.view(frame, rows);
         let matcher = Matcher::new(&self.config, background);
         let scene = Scene { rows, view, matcher };
         match search {
@@ -249,6 +257,11 @@ impl Detector for DepthTemplate {
             Search::Near(track) => self.follow(frame, &scene, track, funnel),
         }
     }
+}
+
+/// The last coordinate of the grid up to `at`.
+fn on_grid(at: f64) -> i64 {
+    at as i64 / View::GRID * View::GRID
 }
 
 /// Cells are 2, 4 or 8 pixels apart: about 3 cm at the person.
@@ -260,8 +273,29 @@ fn spacing(px_per_m: f64) -> i64 {
     }
 }
 
-fn region(scene: &Scene<'_>, x: f64, y: f64, depth_m: f64) -> Rect {
-    scene.view.camera().upper_body(&scene.view.head(x, y, depth_m))
+/// What the tests of one scan dropped; an example is worked out at the end.
+#[derive(Default)]
+struct Tests {
+    entries: Vec<(&'static str, u64, (i64, i64, f64))>,
+}
+
+impl Tests {
+    fn add(&mut self, test: &'static str, x: i64, y: i64, depth_m: f64) {
+        match self.entries.iter_mut().find(|(name, ..)| *name == test) {
+            Some((_, count, last)) => {
+                *count += 1;
+                *last = (x, y, depth_m);
+            }
+            None => self.entries.push((test, 1, (x, y, depth_m))),
+        }
+    }
+
+    fn report(&self, view: &View, funnel: &mut Funnel) {
+        for (test, count, (x, y, depth_m)) in &self.entries {
+            funnel.drop_at(test, view.region(*x as f64, *y as f64, *depth_m));
+            funnel.drop_many(test, count - 1);
+        }
+    }
 }
 
 /// The inverse depth of the background: a percentile of the valid depths

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{Camera, Derived, Frame, HEAD_RADIUS_M, Result};
+use tagalong_core::{Camera, Derived, Frame, HEAD_RADIUS_M, Rect, Result};
 use tagalong_vision::RowSums;
 
 /// The reduced inverse-depth image of a frame, shared by whoever matches
@@ -19,10 +19,21 @@ impl Derived for Working {
     }
 }
 
-/// Reduced pixels in metric terms.
+/// Reduced pixels in metric terms. Made once per camera pose.
 pub struct View {
     camera: Arc<Camera>,
     scale: f64,
+    columns: usize,
+    geometry: Vec<Geometry>,
+}
+
+/// What depends on the viewing ray alone.
+#[derive(Clone, Copy, Debug, Default)]
+struct Geometry {
+    /// Height gained per metre of depth.
+    slope: f32,
+    pitch_rad: f32,
+    roll_rad: f32,
 }
 
 /// The neighbourhood of a head in the image.
@@ -40,13 +51,21 @@ pub struct Local {
     pub pitch_rad: f64,
     /// How far the upward direction leans to the right in the image, rad.
     pub roll_rad: f64,
+    /// Sine and cosine of `roll_rad`.
+    sin_cos: (f64, f64),
 }
 
 impl Local {
+    /// The same neighbourhood around another pixel close by.
+    pub fn moved_to(mut self, x: i64, y: i64) -> Self {
+        (self.x, self.y) = (x, y);
+        self
+    }
+
     /// The reduced pixel that lies `right_m`, `down_m` from the head centre in
     /// the person's own axes, at the head's depth.
     pub fn offset(&self, right_m: f64, down_m: f64) -> (i64, i64) {
-        let (sin, cos) = self.roll_rad.sin_cos();
+        let (sin, cos) = self.sin_cos;
         let x = (right_m * cos - down_m * sin) * self.px_per_m;
         let y = (right_m * sin + down_m * cos) * self.px_per_m;
         (self.x + x.round() as i64, self.y + y.round() as i64)
@@ -54,9 +73,44 @@ impl Local {
 }
 
 impl View {
-    /// The view of `camera` reduced by `scale`.
-    pub fn new(camera: &Arc<Camera>, scale: usize) -> Self {
-        Self { camera: Arc::clone(camera), scale: scale as f64 }
+    /// Cells of the image that have a geometry are this many pixels apart.
+    pub const GRID: i64 = 2;
+
+    /// The view of `camera`, reduced like `rows`.
+    pub fn new(camera: &Arc<Camera>, rows: &RowSums) -> Self {
+        let columns = rows.width().div_ceil(Self::GRID as usize);
+        let lines = rows.height().div_ceil(Self::GRID as usize);
+        let (camera, scale) = (Arc::clone(camera), rows.scale() as f64);
+        let mut view = Self { camera, scale, columns, geometry: Vec::new() };
+        let up = view.camera.robot_from_camera.rotation.inverse() * Vector3::z();
+        let cell = |i: usize| (i % columns * 2, i / columns * 2);
+        let cells = (0..columns * lines).map(cell);
+        view.geometry = cells.map(|(x, y)| view.geometry_of(x as f64, y as f64, &up)).collect();
+        view
+    }
+
+    /// True if this is the view of that camera and reduction.
+    pub fn is_of(&self, camera: &Camera, rows: &RowSums) -> bool {
+        self.scale == rows.scale() as f64 && *self.camera == *camera
+    }
+
+    /// The upward direction in the image is that in which a point moves when
+    /// it is raised; it does not depend on the depth.
+    fn geometry_of(&self, x: f64, y: f64, up_in_camera: &Vector3<f64>) -> Geometry {
+        let ray = self.camera.ray(self.full_pixel(x, y));
+        let slope = (self.camera.robot_from_camera.rotation * ray).z;
+        let (right, down) =
+            (up_in_camera.x - ray.x * up_in_camera.z, up_in_camera.y - ray.y * up_in_camera.z);
+        Geometry {
+            slope: slope as f32,
+            pitch_rad: -(slope / ray.norm()).asin() as f32,
+            roll_rad: right.atan2(-down) as f32,
+        }
+    }
+
+    fn geometry(&self, x: i64, y: i64) -> Geometry {
+        let index = (y / Self::GRID) as usize * self.columns + (x / Self::GRID) as usize;
+        self.geometry.get(index).copied().unwrap_or_default()
     }
 
     /// The full-size pixel of a reduced one: the middle of its block.
@@ -84,29 +138,21 @@ impl View {
         self.camera.back_project(self.full_pixel(x, y), depth_m + HEAD_RADIUS_M)
     }
 
-    /// How fast the height grows with depth along the ray of a reduced pixel.
-    pub fn slope(&self, x: i64, y: i64) -> f64 {
-        let ray = self.camera.ray(self.full_pixel(x as f64, y as f64));
-        (self.camera.robot_from_camera.rotation * ray).z
-    }
-
-    /// Height of the camera, m.
-    pub fn height_m(&self) -> f64 {
-        self.camera.height_m()
+    /// Height of the head centre whose face is seen at a reduced pixel, m.
+    pub fn head_height_m(&self, x: i64, y: i64, depth_m: f64) -> f64 {
+        self.camera.height_m() + f64::from(self.geometry(x, y).slope) * (depth_m + HEAD_RADIUS_M)
     }
 
     /// The neighbourhood of a head at a reduced pixel and depth.
     pub fn local(&self, x: i64, y: i64, depth_m: f64) -> Local {
-        let head = self.head(x as f64, y as f64, depth_m);
-        let above = self.reduced_pixel(&(head + Vector3::new(0.0, 0.0, 0.1)));
-        let roll_rad = above.map_or(0.0, |p| (p.x - x as f64).atan2(y as f64 - p.y));
-        let ray = head - Point3::from(self.camera.robot_from_camera.translation.vector);
-        let pitch_rad = -(ray.z / ray.norm()).asin();
-        Local { x, y, depth_m, px_per_m: self.px_per_m(depth_m), pitch_rad, roll_rad }
+        let Geometry { pitch_rad, roll_rad, .. } = self.geometry(x, y);
+        let (pitch_rad, roll_rad) = (f64::from(pitch_rad), f64::from(roll_rad));
+        let px_per_m = self.px_per_m(depth_m);
+        Local { x, y, depth_m, px_per_m, pitch_rad, roll_rad, sin_cos: roll_rad.sin_cos() }
     }
 
-    /// The camera.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
+    /// The upper-body square of a head at a reduced pixel and depth.
+    pub fn region(&self, x: f64, y: f64, depth_m: f64) -> Rect {
+        self.camera.upper_body(&self.head(x, y, depth_m))
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix5, Point3, Vector2};
 use tagalong_core::{
-    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, HEAD_RADIUS_M, Images,
-    Motion, Person, Pinhole, Search, Stamp, Track, TrackId,
+    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, HEAD_RADIUS_M,
+    Images, Motion, Person, Pinhole, Search, Stamp, Track, TrackId,
 };
 use tagalong_depth_template::{DepthTemplate, DepthTemplateConfig, render};
 
@@ -14,7 +14,13 @@ const CAMERA_HEIGHT_M: f64 = 1.2;
 fn camera(width: usize) -> Arc<Camera> {
     let (w, h) = (width as f64, 0.75 * width as f64);
     let f = 0.83 * w;
-    let lens = Pinhole { fx: f, fy: f, cx: 0.5 * (w - 1.0), cy: 0.5 * (h - 1.0), distortion: Distortion::None };
+    let lens = Pinhole {
+        fx: f,
+        fy: f,
+        cx: 0.5 * (w - 1.0),
+        cy: 0.5 * (h - 1.0),
+        distortion: Distortion::None,
+    };
     Arc::new(Camera::mounted(lens, width, 3 * width / 4, CAMERA_HEIGHT_M, 0.0, 0.0))
 }
 
@@ -28,7 +34,8 @@ fn frame(width: usize, wall_m: f64, heads: &[Point3<f64>]) -> Frame {
         let mut depth = wall_m.min(floor);
         for head in heads {
             let plane = head.x;
-            let (right, down) = (ray.x * plane + head.y, ray.y * plane - (CAMERA_HEIGHT_M - head.z));
+            let (right, down) =
+                (ray.x * plane + head.y, ray.y * plane - (CAMERA_HEIGHT_M - head.z));
             // Legs: the silhouette of the hips, down to the floor.
             let behind = body.at(right, down.min(0.45));
             if behind.is_finite() {
@@ -53,7 +60,8 @@ fn one_person_is_found_where_she_stands_at_any_resolution() {
     for width in [320, 512, 640, 1280] {
         for range in [1.5, 2.5, 4.0] {
             let head = Point3::new(range, 0.2, 1.6);
-            let (found, funnel) = discover(DepthTemplateConfig::default(), &frame(width, 7.0, &[head]));
+            let (found, funnel) =
+                discover(DepthTemplateConfig::default(), &frame(width, 7.0, &[head]));
             assert_eq!(found.len(), 1, "width {width}, range {range}: {funnel:?}");
             let error = (found[0].position - head).norm();
             assert!(error < 0.12, "width {width}, range {range}: {error} m");
@@ -106,8 +114,11 @@ fn somebody_already_found_is_not_found_again() {
 
 fn track_at(position: Point3<f64>, camera: &Camera) -> Track {
     let person = Person { position, velocity: Vector2::zeros() };
-    let estimate =
-        Estimate { person, covariance: Matrix5::identity() * 0.02, region: camera.upper_body(&position) };
+    let estimate = Estimate {
+        person,
+        covariance: Matrix5::identity() * 0.02,
+        region: camera.upper_body(&position),
+    };
     Track {
         id: TrackId(1),
         estimate,
