@@ -1,0 +1,125 @@
+use serde::{Deserialize, Serialize};
+use statrs::function::gamma::checked_gamma_lr;
+
+/// Whether a filter's covariance fits its errors.
+///
+/// The squares of innovations (NIS) or errors (NEES), each divided by its
+/// covariance, follow a chi-square distribution with as many degrees of freedom
+/// as they have components, if the filter is honest (Bar-Shalom, Li and
+/// Kirubarajan, 2001, section 5.4). A mean above the bounds says that the filter
+/// is too sure of itself, one below that it is too timid.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Consistency {
+    /// Mean of the values.
+    pub mean: f64,
+    /// What the mean should be: the degrees of freedom of a single value.
+    pub expected: f64,
+    /// Lower bound of the mean.
+    pub lower: f64,
+    /// Upper bound of the mean.
+    pub upper: f64,
+    /// Fraction of the single values below their own upper quantile.
+    pub inside: f64,
+    /// Number of values.
+    pub count: u64,
+}
+
+impl Consistency {
+    /// Summary of NIS or NEES values with `freedom` degrees of freedom each and
+    /// bounds at this confidence (between 0 and 1). The bounds take the values
+    /// as independent. Nothing without values or degrees of freedom.
+    pub fn of(values: &[f64], freedom: u32, confidence: f64) -> Option<Self> {
+        if values.is_empty() || freedom == 0 {
+            return None;
+        }
+        let count = values.len() as f64;
+        let single = f64::from(freedom);
+        let tail = 0.5 * (1.0 - confidence);
+        let limit = chi_square_quantile(confidence, single)?;
+        Some(Self {
+            mean: values.iter().sum::<f64>() / count,
+            expected: single,
+            lower: chi_square_quantile(tail, single * count)? / count,
+            upper: chi_square_quantile(1.0 - tail, single * count)? / count,
+            inside: values.iter().filter(|&&v| v <= limit).count() as f64 / count,
+            count: values.len() as u64,
+        })
+    }
+
+    /// True if the mean lies within its bounds.
+    pub fn is_consistent(&self) -> bool {
+        self.lower <= self.mean && self.mean <= self.upper
+    }
+}
+
+/// The value that a chi-square variable stays below with a probability; nothing
+/// unless the probability lies within 0 and 1 and there is some freedom.
+///
+/// ```
+/// let bound = tagalong_eval::chi_square_quantile(0.95, 2.0).unwrap();
+/// assert!((bound - 5.991_464_547).abs() < 1e-8);
+/// ```
+pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
+    let sensible = (0.0..1.0).contains(&probability) && freedom > 0.0 && freedom.is_finite();
+    if !sensible {
+        return None;
+    }
+    let below = |x: f64| match x {
+        x if x <= 0.0 => 0.0,
+        x => checked_gamma_lr(0.5 * freedom, 0.5 * x).unwrap_or(1.0),
+    };
+    let mut high = freedom + 10.0;
+    while below(high) < probability {
+        high *= 2.0;
+    }
+    Some(bisect(0.0, high, |x| below(x) < probability))
+}
+
+/// The point in between where `too_low` turns from true to false.
+fn bisect(mut low: f64, mut high: f64, too_low: impl Fn(f64) -> bool) -> f64 {
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return middle;
+        }
+        if too_low(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_equal_the_tables() {
+        for (p, freedom, value) in [
+            (0.95, 1.0, 3.841_458_820_694_124),
+            (0.025, 3.0, 0.215_795_282_623_898),
+            (0.975, 100.0, 129.561_197_186_583_66),
+            (0.99, 2.0, 9.210_340_371_976_18),
+        ] {
+            let got = chi_square_quantile(p, freedom).unwrap();
+            assert!((got - value).abs() < 1e-8 * value, "{p} {freedom}: {got}");
+        }
+        assert_eq!(chi_square_quantile(1.0, 2.0), None);
+        assert_eq!(chi_square_quantile(0.5, 0.0), None);
+    }
+
+    #[test]
+    fn an_honest_a_too_sure_and_a_too_timid_filter() {
+        // Evenly spaced quantiles of two degrees of freedom: -2 ln(1 - u).
+        let honest: Vec<f64> =
+            (0..500).map(|i| -2.0 * (1.0 - (f64::from(i) + 0.5) / 500.0).ln()).collect();
+        let scaled = |by: f64| honest.iter().map(|v| v * by).collect::<Vec<_>>();
+        let judge = |values: &[f64]| Consistency::of(values, 2, 0.95).unwrap();
+        assert!(judge(&honest).is_consistent());
+        assert!((judge(&honest).inside - 0.95).abs() < 0.01);
+        assert!(judge(&scaled(1.5)).mean > judge(&scaled(1.5)).upper);
+        assert!(judge(&scaled(0.5)).mean < judge(&scaled(0.5)).lower);
+        assert_eq!(Consistency::of(&[], 2, 0.95), None);
+    }
+}

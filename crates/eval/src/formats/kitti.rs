@@ -1,0 +1,137 @@
+//! KITTI tracking labels: one object a line, blanks between, frames from 0,
+//! `frame id type truncated occluded alpha left top right bottom height width
+//! length x y z rotation_y [score]`.
+
+use std::io::{self, Write};
+
+use super::{FormatError, Line, Timeline, lines};
+use crate::types::{Region, Report, Role, Truth};
+
+/// One line of a label file.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Label {
+    /// Number of the frame, from 0.
+    pub frame: u32,
+    /// The object; -1 for `DontCare`.
+    pub id: i64,
+    /// The class, for example `Pedestrian`.
+    pub class: String,
+    /// 0 whole, above 0 leaves the image; -1 not annotated.
+    pub truncated: f64,
+    /// 0 visible, 1 partly, 2 largely hidden, 3 unknown; -1 not annotated.
+    pub occluded: f64,
+    /// Observation angle in radians.
+    pub alpha: f64,
+    /// The box in pixels.
+    pub region: Region,
+    /// Height, width and length in metres.
+    pub size_m: [f64; 3],
+    /// Middle of the lower side, in metres, in camera 0: right, down, forward.
+    pub position_in_camera_m: [f64; 3],
+    /// Rotation about the vertical axis in radians.
+    pub rotation_y: f64,
+    /// Score of a report.
+    pub score: Option<f64>,
+}
+
+impl Label {
+    /// Where on the floor, as (right, forward) of the camera in metres; the
+    /// marker -1000 for "not annotated" gives nothing.
+    pub fn floor_m(&self) -> Option<[f64; 2]> {
+        let [x, _, z] = self.position_in_camera_m;
+        (x > -999.0 && z > -999.0).then_some([x, z])
+    }
+
+    /// What the label means when pedestrians are scored: other classes are not
+    /// looked at, seated people and those who are cut off or of unknown
+    /// occlusion are ignored (the rules of TrackEval).
+    pub fn pedestrian_role(&self) -> Option<Role> {
+        let hard = self.occluded > 2.0 || self.truncated > 0.0;
+        match self.class.to_ascii_lowercase().as_str() {
+            "pedestrian" if hard => Some(Role::Ignored),
+            "pedestrian" => Some(Role::Counts),
+            "person" | "person_sitting" => Some(Role::Ignored),
+            _ => None,
+        }
+    }
+
+    fn is_dont_care(&self) -> bool {
+        self.class.eq_ignore_ascii_case("dontcare")
+    }
+}
+
+/// Reads label lines; `file` names the text in errors.
+///
+/// # Errors
+///
+/// Fewer than 17 fields, something that is no number, a box turned inside out.
+pub fn parse(text: &str, file: &str) -> Result<Vec<Label>, FormatError> {
+    lines(text, file).map(|line| label(&line)).collect()
+}
+
+fn label(line: &Line<'_>) -> Result<Label, FormatError> {
+    let number = |index, name| line.number(index, name);
+    let (left, top) = (number(6, "left")?, number(7, "top")?);
+    let (right, bottom) = (number(8, "right")?, number(9, "bottom")?);
+    let region = Region::new(left, top, right - left, bottom - top);
+    if !region.is_sane() {
+        return Err(line.error("the box ends before it begins"));
+    }
+    Ok(Label {
+        frame: line.frame(0, 0)?,
+        id: line.whole(1, "id")?,
+        class: line.text(2, "type")?.to_owned(),
+        truncated: number(3, "truncated")?,
+        occluded: number(4, "occluded")?,
+        alpha: number(5, "alpha")?,
+        region,
+        size_m: [number(10, "height")?, number(11, "width")?, number(12, "length")?],
+        position_in_camera_m: [number(13, "x")?, number(14, "y")?, number(15, "z")?],
+        rotation_y: number(16, "rotation_y")?,
+        score: if line.fields.len() > 17 { Some(number(17, "score")?) } else { None },
+    })
+}
+
+/// Adds labels to a timeline as truth for pedestrians; `DontCare` becomes an
+/// ignore region. Frames keep KITTI's numbers, from 0.
+pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
+    for label in labels {
+        let frame = timeline.frame(label.frame);
+        if label.is_dont_care() {
+            frame.ignore_regions.push(label.region);
+        } else if let Some(role) = label.pedestrian_role() {
+            let (region, floor_m) = (Some(label.region), label.floor_m());
+            frame.truths.push(Truth { id: label.id, region, floor_m, role });
+        }
+    }
+}
+
+/// Adds the pedestrians among labels to a timeline as reports.
+pub fn add_reports(timeline: &mut Timeline, labels: &[Label]) {
+    let reported = labels.iter().filter(|label| label.class.eq_ignore_ascii_case("pedestrian"));
+    for label in reported {
+        timeline.frame(label.frame).reports.push(Report {
+            id: label.id,
+            region: Some(label.region),
+            floor_m: label.floor_m(),
+            score: label.score.unwrap_or(1.0),
+        });
+    }
+}
+
+/// Writes a label line.
+///
+/// # Errors
+///
+/// Those of the writer.
+pub fn write(out: &mut impl Write, label: &Label) -> io::Result<()> {
+    let Region { x, y, width, height } = label.region;
+    let Label { frame, id, class, truncated, occluded, alpha, .. } = label;
+    write!(out, "{frame} {id} {class} {truncated} {occluded} {alpha}")?;
+    write!(out, " {x} {y} {} {}", x + width, y + height)?;
+    let numbers = label.size_m.iter().chain(&label.position_in_camera_m);
+    for value in numbers.chain([&label.rotation_y]).chain(&label.score) {
+        write!(out, " {value}")?;
+    }
+    writeln!(out)
+}

@@ -1,0 +1,77 @@
+//! `tracks-metres.csv`: the places of tracks as a run writes them. The first
+//! line names the columns; frames are numbered from 1.
+
+use super::{FormatError, Table};
+use crate::types::Report;
+
+/// One track in one frame.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Row {
+    /// When, in nanoseconds.
+    pub stamp_ns: i64,
+    /// Number of the colour image, from 1.
+    pub frame: u32,
+    /// The track.
+    pub id: i64,
+    /// Centre of the head in the robot frame: forward, left, up.
+    pub head_in_robot_m: [f64; 3],
+    /// The same in the odometry frame.
+    pub head_in_odom_m: [f64; 3],
+    /// Whether the track was seen in this frame.
+    pub seen: bool,
+}
+
+/// Which frame the floor is taken from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Floor {
+    /// The robot frame of each moment.
+    #[default]
+    Robot,
+    /// The odometry frame, which stands still.
+    Odometry,
+}
+
+impl Row {
+    /// The row as a report, with the number of its frame; the score is 1.
+    pub fn report(&self, floor: Floor) -> (u32, Report) {
+        let [x, y, _] = match floor {
+            Floor::Robot => self.head_in_robot_m,
+            Floor::Odometry => self.head_in_odom_m,
+        };
+        (self.frame, Report { id: self.id, region: None, floor_m: Some([x, y]), score: 1.0 })
+    }
+}
+
+/// Reads `tracks-metres.csv`; columns are found by name.
+///
+/// # Errors
+///
+/// A missing column or something that is no number.
+pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
+    let table = Table::new(text, file)?;
+    let place = |frame: &str| -> Result<[usize; 3], FormatError> {
+        let column = |axis: &str| table.column(&format!("{axis}_{frame}_m"));
+        Ok([column("x")?, column("y")?, column("z")?])
+    };
+    let (stamp, frame, id) =
+        (table.column("stamp_ns")?, table.column("frame")?, table.column("id")?);
+    let (robot, odom, seen) = (place("robot")?, place("odom")?, table.column("seen")?);
+    let mut rows = Vec::new();
+    for line in &table.rows {
+        let point = |at: [usize; 3]| -> Result<[f64; 3], FormatError> {
+            Ok([line.number(at[0], "x")?, line.number(at[1], "y")?, line.number(at[2], "z")?])
+        };
+        let stamp = line.text(stamp, "stamp_ns")?;
+        rows.push(Row {
+            stamp_ns: stamp.parse().map_err(|_| {
+                line.error(format!("`stamp_ns` is `{stamp}`, expected whole nanoseconds"))
+            })?,
+            frame: line.frame(frame, 1)?,
+            id: line.whole(id, "id")?,
+            head_in_robot_m: point(robot)?,
+            head_in_odom_m: point(odom)?,
+            seen: line.number(seen, "seen")? != 0.0,
+        });
+    }
+    Ok(rows)
+}

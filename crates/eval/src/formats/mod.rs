@@ -1,0 +1,179 @@
+//! Text formats of truth and tracks, read from strings and written to strings.
+//!
+//! * [`mot`]: MOTChallenge `gt.txt`, `det.txt`, tracker output, `seqinfo.ini`.
+//! * [`trackeval`]: the folder tree that TrackEval reads.
+//! * [`kitti`]: KITTI tracking labels.
+//! * [`people`]: `people.csv`, the upper-body annotation of recordings.
+//! * [`metres`]: `tracks-metres.csv`, the places that a run writes.
+//!
+//! Readers keep every row as it stands; a second step turns rows into frames
+//! and decides what counts.
+
+pub mod kitti;
+pub mod metres;
+pub mod mot;
+pub mod people;
+pub mod trackeval;
+
+use std::collections::BTreeMap;
+
+use crate::types::{Frame, Report, Sequence, Truth};
+
+/// A line that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}, line {line}: {why}")]
+pub struct FormatError {
+    /// The file as the caller calls it.
+    pub file: String,
+    /// 1-based line, 0 for the file as a whole.
+    pub line: usize,
+    /// What is wrong and what was expected.
+    pub why: String,
+}
+
+/// Frames by number, to be filled from rows in any order.
+#[derive(Clone, Debug, Default)]
+pub struct Timeline {
+    frames: BTreeMap<u32, Frame>,
+}
+
+impl Timeline {
+    /// No frames yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The frame with this number, made when it is new.
+    pub fn frame(&mut self, number: u32) -> &mut Frame {
+        self.frames.entry(number).or_default()
+    }
+
+    /// Adds truths, each with the number of its frame.
+    pub fn add_truths(&mut self, rows: impl IntoIterator<Item = (u32, Truth)>) {
+        for (number, truth) in rows {
+            self.frame(number).truths.push(truth);
+        }
+    }
+
+    /// Adds reports, each with the number of its frame.
+    pub fn add_reports(&mut self, rows: impl IntoIterator<Item = (u32, Report)>) {
+        for (number, report) in rows {
+            self.frame(number).reports.push(report);
+        }
+    }
+
+    /// The number of the last frame with anybody in it.
+    pub fn last(&self) -> Option<u32> {
+        self.frames.last_key_value().map(|(&number, _)| number)
+    }
+
+    /// The frames `first..first + length` with evenly spaced stamps, empty ones
+    /// included, and how many frames outside of that range were left out.
+    pub fn into_sequence(
+        mut self,
+        name: &str,
+        first: u32,
+        length: u32,
+        rate_hz: f64,
+    ) -> (Sequence, usize) {
+        let frames: Vec<Frame> = (0..length)
+            .map(|index| {
+                let number = first.saturating_add(index);
+                let frame = self.frames.remove(&number).unwrap_or_default();
+                Frame { stamp_ns: (f64::from(index) / rate_hz * 1e9).round() as i64, ..frame }
+            })
+            .collect();
+        (Sequence { name: name.to_owned(), frames }, self.frames.len())
+    }
+}
+
+/// One line cut into fields, with what is needed to complain about it.
+struct Line<'a> {
+    file: &'a str,
+    number: usize,
+    fields: Vec<&'a str>,
+}
+
+impl<'a> Line<'a> {
+    fn error(&self, why: impl Into<String>) -> FormatError {
+        FormatError { file: self.file.to_owned(), line: self.number, why: why.into() }
+    }
+
+    fn text(&self, index: usize, name: &str) -> Result<&'a str, FormatError> {
+        self.fields.get(index).copied().ok_or_else(|| {
+            self.error(format!(
+                "has {} fields, but `{name}` should be field {}; is the file cut off?",
+                self.fields.len(),
+                index + 1
+            ))
+        })
+    }
+
+    fn number(&self, index: usize, name: &str) -> Result<f64, FormatError> {
+        let text = self.text(index, name)?;
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(self.error(format!("`{name}` is `{text}`, expected a finite number"))),
+        }
+    }
+
+    /// A whole number; some programs write it as `12.0`.
+    fn whole(&self, index: usize, name: &str) -> Result<i64, FormatError> {
+        let value = self.number(index, name)?;
+        let whole = value.fract() == 0.0 && value.abs() < 9e15;
+        let wrong = || self.error(format!("`{name}` is `{value}`, expected a whole number"));
+        if whole { Ok(value as i64) } else { Err(wrong()) }
+    }
+
+    fn frame(&self, index: usize, first: u32) -> Result<u32, FormatError> {
+        let value = self.whole(index, "frame")?;
+        match u32::try_from(value) {
+            Ok(frame) if frame >= first => Ok(frame),
+            _ => Err(self.error(format!("frame {value}; frames are numbered from {first}"))),
+        }
+    }
+}
+
+/// The lines that are not empty, cut at commas if there are any, else at blanks.
+fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(
+        move |(index, line)| {
+            let fields = if line.contains(',') {
+                line.split(',').map(str::trim).collect()
+            } else {
+                line.split_whitespace().collect()
+            };
+            Line { file, number: index + 1, fields }
+        },
+    )
+}
+
+/// A table with a header line: columns are found by name.
+struct Table<'a> {
+    header: Line<'a>,
+    rows: Vec<Line<'a>>,
+}
+
+impl<'a> Table<'a> {
+    fn new(text: &'a str, file: &'a str) -> Result<Self, FormatError> {
+        let mut lines = lines(text, file);
+        let header = lines.next().ok_or_else(|| FormatError {
+            file: file.to_owned(),
+            line: 0,
+            why: "is empty, expected a header line".to_owned(),
+        })?;
+        Ok(Self { header, rows: lines.collect() })
+    }
+
+    fn find(&self, name: &str) -> Option<usize> {
+        self.header.fields.iter().position(|&field| field == name)
+    }
+
+    fn column(&self, name: &str) -> Result<usize, FormatError> {
+        self.find(name).ok_or_else(|| {
+            let there = self.header.fields.join(", ");
+            self.header.error(format!("no column `{name}`; there are: {there}"))
+        })
+    }
+}

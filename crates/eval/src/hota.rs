@@ -1,0 +1,237 @@
+use serde::{Deserialize, Serialize};
+
+use crate::assign::{Edge, Matcher};
+use crate::pairs::PairTable;
+use crate::prepare::{Prepared, PreparedFrame};
+use crate::ratio;
+
+/// Number of similarity thresholds.
+pub const LEVELS: usize = 19;
+
+/// The threshold of a level: 0.05, 0.10, ... 0.95.
+pub fn alpha(level: usize) -> f64 {
+    0.05 + level as f64 * 0.05
+}
+
+/// The HOTA family (Luiten et al., IJCV 2021) at one similarity threshold.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct HotaLevel {
+    /// Matched truths.
+    pub tp: u64,
+    /// Truths without a report.
+    #[serde(rename = "fn")]
+    pub fn_: u64,
+    /// Reports without a truth.
+    pub fp: u64,
+    /// Association accuracy summed over all matches.
+    pub association_sum: f64,
+    /// Association recall summed over all matches.
+    pub association_recall_sum: f64,
+    /// Association precision summed over all matches.
+    pub association_precision_sum: f64,
+    /// Similarity summed over all matches.
+    pub similarity_sum: f64,
+}
+
+impl HotaLevel {
+    /// Detection accuracy: `TP / (TP + FN + FP)`.
+    pub fn det_a(&self) -> f64 {
+        ratio(self.tp as f64, (self.tp + self.fn_ + self.fp) as f64)
+    }
+
+    /// Association accuracy, mean over the matches.
+    pub fn ass_a(&self) -> f64 {
+        ratio(self.association_sum, self.tp as f64)
+    }
+
+    /// `sqrt(DetA * AssA)`.
+    pub fn hota(&self) -> f64 {
+        (self.det_a() * self.ass_a()).sqrt()
+    }
+
+    /// Mean similarity of the matches; 1 without any, as in TrackEval.
+    pub fn loc_a(&self) -> f64 {
+        self.similarity_sum.max(1e-10) / (self.tp as f64).max(1e-10)
+    }
+
+    /// Detection recall.
+    pub fn det_re(&self) -> f64 {
+        ratio(self.tp as f64, (self.tp + self.fn_) as f64)
+    }
+
+    /// Detection precision.
+    pub fn det_pr(&self) -> f64 {
+        ratio(self.tp as f64, (self.tp + self.fp) as f64)
+    }
+
+    /// Association recall, mean over the matches.
+    pub fn ass_re(&self) -> f64 {
+        ratio(self.association_recall_sum, self.tp as f64)
+    }
+
+    /// Association precision, mean over the matches.
+    pub fn ass_pr(&self) -> f64 {
+        ratio(self.association_precision_sum, self.tp as f64)
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        Self {
+            tp: self.tp + other.tp,
+            fn_: self.fn_ + other.fn_,
+            fp: self.fp + other.fp,
+            association_sum: self.association_sum + other.association_sum,
+            association_recall_sum: self.association_recall_sum + other.association_recall_sum,
+            association_precision_sum: self.association_precision_sum
+                + other.association_precision_sum,
+            similarity_sum: self.similarity_sum + other.similarity_sum,
+        }
+    }
+}
+
+/// The HOTA family at all nineteen thresholds.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Hota {
+    /// One entry for each threshold, see [`alpha`].
+    pub levels: [HotaLevel; LEVELS],
+}
+
+impl Hota {
+    /// Scores one sequence. The matching does not depend on the threshold, so
+    /// it is done once; each match is then filed under the highest threshold
+    /// that it passes, and sums from above give all nineteen.
+    pub fn measure(prepared: &Prepared, table: &PairTable) -> Self {
+        let alignment = alignment(prepared, table);
+        let mut run = Run {
+            matcher: Matcher::new(),
+            scored: Vec::new(),
+            chosen: Vec::new(),
+            matches: vec![[0; LEVELS]; table.pairs.len()],
+            hota: Self::default(),
+        };
+        let mut rest = &table.pair_of[..];
+        for frame in &prepared.frames {
+            let (pair_of, others) = rest.split_at(frame.pairs.len());
+            run.step(frame, pair_of, &alignment);
+            rest = others;
+        }
+        run.finish(prepared, table)
+    }
+
+    /// The figures of several sequences together; each match weighs the same.
+    pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
+        all.into_iter().fold(Self::default(), |sum, one| Self {
+            levels: std::array::from_fn(|a| sum.levels[a].plus(&one.levels[a])),
+        })
+    }
+
+    /// Mean of a figure over the thresholds.
+    ///
+    /// ```
+    /// use tagalong_eval::{Hota, HotaLevel};
+    /// assert_eq!(Hota::default().mean(HotaLevel::hota), 0.0);
+    /// ```
+    pub fn mean(&self, figure: impl Fn(&HotaLevel) -> f64) -> f64 {
+        self.levels.iter().map(figure).sum::<f64>() / LEVELS as f64
+    }
+}
+
+/// How well each pair goes together over the whole sequence, 0 to 1: the soft
+/// Jaccard index of their frames (Luiten et al., section 5; as in TrackEval a
+/// similarity is first divided by all that compete with it).
+fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
+    let mut together = vec![0.0; table.pairs.len()];
+    let (mut of_row, mut of_col) = (Vec::new(), Vec::new());
+    let mut indices = table.pair_of.iter();
+    for frame in &prepared.frames {
+        sums(frame, &mut of_row, &mut of_col);
+        for (pair, &index) in frame.pairs.iter().zip(&mut indices) {
+            let rivals = of_col[pair.col as usize] + of_row[pair.row as usize] - pair.weight;
+            if rivals > f64::EPSILON {
+                together[index as usize] += pair.weight / rivals;
+            }
+        }
+    }
+    let jaccard = |(&(truth, track), both): (&(u32, u32), f64)| {
+        let either = prepared.truth_frames[truth as usize] + prepared.track_frames[track as usize];
+        both / (f64::from(either) - both)
+    };
+    table.pairs.iter().zip(together).map(jaccard).collect()
+}
+
+/// Sums of the similarities in each row and column.
+fn sums(frame: &PreparedFrame, of_row: &mut Vec<f64>, of_col: &mut Vec<f64>) {
+    of_row.clear();
+    of_row.resize(frame.truths.len(), 0.0);
+    of_col.clear();
+    of_col.resize(frame.tracks.len(), 0.0);
+    for pair in &frame.pairs {
+        of_row[pair.row as usize] += pair.weight;
+        of_col[pair.col as usize] += pair.weight;
+    }
+}
+
+struct Run {
+    matcher: Matcher,
+    scored: Vec<Edge>,
+    chosen: Vec<u32>,
+    /// For each pair the number of matches whose highest threshold is the level.
+    matches: Vec<[u32; LEVELS]>,
+    hota: Hota,
+}
+
+impl Run {
+    fn step(&mut self, frame: &PreparedFrame, pair_of: &[u32], alignment: &[f64]) {
+        let (truths, tracks) = (frame.truths.len(), frame.tracks.len());
+        for level in &mut self.hota.levels {
+            level.fn_ += truths as u64;
+            level.fp += tracks as u64;
+        }
+        self.scored.clear();
+        self.scored.extend(frame.pairs.iter().zip(pair_of).map(|(pair, &index)| Edge {
+            weight: alignment[index as usize] * pair.weight,
+            ..*pair
+        }));
+        self.matcher.best(truths, tracks, &self.scored, &mut self.chosen);
+        for &e in &self.chosen {
+            let similarity = frame.pairs[e as usize].weight;
+            if let Some(level) = highest_level(similarity) {
+                self.matches[pair_of[e as usize] as usize][level] += 1;
+                self.hota.levels[level].similarity_sum += similarity;
+            }
+        }
+    }
+
+    fn finish(mut self, prepared: &Prepared, table: &PairTable) -> Hota {
+        for level in (0..LEVELS - 1).rev() {
+            self.hota.levels[level].similarity_sum += self.hota.levels[level + 1].similarity_sum;
+        }
+        for (counts, &(truth, track)) in self.matches.iter().zip(&table.pairs) {
+            let of_truth = prepared.truth_frames[truth as usize];
+            let of_track = prepared.track_frames[track as usize];
+            let mut both = 0;
+            for level in (0..LEVELS).rev() {
+                both += counts[level];
+                self.hota.levels[level].add(both, of_truth, of_track);
+            }
+        }
+        self.hota
+    }
+}
+
+impl HotaLevel {
+    /// Adds a pair that is matched in `both` of the frames that each of the two has.
+    fn add(&mut self, both: u32, of_truth: u32, of_track: u32) {
+        let (n, truth, track) = (f64::from(both), f64::from(of_truth), f64::from(of_track));
+        self.tp += u64::from(both);
+        self.fn_ -= u64::from(both);
+        self.fp -= u64::from(both);
+        self.association_sum += n * n / (truth + track - n).max(1.0);
+        self.association_recall_sum += n * n / truth.max(1.0);
+        self.association_precision_sum += n * n / track.max(1.0);
+    }
+}
+
+/// The highest level whose threshold the similarity reaches.
+fn highest_level(similarity: f64) -> Option<usize> {
+    (0..LEVELS).rev().find(|&level| similarity >= alpha(level) - f64::EPSILON)
+}

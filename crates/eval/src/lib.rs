@@ -1,0 +1,75 @@
+//! Pure tracking and detection metrics.
+//!
+//! A [`Sequence`] holds frames, a [`Frame`] holds who was there ([`Truth`]) and
+//! who was reported ([`Report`]); the metrics compare the two, either in the
+//! image (intersection over union) or on the floor (metres). Nothing here reads
+//! a file or a clock: the text formats in [`formats`] work on strings.
+//!
+//! ```
+//! use tagalong_eval::{Frame, Region, Report, Scores, Sequence, Similarity, Truth};
+//!
+//! let region = Some(Region::new(10.0, 20.0, 30.0, 60.0));
+//! let frame = Frame {
+//!     truths: vec![Truth { id: 1, region, ..Truth::default() }],
+//!     reports: vec![Report { id: 7, region, score: 0.9, ..Report::default() }],
+//!     ..Frame::default()
+//! };
+//! let sequence = Sequence { name: "one frame".into(), frames: vec![frame] };
+//! let scores = Scores::measure(&sequence, Similarity::Iou)?;
+//! assert_eq!((scores.hota, scores.mota, scores.idf1), (Some(1.0), Some(1.0), Some(1.0)));
+//! # Ok::<(), tagalong_eval::EvalError>(())
+//! ```
+//!
+//! # Which figure for what
+//!
+//! * [`Hota`], [`Clear`], [`Identity`]: tracking, equal to TrackEval's figures.
+//! * [`DetectionTally`]: single detections; the miss-rate curve and its average.
+//! * [`SetTally`]: OSPA and GOSPA, one number for place and count errors.
+//! * [`PositionError`], [`Times`], [`Following`]: what a robot cares about.
+//! * [`Consistency`]: whether a filter knows how wrong it is.
+//! * [`wilson`], [`Bootstrap`]: how far a figure can be trusted.
+//!
+//! # Why similarities are computed once
+//!
+//! All families look at the same pairs. [`Prepared`] leaves out what must not
+//! count, numbers the ids densely and keeps only the pairs that are alike at
+//! all, some per person; everything after that works on short lists. Scoring is
+//! so cheap that it can stand inside a bootstrap or a parameter search.
+
+mod assign;
+mod clear;
+mod consistency;
+mod error;
+pub mod formats;
+mod hota;
+mod identity;
+mod missrate;
+mod pairs;
+mod position;
+mod prepare;
+mod scores;
+mod sets;
+mod statistics;
+mod times;
+mod types;
+
+pub use assign::{Edge, Matcher};
+pub use clear::{Clear, MATCH_SIMILARITY, Match};
+pub use consistency::{Consistency, chi_square_quantile};
+pub use error::EvalError;
+pub use hota::{Hota, HotaLevel, LEVELS, alpha};
+pub use identity::Identity;
+pub use missrate::{CurvePoint, DetectionTally, PrecisionRecall, REFERENCE_FPPI, Verdict};
+pub use pairs::PairTable;
+pub use position::{PositionError, position_errors_m};
+pub use prepare::{Comparison, Prepared, PreparedFrame};
+pub use scores::{Scores, Tally};
+pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
+pub use statistics::{Bootstrap, Gain, Interval, percentile, wilson};
+pub use times::{Following, Times};
+pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};
+
+/// A ratio of counts, with a denominator of at least one.
+fn ratio(part: f64, whole: f64) -> f64 {
+    part / whole.max(1.0)
+}

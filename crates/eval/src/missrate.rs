@@ -1,0 +1,210 @@
+use serde::{Deserialize, Serialize};
+
+use crate::ratio;
+use crate::types::{Frame, Report, Role, Sequence, Similarity, Truth};
+
+/// False positives per image at which the miss rate is read.
+pub const REFERENCE_FPPI: [f64; 9] =
+    [0.01, 0.0178, 0.0316, 0.0562, 0.1, 0.1778, 0.3162, 0.5623, 1.0];
+
+/// The least miss rate that enters the logarithm.
+const FLOOR: f64 = 1e-10;
+
+/// Every detection with its score and whether it was right: what the miss-rate
+/// and the precision-recall curve are drawn from.
+///
+/// The protocol is that of the Caltech benchmark (Dollár et al., PAMI 2012):
+/// detections in descending score each take the best free truth, a real one
+/// before an ignored one; an ignored truth absorbs any number of detections,
+/// and the overlap with it is taken over the detection's own area.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct DetectionTally {
+    /// Score and verdict of each detection that counts.
+    pub verdicts: Vec<Verdict>,
+    /// Truths that count.
+    pub truths: u64,
+    /// Images, those without anybody included.
+    pub images: u64,
+}
+
+/// A detection that counts.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Verdict {
+    /// How sure the detector was.
+    pub score: f64,
+    /// Whether it found a truth of its own.
+    pub right: bool,
+}
+
+/// What accepting everything from a score on would give.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// The least score accepted.
+    pub score: f64,
+    /// False positives per image.
+    pub fppi: f64,
+    /// Fraction of the truths that is missed.
+    pub miss_rate: f64,
+    /// Fraction of the accepted detections that is right.
+    pub precision: f64,
+}
+
+impl DetectionTally {
+    /// Judges the reports of a sequence as single detections; `at_least` is the
+    /// similarity that a match needs (0.5 in the protocol).
+    pub fn measure(sequence: &Sequence, similarity: Similarity, at_least: f64) -> Self {
+        let mut tally = Self { images: sequence.frames.len() as u64, ..Self::default() };
+        for frame in &sequence.frames {
+            tally.add(frame, &Judge { similarity, at_least });
+        }
+        tally
+    }
+
+    /// All detections of several sequences together.
+    pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
+        all.into_iter().fold(Self::default(), |mut sum, one| {
+            sum.verdicts.extend_from_slice(&one.verdicts);
+            sum.truths += one.truths;
+            sum.images += one.images;
+            sum
+        })
+    }
+
+    fn add(&mut self, frame: &Frame, judge: &Judge) {
+        let real: Vec<&Truth> = frame.truths.iter().filter(|t| t.role == Role::Counts).collect();
+        self.truths += real.len() as u64;
+        let mut taken = vec![false; real.len()];
+        let mut reports: Vec<&Report> = frame.reports.iter().collect();
+        reports.sort_by(|a, b| b.score.total_cmp(&a.score));
+        for report in reports {
+            let right = match judge.best_free(&real, &taken, report) {
+                Some(index) => {
+                    taken[index] = true;
+                    true
+                }
+                None if judge.ignored(frame, report) => continue,
+                None => false,
+            };
+            self.verdicts.push(Verdict { score: report.score, right });
+        }
+    }
+
+    /// The curve from the highest score to the lowest, one point for each
+    /// distinct score: no threshold lies between equal ones.
+    pub fn curve(&self) -> Vec<CurvePoint> {
+        let mut sorted = self.verdicts.clone();
+        sorted.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let (mut right, mut wrong) = (0_u64, 0_u64);
+        let mut points = Vec::new();
+        for equal in sorted.chunk_by(|a, b| a.score == b.score) {
+            let found = equal.iter().filter(|v| v.right).count() as u64;
+            right += found;
+            wrong += equal.len() as u64 - found;
+            points.push(CurvePoint {
+                score: equal[0].score,
+                fppi: ratio(wrong as f64, self.images as f64),
+                miss_rate: 1.0 - ratio(right as f64, self.truths as f64),
+                precision: ratio(right as f64, (right + wrong) as f64),
+            });
+        }
+        points
+    }
+
+    /// The log-average miss rate, 0 to 1: the geometric mean of the miss rate at
+    /// the [`REFERENCE_FPPI`], each read at the last point of the curve that is
+    /// not beyond it (1 if there is none). Nothing where there is no truth.
+    pub fn log_average_miss_rate(&self) -> Option<f64> {
+        if self.truths == 0 {
+            return None;
+        }
+        let curve = self.curve();
+        let read = |fppi: f64| {
+            let within = curve.partition_point(|point| point.fppi <= fppi);
+            within.checked_sub(1).map_or(1.0, |last| curve[last].miss_rate)
+        };
+        let sum: f64 = REFERENCE_FPPI.iter().map(|&fppi| read(fppi).max(FLOOR).ln()).sum();
+        Some((sum / REFERENCE_FPPI.len() as f64).exp())
+    }
+
+    /// Precision and recall of all detections with at least this score.
+    pub fn precision_recall(&self, least_score: f64) -> PrecisionRecall {
+        let accepted = || self.verdicts.iter().filter(|v| v.score >= least_score);
+        let tp = accepted().filter(|v| v.right).count() as u64;
+        let fp = accepted().count() as u64 - tp;
+        PrecisionRecall { tp, fp, fn_: self.truths - tp }
+    }
+
+    /// Area under the precision-recall curve, precision made monotone from the
+    /// right (all-point interpolation, Pascal VOC 2010). Nothing without truth.
+    pub fn average_precision(&self) -> Option<f64> {
+        if self.truths == 0 {
+            return None;
+        }
+        let (mut area, mut best, mut recall_after) = (0.0, 0.0_f64, None);
+        for point in self.curve().iter().rev() {
+            let recall = 1.0 - point.miss_rate;
+            area += best * (recall_after.unwrap_or(recall) - recall);
+            best = best.max(point.precision);
+            recall_after = Some(recall);
+        }
+        Some(area + best * recall_after.unwrap_or(0.0))
+    }
+}
+
+/// How good a detector is at one threshold.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct PrecisionRecall {
+    /// Right detections.
+    pub tp: u64,
+    /// Wrong detections.
+    pub fp: u64,
+    /// Missed truths.
+    #[serde(rename = "fn")]
+    pub fn_: u64,
+}
+
+impl PrecisionRecall {
+    /// Fraction of the detections that is right; 0 without any.
+    pub fn precision(&self) -> f64 {
+        ratio(self.tp as f64, (self.tp + self.fp) as f64)
+    }
+
+    /// Fraction of the truths that is found; 0 without any.
+    pub fn recall(&self) -> f64 {
+        ratio(self.tp as f64, (self.tp + self.fn_) as f64)
+    }
+
+    /// Harmonic mean of the two.
+    pub fn f1(&self) -> f64 {
+        ratio(self.tp as f64, self.tp as f64 + 0.5 * (self.fp + self.fn_) as f64)
+    }
+}
+
+struct Judge {
+    similarity: Similarity,
+    at_least: f64,
+}
+
+impl Judge {
+    fn best_free(&self, real: &[&Truth], taken: &[bool], report: &Report) -> Option<usize> {
+        let mut best = None;
+        let mut at_least = self.at_least;
+        for (index, truth) in real.iter().enumerate().filter(|(index, _)| !taken[*index]) {
+            let similarity = self.similarity.between(truth, report);
+            if similarity >= at_least && (best.is_none() || similarity > at_least) {
+                best = Some(index);
+                at_least = similarity;
+            }
+        }
+        best
+    }
+
+    fn ignored(&self, frame: &Frame, report: &Report) -> bool {
+        let mut ignored = frame.truths.iter().filter(|t| t.role == Role::Ignored);
+        let inside = |region| report.region.is_some_and(|r| r.covered_by(region) >= self.at_least);
+        ignored.any(|truth| match (self.similarity, &truth.region) {
+            (Similarity::Iou, Some(region)) => inside(region),
+            _ => self.similarity.between(truth, report) >= self.at_least,
+        }) || frame.ignore_regions.iter().any(inside)
+    }
+}

@@ -1,0 +1,169 @@
+use serde::{Deserialize, Serialize};
+
+use crate::assign::{Edge, Matcher};
+use crate::prepare::{Prepared, PreparedFrame};
+use crate::types::{Frame, Sequence, Similarity, distance_m};
+
+/// Settings of the distances between sets.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SetDistance {
+    /// What a person too many or too few costs, and the greatest distance of a
+    /// pair: metres on the floor, or `1 - IoU` in the image (then at most 1).
+    pub cutoff: f64,
+    /// Order of the mean, at least 1; 2 punishes outliers.
+    pub order: f64,
+}
+
+impl Default for SetDistance {
+    fn default() -> Self {
+        Self { cutoff: 1.0, order: 2.0 }
+    }
+}
+
+impl SetDistance {
+    /// Settings with this cutoff and order.
+    pub fn new(cutoff: f64, order: f64) -> Self {
+        Self { cutoff, order }
+    }
+
+    /// Both distances of one frame from the distances of the pairs that lie
+    /// below the cutoff (an edge's weight is a distance).
+    ///
+    /// One assignment serves both: OSPA (Schuhmacher et al., IEEE TSP 2008,
+    /// equation 3) and GOSPA with alpha = 2 (Rahmathullah et al., FUSION 2017,
+    /// proposition 1) both gain `cutoff^order - distance^order` by a match.
+    pub fn between(&self, truths: usize, reports: usize, near: &[Edge]) -> FrameDistance {
+        let pay = self.cutoff.powf(self.order);
+        let gain = |edge: &Edge| Edge { weight: pay - edge.weight.powf(self.order), ..*edge };
+        let gains: Vec<Edge> = near.iter().map(gain).collect();
+        let mut matched = Vec::new();
+        Matcher::new().best(truths, reports, &gains, &mut matched);
+        let location: f64 = matched.iter().map(|&e| pay - gains[e as usize].weight).sum();
+        let (pairs, most) = (matched.len(), truths.max(reports));
+        let parts = GospaParts {
+            location,
+            missed: 0.5 * pay * (truths - pairs) as f64,
+            false_: 0.5 * pay * (reports - pairs) as f64,
+        };
+        let root = |value: f64| value.max(0.0).powf(self.order.recip());
+        let mean = (location + pay * (most - pairs) as f64) / most.max(1) as f64;
+        FrameDistance { ospa: root(mean), gospa: root(parts.total()), parts }
+    }
+}
+
+/// The distances between truth and reports in one frame.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct FrameDistance {
+    /// Optimal sub-pattern assignment, 0 to the cutoff.
+    pub ospa: f64,
+    /// Generalised OSPA, 0 upwards.
+    pub gospa: f64,
+    /// What the generalised one consists of.
+    pub parts: GospaParts,
+}
+
+/// GOSPA before the root, by cause.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct GospaParts {
+    /// Distances of the matched pairs.
+    pub location: f64,
+    /// People without a report.
+    pub missed: f64,
+    /// Reports without a person.
+    #[serde(rename = "false")]
+    pub false_: f64,
+}
+
+impl GospaParts {
+    fn total(&self) -> f64 {
+        self.location + self.missed + self.false_
+    }
+}
+
+/// The distances summed over frames.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct SetTally {
+    /// Sum of OSPA.
+    pub ospa_sum: f64,
+    /// Sum of GOSPA.
+    pub gospa_sum: f64,
+    /// Sums of GOSPA's parts.
+    pub parts: GospaParts,
+    /// Frames.
+    pub frames: u64,
+}
+
+impl SetTally {
+    /// Measures each frame of a sequence that `prepared` was made from.
+    pub fn measure(
+        sequence: &Sequence,
+        prepared: &Prepared,
+        similarity: Similarity,
+        settings: &SetDistance,
+    ) -> Self {
+        let mut tally = Self::default();
+        for (of, frame) in sequence.frames.iter().zip(&prepared.frames) {
+            let near = near(of, frame, similarity, settings.cutoff);
+            tally.add(&settings.between(frame.truths.len(), frame.tracks.len(), &near));
+        }
+        tally
+    }
+
+    fn add(&mut self, frame: &FrameDistance) {
+        self.ospa_sum += frame.ospa;
+        self.gospa_sum += frame.gospa;
+        self.parts.location += frame.parts.location;
+        self.parts.missed += frame.parts.missed;
+        self.parts.false_ += frame.parts.false_;
+        self.frames += 1;
+    }
+
+    /// The sums of several sequences together.
+    pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
+        all.into_iter().fold(Self::default(), |a, b| Self {
+            ospa_sum: a.ospa_sum + b.ospa_sum,
+            gospa_sum: a.gospa_sum + b.gospa_sum,
+            parts: GospaParts {
+                location: a.parts.location + b.parts.location,
+                missed: a.parts.missed + b.parts.missed,
+                false_: a.parts.false_ + b.parts.false_,
+            },
+            frames: a.frames + b.frames,
+        })
+    }
+
+    /// Mean OSPA over the frames; nothing without frames.
+    pub fn ospa(&self) -> Option<f64> {
+        (self.frames > 0).then(|| self.ospa_sum / self.frames as f64)
+    }
+
+    /// Mean GOSPA over the frames; nothing without frames.
+    pub fn gospa(&self) -> Option<f64> {
+        (self.frames > 0).then(|| self.gospa_sum / self.frames as f64)
+    }
+}
+
+/// The pairs of a frame nearer than the cutoff, weighted by their distance.
+fn near(of: &Frame, frame: &PreparedFrame, similarity: Similarity, cutoff: f64) -> Vec<Edge> {
+    let all: Vec<Edge> = match similarity {
+        Similarity::Iou => {
+            frame.pairs.iter().map(|pair| Edge { weight: 1.0 - pair.weight, ..*pair }).collect()
+        }
+        Similarity::Metres => floor_distances(of, frame),
+    };
+    all.into_iter().filter(|edge| edge.weight < cutoff).collect()
+}
+
+/// Similarity ends at one metre, but the cutoff may be wider.
+fn floor_distances(of: &Frame, frame: &PreparedFrame) -> Vec<Edge> {
+    let mut edges = Vec::new();
+    for (row, &truth) in frame.truth_at.iter().enumerate() {
+        for (col, &report) in frame.track_at.iter().enumerate() {
+            let places = (of.truths[truth as usize].floor_m, of.reports[report as usize].floor_m);
+            if let (Some(a), Some(b)) = places {
+                edges.push(Edge { row: row as u32, col: col as u32, weight: distance_m(a, b) });
+            }
+        }
+    }
+    edges
+}

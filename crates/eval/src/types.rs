@@ -1,0 +1,153 @@
+use serde::{Deserialize, Serialize};
+
+/// An upright rectangle in an image, in pixels; `x`, `y` is the upper left corner.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Region {
+    /// Left edge.
+    pub x: f64,
+    /// Upper edge.
+    pub y: f64,
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+}
+
+impl Region {
+    /// A rectangle from its upper left corner and its size.
+    pub const fn new(x: f64, y: f64, width: f64, height: f64) -> Self {
+        Self { x, y, width, height }
+    }
+
+    /// Area in square pixels, taken from the edges as the reference evaluators do.
+    pub fn area(&self) -> f64 {
+        (self.x + self.width - self.x) * (self.y + self.height - self.y)
+    }
+
+    /// Area of the common part in square pixels.
+    pub fn intersection(&self, other: &Self) -> f64 {
+        let right = (self.x + self.width).min(other.x + other.width);
+        let bottom = (self.y + self.height).min(other.y + other.height);
+        (right - self.x.max(other.x)).max(0.0) * (bottom - self.y.max(other.y)).max(0.0)
+    }
+
+    /// Intersection over union, 0 to 1; 0 where either has no area.
+    pub fn iou(&self, other: &Self) -> f64 {
+        let common = self.intersection(other);
+        if common <= 0.0 {
+            return 0.0;
+        }
+        let (own, others) = (self.area(), other.area());
+        let union = own + others - common;
+        if own > f64::EPSILON && others > f64::EPSILON { common / union } else { 0.0 }
+    }
+
+    /// The fraction of this rectangle that `other` covers, 0 to 1.
+    pub fn covered_by(&self, other: &Self) -> f64 {
+        let area = self.area();
+        if area > f64::EPSILON { self.intersection(other) / area } else { 0.0 }
+    }
+
+    /// True if all four numbers are finite and the size is not negative.
+    pub fn is_sane(&self) -> bool {
+        [self.x, self.y, self.width, self.height].iter().all(|v| v.is_finite())
+            && self.width >= 0.0
+            && self.height >= 0.0
+    }
+}
+
+/// What an annotated object means for the score.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Has to be found.
+    #[default]
+    Counts,
+    /// Neither a miss nor, when reported, a false alarm (too far, too hidden,
+    /// a reflection, a person on a poster).
+    Ignored,
+    /// Is there and can be mistaken for a person, but excuses nobody: whoever
+    /// reports it is wrong (a car in MOT17).
+    Bystander,
+}
+
+/// An annotated person in one frame.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Truth {
+    /// Who it is, the same in all frames of a sequence.
+    pub id: i64,
+    /// Where in the image, in pixels; absent when only the floor is annotated.
+    pub region: Option<Region>,
+    /// Where on the floor, in metres, in any frame that the tracks share.
+    pub floor_m: Option<[f64; 2]>,
+    /// Whether it counts.
+    pub role: Role,
+}
+
+/// A reported person in one frame.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Report {
+    /// The track, the same in all frames of a sequence.
+    pub id: i64,
+    /// Where in the image, in pixels.
+    pub region: Option<Region>,
+    /// Where on the floor, in metres, in the frame of the truth.
+    pub floor_m: Option<[f64; 2]>,
+    /// How sure the tracker is; only the order matters.
+    pub score: f64,
+}
+
+/// One moment: what was there and what was reported.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Frame {
+    /// When, in nanoseconds.
+    pub stamp_ns: i64,
+    /// Everybody annotated.
+    pub truths: Vec<Truth>,
+    /// Everybody reported.
+    pub reports: Vec<Report>,
+    /// Parts of the image that are not annotated (KITTI's `DontCare`): reports
+    /// that match nobody and lie mostly inside are left out.
+    pub ignore_regions: Vec<Region>,
+}
+
+/// A recording: frames in the order of time.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Sequence {
+    /// Its name, for messages and tables.
+    pub name: String,
+    /// All frames, those without anybody included.
+    pub frames: Vec<Frame>,
+}
+
+/// How alike a truth and a report are: a number from 0 to 1.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Similarity {
+    /// Intersection over union of the image regions.
+    #[default]
+    Iou,
+    /// `max(0, 1 - distance / 1 m)` on the floor; one half means half a metre.
+    Metres,
+}
+
+impl Similarity {
+    /// The similarity of a truth and a report; 0 if either lacks the place.
+    pub fn between(self, truth: &Truth, report: &Report) -> f64 {
+        match self {
+            Self::Iou => match (&truth.region, &report.region) {
+                (Some(a), Some(b)) => a.iou(b),
+                _ => 0.0,
+            },
+            Self::Metres => match (truth.floor_m, report.floor_m) {
+                (Some(a), Some(b)) => (1.0 - distance_m(a, b)).max(0.0),
+                _ => 0.0,
+            },
+        }
+    }
+}
+
+/// Euclidean distance of two places on the floor, in metres.
+pub(crate) fn distance_m(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
