@@ -62,7 +62,7 @@ pub struct Pose {
     direction: Direction,
     pitch: i8,
     roll: i8,
-    px_per_m: u16,
+    scale_step: u16,
 }
 
 impl Pose {
@@ -72,8 +72,12 @@ impl Pose {
     pub fn nearest(direction: Direction, pitch_rad: f64, roll_rad: f64, px_per_m: f64) -> Self {
         let pitch = (pitch_rad.to_degrees() / PITCH_STEP_DEG).round().clamp(-1.0, 4.0);
         let roll = (roll_rad.to_degrees() / ROLL_STEP_DEG).round().clamp(-15.0, 15.0);
-        let px_per_m = px_per_m.round().clamp(1.0, 4000.0);
-        Self { direction, pitch: pitch as i8, roll: roll as i8, px_per_m: px_per_m as u16 }
+        let step = (px_per_m.clamp(1.0, 4000.0).ln() / SCALE_STEP).round();
+        Self { direction, pitch: pitch as i8, roll: roll as i8, scale_step: step as u16 }
+    }
+
+    fn px_per_m(self) -> f64 {
+        (f64::from(self.scale_step) * SCALE_STEP).exp()
     }
 }
 
@@ -88,6 +92,8 @@ pub struct Bank {
 
 const PITCH_STEP_DEG: f64 = 15.0;
 const ROLL_STEP_DEG: f64 = 6.0;
+/// Scales of the bank are 2 % apart.
+const SCALE_STEP: f64 = 0.02;
 /// The window around the head centre, m: to each side, above, below.
 const HALF_WIDTH_M: f64 = 0.33;
 const ABOVE_M: f64 = 0.20;
@@ -117,7 +123,7 @@ impl Bank {
 
 /// Cuts a relief into runs at the scale and roll of `pose`.
 fn cut(relief: &Relief, pose: Pose, max_rows: usize) -> Template {
-    let scale = f64::from(pose.px_per_m);
+    let scale = pose.px_per_m();
     let (first, last) = ((-ABOVE_M * scale).round() as i64, (BELOW_M * scale).round() as i64);
     let half_width = (HALF_WIDTH_M * scale).round() as i64;
     let step = ((last - first + 1) as usize).div_ceil(max_rows).max(1);

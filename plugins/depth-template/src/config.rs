@@ -57,7 +57,7 @@ pub struct DepthTemplateConfig {
     pub discover_cost: f64,
     /// Largest cost of somebody already tracked and confirmed.
     pub follow_cost: f64,
-    /// Below this cost the neighbours of a cell are tried, too.
+    /// Cells up to this cost are looked at more closely.
     pub refine_cost: f64,
     /// Cost at which person and no person are equally likely; the score is the
     /// distance to it times `score_per_cost`.

@@ -12,7 +12,7 @@ use crate::bank::{Bank, Direction, Pose};
 use crate::candidates::{body_below, boundary, head_width_m, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
 use crate::matching::{Match, Matcher};
-use crate::people::{Cell, Group, group};
+use crate::people::{Cell, group, weighted_centre};
 use crate::view::{Local, View, Working};
 
 /// The detector: discovers people, and follows them near a prediction.
@@ -21,6 +21,18 @@ pub struct DepthTemplate {
     bank: Bank,
     cells: Vec<Cell>,
     view: Option<Arc<View>>,
+}
+
+/// Where a silhouette fits best.
+struct Fitted {
+    /// Reduced pixel.
+    x: f64,
+    /// Its row.
+    y: f64,
+    /// Depth of the face, m.
+    depth_m: f64,
+    /// Cost of the best template.
+    cost: f64,
 }
 
 /// A frame, ready for matching.
@@ -54,13 +66,12 @@ impl DepthTemplate {
         Ok(Self { bank: Bank::new(config.max_rows), config, cells: Vec::new(), view: None })
     }
 
-    /// Looks at the cells of a window with the given spacing and keeps those
-    /// that `admit` lets through and where a silhouette fits.
+    /// Looks at the cells of a window and keeps those that `admit` lets through
+    /// and where a silhouette fits well enough to look closer.
     fn scan(
         &mut self,
         scene: &Scene<'_>,
         window: &Rect,
-        limit: f64,
         funnel: &mut Funnel,
         admit: impl Fn(&Self, &Local) -> std::result::Result<(), &'static str>,
     ) {
@@ -84,10 +95,10 @@ impl DepthTemplate {
                     dropped.add(test, x, y, depth_m);
                     continue;
                 }
-                match self.refined(scene, local).filter(|(_, fit)| fit.cost < limit) {
-                    Some((at, fit)) => {
-                        let head = view.head(at.x as f64, at.y as f64, depth_m);
-                        self.cells.push(Cell { x: at.x, y: at.y, depth_m, cost: fit.cost, head });
+                match self.best(scene, &local).filter(|fit| fit.cost < self.config.refine_cost) {
+                    Some(fit) => {
+                        let head = view.head(x as f64, y as f64, depth_m);
+                        self.cells.push(Cell { x, y, depth_m, cost: fit.cost, head });
                     }
                     None => dropped.add(tests_named::COST, x, y, depth_m),
                 }
@@ -129,22 +140,31 @@ impl DepthTemplate {
         Ok(())
     }
 
-    /// The best silhouette at a cell, or right beside it: cells lie two and
+    /// Walks from a cell to where the silhouette fits best: cells lie two and
     /// more pixels apart, and the edge of a silhouette is sharper than that.
-    fn refined(&mut self, scene: &Scene<'_>, local: Local) -> Option<(Local, Match)> {
-        let mut best = (local, self.best(scene, &local)?);
-        if best.1.cost > self.config.refine_cost {
-            return Some(best);
-        }
+    /// Returns the weighted centre of the fits around that place.
+    fn refined(&mut self, scene: &Scene<'_>, cell: &Cell) -> Fitted {
+        const AROUND: [(i64, i64); 8] =
+            [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
+        let local = scene.view.local(cell.x, cell.y, cell.depth_m);
         let step = (spacing(local.px_per_m) / 2).max(1);
-        for (dx, dy) in [(-step, 0), (step, 0), (0, -step), (0, step)] {
-            let (x, y) = (best.0.x + dx, best.0.y + dy);
-            let beside = local.moved_to(x, y);
-            if let Some(fit) = self.best(scene, &beside).filter(|fit| fit.cost < best.1.cost) {
-                best = (beside, fit);
-            }
+        let mut at = (cell.x, cell.y, cell.cost);
+        for _ in 0..6 {
+            let fits = AROUND.map(|(dx, dy)| {
+                let beside = local.moved_to(at.0 + step * dx, at.1 + step * dy);
+                let cost = self.best(scene, &beside).map_or(f64::INFINITY, |fit| fit.cost);
+                (beside.x, beside.y, cost)
+            });
+            let better = fits.into_iter().filter(|f| f.2 < at.2).min_by(|a, b| a.2.total_cmp(&b.2));
+            let Some(better) = better else {
+                let limit = 1.5 * at.2 + 0.02;
+                let all = fits.into_iter().chain([at]);
+                let (x, y) = weighted_centre(all, limit).unwrap_or((at.0 as f64, at.1 as f64));
+                return Fitted { x, y, depth_m: cell.depth_m, cost: at.2 };
+            };
+            at = better;
         }
-        Some(best)
+        Fitted { x: at.0 as f64, y: at.1 as f64, depth_m: cell.depth_m, cost: at.2 }
     }
 
     /// The best of the three body directions.
@@ -170,12 +190,17 @@ impl DepthTemplate {
         self.cells.clear();
         let everywhere = Rect::new(0.0, 0.0, scene.rows.width() as f64, scene.rows.height() as f64);
         let limit = self.config.discover_cost;
-        self.scan(scene, &everywhere, limit, funnel, |this, l| this.admit_newcomer(scene.rows, l));
+        self.scan(scene, &everywhere, funnel, |this, l| this.admit_newcomer(scene.rows, l));
         let mut found = Vec::new();
-        for person in group(&mut self.cells, limit, self.config.min_separation_m) {
+        for group in group(&mut self.cells, self.config.min_separation_m) {
+            let person = self.refined(scene, &group.best);
             let at = scene.view.region(person.x, person.y, person.depth_m);
-            if person.cells < self.config.min_cells {
+            if group.cells < self.config.min_cells {
                 funnel.drop_at(tests_named::SIZE, at);
+                continue;
+            }
+            if person.cost > limit {
+                funnel.drop_at(tests_named::COST, at);
                 continue;
             }
             let detection = self.detection(frame, scene, &person)?;
@@ -208,16 +233,24 @@ impl DepthTemplate {
         let window = Rect::new(centre.x - reach, centre.y - reach, 2.0 * reach, 2.0 * reach);
         let c = &self.config;
         let limit = if track.confirmed { c.follow_cost } else { c.discover_cost };
-        self.scan(scene, &window, limit, funnel, |_, local| {
+        self.scan(scene, &window, funnel, |_, local| {
             let head = scene.view.head(local.x as f64, local.y as f64, local.depth_m);
             let near = (head.xy() - expected.xy()).norm() <= radius_m;
             if near { Ok(()) } else { Err(tests_named::WINDOW) }
         });
-        let best = group(&mut self.cells, limit, 2.0 * radius_m).into_iter().next();
-        best.map(|person| self.detection(frame, scene, &person)).into_iter().collect()
+        let Some(best) = group(&mut self.cells, 2.0 * radius_m).into_iter().next() else {
+            return Ok(Vec::new());
+        };
+        let person = self.refined(scene, &best.best);
+        if person.cost > limit {
+            let at = scene.view.region(person.x, person.y, person.depth_m);
+            funnel.drop_at(tests_named::COST, at);
+            return Ok(Vec::new());
+        }
+        Ok(vec![self.detection(frame, scene, &person)?])
     }
 
-    fn detection(&self, frame: &Frame, scene: &Scene<'_>, person: &Group) -> Result<Detection> {
+    fn detection(&self, frame: &Frame, scene: &Scene<'_>, person: &Fitted) -> Result<Detection> {
         let c = &self.config;
         let pixel = scene.view.full_pixel(person.x, person.y);
         let px_per_m = frame.camera.focal_px() / person.depth_m;
