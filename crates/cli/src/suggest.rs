@@ -29,7 +29,7 @@ fn toml_files(folder: &Path) -> Vec<PathBuf> {
         .flatten()
         .map(|entry| folder.join(entry.file_name()))
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
-        .filter(|path| !path.file_name().is_some_and(|n| n == "Cargo.toml"))
+        .filter(|path| path.file_name().is_none_or(|n| n != "Cargo.toml"))
         .collect();
     files.sort();
     files

@@ -118,6 +118,10 @@ fn write_table(
         comment(out, property(key).0);
         let _ = writeln!(out, "{key} = {}", table[key]);
     }
+    for key in absent(schema, table) {
+        comment(out, property(key).0);
+        let _ = writeln!(out, "# {key} =");
+    }
     for key in tables {
         let (text, inner) = property(key);
         let name = if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
@@ -128,6 +132,12 @@ fn write_table(
             write_table(out, &name, table, inner, root);
         }
     }
+}
+
+/// Keys that have no default, because leaving them out means something.
+fn absent<'a>(schema: &'a serde_json::Value, table: &toml::Table) -> Vec<&'a str> {
+    let declared = schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
+    declared.map(String::as_str).filter(|key| !table.contains_key(*key)).collect()
 }
 
 /// The description of a property, and the schema that a reference points to.
@@ -162,6 +172,8 @@ mod tests {
         min_depth_m: f64,
         /// Names.
         names: Vec<String>,
+        /// A topic, else the only one.
+        topic: Option<String>,
         /// More of it.
         inner: Inner,
     }
@@ -175,7 +187,7 @@ mod tests {
 
     impl Default for Example {
         fn default() -> Self {
-            Self { min_depth_m: 0.5, names: vec!["a".into()], inner: Inner::default() }
+            Self { min_depth_m: 0.5, names: vec!["a".into()], topic: None, inner: Inner::default() }
         }
     }
 
@@ -198,6 +210,7 @@ mod tests {
         let text = commented_defaults::<Example>();
         assert!(text.contains("# Nearest depth, m.\nmin_depth_m = 0.5\n"), "{text}");
         assert!(text.contains("# More of it.\n[inner]\n# A count.\ncount = 0\n"), "{text}");
+        assert!(text.contains("# A topic, else the only one.\n# topic =\n"), "{text}");
         assert_eq!(toml::from_str::<Example>(&text).unwrap().min_depth_m, 0.5);
     }
 }

@@ -38,8 +38,8 @@ impl Canvas {
     }
 
     /// What was drawn.
-    pub fn image(&self) -> &RgbImage {
-        &self.image
+    pub fn into_image(self) -> RgbImage {
+        self.image
     }
 
     /// Copies `source` with its upper left corner at column `left`.

@@ -62,8 +62,8 @@ fn picture(scene: &Scene, trails: &Trails) -> RgbImage {
     let mut canvas = Canvas::new(width + plan_width, height, [24, 24, 28]);
     plan_view::draw(&mut canvas, width, scene, trails);
     // The image comes second and covers what the plan view drew beyond its part.
-    canvas.paste(image_view::draw(scene, trails).image(), 0);
-    canvas.image().clone()
+    canvas.paste(&image_view::draw(scene, trails).into_image(), 0);
+    canvas.into_image()
 }
 
 /// A colour for a track: neighbours in number are far apart in hue.

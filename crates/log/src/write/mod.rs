@@ -116,6 +116,15 @@ impl TrackLog {
         Ok(path)
     }
 
+    /// Removes what was written, and the directory if nothing else is in it:
+    /// for a run that failed before its first frame.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn discard(self) -> Result<(), WriteError> {
+        self.dir.discard()
+    }
+
     fn file(&self, name: &str) -> PathBuf {
         Path::new(self.dir.path()).join(run_dir::partial(name))
     }

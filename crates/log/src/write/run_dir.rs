@@ -108,6 +108,20 @@ impl RunDir {
         }
         Ok(())
     }
+
+    /// Removes the partial files, and the folders if they are empty.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn discard(self) -> Result<(), WriteError> {
+        for name in &self.pending {
+            remove(&self.path.join(partial(name)))?;
+        }
+        // A folder with other files in it stays, and that is no error.
+        let _ = fs::remove_dir(self.path.join(OVERLAY));
+        let _ = fs::remove_dir(&self.path);
+        Ok(())
+    }
 }
 
 pub(super) fn partial(name: &str) -> String {

@@ -1,0 +1,191 @@
+//! A small drawn log, and the programs under test.
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use mcap::records::MessageHeader;
+use mcap::{WriteOptions, Writer};
+use nalgebra::Isometry3;
+use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
+use tagalong_log::msgs::{
+    CameraInfo, Header, Image, Message, TFMessage, TransformStamped, encode,
+};
+
+pub const WIDTH: usize = 160;
+pub const HEIGHT: usize = 120;
+pub const FIRST_NS: u64 = 1_700_000_000_000_000_000;
+
+/// The program as it is shipped.
+pub fn tagalong() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_tagalong"))
+}
+
+/// The same program with the plugin of `examples/own_plugin.rs`.
+pub fn own_plugin() -> Command {
+    let mut path = PathBuf::from(env!("CARGO_BIN_EXE_tagalong"));
+    path.pop();
+    let program = path.join("examples").join("own_plugin");
+    assert!(program.exists(), "cargo test builds the examples; {} is missing", program.display());
+    Command::new(program)
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+pub fn code(output: &Output) -> i32 {
+    output.status.code().expect("the program was not killed")
+}
+
+/// A config that tracks whatever is nearest.
+pub fn config(folder: &Path, extra: &str) -> PathBuf {
+    let path = folder.join("nearest.toml");
+    let text = format!(
+        "seed = 7\n[[detectors]]\nplugin = \"nearest-thing\"\nroles = [\"discover\"]\n{extra}\n\
+         [filter]\nplugin = \"ekf\"\n"
+    );
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+pub fn camera() -> Camera {
+    let lens = Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+    Camera::mounted(lens, WIDTH, HEIGHT, 1.2, 0.0, 0.0)
+}
+
+/// What a drawn log consists of.
+pub struct Drawn {
+    pub frames: u64,
+    pub depth: bool,
+    /// Frames that are written twice, with the same stamp.
+    pub twice: u64,
+}
+
+impl Drawn {
+    pub fn of(frames: u64) -> Self {
+        Self { frames, depth: true, twice: 0 }
+    }
+
+    /// Writes a log of somebody who walks to the left, ten frames a second.
+    pub fn write(&self, path: &Path) {
+        let mut log = Log::create(path);
+        log.send("/tf_static", FIRST_NS, &mount());
+        for index in 0..self.frames {
+            let stamp = FIRST_NS + index * 100_000_000;
+            for _ in 0..=u64::from(index == self.twice && self.twice > 0) {
+                self.write_frame(&mut log, stamp, index);
+            }
+        }
+        log.writer.finish().unwrap();
+    }
+
+    fn write_frame(&self, log: &mut Log, stamp: u64, index: u64) {
+        let header = Header::new(Stamp::from_nanos(stamp), "camera_optical");
+        log.send("/camera/color/camera_info", stamp, &info(&header));
+        let colour = colour(index);
+        log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", 3, &colour));
+        if self.depth {
+            log.send("/camera/depth/camera_info", stamp, &info(&header));
+            let depth = depth(index);
+            log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", 2, &depth));
+        }
+    }
+}
+
+/// Columns that the walker covers.
+fn walker(index: u64) -> std::ops::Range<usize> {
+    let left = 90usize.saturating_sub(index as usize % 60);
+    left..left + 26
+}
+
+fn colour(index: u64) -> Vec<u8> {
+    let pixel = |x: usize, y: usize| match walker(index).contains(&x) && y >= 40 {
+        true => [200, 120, 40],
+        false => [x as u8, y as u8, 90],
+    };
+    (0..HEIGHT).flat_map(|y| (0..WIDTH).flat_map(move |x| pixel(x, y))).collect()
+}
+
+fn depth(index: u64) -> Vec<u8> {
+    let millimetres = |x: usize, y: usize| -> u16 {
+        if walker(index).contains(&x) && y >= 40 { 2800 } else { 6000 }
+    };
+    (0..HEIGHT)
+        .flat_map(|y| (0..WIDTH).flat_map(move |x| millimetres(x, y).to_le_bytes()))
+        .collect()
+}
+
+fn image<'a>(header: &Header, encoding: &'a str, bytes: u32, data: &'a [u8]) -> Image<'a> {
+    Image {
+        header: header.clone(),
+        height: HEIGHT as u32,
+        width: WIDTH as u32,
+        encoding: encoding.into(),
+        is_bigendian: 0,
+        step: bytes * WIDTH as u32,
+        data: data.into(),
+    }
+}
+
+fn info(header: &Header) -> CameraInfo {
+    CameraInfo {
+        header: header.clone(),
+        height: HEIGHT as u32,
+        width: WIDTH as u32,
+        distortion_model: "plumb_bob".into(),
+        d: vec![0.0; 5],
+        k: [130.0, 0.0, 79.5, 0.0, 130.0, 59.5, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [130.0, 0.0, 79.5, 0.0, 0.0, 130.0, 59.5, 0.0, 0.0, 0.0, 1.0, 0.0],
+        ..CameraInfo::default()
+    }
+}
+
+fn mount() -> TFMessage {
+    let pose: Isometry3<f64> = camera().robot_from_camera;
+    TFMessage {
+        transforms: vec![TransformStamped {
+            header: Header::new(Stamp::from_nanos(FIRST_NS), "base_link"),
+            child_frame_id: "camera_optical".into(),
+            transform: (&pose).into(),
+        }],
+    }
+}
+
+struct Log {
+    writer: Writer<BufWriter<File>>,
+    channels: BTreeMap<String, u16>,
+}
+
+impl Log {
+    fn create(path: &Path) -> Self {
+        let file = BufWriter::new(File::create(path).unwrap());
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .compression(Some(mcap::Compression::Zstd))
+            .compression_threads(1)
+            .chunk_size(Some(1 << 18));
+        Self { writer: options.create(file).unwrap(), channels: BTreeMap::new() }
+    }
+
+    fn send<M: Message + serde::Serialize>(&mut self, topic: &str, at: u64, message: &M) {
+        if !self.channels.contains_key(topic) {
+            let definition = M::DEFINITION.as_bytes();
+            let schema = self.writer.add_schema(M::TYPE, "ros2msg", definition).unwrap();
+            let about = BTreeMap::new();
+            let id = self.writer.add_channel(schema, topic, "cdr", &about).unwrap();
+            self.channels.insert(topic.to_owned(), id);
+        }
+        let header = MessageHeader {
+            channel_id: self.channels[topic],
+            sequence: 0,
+            log_time: at + 15_000_000,
+            publish_time: at,
+        };
+        self.writer.write_to_known_channel(&header, &encode(message)).unwrap();
+    }
+}

@@ -1,0 +1,133 @@
+//! Users' mistakes at the boundary of the process: each gets its exit code and
+//! a message that says what is wrong and what to do.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{Drawn, code, config, own_plugin, tagalong, text};
+
+/// A mistake: arguments, exit code, and what the message must contain.
+struct Mistake {
+    name: &'static str,
+    args: Vec<&'static str>,
+    code: i32,
+    says: &'static [&'static str],
+}
+
+fn mistake(
+    name: &'static str,
+    args: &str,
+    code: i32,
+    says: &'static [&'static str],
+) -> Mistake {
+    let args: &'static str = args.to_owned().leak();
+    Mistake { name, args: args.split(' ').collect(), code, says }
+}
+
+/// Everything that the mistakes need, in one folder.
+fn lay_out(home: &Path) {
+    Drawn::of(3).write(&home.join("good.mcap"));
+    Drawn { depth: false, ..Drawn::of(3) }.write(&home.join("no-depth.mcap"));
+    config(home, "");
+    let write = |name: &str, bytes: &str| fs::write(home.join(name), bytes).unwrap();
+    write("empty.toml", "");
+    write("words.toml", "this is\nno toml\n");
+    write("typo.toml", "[[detectors]]\nplugin = \"nearest-thing\"\nrolls = []\n");
+    write("plugin.toml", "[[detectors]]\nplugin = \"nearest-think\"\n[filter]\nplugin = \"ekf\"\n");
+    let fine = fs::read_to_string(home.join("nearest.toml")).unwrap();
+    write("input.toml", &format!("{fine}\n[input]\ndepth_tropic = \"/d\"\n"));
+    write("output.toml", &format!("{fine}\n[output]\nreport_unseen_s = -1.0\n"));
+    write("deep.toml", &format!("{fine}config = {{ max_depth_m = \"far\" }}\n"));
+    write("empty.mcap", "");
+    write("words.mcap", "these are only words, and a lot of them, but no log\n");
+    write("old.bag", "#ROSBAG V2.0\n");
+    write("bag.db3", "SQLite format 3");
+    fs::create_dir_all(home.join("full")).unwrap();
+    write("full/precious.txt", "keep me");
+    fs::create_dir_all(home.join("logs")).unwrap();
+    Drawn::of(2).write(&home.join("logs/inside.mcap"));
+}
+
+fn mistakes() -> Vec<Mistake> {
+    let m = mistake;
+    vec![
+        m("no command", "", 2, &["Usage"]),
+        m("an unknown command", "rum a b", 2, &["rum", "run"]),
+        m("an unknown option", "run a b --overly", 2, &["--overlay"]),
+        m("no threads", "run a b --threads 0", 2, &["--threads"]),
+        m("no config", "run neerest.toml good.mcap", 2, &["did you mean", "nearest.toml"]),
+        m("a folder as config", "run full good.mcap", 2, &["full is a directory"]),
+        m("an empty config", "run empty.toml good.mcap", 2, &["empty.toml", "filter"]),
+        m("a config of words", "run words.toml good.mcap", 2, &["words.toml:1:"]),
+        m("an unknown key", "run typo.toml good.mcap", 2, &["typo.toml:3:1", "did you mean `roles`"]),
+        m("an unknown plugin", "run plugin.toml good.mcap", 2, &["plugin.toml:2", "nearest-thing"]),
+        m("a wrong type", "check deep.toml", 2, &["deep.toml:"]),
+        m("an unknown topic key", "run input.toml good.mcap", 2, &["depth_tropic", "depth_topic"]),
+        m("a negative time", "run output.toml good.mcap", 2, &["report_unseen_s"]),
+        m("no log", "run nearest.toml goood.mcap", 1, &["no such file", "did you mean `good.mcap`"]),
+        m("a folder as log", "run nearest.toml logs", 1, &["directory", "inside.mcap"]),
+        m("an empty log", "run nearest.toml empty.mcap", 1, &["empty.mcap"]),
+        m("a log of words", "run nearest.toml words.mcap", 1, &["words.mcap"]),
+        m("a ROS 1 bag", "run nearest.toml old.bag", 1, &["rosbags-convert --src old.bag"]),
+        m("a SQLite bag", "inspect bag.db3", 1, &["mcap convert bag.db3"]),
+        m("no depth", "run nearest.toml no-depth.mcap", 1, &["depth"]),
+        m("a log that does not fit", "check nearest.toml no-depth.mcap", 1, &["depth"]),
+        m("results in a full folder", "run nearest.toml good.mcap -o full", 2, &["--overwrite"]),
+        m("results below a file", "run nearest.toml good.mcap -o old.bag/x", 2, &["old.bag"]),
+        m("results as a file", "run nearest.toml good.mcap -o old.bag", 2, &["not a directory"]),
+        m("results over the log", "run nearest.toml good.mcap -o good.mcap --overwrite", 2, &["good.mcap"]),
+        m(
+            "results beside the log",
+            "run nearest.toml logs/inside.mcap -o logs --overwrite",
+            2,
+            &["logs/inside.mcap", "another directory"],
+        ),
+        m("no such plugin", "config nearest-thin", 2, &["nearest-thing", "pipeline"]),
+        m("nothing to inspect", "inspect words.mcap", 1, &["words.mcap"]),
+    ]
+}
+
+#[test]
+fn every_mistake_has_its_exit_code_and_says_what_to_do() {
+    let home = tempfile::tempdir().unwrap();
+    lay_out(home.path());
+    for Mistake { name, args, code: expected, says } in mistakes() {
+        let args = args.iter().filter(|arg| !arg.is_empty());
+        let output = own_plugin().args(args).current_dir(home.path()).output().unwrap();
+        let told = text(&output.stderr);
+        assert_eq!(code(&output), expected, "{name}: {told}");
+        for part in says {
+            assert!(told.contains(part), "{name}: no `{part}` in: {told}");
+        }
+        assert!(!told.contains("panicked") && !told.contains("backtrace"), "{name}: {told}");
+        assert!(told.lines().count() <= 24, "{name} is told at length: {told}");
+    }
+    assert_eq!(fs::read(home.path().join("full/precious.txt")).unwrap(), b"keep me");
+    assert!(fs::metadata(home.path().join("good.mcap")).unwrap().len() > 1000);
+    assert!(!home.path().join("runs").exists(), "a refused run leaves nothing behind");
+}
+
+#[test]
+fn a_closed_pipe_is_a_quiet_end() {
+    use std::process::Stdio;
+    let mut child = tagalong()
+        .args(["config", "pipeline"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((code(&output), text(&output.stderr).as_str()), (0, ""));
+}
+
+#[test]
+fn help_is_there_for_every_command() {
+    for command in ["run", "list", "config", "check", "inspect"] {
+        let output = tagalong().args([command, "--help"]).output().unwrap();
+        assert_eq!(code(&output), 0);
+        assert!(text(&output.stdout).contains("Example"), "{command}");
+    }
+}

@@ -1,0 +1,212 @@
+//! Whole runs over a drawn log: the files, their formats, and that they are the
+//! same every time.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use common::{Drawn, code, config, own_plugin, text};
+
+const FILES: [&str; 4] = ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"];
+
+struct Home {
+    folder: tempfile::TempDir,
+}
+
+impl Home {
+    fn new(log: &Drawn, extra: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        log.write(&folder.path().join("walk.mcap"));
+        config(folder.path(), extra);
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, out: &str, more: &[&str]) -> Command {
+        let mut command = own_plugin();
+        command.current_dir(self.folder.path());
+        command.args(["run", "nearest.toml", "walk.mcap", "-o", out]).args(more);
+        command
+    }
+
+    fn run(&self, out: &str, more: &[&str]) -> Output {
+        self.command(out, more).output().unwrap()
+    }
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn cells(path: &Path) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(path).unwrap();
+    text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn a_run_writes_whole_files_and_says_what_it_found() {
+    let home = Home::new(&Drawn::of(20), "");
+    let output = home.run("out", &[]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("1 person"), "{}", text(&output.stdout));
+    let mut names: Vec<_> = fs::read_dir(home.path("out"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        ["report.json", "timings.json", "tracks-metres.csv", "tracks.csv", "tracks.mcap"]
+    );
+}
+
+#[test]
+fn boxes_follow_the_walker_in_ten_columns() {
+    let home = Home::new(&Drawn::of(20), "");
+    home.run("out", &[]);
+    let rows = cells(&home.path("out/tracks.csv"));
+    assert!(rows.len() >= 15, "{} rows", rows.len());
+    assert!(rows.iter().all(|row| row.len() == 10 && row[7..] == ["-1", "-1", "-1"]));
+    for row in &rows {
+        let value = |i: usize| row[i].parse::<f64>().unwrap();
+        let (frame, centre) = (value(0), value(2) + 0.5 * value(4));
+        assert!((1.0..=20.0).contains(&frame));
+        let walker = 90.0 - (frame - 1.0) + 13.0;
+        assert!((centre - walker).abs() < 4.0, "frame {frame}: {centre}, drawn at {walker}");
+        assert!((0.0..=1.0).contains(&value(6)));
+    }
+}
+
+#[test]
+fn metres_have_a_header_and_the_place_of_the_walker() {
+    let home = Home::new(&Drawn::of(20), "");
+    home.run("out", &[]);
+    let rows = cells(&home.path("out/tracks-metres.csv"));
+    assert_eq!(rows[0][..3], ["stamp_ns", "frame", "id"]);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    let last = rows.last().unwrap();
+    let value = |i: usize| last[i].parse::<f64>().unwrap();
+    assert_eq!(last[0], (common::FIRST_NS + 19 * 100_000_000).to_string());
+    assert!((value(3) - 2.88).abs() < 0.15, "the head is 2.88 m ahead: {}", value(3));
+    assert_eq!(value(3), value(6), "no odometry: both frames agree");
+}
+
+#[test]
+fn the_report_tells_frames_persons_and_hashes() {
+    let home = Home::new(&Drawn { twice: 5, ..Drawn::of(20) }, "");
+    let output = home.run("out", &["--format", "json", "--seed", "11"]);
+    let report = json(&home.path("out/report.json"));
+    let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(printed, report, "stdout carries the report and nothing else");
+    assert_eq!(report["seed"], 11);
+    assert_eq!(report["ended"], "complete");
+    assert_eq!(report["frames"]["processed"], 20);
+    assert_eq!(report["persons"]["1"]["last_frame"], report["frames"]["read"]);
+    assert!(report["config"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64));
+    assert!(report["log"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64), "{report}");
+    assert!(report["nis"]["mean"].as_f64().is_some_and(f64::is_finite));
+    let timings = json(&home.path("out/timings.json"));
+    assert!(timings["read"]["p95_ms"].as_f64().is_some_and(|ms| ms > 0.0), "{timings}");
+}
+
+#[test]
+fn every_run_gives_the_same_bytes() {
+    let home = Home::new(&Drawn::of(30), "");
+    assert_eq!(code(&home.run("a", &["--threads", "1"])), 0);
+    for (out, threads) in [("b", "1"), ("c", "2"), ("d", "3"), ("e", "8")] {
+        let mut command = home.command(out, &["--threads", threads, "--overlay"]);
+        command.env("TZ", "Asia/Tokyo").env("LC_ALL", "de_DE.UTF-8").env_remove("HOME");
+        assert!(command.output().unwrap().status.success());
+        for name in FILES {
+            let read = |out: &str| fs::read(home.path(out).join(name)).unwrap();
+            assert_eq!(read("a"), read(out), "{name} with {threads} threads");
+        }
+    }
+    let picture = |out: &str| fs::read(home.path(out).join("overlay/000017.png")).unwrap();
+    assert_eq!(picture("b"), picture("e"));
+}
+
+#[test]
+fn overlay_draws_every_frame() {
+    let home = Home::new(&Drawn::of(12), "");
+    home.run("out", &["--overlay"]);
+    let mut names: Vec<_> = fs::read_dir(home.path("out/overlay"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names.len(), 12);
+    assert_eq!((names[0].as_str(), names[11].as_str()), ("000001.png", "000012.png"));
+}
+
+#[test]
+fn results_are_replaced_only_when_asked() {
+    let home = Home::new(&Drawn::of(5), "");
+    assert_eq!(code(&home.run("out", &[])), 0);
+    let before = fs::read(home.path("out/report.json")).unwrap();
+    assert_eq!(code(&home.run("out", &["--seed", "3"])), 2);
+    assert_eq!(fs::read(home.path("out/report.json")).unwrap(), before);
+    assert_eq!(code(&home.run("out", &["--seed", "3", "--overwrite"])), 0);
+    assert_ne!(fs::read(home.path("out/report.json")).unwrap(), before);
+}
+
+#[test]
+fn results_go_to_a_folder_named_after_log_and_config() {
+    let home = Home::new(&Drawn::of(3), "");
+    let mut command = own_plugin();
+    command.current_dir(home.folder.path()).args(["run", "nearest.toml", "walk.mcap"]);
+    assert!(command.output().unwrap().status.success());
+    assert!(home.path("runs/walk-nearest/tracks.mcap").exists());
+}
+
+#[test]
+fn a_damaged_log_is_used_as_far_as_it_goes() {
+    let home = Home::new(&Drawn::of(30), "");
+    let whole = fs::read(home.path("walk.mcap")).unwrap();
+    fs::write(home.path("walk.mcap"), &whole[..whole.len() / 2]).unwrap();
+    let output = home.run("out", &[]);
+    assert_eq!(code(&output), 3, "{}", text(&output.stderr));
+    let report = json(&home.path("out/report.json"));
+    assert_eq!(report["data_lost"], true);
+    assert!(report["frames"]["processed"].as_u64().is_some_and(|n| n > 3), "{report}");
+    assert!(report["counters"].as_object().is_some_and(|c| !c.is_empty()), "{report}");
+    let strict = home.run("strict", &["--strict"]);
+    assert_eq!(code(&strict), 1);
+    assert!(text(&strict.stderr).contains("--strict"));
+}
+
+#[test]
+fn a_plugin_that_panics_ends_the_run_with_valid_files() {
+    let home = Home::new(&Drawn::of(20), "config = { panic_after_frames = 9 }");
+    let output = home.run("out", &[]);
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 3, "{told}");
+    assert!(told.contains("nearest-thing") && told.contains("frame 10"), "{told}");
+    let report = json(&home.path("out/report.json"));
+    assert_eq!(report["frames"]["processed"], 9);
+    assert!(report["ended"].as_str().is_some_and(|s| s.contains("nearest-thing")), "{report}");
+    let bytes = fs::read(home.path("out/tracks.mcap")).unwrap();
+    assert!(mcap::Summary::read(&bytes).unwrap().is_some());
+}
+
+#[test]
+fn the_config_travels_with_the_tracks() {
+    let home = Home::new(&Drawn::of(3), "");
+    home.run("out", &[]);
+    let bytes = fs::read(home.path("out/tracks.mcap")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let attachment = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+    let config = text(&attachment.data);
+    fs::write(home.path("again.toml"), &config).unwrap();
+    let mut command = own_plugin();
+    command.current_dir(home.folder.path()).args(["run", "again.toml", "walk.mcap", "-o", "again"]);
+    let output = command.output().unwrap();
+    assert_eq!(code(&output), 0, "{config}\n{}", text(&output.stderr));
+    let read = |out: &str| fs::read(home.path(out).join("tracks.csv")).unwrap();
+    assert_eq!(read("out"), read("again"), "the resolved config does the same");
+}
