@@ -31,6 +31,11 @@ pub(crate) struct Life {
     sight: Sight,
     age: u32,
     unseen_s: f64,
+    /// Time since the frame before.
+    step_s: f64,
+    /// For how long, and how often in a row, it should have been seen and was
+    /// not.
+    missed_s: f64,
     misses: u32,
     /// Hits (1) and misses (0) of the last frames, newest in the lowest bit.
     recent: u32,
@@ -77,6 +82,8 @@ impl Lifecycle {
             sight: Sight::Seen(Some((score, detector))),
             age: 0,
             unseen_s: 0.0,
+            step_s: 0.0,
+            missed_s: 0.0,
             misses: 0,
             recent: 1,
         };
@@ -94,6 +101,7 @@ impl Lifecycle {
         for life in self.lives.values_mut() {
             life.age = life.age.saturating_add(1);
             life.unseen_s += dt_s;
+            life.step_s = dt_s;
         }
     }
 
@@ -105,7 +113,9 @@ impl Lifecycle {
         match sight {
             Sight::Seen(detection) => life.see(detection, &self.settings),
             Sight::Missed => life.miss(&self.settings),
-            Sight::NotAsked | Sight::Hidden | Sight::Outside => {}
+            Sight::NotAsked => life.missed_s += life.step_s,
+            Sight::Hidden => life.excuse(),
+            Sight::Outside => {}
         }
         life.is_over(&self.settings)
     }
@@ -169,7 +179,7 @@ impl Lifecycle {
 impl Life {
     fn see(&mut self, detection: Option<(f64, usize)>, settings: &LifecycleSettings) {
         self.unseen_s = 0.0;
-        self.misses = 0;
+        self.excuse();
         self.remember(true, settings);
         if let Some((score, detector)) = detection {
             self.detector = Some(detector);
@@ -180,7 +190,14 @@ impl Life {
         self.confirmed |= is_likely && self.recent.count_ones() >= settings.confirm_hits;
     }
 
+    /// A good reason forgives the misses before it.
+    fn excuse(&mut self) {
+        self.missed_s = 0.0;
+        self.misses = 0;
+    }
+
     fn miss(&mut self, settings: &LifecycleSettings) {
+        self.missed_s += self.step_s;
         self.misses = self.misses.saturating_add(1);
         self.remember(false, settings);
         if self.score > settings.miss_score {
@@ -208,8 +225,9 @@ impl Life {
             }
             Sight::Outside => (longer_than(settings.left_drop_after_s), "track: left the image"),
             Sight::Missed | Sight::NotAsked => {
-                let missed = self.misses >= settings.drop_after_misses;
-                (missed && longer_than(settings.drop_after_s), "track: not seen")
+                let long = self.missed_s > settings.drop_after_s
+                    || longer_than(settings.occluded_drop_after_s);
+                (long && self.misses >= settings.drop_after_misses, "track: not seen")
             }
         };
         over.then_some(test)

@@ -176,10 +176,10 @@ pub struct LifecycleSettings {
     pub confirm_score: f64,
     /// A track that is not confirmed ends after this many misses in a row.
     pub tentative_misses: u32,
-    /// A track that should be visible ends when it was not seen for longer
-    /// than this, s, ...
+    /// A track ends when it should have been visible and was not seen for
+    /// longer than this, s, ...
     pub drop_after_s: f64,
-    /// ... and missed at least this often.
+    /// ... and missed at least this often in a row.
     pub drop_after_misses: u32,
     /// A track that left the image ends when it was not seen for longer, s.
     pub left_drop_after_s: f64,

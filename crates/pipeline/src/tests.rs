@@ -1,1 +1,4 @@
-
+mod clock;
+pub(crate) mod doubles;
+mod faults;
+mod tracking;

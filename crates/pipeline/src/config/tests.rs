@@ -1,1 +1,141 @@
+use std::path::Path;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::commented_defaults;
+
+use super::{Options, RunSettings};
+use crate::tests::doubles::{PLAIN, World, frame, person};
+use crate::{Pipeline, PipelineSettings};
+
+fn build(text: &str) -> Result<(Pipeline, RunSettings), String> {
+    Pipeline::from_toml(text, Path::new("."), &World::default().registry())
+        .map_err(|error| error.render("a.toml", text))
+}
+
+const FILTER: &str = "filter.plugin = 'steady'\n";
+const SCRIPT: &str = "[[detectors]]\nplugin = 'script'\n";
+
+#[test]
+fn mistakes_are_shown_with_their_place_and_the_remedy() {
+    let plain = |rest: &str| format!("{FILTER}{SCRIPT}{rest}");
+    let own = |line: &str| format!("{line}\n{FILTER}{SCRIPT}");
+    let weighing = "filter = { plugin = 'odd', config = { how = 'weighs' } }\n";
+    let cases: Vec<(String, &[&str])> = vec![
+        (own("sed = 1"), &["a.toml:1:1", "unknown key `sed`", "did you mean `seed`?"]),
+        (own("lifecycle.confirm_hit = 1"), &["a.toml:1:11", "did you mean `confirm_hits`?"]),
+        (own("association.cost = 'overlapp'"), &["a.toml:1:20", "did you mean `overlap`?"]),
+        (own("association.gate = -1.0"), &["a.toml:1:20", "`association.gate` must be positive"]),
+        (own("association.gate_m = nan"), &["a.toml:1:22", "must be positive, not NaN"]),
+        (own("occlusion.min_visible = 1.5"), &["a.toml:1:25", "above 0 and at most 1"]),
+        (own("lifecycle.confirm_hits = 9"), &["`lifecycle.confirm_within` must be at least 9"]),
+        (own("lifecycle.confirm_within = 40"), &["a.toml:1:28", "at most 32"]),
+        (own("robot.max_speed_mps = inf"), &["a.toml:1:23", "must be positive, not inf"]),
+        (own("seed = 'x'"), &["a.toml:1:8", "invalid type"]),
+        (own("seed = -4"), &["a.toml:1:8"]),
+        (own("seed = "), &["a.toml:1:8"]),
+        (own("seed = 1\nseed = 2"), &["a.toml:2:1", "duplicate key"]),
+        (SCRIPT.into(), &["a.toml: no filter: add a section [filter]"]),
+        (FILTER.into(), &["no detector discovers anybody"]),
+        (plain("every = 0"), &["a.toml:4:9", "`every` must be at least 1"]),
+        (plain("every = 2\noffset = 2"), &["a.toml:5:10", "2 is not below 2"]),
+        (plain("roles = []"), &["a.toml:4:9", "`script` has no role"]),
+        (plain("roles = ['folow']"), &["a.toml:4:10", "did you mean `follow`?"]),
+        (plain("roles = ['follow']"), &["a.toml:2:1", "give one of [[detectors]] the role"]),
+        (plain("roles = ['discover', 'weigh']"), &["a.toml:4:9", "cannot weigh scenes"]),
+        (plain("rolls = ['discover']"), &["a.toml:4:1", "did you mean `roles`?"]),
+        (plain("config = { scrip = 1 }"), &["a.toml:4:12", "did you mean `script`?"]),
+        (plain("[controller]\nplugin = 'script'"), &["a.toml:5:10", "not a controller"]),
+        (
+            format!("{FILTER}[[detectors]]\nplugin = 'scripts'"),
+            &["a.toml:3:10", "unknown detector plugin `scripts`", "did you mean `script`?"],
+        ),
+        (format!("{SCRIPT}[filter]\nplugin = 'choosy'"), &["a.toml:4:10", "is a verifier"]),
+        (format!("{FILTER}[detectors]\nplugin = 'script'"), &["a.toml:2:1", "[[detectors]]"]),
+        (format!("{FILTER}detectors = [1]"), &["a.toml:2:14", "must be a table"]),
+        (format!("{weighing}{SCRIPT}"), &["a.toml:1:21", "add the role weigh to a detector"]),
+        ("\u{0}".into(), &["a.toml:1:"]),
+    ];
+    for (text, expected) in cases {
+        let shown = build(&text).map(|_| ()).expect_err(&text);
+        for words in expected {
+            assert!(shown.contains(words), "{text}\n{shown}\nlacks {words}");
+        }
+    }
+}
+
+#[test]
+fn a_filter_that_weighs_scenes_is_content_with_a_detector_that_does() {
+    let filter = "filter = { plugin = 'odd', config = { how = 'weighs' } }\n";
+    let roles = "roles = ['discover', 'weigh']\nconfig = { how = 'weigh' }\n";
+    build(&format!("{filter}{SCRIPT}{roles}")).map(|_| ()).unwrap();
+}
+
+#[test]
+fn too_long_and_too_deep_configs_are_refused() {
+    let long = format!("{PLAIN}\n# {}", "x".repeat(1 << 20));
+    assert!(build(&long).err().unwrap().contains("at most 1048576 are read"));
+    let deep = format!("input = {}1{}\n{PLAIN}", "[".repeat(40), "]".repeat(40));
+    assert!(build(&deep).err().unwrap().contains("a.toml:1:9: nested deeper than 32 levels"));
+    let deeper = format!("input = {}1{}\n{PLAIN}", "[".repeat(50_000), "]".repeat(50_000));
+    assert!(build(&deeper).is_err());
+    assert!(build(&format!("input{} = 1\n{PLAIN}", ".a".repeat(50_000))).is_err());
+}
+
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct Input {
+    /// A topic.
+    topic: String,
+}
+
+#[test]
+fn tables_of_others_are_left_to_them() {
+    let text = format!("{PLAIN}\n[input]\ntopic = '/depth'\n[limits]\ntpoic = 1");
+    let (_, run) = build(&text).unwrap();
+    assert_eq!(run.table::<Input>("input").unwrap().topic, "/depth");
+    assert_eq!(run.table::<Input>("absent").unwrap().topic, "");
+    let error = run.table::<Input>("limits").err().unwrap().render("a.toml", &text);
+    assert!(error.contains("did you mean `topic`?") && error.contains("tpoic = 1"), "{error}");
+}
+
+#[test]
+fn the_resolved_config_holds_every_default_and_means_the_same() {
+    let text = format!("{PLAIN}\n[lifecycle]\nconfirm_hits = 2\n[input]\ntopic = 'x'");
+    let (pipeline, _) = build(&text).unwrap();
+    let resolved = pipeline.resolved();
+    for line in ["gate = 11.34", "confirm_hits = 2", "every = 1", "how = \"\"", "topic = \"x\""] {
+        assert!(resolved.contains(line), "{line} in\n{resolved}");
+    }
+    let (again, _) = build(&resolved).unwrap();
+    assert_eq!(again.resolved(), resolved);
+}
+
+#[test]
+fn the_seed_can_be_replaced() {
+    let options = Options { seed: Some(42), ..Options::default() };
+    let registry = World::default().registry();
+    let built = Pipeline::from_toml_with(PLAIN, Path::new("."), &registry, &options);
+    let (pipeline, run) = built.unwrap();
+    assert_eq!(run.seed, 42);
+    assert!(pipeline.resolved().contains("seed = 42"));
+    let options = Options { seed: Some(u64::MAX), ..options };
+    let built = Pipeline::from_toml_with(PLAIN, Path::new("."), &registry, &options);
+    assert!(built.err().unwrap().message.contains("`seed` must be at most"));
+}
+
+#[test]
+fn the_defaults_are_printed_under_their_documentation_and_parse() {
+    let text = commented_defaults::<PipelineSettings>();
+    for key in ["[association]", "# Mahalanobis: largest squared distance.", "gate = 11.34"] {
+        assert!(text.contains(key), "{key} in\n{text}");
+    }
+    assert_eq!(toml::from_str::<PipelineSettings>(&text).unwrap(), PipelineSettings::default());
+}
+
+#[test]
+fn a_pipeline_built_from_text_tracks() {
+    let world = World::of([vec![person(2.0, 0.0)]]);
+    let report = world.pipeline(PLAIN).step(&frame(1, 0.0)).unwrap();
+    assert_eq!(report.tracks.len(), 1);
+}

@@ -1,0 +1,270 @@
+//! Scripted plugins: what they say is written in the test.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{
+    Camera, Controller, Detection, Detector, Distortion, Error, Estimate, Evidence, Filter, Frame,
+    Funnel, Images, Likelihood, Motion, PerPerson, Person, PersonFilter, Pinhole, Registry, Result,
+    Scene, Search, Stamp, Support, TrackId, Verifier, WheelSpeeds,
+};
+
+use crate::{FrameReport, Pipeline};
+
+/// Settings of every double.
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Which script it reads.
+    pub script: usize,
+    /// What it does.
+    pub how: String,
+}
+
+pub fn camera() -> Camera {
+    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+}
+
+pub fn frame(index: u64, t_s: f64) -> Frame {
+    let stamp = Stamp::from_nanos(1_000_000_000_000).plus_seconds(t_s);
+    let motion = Motion::at_rest(0.1);
+    Frame::new(index, stamp, Arc::new(camera()), motion, Images::default())
+}
+
+/// Somebody 1.6 m tall (to the head's centre) at a place on the floor.
+pub fn person(x: f64, y: f64) -> Detection {
+    let position = Point3::new(x, y, 1.6);
+    Detection {
+        region: camera().upper_body(&position),
+        position,
+        covariance: Matrix3::identity() * 0.01,
+        score: 1.0,
+        source: "script",
+    }
+}
+
+pub fn scored(score: f64, detection: Detection) -> Detection {
+    Detection { score, ..detection }
+}
+
+/// What the detectors see, by script and frame, and what was asked of them.
+#[derive(Clone, Default)]
+pub struct World {
+    seen: Arc<Mutex<BTreeMap<(usize, u64), Vec<Detection>>>>,
+    pub asked: Arc<Mutex<Vec<(usize, u64, Option<TrackId>)>>>,
+    pub predicted: Arc<Mutex<Vec<Motion>>>,
+}
+
+impl World {
+    pub fn show(&self, script: usize, index: u64, detections: Vec<Detection>) {
+        self.seen.lock().unwrap().insert((script, index), detections);
+    }
+
+    /// Script 0 for frames 1, 2, ...
+    pub fn of(frames: impl IntoIterator<Item = Vec<Detection>>) -> Self {
+        let world = Self::default();
+        for (index, detections) in (1..).zip(frames) {
+            world.show(0, index, detections);
+        }
+        world
+    }
+
+    pub fn registry(&self) -> Registry {
+        let mut registry = Registry::default();
+        let world = self.clone();
+        registry.detector("script", "reads a script", move |config: Config, _| {
+            Ok(Script { world: world.clone(), config })
+        });
+        registry.verifier("choosy", "doubts some", |config: Config, _| Ok(Choosy(config)));
+        let world = self.clone();
+        registry.filter("steady", "believes what it saw", move |_: Config, _| {
+            Ok(PerPerson::new(Steady(world.clone())))
+        });
+        registry.filter("odd", "makes mistakes", |config: Config, _| {
+            Ok(Odd { config, ids: BTreeSet::new() })
+        });
+        registry.controller("drive", "drives", |config: Config, _| Ok(Drive(config)));
+        registry
+    }
+
+    pub fn pipeline(&self, config: &str) -> Pipeline {
+        match Pipeline::from_toml(config, Path::new("."), &self.registry()) {
+            Ok((pipeline, _)) => pipeline,
+            Err(error) => panic!("{}", error.render("test.toml", config)),
+        }
+    }
+
+    /// Runs `frames` frames at intervals of `dt_s`.
+    pub fn run(&self, config: &str, frames: u64, dt_s: f64) -> Vec<FrameReport> {
+        let mut pipeline = self.pipeline(config);
+        (1..=frames).map(|i| pipeline.step(&frame(i, i as f64 * dt_s)).unwrap()).collect()
+    }
+}
+
+/// A discovering script and the steady filter.
+pub const PLAIN: &str = "
+    [[detectors]]
+    plugin = 'script'
+    [filter]
+    plugin = 'steady'
+";
+
+struct Script {
+    world: World,
+    config: Config,
+}
+
+impl Detector for Script {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        let script = self.config.script;
+        let track = match search {
+            Search::Near(track) => Some(*track),
+            Search::Everywhere { .. } => None,
+        };
+        self.world.asked.lock().unwrap().push((script, frame.index, track.map(|t| t.id)));
+        match self.config.how.as_str() {
+            "panic" => panic!("out of {}", "ideas"),
+            "depth" => drop(frame.depth()?),
+            "picky" => funnel.drop_many("too small", 2),
+            _ => {}
+        }
+        let seen = self.world.seen.lock().unwrap();
+        let mut found = seen.get(&(script, frame.index)).cloned().unwrap_or_default();
+        if let Some(track) = track.filter(|_| self.config.how != "far") {
+            let here = track.estimate.person.position;
+            found.retain(|d| (d.position - here).norm() < 0.5);
+        }
+        Ok(found)
+    }
+
+    fn likelihood(&self) -> Option<&dyn Likelihood> {
+        (self.config.how == "weigh").then_some(self as &dyn Likelihood)
+    }
+}
+
+impl Likelihood for Script {
+    fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> Result<f64> {
+        Ok(scene.len() as f64)
+    }
+}
+
+/// Says no to everybody left of the middle.
+struct Choosy(Config);
+
+impl Verifier for Choosy {
+    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+        match self.0.how.as_str() {
+            "nan" => Ok(f64::NAN),
+            "panic" => panic!("no"),
+            "once" => Ok(if frame.index == 8 { -2.5 } else { 0.5 }),
+            "fail" => Err(Error::Other("has no opinion".into())),
+            _ => Ok(if candidate.position.y > 0.0 { -4.0 } else { 0.0 }),
+        }
+    }
+}
+
+/// Constant velocity, learned from the last two sightings.
+struct Steady(World);
+
+struct Belief {
+    person: Person,
+    age_s: f64,
+}
+
+impl PersonFilter for Steady {
+    type Belief = Belief;
+
+    fn start(&self, detection: &Detection) -> Belief {
+        let person = Person { position: detection.position, velocity: Vector2::zeros() };
+        Belief { person, age_s: 0.0 }
+    }
+
+    fn predict(&self, belief: &mut Belief, motion: &Motion) {
+        self.0.predicted.lock().unwrap().push(*motion);
+        belief.age_s += motion.dt;
+        let step = belief.person.velocity * motion.dt;
+        belief.person.position += nalgebra::Vector3::new(step.x, step.y, 0.0);
+    }
+
+    fn correct(&self, belief: &mut Belief, detection: &Detection, _: &Camera) -> Support {
+        let off = (detection.position - belief.person.position).xy();
+        belief.person.velocity += 0.5 * off / belief.age_s.max(0.01);
+        belief.person.position = detection.position;
+        belief.age_s = 0.0;
+        Support { nis: Some((off.norm_squared(), 3)) }
+    }
+
+    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+        Estimate {
+            person: belief.person,
+            covariance: SMatrix::identity() * (0.02 + 0.3 * belief.age_s),
+            region: camera.upper_body(&belief.person.position),
+        }
+    }
+}
+
+/// A filter with one fault.
+struct Odd {
+    config: Config,
+    ids: BTreeSet<TrackId>,
+}
+
+impl Filter for Odd {
+    fn start(&mut self, id: TrackId, _: &Detection) {
+        assert!(self.config.how != "panic", "cannot start {id}");
+        self.ids.insert(id);
+    }
+
+    fn predict(&mut self, _: &Motion) {}
+
+    fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+        let nis = Some((f64::NAN, 3));
+        Ok([(TrackId(4711), Support { nis })].into())
+    }
+
+    fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
+        let (x, variance) = match self.config.how.as_str() {
+            "nan" => (f64::NAN, 1.0),
+            "negative" => (3.0, -1.0),
+            _ => (3.0, 1.0),
+        };
+        let estimate = |id: &TrackId| {
+            let position = Point3::new(x, f64::from(id.0), 1.6);
+            let person = Person { position, velocity: Vector2::zeros() };
+            let covariance = SMatrix::identity() * variance;
+            (*id, Estimate { person, covariance, region: camera.upper_body(&position) })
+        };
+        let forgets = self.config.how == "forgets";
+        self.ids.iter().filter(|_| !forgets).map(estimate).collect()
+    }
+
+    fn stop(&mut self, id: TrackId) {
+        self.ids.remove(&id);
+    }
+
+    fn weighs_scenes(&self) -> bool {
+        self.config.how == "weighs"
+    }
+}
+
+struct Drive(Config);
+
+impl Controller for Drive {
+    fn command(&mut self, _: &Scene<'_>) -> WheelSpeeds {
+        match self.0.how.as_str() {
+            "nan" => WheelSpeeds { left: f64::NAN, right: 0.0 },
+            "panic" => panic!("which way?"),
+            _ => WheelSpeeds { left: 2.0, right: -4.0 },
+        }
+    }
+}

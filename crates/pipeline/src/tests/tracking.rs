@@ -1,0 +1,329 @@
+use tagalong_core::{Detection, TrackId};
+
+use super::doubles::{PLAIN, World, person, scored};
+use crate::{Fate, FrameReport};
+
+fn ids(report: &FrameReport) -> Vec<u32> {
+    let mut ids: Vec<u32> = report.tracks.iter().map(|t| t.id.0).collect();
+    ids.sort();
+    ids
+}
+
+fn place_of(report: &FrameReport, id: u32) -> Option<(f64, f64)> {
+    let track = report.tracks.iter().find(|t| t.id == TrackId(id))?;
+    let position = track.estimate.person.position;
+    Some((position.x, position.y))
+}
+
+#[test]
+fn a_person_is_confirmed_by_the_third_sighting_and_keeps_the_number() {
+    let reports = World::of((0..6).map(|_| vec![person(3.0, 0.0)])).run(PLAIN, 6, 0.1);
+    let confirmed: Vec<bool> = reports.iter().map(|r| r.tracks[0].confirmed).collect();
+    assert_eq!(confirmed, [false, false, true, true, true, true]);
+    assert!(reports.iter().all(|r| ids(r) == [1] && r.tracks[0].seen));
+    assert_eq!(reports[0].candidates[0].fate, Fate::Started(TrackId(1)));
+    assert_eq!(reports[1].candidates[0].fate, Fate::Matched(TrackId(1)));
+    assert_eq!(reports[1].nis.len(), 1);
+    assert_eq!(reports[5].tracks[0].age, 5);
+}
+
+#[test]
+fn a_high_score_confirms_at_once() {
+    let reports = World::of([vec![scored(4.5, person(3.0, 0.0))]]).run(PLAIN, 1, 0.1);
+    assert!(reports[0].tracks[0].confirmed);
+}
+
+#[test]
+fn tracks_are_reported_near_to_far() {
+    let people = vec![person(4.0, 0.0), person(2.0, 0.5), person(3.0, -0.5)];
+    let reports = World::of([people]).run(PLAIN, 1, 0.1);
+    let x: Vec<f64> = reports[0].tracks.iter().map(|t| t.estimate.person.position.x).collect();
+    assert_eq!(x, [2.0, 3.0, 4.0]);
+}
+
+#[test]
+fn two_people_who_cross_keep_their_numbers() {
+    let crossing = |i: i32| {
+        let along = 0.1 * f64::from(i) - 1.0;
+        vec![person(3.0, along), person(3.5, -along)]
+    };
+    let reports = World::of((0..21).map(crossing)).run(PLAIN, 21, 0.1);
+    let (first, last) = (&reports[0], &reports[20]);
+    assert_eq!(ids(last), [1, 2]);
+    for id in [1, 2] {
+        let (before, after) = (place_of(first, id).unwrap(), place_of(last, id).unwrap());
+        assert_eq!(before.0, after.0, "track {id} stays in its lane");
+        assert!((before.1 + after.1).abs() < 1e-9, "track {id} crossed over");
+    }
+}
+
+/// One stands 2 m ahead; the other walks behind and is not seen there.
+fn behind_somebody(somebody: bool) -> Vec<FrameReport> {
+    let walk = |i: i32| {
+        let y = 1.3 - 0.05 * f64::from(i);
+        let visible = y.abs() > 0.45;
+        let mut people: Vec<Detection> = visible.then(|| person(4.0, y)).into_iter().collect();
+        if somebody {
+            people.insert(0, person(2.0, 0.0));
+        }
+        people
+    };
+    World::of((0..50).map(walk)).run(PLAIN, 50, 0.1)
+}
+
+#[test]
+fn a_person_hidden_behind_another_coasts_and_keeps_the_number() {
+    let reports = behind_somebody(true);
+    assert!(reports.iter().all(|r| ids(r) == [1, 2]), "no track ends, none is added");
+    let hidden = |r: &FrameReport| r.tracks.iter().any(|t| t.occluded && !t.seen);
+    assert!(reports.iter().filter(|r| hidden(r)).count() >= 10);
+    assert!(reports.iter().all(|r| r.tracks.iter().all(|t| !(t.occluded && t.seen))));
+}
+
+#[test]
+fn a_person_who_should_be_visible_and_is_not_ends_soon() {
+    let reports = behind_somebody(false);
+    assert_eq!(ids(&reports[49]), [2], "the track ended, a new one was started");
+    let ended: Vec<u32> = reports.iter().flat_map(|r| &r.ended).map(|id| id.0).collect();
+    assert_eq!(ended, [1]);
+    assert_eq!(reports.iter().map(|r| r.funnel.count("track: not seen")).sum::<u64>(), 1);
+}
+
+#[test]
+fn a_person_who_left_the_image_is_kept_a_little_longer_but_not_seen() {
+    let leaves = |i: i32| if i < 12 { vec![person(2.0, 0.12 * f64::from(i))] } else { vec![] };
+    let reports = World::of((0..50).map(leaves)).run(PLAIN, 50, 0.1);
+    assert!(!reports[20].tracks[0].seen && !reports[20].tracks[0].occluded);
+    let last = reports.iter().rposition(|r| !r.tracks.is_empty()).unwrap();
+    assert!(last > 11 + 15 && last < 11 + 25, "{last}");
+    assert_eq!(reports.iter().map(|r| r.funnel.count("track: left the image")).sum::<u64>(), 1);
+}
+
+#[test]
+fn a_track_that_was_never_confirmed_dies_after_two_misses() {
+    let reports = World::of([vec![person(3.0, 0.0)]]).run(PLAIN, 3, 0.1);
+    let alive: Vec<usize> = reports.iter().map(|r| r.tracks.len()).collect();
+    assert_eq!(alive, [1, 1, 0]);
+    assert_eq!(reports[2].funnel.count("track: not confirmed"), 1);
+}
+
+#[test]
+fn three_misses_are_needed_however_slow_the_log_is() {
+    let seen = |i: i32| if i < 4 { vec![person(3.0, 0.0)] } else { vec![] };
+    let reports = World::of((0..8).map(seen)).run(PLAIN, 8, 1.0);
+    let alive: Vec<usize> = reports.iter().map(|r| r.tracks.len()).collect();
+    assert_eq!(alive, [1, 1, 1, 1, 1, 1, 0, 0]);
+}
+
+#[test]
+fn the_gate_grows_with_the_time_between_frames() {
+    let walk = |i: i32| vec![person(3.0, -1.5 + f64::from(i))];
+    let numbers = |dt_s: f64| ids(&World::of((0..3).map(walk)).run(PLAIN, 3, dt_s)[2]).len();
+    let wide =
+        |gate_m: f64| format!("association.gate = 1e3\nassociation.gate_m = {gate_m}\n{PLAIN}");
+    let slow = World::of((0..3).map(walk)).run(&wide(0.3), 3, 0.5);
+    assert_eq!(ids(&slow[2]), [1], "1 m in half a second");
+    let fast = World::of((0..3).map(walk)).run(&wide(0.3), 3, 0.1);
+    assert!(ids(&fast[2]).len() > 1, "nobody runs at 10 m/s");
+    assert!(numbers(0.1) > 1);
+}
+
+#[test]
+fn what_is_dropped_is_counted_under_the_name_of_the_test() {
+    let config = format!("{PLAIN}\n[[verifiers]]\nplugin = 'choosy'");
+    let people = vec![
+        scored(-1.0, person(3.0, -0.3)),
+        person(3.0, 0.6),
+        person(2.0, -0.2),
+        scored(0.5, person(2.05, -0.22)),
+    ];
+    let report = World::of([people]).run(&config, 1, 0.1).remove(0);
+    let fates: Vec<Fate> = report.candidates.iter().map(|c| c.fate).collect();
+    let expected = [
+        Fate::Dropped("score"),
+        Fate::Dropped("verifier"),
+        Fate::Started(TrackId(1)),
+        Fate::Dropped("same person"),
+    ];
+    assert_eq!(fates, expected);
+    for test in ["score", "verifier", "same person"] {
+        assert_eq!(report.funnel.count(test), 1, "{test}");
+    }
+}
+
+#[test]
+fn the_detectors_own_tests_are_in_the_funnel() {
+    let config = PLAIN.replace("'script'", "'script'\nconfig = { how = 'picky' }");
+    let report = World::of([vec![]]).run(&config, 1, 0.1).remove(0);
+    assert_eq!(report.funnel.count("too small"), 2);
+}
+
+#[test]
+fn the_silence_of_a_detector_on_anothers_frame_is_no_miss() {
+    let config = "
+        [[detectors]]
+        plugin = 'script'
+        every = 2
+        [[detectors]]
+        plugin = 'script'
+        every = 2
+        offset = 1
+        config = { script = 1 }
+        [filter]
+        plugin = 'steady'
+        [lifecycle]
+        drop_after_s = 0.05
+        drop_after_misses = 1
+        tentative_misses = 1
+    ";
+    let world = World::default();
+    for index in (1..20).step_by(2) {
+        world.show(0, index, vec![person(3.0, 0.0)]);
+    }
+    let reports = world.run(config, 20, 0.1);
+    assert!(reports.iter().all(|r| ids(r) == [1]));
+    assert!(reports[4].tracks[0].confirmed, "3 of 3 looks, not 3 of 5 frames");
+    let asked = world.asked.lock().unwrap();
+    let turns: Vec<(usize, u64)> = asked.iter().map(|a| (a.0, a.1)).take(4).collect();
+    assert_eq!(turns, [(0, 1), (1, 2), (0, 3), (1, 4)]);
+}
+
+const FOLLOWING: &str = "
+    [[detectors]]
+    plugin = 'script'
+    roles = ['discover', 'follow']
+    [filter]
+    plugin = 'steady'
+";
+
+#[test]
+fn a_followed_person_who_is_discovered_again_stays_one() {
+    let reports = World::of((0..8).map(|_| vec![person(3.0, 0.0)])).run(FOLLOWING, 8, 0.1);
+    assert!(reports.iter().all(|r| ids(r) == [1]));
+    assert_eq!(reports[3].candidates.len(), 2);
+    assert_eq!(reports[3].funnel.count("same person"), 1);
+}
+
+#[test]
+fn the_better_sighting_of_a_followed_person_is_kept() {
+    let config = "
+        [[detectors]]
+        plugin = 'script'
+        roles = ['discover']
+        [[detectors]]
+        plugin = 'script'
+        roles = ['follow']
+        config = { script = 1 }
+        [filter]
+        plugin = 'steady'
+    ";
+    let world = World::of((0..4).map(|_| vec![scored(2.0, person(3.0, 0.0))]));
+    for index in 2..5 {
+        world.show(1, index, vec![person(3.1, 0.0)]);
+    }
+    let reports = world.run(config, 4, 0.1);
+    assert_eq!(place_of(&reports[3], 1), Some((3.0, 0.0)));
+    assert_eq!(ids(&reports[3]), [1]);
+}
+
+#[test]
+fn nobody_looks_for_a_person_behind_one_who_was_found() {
+    let people = |i: i32| {
+        let near = person(2.0, 0.0);
+        if i < 5 { vec![near, person(4.0, 0.9)] } else { vec![near, person(4.0, 0.1)] }
+    };
+    let far_config = format!("association.gate = 1e3\n{FOLLOWING}");
+    let world = World::of((0..8).map(people));
+    world.run(&far_config, 8, 0.1);
+    let asked = world.asked.lock().unwrap();
+    assert!(asked.contains(&(0, 4, Some(TrackId(2)))));
+    assert!(asked.contains(&(0, 8, Some(TrackId(1)))));
+    assert!(!asked.contains(&(0, 8, Some(TrackId(2)))), "hidden behind track 1");
+}
+
+#[test]
+fn a_follower_that_looks_elsewhere_is_gated() {
+    let config = FOLLOWING.replace("'follow']", "'follow']\nconfig = { how = 'far' }");
+    let world = World::of([vec![person(3.0, 0.0)], vec![person(3.0, 0.0), person(4.5, 1.0)]]);
+    let report = world.run(&config, 2, 0.1).remove(1);
+    assert_eq!(report.funnel.count("gate"), 1);
+    assert_eq!(ids(&report), [1, 2]);
+}
+
+#[test]
+fn one_no_of_a_verifier_kills_no_track() {
+    let config = format!("{PLAIN}\n[[verifiers]]\nplugin = 'choosy'\nconfig = {{ how = 'once' }}");
+    let reports = World::of((0..12).map(|_| vec![person(3.0, 0.0)])).run(&config, 12, 0.1);
+    assert!(reports.iter().all(|r| ids(r) == [1]));
+    assert!(reports[7].tracks[0].score < reports[6].tracks[0].score);
+}
+
+#[test]
+fn a_track_that_is_doubted_again_and_again_ends() {
+    let config = format!("{PLAIN}\n[[verifiers]]\nplugin = 'choosy'");
+    let walk = |i: i32| vec![person(3.0, if i < 5 { -0.02 } else { 0.02 })];
+    let reports = World::of((0..25).map(walk)).run(&config, 25, 0.1);
+    assert!(reports[4].tracks[0].confirmed);
+    assert!(reports[24].tracks.is_empty());
+}
+
+#[test]
+fn two_tracks_of_one_person_become_the_older_one() {
+    let approach = |i: i32| {
+        let apart = (0.8 - 0.1 * f64::from(i)).max(0.28);
+        vec![person(3.0, 0.0), person(3.0, apart)]
+    };
+    let config = format!("{PLAIN}\n[lifecycle]\nduplicate_m = 0.3");
+    let reports = World::of((0..12).map(approach)).run(&config, 12, 0.1);
+    assert_eq!(ids(&reports[2]), [1, 2]);
+    let ended: Vec<u32> = reports.iter().flat_map(|r| &r.ended).map(|id| id.0).collect();
+    assert!(ended.contains(&2) && !ended.contains(&1), "{ended:?}");
+    assert!(reports.iter().map(|r| r.funnel.count("track: duplicate")).sum::<u64>() >= 1);
+}
+
+#[test]
+fn too_many_detections_and_tracks_are_dropped_lowest_score_first() {
+    let crowd = || (0..8).map(|i| scored(f64::from(i), person(3.0, f64::from(i) * 0.4 - 1.4)));
+    let config = format!("association.max_detections = 6\nlifecycle.max_tracks = 4\n{PLAIN}");
+    let report = World::of([crowd().collect()]).run(&config, 1, 0.1).remove(0);
+    assert_eq!(report.funnel.count("too many detections"), 2);
+    assert_eq!(report.funnel.count("track: too many"), 2);
+    let scores: Vec<f64> = report.tracks.iter().map(|t| t.score).collect();
+    assert!(scores.len() == 4 && scores.iter().all(|s| *s >= 4.0), "{scores:?}");
+}
+
+#[test]
+fn overlap_in_the_image_can_decide_who_is_who() {
+    let config = format!("association.cost = 'overlap'\n{PLAIN}");
+    let walk = |i: i32| {
+        let y = 0.04 * f64::from(i);
+        vec![person(3.0, y - 1.0), person(3.0, y)]
+    };
+    let reports = World::of((0..8).map(walk)).run(&config, 8, 0.1);
+    assert!(reports.iter().all(|r| ids(r) == [1, 2]));
+    let jump = World::of([vec![person(3.0, 0.0)], vec![person(3.0, 0.6)]]);
+    assert_eq!(ids(&jump.run(&config, 2, 0.1)[1]), [1, 2], "no overlap, no match");
+}
+
+#[test]
+fn the_same_run_gives_the_same_reports() {
+    let walk = |i: i32| {
+        let y = 0.1 * f64::from(i % 7);
+        vec![person(3.0, y), person(4.0, -y), person(2.0, 1.0 - y), scored(-1.0, person(5.0, y))]
+    };
+    let run = || {
+        let reports = World::of((0..20).map(walk)).run(FOLLOWING, 20, 0.1);
+        let timeless = reports.into_iter().map(|r| FrameReport { timings: vec![], ..r });
+        format!("{:?}", timeless.collect::<Vec<_>>())
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn all_stages_are_timed() {
+    let world = World::of([vec![]]);
+    let mut pipeline = world.pipeline(PLAIN);
+    let report = pipeline.step(&super::doubles::frame(1, 0.0)).unwrap();
+    let timed: Vec<&str> = report.timings.iter().map(|t| t.0).collect();
+    assert_eq!(timed, pipeline.stage_names());
+}
