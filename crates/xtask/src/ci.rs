@@ -1,0 +1,10 @@
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::workspace::{Workspace, succeed};
+
+/// Runs what the server runs.
+pub fn ci(workspace: &Workspace) -> Result<()> {
+    succeed(Command::new("bash").arg(".ci/run").current_dir(workspace.root()))
+}

@@ -1,0 +1,77 @@
+//! Commands for those who work on Tagalong: `cargo xtask --help`.
+
+mod ci;
+mod metadata;
+mod new_plugin;
+mod tidy;
+mod try_out;
+mod workspace;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Args, Parser, Subcommand};
+
+use new_plugin::Kind;
+use workspace::Workspace;
+
+/// Commands for those who work on Tagalong.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Writes a new plugin crate, lists it in the catalog and gives it a config
+    NewPlugin(NewPlugin),
+    /// Fails on wrong dependency arrows, unlisted plugins, stale paths and the like
+    Tidy,
+    /// Runs everything that the server runs (`.ci/run`)
+    Ci,
+}
+
+#[derive(Args)]
+struct NewPlugin {
+    /// What the plugin is.
+    #[arg(required_unless_present = "try_out")]
+    kind: Option<Kind>,
+    /// Its name in configs, for example `leg-width`.
+    #[arg(required_unless_present = "try_out")]
+    name: Option<String>,
+    /// Generate one of each kind in a copy of the workspace and test them there.
+    #[arg(long = "try", conflicts_with_all = ["kind", "name"])]
+    try_out: bool,
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<()> {
+    let workspace = Workspace::find()?;
+    match command {
+        Command::NewPlugin(NewPlugin { kind: Some(kind), name: Some(name), .. }) => {
+            new_plugin::create(&workspace, kind, &name)?;
+            eprintln!("{}", new_plugin::what_now(kind, &name));
+            Ok(())
+        }
+        Command::NewPlugin(_) => try_out::try_out(&workspace),
+        Command::Tidy => tidy::tidy(&workspace),
+        Command::Ci => ci::ci(&workspace),
+    }
+}
+
+/// The sub-commands of this program, for the check of documented commands.
+fn subcommands() -> Vec<String> {
+    use clap::CommandFactory as _;
+    Cli::command().get_subcommands().map(|c| c.get_name().to_owned()).collect()
+}

@@ -1,0 +1,229 @@
+//! Writes a plugin crate that builds, keeps the promises of its kind, and does
+//! as little as that allows.
+
+use std::collections::BTreeSet;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::ValueEnum;
+
+use crate::workspace::Workspace;
+
+/// The four kinds of plugin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// Finds people in images.
+    Detector,
+    /// Doubts what a detector found.
+    Verifier,
+    /// Believes in people over time.
+    Filter,
+    /// Steers after one of them.
+    Controller,
+}
+
+/// The files that differ between the kinds.
+struct Template {
+    /// The source file of the verb, and its text.
+    verb: (&'static str, &'static str),
+    lib: &'static str,
+    config: &'static str,
+    readme: &'static str,
+    pipeline: &'static str,
+}
+
+macro_rules! template {
+    ($folder:literal, $verb:literal) => {
+        Template {
+            verb: ($verb, include_str!(concat!("../templates/", $folder, "/", $verb, ".rs.txt"))),
+            lib: include_str!(concat!("../templates/", $folder, "/lib.rs.txt")),
+            config: include_str!(concat!("../templates/", $folder, "/config.rs.txt")),
+            readme: include_str!(concat!("../templates/", $folder, "/README.md.txt")),
+            pipeline: include_str!(concat!("../templates/", $folder, "/pipeline.toml.txt")),
+        }
+    };
+}
+
+const MANIFEST: &str = include_str!("../templates/Cargo.toml.txt");
+
+impl Kind {
+    fn template(self) -> Template {
+        match self {
+            Self::Detector => template!("detector", "detect"),
+            Self::Verifier => template!("verifier", "verify"),
+            Self::Filter => template!("filter", "filter"),
+            Self::Controller => template!("controller", "control"),
+        }
+    }
+}
+
+/// Writes the crate, its lines in the workspace and the catalog, and a config.
+/// Nothing is written if anything is in the way.
+pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
+    check_name(workspace, name)?;
+    let lists = lists_with(workspace, name)?;
+    let template = kind.template();
+    let fill = |text: &str| fill(text, name);
+    let folder = format!("plugins/{name}");
+    let (verb, verb_text) = template.verb;
+    workspace.write(format!("{folder}/Cargo.toml"), &fill(MANIFEST))?;
+    workspace.write(format!("{folder}/README.md"), &fill(template.readme))?;
+    workspace.write(format!("{folder}/src/lib.rs"), &fill(template.lib))?;
+    workspace.write(format!("{folder}/src/config.rs"), &fill(template.config))?;
+    workspace.write(format!("{folder}/src/{verb}.rs"), &fill(verb_text))?;
+    workspace.write(format!("configs/{name}.toml"), &fill(template.pipeline))?;
+    lists.iter().try_for_each(|(path, text)| workspace.write(path, text))
+}
+
+/// What to do with the new crate, in a few lines.
+pub fn what_now(kind: Kind, name: &str) -> String {
+    let verb = kind.template().verb.0;
+    format!(
+        "plugins/{name} is written, listed in crates/catalog and used by configs/{name}.toml.\n\
+         Write the method in plugins/{name}/src/{verb}.rs, its settings in src/config.rs, then\n\
+         \n    cargo test -p tagalong-{name} && cargo test -p tagalong-tests --test conformance\n    \
+         cargo run --release -- run configs/{name}.toml LOG.mcap --overlay\n"
+    )
+}
+
+fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
+    let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let well_formed = name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.split('-').all(|word| !word.is_empty() && word.chars().all(letters));
+    ensure!(
+        well_formed,
+        "`{name}` cannot name a plugin: use lower-case words joined by hyphens, like `leg-width`"
+    );
+    let mut taken: BTreeSet<String> = workspace.folders("crates")?.into_iter().collect();
+    taken.extend(["tests", "benches", "config", "pipeline"].map(String::from));
+    ensure!(
+        !taken.contains(name),
+        "`{name}` is the name of a room of the workspace: choose another"
+    );
+    for path in [format!("plugins/{name}"), format!("configs/{name}.toml")] {
+        if workspace.root().join(&path).exists() {
+            bail!("{path} exists already: choose another name, or remove it first");
+        }
+    }
+    Ok(())
+}
+
+/// The files that list all plugins, with the new one in its place.
+fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, String); 3]> {
+    let list = |path, line: String, is_sibling: fn(&str) -> bool| -> Result<_> {
+        let text = insert_sorted(&workspace.read(path)?, &line, is_sibling);
+        Ok((path, text.with_context(|| format!("{path}: no place for the line `{line}`"))?))
+    };
+    let package = format!("tagalong-{name}");
+    let register = format!("    {}::register(registry);", package.replace('-', "_"));
+    Ok([
+        list("Cargo.toml", format!("{package} = {{ path = \"plugins/{name}\" }}"), |line| {
+            line.starts_with("tagalong-") && line.contains("{ path = \"plugins/")
+        })?,
+        list("crates/catalog/Cargo.toml", format!("{package}.workspace = true"), |line| {
+            line.starts_with("tagalong-")
+        })?,
+        list("crates/catalog/src/lib.rs", register, |line| {
+            line.starts_with("    tagalong_") && line.ends_with("::register(registry);")
+        })?,
+    ])
+}
+
+/// `text` with `line` before the first sibling that sorts after it, else after
+/// the last one; `None` if there is no sibling at all.
+fn insert_sorted(text: &str, line: &str, is_sibling: fn(&str) -> bool) -> Option<String> {
+    let mut lines: Vec<&str> = text.lines().collect();
+    let siblings: Vec<usize> = (0..lines.len()).filter(|i| is_sibling(lines[*i])).collect();
+    let after = siblings.iter().find(|i| lines[**i] > line).copied();
+    lines.insert(after.or(siblings.last().map(|last| last + 1))?, line);
+    Some(lines.join("\n") + "\n")
+}
+
+/// Puts the names of the plugin into a template.
+fn fill(text: &str, name: &str) -> String {
+    text.replace("@NAME@", name)
+        .replace("@CRATE@", &format!("tagalong_{}", name.replace('-', "_")))
+        .replace("@TYPE@", &type_name(name))
+}
+
+/// `leg-width` as `LegWidth`.
+fn type_name(name: &str) -> String {
+    let capital = |word: &str| {
+        let (first, rest) = word.split_at(1);
+        first.to_uppercase() + rest
+    };
+    name.split('-').map(capital).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn workspace() -> (tempfile::TempDir, Workspace) {
+        let folder = tempfile::tempdir().unwrap();
+        let workspace = Workspace::at(folder.path());
+        let lines = "tagalong-b = { path = \"plugins/b\" }\n\n[profile]\n";
+        workspace.write("Cargo.toml", lines).unwrap();
+        workspace.write("plugins/b/Cargo.toml", "").unwrap();
+        workspace.write("crates/catalog/Cargo.toml", "tagalong-b.workspace = true\n").unwrap();
+        let register = "fn f() {\n    tagalong_b::register(registry);\n}\n";
+        workspace.write("crates/catalog/src/lib.rs", register).unwrap();
+        (folder, workspace)
+    }
+
+    #[test]
+    fn a_new_plugin_is_listed_in_order() {
+        let (_folder, workspace) = workspace();
+        create(&workspace, Kind::Filter, "a-filter").unwrap();
+        create(&workspace, Kind::Detector, "c").unwrap();
+        let catalog = workspace.read("crates/catalog/src/lib.rs").unwrap();
+        let expected = "fn f() {\n    tagalong_a_filter::register(registry);\n    \
+                        tagalong_b::register(registry);\n    tagalong_c::register(registry);\n}\n";
+        assert_eq!(catalog, expected);
+        let root = workspace.read("Cargo.toml").unwrap();
+        assert!(
+            root.starts_with("tagalong-a-filter = { path = \"plugins/a-filter\" }\n"),
+            "{root}"
+        );
+        assert!(workspace.read("plugins/a-filter/src/filter.rs").unwrap().contains("AFilter"));
+    }
+
+    #[test]
+    fn no_placeholder_is_left() {
+        let (_folder, workspace) = workspace();
+        for (kind, name) in Kind::value_variants().iter().zip(["d", "v", "f", "c"]) {
+            create(&workspace, *kind, name).unwrap();
+            let verb = format!("src/{}.rs", kind.template().verb.0);
+            for file in ["Cargo.toml", "README.md", "src/lib.rs", "src/config.rs", &verb] {
+                let text = workspace.read(format!("plugins/{name}/{file}")).unwrap();
+                assert!(!text.contains('@'), "{kind:?} {file}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn bad_and_taken_names_are_refused_and_nothing_is_written() {
+        let (_folder, workspace) = workspace();
+        for (name, why) in [
+            ("Leg", "lower-case"),
+            ("a--b", "lower-case"),
+            ("../x", "lower-case"),
+            ("3d", "lower-case"),
+            ("", "lower-case"),
+            ("b", "exists already"),
+            ("catalog", "a room of the workspace"),
+        ] {
+            let error = create(&workspace, Kind::Detector, name).unwrap_err().to_string();
+            assert!(error.contains(why), "{name}: {error}");
+        }
+        assert_eq!(workspace.folders("plugins").unwrap(), ["b"]);
+    }
+
+    #[test]
+    fn a_missing_list_is_an_error_before_anything_is_written() {
+        let (_folder, workspace) = workspace();
+        workspace.write("crates/catalog/src/lib.rs", "fn f() {}\n").unwrap();
+        let error = create(&workspace, Kind::Detector, "c").unwrap_err().to_string();
+        assert!(error.contains("crates/catalog/src/lib.rs"), "{error}");
+        assert_eq!(workspace.folders("plugins").unwrap(), ["b"]);
+    }
+}

@@ -1,0 +1,117 @@
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+
+use crate::metadata::{Metadata, Package};
+use crate::workspace::Workspace;
+
+/// Who may lean on whom in `crates/`, apart from dev-dependencies. The map of
+/// the house in `crates/README.md` says why.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("core", &[]),
+    ("vision", &["core"]),
+    ("stereo", &["core", "vision"]),
+    ("pipeline", &["core"]),
+    ("log", &["core", "vision"]),
+    ("sim", &["core"]),
+    ("eval", &["core"]),
+    ("report", &["core", "eval"]),
+    ("conformance", &["core"]),
+    ("catalog", &["core", "plugins"]),
+    ("cli", &["core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "catalog"]),
+    ("xtask", &[]),
+];
+
+/// What a plugin may lean on.
+const OF_PLUGINS: &[&str] = &["core", "vision"];
+
+/// What the tests of any crate may lean on in addition.
+const FOR_TESTS: &[&str] = &["core", "vision", "sim", "conformance"];
+
+/// Complains about every wrong arrow.
+pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {
+    let members = metadata.members(workspace.root());
+    let folder_of: BTreeMap<&str, &str> =
+        members.iter().map(|(folder, p)| (p.name.as_str(), folder.as_str())).collect();
+    let mut complaints = Vec::new();
+    for (folder, package) in &members {
+        let Some(allowed) = allowed(folder) else {
+            let file = "crates/xtask/src/tidy/arrows.rs";
+            complaints.push(format!("{folder}: {file} does not say what it may depend on"));
+            continue;
+        };
+        complaints.extend(misnamed(folder, package));
+        for (target, dev) in targets(package, &folder_of) {
+            if !may(folder, allowed, target, dev) {
+                let dev = if dev { " in its tests" } else { "" };
+                complaints.push(format!("{folder} must not depend on {target}{dev}"));
+            }
+        }
+    }
+    Ok(complaints)
+}
+
+/// `None` for a folder that nothing is known about; `Some(None)` for those that
+/// may use everything.
+fn allowed(folder: &str) -> Option<Option<&'static [&'static str]>> {
+    match folder.split_once('/') {
+        Some(("plugins", _)) => Some(Some(OF_PLUGINS)),
+        Some(("crates", room)) => {
+            ARROWS.iter().find(|(name, _)| *name == room).map(|(_, allowed)| Some(*allowed))
+        }
+        _ => matches!(folder, "tests" | "benches").then_some(None),
+    }
+}
+
+/// The folders in the workspace that a package depends on, and whether only its
+/// tests do.
+fn targets<'a>(
+    package: &'a Package,
+    folder_of: &'a BTreeMap<&str, &str>,
+) -> impl Iterator<Item = (&'a str, bool)> {
+    package.dependencies.iter().filter_map(|dependency| {
+        let folder = folder_of.get(dependency.name.as_str())?;
+        Some((*folder, dependency.kind.as_deref() == Some("dev")))
+    })
+}
+
+fn may(folder: &str, allowed: Option<&[&str]>, target: &str, dev: bool) -> bool {
+    let Some(allowed) = allowed else { return true };
+    let room = match target.split_once('/') {
+        Some(("plugins", _)) => "plugins",
+        Some((_, room)) => room,
+        None => target,
+    };
+    let free_tests = dev && (FOR_TESTS.contains(&room) || folder == "crates/cli");
+    target == folder || allowed.contains(&room) || free_tests
+}
+
+fn misnamed(folder: &str, package: &Package) -> Option<String> {
+    let expected = format!("tagalong-{}", folder.rsplit('/').next().unwrap_or(folder));
+    (package.name != expected)
+        .then(|| format!("{folder}: the package is called `{}`, not `{expected}`", package.name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wrong(folder: &str, target: &str, dev: bool) -> bool {
+        !may(folder, allowed(folder).unwrap(), target, dev)
+    }
+
+    #[test]
+    fn arrows_point_from_plugins_to_the_words() {
+        assert!(!wrong("plugins/ekf", "crates/core", false));
+        assert!(!wrong("plugins/ekf", "crates/conformance", true));
+        assert!(!wrong("crates/catalog", "plugins/ekf", false));
+        assert!(!wrong("tests", "plugins/ekf", false));
+        assert!(wrong("plugins/ekf", "crates/conformance", false));
+        assert!(wrong("plugins/ekf", "plugins/depth-template", true));
+        assert!(wrong("plugins/ekf", "crates/pipeline", true));
+        assert!(wrong("crates/core", "crates/vision", false));
+        assert!(wrong("crates/pipeline", "plugins/ekf", false));
+        assert!(wrong("crates/cli", "plugins/ekf", false));
+        assert!(allowed("crates/attic").is_none());
+    }
+}

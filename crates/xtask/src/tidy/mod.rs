@@ -1,0 +1,35 @@
+//! What the compiler does not check: who may depend on whom, whether every
+//! plugin is listed, whether what the documents say is there.
+
+mod arrows;
+mod commands;
+mod files;
+mod licences;
+mod markdown;
+mod paths;
+mod plugins;
+
+use anyhow::{Result, bail};
+
+use crate::metadata::Metadata;
+use crate::workspace::Workspace;
+
+/// Runs all checks; an error if there is any complaint.
+pub fn tidy(workspace: &Workspace) -> Result<()> {
+    let metadata = Metadata::of(workspace)?;
+    let mut complaints = arrows::check(workspace, &metadata)?;
+    complaints.extend(plugins::check(workspace, &metadata)?);
+    complaints.extend(licences::check(workspace, &metadata)?);
+    complaints.extend(files::check(workspace)?);
+    let documents = markdown::documents(workspace)?;
+    complaints.extend(paths::check(workspace, &documents));
+    complaints.extend(commands::check(workspace, &metadata, &documents)?);
+    for complaint in &complaints {
+        eprintln!("tidy: {complaint}");
+    }
+    if complaints.is_empty() {
+        eprintln!("tidy: nothing to complain about");
+        return Ok(());
+    }
+    bail!("{} complaints", complaints.len())
+}
