@@ -52,11 +52,14 @@ pub fn scored(score: f64, detection: Detection) -> Detection {
     Detection { score, ..detection }
 }
 
+type Seen = BTreeMap<(usize, u64), Vec<Detection>>;
+type Question = (usize, u64, Option<TrackId>);
+
 /// What the detectors see, by script and frame, and what was asked of them.
 #[derive(Clone, Default)]
 pub struct World {
-    seen: Arc<Mutex<BTreeMap<(usize, u64), Vec<Detection>>>>,
-    pub asked: Arc<Mutex<Vec<(usize, u64, Option<TrackId>)>>>,
+    seen: Arc<Mutex<Seen>>,
+    pub asked: Arc<Mutex<Vec<Question>>>,
     pub predicted: Arc<Mutex<Vec<Motion>>>,
 }
 

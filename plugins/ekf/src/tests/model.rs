@@ -1,0 +1,284 @@
+//! The equations, one by one.
+
+use nalgebra::{Isometry2, Matrix3, Point2, Point3, SMatrix, Vector2, Vector3, Vector5};
+use proptest::prelude::*;
+use tagalong_core::{Context, Motion, PersonFilter, Registry, Wheels};
+
+use super::world::{DT_S, Random, World, camera, detection};
+use crate::filter::{motion_jacobian, state_jacobian};
+use crate::{Belief, Config, Ekf};
+
+fn filter(config: Config) -> Ekf {
+    Ekf::new(config).unwrap()
+}
+
+fn belief_at(position: Point3<f64>) -> Belief {
+    filter(Config::default()).start(&detection(position, 0.1))
+}
+
+prop_compose! {
+    fn motions()(dt in 0.0..1.0f64, forward in -1.0..1.0f64, left in -0.5..0.5f64,
+                 turn in -2.0..2.0f64) -> Motion {
+        Motion { forward, left, turn, ..Motion::at_rest(dt) }
+    }
+}
+
+prop_compose! {
+    fn states()(x in -5.0..5.0f64, y in -5.0..5.0f64, z in 0.5..2.0f64,
+                vx in -2.0..2.0f64, vy in -2.0..2.0f64) -> Vector5<f64> {
+        Vector5::new(x, y, z, vx, vy)
+    }
+}
+
+fn with(motion: &Motion, index: usize, by: f64) -> Motion {
+    let mut motion = *motion;
+    *[&mut motion.forward, &mut motion.left, &mut motion.turn][index] += by;
+    motion
+}
+
+proptest! {
+    #[test]
+    fn the_state_jacobian_is_that_of_the_transition(
+        state in states(), motion in motions(), printed in any::<bool>(),
+    ) {
+        let filter = filter(Config { compat_printed_velocity: printed, ..Config::default() });
+        let f = state_jacobian(&motion);
+        for i in 0..5 {
+            let mut step = Vector5::zeros();
+            step[i] = 1e-3;
+            let ahead = filter.transition(&(state + step), &motion);
+            let behind = filter.transition(&(state - step), &motion);
+            prop_assert!(((ahead - behind) / 2e-3 - f.column(i)).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_motion_jacobian_is_that_of_the_transition(state in states(), motion in motions()) {
+        let filter = filter(Config::default());
+        let j = motion_jacobian(&filter.transition(&state, &motion), &motion);
+        for i in 0..3 {
+            let ahead = filter.transition(&state, &with(&motion, i, 1e-4));
+            let behind = filter.transition(&state, &with(&motion, i, -1e-4));
+            prop_assert!(((ahead - behind) / 2e-4 - j.column(i)).norm() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_covariance_stays_symmetric_and_positive(
+        seed in any::<u64>(), sigma in 1e-4..1.0f64, motion in motions(),
+    ) {
+        let filter = filter(Config::default());
+        let mut random = Random(seed);
+        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        for _ in 0..30 {
+            filter.predict(&mut belief, &motion);
+            let seen = detection(Point3::from(random.normal3()), sigma);
+            filter.correct(&mut belief, &seen, &camera());
+            prop_assert_eq!(belief.covariance, belief.covariance.transpose());
+            prop_assert!(belief.covariance.cholesky().is_some());
+        }
+    }
+}
+
+/// The textbook filter in the frame of the odometry, where nothing rotates.
+struct InOdometry {
+    mean: Vector5<f64>,
+    covariance: SMatrix<f64, 5, 5>,
+}
+
+impl InOdometry {
+    fn step(&mut self, measured: Vector3<f64>, r: Matrix3<f64>, config: &Config) {
+        let mut f = SMatrix::<f64, 5, 5>::identity();
+        (f[(0, 3)], f[(1, 4)]) = (DT_S, DT_S);
+        let mut g = SMatrix::<f64, 5, 5>::zeros();
+        for i in 0..2 {
+            g[(i, i)] = DT_S.powi(3) / 3.0;
+            g[(i, i + 3)] = DT_S.powi(2) / 2.0;
+            g[(i + 3, i)] = DT_S.powi(2) / 2.0;
+            g[(i + 3, i + 3)] = DT_S;
+        }
+        g *= config.acceleration_noise;
+        g[(2, 2)] = config.height_noise.powi(2) * DT_S;
+        self.mean = f * self.mean;
+        self.covariance = f * self.covariance * f.transpose() + g;
+        let h = SMatrix::<f64, 3, 5>::identity();
+        let s = h * self.covariance * h.transpose() + r;
+        let k = self.covariance * h.transpose() * s.try_inverse().unwrap();
+        self.mean += k * (measured - h * self.mean);
+        self.covariance -= k * h * self.covariance;
+    }
+}
+
+#[test]
+fn tracking_in_the_robot_frame_equals_tracking_in_the_odometry_frame() {
+    let config = Config { extra_sigma_m: 0.0, ..Config::default() };
+    let filter = filter(config.clone());
+    let mut world = World::new(3);
+    let seen = world.look();
+    let mut belief = filter.start(&seen);
+    let mut reference = InOdometry { mean: belief.mean, covariance: belief.covariance };
+    for _ in 0..60 {
+        world.walk(0.5, 0.05);
+        let motion = world.drive(0.5, 0.4);
+        filter.predict(&mut belief, &motion);
+        let seen = world.look();
+        filter.correct(&mut belief, &seen, &camera());
+        let floor = world.robot * seen.position.xy();
+        let measured = Vector3::new(floor.x, floor.y, seen.position.z);
+        reference.step(measured, seen.covariance, &config);
+        let (position, velocity) = world.of_belief(&belief);
+        let (x, v) = (reference.mean.fixed_rows::<2>(0), reference.mean.fixed_rows::<2>(3));
+        assert!((position.coords - x).norm() < 1e-9);
+        assert!((velocity - v).norm() < 1e-9);
+        assert!((belief.covariance.trace() - reference.covariance.trace()).abs() < 1e-9);
+    }
+}
+
+/// Variance of the velocity after one second of steps.
+fn velocity_variance_after_1s(config: &Config, steps: u32) -> f64 {
+    let filter = filter(config.clone());
+    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let before = belief.covariance[(3, 3)];
+    let motion = Motion::at_rest(1.0 / f64::from(steps));
+    (0..steps).for_each(|_| filter.predict(&mut belief, &motion));
+    belief.covariance[(3, 3)] - before
+}
+
+#[test]
+fn the_process_noise_does_not_depend_on_the_frame_rate_as_the_printed_one_does() {
+    let config = Config::default();
+    let (slow, fast) =
+        (velocity_variance_after_1s(&config, 5), velocity_variance_after_1s(&config, 50));
+    assert!((slow - 0.5).abs() < 1e-9 && (fast - 0.5).abs() < 1e-9);
+    let printed = Config { compat_printed_noise: true, ..config };
+    let ratio = velocity_variance_after_1s(&printed, 5) / velocity_variance_after_1s(&printed, 50);
+    assert!((ratio - 10.0).abs() < 1e-6);
+}
+
+/// The believed height of somebody who stands for 20 s and has sat for 1 s.
+fn height_after_sitting_down(config: Config) -> f64 {
+    let filter = filter(config);
+    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    for i in 0..231 {
+        filter.predict(&mut belief, &Motion::at_rest(DT_S));
+        let height = if i < 220 { 1.6 } else { 1.2 };
+        filter.correct(&mut belief, &detection(Point3::new(3.0, 0.0, height), 0.05), &camera());
+    }
+    belief.mean[2]
+}
+
+#[test]
+fn the_height_follows_a_person_who_sits_down_the_printed_one_freezes() {
+    assert!(height_after_sitting_down(Config::default()) < 1.25);
+    let printed = Config { compat_printed_noise: true, ..Config::default() };
+    assert!(height_after_sitting_down(printed) > 1.5);
+}
+
+#[test]
+fn a_heading_error_moves_far_people_sideways() {
+    let filter = filter(Config::default());
+    let mut motion = Motion::at_rest(0.0);
+    motion.covariance[(2, 2)] = 0.5_f64.to_radians().powi(2);
+    let mut belief = belief_at(Point3::new(5.0, 0.0, 1.6));
+    let before = belief.covariance;
+    filter.predict(&mut belief, &motion);
+    let added = belief.covariance - before;
+    assert!((added[(1, 1)].sqrt() - 0.0436).abs() < 1e-4, "4 cm at 5 m");
+    assert!(added[(0, 0)].abs() < 1e-12);
+}
+
+#[test]
+fn the_printed_update_loses_symmetry_the_joseph_form_does_not() {
+    let asymmetry = |printed: bool| {
+        let filter = filter(Config { compat_printed_update: printed, ..Config::default() });
+        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let mut world = World::new(1);
+        let mut worst: f64 = 0.0;
+        for _ in 0..50 {
+            filter.predict(&mut belief, &world.drive(0.5, 0.7));
+            let mut seen = world.look();
+            seen.covariance[(0, 1)] = 1e-3;
+            seen.covariance[(1, 0)] = 1e-3;
+            filter.correct(&mut belief, &seen, &camera());
+            worst = worst.max((belief.covariance - belief.covariance.transpose()).norm());
+        }
+        worst
+    };
+    assert_eq!(asymmetry(false), 0.0);
+    assert!(asymmetry(true) > 0.0);
+}
+
+#[test]
+fn a_detections_own_covariance_decides_how_far_it_is_believed() {
+    let move_by = |config: Config, far_sigma_m: f64| {
+        let filter = filter(config);
+        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let seen = detection(Point3::new(3.5, 0.0, 1.6), far_sigma_m);
+        filter.correct(&mut belief, &seen, &camera());
+        belief.mean[0] - 3.0
+    };
+    assert!(move_by(Config::default(), 0.5) < 0.1 * move_by(Config::default(), 0.01));
+    let printed = || Config { compat_printed_measurement: true, ..Config::default() };
+    assert_eq!(move_by(printed(), 0.5), move_by(printed(), 0.01));
+}
+
+#[test]
+fn an_unmeasured_height_is_not_touched_and_not_counted() {
+    let filter = filter(Config::default());
+    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let mut seen = detection(Point3::new(3.1, 0.0, 0.0), 0.05);
+    seen.covariance[(2, 2)] = 1e6;
+    let support = filter.correct(&mut belief, &seen, &camera());
+    assert!((belief.mean[2] - 1.6).abs() < 1e-6);
+    assert_eq!(support.nis.map(|(_, dof)| dof), Some(2));
+}
+
+#[test]
+fn uncertainty_grows_without_evidence() {
+    let filter = filter(Config::default());
+    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    for _ in 0..20 {
+        let before = belief.covariance.trace();
+        filter.predict(&mut belief, &Motion::at_rest(DT_S));
+        assert!(belief.covariance.trace() > before);
+    }
+}
+
+#[test]
+fn the_region_is_that_of_the_estimated_place() {
+    let filter = filter(Config::default());
+    let estimate = filter.estimate(&belief_at(Point3::new(3.0, 0.4, 1.6)), &camera());
+    assert_eq!(estimate.region, camera().upper_body(&Point3::new(3.0, 0.4, 1.6)));
+    assert!(estimate.is_sane());
+}
+
+#[test]
+fn the_printed_velocity_is_that_of_the_paper() {
+    let filter = filter(Config { compat_printed_velocity: true, ..Config::default() });
+    let wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
+    let motion = Motion::from_wheels(0.4, 0.6, &wheels, DT_S);
+    let got = filter.transition(&Vector5::new(3.0, 1.0, 1.6, 0.2, -0.1), &motion);
+    let turned = Isometry2::rotation(-motion.turn) * Vector2::new(0.2, -0.1);
+    assert!((got[3] - (turned.x - 0.5)).abs() < 1e-3 && (got[4] - turned.y).abs() < 1e-12);
+    let place = motion.apply_to_point(Point2::new(3.0 + 0.2 * DT_S, 1.0 - 0.1 * DT_S));
+    assert!((Point2::new(got[0], got[1]) - place).norm() < 1e-12);
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let context = Context {
+        seed: 0,
+        base_dir: ".".into(),
+        wheels: Wheels { half_separation_m: 0.2, slip: 0.0 },
+    };
+    assert!(registry.build_filter("ekf", None, &context).is_ok());
+    for line in ["acceleration_noise = 0.0", "height_noise = -1.0", "printed_sigma_v_m = nan"] {
+        let text = format!("{{ {line} }}");
+        let value = toml::de::DeValue::parse(&text).unwrap();
+        let error = registry.build_filter("ekf", Some(value), &context).err().unwrap();
+        let key = line.split(' ').next().unwrap();
+        assert!(error.message.starts_with(&format!("`{key}` must be")), "{error}");
+    }
+}
