@@ -10,4 +10,5 @@ use tagalong_core::Registry;
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {
     tagalong_depth_template::register(registry);
+    tagalong_ekf::register(registry);
 }

@@ -6,6 +6,7 @@
 //! ```
 
 use std::process::ExitCode;
+use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,11 +33,13 @@ struct Config {
     max_depth_m: f64,
     /// Panics after this many frames, to show what happens then; 0 never does.
     panic_after_frames: u64,
+    /// Takes at least this long for a frame, to try out slow plugins, ms.
+    delay_ms: u64,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { max_depth_m: 4.0, panic_after_frames: 0 }
+        Self { max_depth_m: 4.0, panic_after_frames: 0, delay_ms: 0 }
     }
 }
 
@@ -50,6 +53,7 @@ impl Detector for NearestThing {
         self.frames += 1;
         let limit = self.config.panic_after_frames;
         assert!(limit == 0 || self.frames <= limit, "as the config asked for");
+        std::thread::sleep(Duration::from_millis(self.config.delay_ms));
         let Some((bounds, depth_m)) = nearest(frame.depth()?, self.config.max_depth_m) else {
             return Ok(Vec::new());
         };

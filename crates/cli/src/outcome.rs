@@ -1,6 +1,8 @@
 use std::fmt::Display;
 use std::io;
 
+use tagalong_log::LogError;
+
 /// How a command ended when it did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
@@ -46,6 +48,16 @@ impl Failure {
     /// Nobody reads our output any more (`| head`): end quietly.
     fn nobody_listens() -> Self {
         Self { code: 0, message: String::new() }
+    }
+}
+
+impl From<LogError> for Failure {
+    /// A log that cannot be used is exit code 1; settings that cannot are 2.
+    fn from(error: LogError) -> Self {
+        match error {
+            LogError::Settings(_) => Self::usage(error),
+            _ => Self::failed(error),
+        }
     }
 }
 

@@ -3,8 +3,7 @@
 
 mod common;
 
-use std::fs::{self, OpenOptions};
-use std::io::Write;
+use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread;
@@ -12,24 +11,17 @@ use std::time::{Duration, Instant};
 
 use common::{Drawn, code, config, own_plugin, text};
 
-/// A run that waits for the rest of its log, which never comes.
-fn waiting_run(home: &Path) -> (Child, fs::File) {
-    Drawn::of(40).write(&home.join("whole.mcap"));
-    config(home, "");
-    let pipe = home.join("pipe.mcap");
-    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let child = own_plugin()
+/// A run that takes much longer than the test.
+fn slow_run(home: &Path) -> Child {
+    Drawn::of(600).write(&home.join("walk.mcap"));
+    config(home, "config = { delay_ms = 50 }");
+    own_plugin()
         .current_dir(home)
-        .args(["run", "nearest.toml", "pipe.mcap", "-o", "out", "--threads", "2"])
+        .args(["run", "nearest.toml", "walk.mcap", "-o", "out"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
-    let mut writer = OpenOptions::new().write(true).open(&pipe).unwrap();
-    let bytes = fs::read(home.join("whole.mcap")).unwrap();
-    writer.write_all(&bytes[..bytes.len() * 3 / 4]).unwrap();
-    writer.flush().unwrap();
-    (child, writer)
+        .unwrap()
 }
 
 /// Waits until tracks have reached the disk.
@@ -44,22 +36,27 @@ fn wait_for_tracks(home: &Path) {
 
 fn stopped_by(signal: &str, expected: i32) {
     let home = tempfile::tempdir().unwrap();
-    let (child, writer) = waiting_run(home.path());
+    let child = slow_run(home.path());
     wait_for_tracks(home.path());
     let pid = child.id().to_string();
     assert!(Command::new("kill").args(["-s", signal, &pid]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
-    drop(writer);
     assert_eq!(code(&output), expected, "{}", text(&output.stderr));
     let out = home.path().join("out");
     let bytes = fs::read(out.join("tracks.mcap")).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    let messages = summary.stats.unwrap().message_count;
-    assert!(messages > 0);
+    let count = |topic: &str| {
+        let channel = summary.channels.values().find(|channel| channel.topic == topic).unwrap();
+        summary.stats.as_ref().unwrap().channel_message_counts[&channel.id]
+    };
+    let frames = count("/people/tracks");
+    assert!((5..600).contains(&frames), "{frames} frames");
+    assert_eq!((count("/tf"), count("/people/tracks_json")), (frames, frames));
     let csv = fs::read_to_string(out.join("tracks.csv")).unwrap();
     assert!(csv.ends_with('\n') && csv.lines().all(|line| line.split(',').count() == 10));
     let report = fs::read_to_string(out.join("report.json")).unwrap();
     assert!(report.contains("stopped by signal"), "{report}");
+    assert!(report.contains(&format!("\"processed\": {frames},")), "{report}");
     assert!(!out.join("tracks.mcap.partial").exists());
 }
 

@@ -32,8 +32,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>) -> Outcome 
 /// Tries the first frames of the log.
 fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path, wanted: Needs) -> Outcome {
     check_log_path(log)?;
-    let mut source =
-        FrameSource::open(log, &outer.input, &outer.limits, wanted).map_err(Failure::failed)?;
+    let mut source = FrameSource::open(log, &outer.input, &outer.limits, wanted)?;
     let mut tried = 0;
     while tried < FRAMES
         && let Some(item) = source.next_frame()

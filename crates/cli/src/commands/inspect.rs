@@ -2,7 +2,7 @@ use std::path::Path;
 
 use crate::args::Format;
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, print};
+use crate::outcome::{Ended, Outcome, print};
 use crate::suggest::check_log_path;
 
 /// `tagalong inspect LOG`.
@@ -15,8 +15,7 @@ pub fn inspect(log: &Path, config: Option<&Path>, format: Format) -> Outcome {
         None => OuterSettings::default(),
     };
     check_log_path(log)?;
-    let found =
-        tagalong_log::inspect(log, &outer.input, &outer.limits).map_err(Failure::failed)?;
+    let found = tagalong_log::inspect(log, &outer.input, &outer.limits)?;
     print(&match format {
         Format::Text => found.to_string(),
         Format::Json => serde_json::to_string_pretty(&found).unwrap_or_default() + "\n",

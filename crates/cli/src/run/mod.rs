@@ -73,8 +73,7 @@ impl Job {
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, &args.log).map_err(refused)?;
         let needs = needs(|| Ok(config.pipeline(registry, args.seed)?.0))?;
-        let source = FrameSource::open(&args.log, &outer.input, &outer.limits, needs)
-            .map_err(Failure::failed)?;
+        let source = FrameSource::open(&args.log, &outer.input, &outer.limits, needs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
         let report = blank_report(args, &config, settings.seed);
         Ok(Self { pipeline, outer, source, resolved, folder, report })
