@@ -39,13 +39,15 @@ fn backticked(line: &str) -> impl Iterator<Item = &str> {
 }
 
 fn is_stale(root: &Path, document: &Path, path: &str, is_link: bool) -> bool {
-    let beside = document.parent().unwrap_or(Path::new("")).join(path);
-    let candidates = [normal(&beside), normal(Path::new(path))];
+    let folder = document.parent().unwrap_or(Path::new(""));
+    let path = Path::new(path);
+    let candidates = [normal(&folder.join(path)), normal(path)];
     let inside: Vec<&PathBuf> = candidates.iter().flatten().collect();
     if inside.is_empty() || inside.iter().any(|path| root.join(path).exists()) {
         return false;
     }
-    is_link || is_source(path) || inside.iter().any(|path| starts_here(root, path))
+    let begins = [root, &root.join(folder)].iter().any(|base| starts_in(base, path));
+    is_link || is_source(path) || begins
 }
 
 /// The path without `..`; `None` if it leads out of the workspace.
@@ -62,15 +64,16 @@ fn normal(path: &Path) -> Option<PathBuf> {
 }
 
 /// Files that are never the output of a run.
-fn is_source(path: &str) -> bool {
-    [".rs", ".toml", ".md", ".sh"].iter().any(|end| path.ends_with(end))
+fn is_source(path: &Path) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    extension.is_some_and(|extension| ["rs", "toml", "md", "sh"].contains(&extension))
 }
 
 /// True if the first folder of the path exists: then the rest should, too.
 /// (A message type like `sensor_msgs/Image` starts nowhere.)
-fn starts_here(root: &Path, path: &Path) -> bool {
+fn starts_in(base: &Path, path: &Path) -> bool {
     let first = path.components().next();
-    first.is_some_and(|first| first.as_os_str() != "target" && root.join(first).is_dir())
+    first.is_some_and(|first| first.as_os_str() != "target" && base.join(first).is_dir())
 }
 
 #[cfg(test)]
