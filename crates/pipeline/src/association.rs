@@ -99,3 +99,78 @@ fn overlap(a: &Rect, b: &Rect, kind: Overlap) -> f64 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use proptest::prelude::*;
+    use tagalong_core::{Estimate, Person, TrackId};
+
+    use super::*;
+    use crate::tests::doubles::person;
+
+    fn track(position: Point3<f64>, covariance: SMatrix<f64, 5, 5>) -> Track {
+        let person = Person { position, velocity: Vector2::zeros() };
+        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 10.0, 10.0) };
+        Track {
+            id: TrackId(1),
+            estimate,
+            seen: false,
+            occluded: false,
+            confirmed: true,
+            age: 0,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_distance_is_that_of_the_inverted_matrix(
+            off in prop::array::uniform3(-0.6..0.6f64), spread in prop::array::uniform9(-0.3..0.3f64),
+        ) {
+            let settings = AssociationSettings { gate: 1e9, ..AssociationSettings::default() };
+            let root = Matrix3::from_iterator(spread);
+            let covariance = root * root.transpose() + Matrix3::identity() * 0.01;
+            let detection = Detection { covariance, ..person(3.0, 0.0) };
+            let prior = SMatrix::<f64, 5, 5>::identity() * 0.04;
+            let track = track(detection.position - nalgebra::Vector3::from(off), prior);
+            let found = fit(&track, &detection, 0.1, &settings).unwrap();
+            let s = covariance + Matrix3::identity() * 0.04;
+            let nu = nalgebra::Vector3::from(off);
+            let expected = (nu.transpose() * s.try_inverse().unwrap() * nu).x;
+            prop_assert!((found.cost - expected).abs() < 1e-6 * (1.0 + expected));
+            prop_assert!((found.log_volume - s.determinant().ln()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_vague_track_does_not_take_the_detection_of_a_certain_one() {
+        let settings = AssociationSettings::default();
+        let detection = person(3.0, 0.0);
+        let near = detection.position + nalgebra::Vector3::new(0.25, 0.0, 0.0);
+        let certain = track(near, SMatrix::identity() * 0.01);
+        let vague = track(near, SMatrix::identity() * 1.0);
+        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+        let given = associate(&[&vague, &certain], &[&detection], fit, &settings);
+        assert_eq!(given, [None, Some(0)]);
+    }
+
+    #[test]
+    fn both_measures_of_overlap() {
+        let (a, b) = (Rect::new(0.0, 0.0, 2.0, 1.0), Rect::new(1.0, 0.0, 2.0, 1.0));
+        assert_eq!(overlap(&a, &b, Overlap::Iou), 1.0 / 3.0);
+        assert_eq!(overlap(&a, &b, Overlap::Dice), 0.5);
+        assert_eq!(overlap(&Rect::default(), &Rect::default(), Overlap::Dice), 0.0);
+    }
+
+    #[test]
+    fn two_people_one_behind_the_other_are_two_unless_their_range_is_unknown() {
+        let settings = AssociationSettings::default();
+        let (near, far) = (person(3.0, 0.0), person(3.6, 0.0));
+        assert!(near.region.iou(&far.region) > settings.same_person_iou);
+        assert!(!is_same_person(&near, &far, &settings));
+        let vague = |d: Detection| Detection { covariance: Matrix3::identity() * 4.0, ..d };
+        assert!(is_same_person(&vague(near), &vague(far), &settings));
+    }
+}

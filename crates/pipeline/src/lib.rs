@@ -28,6 +28,7 @@ mod clock;
 mod config;
 mod control;
 mod lifecycle;
+mod now;
 mod occlusion;
 mod pipeline;
 mod report;

@@ -1,17 +1,17 @@
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::Instant;
 
 use tagalong_core::{
     Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched, Motion,
-    Scene, Search, Support, Track, TrackId, Verifier, WheelSpeeds,
+    Scene, Search, Track, TrackId, Verifier, WheelSpeeds,
 };
 
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
 use crate::control::{Steering, limited};
 use crate::lifecycle::{Lifecycle, Sight};
+use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
-use crate::sightings::{Rules, Sighting, Sightings};
+use crate::sightings::{Rules, Sighting};
 use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role, StepError};
 
 /// Plugins and the rules by which they work together.
@@ -51,46 +51,8 @@ impl DetectorSlot {
     }
 }
 
-/// What is known of the frame that is being processed.
-struct Now<'f> {
-    frame: &'f Frame,
-    dt_s: f64,
-    /// All tracks, predicted to this frame, near to far.
-    expected: Vec<Track>,
-    sightings: Sightings,
-    /// Detectors that work on this frame.
-    due: Vec<usize>,
-    supports: BTreeMap<TrackId, Support>,
-    report: FrameReport,
-    lap: Instant,
-}
-
-impl<'f> Now<'f> {
-    fn new(frame: &'f Frame) -> Self {
-        Self {
-            frame,
-            dt_s: 0.0,
-            expected: Vec::new(),
-            sightings: Sightings::default(),
-            due: Vec::new(),
-            supports: BTreeMap::new(),
-            report: FrameReport::new(frame.index, frame.stamp),
-            lap: Instant::now(),
-        }
-    }
-
-    fn lap(&mut self, stage: &'static str) {
-        let now = Instant::now();
-        let spent_ms = (now - self.lap).as_secs_f64() * 1e3;
-        self.report.timings.push((stage, spent_ms));
-        self.lap = now;
-    }
-
-    fn finish(mut self) -> FrameReport {
-        self.report.candidates = self.sightings.into_candidates(&mut self.report.funnel);
-        self.report
-    }
-}
+/// Log-odds that stand for certainty. Larger ones would drown all others.
+const CERTAIN: f64 = 100.0;
 
 const STAGES: [&str; 8] =
     ["predict", "follow", "discover", "associate", "update", "life cycle", "learn", "control"];
@@ -445,7 +407,7 @@ impl Pipeline {
             funnel.drop_at("verifier not finite", sighting.detection.region);
             return Ok(None);
         }
-        sighting.detection.score += sum;
+        sighting.detection.score = (sighting.detection.score + sum).clamp(-CERTAIN, CERTAIN);
         Ok(Some(sighting))
     }
 

@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use proptest::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::commented_defaults;
@@ -138,4 +139,38 @@ fn a_pipeline_built_from_text_tracks() {
     let world = World::of([vec![person(2.0, 0.0)]]);
     let report = world.pipeline(PLAIN).step(&frame(1, 0.0)).unwrap();
     assert_eq!(report.tracks.len(), 1);
+}
+
+const WHOLE: &str = "seed = 1
+[[detectors]]
+plugin = 'script'
+roles = ['discover', 'follow']
+every = 2
+offset = 1
+config = { script = 1, how = 'x' }
+[[verifiers]]
+plugin = 'choosy'
+[filter]
+plugin = 'steady'
+[controller]
+plugin = 'drive'
+[association]
+cost = 'overlap'
+gate = 9.0
+";
+
+proptest! {
+    #[test]
+    fn a_damaged_config_is_an_error_or_works(
+        edits in prop::collection::vec((0..WHOLE.len(), 0..4usize, "[-0-9a-z='\\[\\]{}., \\n]{0,3}"), 1..4),
+    ) {
+        let mut text = WHOLE.to_owned();
+        for (at, removed, inserted) in edits {
+            let at = at.min(text.len());
+            text.replace_range(at..(at + removed).min(text.len()), &inserted);
+        }
+        if let Err(shown) = build(&text) {
+            prop_assert!(shown.starts_with("a.toml:"), "{shown}");
+        }
+    }
 }

@@ -1,4 +1,7 @@
-use tagalong_core::WheelSpeeds;
+use std::collections::BTreeSet;
+
+use proptest::prelude::*;
+use tagalong_core::{Detection, WheelSpeeds};
 
 use super::doubles::{PLAIN, World, frame, person, scored};
 use crate::{FrameReport, StepError};
@@ -129,4 +132,48 @@ fn without_a_target_the_robot_stands_and_a_lost_one_is_not_replaced() {
     assert_eq!(reports[29].target, None);
     assert_eq!(reports[29].command, Some(WheelSpeeds::STOP));
     assert!(reports[29].tracks[0].confirmed);
+}
+
+fn any_detection() -> impl Strategy<Value = Detection> {
+    let number = || prop_oneof![8 => -6.0..8.0f64, 1 => Just(0.0), 1 => any::<f64>()];
+    (number(), number(), number(), prop_oneof![4 => 1e-4..2.0f64, 1 => any::<f64>()]).prop_map(
+        |(x, y, score, variance)| {
+            let known = scored(score, person(x, y));
+            Detection { covariance: nalgebra::Matrix3::identity() * variance, ..known }
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn whatever_detectors_say_the_report_is_sane(
+        frames in prop::collection::vec(prop::collection::vec(any_detection(), 0..6), 1..20),
+        steps_s in prop::collection::vec(-0.3..1.0f64, 20),
+    ) {
+        let world = World::default();
+        let config = "
+            [[detectors]]
+            plugin = 'script'
+            roles = ['follow', 'discover']
+            [filter]
+            plugin = 'steady'
+            [controller]
+            plugin = 'drive'
+        ";
+        let mut pipeline = world.pipeline(config);
+        let (mut t_s, mut ended) = (10.0, BTreeSet::new());
+        for (index, (detections, step_s)) in (1..).zip(frames.into_iter().zip(steps_s)) {
+            world.show(0, index, detections);
+            t_s += step_s;
+            let report = pipeline.step(&frame(index, t_s)).unwrap();
+            prop_assert!(report.tracks.iter().all(|t| t.estimate.is_sane() && t.score.is_finite()));
+            prop_assert!(report.tracks.iter().all(|t| !ended.contains(&t.id)), "a number again");
+            let alive: BTreeSet<_> = report.tracks.iter().map(|t| t.id).collect();
+            prop_assert_eq!(alive.len(), report.tracks.len());
+            if let Some(command) = report.command {
+                prop_assert!(command.left.abs() <= 0.9 && command.right.abs() <= 0.9);
+            }
+            ended.extend(report.ended);
+        }
+    }
 }
