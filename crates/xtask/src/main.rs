@@ -61,6 +61,7 @@ fn run(command: Command) -> Result<()> {
     match command {
         Command::NewPlugin(NewPlugin { kind: Some(kind), name: Some(name), .. }) => {
             new_plugin::create(&workspace, kind, &name)?;
+            new_plugin::format(&workspace, &name)?;
             eprintln!("{}", new_plugin::what_now(kind, &name));
             Ok(())
         }

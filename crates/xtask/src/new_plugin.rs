@@ -2,11 +2,12 @@
 //! as little as that allows.
 
 use std::collections::BTreeSet;
+use std::process::Command;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
 
-use crate::workspace::Workspace;
+use crate::workspace::{Workspace, succeed};
 
 /// The four kinds of plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -72,6 +73,13 @@ pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
     workspace.write(format!("{folder}/src/{verb}.rs"), &fill(verb_text))?;
     workspace.write(format!("configs/{name}.toml"), &fill(template.pipeline))?;
     lists.iter().try_for_each(|(path, text)| workspace.write(path, text))
+}
+
+/// Formats the new crate: where a line breaks depends on the length of its name.
+pub fn format(workspace: &Workspace, name: &str) -> Result<()> {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["fmt", "-p", &format!("tagalong-{name}")]);
+    succeed(cargo.current_dir(workspace.root()))
 }
 
 /// What to do with the new crate, in a few lines.

@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result};
 use clap::ValueEnum as _;
 
 use crate::metadata::Metadata;
-use crate::new_plugin::{Kind, create};
+use crate::new_plugin::{Kind, create, format};
 use crate::workspace::{Workspace, succeed};
 
 /// Where the copy lives. It is inside of `target/`, so that what was built last
@@ -22,6 +22,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     for kind in Kind::value_variants() {
         let name = format!("trial-{kind:?}").to_lowercase();
         create(&copy, *kind, &name)?;
+        format(&copy, &name)?;
         names.push(name);
     }
     let packages: Vec<String> =
