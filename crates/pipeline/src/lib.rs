@@ -21,6 +21,23 @@
 //!   detector's miss look the same to the filter: no evidence.
 //! * Timings are in [`FrameReport::timings`] and influence nothing.
 
+//!
+//! # The pipeline's own entries in the funnel
+//!
+//! | entry | what was dropped |
+//! |---|---|
+//! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
+//! | `motion not finite` | a frame's odometry; the robot counts as standing |
+//! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
+//! | `gate`, `not the best sighting` | what a follower found for a track |
+//! | `same person` | the weaker of two sightings of one person |
+//! | `score`, `verifier` | a candidate that is probably no person, by its detector or by the verifiers |
+//! | `filter` | a match that the filter did not accept |
+//! | `too many detections`, `no track numbers left` | what exceeds a limit |
+//! | `support of an unknown track`, `estimate of an unknown track`, `nis not finite` | a filter's mistakes |
+//! | `command not finite` | a controller's command; the robot stops |
+//! | `track: ...` | a track, by the reason for which it ended |
+
 mod assignment;
 mod association;
 mod boundary;

@@ -131,7 +131,9 @@ impl Lifecycle {
             {
                 let apart = (a.person.position.xy() - b.person.position.xy()).norm();
                 let before = self.near.get(&(*older, *younger)).copied().unwrap_or_default();
-                let now = before << 1 & 0b11111 | u8::from(apart < self.settings.duplicate_m);
+                let is_near =
+                    apart < self.settings.duplicate_m && self.may_be_same(*older, *younger);
+                let now = before << 1 & 0b11111 | u8::from(is_near);
                 if now > 0 {
                     near.insert((*older, *younger), now);
                 }
@@ -143,6 +145,12 @@ impl Lifecycle {
         }
         self.near = near;
         doubles
+    }
+
+    /// A hidden person may be believed to be where somebody else is seen.
+    fn may_be_same(&self, a: TrackId, b: TrackId) -> bool {
+        let is_hidden = |id| self.lives.get(&id).is_some_and(|life| life.sight == Sight::Hidden);
+        !is_hidden(a) && !is_hidden(b)
     }
 
     fn hand_over(&mut self, younger: TrackId, older: TrackId) {
@@ -231,5 +239,41 @@ impl Life {
             }
         };
         over.then_some(test)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, SMatrix, Vector2};
+    use tagalong_core::{Person, Rect};
+
+    use super::*;
+
+    fn two_at_one_place() -> (Lifecycle, BTreeMap<TrackId, Estimate>) {
+        let mut lifecycle = Lifecycle::new(LifecycleSettings::default());
+        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
+        let estimate =
+            Estimate { person, covariance: SMatrix::identity(), region: Rect::default() };
+        let ids = [lifecycle.start(1.0, 0).unwrap(), lifecycle.start(4.5, 0).unwrap()];
+        (lifecycle, ids.map(|id| (id, estimate.clone())).into())
+    }
+
+    #[test]
+    fn the_older_of_two_at_one_place_takes_over_in_the_third_frame() {
+        let (mut lifecycle, estimates) = two_at_one_place();
+        assert_eq!(lifecycle.duplicates(&estimates), []);
+        assert_eq!(lifecycle.duplicates(&estimates), []);
+        assert_eq!(lifecycle.duplicates(&estimates), [TrackId(2)]);
+        assert!(lifecycle.get(TrackId(1)).unwrap().confirmed, "taken over from the younger one");
+    }
+
+    #[test]
+    fn a_hidden_person_is_no_duplicate_of_the_one_in_front() {
+        let (mut lifecycle, estimates) = two_at_one_place();
+        for _ in 0..10 {
+            lifecycle.grow_older(0.1);
+            assert_eq!(lifecycle.advance(TrackId(1), Sight::Hidden), None);
+            assert_eq!(lifecycle.duplicates(&estimates), []);
+        }
     }
 }
