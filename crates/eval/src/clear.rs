@@ -36,7 +36,8 @@ pub struct Clear {
     pub fp: u64,
     /// Changes of the track that goes with a truth.
     pub id_switches: u64,
-    /// Interruptions: how often a truth was found again after a pause.
+    /// Interruptions: how often a truth was found again after a pause. As in
+    /// TrackEval somebody who left the view and came back counts, too.
     pub fragmentations: u64,
     /// Truths matched in more than 80 % of their frames.
     pub mostly_tracked: u64,

@@ -26,6 +26,7 @@
 //! * [`DetectionTally`]: single detections; the miss-rate curve and its average.
 //! * [`SetTally`]: OSPA and GOSPA, one number for place and count errors.
 //! * [`PositionError`], [`Times`], [`Following`]: what a robot cares about.
+//! * [`events`]: when and where it went wrong, for a list to look through.
 //! * [`Consistency`]: whether a filter knows how wrong it is.
 //! * [`wilson`], [`Bootstrap`]: how far a figure can be trusted.
 //!
@@ -40,6 +41,7 @@ mod assign;
 mod clear;
 mod consistency;
 mod error;
+mod events;
 pub mod formats;
 mod hota;
 mod identity;
@@ -57,6 +59,7 @@ pub use assign::{Edge, Matcher};
 pub use clear::{Clear, MATCH_SIMILARITY, Match};
 pub use consistency::{Consistency, chi_square_quantile};
 pub use error::EvalError;
+pub use events::{Event, EventKind, events};
 pub use hota::{Hota, HotaLevel, LEVELS, alpha};
 pub use identity::Identity;
 pub use missrate::{CurvePoint, DetectionTally, PrecisionRecall, REFERENCE_FPPI, Verdict};

@@ -254,6 +254,9 @@ struct Someone {
     id: i64,
     has_region: bool,
     has_floor: bool,
+    /// Whoever does not count may lack the place that is compared: they then
+    /// excuse nobody.
+    may_lack_place: bool,
     sane: bool,
 }
 
@@ -265,6 +268,7 @@ impl From<&Truth> for Someone {
             id: truth.id,
             has_region: truth.region.is_some(),
             has_floor: truth.floor_m.is_some(),
+            may_lack_place: truth.role != Role::Counts,
             sane,
         }
     }
@@ -287,7 +291,7 @@ impl From<&Report> for Someone {
 impl Place<'_> {
     fn check_side(&self, side: &'static str, mut all: Vec<Someone>) -> Result<(), EvalError> {
         let (sequence, frame) = (|| self.sequence.to_owned(), self.frame);
-        for Someone { id, has_region, has_floor, sane } in &all {
+        for Someone { id, has_region, has_floor, may_lack_place, sane } in &all {
             if !sane {
                 return Err(EvalError::NotFinite { sequence: sequence(), frame, side, id: *id });
             }
@@ -295,7 +299,7 @@ impl Place<'_> {
                 Similarity::Iou => (has_region, "image region"),
                 Similarity::Metres => (has_floor, "floor position"),
             };
-            if !present {
+            if !(*present || *may_lack_place) {
                 return Err(EvalError::NoPlace {
                     sequence: sequence(),
                     frame,

@@ -77,6 +77,17 @@ impl Bootstrap {
     /// replacement; Efron and Tibshirani, 1993, chapter 13). Sequences are
     /// drawn, not frames, because frames of one recording are not independent.
     /// Nothing without sequences, samples or a finite figure.
+    ///
+    /// For a figure of all sequences together combine its own tallies:
+    ///
+    /// ```
+    /// use tagalong_eval::{Bootstrap, Clear};
+    /// let runs = [Clear { tp: 8, fn_: 2, ..Clear::default() }, Clear { tp: 5, ..Clear::default() }];
+    /// let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &runs[i])).mota();
+    /// let interval = Bootstrap::default().interval(runs.len(), mota).unwrap();
+    /// assert!((interval.estimate - 13.0 / 15.0).abs() < 1e-12);
+    /// assert_eq!((interval.lower, interval.upper), (0.8, 1.0));
+    /// ```
     pub fn interval(&self, sequences: usize, figure: impl Fn(&[usize]) -> f64) -> Option<Interval> {
         let drawn = self.draw(sequences, &figure);
         let tail = 0.5 * (1.0 - self.confidence);

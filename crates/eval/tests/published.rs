@@ -1,6 +1,8 @@
 //! The figures that TrackEval, py-motmetrics and the KAIST evaluation print on
 //! real data. Where the data are absent the tests say so and pass.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +18,7 @@ use tagalong_eval::{
 fn data(folder: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(folder);
     if !path.is_dir() {
-        println!("skipped: no data in {}", path.display());
+        eprintln!("skipped: no data in {}", path.display());
         return None;
     }
     Some(path)
@@ -57,6 +59,8 @@ fn tally(sequence: &Sequence) -> Tally {
     Tally::measure(sequence, &Comparison::default(), &SetDistance::default()).unwrap()
 }
 
+type Figure = fn(&HotaLevel) -> f64;
+
 /// All figures under TrackEval's names.
 fn figures(tally: &Tally) -> BTreeMap<String, f64> {
     let (clear, identity) = (&tally.clear, &tally.identity);
@@ -91,7 +95,7 @@ fn figures(tally: &Tally) -> BTreeMap<String, f64> {
     ];
     let mut all: BTreeMap<String, f64> =
         plain.iter().map(|(name, value)| (name.to_string(), *value)).collect();
-    let family: [(&str, fn(&HotaLevel) -> f64); 8] = [
+    let family: [(&str, Figure); 8] = [
         ("HOTA", HotaLevel::hota),
         ("DetA", HotaLevel::det_a),
         ("AssA", HotaLevel::ass_a),
@@ -254,6 +258,6 @@ fn log_average_miss_rates_equal_the_published_ones() {
     let (all, day, night) = (rate(&frames), rate(&frames[..1455]), rate(&frames[1455..]));
     println!("log-average miss rate: all {all:.4} day {day:.4} night {night:.4}");
     assert!((all - 7.58).abs() < 0.01, "{all}");
-    assert!((day - 7.955).abs() < 0.015, "{day}");
+    assert!((day - 7.96).abs() < 0.01, "{day}");
     assert!((night - 6.95).abs() < 0.01, "{night}");
 }

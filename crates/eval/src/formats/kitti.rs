@@ -5,7 +5,16 @@
 use std::io::{self, Write};
 
 use super::{FormatError, Line, Timeline, lines};
-use crate::types::{Region, Report, Role, Truth};
+use crate::prepare::Comparison;
+use crate::types::{Region, Report, Role, Similarity, Truth};
+
+/// Unmatched reports at most this high are left out, in pixels.
+pub const LEAST_HEIGHT_PX: f64 = 25.0;
+
+/// The comparison under KITTI's rules.
+pub fn comparison(similarity: Similarity) -> Comparison {
+    Comparison { ignore_unmatched_below_px: Some(LEAST_HEIGHT_PX), ..similarity.into() }
+}
 
 /// One line of a label file.
 #[derive(Clone, PartialEq, Debug)]

@@ -21,7 +21,7 @@ use crate::types::{Frame, Report, Sequence, Truth};
 
 /// A line that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file}, line {line}: {why}")]
+#[error("{file}{}: {why}", place(*.line))]
 pub struct FormatError {
     /// The file as the caller calls it.
     pub file: String,
@@ -29,6 +29,10 @@ pub struct FormatError {
     pub line: usize,
     /// What is wrong and what was expected.
     pub why: String,
+}
+
+fn place(line: usize) -> String {
+    if line == 0 { String::new() } else { format!(", line {line}") }
 }
 
 /// Frames by number, to be filled from rows in any order.

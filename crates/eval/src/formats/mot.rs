@@ -157,6 +157,9 @@ fn write_box(out: &mut impl Write, frame: u32, id: i64, region: &Region) -> io::
     write!(out, "{frame},{id},{x},{y},{width},{height}")
 }
 
+/// The longest sequence that is believed; nine hours at 30 frames a second.
+const MOST_FRAMES: f64 = 1e6;
+
 /// The part of `seqinfo.ini` that scoring and exporting need.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct SequenceInfo {
@@ -176,7 +179,8 @@ pub struct SequenceInfo {
 ///
 /// # Errors
 ///
-/// A name, rate or length that is missing or no number.
+/// A name, rate or length that is missing or no number, or a length beyond a
+/// million frames.
 pub fn parse_info(text: &str, file: &str) -> Result<SequenceInfo, FormatError> {
     let value = |key: &str| {
         text.lines()
@@ -196,10 +200,14 @@ pub fn parse_info(text: &str, file: &str) -> Result<SequenceInfo, FormatError> {
     if rate_hz == 0.0 {
         return Err(error("`frameRate` is 0, expected frames per second".to_owned()));
     }
+    let length = number("seqLength")?;
+    if length > MOST_FRAMES {
+        return Err(error(format!("`seqLength` is {length}, more than {MOST_FRAMES} frames")));
+    }
     Ok(SequenceInfo {
         name: value("name").ok_or_else(|| error("has no `name=`".to_owned()))?.to_owned(),
         rate_hz,
-        length: number("seqLength")? as u32,
+        length: length as u32,
         width: number("imWidth").unwrap_or(0.0) as u32,
         height: number("imHeight").unwrap_or(0.0) as u32,
     })

@@ -1,0 +1,250 @@
+//! Text in, rows out, and back again; files of other people's tools.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::fs;
+use std::path::Path;
+
+use proptest::prelude::*;
+use tagalong_eval::formats::{FormatError, Timeline, kitti, metres, mot, people, trackeval};
+use tagalong_eval::{
+    Comparison, Frame, Region, Report, Role, Sequence, SetDistance, Similarity, Tally, Truth,
+};
+
+fn text(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
+    let mut bytes = Vec::new();
+    write(&mut bytes).unwrap();
+    String::from_utf8(bytes).unwrap()
+}
+
+fn why<T: std::fmt::Debug>(result: Result<T, FormatError>) -> String {
+    result.unwrap_err().to_string()
+}
+
+#[test]
+fn mot_lines_with_commas_or_blanks_long_or_short() {
+    let rows = mot::parse("1,-1,2.5,3,4,5,0.9,-1,-1,-1\r\n\n2.0 7 1 2 3 4\n", "det.txt").unwrap();
+    assert_eq!(rows.len(), 2);
+    assert_eq!((rows[0].frame, rows[0].id, rows[0].confidence), (1, -1, 0.9));
+    assert_eq!(rows[0].region, Region::new(2.5, 3.0, 4.0, 5.0));
+    assert_eq!((rows[1].frame, rows[1].id, rows[1].confidence, rows[1].class), (2, 7, 1.0, None));
+}
+
+#[test]
+fn a_bad_line_is_named_with_what_was_expected() {
+    let parse = |text| why(mot::parse(text, "gt.txt"));
+    assert_eq!(
+        parse("1,1,1,1,1,1,1\n1,1,1\n"),
+        "gt.txt, line 2: has 3 fields, but `y` should be field 4; is the file cut off?"
+    );
+    assert_eq!(parse("1,1,1,x,1,1"), "gt.txt, line 1: `y` is `x`, expected a finite number");
+    assert!(parse("1,1,1,inf,1,1").contains("finite"));
+    assert!(parse("0,1,1,1,1,1").contains("numbered from 1"));
+    assert!(parse("1,1.5,1,1,1,1").contains("`id` is `1.5`, expected a whole number"));
+    assert!(parse("1,1,1,1,-1,1").contains("negative size"));
+    assert!(
+        why(mot::parse_truth("1,1,1,1,1,1,1,14,1", "gt.txt", mot::Rules::Mot17))
+            .contains("class 14")
+    );
+}
+
+#[test]
+fn classes_and_flags_mean_what_each_benchmark_says() {
+    let role = |class: i64, flag: i64, rules| {
+        let line = format!("1,1,0,0,9,9,{flag},{class},1");
+        mot::parse_truth(&line, "gt.txt", rules).unwrap()[0].1.role
+    };
+    use mot::Rules::{Mot15, Mot17, Mot20};
+    assert_eq!(role(1, 1, Mot17), Role::Counts);
+    assert_eq!(role(1, 0, Mot17), Role::Bystander);
+    assert_eq!(role(7, 0, Mot17), Role::Ignored);
+    assert_eq!(role(3, 0, Mot17), Role::Bystander);
+    assert_eq!((role(6, 0, Mot17), role(6, 0, Mot20)), (Role::Bystander, Role::Ignored));
+    assert_eq!((role(-1, 1, Mot15), role(-1, 0, Mot15)), (Role::Counts, Role::Bystander));
+}
+
+#[test]
+fn sequence_info_survives_a_round_trip() {
+    let info = mot::SequenceInfo {
+        name: "hall".into(),
+        rate_hz: 7.5,
+        length: 12,
+        width: 640,
+        height: 480,
+    };
+    let written = text(|out| mot::write_info(out, &info));
+    assert_eq!(mot::parse_info(&written, "seqinfo.ini").unwrap(), info);
+    assert!(why(mot::parse_info("name=x", "seqinfo.ini")).contains("has no `frameRate=`"));
+    let wrong = why(mot::parse_info("name=x\nframeRate=0\nseqLength=1", "seqinfo.ini"));
+    assert!(wrong.contains("frames per second"), "{wrong}");
+    let endless = why(mot::parse_info("name=x\nframeRate=9\nseqLength=4e9", "seqinfo.ini"));
+    assert!(endless.contains("more than 1000000 frames"), "{endless}");
+}
+
+#[test]
+fn kitti_labels_survive_a_round_trip_and_mean_what_they_say() {
+    let source = "\
+0 1 Pedestrian 0 0 -1.5 10 20 30 80 1.7 0.5 0.8 1.5 1.6 9.25 0.1
+0 2 Pedestrian 1 0 -1.5 50 20 70 80 1.7 0.5 0.8 2.5 1.6 9 0.1
+0 3 Person_sitting 0 1 0 90 20 99 80 1.2 0.5 0.8 -1000 -1000 -1000 0
+0 4 Car 0 0 0 110 20 199 80 1.2 0.5 0.8 1 1 1 0
+1 -1 DontCare -1 -1 -10 200 100 260 180 -1 -1 -1 -1000 -1000 -1000 -10
+";
+    let labels = kitti::parse(source, "0000.txt").unwrap();
+    assert_eq!(text(|out| labels.iter().try_for_each(|label| kitti::write(out, label))), source);
+    let mut timeline = Timeline::new();
+    kitti::add_truths(&mut timeline, &labels);
+    kitti::add_reports(&mut timeline, &labels);
+    let (sequence, beyond) = timeline.into_sequence("0000", 0, 2, 10.0);
+    assert_eq!(beyond, 0);
+    let frame = &sequence.frames[0];
+    let roles: Vec<Role> = frame.truths.iter().map(|t| t.role).collect();
+    assert_eq!(roles, [Role::Counts, Role::Ignored, Role::Ignored]);
+    assert_eq!((frame.truths[0].floor_m, frame.truths[2].floor_m), (Some([1.5, 9.25]), None));
+    assert_eq!((frame.reports.len(), frame.reports[0].score), (2, 1.0));
+    assert_eq!(sequence.frames[1].ignore_regions, [Region::new(200.0, 100.0, 60.0, 80.0)]);
+    assert_eq!(sequence.frames[1].stamp_ns, 100_000_000);
+    // Only the walker counts; the one who is cut off is excused with their report.
+    let tally = |similarity| {
+        Tally::measure(&sequence, &kitti::comparison(similarity), &SetDistance::default()).unwrap()
+    };
+    let clear = tally(Similarity::Iou).clear;
+    assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 0, 0));
+    assert_eq!(tally(Similarity::Metres).clear.tp, 1);
+    let inside_out = source.replace("10 20 30 80", "30 20 10 80");
+    assert!(why(kitti::parse(&inside_out, "0000.txt")).contains("ends before it begins"));
+}
+
+#[test]
+fn people_csv_survives_a_round_trip_in_any_order_of_columns() {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs/um.people.csv");
+    let Ok(source) = fs::read_to_string(&path) else {
+        eprintln!("skipped: no data in {}", path.display());
+        return;
+    };
+    let rows = people::parse(&source, "um.people.csv").unwrap();
+    assert_eq!(rows.len(), source.lines().count() - 1);
+    let written = text(|out| people::write(out, &rows));
+    assert_eq!(people::parse(&written, "written").unwrap(), rows);
+    let counted: Vec<u32> = rows.iter().filter(|r| !r.ignore).map(|r| r.frame).collect();
+    assert!(rows.iter().all(|row| row.ignore || row.id == 1), "only the walker counts");
+    assert_eq!((counted.first(), counted.last()), (Some(&1), Some(&32)));
+}
+
+#[test]
+fn people_rows_become_truth() {
+    let source = "ignore,id,frame,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
+                  visible,occluder,interpolated\n1,4,2,1,2,3,4,5,6,7,8,0.5,-0.3,2.5,0.75,border,2\n";
+    let rows = people::parse(source, "a.csv").unwrap();
+    let (frame, truth) = rows[0].truth(|[x, _, z]| Some([z, -x]));
+    assert_eq!((frame, truth.id, truth.role), (2, 4, Role::Ignored));
+    assert_eq!(truth.region, Some(Region::new(1.0, 2.0, 3.0, 4.0)));
+    assert_eq!(truth.floor_m, Some([2.5, -0.5]));
+    let missing = why(people::parse(&source.replace("ub_w", "width"), "a.csv"));
+    assert!(
+        missing.starts_with("a.csv, line 1: no column `ub_w`; there are: ignore,"),
+        "{missing}"
+    );
+    assert!(why(people::parse("", "a.csv")).contains("is empty"));
+}
+
+#[test]
+fn places_of_a_run_become_reports() {
+    let source = "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,y_odom_m,z_odom_m,seen\n\
+                  1700000000123456789,3,12,2.5,-0.5,1.6,7.5,1.5,1.6,1\n";
+    let rows = metres::parse(source, "tracks-metres.csv").unwrap();
+    assert_eq!((rows[0].stamp_ns, rows[0].seen), (1_700_000_000_123_456_789, true));
+    let (frame, report) = rows[0].report(metres::Floor::Robot);
+    assert_eq!((frame, report.id, report.floor_m), (3, 12, Some([2.5, -0.5])));
+    assert_eq!(rows[0].report(metres::Floor::Odometry).1.floor_m, Some([7.5, 1.5]));
+    let wrong = why(metres::parse(&source.replace("1700000000123456789", "soon"), "t.csv"));
+    assert!(wrong.contains("`stamp_ns` is `soon`"), "{wrong}");
+}
+
+#[test]
+fn frames_beyond_the_end_are_counted() {
+    let mut timeline = Timeline::new();
+    timeline.add_truths([(1, Truth::default()), (9, Truth::default())]);
+    assert_eq!(timeline.last(), Some(9));
+    let (sequence, beyond) = timeline.into_sequence("short", 1, 4, 2.0);
+    assert_eq!((sequence.frames.len(), beyond), (4, 1));
+    assert_eq!(sequence.frames[3].stamp_ns, 1_500_000_000);
+}
+
+fn some_region() -> impl Strategy<Value = Region> {
+    (0.0..50.0_f64, 0.0..10.0_f64, 5.0..30.0_f64, 5.0..30.0_f64)
+        .prop_map(|(x, y, width, height)| Region { x, y, width, height })
+}
+
+fn a_frame() -> impl Strategy<Value = Frame> {
+    let role =
+        prop_oneof![4 => Just(Role::Counts), 1 => Just(Role::Ignored), 1 => Just(Role::Bystander)];
+    let truths = prop::collection::vec((some_region(), role), 0..5);
+    let reports = prop::collection::vec((some_region(), 0.0..1.0_f64), 0..5);
+    (truths, reports).prop_map(|(truths, reports)| Frame {
+        truths: (1..)
+            .zip(truths)
+            .map(|(id, (r, role))| Truth { id, region: Some(r), floor_m: None, role })
+            .collect(),
+        reports: (1..)
+            .zip(reports)
+            .map(|(id, (r, score))| Report { id, region: Some(r), floor_m: None, score })
+            .collect(),
+        ..Frame::default()
+    })
+}
+
+fn exported(sequence: &Sequence) -> trackeval::Files {
+    let info =
+        mot::SequenceInfo { name: "hall".into(), rate_hz: 4.0, width: 640, height: 480, length: 0 };
+    trackeval::write("Tagalong", "ours", &[(info, sequence.clone())])
+}
+
+proptest! {
+    #[test]
+    fn the_exported_tree_scores_like_what_was_exported(
+        frames in prop::collection::vec(a_frame(), 1..6),
+    ) {
+        let mut frames = frames;
+        for (index, frame) in frames.iter_mut().enumerate() {
+            frame.stamp_ns = index as i64 * 250_000_000;
+        }
+        let sequence = Sequence { name: "hall".into(), frames };
+        let files = exported(&sequence);
+        let read = trackeval::read(&files, "Tagalong", "ours", mot::Rules::Mot17).unwrap();
+        prop_assert_eq!(&read[0].1, &sequence);
+        let tally = |s: &Sequence| {
+            Tally::measure(s, &Comparison::from(Similarity::Iou), &SetDistance::default()).unwrap()
+        };
+        prop_assert_eq!(tally(&read[0].1), tally(&sequence));
+    }
+
+    #[test]
+    fn no_text_makes_a_reader_panic(text in "[0-9,. \n\\-a-f=]{0,80}") {
+        let _ = mot::parse(&text, "x");
+        let _ = mot::parse_info(&text, "x");
+        let _ = kitti::parse(&text, "x");
+        let _ = people::parse(&text, "x");
+        let _ = metres::parse(&text, "x");
+    }
+}
+
+#[test]
+fn the_tree_has_the_paths_that_trackeval_looks_for() {
+    let files = exported(&Sequence { name: "hall".into(), frames: vec![Frame::default()] });
+    let paths: Vec<&str> = files.keys().map(String::as_str).collect();
+    assert_eq!(
+        paths,
+        [
+            "gt/mot_challenge/Tagalong-train/hall/gt/gt.txt",
+            "gt/mot_challenge/Tagalong-train/hall/seqinfo.ini",
+            "gt/mot_challenge/seqmaps/Tagalong-train.txt",
+            "trackers/mot_challenge/Tagalong-train/ours/data/hall.txt",
+        ]
+    );
+    let mut broken = files.clone();
+    broken.remove("gt/mot_challenge/Tagalong-train/hall/gt/gt.txt");
+    let missing = trackeval::read(&broken, "Tagalong", "ours", mot::Rules::Mot17);
+    assert!(why(missing).contains("hall/gt/gt.txt: is missing"));
+}

@@ -1,0 +1,302 @@
+//! Small scenes worked out by hand: ignored people, times, following, errors.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use tagalong_eval::{
+    Clear, Comparison, DetectionTally, EvalError, EventKind, Following, Frame, Prepared, Region,
+    Report, Role, Scores, Sequence, SetDistance, Similarity, Tally, Times, Truth, events,
+};
+
+const SECOND_NS: i64 = 1_000_000_000;
+
+/// Place `x` is a square of side 10 at 10 x, and the point x metres ahead.
+fn region(x: f64) -> Region {
+    Region::new(10.0 * x, 0.0, 10.0, 10.0)
+}
+
+fn truth(id: i64, x: f64) -> Truth {
+    Truth { id, region: Some(region(x)), floor_m: Some([x, 0.0]), role: Role::Counts }
+}
+
+fn report(id: i64, x: f64) -> Report {
+    Report { id, region: Some(region(x)), floor_m: Some([x, 0.0]), score: 0.5 }
+}
+
+/// Who is where: id and place.
+type Places<'a> = &'a [(i64, f64)];
+
+/// One frame a second from (who is where) and (which track is where).
+fn sequence(frames: &[(Places<'_>, Places<'_>)]) -> Sequence {
+    let frame = |(index, (truths, reports)): (usize, &(Places<'_>, Places<'_>))| Frame {
+        stamp_ns: index as i64 * SECOND_NS,
+        truths: truths.iter().map(|&(id, x)| truth(id, x)).collect(),
+        reports: reports.iter().map(|&(id, x)| report(id, x)).collect(),
+        ignore_regions: Vec::new(),
+    };
+    Sequence { name: "scene".into(), frames: frames.iter().enumerate().map(frame).collect() }
+}
+
+fn one_frame(truths: Vec<Truth>, reports: Vec<Report>) -> Sequence {
+    let frame = Frame { truths, reports, ..Frame::default() };
+    Sequence { name: "one".into(), frames: vec![frame] }
+}
+
+fn prepared(sequence: &Sequence) -> Prepared {
+    Prepared::new(sequence, &Comparison::default()).unwrap()
+}
+
+fn times(sequence: &Sequence) -> Times {
+    let prepared = prepared(sequence);
+    Times::measure(&prepared, &Clear::measure(&prepared).1)
+}
+
+#[test]
+fn an_ignored_person_is_neither_miss_nor_false_alarm() {
+    for similarity in [Similarity::Iou, Similarity::Metres] {
+        for role in [Role::Ignored, Role::Bystander, Role::Counts] {
+            let other = Truth { role, ..truth(2, 5.0) };
+            let scene = |reports| one_frame(vec![truth(1, 0.0), other], reports);
+            let found = scene(vec![report(1, 0.0), report(2, 5.0)]);
+            let missed = scene(vec![report(1, 0.0)]);
+            let count = |sequence: &Sequence| {
+                let scores = Scores::measure(sequence, similarity).unwrap();
+                (scores.tp, scores.fp, scores.fn_)
+            };
+            let expected = match role {
+                Role::Ignored => ((1, 0, 0), (1, 0, 0)),
+                Role::Bystander => ((1, 1, 0), (1, 0, 0)),
+                Role::Counts => ((2, 0, 0), (1, 0, 1)),
+            };
+            assert_eq!((count(&found), count(&missed)), expected, "{role:?}");
+        }
+    }
+}
+
+#[test]
+fn the_real_person_goes_before_the_ignored_one() {
+    let near = Truth { role: Role::Ignored, ..truth(2, 0.2) };
+    let scene = one_frame(vec![near, truth(1, 0.0)], vec![report(1, 0.0)]);
+    let scores = Scores::measure(&scene, Similarity::Iou).unwrap();
+    assert_eq!((scores.tp, scores.fp, scores.fn_), (1, 0, 0));
+}
+
+#[test]
+fn unmatched_reports_in_an_ignore_region_or_too_small_are_left_out() {
+    let mut scene = one_frame(vec![truth(1, 0.0)], vec![report(1, 0.0), report(2, 5.0)]);
+    let false_alarms = |scene: &Sequence, comparison: &Comparison| {
+        let tally = Tally::measure(scene, comparison, &SetDistance::default()).unwrap();
+        (tally.clear.tp, tally.clear.fp)
+    };
+    let usual = Comparison::default();
+    assert_eq!(false_alarms(&scene, &usual), (1, 1));
+    let small = Comparison { ignore_unmatched_below_px: Some(10.0), ..usual };
+    assert_eq!(false_alarms(&scene, &small), (1, 0));
+    scene.frames[0].ignore_regions.push(Region::new(44.0, 0.0, 100.0, 100.0));
+    assert_eq!(false_alarms(&scene, &usual), (1, 0));
+    scene.frames[0].ignore_regions[0].x = 56.0;
+    assert_eq!(false_alarms(&scene, &usual), (1, 1));
+}
+
+#[test]
+fn an_ignored_truth_absorbs_any_number_of_detections() {
+    let crowd = Truth {
+        role: Role::Ignored,
+        region: Some(Region::new(100.0, 0.0, 100.0, 10.0)),
+        ..truth(9, 10.0)
+    };
+    let reports = vec![report(1, 0.0), report(2, 11.0), report(3, 14.0), report(4, 30.0)];
+    let tally = DetectionTally::measure(
+        &one_frame(vec![truth(1, 0.0), crowd], reports),
+        Similarity::Iou,
+        0.5,
+    );
+    let all = tally.precision_recall(0.0);
+    assert_eq!((all.tp, all.fp, all.fn_), (1, 1, 0));
+    assert_eq!(tally.precision_recall(0.6).recall(), 0.0);
+    assert_eq!((all.precision(), all.recall(), all.f1()), (0.5, 1.0, 2.0 / 3.0));
+}
+
+#[test]
+fn the_miss_rate_is_read_left_of_each_reference() {
+    // Two people in two images; the surer detection of three is wrong.
+    let mut scene = sequence(&[(&[(1, 0.0)], &[(1, 0.0), (2, 5.0)]), (&[(1, 0.0)], &[(1, 0.0)])]);
+    scene.frames[0].reports[1].score = 0.9;
+    let tally = DetectionTally::measure(&scene, Similarity::Iou, 0.5);
+    let curve: Vec<(f64, f64)> = tally.curve().iter().map(|p| (p.fppi, p.miss_rate)).collect();
+    assert_eq!(curve, [(0.5, 1.0), (0.5, 0.0)]);
+    // Seven references lie left of the first point, two see no miss at all.
+    let expected = (2.0 * 1e-10_f64.ln() / 9.0).exp();
+    assert!((tally.log_average_miss_rate().unwrap() - expected).abs() < 1e-12);
+    // One right of two at recall one half, then two of three.
+    assert!((tally.average_precision().unwrap() - 2.0 / 3.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_switch_a_gap_and_a_wrong_person() {
+    let scene = sequence(&[
+        (&[(1, 0.0), (2, 5.0)], &[(7, 5.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 5.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(8, 0.0), (7, 5.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(8, 0.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(8, 0.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(8, 5.0)]),
+        (&[(1, 0.0)], &[]),
+    ]);
+    let (clear, _) = Clear::measure(&prepared(&scene));
+    assert_eq!((clear.tp, clear.fn_, clear.fp, clear.id_switches), (7, 6, 0, 1));
+    // Frames without any report do not interrupt, as in TrackEval.
+    assert_eq!(clear.fragmentations, 1);
+    let times = times(&scene);
+    assert_eq!(times.confirm_s, [0.0, 2.0]);
+    assert_eq!(times.never_confirmed, 0);
+    assert_eq!(times.reacquire_s, [2.0]);
+    assert_eq!(times.never_reacquired, 1);
+    assert_eq!(times.wrong_person_s, 1.0);
+    assert_eq!(times.duration_s, 7.0);
+}
+
+#[test]
+fn what_went_wrong_is_listed_in_the_order_of_time() {
+    let scene = sequence(&[
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 20.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 5.0), (8, 20.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 5.0), (8, 0.0)]),
+    ]);
+    let prepared = prepared(&scene);
+    let (clear, matches) = Clear::measure(&prepared);
+    let happened = events(&prepared, &matches);
+    let listed: Vec<(usize, EventKind)> = happened.iter().map(|e| (e.frame, e.kind)).collect();
+    use EventKind::{FalseTrack, Found, Miss, Switch, WrongPerson};
+    let expected = [
+        (2, Miss { person: 2, track: Some(8) }),
+        (2, FalseTrack { track: 8 }),
+        (3, Miss { person: 1, track: Some(7) }),
+        (3, Found { person: 2, track: 7 }),
+        (3, Switch { person: 2, from: 8, to: 7 }),
+        (3, WrongPerson { track: 7, began_with: 1, person: 2 }),
+        (4, Found { person: 1, track: 8 }),
+        (4, Switch { person: 1, from: 7, to: 8 }),
+        (4, WrongPerson { track: 8, began_with: 2, person: 1 }),
+    ];
+    assert_eq!(listed, expected);
+    assert_eq!((happened[2].stamp_ns, clear.id_switches), (2 * SECOND_NS, 2));
+}
+
+#[test]
+fn who_was_out_of_view_is_waited_for_from_the_return_on() {
+    let scene = sequence(&[
+        (&[(1, 0.0)], &[(7, 0.0)]),
+        (&[], &[(7, 0.0)]),
+        (&[], &[]),
+        (&[(1, 0.0)], &[]),
+        (&[(1, 0.0)], &[(9, 0.0)]),
+        (&[(3, 4.0)], &[]),
+    ]);
+    let times = times(&scene);
+    assert_eq!((times.confirm_s, times.reacquire_s), (vec![0.0], vec![1.0]));
+    assert_eq!((times.never_confirmed, times.never_reacquired), (1, 0));
+}
+
+#[test]
+fn following_is_judged_by_the_clock() {
+    let scene = sequence(&[
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0), (9, 20.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0), (9, 20.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0), (9, 20.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0), (9, 20.0)]),
+        (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0), (9, 20.0)]),
+    ]);
+    let prepared = prepared(&scene);
+    let (_, matches) = Clear::measure(&prepared);
+    let followed = [Some(7), Some(8), None, Some(7), Some(9)];
+    let following = Following::measure(&prepared, &matches, 1, &followed);
+    let expected =
+        Following { on_target_s: 2.0, wrong_person_s: 1.0, nobody_s: 1.0, idle_s: 1.0, losses: 2 };
+    assert_eq!(following, expected);
+}
+
+#[test]
+fn position_errors_and_set_distances_in_metres() {
+    let scene = one_frame(vec![truth(1, 0.0), truth(2, 5.0)], vec![report(1, 0.3), report(2, 5.4)]);
+    let scores = Scores::measure(&scene, Similarity::Metres).unwrap();
+    let close = |got: Option<f64>, expected: f64| {
+        assert!((got.unwrap() - expected).abs() < 1e-12, "{got:?} {expected}");
+    };
+    close(scores.position_error_mean_m, 0.35);
+    close(scores.position_error_rms_m, (0.125_f64).sqrt());
+    close(scores.position_error_p95_m, 0.395);
+    close(scores.position_error_max_m, 0.4);
+    close(scores.motp, 0.65);
+    close(scores.ospa, (0.125_f64).sqrt());
+    close(scores.gospa, 0.5);
+    // A pair 2 m apart counts as long as the cutoff is wider.
+    let apart = one_frame(vec![truth(1, 0.0)], vec![report(1, 2.0)]);
+    let wide = SetDistance { cutoff: 3.0, order: 1.0 };
+    let tally = Tally::measure(&apart, &Similarity::Metres.into(), &wide).unwrap();
+    close(tally.sets.ospa(), 2.0);
+    assert_eq!(tally.clear.tp, 0);
+}
+
+#[test]
+fn bad_input_is_named() {
+    let error = |scene: &Sequence, similarity: Similarity| {
+        Prepared::new(scene, &similarity.into()).unwrap_err()
+    };
+    let twice = one_frame(vec![truth(1, 0.0), truth(1, 3.0)], vec![]);
+    let text = error(&twice, Similarity::Iou).to_string();
+    assert!(text.contains("`one`, frame 1") && text.contains("truth id 1 occurs twice"), "{text}");
+
+    let nowhere = one_frame(vec![], vec![Report { floor_m: None, ..report(4, 0.0) }]);
+    assert!(Prepared::new(&nowhere, &Comparison::default()).is_ok());
+    let text = error(&nowhere, Similarity::Metres).to_string();
+    assert!(text.contains("track id 4 has no floor position"), "{text}");
+
+    for bad in [
+        Report { region: Some(Region::new(f64::NAN, 0.0, 1.0, 1.0)), ..report(4, 0.0) },
+        Report { region: Some(Region::new(0.0, 0.0, -1.0, 1.0)), ..report(4, 0.0) },
+        Report { floor_m: Some([f64::INFINITY, 0.0]), ..report(4, 0.0) },
+        Report { score: f64::NAN, ..report(4, 0.0) },
+    ] {
+        let scene = one_frame(vec![], vec![bad]);
+        assert!(matches!(error(&scene, Similarity::Iou), EvalError::NotFinite { id: 4, .. }));
+    }
+
+    let mut scene = sequence(&[(&[], &[]), (&[], &[])]);
+    scene.frames[0].stamp_ns = 2 * SECOND_NS;
+    assert!(matches!(error(&scene, Similarity::Iou), EvalError::OutOfOrder { frame: 2, .. }));
+}
+
+#[test]
+fn the_flat_object_carries_the_names_of_the_field() {
+    let scores =
+        Scores::measure(&one_frame(vec![truth(1, 0.0)], vec![report(1, 0.0)]), Similarity::Iou);
+    let json = serde_json::to_value(scores.unwrap()).unwrap();
+    let object = json.as_object().unwrap();
+    for name in [
+        "HOTA",
+        "DetA",
+        "AssA",
+        "LocA",
+        "MOTA",
+        "MOTP",
+        "IDF1",
+        "IDP",
+        "IDR",
+        "IDSW",
+        "FP",
+        "FN",
+        "TP",
+        "Frag",
+        "MT",
+        "PT",
+        "ML",
+        "LAMR",
+        "OSPA",
+        "GOSPA",
+        "position_error_mean_m",
+    ] {
+        assert!(object.contains_key(name), "{name}");
+    }
+    assert!(object.values().all(|value| value.is_number() || value.is_null()));
+}
