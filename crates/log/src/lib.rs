@@ -1,8 +1,35 @@
 //! Logs in and out: MCAP files with ROS 2 messages.
+//!
+//! Reading is done twice. The first pass decodes no image: it learns the topics,
+//! the calibrations and the static transforms of the whole log, counts what is
+//! damaged and hashes the file, so that everything a pipeline might miss is
+//! known before its first frame. The second pass is the [`FrameSource`]: it puts
+//! images in order, pairs them, looks up where camera and robot were, and hands
+//! out one [`LogFrame`] after the other. Memory holds a few frames, however long
+//! the log is.
+//!
+//! Nothing in a file is trusted: see [`mcap_walk`] for the container,
+//! [`msgs`] for messages, [`images`] for pictures and [`Limits`] for sizes. What
+//! is whole is used; what is lost is counted under a name.
 
+pub mod camera_info;
+mod error;
+pub mod images;
+mod input;
+mod inspect;
 mod limits;
 pub mod mcap_walk;
 pub mod msgs;
+pub mod odometry;
+pub mod register;
+mod scan;
+mod source;
+pub mod tf;
+mod topics;
 pub mod write;
 
+pub use error::LogError;
+pub use input::{InputSettings, MountSettings, Needs};
+pub use inspect::{ImageFacts, Inspection, TopicFacts, inspect};
 pub use limits::Limits;
+pub use source::{FrameSource, LogFacts, LogFrame};

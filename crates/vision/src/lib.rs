@@ -2,6 +2,7 @@
 //!
 //! Each fast kernel here has a slow, obvious twin in its tests.
 
+pub mod ground;
 mod row_sums;
 
 pub use row_sums::{RowSums, Sums};

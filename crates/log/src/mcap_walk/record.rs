@@ -84,8 +84,7 @@ pub(super) struct Schema {
 
 pub(super) fn schema(body: &[u8]) -> Option<Schema> {
     let mut fields = Fields(body);
-    let schema =
-        Schema { id: fields.u16()?, name: fields.string()?, encoding: fields.string()? };
+    let schema = Schema { id: fields.u16()?, name: fields.string()?, encoding: fields.string()? };
     let definition = fields.u32()? as usize;
     fields.bytes(definition)?;
     (schema.id != 0).then_some(schema)

@@ -65,9 +65,8 @@ pub enum CdrError {
 /// assert_eq!(decode::<StringMsg>(&encode(&sent)).unwrap(), sent);
 /// ```
 pub fn decode<'de, T: Deserialize<'de>>(message: &'de [u8]) -> Result<T, CdrError> {
-    let (header, body) = message
-        .split_at_checked(4)
-        .ok_or_else(|| CdrError::Encapsulation(message.to_vec()))?;
+    let (header, body) =
+        message.split_at_checked(4).ok_or_else(|| CdrError::Encapsulation(message.to_vec()))?;
     let read = match header[..2] {
         [0, 0] => re_cdr::from_bytes::<T, BigEndian>(body),
         [0, 1] => re_cdr::from_bytes::<T, LittleEndian>(body),

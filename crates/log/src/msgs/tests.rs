@@ -30,16 +30,16 @@ fn an_image_lies_in_cdr_as_ros_writes_it() {
     // Written out by hand from the rules of CDR: alignment to the size of the
     // value counted after the encapsulation header, strings with their zero.
     let expected = [
-        &[0, 1, 0, 0][..],                                  // little endian
-        &[7, 0, 0, 0, 8, 0, 0, 0],                          // stamp
+        &[0, 1, 0, 0][..],                                    // little endian
+        &[7, 0, 0, 0, 8, 0, 0, 0],                            // stamp
         &[7, 0, 0, 0, b'c', b'a', b'm', b'e', b'r', b'a', 0], // frame_id
-        &[0],                                               // padding
-        &[1, 0, 0, 0, 2, 0, 0, 0],                          // height, width
-        &[6, 0, 0, 0, b'm', b'o', b'n', b'o', b'8', 0],     // encoding
-        &[0],                                               // is_bigendian
-        &[0],                                               // padding
-        &[2, 0, 0, 0],                                      // step
-        &[2, 0, 0, 0, 9, 10],                               // data
+        &[0],                                                 // padding
+        &[1, 0, 0, 0, 2, 0, 0, 0],                            // height, width
+        &[6, 0, 0, 0, b'm', b'o', b'n', b'o', b'8', 0],       // encoding
+        &[0],                                                 // is_bigendian
+        &[0],                                                 // padding
+        &[2, 0, 0, 0],                                        // step
+        &[2, 0, 0, 0, 9, 10],                                 // data
     ]
     .concat();
     assert_eq!(encode(&image), expected);

@@ -1,0 +1,290 @@
+//! From `sensor_msgs/CameraInfo` to the lens of a camera.
+
+use tagalong_core::{Distortion, Pinhole};
+
+use crate::msgs::CameraInfo;
+
+/// A lens with the image it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrinsics {
+    /// The lens, in pixels of the image as delivered.
+    pub lens: Pinhole,
+    /// Columns of the image as delivered; 0 if the message does not say.
+    pub width: usize,
+    /// Rows of the image as delivered; 0 if the message does not say.
+    pub height: usize,
+    /// Distance to the left camera of a stereo pair, m, from `P[3]`; `None` if 0.
+    pub baseline_m: Option<f64>,
+}
+
+/// Why a calibration cannot be used; the field is named.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// K is all zero, which by REP 104 means uncalibrated.
+    #[error("K is all zero: the camera is uncalibrated; calibrate it or publish its camera_info")]
+    Uncalibrated,
+    /// A number that cannot be.
+    #[error("{field} = {value}: {why}")]
+    Field {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        why: &'static str,
+    },
+    /// The distortion model is unknown or has the wrong number of coefficients.
+    #[error(
+        "distortion model `{model}` with {count} coefficients; \
+         known: plumb_bob (4 or 5), rational_polynomial (8), none (0)"
+    )]
+    Distortion {
+        /// The model.
+        model: String,
+        /// Coefficients given.
+        count: usize,
+    },
+    /// The image does not have the size that was calibrated.
+    #[error(
+        "calibrated for {calibrated_width}x{calibrated_height}, \
+         but the images are {width}x{height}"
+    )]
+    Size {
+        /// Columns that the calibration gives.
+        calibrated_width: usize,
+        /// Rows that the calibration gives.
+        calibrated_height: usize,
+        /// Columns of the image.
+        width: usize,
+        /// Rows of the image.
+        height: usize,
+    },
+}
+
+/// Reads a calibration. `rectified` says that the image was rectified already:
+/// then P holds for it, and it has no distortion.
+///
+/// ROI and binning: K and P are given in pixels of the full image. A pixel of
+/// the delivered image covers `binning` of them, and pixel coordinates are those
+/// of pixel centres, hence `c' = (c - offset + 0.5) / binning - 0.5`.
+///
+/// # Errors
+/// [`CalibrationError`]; every number is checked before it is used.
+pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, CalibrationError> {
+    check_finite(info)?;
+    check_rotation(&info.r)?;
+    let (k, p) = (&info.k, &info.p);
+    let use_p = rectified && p[0] != 0.0;
+    if !use_p && k.iter().all(|v| *v == 0.0) {
+        return Err(CalibrationError::Uncalibrated);
+    }
+    let full = if use_p {
+        check_lens(info, ["P[0]", "P[5]", "P[2]", "P[6]"], [p[0], p[5], p[2], p[6]])?
+    } else {
+        check_lens(info, ["K[0]", "K[4]", "K[2]", "K[5]"], [k[0], k[4], k[2], k[5]])?
+    };
+    let distortion = if rectified { Distortion::None } else { distortion(info)? };
+    Ok(Intrinsics { baseline_m: baseline(p), ..delivered(info, full, distortion) })
+}
+
+/// Fails unless the calibration belongs to images of this size.
+///
+/// # Errors
+/// [`CalibrationError::Size`].
+pub fn check_size(
+    calibrated: &Intrinsics,
+    width: usize,
+    height: usize,
+) -> Result<(), CalibrationError> {
+    let unknown = calibrated.width == 0 || calibrated.height == 0;
+    if unknown || (calibrated.width, calibrated.height) == (width, height) {
+        return Ok(());
+    }
+    Err(CalibrationError::Size {
+        calibrated_width: calibrated.width,
+        calibrated_height: calibrated.height,
+        width,
+        height,
+    })
+}
+
+fn check_finite(info: &CameraInfo) -> Result<(), CalibrationError> {
+    let fields = [("K", &info.k[..]), ("D", &info.d), ("R", &info.r), ("P", &info.p)];
+    for (field, values) in fields {
+        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(CalibrationError::Field { field, value: *value, why: "must be finite" });
+        }
+    }
+    Ok(())
+}
+
+/// R is a rotation, or all zero where the driver leaves it out.
+fn check_rotation(r: &[f64; 9]) -> Result<(), CalibrationError> {
+    if r.iter().all(|v| *v == 0.0) {
+        return Ok(());
+    }
+    let r = nalgebra::Matrix3::from_row_slice(r);
+    let off = (r * r.transpose() - nalgebra::Matrix3::identity()).norm();
+    if off > 1e-3 || r.determinant() < 0.0 {
+        let why = "R must be a rotation (this is how far R times its transpose is from identity)";
+        return Err(CalibrationError::Field { field: "R", value: off, why });
+    }
+    Ok(())
+}
+
+fn check_lens(
+    info: &CameraInfo,
+    names: [&'static str; 4],
+    [fx, fy, cx, cy]: [f64; 4],
+) -> Result<[f64; 4], CalibrationError> {
+    for (field, value) in [(names[0], fx), (names[1], fy)] {
+        if value <= 0.0 {
+            return Err(CalibrationError::Field { field, value, why: "must be positive" });
+        }
+    }
+    for (field, value, size) in [(names[2], cx, info.width), (names[3], cy, info.height)] {
+        if size > 0 && !(-0.5..=f64::from(size) - 0.5).contains(&value) {
+            return Err(CalibrationError::Field { field, value, why: "must lie in the image" });
+        }
+    }
+    Ok([fx, fy, cx, cy])
+}
+
+fn distortion(info: &CameraInfo) -> Result<Distortion, CalibrationError> {
+    let d = &info.d;
+    if d.iter().all(|v| *v == 0.0) {
+        return Ok(Distortion::None);
+    }
+    match (info.distortion_model.as_str(), d[..].len()) {
+        ("plumb_bob", 4) => Ok(Distortion::PlumbBob([d[0], d[1], d[2], d[3], 0.0])),
+        ("plumb_bob", 5) => Ok(Distortion::PlumbBob([d[0], d[1], d[2], d[3], d[4]])),
+        ("rational_polynomial", 8) => {
+            Ok(Distortion::Rational([d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]]))
+        }
+        (model, count) => Err(CalibrationError::Distortion { model: model.to_owned(), count }),
+    }
+}
+
+/// `P[3] = -fx * baseline` for the right camera of a pair, 0 for any other.
+fn baseline(p: &[f64; 12]) -> Option<f64> {
+    (p[0] > 0.0 && p[3] != 0.0).then(|| -p[3] / p[0])
+}
+
+fn delivered(info: &CameraInfo, full: [f64; 4], distortion: Distortion) -> Intrinsics {
+    let [fx, fy, cx, cy] = full;
+    let (bx, by) = (info.binning_x.max(1), info.binning_y.max(1));
+    let roi = &info.roi;
+    let whole = roi.width == 0 || roi.height == 0;
+    let (width, height) = if whole { (info.width, info.height) } else { (roi.width, roi.height) };
+    let (x0, y0) = if whole { (0, 0) } else { (roi.x_offset, roi.y_offset) };
+    let centre = |c: f64, offset: u32, binning: u32| {
+        (c - f64::from(offset) + 0.5) / f64::from(binning) - 0.5
+    };
+    let lens = Pinhole {
+        fx: fx / f64::from(bx),
+        fy: fy / f64::from(by),
+        cx: centre(cx, x0, bx),
+        cy: centre(cy, y0, by),
+        distortion,
+    };
+    Intrinsics {
+        lens,
+        width: (width / bx) as usize,
+        height: (height / by) as usize,
+        baseline_m: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::msgs::RegionOfInterest;
+
+    fn info() -> CameraInfo {
+        CameraInfo {
+            width: 640,
+            height: 480,
+            distortion_model: "plumb_bob".into(),
+            d: vec![0.1, -0.2, 0.001, 0.002, 0.05],
+            k: [500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0],
+            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            p: [480.0, 0.0, 321.0, -48.0, 0.0, 480.0, 241.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ..CameraInfo::default()
+        }
+    }
+
+    fn broken(change: impl FnOnce(&mut CameraInfo)) -> String {
+        let mut info = info();
+        change(&mut info);
+        intrinsics(&info, false).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn raw_images_have_k_and_d_and_rectified_ones_p() {
+        let raw = intrinsics(&info(), false).unwrap();
+        assert_eq!(
+            (raw.lens.fx, raw.lens.fy, raw.lens.cx, raw.lens.cy),
+            (500.0, 510.0, 320.0, 240.0)
+        );
+        assert_eq!(raw.lens.distortion, Distortion::PlumbBob([0.1, -0.2, 0.001, 0.002, 0.05]));
+        let rectified = intrinsics(&info(), true).unwrap();
+        assert_eq!((rectified.lens.fx, rectified.lens.cx), (480.0, 321.0));
+        assert_eq!(rectified.lens.distortion, Distortion::None);
+        assert_eq!(rectified.baseline_m, Some(0.1));
+    }
+
+    #[test]
+    fn a_region_and_binning_move_the_principal_point() {
+        let roi = RegionOfInterest {
+            x_offset: 100,
+            y_offset: 40,
+            width: 400,
+            height: 200,
+            do_rectify: false,
+        };
+        let cut = CameraInfo { roi, binning_x: 2, binning_y: 4, ..info() };
+        let seen = intrinsics(&cut, false).unwrap();
+        assert_eq!((seen.width, seen.height), (200, 50));
+        // The centre of the first delivered pixel is the middle of the two full
+        // pixels 100 and 101, that is 100.5.
+        let column = |full: f64| (full - 320.0) / 500.0 * seen.lens.fx + seen.lens.cx;
+        assert!((column(100.5) - 0.0).abs() < 1e-12);
+        assert!((column(498.5) - 199.0).abs() < 1e-12);
+        assert_eq!(seen.lens.fy, 127.5);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_name() {
+        assert!(broken(|i| i.k = [0.0; 9]).contains("uncalibrated"));
+        assert!(broken(|i| i.k[0] = f64::NAN).starts_with("K = NaN"));
+        assert!(broken(|i| i.k[4] = -1.0).starts_with("K[4] = -1"));
+        assert!(broken(|i| i.k[2] = 900.0).starts_with("K[2] = 900"));
+        assert!(broken(|i| i.r[0] = 2.0).starts_with("R ="));
+        assert!(broken(|i| i.d.truncate(3)).contains("`plumb_bob` with 3"));
+        assert!(broken(|i| i.distortion_model = "equidistant".into()).contains("`equidistant`"));
+        assert!(broken(|i| i.p[3] = f64::INFINITY).starts_with("P ="));
+    }
+
+    #[test]
+    fn four_and_eight_coefficients_are_read() {
+        let four = CameraInfo { d: vec![0.1, 0.2, 0.3, 0.4], ..info() };
+        let lens = intrinsics(&four, false).unwrap().lens;
+        assert_eq!(lens.distortion, Distortion::PlumbBob([0.1, 0.2, 0.3, 0.4, 0.0]));
+        let eight = CameraInfo {
+            d: (1..9).map(f64::from).collect(),
+            distortion_model: "rational_polynomial".into(),
+            ..info()
+        };
+        let lens = intrinsics(&eight, false).unwrap().lens;
+        assert_eq!(lens.distortion, Distortion::Rational([1., 2., 3., 4., 5., 6., 7., 8.]));
+    }
+
+    #[test]
+    fn another_size_is_named() {
+        let calibrated = intrinsics(&info(), false).unwrap();
+        assert!(check_size(&calibrated, 640, 480).is_ok());
+        let error = check_size(&calibrated, 320, 240).unwrap_err();
+        assert_eq!(error.to_string(), "calibrated for 640x480, but the images are 320x240");
+    }
+}

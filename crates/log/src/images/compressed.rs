@@ -1,0 +1,192 @@
+//! `sensor_msgs/CompressedImage`: JPEG, PNG and `compressedDepth`.
+
+use std::io::Cursor;
+
+use tagalong_core::DepthImage;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::raw::exact;
+use super::{ImageError, Pixels, check_size, metres, metres_of_float, rvl};
+use crate::Limits;
+use crate::msgs::CompressedImage;
+
+/// Scans of a progressive JPEG; an honest one has about ten.
+const MAX_JPEG_SCANS: usize = 64;
+
+/// Bytes of the `compressedDepth` header: format, quantisation a and b.
+const DEPTH_HEADER: usize = 12;
+
+/// Decodes a compressed image. The kind of picture is told by its first bytes,
+/// not by the format string, which drivers fill in as they like. Depth is scaled
+/// as in [`super::decode_raw`].
+///
+/// # Errors
+/// [`ImageError`]. A JPEG that ends early is an error, not half a picture.
+pub fn decode_compressed(
+    image: &CompressedImage<'_>,
+    depth_unit_m: Option<f64>,
+    limits: &Limits,
+) -> Result<Pixels, ImageError> {
+    if image.format.to_ascii_lowercase().contains("compresseddepth") {
+        return compressed_depth(image, depth_unit_m, limits).map(Pixels::Depth);
+    }
+    match image.data {
+        [0xff, 0xd8, ..] => jpeg(image.data, limits),
+        [0x89, b'P', b'N', b'G', ..] => png(image.data, depth_unit_m, limits),
+        _ => Err(ImageError::Encoding(image.format.clone())),
+    }
+}
+
+fn codec(error: impl std::fmt::Debug) -> ImageError {
+    ImageError::Codec(format!("{error:?}"))
+}
+
+fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
+    let side = limits.image_side_px as usize;
+    let options = DecoderOptions::default()
+        .set_strict_mode(true)
+        .set_max_width(side)
+        .set_max_height(side)
+        .jpeg_set_max_scans(MAX_JPEG_SCANS);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(data), options);
+    decoder.decode_headers().map_err(codec)?;
+    let info = decoder.info().ok_or_else(|| codec("no header"))?;
+    let (width, height) = (usize::from(info.width), usize::from(info.height));
+    check_size(width as u64, height as u64, 3, limits)?;
+    let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
+    let colours = if grey { ColorSpace::Luma } else { ColorSpace::RGB };
+    decoder.set_options(options.jpeg_set_out_colorspace(colours));
+    if grey {
+        let mut pixels = vec![0; width * height];
+        decoder.decode_into(&mut pixels).map_err(codec)?;
+        return Ok(Pixels::Grey(exact(width, height, pixels)));
+    }
+    let mut pixels = vec![[0; 3]; width * height];
+    decoder.decode_into(pixels.as_flattened_mut()).map_err(codec)?;
+    Ok(Pixels::Colour(exact(width, height, pixels)))
+}
+
+fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels, ImageError> {
+    let png = PngPixels::read(data, limits)?;
+    let (w, h, bytes) = (png.width, png.height, png.bytes);
+    let pixels = match (png.colour, png.depth) {
+        (png::ColorType::Grayscale, png::BitDepth::Eight) => Pixels::Grey(exact(w, h, bytes)),
+        (png::ColorType::Rgb, png::BitDepth::Eight) => {
+            Pixels::Colour(exact(w, h, bytes.as_chunks::<3>().0.to_vec()))
+        }
+        (png::ColorType::Rgba, png::BitDepth::Eight) => {
+            let (pixels, _) = bytes.as_chunks::<4>();
+            Pixels::Colour(exact(w, h, pixels.iter().map(|p| [p[0], p[1], p[2]]).collect()))
+        }
+        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => {
+            let unit = depth_unit_m.unwrap_or(0.001) as f32;
+            let values = bytes.as_chunks::<2>().0.iter();
+            let depth = values.map(|p| metres(u16::from_be_bytes(*p), unit)).collect();
+            Pixels::Depth(exact(w, h, depth))
+        }
+        (colour, depth) => {
+            return Err(ImageError::Codec(format!("a PNG of {colour:?} with {depth:?} bits")));
+        }
+    };
+    Ok(pixels)
+}
+
+/// A decoded PNG, samples of 16 bits high byte first.
+struct PngPixels {
+    width: usize,
+    height: usize,
+    colour: png::ColorType,
+    depth: png::BitDepth,
+    bytes: Vec<u8>,
+}
+
+impl PngPixels {
+    fn read(data: &[u8], limits: &Limits) -> Result<Self, ImageError> {
+        let bytes = usize::try_from(limits.image_bytes).unwrap_or(usize::MAX);
+        let mut decoder = png::Decoder::new_with_limits(Cursor::new(data), png::Limits { bytes });
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().map_err(codec)?;
+        let (width, height) = (reader.info().width, reader.info().height);
+        check_size(width.into(), height.into(), 4, limits)?;
+        let size = reader.output_buffer_size().filter(|size| *size <= bytes);
+        let size =
+            size.ok_or(ImageError::TooLarge { width: width.into(), height: height.into() })?;
+        let mut bytes = vec![0; size];
+        let frame = reader.next_frame(&mut bytes).map_err(codec)?;
+        bytes.truncate(frame.buffer_size());
+        Ok(Self {
+            width: width as usize,
+            height: height as usize,
+            colour: frame.color_type,
+            depth: frame.bit_depth,
+            bytes,
+        })
+    }
+}
+
+/// Depth as `compressed_depth_image_transport` writes it: a header of 12 bytes,
+/// then 16-bit PNG or RVL. `32FC1` is quantised as inverse depth, `a / (v - b)`.
+fn compressed_depth(
+    image: &CompressedImage<'_>,
+    depth_unit_m: Option<f64>,
+    limits: &Limits,
+) -> Result<DepthImage, ImageError> {
+    let Some((header, body)) = image.data.split_at_checked(DEPTH_HEADER) else {
+        return Err(ImageError::Codec("shorter than its 12-byte header".into()));
+    };
+    let (width, height, values) = if body.starts_with(&[0x89, b'P', b'N', b'G']) {
+        depth_png(body, limits)?
+    } else if image.format.to_ascii_lowercase().contains("rvl") {
+        depth_rvl(body, limits)?
+    } else {
+        return Err(ImageError::Codec("compressedDepth that is neither PNG nor RVL".into()));
+    };
+    let float = |at: usize| {
+        f32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
+    };
+    let pixels = if image.format.starts_with("32FC1") {
+        let (a, b, unit) = (float(4), float(8), depth_unit_m.unwrap_or(1.0) as f32);
+        let inverse = |v: u16| if v == 0 { f32::NAN } else { a / (f32::from(v) - b) };
+        values.into_iter().map(|v| metres_of_float(inverse(v), unit)).collect()
+    } else {
+        let unit = depth_unit_m.unwrap_or(0.001) as f32;
+        values.into_iter().map(|v| metres(v, unit)).collect()
+    };
+    Ok(exact(width, height, pixels))
+}
+
+fn depth_png(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), ImageError> {
+    let png = PngPixels::read(body, limits)?;
+    if (png.colour, png.depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
+        return Err(ImageError::Codec("compressedDepth whose PNG has not 16 bits of grey".into()));
+    }
+    let values = png.bytes.as_chunks::<2>().0.iter().map(|p| u16::from_be_bytes(*p)).collect();
+    Ok((png.width, png.height, values))
+}
+
+/// Columns and rows as 32-bit numbers, then the stream.
+fn depth_rvl(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), ImageError> {
+    let (size, stream) =
+        body.split_at_checked(8).ok_or_else(|| ImageError::Codec("RVL without a size".into()))?;
+    let number =
+        |at: usize| u32::from_le_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
+    let (width, height) = (number(0), number(4));
+    check_size(width.into(), height.into(), 4, limits)?;
+    let (width, height) = (width as usize, height as usize);
+    let values = rvl::decode(stream, width * height)
+        .ok_or_else(|| ImageError::Codec("the RVL stream does not fit the size".into()))?;
+    Ok((width, height, values))
+}
+
+/// The data of a `16UC1; compressedDepth rvl` message: header, size, stream.
+/// `values` are `width * height` readings in millimetres, 0 = none.
+pub fn encode_rvl(width: u32, height: u32, values: &[u16]) -> Vec<u8> {
+    let mut out = vec![0; DEPTH_HEADER];
+    out.extend_from_slice(&width.to_le_bytes());
+    out.extend_from_slice(&height.to_le_bytes());
+    out.extend(rvl::encode(values));
+    out
+}

@@ -1,0 +1,201 @@
+//! Where the robot was when an image was taken.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry2, Matrix3};
+use tagalong_core::{Motion, Stamp};
+
+/// A silence longer than this makes poses stale, s.
+pub const MAX_GAP_S: f64 = 0.5;
+/// A step longer than this between neighbouring poses is a jump, m.
+pub const MAX_STEP_M: f64 = 1.0;
+/// Behind the last pose the motion is continued for this long, s.
+const EXTRAPOLATE_S: f64 = 0.2;
+/// Poses are kept for this long, s.
+const KEPT_S: f64 = 15.0;
+/// Poses kept at most.
+const MAX_POSES: usize = 16_384;
+/// A clock that steps back further than this has jumped, s.
+const CLOCK_JUMP_S: f64 = 1.0;
+
+/// A pose at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseAt {
+    /// `odom_from_robot`.
+    pub pose: Isometry2<f64>,
+    /// No odometry was near: the pose is a guess.
+    pub stale: bool,
+}
+
+/// The odometry of the last seconds.
+#[derive(Clone, Debug, Default)]
+pub struct PoseBuffer {
+    poses: VecDeque<(Stamp, Isometry2<f64>)>,
+}
+
+impl PoseBuffer {
+    /// Takes in a pose; false if it is not finite. After a jump of the clock
+    /// the old poses are forgotten.
+    pub fn push(&mut self, stamp: Stamp, pose: Isometry2<f64>) -> bool {
+        let numbers = [pose.translation.x, pose.translation.y, pose.rotation.angle()];
+        if numbers.iter().any(|v| !v.is_finite()) {
+            return false;
+        }
+        let newest = self.poses.back().map_or(stamp, |(at, _)| *at);
+        if newest.seconds_since(stamp) > CLOCK_JUMP_S {
+            self.poses.clear();
+        }
+        let place = self.poses.partition_point(|(at, _)| *at < stamp);
+        if self.poses.get(place).is_none_or(|(at, _)| *at != stamp) {
+            self.poses.insert(place, (stamp, pose));
+        }
+        self.forget_old();
+        true
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.poses.clear();
+    }
+
+    fn forget_old(&mut self) {
+        let Some((newest, _)) = self.poses.back().copied() else { return };
+        while self.poses.len() > MAX_POSES
+            || self.poses.front().is_some_and(|(at, _)| newest.seconds_since(*at) > KEPT_S)
+        {
+            self.poses.pop_front();
+        }
+    }
+
+    /// The pose at a moment, interpolated; `None` while there is no odometry.
+    pub fn at(&self, stamp: Stamp) -> Option<PoseAt> {
+        let after = self.poses.partition_point(|(at, _)| *at < stamp);
+        let before = after.checked_sub(1).map(|i| self.poses[i]);
+        match (before, self.poses.get(after).copied()) {
+            (Some(a), Some(b)) => Some(PoseAt {
+                pose: blend(a, b, stamp),
+                stale: b.0 != stamp && b.0.seconds_since(a.0) > MAX_GAP_S,
+            }),
+            (Some(last), None) => Some(self.beyond(last, stamp)),
+            (None, Some((first, pose))) => {
+                Some(PoseAt { pose, stale: first.seconds_since(stamp) > MAX_GAP_S })
+            }
+            (None, None) => None,
+        }
+    }
+
+    /// Behind the last pose: the last motion goes on for a moment.
+    fn beyond(&self, last: (Stamp, Isometry2<f64>), stamp: Stamp) -> PoseAt {
+        let ahead = stamp.seconds_since(last.0);
+        let known = self.poses.len().checked_sub(2).map(|i| self.poses[i]);
+        let pose = match known {
+            Some(previous) if last.0.seconds_since(previous.0) <= MAX_GAP_S => {
+                blend(previous, last, last.0.plus_seconds(ahead.min(EXTRAPOLATE_S)))
+            }
+            _ => last.1,
+        };
+        PoseAt { pose, stale: ahead > MAX_GAP_S }
+    }
+
+    /// True if the poses between two moments contain a jump.
+    pub fn jumped_between(&self, from: Stamp, to: Stamp) -> bool {
+        let inside = |at: Stamp| from < at && at <= to;
+        let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
+        pairs.filter(|(_, b)| inside(b.0)).any(|(a, b)| {
+            (b.1.translation.vector - a.1.translation.vector).norm() > MAX_STEP_M
+                && b.0.seconds_since(a.0) <= MAX_GAP_S
+        })
+    }
+}
+
+/// On the straight line through two poses, also beyond its ends.
+fn blend(
+    (t0, a): (Stamp, Isometry2<f64>),
+    (t1, b): (Stamp, Isometry2<f64>),
+    at: Stamp,
+) -> Isometry2<f64> {
+    let span = t1.seconds_since(t0);
+    let part = if span > 0.0 { at.seconds_since(t0) / span } else { 0.0 };
+    let turn = (a.rotation.inverse() * b.rotation).angle();
+    Isometry2::new(
+        a.translation.vector.lerp(&b.translation.vector, part),
+        a.rotation.angle() + part * turn,
+    )
+}
+
+/// The motion over `dt` seconds during which odometry failed: at rest, with the
+/// uncertainty of a robot that may have driven at 1 m/s and turned at 1 rad/s.
+pub fn unknown_motion(dt: f64) -> Motion {
+    let reach = dt.clamp(0.0, 5.0);
+    Motion { covariance: Matrix3::identity() * (reach * reach), ..Motion::at_rest(dt) }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn at(seconds: f64) -> Stamp {
+        Stamp::default().plus_seconds(seconds)
+    }
+
+    fn pose(x: f64, turn: f64) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(x, 0.0), turn)
+    }
+
+    fn driven(stamps: &[f64]) -> PoseBuffer {
+        let mut buffer = PoseBuffer::default();
+        stamps.iter().for_each(|t| assert!(buffer.push(at(*t), pose(*t, 0.1 * t))));
+        buffer
+    }
+
+    #[test]
+    fn short_gaps_are_bridged_and_long_ones_are_stale() {
+        let buffer = driven(&[10.0, 10.4, 11.4]);
+        let inside = buffer.at(at(10.1)).unwrap();
+        assert!((inside.pose.translation.x - 10.1).abs() < 1e-6 && !inside.stale);
+        assert!(buffer.at(at(11.0)).unwrap().stale);
+        assert!(!buffer.at(at(11.4)).unwrap().stale);
+        assert!(buffer.at(at(12.0)).unwrap().stale);
+        assert!(buffer.at(at(9.4)).unwrap().stale);
+        assert!(PoseBuffer::default().at(at(1.0)).is_none());
+    }
+
+    #[test]
+    fn the_last_motion_goes_on_for_a_fifth_of_a_second() {
+        let buffer = driven(&[10.0, 10.1]);
+        assert!((buffer.at(at(10.25)).unwrap().pose.translation.x - 10.25).abs() < 1e-6);
+        assert!((buffer.at(at(10.5)).unwrap().pose.translation.x - 10.3).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_jump_is_seen_where_it_happens() {
+        let mut buffer = driven(&[10.0, 10.1]);
+        buffer.push(at(10.2), pose(13.0, 0.0));
+        assert!(buffer.jumped_between(at(10.05), at(10.25)));
+        assert!(!buffer.jumped_between(at(9.0), at(10.1)));
+        assert!(!buffer.jumped_between(at(10.2), at(10.9)));
+    }
+
+    #[test]
+    fn a_clock_that_jumps_back_starts_anew() {
+        let mut buffer = driven(&[100.0, 100.1]);
+        buffer.push(at(3.0), pose(7.0, 0.0));
+        assert_eq!(buffer.at(at(3.0)).unwrap().pose.translation.x, 7.0);
+        assert!(buffer.at(at(100.0)).unwrap().stale);
+        assert!(!buffer.push(at(3.1), pose(f64::NAN, 0.0)));
+    }
+
+    proptest! {
+        #[test]
+        fn order_of_arrival_does_not_matter(t in 0.0..0.9f64, seed in any::<u64>()) {
+            let mut stamps: Vec<f64> = (0..10).map(|i| f64::from(i) * 0.1).collect();
+            let sorted = driven(&stamps);
+            let len = stamps.len();
+            (0..len).for_each(|i| stamps.swap(i, (seed >> (4 * i)) as usize % len));
+            prop_assert_eq!(driven(&stamps).at(at(t)), sorted.at(at(t)));
+        }
+    }
+}

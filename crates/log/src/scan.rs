@@ -1,0 +1,291 @@
+//! The first reading of a log: what is in it. No image is decoded.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+use tagalong_core::Stamp;
+
+use crate::images::{Content, content_of_encoding, content_of_format};
+use crate::mcap_walk::{Counters, Message, Walker};
+use crate::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, decode};
+use crate::tf::TfBuffer;
+use crate::{Limits, LogError};
+
+/// Image stamps kept of a topic, to measure rate and skew.
+const MAX_STAMPS: usize = 20_000;
+
+/// What the messages of a topic are, as far as Tagalong cares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Type {
+    Image,
+    CompressedImage,
+    CameraInfo,
+    Tf,
+    Odometry,
+    Other,
+}
+
+impl Type {
+    /// By the name of the type, with or without its middle part.
+    pub(crate) fn of(schema: &str) -> Self {
+        let (package, name) = schema.split_once('/').unwrap_or(("", schema));
+        match (package, name.rsplit('/').next().unwrap_or(name)) {
+            ("sensor_msgs", "Image") => Self::Image,
+            ("sensor_msgs", "CompressedImage") => Self::CompressedImage,
+            ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
+            ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
+            ("nav_msgs", "Odometry") => Self::Odometry,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// One topic of a log.
+#[derive(Clone, Debug)]
+pub(crate) struct Topic {
+    pub(crate) kind: Type,
+    pub(crate) schema: String,
+    pub(crate) encoding: String,
+    pub(crate) count: u64,
+    pub(crate) undecodable: u64,
+    pub(crate) first_log_time: u64,
+    pub(crate) last_log_time: u64,
+    /// `encoding` or `format` of the first image.
+    pub(crate) pixels: Option<String>,
+    pub(crate) content: Content,
+    /// Columns and rows of the first uncompressed image.
+    pub(crate) size: Option<(u32, u32)>,
+    pub(crate) frame_id: Option<String>,
+    pub(crate) stamps: Vec<Stamp>,
+}
+
+/// What a log holds.
+#[derive(Clone, Debug)]
+pub(crate) struct Scan {
+    pub(crate) path: PathBuf,
+    pub(crate) bytes: u64,
+    pub(crate) sha256: String,
+    pub(crate) topics: BTreeMap<String, Topic>,
+    /// The first calibration of each topic.
+    pub(crate) infos: BTreeMap<String, CameraInfo>,
+    /// All static transforms, and of the moving ones which frames they connect.
+    pub(crate) tf: TfBuffer,
+    pub(crate) counters: Counters,
+    pub(crate) notes: Vec<String>,
+    pub(crate) data_lost: bool,
+}
+
+/// Opens a log that is a regular file.
+///
+/// # Errors
+/// [`LogError::Open`], [`LogError::NotAFile`].
+pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
+    let failed = |source| LogError::Open { path: path.to_owned(), source };
+    let kind = std::fs::metadata(path).map_err(failed)?;
+    if kind.is_dir() {
+        let remedy = " (the .mcap in it)";
+        return Err(LogError::NotAFile { path: path.to_owned(), kind: "a directory", remedy });
+    }
+    if !kind.is_file() {
+        let remedy = "; a pipe can be written to a file first";
+        return Err(LogError::NotAFile {
+            path: path.to_owned(),
+            kind: "a pipe or a device",
+            remedy,
+        });
+    }
+    File::open(path).map_err(failed)
+}
+
+/// Passes bytes on and hashes them.
+struct Hashing<R> {
+    reader: R,
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl<R: Read> Read for Hashing<R> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.reader.read(out)?;
+        self.hash.update(&out[..count]);
+        self.bytes += count as u64;
+        Ok(count)
+    }
+}
+
+impl<R: Read> Hashing<R> {
+    /// Reads what is left, and tells size and hash of everything.
+    fn finish(mut self) -> (u64, String) {
+        let mut rest = vec![0; 1 << 16];
+        while matches!(self.read(&mut rest), Ok(count) if count > 0) {}
+        let hash = self.hash.finalize();
+        (self.bytes, hash.iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+}
+
+impl Scan {
+    /// Reads the whole log once.
+    ///
+    /// # Errors
+    /// A file that cannot be opened or is not MCAP.
+    pub(crate) fn read(
+        path: &Path,
+        depth_unit_m: Option<f64>,
+        limits: &Limits,
+    ) -> Result<Self, LogError> {
+        let file = Hashing { reader: open_file(path)?, hash: Sha256::new(), bytes: 0 };
+        let mut walker = Walker::new(file, limits)
+            .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
+        let mut gathering = Gathering { depth_unit_m, ..Gathering::default() };
+        while let Some(message) = walker.next() {
+            gathering.take(&message);
+        }
+        for channel in walker.channels() {
+            gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
+        }
+        let (counters, notes) = (walker.counters().clone(), walker.notes().to_vec());
+        let data_lost = walker.data_lost();
+        let (bytes, sha256) = walker.into_reader().finish();
+        Ok(Self {
+            path: path.to_owned(),
+            bytes,
+            sha256,
+            topics: gathering.topics,
+            infos: gathering.infos,
+            tf: gathering.tf,
+            counters,
+            notes,
+            data_lost,
+        })
+    }
+
+    /// The frames of the images of a topic.
+    pub(crate) fn frame_of(&self, topic: &str) -> Option<&str> {
+        self.topics.get(topic)?.frame_id.as_deref()
+    }
+
+    /// The topics as lines of text.
+    pub(crate) fn listing(&self) -> String {
+        let line = |(name, topic): (&String, &Topic)| {
+            let pixels =
+                topic.pixels.as_ref().map(|pixels| format!(", {pixels}")).unwrap_or_default();
+            format!("  {name} ({}{pixels}; {} messages)", topic.schema, topic.count)
+        };
+        let lines: Vec<_> = self.topics.iter().map(line).collect();
+        if lines.is_empty() { "  nothing".into() } else { lines.join("\n") }
+    }
+}
+
+#[derive(Default)]
+struct Gathering {
+    topics: BTreeMap<String, Topic>,
+    infos: BTreeMap<String, CameraInfo>,
+    tf: TfBuffer,
+    linked: BTreeSet<(String, String)>,
+    depth_unit_m: Option<f64>,
+}
+
+impl Gathering {
+    fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
+        self.topics.entry(name.to_owned()).or_insert_with(|| Topic {
+            kind: if encoding == "cdr" { Type::of(schema) } else { Type::Other },
+            schema: schema.to_owned(),
+            encoding: encoding.to_owned(),
+            count: 0,
+            undecodable: 0,
+            first_log_time: u64::MAX,
+            last_log_time: 0,
+            pixels: None,
+            content: Content::Unknown,
+            size: None,
+            frame_id: None,
+            stamps: Vec::new(),
+        })
+    }
+
+    fn take(&mut self, message: &Message<'_>) {
+        let channel = message.channel;
+        let unit = self.depth_unit_m;
+        let topic = self.topic(&channel.topic, &channel.schema_name, &channel.encoding);
+        topic.count += 1;
+        topic.first_log_time = topic.first_log_time.min(message.log_time);
+        topic.last_log_time = topic.last_log_time.max(message.log_time);
+        let done = match topic.kind {
+            Type::Image => topic.take_image(message.data, unit),
+            Type::CompressedImage => topic.take_compressed(message.data),
+            Type::Odometry => topic.take_odometry(message.data),
+            Type::CameraInfo => self.take_info(&channel.topic, message.data),
+            Type::Tf => self.take_tf(&channel.topic, message.data),
+            Type::Other => Some(()),
+        };
+        if done.is_none() {
+            self.topic(&channel.topic, "", "").undecodable += 1;
+        }
+    }
+
+    fn take_info(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+        if self.infos.contains_key(topic) {
+            return Some(());
+        }
+        let info: CameraInfo = decode(data).ok()?;
+        self.topic(topic, "", "").frame_id = Some(info.header.frame_id.clone());
+        self.infos.insert(topic.to_owned(), info);
+        Some(())
+    }
+
+    fn take_tf(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+        let message: TFMessage = decode(data).ok()?;
+        let is_static = is_static(topic);
+        for transform in &message.transforms {
+            let link = (transform.child_frame_id.clone(), transform.header.frame_id.clone());
+            if is_static || self.linked.insert(link) {
+                self.tf.insert(transform, is_static);
+            }
+        }
+        Some(())
+    }
+}
+
+/// Static transforms have a topic of their own.
+pub(crate) fn is_static(tf_topic: &str) -> bool {
+    tf_topic.ends_with("tf_static")
+}
+
+impl Topic {
+    fn take_image(&mut self, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {
+        let image: Image<'_> = decode(data).ok()?;
+        if self.pixels.is_none() {
+            self.content = content_of_encoding(&image.encoding, depth_unit_m);
+            self.size = Some((image.width, image.height));
+            self.pixels = Some(image.encoding);
+        }
+        self.take_header(image.header);
+        Some(())
+    }
+
+    fn take_compressed(&mut self, data: &[u8]) -> Option<()> {
+        let image: CompressedImage<'_> = decode(data).ok()?;
+        if self.pixels.is_none() {
+            self.content = content_of_format(&image.format);
+            self.pixels = Some(image.format);
+        }
+        self.take_header(image.header);
+        Some(())
+    }
+
+    fn take_odometry(&mut self, data: &[u8]) -> Option<()> {
+        let odometry: Odometry = decode(data).ok()?;
+        self.take_header(odometry.header);
+        Some(())
+    }
+
+    fn take_header(&mut self, header: Header) {
+        if self.stamps.len() < MAX_STAMPS {
+            self.stamps.push(header.stamp());
+        }
+        self.frame_id.get_or_insert(header.frame_id);
+    }
+}

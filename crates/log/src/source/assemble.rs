@@ -1,0 +1,292 @@
+//! Makes frames of the images that belong together.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry2, Isometry3};
+use tagalong_core::{
+    Camera, DepthImage, Distortion, Frame, Images, Lens, Motion, Pinhole, Stamp, planar_pose,
+};
+
+use super::intake::Intake;
+use super::pairing::Payload;
+use super::tally::Tally;
+use super::{LogFrame, Plan};
+use crate::camera_info::{CalibrationError, check_size};
+use crate::images::{ImageError, Pixels, decode_compressed, decode_raw};
+use crate::msgs::{CompressedImage, Image, decode};
+use crate::odometry::{PoseAt, unknown_motion};
+use crate::register::Registration;
+use crate::scan::Type;
+
+/// What is carried from frame to frame.
+pub(super) struct Assembler {
+    index: u64,
+    camera: Option<Arc<Camera>>,
+    registration: Option<Registration>,
+    previous: Option<(Stamp, Isometry2<f64>)>,
+    /// The first calibration that did not fit its images.
+    pub(super) misfit: Option<CalibrationError>,
+}
+
+impl Assembler {
+    pub(super) fn new() -> Self {
+        Self { index: 0, camera: None, registration: None, previous: None, misfit: None }
+    }
+
+    /// The camera of the last frame.
+    pub(super) fn camera(&self) -> Option<&Arc<Camera>> {
+        self.camera.as_ref()
+    }
+
+    /// Makes a frame of an image and its partners; `None` if something that is
+    /// needed is missing or damaged, which is counted.
+    pub(super) fn assemble(
+        &mut self,
+        plan: &Plan,
+        image: &Payload,
+        next: Option<Stamp>,
+        intake: &mut Intake,
+        tally: &mut Tally,
+    ) -> Option<LogFrame> {
+        self.index += 1;
+        let tolerance_s = plan.input.pair_tolerance_s;
+        let depth = intake.depth.take(image.stamp, next, tolerance_s);
+        let right = intake.right.take(image.stamp, next, tolerance_s);
+        if plan.has_second_depth() && depth.is_none() {
+            tally.count("colour_without_depth");
+        }
+        if plan.chosen.right.is_some() && right.is_none() {
+            tally.count("left_without_right");
+        }
+        let lacks_depth = plan.needs.depth && plan.has_second_depth() && depth.is_none();
+        if lacks_depth || plan.needs.right && right.is_none() {
+            return None;
+        }
+        let mut images = self.primary(plan, image, tally)?;
+        let size = size_of(&images)?;
+        let camera = self.camera_at(plan, image, size, intake, tally)?;
+        if let Some(depth) = depth {
+            images.depth = self.depth(plan, image, &depth, &camera, intake, tally);
+        }
+        if let Some(right) = right {
+            images.right = right_image(plan, &right, size, tally);
+        }
+        let lacks = plan.needs.depth && images.depth.is_none()
+            || plan.needs.right && images.right.is_none();
+        (!lacks).then(|| self.finish(plan, image.stamp, camera, images, intake, tally))
+    }
+
+    /// The image that makes the frame.
+    fn primary(&mut self, plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<Images> {
+        let pixels = pixels(plan, plan.primary(), image, tally)?;
+        let size = pixels.size();
+        if let Some(Err(misfit)) = plan.lens.map(|lens| check_size(&lens, size.0, size.1)) {
+            tally.lose("images_of_other_size", || format!("{}: {misfit}", plan.primary()));
+            self.misfit.get_or_insert(misfit);
+            return None;
+        }
+        let mut images = Images::default();
+        match pixels {
+            Pixels::Colour(colour) => images.colour = Some(Arc::new(colour)),
+            Pixels::Grey(grey) => images.grey = Some(Arc::new(grey)),
+            Pixels::Depth(depth) => images.depth = Some(Arc::new(depth)),
+        }
+        Some(images)
+    }
+
+    /// The camera at the moment of an image; the last one while it stays.
+    fn camera_at(
+        &mut self,
+        plan: &Plan,
+        image: &Payload,
+        (width, height): (usize, usize),
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> Option<Arc<Camera>> {
+        let found = plan.mount.at(&intake.tf, image.stamp);
+        let known = found.or_else(|| self.camera.as_ref().map(|last| last.robot_from_camera));
+        if found.is_none() {
+            tally.count("frames_without_camera_pose");
+        }
+        let Some(robot_from_camera) = known else {
+            tally.lose("frames_before_camera_pose", || {
+                format!("no camera pose in {} at the first images", plan.mount.source())
+            });
+            return None;
+        };
+        let lens = plan.lens.map_or_else(|| assumed_lens(width, height), |known| known.lens);
+        let camera = Camera { lens: Lens::Pinhole(lens), width, height, robot_from_camera };
+        if self.camera.as_deref() != Some(&camera) {
+            self.camera = Some(Arc::new(camera));
+        }
+        self.camera.clone()
+    }
+
+    /// A depth image in the view of the colour camera.
+    fn depth(
+        &mut self,
+        plan: &Plan,
+        image: &Payload,
+        depth: &Payload,
+        camera: &Camera,
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> Option<Arc<DepthImage>> {
+        let Some(Pixels::Depth(seen)) = pixels(plan, plan.chosen.depth.as_ref()?, depth, tally)
+        else {
+            return None;
+        };
+        let same_size = (seen.width(), seen.height()) == (camera.width, camera.height);
+        if same_size && image.frame_id == depth.frame_id && plan.same_lens() {
+            return Some(Arc::new(seen));
+        }
+        let pose = if image.frame_id == depth.frame_id {
+            Some(Isometry3::identity())
+        } else {
+            intake.tf.lookup(&image.frame_id, &depth.frame_id, depth.stamp)
+        };
+        match (pose, plan.depth_camera(&seen)) {
+            (Some(pose), Some(from)) => self.register(&from, camera, pose, &seen, tally),
+            _ if same_size => {
+                tally.note(
+                    "depth and colour have different frames and no transform or calibration \
+                     between them: depth is taken to be registered to colour",
+                );
+                Some(Arc::new(seen))
+            }
+            _ => {
+                tally.lose("depth_not_registrable", || {
+                    "depth has another size than colour, and there is no transform or no \
+                     calibration to register it with"
+                        .into()
+                });
+                None
+            }
+        }
+    }
+
+    fn register(
+        &mut self,
+        from: &Camera,
+        camera: &Camera,
+        colour_from_depth: Isometry3<f64>,
+        seen: &DepthImage,
+        tally: &mut Tally,
+    ) -> Option<Arc<DepthImage>> {
+        tally.count("depth_registered");
+        tally.note("depth is registered to the colour camera through tf and both calibrations");
+        if !self.registration.as_ref().is_some_and(|known| known.is_for(&colour_from_depth)) {
+            self.registration = Some(Registration::new(from, camera, colour_from_depth));
+        }
+        self.registration.as_ref()?.apply(seen).map(Arc::new)
+    }
+
+    fn finish(
+        &mut self,
+        plan: &Plan,
+        stamp: Stamp,
+        camera: Arc<Camera>,
+        images: Images,
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> LogFrame {
+        let here = self.pose_at(plan, stamp, intake);
+        let (motion, jumped) = self.motion(plan, stamp, here, intake);
+        if jumped {
+            tally.count("odometry_jumps");
+        }
+        if here.stale {
+            tally.count("odometry_gap_frames");
+        }
+        self.previous = Some((stamp, here.pose));
+        tally.count("frames");
+        LogFrame {
+            frame: Frame::new(self.index, stamp, camera, motion, images),
+            odom_from_robot: here.pose,
+            odom_stale: here.stale || jumped,
+        }
+    }
+
+    fn pose_at(&self, plan: &Plan, stamp: Stamp, intake: &Intake) -> PoseAt {
+        let found = match &plan.odom_frames {
+            None => return PoseAt { pose: Isometry2::identity(), stale: false },
+            Some(None) => intake.poses.at(stamp),
+            Some(Some((odom, robot))) => intake
+                .tf
+                .lookup(odom, robot, stamp)
+                .map(|pose| PoseAt { pose: planar_pose(&pose), stale: false }),
+        };
+        let last = self.previous.map_or_else(Isometry2::identity, |(_, pose)| pose);
+        found.unwrap_or(PoseAt { pose: last, stale: true })
+    }
+
+    /// The motion since the previous frame, and whether odometry jumped in it.
+    fn motion(&self, plan: &Plan, stamp: Stamp, here: PoseAt, intake: &Intake) -> (Motion, bool) {
+        let Some((then, before)) = self.previous.filter(|(then, _)| *then < stamp) else {
+            return (Motion::at_rest(0.0), false);
+        };
+        let dt = stamp.seconds_since(then);
+        let jumped =
+            matches!(plan.odom_frames, Some(None)) && intake.poses.jumped_between(then, stamp);
+        if here.stale || jumped {
+            return (unknown_motion(dt), jumped);
+        }
+        (Motion::between(&before, &here.pose, dt, plan.input.odometry_sigma), false)
+    }
+}
+
+fn size_of(images: &Images) -> Option<(usize, usize)> {
+    let colour = images.colour.as_ref().map(|image| (image.width(), image.height()));
+    let grey = images.grey.as_ref().map(|image| (image.width(), image.height()));
+    let depth = images.depth.as_ref().map(|image| (image.width(), image.height()));
+    colour.or(grey).or(depth)
+}
+
+fn right_image(
+    plan: &Plan,
+    right: &Payload,
+    size: (usize, usize),
+    tally: &mut Tally,
+) -> Option<Arc<tagalong_core::GreyImage>> {
+    let pixels = pixels(plan, plan.chosen.right.as_ref()?, right, tally)?;
+    if pixels.size() != size {
+        tally.lose("right_of_other_size", || "the right image has another size".into());
+        return None;
+    }
+    match pixels {
+        Pixels::Colour(colour) => Some(Arc::new(colour.to_grey())),
+        Pixels::Grey(grey) => Some(Arc::new(grey)),
+        Pixels::Depth(_) => None,
+    }
+}
+
+/// Decodes an image message; a failure is counted as lost.
+fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Option<Pixels> {
+    let (unit, limits) = (plan.input.depth_unit_m, &plan.limits);
+    let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
+    let decoded = if kind == Some(Type::Image) {
+        decode::<Image<'_>>(&image.data)
+            .map_err(|error| ImageError::Codec(error.to_string()))
+            .and_then(|image| decode_raw(&image, unit, limits))
+    } else {
+        decode::<CompressedImage<'_>>(&image.data)
+            .map_err(|error| ImageError::Codec(error.to_string()))
+            .and_then(|image| decode_compressed(&image, unit, limits))
+    };
+    decoded
+        .map_err(|error| {
+            tally.lose(error.counter(), || format!("{topic} at {}: {error}", image.stamp));
+        })
+        .ok()
+}
+
+/// A lens with a horizontal view of 53 degrees, for logs that tell nothing.
+fn assumed_lens(width: usize, height: usize) -> Pinhole {
+    Pinhole {
+        fx: width as f64,
+        fy: width as f64,
+        cx: 0.5 * (width as f64 - 1.0),
+        cy: 0.5 * (height as f64 - 1.0),
+        distortion: Distortion::None,
+    }
+}

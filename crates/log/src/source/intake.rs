@@ -1,0 +1,133 @@
+//! Sorts the messages of a log into what the frames are made of.
+
+use tagalong_core::planar_pose;
+
+use super::pairing::{Arrival, Payload, Reorder, Waiting};
+use super::tally::Tally;
+use crate::InputSettings;
+use crate::mcap_walk::Message;
+use crate::msgs::{CameraInfo, CdrError, CompressedImage, Image, Odometry, TFMessage, decode};
+use crate::odometry::PoseBuffer;
+use crate::scan::{Scan, Type, is_static};
+use crate::tf::TfBuffer;
+use crate::topics::Chosen;
+
+/// Everything that has been read and not yet become a frame.
+pub(super) struct Intake {
+    chosen: Chosen,
+    /// The topic that makes the frames: colour, or depth where there is none.
+    primary: String,
+    info: Option<CameraInfo>,
+    pub(super) frames: Reorder,
+    pub(super) depth: Waiting,
+    pub(super) right: Waiting,
+    pub(super) tf: TfBuffer,
+    pub(super) poses: PoseBuffer,
+}
+
+impl Intake {
+    pub(super) fn new(scan: &Scan, chosen: &Chosen, primary: &str, input: &InputSettings) -> Self {
+        let mut tf = scan.tf.clone();
+        tf.clear_moving();
+        let info = chosen.colour_info.as_ref().and_then(|topic| scan.infos.get(topic));
+        Self {
+            chosen: chosen.clone(),
+            primary: primary.to_owned(),
+            info: info.cloned(),
+            frames: Reorder::new(input.reorder_frames),
+            depth: Waiting::default(),
+            right: Waiting::default(),
+            tf,
+            poses: PoseBuffer::default(),
+        }
+    }
+
+    /// Takes in a message. One that does not decode is counted as lost.
+    pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        let topic = Some(&message.channel.topic);
+        let outcome = if *message.channel.topic == self.primary {
+            payload(message).map(|image| self.take_frame(image, tally))
+        } else if topic == self.chosen.depth.as_ref() {
+            payload(message).map(|image| self.depth.push(image))
+        } else if topic == self.chosen.right.as_ref() {
+            payload(message).map(|image| self.right.push(image))
+        } else if topic == self.chosen.odometry.as_ref() {
+            decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
+        } else if topic == self.chosen.colour_info.as_ref() {
+            decode(message.data).map(|info| self.watch_info(&info, tally))
+        } else if Type::of(&message.channel.schema_name) == Type::Tf {
+            decode(message.data).map(|tf| self.take_tf(&tf, &message.channel.topic, tally))
+        } else {
+            Ok(())
+        };
+        if let Err(error) = outcome {
+            tally.lose("messages_undecodable", || format!("{}: {error}", message.channel.topic));
+        }
+    }
+
+    fn take_frame(&mut self, image: Payload, tally: &mut Tally) {
+        let newest = self.frames.last();
+        match self.frames.push(image) {
+            Arrival::Queued | Arrival::Suspect => {}
+            Arrival::Duplicate => tally.count("duplicate_frames"),
+            Arrival::LateBefore => tally.count("late_frames"),
+            Arrival::Jumped => {
+                tally.count("time_jumps_back");
+                if let Some(newest) = newest {
+                    self.depth.set_aside(newest);
+                    self.right.set_aside(newest);
+                }
+            }
+        }
+    }
+
+    fn take_odometry(&mut self, odometry: &Odometry, tally: &mut Tally) {
+        let pose = odometry.pose.pose.isometry();
+        let taken =
+            pose.is_some_and(|pose| self.poses.push(odometry.header.stamp(), planar_pose(&pose)));
+        if !taken {
+            tally.lose("odometry_invalid", || "a pose of the odometry is not finite".into());
+        }
+    }
+
+    fn take_tf(&mut self, tf: &TFMessage, topic: &str, tally: &mut Tally) {
+        for transform in &tf.transforms {
+            if !self.tf.insert(transform, is_static(topic)) {
+                tally.lose("transforms_invalid", || {
+                    format!(
+                        "{topic}: {} to {} is no rigid transform",
+                        transform.header.frame_id, transform.child_frame_id
+                    )
+                });
+            }
+        }
+    }
+
+    fn watch_info(&mut self, info: &CameraInfo, tally: &mut Tally) {
+        let changed = self.info.as_ref().is_some_and(|first| {
+            first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
+        });
+        if changed {
+            tally.count("camera_info_changes");
+            tally.note("the calibration changes within the log; the first one is used throughout");
+        }
+    }
+
+    /// At the end of the log and after a jump of the clock.
+    pub(super) fn settle(&mut self) {
+        if self.frames.is_flushed() {
+            self.depth.restore();
+            self.right.restore();
+        }
+    }
+}
+
+/// The stamp and frame of an image message, and its bytes.
+fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
+    let header = if Type::of(&message.channel.schema_name) == Type::Image {
+        decode::<Image<'_>>(message.data)?.header
+    } else {
+        decode::<CompressedImage<'_>>(message.data)?.header
+    };
+    Ok(Payload { stamp: header.stamp(), frame_id: header.frame_id, data: message.data.to_vec() })
+}

@@ -1,0 +1,72 @@
+//! Where the camera sits on the robot.
+
+use nalgebra::Isometry3;
+use tagalong_core::{Camera, Pinhole, Stamp};
+
+use crate::scan::Scan;
+use crate::tf::TfBuffer;
+use crate::{InputSettings, MountSettings};
+
+/// Where the pose of the camera comes from.
+#[derive(Clone, Debug)]
+pub(super) enum Mount {
+    /// Looked up for each image.
+    Tf { base: String, camera: String },
+    /// The same for all images.
+    Fixed { pose: Isometry3<f64>, source: String },
+}
+
+/// The height that is assumed where nothing tells it and nothing depends on it, m.
+const ASSUMED_HEIGHT_M: f64 = 1.2;
+
+impl Mount {
+    /// From tf, else from the settings; `None` if neither tells.
+    pub(super) fn find(scan: &Scan, camera: Option<&str>, input: &InputSettings) -> Option<Self> {
+        let base = robot_frame(scan, input);
+        if let Some(camera) = camera.filter(|camera| scan.tf.connects(base, camera)) {
+            return Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() });
+        }
+        let mount = input.camera.as_ref()?;
+        Some(Self::fixed(mount, "[input.camera] of the config".into()))
+    }
+
+    pub(super) fn fixed(mount: &MountSettings, source: String) -> Self {
+        Self::Fixed { pose: pose_of(mount), source }
+    }
+
+    pub(super) fn assumed() -> Self {
+        let mount = MountSettings { height_m: ASSUMED_HEIGHT_M, ..MountSettings::default() };
+        Self::fixed(&mount, "an assumption (neither tf, nor [input.camera], nor depth)".into())
+    }
+
+    /// What to tell about it.
+    pub(super) fn source(&self) -> String {
+        match self {
+            Self::Tf { base, camera } => format!("tf ({base} to {camera})"),
+            Self::Fixed { source, .. } => source.clone(),
+        }
+    }
+
+    /// The pose of the camera in the robot at a moment, if it is known.
+    pub(super) fn at(&self, tf: &TfBuffer, stamp: Stamp) -> Option<Isometry3<f64>> {
+        match self {
+            Self::Tf { base, camera } => tf.lookup(base, camera, stamp),
+            Self::Fixed { pose, .. } => Some(*pose),
+        }
+    }
+}
+
+/// The frame on the floor: `base_footprint` where a robot has one and the
+/// settings do not say otherwise.
+pub(super) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str {
+    if input.base_frame == "base_link" && scan.tf.knows("base_footprint") {
+        return "base_footprint";
+    }
+    &input.base_frame
+}
+
+fn pose_of(mount: &MountSettings) -> Isometry3<f64> {
+    let (pitch, roll) = (mount.pitch_down_deg.to_radians(), mount.roll_deg.to_radians());
+    let any = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Default::default() };
+    Camera::mounted(any, 1, 1, mount.height_m, pitch, roll).robot_from_camera
+}

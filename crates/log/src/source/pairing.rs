@@ -1,0 +1,261 @@
+//! Puts images in the order of their stamps and finds those that belong together.
+
+use std::collections::VecDeque;
+
+use tagalong_core::Stamp;
+
+/// The undecoded message of an image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Payload {
+    pub(super) stamp: Stamp,
+    pub(super) frame_id: String,
+    pub(super) data: Vec<u8>,
+}
+
+/// Messages kept of a second stream; more are not near any image to come.
+const MAX_WAITING: usize = 64;
+
+/// Images of a second stream (depth, right) that wait for their partner.
+#[derive(Debug, Default)]
+pub(super) struct Waiting {
+    images: VecDeque<Payload>,
+    aside: VecDeque<Payload>,
+    /// Images that left without a partner.
+    pub(super) unpaired: u64,
+}
+
+impl Waiting {
+    pub(super) fn push(&mut self, payload: Payload) {
+        let place = self.images.partition_point(|old| old.stamp <= payload.stamp);
+        self.images.insert(place, payload);
+        if self.images.len() > MAX_WAITING {
+            self.images.pop_front();
+            self.unpaired += 1;
+        }
+    }
+
+    /// Takes the image nearest to `stamp` if it is within the tolerance and not
+    /// nearer to the image that comes next. Older images are dropped.
+    pub(super) fn take(
+        &mut self,
+        stamp: Stamp,
+        next: Option<Stamp>,
+        tolerance_s: f64,
+    ) -> Option<Payload> {
+        let off = |image: &Payload, to: Stamp| image.stamp.seconds_since(to).abs();
+        let nearest = (0..self.images.len())
+            .min_by(|a, b| off(&self.images[*a], stamp).total_cmp(&off(&self.images[*b], stamp)));
+        let found = nearest.filter(|i| {
+            let here = off(&self.images[*i], stamp);
+            let there = next.map_or(f64::INFINITY, |next| off(&self.images[*i], next));
+            here <= tolerance_s && here <= there
+        });
+        let taken = found.and_then(|i| self.images.remove(i));
+        self.drop_before(stamp.plus_seconds(-tolerance_s));
+        taken
+    }
+
+    fn drop_before(&mut self, stamp: Stamp) {
+        while self.images.front().is_some_and(|image| image.stamp < stamp) {
+            self.images.pop_front();
+            self.unpaired += 1;
+        }
+    }
+
+    /// After a jump of the clock: keeps what is older than `stamp`, and hence of
+    /// the new time, for [`Waiting::restore`].
+    pub(super) fn set_aside(&mut self, stamp: Stamp) {
+        let first_old = self.images.partition_point(|image| image.stamp < stamp);
+        let old = self.images.split_off(first_old);
+        self.aside = std::mem::replace(&mut self.images, old);
+    }
+
+    /// The old time is over: drops what is left of it.
+    pub(super) fn restore(&mut self) {
+        if !self.aside.is_empty() {
+            self.unpaired += self.images.len() as u64;
+            self.images = std::mem::take(&mut self.aside);
+        }
+    }
+}
+
+/// What became of an image that arrived.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arrival {
+    /// It waits for its turn.
+    Queued,
+    /// Its stamp is that of another image.
+    Duplicate,
+    /// It is older than what was delivered; whether it is late or the clock has
+    /// jumped will show with the next image.
+    Suspect,
+    /// The image before was late and is dropped; this one waits.
+    LateBefore,
+    /// The clock has jumped back: all images of the old time are ready now, and
+    /// the queue goes on with the new one.
+    Jumped,
+}
+
+/// Orders a stream of images by stamp.
+#[derive(Debug)]
+pub(super) struct Reorder {
+    window: usize,
+    queue: VecDeque<Payload>,
+    ready: VecDeque<Payload>,
+    suspect: Option<Payload>,
+    last: Option<Stamp>,
+}
+
+impl Reorder {
+    pub(super) fn new(window: usize) -> Self {
+        Self { window, queue: VecDeque::new(), ready: VecDeque::new(), suspect: None, last: None }
+    }
+
+    pub(super) fn push(&mut self, payload: Payload) -> Arrival {
+        let taken = |stamp: Stamp| {
+            self.last == Some(stamp)
+                || self.queue.iter().any(|queued| queued.stamp == stamp)
+                || self.suspect.as_ref().is_some_and(|suspect| suspect.stamp == stamp)
+        };
+        if taken(payload.stamp) {
+            return Arrival::Duplicate;
+        }
+        let is_old = self.last.is_some_and(|last| payload.stamp < last);
+        match (self.suspect.take(), is_old) {
+            (None, false) => {
+                self.enqueue(payload);
+                Arrival::Queued
+            }
+            (None, true) => {
+                self.suspect = Some(payload);
+                Arrival::Suspect
+            }
+            (Some(_), false) => {
+                self.enqueue(payload);
+                Arrival::LateBefore
+            }
+            (Some(first), true) => {
+                self.ready.append(&mut self.queue);
+                self.last = None;
+                self.enqueue(first);
+                self.enqueue(payload);
+                Arrival::Jumped
+            }
+        }
+    }
+
+    fn enqueue(&mut self, payload: Payload) {
+        let place = self.queue.partition_point(|queued| queued.stamp < payload.stamp);
+        self.queue.insert(place, payload);
+    }
+
+    /// The next image in order, if no earlier one can come any more (or the log
+    /// has ended), with the stamp of the one after it.
+    pub(super) fn pop(&mut self, ended: bool) -> Option<(Payload, Option<Stamp>)> {
+        if let Some(payload) = self.ready.pop_front() {
+            return Some((payload, self.ready.front().map(|next| next.stamp)));
+        }
+        if self.queue.len() <= self.window && !ended {
+            return None;
+        }
+        let payload = self.queue.pop_front()?;
+        self.last = Some(payload.stamp);
+        Some((payload, self.queue.front().map(|next| next.stamp)))
+    }
+
+    /// True if no images of the time before a jump are left.
+    pub(super) fn is_flushed(&self) -> bool {
+        self.ready.is_empty()
+    }
+
+    /// The newest stamp that was handed out.
+    pub(super) fn last(&self) -> Option<Stamp> {
+        self.last
+    }
+
+    /// At the end of the log: an image that was held back as suspect is late.
+    pub(super) fn drop_suspect(&mut self) -> bool {
+        self.suspect.take().is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn at(millis: u64) -> Payload {
+        Payload { stamp: Stamp::from_nanos(millis * 1_000_000), ..Payload::default() }
+    }
+
+    fn millis(stamp: Stamp) -> u64 {
+        stamp.nanos() / 1_000_000
+    }
+
+    /// Everything that comes out, and what happened to each arrival.
+    fn run(window: usize, arrivals: &[u64]) -> (Vec<u64>, Vec<Arrival>) {
+        let mut reorder = Reorder::new(window);
+        let (mut out, mut what) = (Vec::new(), Vec::new());
+        for arrival in arrivals {
+            what.push(reorder.push(at(*arrival)));
+            while let Some((payload, _)) = reorder.pop(false) {
+                out.push(millis(payload.stamp));
+            }
+        }
+        while let Some((payload, _)) = reorder.pop(true) {
+            out.push(millis(payload.stamp));
+        }
+        (out, what)
+    }
+
+    #[test]
+    fn a_late_image_is_dropped_and_a_repeated_one_too() {
+        let (out, what) = run(1, &[100, 200, 300, 400, 150, 500, 500]);
+        assert_eq!(out, [100, 200, 300, 400, 500]);
+        assert_eq!(what[4..], [Arrival::Suspect, Arrival::LateBefore, Arrival::Duplicate]);
+    }
+
+    #[test]
+    fn after_a_jump_back_everything_is_delivered() {
+        let (out, what) = run(2, &[1000, 1100, 1200, 1300, 1400, 10, 110, 210, 310]);
+        assert_eq!(out, [1000, 1100, 1200, 1300, 1400, 10, 110, 210, 310]);
+        assert_eq!(what[6], Arrival::Jumped);
+    }
+
+    #[test]
+    fn depth_at_half_rate_goes_to_the_nearer_image() {
+        let mut waiting = Waiting::default();
+        waiting.push(at(100));
+        waiting.push(at(160));
+        let mut take = |t, next: u64| waiting.take(at(t).stamp, Some(at(next).stamp), 0.03);
+        assert_eq!(take(92, 125), Some(at(100)));
+        assert_eq!(take(125, 158), None);
+        assert_eq!(take(158, 191), Some(at(160)));
+        assert_eq!(waiting.unpaired, 0);
+    }
+
+    #[test]
+    fn what_finds_no_partner_is_counted() {
+        let mut waiting = Waiting::default();
+        (0..100).for_each(|i| waiting.push(at(i)));
+        assert_eq!(waiting.unpaired, 36);
+        assert_eq!(waiting.take(at(500).stamp, None, 0.03), None);
+        assert_eq!(waiting.unpaired, 100);
+    }
+
+    proptest! {
+        #[test]
+        fn small_disorder_is_undone(seed in any::<u64>(), window in 1..4_usize) {
+            let sorted: Vec<u64> = (1..40).map(|i| i * 33).collect();
+            let mut shuffled = sorted.clone();
+            // Swapping neighbours within blocks delays nothing by more than the window.
+            for (i, block) in shuffled.chunks_mut(window + 1).enumerate() {
+                let turn = (seed >> (i % 60)) as usize % block.len();
+                block.rotate_left(turn);
+            }
+            let (out, _) = run(window + 1, &shuffled);
+            prop_assert_eq!(out, sorted);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Which topics of a log are the colour images, the depth images, and so on.
+
+use tagalong_core::nearest;
+
+use crate::images::Content;
+use crate::scan::{Scan, Topic, Type};
+use crate::{InputSettings, LogError, Needs};
+
+/// The topics that are read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Chosen {
+    pub(crate) colour: Option<String>,
+    pub(crate) depth: Option<String>,
+    pub(crate) right: Option<String>,
+    pub(crate) colour_info: Option<String>,
+    pub(crate) depth_info: Option<String>,
+    pub(crate) right_info: Option<String>,
+    pub(crate) odometry: Option<String>,
+}
+
+/// Chooses topics as named in the settings, else by type, encoding and name.
+///
+/// # Errors
+/// [`LogError::Missing`] for a named topic that is not there, and for images
+/// that are needed and found nowhere.
+pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result<Chosen, LogError> {
+    let images = &[Type::Image, Type::CompressedImage][..];
+    let infos = &[Type::CameraInfo][..];
+    let named = |key, topic: &Option<String>, types| named(scan, key, topic.as_deref(), types);
+    let depth = named("depth_topic", &input.depth_topic, images)?
+        .or_else(|| best(scan, |name, topic| depth_rank(name, topic)));
+    let colour = named("colour_topic", &input.colour_topic, images)?
+        .or_else(|| best(scan, |name, topic| colour_rank(name, topic, false)));
+    let right = named("right_topic", &input.right_topic, images)?
+        .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true)));
+    let right = right.filter(|topic| Some(topic) != colour.as_ref());
+    let odometry = named("odometry_topic", &input.odometry_topic, &[Type::Odometry])?
+        .or_else(|| best(scan, |name, topic| odometry_rank(name, topic)));
+    let info = |key, wanted: &Option<String>, image: &Option<String>| {
+        Ok::<_, LogError>(named(key, wanted, infos)?.or_else(|| info_of(scan, image.as_deref()?)))
+    };
+    let chosen = Chosen {
+        colour_info: info("colour_info_topic", &input.colour_info_topic, &colour)?,
+        depth_info: info("depth_info_topic", &input.depth_info_topic, &depth)?,
+        right_info: info("right_info_topic", &input.right_info_topic, &right)?,
+        colour,
+        depth,
+        right,
+        odometry,
+    };
+    check(scan, &chosen, needs)?;
+    Ok(chosen)
+}
+
+fn check(scan: &Scan, chosen: &Chosen, needs: Needs) -> Result<(), LogError> {
+    let wanted = [
+        (needs.colour && chosen.colour.is_none(), "colour images", "colour_topic", COLOUR),
+        (needs.depth && chosen.depth.is_none(), "depth images", "depth_topic", DEPTH),
+        (
+            needs.right && chosen.right.is_none(),
+            "right images of a stereo pair",
+            "right_topic",
+            COLOUR,
+        ),
+        (
+            !(needs.colour || needs.depth || needs.right)
+                && chosen.colour.is_none()
+                && chosen.depth.is_none(),
+            "images at all",
+            "colour_topic",
+            COLOUR,
+        ),
+    ];
+    match wanted.into_iter().find(|(missing, ..)| *missing) {
+        None => Ok(()),
+        Some((_, what, key, kinds)) => {
+            let image = scan.topics.iter().find(|(_, topic)| is_image(topic));
+            let hint = image.map(|(name, topic)| {
+                let pixels = topic.pixels.as_deref().unwrap_or("no message");
+                format!("; if {name} ({pixels}) is meant, name it as `{key}` under [input]")
+            });
+            Err(missing(scan, format!("{what} ({kinds})"), hint.unwrap_or_default()))
+        }
+    }
+}
+
+const COLOUR: &str = "sensor_msgs/Image with rgb8, bgr8, rgba8, bgra8 or mono8, or \
+                      sensor_msgs/CompressedImage with jpeg or png";
+const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, or sensor_msgs/CompressedImage \
+                     with compressedDepth";
+
+pub(crate) fn missing(scan: &Scan, wanted: String, hint: String) -> LogError {
+    LogError::Missing { path: scan.path.clone(), wanted, hint, present: scan.listing() }
+}
+
+fn is_image(topic: &Topic) -> bool {
+    matches!(topic.kind, Type::Image | Type::CompressedImage)
+}
+
+/// A topic that the settings name.
+fn named(
+    scan: &Scan,
+    key: &str,
+    name: Option<&str>,
+    types: &[Type],
+) -> Result<Option<String>, LogError> {
+    let Some(name) = name else { return Ok(None) };
+    if scan.topics.get(name).is_some_and(|topic| types.contains(&topic.kind)) {
+        return Ok(Some(name.to_owned()));
+    }
+    let fitting = scan.topics.iter().filter(|(_, topic)| types.contains(&topic.kind));
+    let near = nearest(name, fitting.map(|(name, _)| name.as_str()));
+    let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+    Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
+}
+
+/// The topic with the highest rank; of equals the one with the most messages,
+/// then the first by name.
+fn best(scan: &Scan, rank: impl Fn(&str, &Topic) -> Option<i32>) -> Option<String> {
+    let ranked =
+        scan.topics.iter().filter(|(_, topic)| topic.count > 0).filter_map(|(name, topic)| {
+            Some((rank(&name.to_lowercase(), topic)?, topic.count, name))
+        });
+    ranked.rev().max_by_key(|(rank, count, _)| (*rank, *count)).map(|(.., name)| name.clone())
+}
+
+fn has(name: &str, words: &[&str]) -> bool {
+    words.iter().any(|word| name.contains(word))
+}
+
+fn colour_rank(name: &str, topic: &Topic, right: bool) -> Option<i32> {
+    let is_right = has(name, &["right", "infra2"]);
+    if !is_image(topic) || topic.content != Content::Picture || is_right != right {
+        return None;
+    }
+    let mut rank = 0;
+    rank += 8 * i32::from(has(name, &["color", "colour", "rgb"]));
+    rank += 4 * i32::from(has(name, &["left", "front", "rect"]));
+    rank -= 6 * i32::from(has(name, &["infra", "/ir", "depth", "fisheye", "mono", "debug"]));
+    rank += i32::from(topic.kind == Type::Image);
+    Some(rank)
+}
+
+fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
+    if !is_image(topic) || topic.content != Content::Depth {
+        return None;
+    }
+    let mut rank = 0;
+    rank += 8 * i32::from(has(name, &["aligned", "registered"]));
+    rank += 4 * i32::from(name.contains("depth"));
+    rank -= 6 * i32::from(has(name, &["infra", "/ir", "confidence", "debug", "disparity"]));
+    rank += i32::from(topic.kind == Type::Image);
+    Some(rank)
+}
+
+fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
+    let filtered = has(name, &["filtered", "fused"]);
+    (topic.kind == Type::Odometry).then(|| i32::from(!has(name, &["visual"])) + i32::from(filtered))
+}
+
+/// The calibration of an image topic: its `camera_info` sibling, else the only
+/// one with the same frame.
+fn info_of(scan: &Scan, image: &str) -> Option<String> {
+    let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
+    let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let sibling = format!("{folder}/camera_info");
+    if scan.infos.contains_key(&sibling) {
+        return Some(sibling);
+    }
+    let frame = scan.frame_of(image)?;
+    let mut same = scan.infos.iter().filter(|(_, info)| info.header.frame_id == frame);
+    let found = same.next()?.0.clone();
+    same.next().is_none().then_some(found)
+}

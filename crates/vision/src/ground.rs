@@ -1,0 +1,245 @@
+//! The floor, fitted to the points of a depth image.
+//!
+//! Planes through three points are tried (RANSAC; Fischler and Bolles, CACM 1981)
+//! in a fixed order that does not depend on chance, the best one is refined by
+//! least squares over its inliers. The floor is not the largest plane but the
+//! *lowest* large one: points below a plane count against it.
+
+use nalgebra::{Matrix3, Point2, Point3, Unit, Vector3};
+use tagalong_core::{Camera, DepthImage};
+
+/// What a floor may look like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundSettings {
+    /// Lowest and highest camera, m.
+    pub height_m: (f64, f64),
+    /// Largest angle between the image's upward direction and the vertical, rad.
+    pub max_tilt_rad: f64,
+    /// Distance of an inlier at 0 m and its growth with the square of depth, m.
+    pub tolerance_m: (f64, f64),
+    /// Readings farther than this are not used, m.
+    pub max_depth_m: f64,
+    /// Fewest inliers, as a fraction of the points.
+    pub min_inliers: f64,
+    /// Planes tried.
+    pub trials: usize,
+}
+
+impl Default for GroundSettings {
+    fn default() -> Self {
+        Self {
+            height_m: (0.15, 4.0),
+            max_tilt_rad: 0.9,
+            tolerance_m: (0.015, 0.004),
+            max_depth_m: 7.0,
+            min_inliers: 0.06,
+            trials: 600,
+        }
+    }
+}
+
+/// Where the camera is above the floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Upward normal of the floor in the camera frame.
+    pub up_in_camera: Vector3<f64>,
+    /// Height of the camera above the floor, m.
+    pub height_m: f64,
+    /// Part of the points that lie on the floor.
+    pub inliers: f64,
+}
+
+impl Ground {
+    /// How far the optical axis points below the horizon, rad.
+    pub fn pitch_down_rad(&self) -> f64 {
+        (-self.up_in_camera.z).clamp(-1.0, 1.0).asin()
+    }
+
+    /// Roll, rad; positive when the camera's right side is higher.
+    pub fn roll_rad(&self) -> f64 {
+        self.up_in_camera.x.atan2(-self.up_in_camera.y)
+    }
+
+    /// Height of a point of the camera frame above the floor, m.
+    pub fn height_of(&self, point_in_camera: &Point3<f64>) -> f64 {
+        self.up_in_camera.dot(&point_in_camera.coords) + self.height_m
+    }
+}
+
+/// Fits the floor to a depth image of a camera (whose pose is not used).
+/// `None` where no plane qualifies.
+pub fn ground_of_depth(
+    depth: &DepthImage,
+    camera: &Camera,
+    settings: &GroundSettings,
+) -> Option<Ground> {
+    let step = (depth.width() / 160).max(1);
+    let columns = || (0..depth.width()).step_by(step);
+    let pixels = (0..depth.height()).step_by(step).flat_map(|y| columns().map(move |x| (x, y)));
+    let points: Vec<Point3<f64>> = pixels
+        .filter_map(|(x, y)| {
+            let reading = f64::from(depth.row(y)[x]);
+            let usable = reading > 0.0 && reading < settings.max_depth_m;
+            let pixel = Point2::new(x as f64, y as f64);
+            usable.then(|| Point3::from(camera.ray(pixel) * reading))
+        })
+        .collect();
+    ground_of_points(&points, settings)
+}
+
+/// Fits the floor to points of the camera frame (x right, y down, z forward).
+/// `None` where no plane qualifies.
+pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
+    let mut random = Sequence(0x9e37_79b9_7f4a_7c15);
+    let thinned: Vec<_> = points.iter().step_by(points.len() / 2000 + 1).copied().collect();
+    let mut best: Option<(f64, Ground)> = None;
+    for _ in 0..settings.trials {
+        let Some(plane) = random.plane(&thinned).filter(|p| plausible(p, settings)) else {
+            continue;
+        };
+        let score = score(&plane, &thinned, settings);
+        if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
+            best = Some((score, plane));
+        }
+    }
+    let mut plane = best?.1;
+    for _ in 0..4 {
+        plane = refined(&plane, points, settings)?;
+    }
+    let inliers = points.iter().filter(|p| is_inlier(&plane, p, settings)).count();
+    plane.inliers = inliers as f64 / points.len() as f64;
+    (plausible(&plane, settings) && plane.inliers >= settings.min_inliers).then_some(plane)
+}
+
+fn plausible(plane: &Ground, settings: &GroundSettings) -> bool {
+    let (low, high) = settings.height_m;
+    -plane.up_in_camera.y > settings.max_tilt_rad.cos()
+        && low <= plane.height_m
+        && plane.height_m <= high
+}
+
+fn tolerance(point: &Point3<f64>, settings: &GroundSettings) -> f64 {
+    settings.tolerance_m.0 + settings.tolerance_m.1 * point.z * point.z
+}
+
+fn is_inlier(plane: &Ground, point: &Point3<f64>, settings: &GroundSettings) -> bool {
+    plane.height_of(point).abs() < tolerance(point, settings)
+}
+
+/// Points on the plane, less twice the points well below it.
+fn score(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> f64 {
+    let votes = points.iter().map(|point| {
+        let (height, near) = (plane.height_of(point), tolerance(point, settings));
+        if height.abs() < near {
+            1.0
+        } else if height < -3.0 * near {
+            -2.0
+        } else {
+            0.0
+        }
+    });
+    votes.sum()
+}
+
+/// The plane of least squares through the inliers.
+fn refined(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
+    let inliers = || points.iter().filter(|p| is_inlier(plane, p, settings));
+    let count = inliers().count();
+    if count < 3 {
+        return None;
+    }
+    let mean = inliers().map(|p| p.coords).sum::<Vector3<f64>>() / count as f64;
+    let scatter: Matrix3<f64> =
+        inliers().map(|p| (p.coords - mean) * (p.coords - mean).transpose()).sum();
+    let eigen = scatter.symmetric_eigen();
+    let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    through(&mean, normal)
+}
+
+/// The plane through a point with a normal, which is turned upwards.
+fn through(point: &Vector3<f64>, normal: Vector3<f64>) -> Option<Ground> {
+    let up = Unit::try_new(normal, 1e-9)?.into_inner();
+    let up = if up.y > 0.0 { -up } else { up };
+    Some(Ground { up_in_camera: up, height_m: -up.dot(point), inliers: 0.0 })
+}
+
+/// A fixed sequence of well-spread numbers (xorshift).
+struct Sequence(u64);
+
+impl Sequence {
+    fn below(&mut self, count: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % count as u64) as usize
+    }
+
+    fn plane(&mut self, points: &[Point3<f64>]) -> Option<Ground> {
+        if points.len() < 3 {
+            return None;
+        }
+        let [a, b, c] = [(); 3].map(|()| points[self.below(points.len())].coords);
+        through(&a, (b - a).cross(&(c - a)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use tagalong_core::{Distortion, Pinhole};
+
+    use super::*;
+
+    /// A room by ray casting: floor, a wall at 5 m, a table top 0.75 m high.
+    fn room(camera: &Camera) -> DepthImage {
+        DepthImage::from_fn(camera.width, camera.height, |x, y| {
+            let pixel = Point2::new(x as f64, y as f64);
+            let (eye, to) = (camera.back_project(pixel, 0.0), camera.back_project(pixel, 1.0));
+            let ray = to - eye;
+            let floor = Some(-eye.z / ray.z);
+            let wall = Some((5.0 - eye.x) / ray.x);
+            let table = Some((0.75 - eye.z) / ray.z).filter(|t| {
+                let at = eye + ray * *t;
+                (1.5..2.8).contains(&at.x) && (-0.2..1.2).contains(&at.y)
+            });
+            let hits = [floor, wall, table].into_iter().flatten().filter(|t| *t > 0.1);
+            let nearest = hits.fold(f64::INFINITY, f64::min);
+            let noise = 1.0 + 0.002 * (((x * 7 + y * 13) % 11) as f64 / 5.0 - 1.0);
+            if nearest < 8.0 { (nearest * noise) as f32 } else { f32::NAN }
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn the_floor_is_found_beside_tables_and_walls(
+            height in 0.9..2.5f64, pitch in 0.05..0.5f64, roll in -0.2..0.2f64,
+        ) {
+            let lens = Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+            let camera = Camera::mounted(lens, 160, 120, height, pitch, roll);
+            let found = ground_of_depth(&room(&camera), &camera, &GroundSettings::default()).unwrap();
+            prop_assert!((found.height_m - height).abs() < 0.03, "{found:?} {height}");
+            prop_assert!((found.pitch_down_rad() - pitch).abs() < 0.015, "{found:?} {pitch}");
+            prop_assert!((found.roll_rad() - roll).abs() < 0.015, "{found:?} {roll}");
+        }
+    }
+
+    #[test]
+    fn without_a_floor_nothing_is_found() {
+        let settings = GroundSettings::default();
+        assert_eq!(ground_of_points(&[], &settings), None);
+        let wall: Vec<_> = (0..400)
+            .map(|i| Point3::new(f64::from(i % 20) * 0.1 - 1.0, f64::from(i / 20) * 0.1 - 1.0, 3.0))
+            .collect();
+        assert_eq!(ground_of_points(&wall, &settings), None);
+    }
+
+    #[test]
+    fn the_same_points_give_the_same_floor() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 160, 120, 1.2, 0.3, 0.0);
+        let fit = || ground_of_depth(&room(&camera), &camera, &GroundSettings::default());
+        assert_eq!(fit(), fit());
+    }
+}
