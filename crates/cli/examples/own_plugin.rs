@@ -11,7 +11,7 @@ use std::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Detection, DepthImage, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
+    DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
 };
 
 fn main() -> ExitCode {

@@ -67,8 +67,8 @@ pub type Outcome = Result<Ended, Failure>;
 /// Prints to stdout. A closed pipe is a quiet end.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    let written = io::Write::write_all(&mut out, text.as_bytes())
-        .and_then(|()| io::Write::flush(&mut out));
+    let written =
+        io::Write::write_all(&mut out, text.as_bytes()).and_then(|()| io::Write::flush(&mut out));
     written.map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => Failure::nobody_listens(),
         _ => Failure::failed(format!("cannot write to stdout: {error}")),

@@ -16,12 +16,7 @@ struct Mistake {
     says: &'static [&'static str],
 }
 
-fn mistake(
-    name: &'static str,
-    args: &str,
-    code: i32,
-    says: &'static [&'static str],
-) -> Mistake {
+fn mistake(name: &'static str, args: &str, code: i32, says: &'static [&'static str]) -> Mistake {
     let args: &'static str = args.to_owned().leak();
     Mistake { name, args: args.split(' ').collect(), code, says }
 }
@@ -61,12 +56,22 @@ fn mistakes() -> Vec<Mistake> {
         m("a folder as config", "run full good.mcap", 2, &["full is a directory"]),
         m("an empty config", "run empty.toml good.mcap", 2, &["empty.toml", "filter"]),
         m("a config of words", "run words.toml good.mcap", 2, &["words.toml:1:"]),
-        m("an unknown key", "run typo.toml good.mcap", 2, &["typo.toml:3:1", "did you mean `roles`"]),
+        m(
+            "an unknown key",
+            "run typo.toml good.mcap",
+            2,
+            &["typo.toml:3:1", "did you mean `roles`"],
+        ),
         m("an unknown plugin", "run plugin.toml good.mcap", 2, &["plugin.toml:2", "nearest-thing"]),
         m("a wrong type", "check deep.toml", 2, &["deep.toml:"]),
         m("an unknown topic key", "run input.toml good.mcap", 2, &["depth_tropic", "depth_topic"]),
         m("a negative time", "run output.toml good.mcap", 2, &["report_unseen_s"]),
-        m("no log", "run nearest.toml goood.mcap", 1, &["no such file", "did you mean `good.mcap`"]),
+        m(
+            "no log",
+            "run nearest.toml goood.mcap",
+            1,
+            &["no such file", "did you mean `good.mcap`"],
+        ),
         m("a folder as log", "run nearest.toml logs", 1, &["directory", "inside.mcap"]),
         m("an empty log", "run nearest.toml empty.mcap", 1, &["empty.mcap"]),
         m("a log of words", "run nearest.toml words.mcap", 1, &["words.mcap"]),
@@ -77,7 +82,12 @@ fn mistakes() -> Vec<Mistake> {
         m("results in a full folder", "run nearest.toml good.mcap -o full", 2, &["--overwrite"]),
         m("results below a file", "run nearest.toml good.mcap -o old.bag/x", 2, &["old.bag"]),
         m("results as a file", "run nearest.toml good.mcap -o old.bag", 2, &["not a directory"]),
-        m("results over the log", "run nearest.toml good.mcap -o good.mcap --overwrite", 2, &["good.mcap"]),
+        m(
+            "results over the log",
+            "run nearest.toml good.mcap -o good.mcap --overwrite",
+            2,
+            &["good.mcap"],
+        ),
         m(
             "results beside the log",
             "run nearest.toml logs/inside.mcap -o logs --overwrite",

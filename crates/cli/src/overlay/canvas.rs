@@ -149,11 +149,7 @@ impl Canvas {
 }
 
 /// The part of a line inside `bounds` (Liang and Barsky), if there is one.
-fn clip(
-    from: Point2<f64>,
-    to: Point2<f64>,
-    bounds: &Rect,
-) -> Option<(Point2<f64>, Point2<f64>)> {
+fn clip(from: Point2<f64>, to: Point2<f64>, bounds: &Rect) -> Option<(Point2<f64>, Point2<f64>)> {
     let along = to - from;
     let (mut enter, mut leave) = (0.0f64, 1.0f64);
     for (step, room) in [

@@ -36,6 +36,9 @@ impl Trails {
             let floor = scene.odom_from_robot.inverse_transform_point(&p.xy());
             Point3::new(floor.x, floor.y, p.z)
         };
-        self.places.iter().map(|(id, trail)| (*id, trail.iter().map(into_robot).collect())).collect()
+        self.places
+            .iter()
+            .map(|(id, trail)| (*id, trail.iter().map(into_robot).collect()))
+            .collect()
     }
 }

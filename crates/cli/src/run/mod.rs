@@ -75,7 +75,8 @@ impl Job {
         let needs = needs(|| Ok(config.pipeline(registry, args.seed)?.0))?;
         let source = FrameSource::open(&args.log, &outer.input, &outer.limits, needs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
-        let report = blank_report(args, &config, settings.seed);
+        let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
+        let report = blank_report(&config, settings.seed, log);
         Ok(Self { pipeline, outer, source, resolved, folder, report })
     }
 }
@@ -86,14 +87,17 @@ fn default_folder(args: &RunArgs, config: &ConfigFile) -> PathBuf {
     Path::new("runs").join(format!("{log}-{}", config.stem()))
 }
 
-fn blank_report(args: &RunArgs, config: &ConfigFile, seed: u64) -> RunReport {
-    let log = args.log.file_name().unwrap_or_default().to_string_lossy().into_owned();
+fn log_name(args: &RunArgs) -> String {
+    args.log.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
     RunReport {
         tagalong: env!("CARGO_PKG_VERSION"),
         ended: "complete".into(),
-        config: FileFacts { name: config.name(), sha256: Some(config.sha256()) },
+        config: FileFacts { name: config.name(), sha256: config.sha256() },
         seed,
-        log: FileFacts { name: log, sha256: None },
+        log,
         data_lost: false,
         frames: report::Frames::default(),
         persons: BTreeMap::new(),
@@ -161,11 +165,8 @@ struct Desk {
 impl Desk {
     fn open(args: &RunArgs, job: &Job) -> Result<Self, Failure> {
         let dir = RunDir::create(&job.folder, args.overwrite, &args.log).map_err(refused)?;
-        let overlay = if args.overlay {
-            Some(Overlay::new(dir.overlay().map_err(refused)?))
-        } else {
-            None
-        };
+        let overlay =
+            if args.overlay { Some(Overlay::new(dir.overlay().map_err(refused)?)) } else { None };
         let input = &job.outer.input;
         let names = FrameNames { base: input.base_frame.clone(), odom: input.odom_frame.clone() };
         let log = TrackLog::create(dir, names, job.outer.output.clone(), &job.resolved)
@@ -231,7 +232,6 @@ fn describe_source(report: &mut RunReport, source: Option<FrameSource>) {
         report.notes.push("the reader was still waiting for its input".into());
         return;
     };
-    report.log.sha256 = source.facts().sha256.clone();
     report.counters =
         source.counters().iter().map(|(name, count)| ((*name).to_owned(), *count)).collect();
     report.notes.extend(source.notes().iter().cloned());
@@ -248,12 +248,11 @@ fn describe_end(report: &mut RunReport, stopped: Option<&StepError>, signals: &S
 
 /// What the metadata record of `tracks.mcap` says.
 fn about(report: &RunReport) -> BTreeMap<String, String> {
-    let sha256 = |file: &FileFacts| file.sha256.clone().unwrap_or_default();
     BTreeMap::from([
         ("version".into(), report.tagalong.into()),
         ("seed".into(), report.seed.to_string()),
-        ("config_sha256".into(), sha256(&report.config)),
-        ("log_sha256".into(), sha256(&report.log)),
+        ("config_sha256".into(), report.config.sha256.clone()),
+        ("log_sha256".into(), report.log.sha256.clone()),
     ])
 }
 

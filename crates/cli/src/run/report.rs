@@ -41,8 +41,8 @@ pub struct RunReport {
 pub struct FileFacts {
     /// Name of the file.
     pub name: String,
-    /// SHA-256 of its bytes, if all of them were read.
-    pub sha256: Option<String>,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
 }
 
 /// Frames by what their stamp led to.

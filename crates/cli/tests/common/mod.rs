@@ -11,9 +11,7 @@ use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 use nalgebra::Isometry3;
 use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
-use tagalong_log::msgs::{
-    CameraInfo, Header, Image, Message, TFMessage, TransformStamped, encode,
-};
+use tagalong_log::msgs::{CameraInfo, Header, Image, Message, TFMessage, TransformStamped, encode};
 
 pub const WIDTH: usize = 160;
 pub const HEIGHT: usize = 120;
