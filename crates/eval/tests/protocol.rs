@@ -156,6 +156,17 @@ fn a_switch_a_gap_and_a_wrong_person() {
 }
 
 #[test]
+fn a_track_is_kept_before_similarity_is_looked_at() {
+    // The second track lies better in the second frame, the first well enough.
+    let scene = sequence(&[(&[(1, 0.0)], &[(7, 0.0)]), (&[(1, 0.0)], &[(7, 0.3), (8, 0.0)])]);
+    let (clear, matches) = Clear::measure(&prepared(&scene));
+    assert_eq!((clear.id_switches, clear.fp, matches[1][0].col), (0, 1, 0));
+    // Too far off it is not kept.
+    let scene = sequence(&[(&[(1, 0.0)], &[(7, 0.0)]), (&[(1, 0.0)], &[(7, 0.4), (8, 0.0)])]);
+    assert_eq!(Clear::measure(&prepared(&scene)).0.id_switches, 1);
+}
+
+#[test]
 fn what_went_wrong_is_listed_in_the_order_of_time() {
     let scene = sequence(&[
         (&[(1, 0.0), (2, 5.0)], &[(7, 0.0), (8, 5.0)]),
