@@ -159,7 +159,7 @@ impl Pipeline {
             let Some(found) = self.find(now, &followers, &track)? else { continue };
             let Detection { region, position, covariance, .. } = &found.detection;
             covers.push(Cover::new(*region, position, covariance, &now.frame.camera));
-            now.sightings.add(Sighting { fate: Some(Fate::Matched(track.id)), ..found });
+            now.sightings.add(found);
         }
         Ok(())
     }
@@ -192,8 +192,7 @@ impl Pipeline {
 
     /// Who is here that was not found yet?
     fn discover(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
-        let occupied: Vec<Detection> =
-            now.sightings.matched().map(|(_, s)| s.detection.clone()).collect();
+        let occupied: Vec<Detection> = now.sightings.undecided_detections();
         for index in self.due_with(now, Role::Discover) {
             let search = Search::Everywhere { occupied: &occupied };
             for sighting in self.detect(now, index, &search)? {
@@ -206,7 +205,7 @@ impl Pipeline {
 
     fn associate(&mut self, now: &mut Now<'_>) {
         let rules = self.rules(now);
-        now.sightings.merge(&now.expected, &rules);
+        now.sightings.merge(rules.association);
         now.sightings.associate(&now.expected, &rules);
     }
 
@@ -217,12 +216,7 @@ impl Pipeline {
             .matched()
             .map(|(id, s)| Matched { id, detection: &s.detection })
             .collect();
-        let unmatched: Vec<Detection> = now
-            .sightings
-            .undecided()
-            .into_iter()
-            .map(|i| now.sightings.get(i).detection.clone())
-            .collect();
+        let unmatched = now.sightings.undecided_detections();
         let likelihood = likelihood(&self.detectors);
         let evidence =
             Evidence { frame: now.frame, matched: &matched, unmatched: &unmatched, likelihood };
@@ -281,6 +275,10 @@ impl Pipeline {
             let sighting = now.sightings.get(index).clone();
             if sighting.detection.score < start_score {
                 now.sightings.settle(index, Fate::Dropped(sighting.score_test(start_score)));
+                continue;
+            }
+            if !sighting.is_discovery {
+                now.sightings.settle(index, Fate::Dropped("no track fits"));
                 continue;
             }
             let Some(id) = self.lifecycle.start(sighting.detection.score, sighting.detector) else {
@@ -379,13 +377,16 @@ impl Pipeline {
         let found = guard(&slot.settings.plugin, frame.index, || {
             slot.plugin.detect(frame, search, funnel)
         })?;
+        let is_discovery = matches!(search, Search::Everywhere { .. });
         let mut sightings = Vec::new();
         for detection in found {
             if !detection.is_sane() {
                 funnel.drop_many("detection not finite", 1);
                 continue;
             }
-            if let Some(sighting) = self.verify(frame, Sighting::new(detection, index), funnel)? {
+            if let Some(sighting) =
+                self.verify(frame, Sighting::new(detection, index, is_discovery), funnel)?
+            {
                 sightings.push(sighting);
             }
         }

@@ -13,13 +13,16 @@ pub(crate) struct Sighting {
     pub(crate) detector: usize,
     /// Its score before the verifiers.
     pub(crate) raw_score: f64,
+    /// Found by a search everywhere. A search near a track proves nothing about
+    /// somebody new: it passes tests that are meant for known people.
+    pub(crate) is_discovery: bool,
     /// `None` while nothing is decided.
     pub(crate) fate: Option<Fate>,
 }
 
 impl Sighting {
-    pub(crate) fn new(detection: Detection, detector: usize) -> Self {
-        Self { raw_score: detection.score, detection, detector, fate: None }
+    pub(crate) fn new(detection: Detection, detector: usize, is_discovery: bool) -> Self {
+        Self { raw_score: detection.score, detection, detector, is_discovery, fate: None }
     }
 
     /// The test that a score below `start_score` fails.
@@ -87,6 +90,11 @@ impl Sightings {
         (0..self.all.len()).filter(|i| self.all[*i].fate.is_none()).collect()
     }
 
+    /// The detections about which nothing is decided.
+    pub(crate) fn undecided_detections(&self) -> Vec<Detection> {
+        self.undecided().into_iter().map(|i| self.all[i].detection.clone()).collect()
+    }
+
     pub(crate) fn get(&self, index: usize) -> &Sighting {
         &self.all[index]
     }
@@ -95,54 +103,30 @@ impl Sightings {
         self.all[index].fate = Some(fate);
     }
 
-    /// Keeps one sighting a person, the one with the best score. One that
-    /// takes the place of a followed person's sighting keeps their track.
-    pub(crate) fn merge(&mut self, expected: &[Track], rules: &Rules<'_>) {
+    /// Keeps one sighting a person, the one with the best score: two detectors
+    /// may have seen the same one, and so may the searches for two tracks.
+    pub(crate) fn merge(&mut self, settings: &AssociationSettings) {
         let mut order = self.undecided();
         order.sort_by(|a, b| self.score(*b).total_cmp(&self.score(*a)));
         let mut kept: Vec<usize> = Vec::new();
         for index in order {
-            let is_same = |other: usize| {
-                let (a, b) = (&self.all[index].detection, &self.all[other].detection);
-                is_same_person(a, b, rules.association)
+            let is_same = |other: &&usize| {
+                is_same_person(&self.all[index].detection, &self.all[**other].detection, settings)
             };
-            let followed = self.followed().find(|(_, f)| is_same(*f));
-            let is_known = kept.iter().any(|k| is_same(*k));
-            if let Some((id, followed)) = followed {
-                self.compete(index, followed, id, expected, rules);
-            } else if is_known {
-                self.settle(index, Fate::Dropped("same person"));
-            } else {
-                kept.push(index);
+            match kept.iter().find(is_same).copied() {
+                Some(better) => {
+                    self.all[better].is_discovery |= self.all[index].is_discovery;
+                    self.settle(index, Fate::Dropped("same person"));
+                }
+                None => kept.push(index),
             }
         }
     }
 
-    fn compete(
-        &mut self,
-        discovered: usize,
-        followed: usize,
-        id: TrackId,
-        expected: &[Track],
-        rules: &Rules<'_>,
-    ) {
-        let fits = expected
-            .iter()
-            .find(|t| t.id == id)
-            .is_some_and(|t| rules.fit(t, &self.all[discovered].detection).is_some());
-        let (best, other) = if fits && self.score(discovered) > self.score(followed) {
-            (discovered, followed)
-        } else {
-            (followed, discovered)
-        };
-        self.settle(best, Fate::Matched(id));
-        self.settle(other, Fate::Dropped("same person"));
-    }
-
-    /// Gives undecided sightings to the tracks that have none yet.
+    /// Gives sightings to tracks, all at once: a search near one track that
+    /// found another person must not steal that person's sighting.
     pub(crate) fn associate(&mut self, expected: &[Track], rules: &Rules<'_>) {
-        let tracks: Vec<&Track> =
-            expected.iter().filter(|t| self.of_track(t.id).is_none()).collect();
+        let tracks: Vec<&Track> = expected.iter().collect();
         let open = self.undecided();
         let detections: Vec<&Detection> = open.iter().map(|i| &self.all[*i].detection).collect();
         let columns = associate(&tracks, &detections, |t, d| rules.fit(t, d), rules.association);
@@ -186,13 +170,6 @@ impl Sightings {
                 Candidate { detection: sighting.detection, fate }
             })
             .collect()
-    }
-
-    fn followed(&self) -> impl Iterator<Item = (TrackId, usize)> {
-        self.all.iter().enumerate().filter_map(|(index, s)| match s.fate {
-            Some(Fate::Matched(id)) => Some((id, index)),
-            _ => None,
-        })
     }
 
     fn score(&self, index: usize) -> f64 {

@@ -227,6 +227,40 @@ fn the_better_sighting_of_a_followed_person_is_kept() {
 }
 
 #[test]
+fn a_search_for_one_person_does_not_steal_anothers_sighting() {
+    // Two people side by side; then one is gone, and the searches for both
+    // tracks find the other one. Track 1 is the nearer one and searches first.
+    let both = || vec![person(2.9, 0.2), person(3.0, -0.2)];
+    let one = || vec![person(3.0, -0.2)];
+    let world = World::of((0..10).map(|i| if i < 5 { both() } else { one() }));
+    let reports = world.run(FOLLOWING, 10, 0.1);
+    assert_eq!(ids(&reports[4]), [1, 2]);
+    for report in &reports[5..] {
+        let seen: Vec<u32> = report.tracks.iter().filter(|t| t.seen).map(|t| t.id.0).collect();
+        assert_eq!(seen, [2], "frame {}", report.index);
+    }
+}
+
+#[test]
+fn a_search_near_a_track_starts_nobody() {
+    let config = "
+        [[detectors]]
+        plugin = 'script'
+        roles = ['discover']
+        [[detectors]]
+        plugin = 'script'
+        roles = ['follow']
+        config = { script = 1 }
+        [filter]
+        plugin = 'steady'
+    ";
+    let world = World::of([vec![person(3.0, 0.0)], vec![]]);
+    world.show(1, 2, vec![person(3.0, 0.0), person(3.0, 0.45)]);
+    let report = world.run(config, 2, 0.1).remove(1);
+    assert_eq!(ids(&report), [1]);
+}
+
+#[test]
 fn nobody_looks_for_a_person_behind_one_who_was_found() {
     let people = |i: i32| {
         let near = person(2.0, 0.0);

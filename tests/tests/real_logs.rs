@@ -1,0 +1,112 @@
+//! The shipped `depth-ekf` config, unchanged, on every real log with depth.
+//! Without `../shared/data/logs` each test says that it skips.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use tagalong_core::{Funnel, Registry};
+use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_pipeline::Pipeline;
+use tagalong_tests::people::{Boxes, Score, read, score};
+
+struct Run {
+    /// Boxes of confirmed tracks that were seen in the frame.
+    confirmed: Boxes,
+    /// Detections of each frame, whatever became of them.
+    detections: BTreeMap<u64, usize>,
+    frames: u64,
+    funnel: Funnel,
+}
+
+fn data(file: &str) -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/logs");
+    let path = root.join(file);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {} is not here", path.display());
+    None
+}
+
+fn run(path: &Path) -> Run {
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let text = std::fs::read_to_string(configs.join("depth-ekf.toml")).unwrap();
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
+    let needs = Needs { depth: true, ..Needs::default() };
+    let mut source = FrameSource::open(path, &InputSettings::default(), &Limits::default(), needs).unwrap();
+    let mut run =
+        Run { confirmed: Boxes::new(), detections: BTreeMap::new(), frames: 0, funnel: Funnel::default() };
+    while let Some(frame) = source.next_frame() {
+        let frame = frame.frame;
+        let report = pipeline.step(&frame).unwrap();
+        run.frames += 1;
+        run.funnel.merge(&report.funnel);
+        run.detections.insert(frame.index, report.candidates.len());
+        let (width, height) = (frame.camera.width, frame.camera.height);
+        let seen = report.tracks.iter().filter(|t| t.confirmed && t.seen);
+        let boxes: Vec<_> =
+            seen.map(|t| (t.id.0, t.estimate.region.clipped(width, height))).collect();
+        if !boxes.is_empty() {
+            run.confirmed.insert(frame.index, boxes);
+        }
+    }
+    assert!(!source.data_lost(), "{:?}", source.counters());
+    run
+}
+
+fn scored(name: &str) -> Option<(Run, Score)> {
+    let path = data(&format!("{name}.mcap"))?;
+    let truth = read(&path.with_file_name(format!("{name}.people.csv"))).unwrap();
+    let run = run(&path);
+    let score = score(&truth, &run.confirmed);
+    println!("{name}: {score:?}\n{name}: {:?}", run.funnel);
+    Some((run, score))
+}
+
+#[test]
+fn the_walker_of_um_is_found_and_keeps_at_most_two_numbers() {
+    let Some((run, score)) = scored("um") else { return };
+    assert_eq!(run.frames, 38);
+    assert_eq!((score.people, score.covered_soon), (1, 1));
+    assert!(score.covered * 10 >= score.rows * 7, "{score:?}");
+    assert!(score.ids[&1].len() <= 2, "{score:?}");
+    assert!(score.false_boxes <= 2, "{score:?}");
+}
+
+#[test]
+fn people_who_walk_past_lab2_are_found_within_two_frames() {
+    let Some((_, score)) = scored("lab2-camera2") else { return };
+    assert!(score.covered_soon * 10 >= score.people * 7, "{score:?}");
+    assert_eq!(score.false_boxes, 0, "{score:?}");
+}
+
+#[test]
+fn nobody_is_confirmed_in_the_empty_frames_of_filinha() {
+    let Some((run, score)) = scored("filinha") else { return };
+    assert_eq!(run.frames, 108);
+    for frame in (1..=4).chain(7..=26).chain(103..=108) {
+        assert!(!run.confirmed.contains_key(&frame), "frame {frame}: {:?}", run.confirmed[&frame]);
+    }
+    assert!(score.covered * 10 >= score.rows * 7, "{score:?}");
+}
+
+#[test]
+fn five_people_are_five_and_the_office_is_empty() {
+    let Some(path) = data("pcl-single-frames.mcap") else { return };
+    let run = run(&path);
+    println!("five_people: {} detections; {:?}", run.detections[&1], run.funnel);
+    assert_eq!(run.detections[&1], 5);
+    assert!(!run.confirmed.contains_key(&2), "office1: {:?}", run.confirmed[&2]);
+}
+
+#[test]
+fn every_log_with_depth_runs() {
+    for (name, frames) in [("lab2-camera1", 39), ("uc3m-single-frames", 12)] {
+        let Some(path) = data(&format!("{name}.mcap")) else { return };
+        let run = run(&path);
+        println!("{name}: {:?}", run.funnel);
+        assert_eq!(run.frames, frames, "{name}");
+    }
+}
