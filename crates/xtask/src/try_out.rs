@@ -11,9 +11,13 @@ use crate::metadata::Metadata;
 use crate::new_plugin::{Kind, create, format};
 use crate::workspace::{Workspace, succeed};
 
-/// Where the copy lives. It is inside of `target/`, so that what was built last
-/// time can be used again and `cargo clean` removes it.
+/// Where the copy lives: where `cargo clean` removes it.
 const COPY: &str = "target/try-new-plugin";
+
+/// Where the copy is built. It outlives the copy, so that the second trial is
+/// fast, and is not the workspace's own: cargo would take the crates of the one
+/// for those of the other.
+const BUILD: &str = "target/try-new-plugin-build";
 
 /// Runs the whole trial.
 pub fn try_out(workspace: &Workspace) -> Result<()> {
@@ -35,7 +39,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
             None => (args, &[][..]),
         };
         cargo.args(before).args(packages).args(after);
-        cargo.current_dir(copy.root()).env("CARGO_TARGET_DIR", workspace.root().join("target"));
+        cargo.current_dir(copy.root()).env("CARGO_TARGET_DIR", workspace.root().join(BUILD));
         succeed(&mut cargo)
     };
     cargo("the generated crates are formatted", &["fmt", "--", "--check"], &packages)?;

@@ -1,3 +1,4 @@
+use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,10 +11,11 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// The workspace that this program was built in.
+    /// The workspace in which cargo runs this program. The folder it was built
+    /// in may be another one: copies of a workspace can share what is built.
     pub fn find() -> Result<Self> {
-        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let root = here.ancestors().nth(2).context("xtask does not lie in crates/")?;
+        let here = env::var("CARGO_MANIFEST_DIR").context("start this with `cargo xtask`")?;
+        let root = Path::new(&here).ancestors().nth(2).context("xtask does not lie in crates/")?;
         Ok(Self::at(root))
     }
 
