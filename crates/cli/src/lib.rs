@@ -34,6 +34,7 @@ use tagalong_core::Registry;
 /// The whole program: registers plugins, reads the command line, does what it
 /// says.
 pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
+    tell_panics_briefly();
     let mut registry = Registry::default();
     register(&mut registry);
     // Wrong usage and --help end in here, with exit codes 2 and 0.
@@ -46,6 +47,14 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
             }
             ExitCode::from(failure.code)
         }
+    }
+}
+
+/// A mistake in the code is told in a line or two, unless a developer asked for
+/// more with `RUST_BACKTRACE`.
+fn tell_panics_briefly() {
+    if std::env::var_os("RUST_BACKTRACE").is_none() {
+        std::panic::set_hook(Box::new(|panic| say(&format!("internal error: {panic}"))));
     }
 }
 

@@ -1,5 +1,6 @@
 //! Users' mistakes at the boundary of the process: each gets its exit code and
 //! a message that says what is wrong and what to do.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! Ctrl-C and SIGTERM leave valid files.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
 #![cfg(unix)]
 
 mod common;
@@ -68,4 +69,39 @@ fn an_interrupt_finishes_the_files() {
 #[test]
 fn a_termination_finishes_the_files() {
     stopped_by("TERM", 143);
+}
+
+#[test]
+fn a_killed_run_leaves_what_can_be_recovered_under_no_final_name() {
+    let home = tempfile::tempdir().unwrap();
+    let mut child = slow_run(home.path());
+    wait_for_tracks(home.path());
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let out = home.path().join("out");
+    let finals = ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"];
+    assert!(finals.iter().all(|name| !out.join(name).exists()));
+    let bytes = fs::read(out.join("tracks.mcap.partial")).unwrap();
+    let options = [mcap::read::Options::IgnoreEndMagic].into_iter().collect();
+    let stream = mcap::MessageStream::new_with_options(&bytes, options).unwrap();
+    let kept = stream.map_while(Result::ok).filter(|m| m.channel.topic == "/people/tracks").count();
+    assert!(kept >= 11, "everything older than a second: {kept} frames");
+}
+
+#[test]
+fn a_full_disk_is_told_with_the_name_of_the_file() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(200).write(&home.path().join("walk.mcap"));
+    config(home.path(), "");
+    let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" run nearest.toml walk.mcap -o out";
+    let output = Command::new("sh")
+        .args(["-c", limited])
+        .arg(own_plugin().get_program())
+        .current_dir(home.path())
+        .output()
+        .unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 1, "{told}");
+    assert!(told.contains("cannot write") && told.contains("out/tracks"), "{told}");
+    assert!(!home.path().join("out/tracks.mcap").exists(), "half a file has no final name");
 }

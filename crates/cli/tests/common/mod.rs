@@ -125,7 +125,7 @@ fn image<'a>(header: &Header, encoding: &'a str, bytes: u32, data: &'a [u8]) -> 
         encoding: encoding.into(),
         is_bigendian: 0,
         step: bytes * WIDTH as u32,
-        data: data.into(),
+        data,
     }
 }
 

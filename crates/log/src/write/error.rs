@@ -51,10 +51,7 @@ impl WriteError {
     /// True if the caller asked for something that is not allowed, as opposed
     /// to a disk that failed.
     pub fn is_refusal(&self) -> bool {
-        matches!(
-            self,
-            Self::Exists { .. } | Self::NotADirectory { .. } | Self::InputInside { .. }
-        )
+        matches!(self, Self::Exists { .. } | Self::NotADirectory { .. } | Self::InputInside { .. })
     }
 
     pub(super) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {

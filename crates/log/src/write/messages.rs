@@ -101,9 +101,11 @@ pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMes
         transform: pose.into(),
     };
     let mut transforms = vec![stamped(frames.base.clone(), &record.odom_from_robot())];
-    transforms.extend(record.confirmed().map(|track| {
-        stamped(format!("person_{}", track.id), &odom_from_person(record, track))
-    }));
+    transforms.extend(
+        record
+            .confirmed()
+            .map(|track| stamped(format!("person_{}", track.id), &odom_from_person(record, track))),
+    );
     TFMessage { transforms }
 }
 

@@ -78,9 +78,8 @@ impl TrackLog {
             .map_err(WriteError::io(&self.file("tracks.csv")))?;
         csv::metres(&mut self.metres, record)
             .map_err(WriteError::io(&self.file("tracks-metres.csv")))?;
-        let due = self
-            .flushed
-            .is_none_or(|last| record.stamp.seconds_since(last).abs() >= FLUSH_EVERY_S);
+        let due =
+            self.flushed.is_none_or(|last| record.stamp.seconds_since(last).abs() >= FLUSH_EVERY_S);
         if due { self.flush(record.stamp) } else { Ok(()) }
     }
 

@@ -35,10 +35,13 @@ impl RunDir {
         if let (Ok(output), Ok(log)) = (path.canonicalize(), input.canonicalize())
             && log.starts_with(&output)
         {
-            return Err(WriteError::InputInside { input: input.to_owned(), output: path.to_owned() });
+            return Err(WriteError::InputInside {
+                input: input.to_owned(),
+                output: path.to_owned(),
+            });
         }
-        let empty = !path.exists()
-            || fs::read_dir(path).map_err(WriteError::io(path))?.next().is_none();
+        let empty =
+            !path.exists() || fs::read_dir(path).map_err(WriteError::io(path))?.next().is_none();
         if empty || overwrite {
             return Ok(());
         }

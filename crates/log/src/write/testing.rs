@@ -13,8 +13,7 @@ pub(super) fn track(id: u32) -> Track {
     let person =
         Person { position: Point3::new(3.0, 0.5, 1.6), velocity: Vector2::new(0.5, -0.25) };
     let region = camera().upper_body(&person.position);
-    let estimate =
-        Estimate { person, covariance: SMatrix::<f64, 5, 5>::identity() * 0.01, region };
+    let estimate = Estimate { person, covariance: SMatrix::<f64, 5, 5>::identity() * 0.01, region };
     Track {
         id: TrackId(id),
         estimate,

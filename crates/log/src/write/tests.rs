@@ -61,7 +61,10 @@ fn the_log_carries_tracks_poses_transforms_and_the_config() {
     let array: Detection3DArray = decode(&arrays[0]).unwrap();
     assert_eq!(array.header.frame_id, "base_link");
     let [person] = &array.detections[..] else { panic!("tentative tracks are not people") };
-    assert_eq!((person.id.as_str(), person.results[0].hypothesis.class_id.as_str()), ("12", "person"));
+    assert_eq!(
+        (person.id.as_str(), person.results[0].hypothesis.class_id.as_str()),
+        ("12", "person")
+    );
     assert_eq!(person.results[0].pose.covariance[1][1], 0.01);
     assert!(person.results[0].pose.covariance[5][5] > 99_999.0, "the heading is unknown");
     let pose: PoseStamped = decode(&read(&bytes, "/people/person_12")[2]).unwrap();
