@@ -102,7 +102,7 @@ impl Default for DepthTemplateConfig {
             relief_free_m: 0.15,
             relief_full_m: 0.30,
             min_foreground_valid: 0.5,
-            discover_cost: 0.155,
+            discover_cost: 0.16,
             follow_cost: 0.30,
             refine_cost: 0.4,
             even_cost: 0.22,
