@@ -56,6 +56,16 @@ pub enum LogError {
         /// What is wrong with it.
         source: CalibrationError,
     },
+    /// A message of the truth channel cannot be read.
+    #[error("`{}`, message {number} on {}: {why}", path.display(), crate::TRUTH_TOPIC)]
+    Truth {
+        /// The file.
+        path: PathBuf,
+        /// Which message of the channel, from 1.
+        number: usize,
+        /// What is wrong with it.
+        why: String,
+    },
     /// Settings of `[input]` that cannot work.
     #[error("[input] {0}")]
     Settings(String),

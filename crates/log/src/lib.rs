@@ -26,6 +26,7 @@ mod scan;
 mod source;
 pub mod tf;
 mod topics;
+mod truth;
 pub mod write;
 
 pub use error::LogError;
@@ -33,3 +34,4 @@ pub use input::{InputSettings, MountSettings, Needs};
 pub use inspect::{ImageFacts, Inspection, TopicFacts, inspect};
 pub use limits::Limits;
 pub use source::{FrameSource, LogFacts, LogFrame};
+pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth};

@@ -97,11 +97,10 @@ impl PoseBuffer {
         PoseAt { pose, stale: ahead > MAX_GAP_S }
     }
 
-    /// True if the poses between two moments contain a jump.
+    /// True if the poses that tell the motion between two moments contain a jump.
     pub fn jumped_between(&self, from: Stamp, to: Stamp) -> bool {
-        let inside = |at: Stamp| from < at && at <= to;
         let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
-        pairs.filter(|(_, b)| inside(b.0)).any(|(a, b)| {
+        pairs.filter(|(a, b)| a.0 < to && from < b.0).any(|(a, b)| {
             (b.1.translation.vector - a.1.translation.vector).norm() > MAX_STEP_M
                 && b.0.seconds_since(a.0) <= MAX_GAP_S
         })

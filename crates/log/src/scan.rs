@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
-use crate::mcap_walk::{Counters, Message, Walker};
+use crate::mcap_walk::{Channel, Counters, Message, Walker};
 use crate::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, decode};
 use crate::tf::TfBuffer;
 use crate::{Limits, LogError};
@@ -68,6 +69,7 @@ pub(crate) struct Scan {
     pub(crate) path: PathBuf,
     pub(crate) bytes: u64,
     pub(crate) sha256: String,
+    pub(crate) channels: Vec<Arc<Channel>>,
     pub(crate) topics: BTreeMap<String, Topic>,
     /// The first calibration of each topic.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
@@ -127,7 +129,8 @@ impl<R: Read> Hashing<R> {
 }
 
 impl Scan {
-    /// Reads the whole log once.
+    /// Reads the whole log once; a second time if messages were met whose channel
+    /// became known only later.
     ///
     /// # Errors
     /// A file that cannot be opened or is not MCAP.
@@ -136,9 +139,23 @@ impl Scan {
         depth_unit_m: Option<f64>,
         limits: &Limits,
     ) -> Result<Self, LogError> {
+        let first = Self::pass(path, depth_unit_m, limits, &[])?;
+        if first.counters.contains_key("unknown_channel_messages") {
+            return Self::pass(path, depth_unit_m, limits, &first.channels);
+        }
+        Ok(first)
+    }
+
+    fn pass(
+        path: &Path,
+        depth_unit_m: Option<f64>,
+        limits: &Limits,
+        known: &[Arc<Channel>],
+    ) -> Result<Self, LogError> {
         let file = Hashing { reader: open_file(path)?, hash: Sha256::new(), bytes: 0 };
         let mut walker = Walker::new(file, limits)
-            .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
+            .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?
+            .knowing(known.iter().cloned());
         let mut gathering = Gathering { depth_unit_m, ..Gathering::default() };
         while let Some(message) = walker.next() {
             gathering.take(&message);
@@ -147,12 +164,14 @@ impl Scan {
             gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
         }
         let (counters, notes) = (walker.counters().clone(), walker.notes().to_vec());
+        let channels = walker.channels().cloned().collect();
         let data_lost = walker.data_lost();
         let (bytes, sha256) = walker.into_reader().finish();
         Ok(Self {
             path: path.to_owned(),
             bytes,
             sha256,
+            channels,
             topics: gathering.topics,
             infos: gathering.infos,
             tf: gathering.tf,

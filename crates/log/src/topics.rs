@@ -27,15 +27,15 @@ pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result
     let images = &[Type::Image, Type::CompressedImage][..];
     let infos = &[Type::CameraInfo][..];
     let named = |key, topic: &Option<String>, types| named(scan, key, topic.as_deref(), types);
-    let depth = named("depth_topic", &input.depth_topic, images)?
-        .or_else(|| best(scan, |name, topic| depth_rank(name, topic)));
+    let depth =
+        named("depth_topic", &input.depth_topic, images)?.or_else(|| best(scan, depth_rank));
     let colour = named("colour_topic", &input.colour_topic, images)?
         .or_else(|| best(scan, |name, topic| colour_rank(name, topic, false)));
     let right = named("right_topic", &input.right_topic, images)?
         .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true)));
     let right = right.filter(|topic| Some(topic) != colour.as_ref());
     let odometry = named("odometry_topic", &input.odometry_topic, &[Type::Odometry])?
-        .or_else(|| best(scan, |name, topic| odometry_rank(name, topic)));
+        .or_else(|| best(scan, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
         Ok::<_, LogError>(named(key, wanted, infos)?.or_else(|| info_of(scan, image.as_deref()?)))
     };

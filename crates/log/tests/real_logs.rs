@@ -1,4 +1,5 @@
 //! The logs of real people, with the default settings.
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 use std::path::{Path, PathBuf};
 
@@ -122,7 +123,8 @@ fn the_floor_gives_the_pose_of_the_camera() {
         assert!(facts.camera_source.contains("floor"));
         let (height, pitch, roll) = expected.pose.unwrap();
         let loose = expected.name == "pcl-single-frames";
-        let (metres, degrees) = if loose { (0.2, 4.0) } else { (0.08, 1.5) };
+        // The floor of these cameras is shaped like a bowl (see the README of the logs).
+        let (metres, degrees) = if loose { (0.2, 4.0) } else { (0.08, 2.0) };
         assert!((facts.camera_height_m - height).abs() < metres, "{facts:?}");
         assert!((facts.camera_pitch_down_deg - pitch).abs() < degrees, "{facts:?}");
         assert!((facts.camera_roll_deg - roll).abs() < degrees, "{facts:?}");

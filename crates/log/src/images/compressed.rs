@@ -44,7 +44,17 @@ fn codec(error: impl std::fmt::Debug) -> ImageError {
     ImageError::Codec(format!("{error:?}"))
 }
 
+/// True if a JPEG has its end marker behind its last scan. The decoder fills up
+/// the last few blocks of a picture that lacks only a little.
+fn has_jpeg_end(data: &[u8]) -> bool {
+    let markers = data.windows(2).rev().filter(|pair| pair[0] == 0xff);
+    markers.map(|pair| pair[1]).find(|code| matches!(code, 0xd9 | 0xda)) == Some(0xd9)
+}
+
 fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
+    if !has_jpeg_end(data) {
+        return Err(ImageError::Codec("a JPEG without its end".into()));
+    }
     let side = limits.image_side_px as usize;
     let options = DecoderOptions::default()
         .set_strict_mode(true)

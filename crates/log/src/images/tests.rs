@@ -1,1 +1,271 @@
+use proptest::prelude::*;
 
+use super::*;
+use crate::msgs::{CompressedImage, Header, Image};
+
+const JPEG: &[u8] = include_bytes!("../../tests/data/gradient.jpg");
+const GREY_JPEG: &[u8] = include_bytes!("../../tests/data/gradient-grey.jpg");
+const PROGRESSIVE_JPEG: &[u8] = include_bytes!("../../tests/data/gradient-progressive.jpg");
+
+fn raw<'a>(encoding: &str, width: u32, height: u32, step: u32, data: &'a [u8]) -> Image<'a> {
+    let header = Header::default();
+    Image { header, height, width, encoding: encoding.into(), is_bigendian: 0, step, data }
+}
+
+fn decoded(image: &Image<'_>) -> Result<Pixels, ImageError> {
+    decode_raw(image, None, &Limits::default())
+}
+
+fn compressed(format: &str, data: &[u8]) -> Result<Pixels, ImageError> {
+    let image = CompressedImage { header: Header::default(), format: format.into(), data };
+    decode_compressed(&image, None, &Limits::default())
+}
+
+fn png_16(width: u32, height: u32, values: &[u16]) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
+    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+    out
+}
+
+fn png_8(colour: png::ColorType, width: u32, height: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, width, height);
+    encoder.set_color(colour);
+    encoder.write_header().unwrap().write_image_data(bytes).unwrap();
+    out
+}
+
+fn depth_of(pixels: Pixels) -> Vec<f32> {
+    match pixels {
+        Pixels::Depth(depth) => depth.pixels().to_vec(),
+        other => panic!("no depth: {other:?}"),
+    }
+}
+
+fn same_depth(a: &[f32], b: &[f32]) -> bool {
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| a.is_nan() && b.is_nan() || (a - b).abs() < 1e-6)
+}
+
+#[test]
+fn every_colour_encoding_gives_red_green_blue() {
+    let expected = Pixels::Colour(RgbImage::from_pixels(2, 1, vec![[1, 2, 3], [4, 5, 6]]).unwrap());
+    let cases: [(&str, &[u8]); 4] = [
+        ("rgb8", &[1, 2, 3, 4, 5, 6]),
+        ("bgr8", &[3, 2, 1, 6, 5, 4]),
+        ("rgba8", &[1, 2, 3, 9, 4, 5, 6, 9]),
+        ("bgra8", &[3, 2, 1, 9, 6, 5, 4, 9]),
+    ];
+    for (encoding, data) in cases {
+        assert_eq!(decoded(&raw(encoding, 2, 1, data.len() as u32, data)).unwrap(), expected);
+    }
+}
+
+#[test]
+fn padding_between_rows_is_passed_over() {
+    let image = raw("mono8", 2, 2, 3, &[1, 2, 99, 3, 4, 99]);
+    let expected = GreyImage::from_pixels(2, 2, vec![1, 2, 3, 4]).unwrap();
+    assert_eq!(decoded(&image).unwrap(), Pixels::Grey(expected));
+}
+
+#[test]
+fn depth_is_metres_and_nan() {
+    let values: Vec<u8> = [0_u16, 1500, 65535].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let millimetres = depth_of(decoded(&raw("16UC1", 3, 1, 6, &values)).unwrap());
+    assert!(same_depth(&millimetres, &[f32::NAN, 1.5, f32::NAN]), "{millimetres:?}");
+    let floats = [2.5, 0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let bytes: Vec<u8> = floats.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let metres = depth_of(decoded(&raw("32FC1", 6, 1, 24, &bytes)).unwrap());
+    assert!(same_depth(&metres, &[2.5, f32::NAN, f32::NAN, f32::NAN, f32::NAN, f32::NAN]));
+}
+
+#[test]
+fn the_high_byte_may_come_first() {
+    let mut image = raw("16UC1", 1, 1, 2, &[0x05, 0xdc]);
+    image.is_bigendian = 1;
+    assert!(same_depth(&depth_of(decoded(&image).unwrap()), &[1.5]));
+    let bytes = 2.5_f32.to_be_bytes();
+    let mut image = raw("32FC1", 1, 1, 4, &bytes);
+    image.is_bigendian = 1;
+    assert!(same_depth(&depth_of(decoded(&image).unwrap()), &[2.5]));
+}
+
+#[test]
+fn mono16_is_depth_only_with_a_unit() {
+    let image = raw("mono16", 1, 1, 2, &[0xdc, 0x05]);
+    assert_eq!(decoded(&image), Err(ImageError::Encoding("mono16".into())));
+    let scaled = decode_raw(&image, Some(0.0001), &Limits::default()).unwrap();
+    assert!(same_depth(&depth_of(scaled), &[0.15]));
+}
+
+#[test]
+fn lies_about_the_layout_are_refused() {
+    let data = [0; 12];
+    let counter = |image: Image<'_>| decoded(&image).unwrap_err().counter();
+    assert_eq!(counter(raw("rgb8", 2, 2, 5, &data)), "images_of_wrong_layout");
+    assert_eq!(counter(raw("rgb8", 2, 2, 7, &data)), "images_of_wrong_layout");
+    assert_eq!(counter(raw("rgb8", 2, 3, 6, &data)), "images_of_wrong_layout");
+    assert_eq!(counter(raw("rgb8", 0, 0, 0, &[])), "images_of_wrong_layout");
+    let huge = i32::MAX as u32;
+    assert_eq!(counter(raw("rgb8", huge, huge, huge, &data)), "images_too_large");
+    assert_eq!(counter(raw("mono8", 16_000, 16_000, 16_000, &data)), "images_too_large");
+    assert_eq!(counter(raw("nonsense99", 2, 2, 6, &data)), "images_of_unknown_encoding");
+    assert_eq!(counter(raw("", 2, 2, 6, &data)), "images_of_unknown_encoding");
+}
+
+#[test]
+fn jpegs_are_read_whatever_the_format_says() {
+    for (data, format) in [(JPEG, "bgr8; jpeg compressed bgr8"), (PROGRESSIVE_JPEG, "png")] {
+        let Pixels::Colour(image) = compressed(format, data).unwrap() else { panic!("colour") };
+        assert_eq!((image.width(), image.height()), (48, 32));
+        for (x, y) in [(0, 0), (40, 3), (20, 30)] {
+            let [r, g, b] = image.get(x, y).unwrap();
+            let off = |got: u8, want: i64| (i64::from(got) - want).abs();
+            assert!(off(r, x * 5) < 9 && off(g, y * 8) < 9 && off(b, 128) < 9, "{r} {g} {b}");
+        }
+    }
+    let Pixels::Grey(grey) = compressed("mono8; jpeg", GREY_JPEG).unwrap() else { panic!("grey") };
+    assert_eq!((grey.width(), grey.height()), (48, 32));
+}
+
+#[test]
+fn a_jpeg_cut_anywhere_is_an_error() {
+    for picture in [JPEG, GREY_JPEG, PROGRESSIVE_JPEG] {
+        assert!(compressed("jpeg", picture).is_ok());
+        for length in 0..picture.len() {
+            let cut = compressed("jpeg", &picture[..length]);
+            assert!(cut.is_err(), "cut at {length} of {}", picture.len());
+        }
+    }
+}
+
+#[test]
+fn pngs_of_all_kinds_are_read() {
+    let rgb = compressed("png", &png_8(png::ColorType::Rgb, 1, 2, &[1, 2, 3, 4, 5, 6])).unwrap();
+    assert_eq!(
+        rgb,
+        Pixels::Colour(RgbImage::from_pixels(1, 2, vec![[1, 2, 3], [4, 5, 6]]).unwrap())
+    );
+    let rgba = compressed("png", &png_8(png::ColorType::Rgba, 1, 1, &[1, 2, 3, 4])).unwrap();
+    assert_eq!(rgba, Pixels::Colour(RgbImage::filled(1, 1, [1, 2, 3])));
+    let grey = compressed("png", &png_8(png::ColorType::Grayscale, 1, 1, &[7])).unwrap();
+    assert_eq!(grey, Pixels::Grey(GreyImage::filled(1, 1, 7)));
+    let palette = include_bytes!("../../tests/data/gradient-palette.png");
+    assert_eq!(compressed("png", palette).unwrap().size(), (48, 32));
+    let depth = compressed("16UC1; png compressed", &png_16(2, 1, &[0, 2000])).unwrap();
+    assert!(same_depth(&depth_of(depth), &[f32::NAN, 2.0]));
+}
+
+#[test]
+fn a_png_cut_anywhere_is_an_error_or_whole() {
+    let values: Vec<u16> = (0..600).map(|v| v * 7).collect();
+    let data = [&[0; 12][..], &png_16(30, 20, &values)].concat();
+    let whole = depth_of(compressed("16UC1; compressedDepth png", &data).unwrap());
+    for length in 0..data.len() {
+        if let Ok(pixels) = compressed("16UC1; compressedDepth png", &data[..length]) {
+            assert!(length + 20 > data.len(), "cut at {length}");
+            assert!(same_depth(&depth_of(pixels), &whole));
+        }
+    }
+}
+
+#[test]
+fn a_png_of_giant_size_is_refused() {
+    let mut data = png_8(png::ColorType::Grayscale, 1, 1, &[7]);
+    data[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
+    let crc = crc32fast::hash(&data[12..29]);
+    data[29..33].copy_from_slice(&crc.to_be_bytes());
+    let error = compressed("png", &data).unwrap_err();
+    assert_eq!(error, ImageError::TooLarge { width: 60_000, height: 60_000 });
+}
+
+#[test]
+fn a_jpeg_of_giant_size_is_refused() {
+    let mut data = JPEG.to_vec();
+    let frame = data.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
+    data[frame + 5..frame + 9].copy_from_slice(&[0xea, 0x60, 0xea, 0x60]);
+    assert!(compressed("jpeg", &data).is_err());
+    data[frame + 5..frame + 9].copy_from_slice(&[0x3a, 0x98, 0x3a, 0x98]);
+    let error = compressed("jpeg", &data).unwrap_err();
+    assert_eq!(error, ImageError::TooLarge { width: 15_000, height: 15_000 });
+}
+
+#[test]
+fn quantised_float_depth_is_inverted() {
+    // a / (v - b) with a = 100, b = 2: 52 is 2 m, 102 is 1 m, 0 is none.
+    let mut data = vec![1, 0, 0, 0];
+    data.extend(100.0_f32.to_le_bytes());
+    data.extend(2.0_f32.to_le_bytes());
+    data.extend(png_16(4, 1, &[52, 102, 0, 2]));
+    let depth = depth_of(compressed("32FC1; compressedDepth", &data).unwrap());
+    assert!(same_depth(&depth, &[2.0, 1.0, f32::NAN, f32::NAN]), "{depth:?}");
+}
+
+#[test]
+fn compressed_depth_without_its_header_is_refused() {
+    for length in 0..12 {
+        assert!(compressed("16UC1; compressedDepth", &vec![0; length]).is_err());
+    }
+    assert!(compressed("16UC1; compressedDepth rvl", &[0; 19]).is_err());
+    let giant = [&[0; 12][..], &[0xff; 8], &[0; 40]].concat();
+    assert_eq!(
+        compressed("16UC1; compressedDepth rvl", &giant).unwrap_err().counter(),
+        "images_too_large"
+    );
+}
+
+/// Worked out by hand from the paper: 2 zeros, 3 readings 5, 5, 4. Differences
+/// 5, 0, -1 are 10, 0, 1 in zigzag. 10 is 1010 binary: nibble 2 with more, then 1.
+#[test]
+fn rvl_is_as_published() {
+    let nibbles = [2_u32, 3, 8 | 2, 1, 0, 1];
+    let word = nibbles.iter().fold(0, |word, nibble| word << 4 | nibble) << 8;
+    assert_eq!(rvl::encode(&[0, 0, 5, 5, 4]), word.to_le_bytes());
+    assert_eq!(rvl::decode(&word.to_le_bytes(), 5).unwrap(), [0, 0, 5, 5, 4]);
+}
+
+#[test]
+fn what_is_in_an_image_shows_in_its_name() {
+    assert_eq!(content_of_format("16UC1; compressedDepth"), Content::Depth);
+    assert_eq!(content_of_format("rgb8; jpeg compressed bgr8"), Content::Picture);
+    assert_eq!(content_of_format("h264"), Content::Unknown);
+    assert_eq!(content_of_encoding("mono16", None), Content::Unknown);
+    assert_eq!(content_of_encoding("mono16", Some(0.001)), Content::Depth);
+}
+
+proptest! {
+    #[test]
+    fn rvl_round_trips(runs in proptest::collection::vec((any::<u16>(), 1..40_usize, any::<bool>()), 0..30)) {
+        let values: Vec<u16> = runs.iter()
+            .flat_map(|(value, count, zero)| (0..*count).map(|i| if *zero { 0 } else { value.wrapping_add(i as u16) }))
+            .collect();
+        let coded = rvl::encode(&values);
+        prop_assert_eq!(rvl::decode(&coded, values.len()).unwrap(), values.clone());
+        for length in 0..coded.len().saturating_sub(4) {
+            prop_assert!(rvl::decode(&coded[..length], values.len()).is_none_or(|v| v.len() == values.len()));
+        }
+        if !values.is_empty() {
+            let data = encode_rvl(values.len() as u32, 1, &values);
+            let expected: Vec<f32> = values.iter().map(|v| metres(*v, 0.001)).collect();
+            let read = depth_of(compressed("16UC1; compressedDepth rvl", &data).unwrap());
+            prop_assert!(same_depth(&read, &expected));
+        }
+    }
+
+    #[test]
+    fn any_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200), at in 0..600_usize, with in any::<u8>()) {
+        for format in ["16UC1; compressedDepth rvl", "32FC1; compressedDepth", "jpeg"] {
+            let _ = compressed(format, &bytes);
+        }
+        for picture in [JPEG, PROGRESSIVE_JPEG, GREY_JPEG] {
+            let mut flipped = picture.to_vec();
+            let place = at % flipped.len();
+            flipped[place] = with;
+            let _ = compressed("jpeg", &flipped);
+        }
+    }
+}

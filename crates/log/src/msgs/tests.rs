@@ -9,8 +9,10 @@ fn header() -> Header {
 fn detections() -> Detection3DArray {
     let mut one = Detection3D { header: header(), id: "12".into(), ..Default::default() };
     one.bbox.center.position.x = 2.5;
-    let mut result = ObjectHypothesisWithPose::default();
-    result.hypothesis = ObjectHypothesis { class_id: "person".into(), score: 0.5 };
+    let mut result = ObjectHypothesisWithPose {
+        hypothesis: ObjectHypothesis { class_id: "person".into(), score: 0.5 },
+        ..Default::default()
+    };
     result.pose.covariance[2][3] = 0.25;
     one.results.push(result);
     Detection3DArray { header: header(), detections: vec![one.clone(), one] }

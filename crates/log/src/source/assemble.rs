@@ -23,7 +23,7 @@ pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
     registration: Option<Registration>,
-    previous: Option<(Stamp, Isometry2<f64>)>,
+    previous: Option<(Stamp, PoseAt)>,
     /// The first calibration that did not fit its images.
     pub(super) misfit: Option<CalibrationError>,
 }
@@ -191,19 +191,13 @@ impl Assembler {
         tally: &mut Tally,
     ) -> LogFrame {
         let here = self.pose_at(plan, stamp, intake);
-        let (motion, jumped) = self.motion(plan, stamp, here, intake);
-        if jumped {
-            tally.count("odometry_jumps");
-        }
-        if here.stale {
-            tally.count("odometry_gap_frames");
-        }
-        self.previous = Some((stamp, here.pose));
+        let (motion, known) = self.motion(plan, stamp, here, intake, tally);
+        self.previous = Some((stamp, here));
         tally.count("frames");
         LogFrame {
             frame: Frame::new(self.index, stamp, camera, motion, images),
             odom_from_robot: here.pose,
-            odom_stale: here.stale || jumped,
+            odom_stale: here.stale || !known,
         }
     }
 
@@ -216,22 +210,37 @@ impl Assembler {
                 .lookup(odom, robot, stamp)
                 .map(|pose| PoseAt { pose: planar_pose(&pose), stale: false }),
         };
-        let last = self.previous.map_or_else(Isometry2::identity, |(_, pose)| pose);
+        let last = self.previous.map_or_else(Isometry2::identity, |(_, last)| last.pose);
         found.unwrap_or(PoseAt { pose: last, stale: true })
     }
 
-    /// The motion since the previous frame, and whether odometry jumped in it.
-    fn motion(&self, plan: &Plan, stamp: Stamp, here: PoseAt, intake: &Intake) -> (Motion, bool) {
+    /// The motion since the previous frame, and whether it is known.
+    fn motion(
+        &self,
+        plan: &Plan,
+        stamp: Stamp,
+        here: PoseAt,
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> (Motion, bool) {
+        if here.stale {
+            tally.count("odometry_gap_frames");
+            tally.note("odometry is silent for more than half a second at some frames");
+        }
         let Some((then, before)) = self.previous.filter(|(then, _)| *then < stamp) else {
-            return (Motion::at_rest(0.0), false);
+            return (Motion::at_rest(0.0), true);
         };
         let dt = stamp.seconds_since(then);
-        let jumped =
-            matches!(plan.odom_frames, Some(None)) && intake.poses.jumped_between(then, stamp);
-        if here.stale || jumped {
-            return (unknown_motion(dt), jumped);
+        let from_topic = matches!(plan.odom_frames, Some(None));
+        let jumped = from_topic && intake.poses.jumped_between(then, stamp);
+        if jumped {
+            tally.count("odometry_jump_frames");
+            tally.note("odometry jumps by more than a metre at some frames");
         }
-        (Motion::between(&before, &here.pose, dt, plan.input.odometry_sigma), false)
+        if here.stale || before.stale || jumped {
+            return (unknown_motion(dt), false);
+        }
+        (Motion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
     }
 }
 

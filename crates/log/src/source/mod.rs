@@ -182,7 +182,8 @@ impl FrameSource {
     fn start(plan: Plan, tally: Tally) -> Result<Self, LogError> {
         let path = &plan.scan.path;
         let walker = Walker::new(open_file(path)?, &plan.limits)
-            .map_err(|source| LogError::NotMcap { path: path.clone(), source })?;
+            .map_err(|source| LogError::NotMcap { path: path.clone(), source })?
+            .knowing(plan.scan.channels.iter().cloned());
         Ok(Self {
             intake: Intake::new(&plan.scan, &plan.chosen, plan.primary(), &plan.input),
             walker,

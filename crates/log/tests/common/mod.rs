@@ -1,0 +1,207 @@
+//! Small logs, written with the `mcap` crate.
+#![allow(dead_code, reason = "each test program uses a part")]
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::PathBuf;
+
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions, Writer};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use serde::Serialize;
+use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
+use tagalong_log::msgs::{
+    CameraInfo, Header, Image, Message, Odometry, Pose, TFMessage, Transform, TransformStamped,
+    encode,
+};
+
+pub fn at(seconds: f64) -> Stamp {
+    Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(seconds)
+}
+
+/// Writes messages of our types into an MCAP file in memory.
+pub struct LogWriter {
+    writer: Writer<Cursor<Vec<u8>>>,
+    channels: BTreeMap<String, u16>,
+    schemas: BTreeMap<&'static str, u16>,
+}
+
+impl LogWriter {
+    pub fn new(options: WriteOptions) -> Self {
+        let writer = options.profile("ros2").create(Cursor::new(Vec::new())).unwrap();
+        Self { writer, channels: BTreeMap::new(), schemas: BTreeMap::new() }
+    }
+
+    pub fn plain() -> Self {
+        Self::new(WriteOptions::new().compression(None))
+    }
+
+    fn channel(&mut self, topic: &str, name: &'static str, definition: &str) -> u16 {
+        let writer = &mut self.writer;
+        let schema = *self
+            .schemas
+            .entry(name)
+            .or_insert_with(|| writer.add_schema(name, "ros2msg", definition.as_bytes()).unwrap());
+        *self
+            .channels
+            .entry(topic.to_owned())
+            .or_insert_with(|| writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap())
+    }
+
+    pub fn bytes<T: Message>(&mut self, topic: &str, stamp: Stamp, data: &[u8]) {
+        let channel_id = self.channel(topic, T::TYPE, T::DEFINITION);
+        let time = stamp.nanos();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, data).unwrap();
+    }
+
+    pub fn message<T: Message + Serialize>(&mut self, topic: &str, stamp: Stamp, message: &T) {
+        self.bytes::<T>(topic, stamp, &encode(message));
+    }
+
+    pub fn colour(&mut self, stamp: Stamp) {
+        self.colour_of(stamp, 16, 12);
+    }
+
+    pub fn colour_of(&mut self, stamp: Stamp, width: u32, height: u32) {
+        let data = vec![(stamp.nanos() / 1_000_000 % 251) as u8; (3 * width * height) as usize];
+        let message = Image {
+            header: Header::new(stamp, "colour"),
+            height,
+            width,
+            encoding: "rgb8".into(),
+            is_bigendian: 0,
+            step: 3 * width,
+            data: &data,
+        };
+        self.message("/camera/color/image_raw", stamp, &message);
+    }
+
+    /// A depth image of one distance.
+    pub fn depth(&mut self, stamp: Stamp, frame: &str, metres: f32) {
+        let values = vec![metres; 16 * 12];
+        self.depth_of(stamp, frame, 16, 12, &values);
+    }
+
+    pub fn depth_of(&mut self, stamp: Stamp, frame: &str, width: u32, height: u32, depth: &[f32]) {
+        let data: Vec<u8> = depth.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let message = Image {
+            header: Header::new(stamp, frame),
+            height,
+            width,
+            encoding: "32FC1".into(),
+            is_bigendian: 0,
+            step: 4 * width,
+            data: &data,
+        };
+        self.message("/camera/depth/image_raw", stamp, &message);
+    }
+
+    pub fn info(&mut self, topic: &str, frame: &str, camera: &Camera) {
+        self.message(topic, at(0.0), &info_of(frame, camera));
+    }
+
+    pub fn fixed(&mut self, parent: &str, child: &str, pose: &Isometry3<f64>) {
+        self.message("/tf_static", at(0.0), &transform(parent, child, at(0.0), pose));
+    }
+
+    pub fn moving(&mut self, parent: &str, child: &str, stamp: Stamp, pose: &Isometry3<f64>) {
+        self.message("/tf", stamp, &transform(parent, child, stamp, pose));
+    }
+
+    pub fn odometry(&mut self, stamp: Stamp, x: f64, yaw: f64) {
+        let mut odometry = Odometry { header: Header::new(stamp, "odom"), ..Odometry::default() };
+        odometry.child_frame_id = "base_link".into();
+        let pose = Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::new(0.0, 0.0, yaw));
+        odometry.pose.pose = Pose::from(&pose);
+        self.message("/odom", stamp, &odometry);
+    }
+
+    pub fn attachment(&mut self, data: &[u8]) {
+        let attachment = mcap::Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: "notes".into(),
+            media_type: "text/plain".into(),
+            data: data.to_vec().into(),
+        };
+        self.writer.attach(&attachment).unwrap();
+    }
+
+    pub fn flush(&mut self) {
+        self.writer.flush().unwrap();
+    }
+
+    pub fn finish(mut self) -> Vec<u8> {
+        self.writer.finish().unwrap();
+        self.writer.into_inner().into_inner()
+    }
+
+    pub fn save(self) -> SavedLog {
+        SavedLog::new(&self.finish())
+    }
+}
+
+fn transform(parent: &str, child: &str, stamp: Stamp, pose: &Isometry3<f64>) -> TFMessage {
+    let transform = TransformStamped {
+        header: Header::new(stamp, parent),
+        child_frame_id: child.into(),
+        transform: Transform::from(pose),
+    };
+    TFMessage { transforms: vec![transform] }
+}
+
+pub fn info_of(frame: &str, camera: &Camera) -> CameraInfo {
+    let tagalong_core::Lens::Pinhole(lens) = &camera.lens else { panic!("pinhole") };
+    CameraInfo {
+        header: Header::new(at(0.0), frame),
+        height: camera.height as u32,
+        width: camera.width as u32,
+        distortion_model: "plumb_bob".into(),
+        d: vec![0.0; 5],
+        k: [lens.fx, 0.0, lens.cx, 0.0, lens.fy, lens.cy, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [lens.fx, 0.0, lens.cx, 0.0, 0.0, lens.fy, lens.cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        ..CameraInfo::default()
+    }
+}
+
+/// A level camera 1.2 m high.
+pub fn camera(width: usize, height: usize, focal: f64) -> Camera {
+    let lens = Pinhole {
+        fx: focal,
+        fy: focal,
+        cx: 0.5 * (width as f64 - 1.0),
+        cy: 0.5 * (height as f64 - 1.0),
+        distortion: Distortion::None,
+    };
+    Camera::mounted(lens, width, height, 1.2, 0.0, 0.0)
+}
+
+pub fn level_pose() -> Isometry3<f64> {
+    let pose = camera(1, 1, 1.0).robot_from_camera;
+    Isometry3::from_parts(
+        pose.translation,
+        UnitQuaternion::new_normalize(*pose.rotation.quaternion()),
+    )
+}
+
+/// A log in a folder of its own, which goes with it.
+pub struct SavedLog {
+    _folder: tempfile::TempDir,
+    pub path: PathBuf,
+}
+
+impl SavedLog {
+    pub fn new(bytes: &[u8]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("test.mcap");
+        std::fs::write(&path, bytes).unwrap();
+        Self { _folder: folder, path }
+    }
+}
+
+/// Chunks of a few messages in each way of compression.
+pub fn compressions() -> [(&'static str, Option<Compression>); 3] {
+    [("none", None), ("lz4", Some(Compression::Lz4)), ("zstd", Some(Compression::Zstd))]
+}

@@ -1,0 +1,419 @@
+//! Frames from small logs that were made up for the purpose.
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
+
+mod common;
+
+use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
+use mcap::WriteOptions;
+use nalgebra::{Isometry3, Point2, Vector3};
+use tagalong_core::{Camera, DepthImage};
+use tagalong_log::msgs::{CameraInfo, Image, encode_big_endian};
+use tagalong_log::{FrameSource, InputSettings, Limits, LogError, LogFrame, MountSettings, Needs};
+
+const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
+const INFO: &str = "/camera/color/camera_info";
+
+/// A log with a calibration and a fixed camera.
+fn started() -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    log
+}
+
+fn open(log: LogWriter, needs: Needs) -> (FrameSource, SavedLog) {
+    let saved = log.save();
+    let source =
+        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), needs);
+    (source.unwrap(), saved)
+}
+
+fn frames(source: &mut FrameSource) -> Vec<LogFrame> {
+    std::iter::from_fn(|| source.next_frame()).collect()
+}
+
+fn indices(frames: &[LogFrame]) -> Vec<u64> {
+    frames.iter().map(|found| found.frame.index).collect()
+}
+
+fn count(source: &FrameSource, name: &str) -> u64 {
+    source.counters().get(name).copied().unwrap_or(0)
+}
+
+#[test]
+fn colour_without_depth_is_counted_and_keeps_its_index() {
+    let mut log = started();
+    for i in 0..10 {
+        let stamp = at(f64::from(i) * 0.033);
+        log.colour(stamp);
+        if i % 2 == 0 {
+            log.depth(stamp.plus_seconds(0.008), "colour", 2.0 + i as f32);
+        }
+    }
+    let bytes = log.finish();
+    let saved = SavedLog::new(&bytes);
+    let open = |needs| {
+        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), needs)
+            .unwrap()
+    };
+    let mut source = open(DEPTH);
+    let found = frames(&mut source);
+    assert_eq!(indices(&found), [1, 3, 5, 7, 9]);
+    assert_eq!(found[2].frame.depth().unwrap().get(3, 3), Some(6.0));
+    assert_eq!(count(&source, "colour_without_depth"), 5);
+    assert!((found[1].frame.motion.dt - 0.066).abs() < 1e-9);
+    assert!(!source.data_lost());
+    let mut source = open(Needs { colour: true, ..Needs::default() });
+    let found = frames(&mut source);
+    assert_eq!(found.len(), 10);
+    assert!(found[0].frame.depth().is_ok() && found[1].frame.depth().is_err());
+}
+
+#[test]
+fn skew_beyond_the_tolerance_pairs_nothing() {
+    for (skew, expected) in [(0.0, 4), (0.029, 4), (-0.029, 4), (0.05, 0)] {
+        let mut log = started();
+        for i in 0..4 {
+            let stamp = at(1.0 + f64::from(i) * 0.25);
+            log.colour(stamp);
+            log.depth(stamp.plus_seconds(skew), "colour", 2.0);
+        }
+        let (mut source, _saved) = open(log, DEPTH);
+        assert_eq!(frames(&mut source).len(), expected, "{skew}");
+        assert_eq!(count(&source, "colour_without_depth"), 4 - expected as u64);
+    }
+}
+
+/// Writes colour images with these stamps in this order.
+fn run_of(stamps: &[f64]) -> (FrameSource, SavedLog) {
+    let mut log = started();
+    stamps.iter().for_each(|stamp| {
+        log.colour(at(*stamp));
+        log.depth(at(*stamp + 0.001), "colour", *stamp as f32 + 1.0);
+    });
+    open(log, DEPTH)
+}
+
+fn stamps(frames: &[LogFrame]) -> Vec<f64> {
+    let seconds = |found: &LogFrame| found.frame.stamp.seconds_since(at(0.0));
+    frames.iter().map(|found| (seconds(found) * 1000.0).round() / 1000.0).collect()
+}
+
+#[test]
+fn disorder_within_the_window_is_undone_to_the_byte() {
+    let (mut sorted, _a) = run_of(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+    let (mut mixed, _b) = run_of(&[0.3, 0.1, 0.2, 0.4, 0.6, 0.5]);
+    let (sorted, mixed) = (frames(&mut sorted), frames(&mut mixed));
+    assert_eq!(stamps(&sorted), stamps(&mixed));
+    for (a, b) in sorted.iter().zip(&mixed) {
+        assert_eq!(a.frame.index, b.frame.index);
+        assert_eq!(a.frame.motion, b.frame.motion);
+        assert_eq!(a.frame.colour().unwrap(), b.frame.colour().unwrap());
+        assert_eq!(a.frame.depth().unwrap(), b.frame.depth().unwrap());
+    }
+}
+
+#[test]
+fn repeated_frames_are_delivered_once() {
+    let (mut source, _saved) = run_of(&[0.1, 0.2, 0.2, 0.3, 0.3, 0.4]);
+    let found = frames(&mut source);
+    assert_eq!(stamps(&found), [0.1, 0.2, 0.3, 0.4]);
+    assert_eq!(indices(&found), [1, 2, 3, 4]);
+    assert_eq!(count(&source, "duplicate_frames"), 2);
+}
+
+#[test]
+fn a_frame_that_is_very_late_is_dropped() {
+    let mut late: Vec<f64> = (1..12).map(|i| f64::from(i) * 0.1).collect();
+    late.insert(9, 0.15);
+    let (mut source, _saved) = run_of(&late);
+    let found = frames(&mut source);
+    assert_eq!(found.len(), 11);
+    assert!(stamps(&found).is_sorted());
+    assert_eq!(count(&source, "late_frames"), 1);
+}
+
+#[test]
+fn a_clock_that_jumps_back_loses_no_frame() {
+    for back in [10.0, 86_400.0] {
+        let first: Vec<f64> = (1..8).map(|i| 90_000.0 + f64::from(i) * 0.1).collect();
+        let second: Vec<f64> = first.iter().map(|t| t - back).collect();
+        let (mut source, _saved) = run_of(&[first.clone(), second.clone()].concat());
+        let found = frames(&mut source);
+        let rounded = |t: &f64| (t * 1000.0).round() / 1000.0;
+        let written: Vec<f64> = first.iter().chain(&second).map(rounded).collect();
+        assert_eq!(stamps(&found), written);
+        assert_eq!(count(&source, "time_jumps_back"), 1);
+        assert!(found.iter().all(|found| found.frame.motion.dt >= 0.0));
+        assert_eq!(found[7].frame.motion.dt, 0.0);
+    }
+}
+
+#[test]
+fn odometry_is_taken_at_the_stamps_of_the_images() {
+    let mut log = started();
+    for i in 0..40 {
+        let t = f64::from(i) * 0.05;
+        log.odometry(at(t), 0.4 * t, 0.2 * t);
+        if i % 5 == 3 {
+            log.colour(at(t - 0.02));
+        }
+    }
+    let (mut source, _saved) = open(log, Needs { colour: true, ..Needs::default() });
+    let found = frames(&mut source);
+    assert_eq!(found.len(), 8);
+    assert!(!source.notes().iter().any(|note| note.contains("at rest")));
+    for found in &found {
+        let t = found.frame.stamp.seconds_since(at(0.0));
+        assert!((found.odom_from_robot.translation.x - 0.4 * t).abs() < 1e-6);
+        assert!((found.odom_from_robot.rotation.angle() - 0.2 * t).abs() < 1e-6);
+        assert!(!found.odom_stale);
+    }
+    let motion = &found[4].frame.motion;
+    assert!((motion.dt - 0.25).abs() < 1e-9 && (motion.turn - 0.05).abs() < 1e-6);
+    assert!(motion.covariance[(0, 0)] > 0.0);
+    assert_eq!(found[0].frame.motion.dt, 0.0);
+}
+
+#[test]
+fn gaps_and_jumps_of_odometry_are_told() {
+    let mut log = started();
+    let seconds = |i: i32| f64::from(i) * 0.1;
+    for i in 0..60 {
+        if !(10..30).contains(&i) {
+            // The odometry jumps by 5 m at 4.5 s.
+            log.odometry(at(seconds(i)), if i < 45 { 0.0 } else { 5.0 }, 0.0);
+        }
+        log.colour(at(seconds(i) + 0.01));
+    }
+    let (mut source, _saved) = open(log, Needs::default());
+    let found = frames(&mut source);
+    let stale: Vec<u64> =
+        found.iter().filter(|found| found.odom_stale).map(|found| found.frame.index - 1).collect();
+    // Up to half a second the last motion is carried on; the frame behind a gap
+    // does not know how it came there.
+    assert_eq!(stale, [&(14..=30).collect::<Vec<u64>>()[..], &[44, 45]].concat());
+    assert_eq!(count(&source, "odometry_gap_frames"), 16);
+    assert_eq!(count(&source, "odometry_jump_frames"), 2);
+    assert!(found.iter().all(|found| found.frame.motion.forward.abs() < 0.5));
+}
+
+#[test]
+fn without_odometry_the_robot_rests_and_this_is_said_once() {
+    let (mut source, _saved) = run_of(&[0.1, 0.2, 0.3]);
+    let found = frames(&mut source);
+    assert!(found.iter().all(|f| f.odom_from_robot == nalgebra::Isometry2::identity()));
+    assert_eq!(source.notes().iter().filter(|note| note.contains("at rest")).count(), 1);
+}
+
+#[test]
+fn tf_can_be_the_odometry() {
+    let mut log = started();
+    for i in 0..20 {
+        let t = f64::from(i) * 0.1;
+        let pose = Isometry3::new(Vector3::new(t, 0.0, 0.0), Vector3::zeros());
+        log.moving("odom", "base_link", at(t), &pose);
+        if i % 2 == 1 {
+            log.colour(at(t - 0.05));
+        }
+    }
+    let (mut source, _saved) = open(log, Needs::default());
+    let found = frames(&mut source);
+    assert!((found[3].odom_from_robot.translation.x - 0.65).abs() < 1e-6);
+    assert!((found[3].frame.motion.forward - 0.2).abs() < 1e-6);
+}
+
+#[test]
+fn both_byte_orders_and_every_compression_give_the_same_frames() {
+    for (name, compression) in common::compressions() {
+        let options = WriteOptions::new().compression(compression);
+        let mut log = LogWriter::new(options);
+        let info = info_of("colour", &camera(16, 12, 14.0));
+        log.bytes::<CameraInfo>(INFO, at(0.0), &encode_big_endian(&info));
+        let data: Vec<u8> = (0..16 * 12 * 3).map(|v| v as u8).collect();
+        let mut image = Image {
+            header: tagalong_log::msgs::Header::new(at(1.0), "colour"),
+            height: 12,
+            width: 16,
+            encoding: "bgr8".into(),
+            is_bigendian: 0,
+            step: 48,
+            data: &data,
+        };
+        log.bytes::<Image<'_>>("/camera/color/image_raw", at(1.0), &encode_big_endian(&image));
+        image.header = tagalong_log::msgs::Header::new(at(2.0), "colour");
+        log.message("/camera/color/image_raw", at(2.0), &image);
+        let (mut source, _saved) = open(log, Needs { colour: true, ..Needs::default() });
+        let found = frames(&mut source);
+        assert_eq!(stamps(&found), [1.0, 2.0], "{name}");
+        assert_eq!(found[0].frame.colour().unwrap(), found[1].frame.colour().unwrap());
+        assert_eq!(found[0].frame.colour().unwrap().get(0, 0), Some([2, 1, 0]));
+    }
+}
+
+#[test]
+fn messages_that_do_not_decode_are_dropped_and_counted() {
+    let mut log = started();
+    log.colour(at(0.1));
+    log.bytes::<Image<'_>>("/camera/color/image_raw", at(0.2), &[0, 1, 0, 0, 1, 2, 3]);
+    log.bytes::<Image<'_>>("/camera/color/image_raw", at(0.3), &[0, 3, 0, 0, 1, 2, 3]);
+    log.colour(at(0.4));
+    let (mut source, _saved) = open(log, Needs::default());
+    assert_eq!(frames(&mut source).len(), 2);
+    assert_eq!(count(&source, "messages_undecodable"), 2);
+    assert!(source.data_lost());
+}
+
+#[test]
+fn images_of_another_size_are_refused() {
+    let mut log = started();
+    log.colour(at(0.1));
+    log.colour_of(at(0.2), 20, 12);
+    log.colour(at(0.3));
+    let (mut source, _saved) = open(log, Needs::default());
+    assert_eq!(indices(&frames(&mut source)), [1, 3]);
+    assert_eq!(count(&source, "images_of_other_size"), 1);
+
+    let mut log = started();
+    log.colour_of(at(0.2), 20, 12);
+    let saved = log.save();
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let error = FrameSource::open(&saved.path, &input, &limits, Needs::default()).err().unwrap();
+    assert!(matches!(error, LogError::Calibration { .. }));
+    assert!(error.to_string().contains("16x12, but the images are 20x12"), "{error}");
+}
+
+#[test]
+fn a_bad_calibration_names_topic_and_field() {
+    let mut log = LogWriter::plain();
+    let mut info = info_of("colour", &camera(16, 12, 14.0));
+    info.k[0] = f64::NAN;
+    log.message(INFO, at(0.0), &info);
+    log.colour(at(0.1));
+    let saved = log.save();
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let error = FrameSource::open(&saved.path, &input, &limits, Needs::default()).err().unwrap();
+    assert!(error.to_string().contains("topic /camera/color/camera_info: K = NaN"), "{error}");
+}
+
+#[test]
+fn the_pose_of_the_camera_can_be_given() {
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.colour(at(0.1));
+    log.depth(at(0.1), "colour", 2.0);
+    let saved = log.save();
+    let mount = MountSettings { height_m: 1.5, pitch_down_deg: 10.0, roll_deg: -3.0 };
+    let input = InputSettings { camera: Some(mount), ..InputSettings::default() };
+    let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), DEPTH).unwrap();
+    let camera = source.next_frame().unwrap().frame.camera.clone();
+    assert!((camera.height_m() - 1.5).abs() < 1e-12);
+    assert!((camera.pitch_down_rad().to_degrees() - 10.0).abs() < 1e-9);
+    assert!((camera.roll_rad().to_degrees() + 3.0).abs() < 1e-9);
+    assert!(source.facts().camera_source.contains("[input.camera]"));
+    // A wall gives no floor: with nothing else, the run cannot start.
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let error = FrameSource::open(&saved.path, &input, &limits, DEPTH).err().unwrap();
+    assert!(error.to_string().contains("camera pose"), "{error}");
+    assert!(error.to_string().contains("[input.camera]"), "{error}");
+}
+
+/// A floor 1.2 m below and a wall 4 m ahead of the colour camera, seen from a
+/// camera whose pose in the colour camera is given.
+fn room(from: &Camera, colour_from_camera: &Isometry3<f64>) -> DepthImage {
+    DepthImage::from_fn(from.width, from.height, |x, y| {
+        let ray = colour_from_camera.rotation * from.ray(Point2::new(x as f64, y as f64));
+        let eye = colour_from_camera.translation.vector;
+        let floor = Some((1.2 - eye.y) / ray.y).filter(|t| *t > 0.0);
+        let wall = (4.0 - eye.z) / ray.z;
+        floor.map_or(wall, |floor| floor.min(wall)) as f32
+    })
+}
+
+#[test]
+fn depth_of_another_camera_is_registered_through_tf() {
+    let (colour, depth) = (camera(80, 60, 70.0), camera(96, 72, 80.0));
+    let shift = Isometry3::new(Vector3::new(0.05, -0.01, 0.0), Vector3::new(0.01, -0.02, 0.0));
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &colour);
+    log.info("/camera/depth/camera_info", "depth", &depth);
+    log.fixed("base_link", "colour", &level_pose());
+    log.fixed("colour", "depth", &shift);
+    log.colour_of(at(0.1), 80, 60);
+    log.depth_of(at(0.11), "depth", 96, 72, room(&depth, &shift).pixels());
+    let (mut source, _saved) = open(log, DEPTH);
+    let frame = source.next_frame().unwrap().frame;
+    let (got, want) = (frame.depth().unwrap(), room(&colour, &Isometry3::identity()));
+    assert_eq!((got.width(), got.height()), (80, 60));
+    let seen = got.pixels().iter().filter(|d| d.is_finite()).count();
+    let wrong = got
+        .pixels()
+        .iter()
+        .zip(want.pixels())
+        .filter(|(got, want)| got.is_finite() && (*got - *want).abs() > 0.02 * *want + 0.02)
+        .count();
+    assert!(seen > 4400 && wrong < 60, "{seen} seen, {wrong} wrong");
+    assert_eq!(count(&source, "depth_registered"), 1);
+}
+
+#[test]
+fn depth_that_cannot_be_registered_is_told() {
+    let mut log = started();
+    log.colour(at(0.1));
+    log.depth_of(at(0.1), "depth", 8, 6, &[2.0; 48]);
+    let (mut source, _saved) = open(log, DEPTH);
+    assert!(source.next_frame().is_none());
+    assert_eq!(count(&source, "depth_not_registrable"), 1);
+    assert!(source.data_lost());
+}
+
+#[test]
+fn a_log_of_depth_alone_gives_frames() {
+    let mut log = LogWriter::plain();
+    log.info("/camera/depth/camera_info", "depth", &camera(16, 12, 14.0));
+    log.fixed("base_link", "depth", &level_pose());
+    (0..6).for_each(|i| log.depth(at(f64::from(i) * 0.1), "depth", 3.0));
+    let (mut source, _saved) = open(log, Needs { depth: true, ..Needs::default() });
+    let found = frames(&mut source);
+    assert_eq!(found.len(), 6);
+    assert!(found[0].frame.colour().is_err() && found[0].frame.depth().is_ok());
+}
+
+#[test]
+fn a_truncated_log_gives_what_is_whole_and_says_so() {
+    let mut log = started();
+    for i in 0..20 {
+        log.colour(at(f64::from(i) * 0.1));
+        log.depth(at(f64::from(i) * 0.1), "colour", 2.0);
+        log.flush();
+    }
+    let bytes = log.finish();
+    let saved = SavedLog::new(&bytes[..bytes.len() * 6 / 10]);
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
+    let found = frames(&mut source);
+    assert!((5..15).contains(&found.len()), "{}", found.len());
+    assert!(source.data_lost());
+    assert_eq!(count(&source, "truncated"), 1);
+}
+
+#[test]
+fn two_readings_are_the_same() {
+    let stamps: Vec<f64> = (0..12).map(|i| f64::from(i * 7 % 12) * 0.1).collect();
+    let (mut first, _a) = run_of(&stamps);
+    let (mut second, _b) = run_of(&stamps);
+    let (a, b) = (frames(&mut first), frames(&mut second));
+    assert_eq!(self::stamps(&a), self::stamps(&b));
+    assert_eq!(first.counters(), second.counters());
+    assert_eq!(first.facts().sha256, second.facts().sha256);
+    assert_eq!(first.facts().sha256.len(), 64);
+}
+
+#[test]
+fn settings_that_cannot_work_name_their_key() {
+    let saved = started().save();
+    let input = InputSettings { pair_tolerance_s: f64::NAN, ..InputSettings::default() };
+    let error =
+        FrameSource::open(&saved.path, &input, &Limits::default(), Needs::default()).err().unwrap();
+    assert!(error.to_string().contains("pair_tolerance_s"), "{error}");
+}
