@@ -61,6 +61,7 @@ fn colour_without_depth_is_counted_and_keeps_its_index() {
     assert_eq!(indices(&found), [1, 3, 5, 7, 9]);
     assert_eq!(found[2].frame.depth().unwrap().get(3, 3), Some(6.0));
     assert_eq!(count(&source, "colour_without_depth"), 5);
+    assert_eq!(count(&source, "depth_without_colour"), 0);
     assert!((found[1].frame.motion.dt - 0.066).abs() < 1e-9);
     assert!(!source.data_lost());
     let mut source = open(Needs { colour: true, ..Needs::default() });
@@ -81,6 +82,7 @@ fn skew_beyond_the_tolerance_pairs_nothing() {
         let (mut source, _saved) = open(log, DEPTH);
         assert_eq!(frames(&mut source).len(), expected, "{skew}");
         assert_eq!(count(&source, "colour_without_depth"), 4 - expected as u64);
+        assert_eq!(count(&source, "depth_without_colour"), 4 - expected as u64);
     }
 }
 
@@ -416,4 +418,22 @@ fn settings_that_cannot_work_name_their_key() {
     let error =
         FrameSource::open(&saved.path, &input, &Limits::default(), Needs::default()).err().unwrap();
     assert!(error.to_string().contains("pair_tolerance_s"), "{error}");
+}
+
+#[test]
+fn a_file_that_shrinks_while_it_is_read_is_noticed() {
+    let mut log = started();
+    for i in 0..200 {
+        log.colour_of(at(f64::from(i) * 0.1), 16, 12);
+        log.depth(at(f64::from(i) * 0.1), "colour", 2.0);
+        log.flush();
+    }
+    let (mut source, saved) = open(log, DEPTH);
+    let length = std::fs::metadata(&saved.path).unwrap().len();
+    let file = std::fs::OpenOptions::new().write(true).open(&saved.path).unwrap();
+    file.set_len(length / 2).unwrap();
+    let found = frames(&mut source);
+    assert!((50..150).contains(&found.len()), "{}", found.len());
+    assert!(source.data_lost());
+    assert_eq!(count(&source, "log_changed_while_read"), 1);
 }

@@ -38,7 +38,7 @@ fn logs() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("skipped: {} is not there", folder.display());
+    eprintln!("skipped: {} is not there", folder.display());
     None
 }
 
@@ -111,7 +111,7 @@ fn the_floor_gives_the_pose_of_the_camera() {
     for expected in LOGS.iter().filter(|log| log.depth && log.name != "uc3m-single-frames") {
         let source = open(&folder, expected.name, &input, needs(expected));
         let facts = source.facts();
-        println!(
+        eprintln!(
             "{}: {:.3} {:.2} {:.2} from {}; expected {:?}",
             expected.name,
             facts.camera_height_m,

@@ -68,7 +68,8 @@ impl Assembler {
         if let Some(depth) = depth {
             images.depth = self.depth(plan, image, &depth, &camera, intake, tally);
         }
-        if let Some(right) = right {
+        // A second picture to decode is only worth it for those who look at it.
+        if let Some(right) = right.filter(|_| plan.needs.right) {
             images.right = right_image(plan, &right, size, tally);
         }
         let lacks = plan.needs.depth && images.depth.is_none()

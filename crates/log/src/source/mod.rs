@@ -217,6 +217,8 @@ impl FrameSource {
                 }
             }
             if self.ended {
+                self.tally.add("depth_without_colour", self.intake.depth.leave());
+                self.tally.add("right_without_left", self.intake.right.leave());
                 return None;
             }
             self.read_on();
@@ -235,6 +237,12 @@ impl FrameSource {
         self.ended = true;
         if self.intake.frames.drop_suspect() {
             self.tally.count("late_frames");
+        }
+        if self.walker.data_lost() && !self.plan.scan.data_lost {
+            let notes = self.walker.notes().join("; ");
+            self.tally.lose("log_changed_while_read", || {
+                format!("the file was whole when it was opened and is not any more: {notes}")
+            });
         }
     }
 

@@ -12,8 +12,12 @@ pub(super) struct Payload {
     pub(super) data: Vec<u8>,
 }
 
-/// Messages kept of a second stream; more are not near any image to come.
+/// Images kept of a second stream; more are not near any image to come.
 const MAX_WAITING: usize = 64;
+/// Bytes kept of a second stream, unless a few images alone are larger.
+const MAX_WAITING_BYTES: usize = 40 << 20;
+/// So many images are kept whatever their size.
+const MIN_WAITING: usize = 4;
 
 /// Images of a second stream (depth, right) that wait for their partner.
 #[derive(Debug, Default)]
@@ -21,17 +25,23 @@ pub(super) struct Waiting {
     images: VecDeque<Payload>,
     aside: VecDeque<Payload>,
     /// Images that left without a partner.
-    pub(super) unpaired: u64,
+    unpaired: u64,
 }
 
 impl Waiting {
     pub(super) fn push(&mut self, payload: Payload) {
         let place = self.images.partition_point(|old| old.stamp <= payload.stamp);
         self.images.insert(place, payload);
-        if self.images.len() > MAX_WAITING {
+        while self.is_overfull() {
             self.images.pop_front();
             self.unpaired += 1;
         }
+    }
+
+    fn is_overfull(&self) -> bool {
+        let bytes: usize = self.images.iter().map(|image| image.data.len()).sum();
+        let count = self.images.len();
+        count > MAX_WAITING || count > MIN_WAITING && bytes > MAX_WAITING_BYTES
     }
 
     /// Takes the image nearest to `stamp` if it is within the tolerance and not
@@ -76,6 +86,14 @@ impl Waiting {
             self.unpaired += self.images.len() as u64;
             self.images = std::mem::take(&mut self.aside);
         }
+    }
+
+    /// At the end: how many images found no partner since this was last asked.
+    pub(super) fn leave(&mut self) -> u64 {
+        let left = self.images.len() + self.aside.len();
+        self.images.clear();
+        self.aside.clear();
+        std::mem::take(&mut self.unpaired) + left as u64
     }
 }
 
@@ -233,6 +251,15 @@ mod tests {
         assert_eq!(take(125, 158), None);
         assert_eq!(take(158, 191), Some(at(160)));
         assert_eq!(waiting.unpaired, 0);
+    }
+
+    #[test]
+    fn large_images_wait_in_bounded_memory() {
+        let mut waiting = Waiting::default();
+        for i in 0..20 {
+            waiting.push(Payload { data: vec![0; 5 << 20], ..at(i) });
+        }
+        assert_eq!((waiting.images.len(), waiting.unpaired), (8, 12));
     }
 
     #[test]
