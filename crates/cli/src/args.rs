@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::commands::EvalArgs;
+
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.
 #[derive(Debug, Parser)]
@@ -49,6 +51,9 @@ pub enum Command {
         /// A log that the config should work on.
         log: Option<PathBuf>,
     },
+    /// Scores tracks against the truth
+    #[command(after_help = EVAL_HELP)]
+    Eval(EvalArgs),
     /// Says what a log contains and what a pipeline could use of it
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -82,6 +87,15 @@ const CHECK_HELP: &str = "\
 Examples:
   tagalong check configs/depth-ekf.toml
   tagalong check configs/depth-ekf.toml robot.mcap";
+
+const EVAL_HELP: &str = "\
+Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors); --format json
+prints one flat object.
+
+Examples:
+  tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf
+  tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf --similarity metres
+  tagalong eval --truth MOT17-04/gt/gt.txt --tracks MOT17-04.txt --format json | jq .HOTA";
 
 const INSPECT_HELP: &str = "\
 Examples:

@@ -21,6 +21,7 @@ mod needs;
 mod outcome;
 mod overlay;
 mod run;
+mod scoring;
 mod signals;
 mod suggest;
 
@@ -64,6 +65,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin } => commands::config(registry, plugin),
         Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
+        Command::Eval(args) => commands::eval(args),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }

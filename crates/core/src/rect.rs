@@ -1,6 +1,11 @@
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
+use crate::{HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
+
+/// From the centre of a head to its top, m.
+const HALF_HEAD_M: f64 = 0.115;
+
 /// An upright rectangle in an image, in pixels. `x`, `y` is the upper left
 /// corner; it may lie outside the image.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
@@ -78,6 +83,16 @@ impl Rect {
     pub fn inflated(&self, by: f64) -> Self {
         let (dx, dy) = (self.width * by, self.height * by);
         Self::new(self.x - 0.5 * dx, self.y - 0.5 * dy, self.width + dx, self.height + dy)
+    }
+
+    /// The upper-body square of a standing person of this height, in metres,
+    /// whose whole body fills this rectangle: for boxes of detectors and data
+    /// sets that know whole bodies only.
+    pub fn upper_body_of_standing(&self, height_m: f64) -> Self {
+        let px_per_m = self.height / height_m;
+        let side = UPPER_BODY_SIDE_M * px_per_m;
+        let above = (HEAD_BELOW_TOP_M - HALF_HEAD_M) * px_per_m;
+        Self::new(self.centre().x - 0.5 * side, self.y - above, side, side)
     }
 
     /// True if all four numbers are finite and the size is not negative.

@@ -12,6 +12,7 @@ use mcap::{WriteOptions, Writer};
 use nalgebra::Isometry3;
 use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
 use tagalong_log::msgs::{CameraInfo, Header, Image, Message, TFMessage, TransformStamped, encode};
+use tagalong_log::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame};
 
 pub const WIDTH: usize = 160;
 pub const HEIGHT: usize = 120;
@@ -61,11 +62,13 @@ pub struct Drawn {
     pub depth: bool,
     /// Frames that are written twice, with the same stamp.
     pub twice: u64,
+    /// Truth that stands in the log itself.
+    pub truth: Vec<TruthFrame>,
 }
 
 impl Drawn {
     pub fn of(frames: u64) -> Self {
-        Self { frames, depth: true, twice: 0 }
+        Self { frames, depth: true, twice: 0, truth: Vec::new() }
     }
 
     /// Writes a log of somebody who walks to the left, ten frames a second.
@@ -78,6 +81,7 @@ impl Drawn {
                 self.write_frame(&mut log, stamp, index);
             }
         }
+        log.send_truth(&self.truth);
         log.writer.finish().unwrap();
     }
 
@@ -168,6 +172,21 @@ impl Log {
             .compression_threads(1)
             .chunk_size(Some(1 << 18));
         Self { writer: options.create(file).unwrap(), channels: BTreeMap::new() }
+    }
+
+    fn send_truth(&mut self, frames: &[TruthFrame]) {
+        if frames.is_empty() {
+            return;
+        }
+        let schema = TruthFrame::schema();
+        let schema = self.writer.add_schema(TRUTH_SCHEMA, "jsonschema", schema.as_bytes()).unwrap();
+        let about = BTreeMap::new();
+        let channel_id = self.writer.add_channel(schema, TRUTH_TOPIC, "json", &about).unwrap();
+        for frame in frames {
+            let (log_time, publish_time) = (frame.stamp_ns, frame.stamp_ns);
+            let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time };
+            self.writer.write_to_known_channel(&header, &frame.encode()).unwrap();
+        }
     }
 
     fn send<M: Message + serde::Serialize>(&mut self, topic: &str, at: u64, message: &M) {

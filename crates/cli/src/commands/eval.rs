@@ -1,0 +1,170 @@
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use tagalong_eval::{Scores, Sequence, Similarity};
+
+use crate::args::Format;
+use crate::config_file::{ConfigFile, OuterSettings};
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::scoring::{
+    Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
+};
+use crate::suggest::check_log_path;
+
+/// The arguments of `tagalong eval`.
+#[derive(Args, Debug)]
+pub struct EvalArgs {
+    /// Who was there: MOTChallenge text, people.csv, KITTI labels, or a log with
+    /// the channel /truth/people.
+    #[arg(long, value_name = "FILE")]
+    pub truth: PathBuf,
+    /// Who was reported: MOTChallenge text, KITTI labels, tracks-metres.csv, or
+    /// the folder of a run.
+    #[arg(long, value_name = "FILE")]
+    pub tracks: PathBuf,
+    /// What is compared: boxes in the image, or places on the floor.
+    #[arg(long, value_enum, default_value_t)]
+    pub similarity: SimilarityChoice,
+    /// The log of the truth, for stamps and the camera's pose [default: the one
+    /// that the run names, beside the truth].
+    #[arg(long, value_name = "LOG")]
+    pub log: Option<PathBuf>,
+    /// Read that log with the `[input]` and `[limits]` of this config.
+    #[arg(long)]
+    pub config: Option<PathBuf>,
+    /// Whose rules say what MOTChallenge truth means.
+    #[arg(long, value_enum, default_value_t)]
+    pub rules: RulesChoice,
+    /// The truth's boxes are whole bodies; compare the upper bodies of them.
+    #[arg(long)]
+    pub upper_body: bool,
+    /// Frames per second where no file tells [default: 30; KITTI 10].
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// How to print.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// What makes a truth and a report alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum SimilarityChoice {
+    /// Intersection over union of the boxes.
+    #[default]
+    Iou,
+    /// Distance on the floor: 1 at the same place, 0 a metre away.
+    Metres,
+}
+
+impl From<SimilarityChoice> for Similarity {
+    fn from(choice: SimilarityChoice) -> Self {
+        match choice {
+            SimilarityChoice::Iou => Self::Iou,
+            SimilarityChoice::Metres => Self::Metres,
+        }
+    }
+}
+
+/// `tagalong eval`.
+///
+/// # Errors
+/// Files that cannot be read or do not fit together.
+pub fn eval(args: &EvalArgs) -> Outcome {
+    let (sequence, truth) = sequence(args)?;
+    let similarity = args.similarity.into();
+    let Some(sequence) = comparable(&sequence, similarity) else {
+        return Err(no_place(args, &truth));
+    };
+    let scores = Scores::measure(&sequence, comparison(&truth, similarity))
+        .map_err(|error| Failure::failed(format!("{}: {error}", args.tracks.display())))?;
+    print(&match args.format {
+        Format::Json => serde_json::to_string_pretty(&scores).unwrap_or_default() + "\n",
+        Format::Text => as_text(&scores),
+    })?;
+    Ok(Ended::Well)
+}
+
+fn sequence(args: &EvalArgs) -> Result<(Sequence, TruthFile), Failure> {
+    let options = TruthOptions { rules: args.rules, upper_body: args.upper_body };
+    let truth = TruthFile::read(&args.truth, options)?;
+    let tracks = Tracks::read(&args.tracks)?;
+    let shots = shots(args, &truth, &tracks)?;
+    if args.similarity == SimilarityChoice::Metres && truth.is_kitti() && tracks.in_robot_frame {
+        return Err(Failure::usage(
+            "KITTI gives places in the camera's frame and the tracks theirs in the robot's: \
+             compare boxes (--similarity iou), or give tracks as KITTI labels",
+        ));
+    }
+    let lost = truth.without_image(&shots);
+    if lost > 0 {
+        let shown = args.truth.display();
+        say(&format!("note: {lost} moments of {shown} have no image and are left out"));
+    }
+    let rate = rate(args, &truth)?;
+    let name = args.truth.display().to_string();
+    Ok((assemble(&name, &truth, &shots, tracks.reports, rate), truth))
+}
+
+fn rate(args: &EvalArgs, truth: &TruthFile) -> Result<Rate, Failure> {
+    let usual = if truth.is_kitti() { 10.0 } else { 30.0 };
+    let stated = truth.info.as_ref().map(|info| info.rate_hz);
+    let rate = args.rate.or(stated).unwrap_or(usual);
+    if rate > 0.0 && rate.is_finite() {
+        return Ok(Rate(rate));
+    }
+    Err(Failure::usage(format!("--rate is {rate}; it must be above 0")))
+}
+
+/// The frames of the log, if one is named, or found where it is of use.
+fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, Failure> {
+    let found = args.log.clone().or_else(|| match truth.needs_stamps() {
+        true => Some(args.truth.clone()),
+        false => beside(&args.truth, tracks.log_name.as_deref()),
+    });
+    let Some(log) = found else { return Ok(Shots::default()) };
+    let outer = match &args.config {
+        Some(config) => ConfigFile::read(config)?.outer()?,
+        None => OuterSettings::default(),
+    };
+    check_log_path(&log)?;
+    Shots::read(&log, &outer.input, &outer.limits)
+}
+
+fn beside(truth: &Path, log_name: Option<&str>) -> Option<PathBuf> {
+    let path = truth.with_file_name(log_name?);
+    path.is_file().then_some(path)
+}
+
+fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {
+    let shown = args.truth.display();
+    Failure::usage(match args.similarity {
+        SimilarityChoice::Iou => {
+            format!("{shown} has people without a box; compare places (--similarity metres)")
+        }
+        SimilarityChoice::Metres if truth.needs_pose() => format!(
+            "{shown} gives heads in the camera's frame, and where the camera was is not known; \
+             name the log with --log LOG.mcap"
+        ),
+        SimilarityChoice::Metres => {
+            format!("{shown} has people without a place; compare boxes (--similarity iou)")
+        }
+    })
+}
+
+/// One figure a line, in the order of the fields.
+fn as_text(scores: &Scores) -> String {
+    let json = serde_json::to_string(scores).unwrap_or_default();
+    let mut out = String::new();
+    let inside = json.trim_start_matches('{').trim_end_matches('}');
+    for field in inside.split(',') {
+        let (name, value) = field.split_once(':').unwrap_or((field, ""));
+        let value = match (value, value.parse::<f64>()) {
+            ("null", _) => "-".to_owned(),
+            (text, Ok(number)) if text.contains(['.', 'e']) => format!("{number:.4}"),
+            (text, _) => text.to_owned(),
+        };
+        let _ = writeln!(out, "{:<24} {value:>10}", name.trim_matches('"'));
+    }
+    out
+}

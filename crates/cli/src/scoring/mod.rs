@@ -1,0 +1,99 @@
+//! From files of truth and tracks to a sequence that can be scored.
+
+mod shots;
+mod tracks;
+mod truth;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+pub use shots::{Shot, Shots};
+use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};
+pub use tracks::Tracks;
+pub use truth::{RulesChoice, TruthFile, TruthOptions};
+
+use crate::outcome::Failure;
+
+/// Reports by the number of their frame, from 1.
+pub type Reports = BTreeMap<u32, Vec<Report>>;
+
+/// The stamps of frames that no log tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate(pub f64);
+
+/// Puts truth and reports of all frames side by side.
+///
+/// Frames that the log has but did not deliver (their depth was lost, say) are
+/// there, too: whoever was in them was missed.
+pub fn assemble(
+    name: &str,
+    truth: &TruthFile,
+    shots: &Shots,
+    mut reports: Reports,
+    rate: Rate,
+) -> Sequence {
+    let last_report = reports.last_key_value().map_or(0, |(&number, _)| number);
+    let length = truth.last(shots).max(shots.last()).max(last_report);
+    let mut people = truth.frames(shots);
+    let frames = (1..=length).map(|number| {
+        let (truths, ignore_regions) = people.remove(&number).unwrap_or_default();
+        Frame {
+            stamp_ns: shots.stamp_ns(number, rate),
+            truths,
+            reports: reports.remove(&number).unwrap_or_default(),
+            ignore_regions,
+        }
+    });
+    Sequence { name: name.to_owned(), frames: frames.collect() }
+}
+
+/// The part of a sequence that a similarity can compare: reports without the
+/// place it looks at are left out; `None` if a truth lacks it.
+pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequence> {
+    let has_truth = |truth: &Truth| match similarity {
+        Similarity::Iou => truth.region.is_some(),
+        Similarity::Metres => truth.floor_m.is_some(),
+    };
+    let has_report = |report: &Report| match similarity {
+        Similarity::Iou => report.region.is_some(),
+        Similarity::Metres => report.floor_m.is_some(),
+    };
+    let mut kept = sequence.clone();
+    for frame in &mut kept.frames {
+        if !frame.truths.iter().all(has_truth) {
+            return None;
+        }
+        frame.reports.retain(has_report);
+    }
+    Some(kept)
+}
+
+/// The comparison that the truth's protocol asks for.
+pub fn comparison(truth: &TruthFile, similarity: Similarity) -> Comparison {
+    match truth.is_kitti() && similarity == Similarity::Iou {
+        true => tagalong_eval::formats::kitti::comparison(similarity),
+        false => similarity.into(),
+    }
+}
+
+/// A text file.
+///
+/// # Errors
+/// A file that cannot be read, by name.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    let shown = path.display();
+    let bytes =
+        fs::read(path).map_err(|error| Failure::failed(format!("cannot read {shown}: {error}")))?;
+    String::from_utf8(bytes).map_err(|_| {
+        Failure::failed(format!(
+            "{shown} is no text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, or \
+             the folder of a run"
+        ))
+    })
+}
+
+/// A rectangle in the words of the metrics.
+pub fn region(rect: &tagalong_core::Rect) -> Region {
+    Region::new(rect.x, rect.y, rect.width, rect.height)
+}

@@ -1,0 +1,121 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use tagalong_eval::Report;
+use tagalong_eval::formats::{Timeline, kitti, metres, mot};
+
+use super::{Reports, read_text};
+use crate::outcome::Failure;
+
+/// Tracks as a tracker wrote them.
+#[derive(Clone, Debug, Default)]
+pub struct Tracks {
+    /// By the number of the frame.
+    pub reports: Reports,
+    /// The log that a run worked on, if the tracks are those of a run.
+    pub log_name: Option<String>,
+    /// Positions are in the robot frame.
+    pub in_robot_frame: bool,
+}
+
+/// The part of a run's `report.json` that is looked at.
+#[derive(Deserialize)]
+struct RunFacts {
+    log: LogName,
+}
+
+#[derive(Deserialize)]
+struct LogName {
+    name: String,
+}
+
+impl Tracks {
+    /// Reads tracks: MOTChallenge or KITTI text, `tracks-metres.csv`, or the
+    /// folder of a run.
+    ///
+    /// # Errors
+    /// A file that cannot be read; names the file and the line.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        if path.is_dir() {
+            return Self::of_run(path);
+        }
+        let (text, name) = (read_text(path)?, path.display().to_string());
+        let first = text.lines().next().unwrap_or_default();
+        let reports = if first.starts_with("stamp_ns") {
+            return Ok(Self { in_robot_frame: true, ..Self::of(places(&text, &name)?) });
+        } else if is_kitti(first) {
+            kitti_reports(&text, &name)?
+        } else {
+            boxes(&text, &name)?
+        };
+        Ok(Self::of(reports))
+    }
+
+    fn of(reports: Reports) -> Self {
+        Self { reports, ..Self::default() }
+    }
+
+    fn of_run(folder: &Path) -> Result<Self, Failure> {
+        let file = |name: &str| -> Result<(String, String), Failure> {
+            let path: PathBuf = folder.join(name);
+            Ok((read_text(&path)?, path.display().to_string()))
+        };
+        let (text, name) = file("tracks.csv")?;
+        let mut reports = boxes(&text, &name)?;
+        let (text, name) = file("tracks-metres.csv")?;
+        merge(&mut reports, places(&text, &name)?);
+        let (text, name) = file("report.json")?;
+        let facts: RunFacts = serde_json::from_str(&text)
+            .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
+        Ok(Self { reports, log_name: Some(facts.log.name), in_robot_frame: true })
+    }
+}
+
+fn is_kitti(first: &str) -> bool {
+    let class = first.split_whitespace().nth(2);
+    !first.contains(',') && class.is_some_and(|field| field.parse::<f64>().is_err())
+}
+
+fn gather(rows: impl IntoIterator<Item = (u32, Report)>) -> Reports {
+    let mut reports = Reports::new();
+    for (number, report) in rows {
+        reports.entry(number).or_default().push(report);
+    }
+    reports
+}
+
+fn boxes(text: &str, name: &str) -> Result<Reports, Failure> {
+    let rows = mot::parse(text, name).map_err(Failure::failed)?;
+    Ok(gather(rows.iter().map(mot::Row::report)))
+}
+
+/// Only tracks that were seen: a box is written of no other.
+fn places(text: &str, name: &str) -> Result<Reports, Failure> {
+    let rows = metres::parse(text, name).map_err(Failure::failed)?;
+    let seen = rows.iter().filter(|row| row.seen);
+    Ok(gather(seen.map(|row| row.report(metres::Floor::Robot))))
+}
+
+fn kitti_reports(text: &str, name: &str) -> Result<Reports, Failure> {
+    let labels = kitti::parse(text, name).map_err(Failure::failed)?;
+    let mut timeline = Timeline::new();
+    kitti::add_reports(&mut timeline, &labels);
+    let numbers = 0..=timeline.last().unwrap_or(0);
+    Ok(numbers.map(|number| (number + 1, timeline.frame(number).reports.clone())).collect())
+}
+
+/// Gives boxes their places, and adds tracks that have a place but no box.
+fn merge(reports: &mut Reports, places: Reports) {
+    for (number, places) in places {
+        let frame = reports.entry(number).or_default();
+        let mut by_id: BTreeMap<i64, usize> =
+            frame.iter().enumerate().map(|(index, report)| (report.id, index)).collect();
+        for place in places {
+            match by_id.remove(&place.id) {
+                Some(index) => frame[index].floor_m = place.floor_m,
+                None => frame.push(place),
+            }
+        }
+    }
+}

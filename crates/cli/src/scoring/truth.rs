@@ -1,0 +1,281 @@
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use clap::ValueEnum;
+use nalgebra::{Isometry3, Point3};
+use tagalong_core::{HEAD_RADIUS_M, Rect};
+use tagalong_eval::formats::mot::{self, SequenceInfo};
+use tagalong_eval::formats::{Timeline, kitti, people};
+use tagalong_eval::{Region, Role, Truth};
+use tagalong_log::{Limits, TRUTH_TOPIC, TruthPerson, read_truth};
+
+use super::{Shots, read_text, region};
+use crate::outcome::Failure;
+
+/// Truth of a log belongs to the image whose stamp is this near, ns.
+const SAME_MOMENT_NS: u64 = 5_000_000;
+
+/// How tall a person in a whole-body box is taken to be, m.
+const STANDING_HEIGHT_M: f64 = 1.7;
+
+/// Who is there in a frame, and what of it is not annotated.
+pub type People = (Vec<Truth>, Vec<Region>);
+
+/// Whose rules say what MOTChallenge truth means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum RulesChoice {
+    /// MOT17 if all boxes have a class of it, else MOT15.
+    #[default]
+    Auto,
+    /// No classes; confidence 0 does not count.
+    Mot15,
+    /// Pedestrians count, distractors are ignored.
+    Mot17,
+    /// As MOT17, and bicycles are ignored, too.
+    Mot20,
+}
+
+/// How truth is read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TruthOptions {
+    /// The rules of MOTChallenge text.
+    pub rules: RulesChoice,
+    /// Boxes are of whole standing people: their upper bodies are compared.
+    pub upper_body: bool,
+}
+
+/// Where a person was, as far as the file says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    Unknown,
+    /// Surface of the head in the colour optical frame, m.
+    HeadInCamera([f64; 3]),
+    /// On the floor in the frame of the tracks, m.
+    Floor([f64; 2]),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Mot,
+    People,
+    Kitti,
+    Log,
+}
+
+/// A frame as annotated; the key of the map is its number, or its stamp.
+#[derive(Clone, Debug, Default)]
+struct Annotated {
+    people: Vec<(Truth, Place)>,
+    ignore_regions: Vec<Region>,
+}
+
+/// A file of truth.
+#[derive(Clone, Debug)]
+pub struct TruthFile {
+    kind: Kind,
+    frames: BTreeMap<u64, Annotated>,
+    /// The `seqinfo.ini` beside it.
+    pub info: Option<SequenceInfo>,
+}
+
+impl TruthFile {
+    /// Reads truth, whatever its format.
+    ///
+    /// # Errors
+    /// A file that cannot be read; names the file and the line.
+    pub fn read(path: &Path, options: TruthOptions) -> Result<Self, Failure> {
+        let mut truth = match kind_of(path)? {
+            Kind::Log => Self::of_log(path)?,
+            Kind::People => Self::of_people(path)?,
+            Kind::Kitti => Self::of_kitti(path)?,
+            Kind::Mot => Self::of_mot(path, options.rules)?,
+        };
+        if options.upper_body {
+            truth.cut_to_upper_bodies();
+        }
+        Ok(truth)
+    }
+
+    fn empty(kind: Kind) -> Self {
+        Self { kind, frames: BTreeMap::new(), info: None }
+    }
+
+    fn add(&mut self, key: u64, truth: Truth, place: Place) {
+        self.frames.entry(key).or_default().people.push((truth, place));
+    }
+
+    fn of_mot(path: &Path, rules: RulesChoice) -> Result<Self, Failure> {
+        let (text, name) = (read_text(path)?, path.display().to_string());
+        let rules = match rules {
+            RulesChoice::Auto => guess(&mot::parse(&text, &name).map_err(Failure::failed)?),
+            RulesChoice::Mot15 => mot::Rules::Mot15,
+            RulesChoice::Mot17 => mot::Rules::Mot17,
+            RulesChoice::Mot20 => mot::Rules::Mot20,
+        };
+        let mut file = Self::empty(Kind::Mot);
+        let rows = mot::parse_truth(&text, &name, rules).map_err(Failure::failed)?;
+        rows.into_iter().for_each(|(n, truth)| file.add(u64::from(n), truth, Place::Unknown));
+        file.info = sequence_info(path)?;
+        Ok(file)
+    }
+
+    fn of_people(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let rows = people::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let mut file = Self::empty(Kind::People);
+        for row in rows {
+            let (number, truth) = row.truth(|_| None);
+            file.add(u64::from(number), truth, Place::HeadInCamera(row.head_in_camera_m));
+        }
+        Ok(file)
+    }
+
+    /// KITTI counts frames from 0, everybody else from 1.
+    fn of_kitti(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let labels = kitti::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let mut timeline = Timeline::new();
+        kitti::add_truths(&mut timeline, &labels);
+        let mut file = Self::empty(Kind::Kitti);
+        for number in 0..=timeline.last().unwrap_or(0) {
+            let frame = timeline.frame(number).clone();
+            let annotated = file.frames.entry(u64::from(number) + 1).or_default();
+            annotated.ignore_regions = frame.ignore_regions;
+            annotated.people = frame
+                .truths
+                .into_iter()
+                .map(|truth| (truth, truth.floor_m.map_or(Place::Unknown, Place::Floor)))
+                .collect();
+        }
+        Ok(file)
+    }
+
+    fn of_log(path: &Path) -> Result<Self, Failure> {
+        let frames = read_truth(path, &Limits::default())?.ok_or_else(|| {
+            Failure::failed(format!("{} has no truth: no channel {TRUTH_TOPIC}", path.display()))
+        })?;
+        let mut file = Self::empty(Kind::Log);
+        for frame in frames {
+            let annotated = file.frames.entry(frame.stamp_ns).or_default();
+            annotated.people = frame.people.iter().map(of_person).collect();
+        }
+        Ok(file)
+    }
+
+    fn cut_to_upper_bodies(&mut self) {
+        for (truth, _) in self.frames.values_mut().flat_map(|frame| &mut frame.people) {
+            truth.region = truth.region.map(|whole| {
+                let whole = Rect::new(whole.x, whole.y, whole.width, whole.height);
+                region(&whole.upper_body_of_standing(STANDING_HEIGHT_M))
+            });
+        }
+    }
+
+    /// True if the rules of KITTI apply.
+    pub fn is_kitti(&self) -> bool {
+        self.kind == Kind::Kitti
+    }
+
+    /// True if the floor positions are to be had with the camera's pose only.
+    pub fn needs_pose(&self) -> bool {
+        let mut people = self.frames.values().flat_map(|frame| &frame.people);
+        people.any(|(_, place)| matches!(place, Place::HeadInCamera(_)))
+    }
+
+    /// True if frames are told by stamp: only the log knows their numbers.
+    pub fn needs_stamps(&self) -> bool {
+        self.kind == Kind::Log
+    }
+
+    /// The number of the last frame that is known to exist.
+    pub fn last(&self, shots: &Shots) -> u32 {
+        let stated = self.info.as_ref().map_or(0, |info| info.length);
+        let annotated = self.frames.keys().filter_map(|key| self.number(*key, shots)).max();
+        stated.max(annotated.unwrap_or(0))
+    }
+
+    /// Annotated moments without an image of the log.
+    pub fn without_image(&self, shots: &Shots) -> usize {
+        self.frames.keys().filter(|key| self.number(**key, shots).is_none()).count()
+    }
+
+    fn number(&self, key: u64, shots: &Shots) -> Option<u32> {
+        match self.kind {
+            Kind::Log => shots.near(key, SAME_MOMENT_NS).map(|shot| shot.number),
+            _ => u32::try_from(key).ok(),
+        }
+    }
+
+    /// The people by the number of the frame, on the floor where that can be.
+    pub fn frames(&self, shots: &Shots) -> BTreeMap<u32, People> {
+        let mut all = BTreeMap::new();
+        for (key, frame) in &self.frames {
+            let Some(number) = self.number(*key, shots) else { continue };
+            let pose = shots.at(number).map(|shot| &shot.robot_from_camera);
+            let people = frame
+                .people
+                .iter()
+                .map(|(truth, place)| Truth { floor_m: place.on_floor(pose), ..*truth });
+            all.insert(number, (people.collect(), frame.ignore_regions.clone()));
+        }
+        all
+    }
+}
+
+impl Place {
+    /// In the robot frame; heads are moved from their surface to their centre.
+    fn on_floor(self, robot_from_camera: Option<&Isometry3<f64>>) -> Option<[f64; 2]> {
+        match self {
+            Self::Unknown => None,
+            Self::Floor(place) => Some(place),
+            Self::HeadInCamera(surface) => {
+                let surface = Point3::from(surface);
+                let centre = surface + surface.coords.normalize() * HEAD_RADIUS_M;
+                let head = robot_from_camera? * centre;
+                Some([head.x, head.y])
+            }
+        }
+    }
+}
+
+fn of_person(person: &TruthPerson) -> (Truth, Place) {
+    let truth = Truth {
+        id: person.id,
+        region: person.upper_body_px.map(|[x, y, width, height]| Region { x, y, width, height }),
+        floor_m: None,
+        role: if person.ignore { Role::Ignored } else { Role::Counts },
+    };
+    (truth, person.head_in_robot_m.map_or(Place::Unknown, |[x, y, _]| Place::Floor([x, y])))
+}
+
+/// Boxes without a proper class follow the rules that have none.
+fn guess(rows: &[mot::Row]) -> mot::Rules {
+    let has_class = |row: &mot::Row| row.class.is_some_and(|class| (1..=13).contains(&class));
+    if rows.iter().all(has_class) { mot::Rules::Mot17 } else { mot::Rules::Mot15 }
+}
+
+/// Tells formats apart by how they begin.
+fn kind_of(path: &Path) -> Result<Kind, Failure> {
+    if path.extension().is_some_and(|extension| extension == "mcap") {
+        return Ok(Kind::Log);
+    }
+    let text = read_text(path)?;
+    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let blank_separated: Vec<&str> = first.split_whitespace().collect();
+    let has_class = |fields: &[&str]| fields.get(2).is_some_and(|f| f.parse::<f64>().is_err());
+    Ok(match first {
+        _ if first.contains("ub_x") || first.contains("head_x") => Kind::People,
+        _ if !first.contains(',') && has_class(&blank_separated) => Kind::Kitti,
+        _ => Kind::Mot,
+    })
+}
+
+/// The `seqinfo.ini` of a MOTChallenge folder: beside `gt.txt` or above `gt`.
+fn sequence_info(truth: &Path) -> Result<Option<SequenceInfo>, Failure> {
+    let folders = truth.ancestors().skip(1).take(2);
+    let Some(path) = folders.map(|f| f.join("seqinfo.ini")).find(|path| path.is_file()) else {
+        return Ok(None);
+    };
+    let text = read_text(&path)?;
+    mot::parse_info(&text, &path.display().to_string()).map(Some).map_err(Failure::failed)
+}

@@ -1,0 +1,205 @@
+//! `tagalong eval` as a user calls it.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use common::{Drawn, code, own_plugin, tagalong, text};
+use serde_json::Value;
+
+fn eval(arguments: &[&str]) -> Output {
+    tagalong().arg("eval").args(arguments).output().unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    assert_eq!(code(output), 0, "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {} is not here", path.display());
+    None
+}
+
+fn shown(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Where the walker of the drawn log is, as `people.csv` says it.
+fn people(frames: u64) -> String {
+    let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
+                  visible,occluder,ignore,interpolated\n";
+    let row = |index: u64| {
+        let (depth, centre) = (2.8, 90.0 - index as f64 + 13.0);
+        let scale = 130.0 / depth;
+        let (side, top) = (0.57 * scale, 40.0 - 0.025 * scale);
+        let x = (centre - 79.5) * depth / 130.0;
+        let y = (top + 0.14 * scale - 59.5) * depth / 130.0;
+        let left = centre - 0.5 * side;
+        format!(
+            "{},1,{left},{top},{side},{side},{left},{top},{side},80,{x},{y},{depth},1,0,0,0\n",
+            index + 1
+        )
+    };
+    header.to_owned() + &(0..frames).map(row).collect::<String>()
+}
+
+/// A log, its truth, and a run over it.
+fn home() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    Drawn::of(20).write(&folder.path().join("walk.mcap"));
+    common::config(folder.path(), "");
+    fs::write(folder.path().join("walk.people.csv"), people(20)).unwrap();
+    let mut run = own_plugin();
+    run.current_dir(folder.path()).args(["run", "nearest.toml", "walk.mcap", "-o", "out"]);
+    assert!(run.output().unwrap().status.success());
+    folder
+}
+
+fn in_home(folder: &Path, arguments: &[&str]) -> Output {
+    tagalong().current_dir(folder).arg("eval").args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_run_is_scored_in_the_image_and_on_the_floor() {
+    let folder = home();
+    let files = ["--truth", "walk.people.csv", "--tracks", "out", "--format", "json"];
+    let image = json(&in_home(folder.path(), &files));
+    assert_eq!((image["frames"].as_u64(), image["truths"].as_u64()), (Some(20), Some(20)));
+    assert_eq!((image["FP"].as_u64(), image["IDSW"].as_u64()), (Some(0), Some(0)));
+    assert!(image["MOTA"].as_f64().unwrap() > 0.7, "{image}");
+    let floor = json(&in_home(folder.path(), &[&files[..], &["--similarity", "metres"]].concat()));
+    assert!(floor["HOTA"].as_f64().unwrap() > 0.6, "{floor}");
+    assert!(floor["position_error_mean_m"].as_f64().unwrap() < 0.15, "{floor}");
+    assert_eq!(image["position_error_mean_m"].is_number(), true, "{image}");
+    assert!(floor.as_object().unwrap().values().all(|value| !value.is_object()), "one flat object");
+}
+
+#[test]
+fn a_log_that_is_not_beside_the_truth_can_be_named() {
+    let folder = home();
+    fs::create_dir(folder.path().join("elsewhere")).unwrap();
+    fs::rename(folder.path().join("walk.mcap"), folder.path().join("elsewhere/w.mcap")).unwrap();
+    let files = ["--truth", "walk.people.csv", "--tracks", "out", "--similarity", "metres"];
+    let lost = in_home(folder.path(), &files);
+    assert_eq!(code(&lost), 2);
+    assert!(text(&lost.stderr).contains("--log"), "{}", text(&lost.stderr));
+    let found = in_home(folder.path(), &[&files[..], &["--log", "elsewhere/w.mcap"]].concat());
+    assert_eq!(code(&found), 0, "{}", text(&found.stderr));
+    assert!(text(&found.stdout).contains("HOTA"), "{}", text(&found.stdout));
+}
+
+#[test]
+fn mistakes_are_named_by_file_and_line() {
+    let folder = home();
+    fs::write(folder.path().join("bad.txt"), "1,1,0,0,5,5,1\n2,1,0,zero,5,5,1\n").unwrap();
+    let bad = in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "bad.txt"]);
+    assert_eq!(code(&bad), 1);
+    assert!(text(&bad.stderr).contains("bad.txt, line 2"), "{}", text(&bad.stderr));
+    let none = in_home(folder.path(), &["--truth", "none.csv", "--tracks", "out"]);
+    assert_eq!(code(&none), 1);
+    assert!(text(&none.stderr).contains("none.csv"), "{}", text(&none.stderr));
+    let log = in_home(folder.path(), &["--truth", "walk.mcap", "--tracks", "out"]);
+    assert_eq!(code(&log), 1);
+    assert!(text(&log.stderr).contains("/truth/people"), "{}", text(&log.stderr));
+    assert_eq!(code(&eval(&["--truth", "a", "--tracks", "b", "--similarity", "feet"])), 2);
+}
+
+#[test]
+fn truth_is_read_from_the_log_itself() {
+    let folder = home();
+    let truth = tagalong_log::TruthFrame {
+        stamp_ns: common::FIRST_NS + 300_000_000,
+        people: vec![tagalong_log::TruthPerson {
+            id: 1,
+            head_in_robot_m: Some([2.88, -0.43, 1.5]),
+            upper_body_px: Some([87.0, 39.0, 26.0, 26.0]),
+            visible: 1.0,
+            ..Default::default()
+        }],
+    };
+    Drawn { truth: vec![truth], ..Drawn::of(20) }.write(&folder.path().join("walk.mcap"));
+    let files = ["--truth", "walk.mcap", "--tracks", "out", "--format", "json"];
+    let image = json(&in_home(folder.path(), &files));
+    assert_eq!((image["truths"].as_u64(), image["TP"].as_u64()), (Some(1), Some(1)), "{image}");
+    let floor = json(&in_home(folder.path(), &[&files[..], &["--similarity", "metres"]].concat()));
+    assert_eq!(floor["TP"].as_u64(), Some(1), "{floor}");
+}
+
+#[test]
+fn whole_bodies_can_be_compared_by_their_upper_bodies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    // 1.7 m over 170 pixels: the square has 57 of them, and 2.5 of air.
+    fs::write(path("whole.txt"), "1,1,100,50,60,170,1,1,1\n").unwrap();
+    fs::write(path("upper.txt"), "1,1,101.5,47.5,57,57,1,-1,-1,-1\n").unwrap();
+    let (truth, tracks) = (path("whole.txt"), path("upper.txt"));
+    let files = ["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"];
+    assert_eq!(json(&eval(&files))["TP"].as_u64(), Some(0));
+    let upper = json(&eval(&[&files[..], &["--upper-body"]].concat()));
+    assert!((upper["MOTP"].as_f64().unwrap() - 1.0).abs() < 1e-9, "{upper}");
+}
+
+#[test]
+fn kitti_labels_count_frames_from_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let line = |frame: u32, class: &str| {
+        format!("{frame} 4 {class} 0 0 0 100 100 150 220 1.7 0.5 0.5 1 1.6 8 0")
+    };
+    fs::write(path("truth.txt"), [line(0, "Pedestrian"), line(1, "Pedestrian")].join("\n"))
+        .unwrap();
+    fs::write(path("tracks.txt"), "1,9,100,100,50,120,1,-1,-1,-1\n2,9,100,100,50,120,1,-1,-1,-1\n")
+        .unwrap();
+    let (truth, tracks) = (path("truth.txt"), path("tracks.txt"));
+    let scores =
+        json(&eval(&["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"]));
+    assert_eq!(scores["HOTA"].as_f64(), Some(1.0), "{scores}");
+}
+
+#[test]
+fn mot17_figures_equal_those_of_trackeval() {
+    let Some(mot) = shared("mot") else { return };
+    let expected: Value =
+        serde_json::from_slice(&fs::read(mot.join("expected-trackeval.json")).unwrap()).unwrap();
+    for (name, figures) in expected["MOT17-train"].as_object().unwrap() {
+        let truth = mot.join("gt/MOT17-train").join(name).join("gt/gt.txt");
+        let tracks = mot.join("tracker-output/MOT17-train").join(format!("{name}.txt"));
+        if !truth.exists() {
+            continue;
+        }
+        let scores = json(&eval(&[
+            "--truth",
+            shown(&truth),
+            "--tracks",
+            shown(&tracks),
+            "--format",
+            "json",
+        ]));
+        for (ours, theirs) in [
+            ("HOTA", "HOTA"),
+            ("DetA", "DetA"),
+            ("AssA", "AssA"),
+            ("LocA", "LocA"),
+            ("MOTA", "MOTA"),
+            ("MOTP", "MOTP"),
+            ("IDF1", "IDF1"),
+            ("IDP", "IDP"),
+            ("IDR", "IDR"),
+            ("IDSW", "IDSW"),
+            ("FP", "CLR_FP"),
+            ("FN", "CLR_FN"),
+            ("Frag", "Frag"),
+        ] {
+            let (got, want) = (scores[ours].as_f64().unwrap(), figures[theirs].as_f64().unwrap());
+            assert!((got - want).abs() < 1e-6, "{name} {ours}: {got}, TrackEval {want}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Ground truth inside a log: who was where, as a simulator or an annotator
+//! knows it.
+//!
+//! The channel [`TRUTH_TOPIC`] carries one JSON message per image, with the
+//! image's stamp (see [`TruthFrame`]; message encoding `json`, schema encoding
+//! `jsonschema`, schema name [`TRUTH_SCHEMA`]). JSON, because no ROS message
+//! says "this one is hidden and does not count", and because it can be read in
+//! any viewer.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mcap_walk::Walker;
+use crate::scan::open_file;
+use crate::{Limits, LogError};
+
+/// The topic of the truth.
+pub const TRUTH_TOPIC: &str = "/truth/people";
+
+/// The name of its schema.
+pub const TRUTH_SCHEMA: &str = "tagalong/TruthFrame";
+
+/// Everybody who was there at the moment of one image.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TruthFrame {
+    /// Stamp of the image, ns.
+    pub stamp_ns: u64,
+    /// Everybody, those who do not count included.
+    pub people: Vec<TruthPerson>,
+}
+
+/// One person at one moment.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TruthPerson {
+    /// Who it is, the same throughout the log.
+    pub id: i64,
+    /// Centre of the head in the robot frame (X forward, Y left, Z up), m.
+    pub head_in_robot_m: Option<[f64; 3]>,
+    /// The upper-body square clipped to the image: x, y, width, height, pixels.
+    pub upper_body_px: Option<[f64; 4]>,
+    /// The part of it that can be seen, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visible_px: Option<[f64; 4]>,
+    /// Visible fraction of the upper body, 0 to 1.
+    #[serde(default = "whole")]
+    pub visible: f64,
+    /// Neither a miss nor a false alarm.
+    #[serde(default)]
+    pub ignore: bool,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+impl TruthFrame {
+    /// The message as bytes.
+    pub fn encode(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// The JSON schema of the message, for the log's schema record.
+    pub fn schema() -> String {
+        schemars::schema_for!(TruthFrame).to_value().to_string()
+    }
+}
+
+/// Reads the truth of a log in the order of the stamps; `None` if the log has
+/// no such channel.
+///
+/// # Errors
+/// A log that cannot be opened, or a message of the channel that is no
+/// [`TruthFrame`]: half a truth would make false figures.
+pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
+    let mut walker = Walker::new(open_file(path)?, limits)
+        .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
+    let mut frames: Vec<TruthFrame> = Vec::new();
+    while let Some(message) = walker.next() {
+        if message.channel.topic == TRUTH_TOPIC {
+            let frame = serde_json::from_slice(message.data).map_err(|error| LogError::Truth {
+                path: path.to_owned(),
+                number: frames.len() + 1,
+                why: error.to_string(),
+            })?;
+            frames.push(frame);
+        }
+    }
+    let present = walker.channels().any(|channel| channel.topic == TRUTH_TOPIC);
+    frames.sort_by_key(|frame| frame.stamp_ns);
+    Ok(present.then_some(frames))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_means_whole_and_counted() {
+        let text = r#"{"stamp_ns":5,"people":[{"id":3,"head_in_robot_m":[1,2,1.6],
+                       "upper_body_px":null}]}"#;
+        let frame: TruthFrame = serde_json::from_str(text).unwrap();
+        let person = &frame.people[0];
+        assert_eq!((person.visible, person.ignore, person.upper_body_px), (1.0, false, None));
+        assert_eq!(serde_json::from_slice::<TruthFrame>(&frame.encode()).unwrap(), frame);
+        assert!(TruthFrame::schema().contains("head_in_robot_m"));
+    }
+}
