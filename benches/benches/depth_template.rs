@@ -26,7 +26,7 @@ fn camera() -> Arc<Camera> {
 /// Four people in front of a wall, on a floor, at 640x480.
 fn depth(camera: &Camera) -> DepthImage {
     let body = render(PI, 0.0);
-    let heads = [(1.8, 0.6), (2.4, -0.5), (3.0, 0.3), (4.0, -1.0)].map(|(x, y)| Point3::new(x, y, 1.6));
+    let heads = [(1.8, 0.6), (2.4, -0.5), (3.0, 0.3), (4.0, -1.7)].map(|(x, y)| Point3::new(x, y, 1.6));
     DepthImage::from_fn(640, 480, |u, v| {
         let ray = camera.ray(Point2::new(u as f64, v as f64));
         let floor = if ray.y > 0.0 { 1.2 / ray.y } else { f64::INFINITY };

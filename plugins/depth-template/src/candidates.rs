@@ -25,18 +25,21 @@ pub mod tests_named {
 
 /// P4's boundary points: left of, right of and above the head the scene must be
 /// farther away. A point without a reading, or nearer than the head (somebody
-/// in front), says nothing; one at the head's own depth contradicts.
+/// in front), says nothing; one at the head's own depth contradicts. Somebody
+/// may stand on one side; but what goes on above is no head.
 pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
     let (d, margin) = (config.boundary_distance_m, config.boundary_margin_m);
-    let (mut passed, mut contradicted) = (0, 0);
-    for (right, down) in [(-d, 0.0), (d, 0.0), (0.0, -d)] {
+    let behind = |right: f64, down: f64| {
         let (x, y) = local.offset(right, down);
-        if let Some(z) = rows.depth_m(x, y) {
-            passed += u32::from(z > local.depth_m + margin);
-            contradicted += u32::from((z - local.depth_m).abs() <= margin);
-        }
-    }
-    passed >= config.boundary_min_passed || contradicted == 0
+        rows.depth_m(x, y).map(|z| z - local.depth_m)
+    };
+    let passes = |m: &f64| *m > margin;
+    let contradicts = |m: &f64| m.abs() <= margin;
+    let points = [behind(-d, 0.0), behind(d, 0.0), behind(0.0, -d)];
+    let passed = points.iter().flatten().filter(|m| passes(m)).count();
+    let contradicted = points.iter().flatten().filter(|m| contradicts(m)).count();
+    let is_below_something = points[2].as_ref().is_some_and(contradicts);
+    !is_below_something && (passed >= config.boundary_min_passed as usize || contradicted == 0)
 }
 
 /// Depth steps smaller than this belong to the same head, m.
