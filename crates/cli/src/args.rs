@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -74,6 +74,7 @@ tracks-metres.csv, report.json (what was dropped and why), timings.json, and wit
 overlay/000001.png and so on.
 
 Examples:
+  tagalong run --overlay --overwrite       (built-in config, drawn log)
   tagalong run configs/depth-ekf.toml robot.mcap
   tagalong run configs/depth-ekf.toml robot.mcap -o out --overlay --overwrite
   tagalong run configs/depth-ekf.toml robot.mcap --format json | jq .funnel";
@@ -105,10 +106,11 @@ Examples:
 /// The arguments of `tagalong run`.
 #[derive(Args, Debug)]
 pub struct RunArgs {
-    /// The pipeline, a TOML file.
-    pub config: PathBuf,
-    /// The log, an MCAP file with ROS 2 messages.
-    pub log: PathBuf,
+    /// The pipeline, a TOML file [default: depth-ekf, built in].
+    pub config: Option<PathBuf>,
+    /// The log, an MCAP file with ROS 2 messages [default: a short drawn one,
+    /// written to runs/sample.mcap].
+    pub log: Option<PathBuf>,
     /// Where the files go [default: runs/<log>-<config>].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
@@ -168,3 +170,13 @@ mod tests {
         assert!(Cli::try_parse_from(["tagalong", "run", "a", "b", "--threads", "2"]).is_ok());
     }
 }
+
+impl RunArgs {
+    /// The log that is read.
+    pub fn log(&self) -> &Path {
+        self.log.as_deref().unwrap_or(Path::new(SAMPLE))
+    }
+}
+
+/// Where the drawn log goes that stands in for a real one.
+const SAMPLE: &str = "runs/sample.mcap";

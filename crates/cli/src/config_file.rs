@@ -63,6 +63,12 @@ impl ConfigFile {
         Ok(Self { path: path.to_owned(), text })
     }
 
+    /// The config that is used where none is given.
+    pub fn built_in() -> Self {
+        let text = include_str!("../../../configs/depth-ekf.toml").to_owned();
+        Self { path: "configs/depth-ekf.toml".into(), text }
+    }
+
     /// Its name without folder and extension.
     pub fn stem(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()

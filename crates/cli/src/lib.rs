@@ -21,6 +21,7 @@ mod needs;
 mod outcome;
 mod overlay;
 mod run;
+mod sample;
 mod scoring;
 mod signals;
 mod suggest;

@@ -22,7 +22,7 @@ pub fn config_hint(wanted: &Path) -> String {
 }
 
 /// The TOML files of a folder, by name.
-fn toml_files(folder: &Path) -> Vec<PathBuf> {
+pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let Ok(entries) = fs::read_dir(here) else { return Vec::new() };
     let mut files: Vec<PathBuf> = entries

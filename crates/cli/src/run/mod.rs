@@ -5,7 +5,7 @@ mod pictures;
 mod progress;
 mod report;
 mod summary;
-mod timings;
+pub mod timings;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,7 @@ use crate::config_file::{ConfigFile, OuterSettings};
 use crate::needs::needs;
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::overlay::{Overlay, Scene};
+use crate::sample;
 use crate::signals::Signals;
 use crate::suggest::check_log_path;
 
@@ -37,6 +38,10 @@ use crate::suggest::check_log_path;
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()
         .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))?;
+    if args.log.is_none() {
+        sample::write(args.log()).map_err(refused)?;
+        say(&format!("no log given: two drawn people walk through {}", args.log().display()));
+    }
     let job = Job::prepare(args, registry)?;
     let mut desk = Desk::open(args, &job)?;
     let threads = args.threads.map_or_else(default_threads, usize::from);
@@ -66,14 +71,15 @@ struct Job {
 
 impl Job {
     fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
-        let config = ConfigFile::read(&args.config)?;
+        let config =
+            args.config.as_deref().map_or_else(|| Ok(ConfigFile::built_in()), ConfigFile::read)?;
         let (pipeline, settings) = config.pipeline(registry, args.seed)?;
         let outer = config.outer()?;
-        check_log_path(&args.log)?;
+        check_log_path(args.log())?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
-        RunDir::check(&folder, args.overwrite, &args.log).map_err(refused)?;
+        RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let needs = needs(|| Ok(config.pipeline(registry, args.seed)?.0))?;
-        let source = FrameSource::open(&args.log, &outer.input, &outer.limits, needs)?;
+        let source = FrameSource::open(args.log(), &outer.input, &outer.limits, needs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);
@@ -83,12 +89,12 @@ impl Job {
 
 /// `runs/<log>-<config>`.
 fn default_folder(args: &RunArgs, config: &ConfigFile) -> PathBuf {
-    let log = args.log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let log = args.log().file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Path::new("runs").join(format!("{log}-{}", config.stem()))
 }
 
 fn log_name(args: &RunArgs) -> String {
-    args.log.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    args.log().file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
@@ -164,7 +170,7 @@ struct Desk {
 
 impl Desk {
     fn open(args: &RunArgs, job: &Job) -> Result<Self, Failure> {
-        let dir = RunDir::create(&job.folder, args.overwrite, &args.log).map_err(refused)?;
+        let dir = RunDir::create(&job.folder, args.overwrite, args.log()).map_err(refused)?;
         let overlay =
             if args.overlay { Some(Overlay::new(dir.overlay().map_err(refused)?)) } else { None };
         let input = &job.outer.input;

@@ -10,6 +10,7 @@
 mod csv;
 mod error;
 mod mcap_tracks;
+mod message_log;
 mod messages;
 mod record;
 mod run_dir;
@@ -27,6 +28,7 @@ pub use csv::METRES_HEADER;
 pub use error::WriteError;
 pub use mcap_tracks::FrameNames;
 use mcap_tracks::McapTracks;
+pub use message_log::MessageLog;
 pub use record::{FrameRecord, OutputSettings};
 pub use run_dir::RunDir;
 use tagalong_core::Stamp;

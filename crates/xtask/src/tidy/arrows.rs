@@ -18,7 +18,21 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("report", &["core", "eval"]),
     ("conformance", &["core"]),
     ("catalog", &["core", "plugins"]),
-    ("cli", &["core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "catalog"]),
+    (
+        "cli",
+        &[
+            "core",
+            "vision",
+            "stereo",
+            "pipeline",
+            "log",
+            "sim",
+            "eval",
+            "report",
+            "catalog",
+            "conformance",
+        ],
+    ),
     ("xtask", &[]),
 ];
 

@@ -1,0 +1,85 @@
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use mcap::records::MessageHeader;
+use mcap::{Compression, McapError, WriteOptions, Writer};
+use serde::Serialize;
+use tagalong_core::Stamp;
+
+use super::WriteError;
+use crate::msgs::{Message, encode};
+
+/// Writes any ROS 2 messages to an MCAP file, as a robot's recorder would. The
+/// file has a partial name until [`MessageLog::finish`].
+pub struct MessageLog {
+    writer: Writer<BufWriter<File>>,
+    channels: BTreeMap<String, u16>,
+    partial: PathBuf,
+    path: PathBuf,
+}
+
+impl MessageLog {
+    /// Starts a file, and the folder it lies in.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`], [`WriteError::Mcap`].
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            fs::create_dir_all(folder).map_err(WriteError::io(folder))?;
+        }
+        let partial = path.with_extension("mcap.partial");
+        let file = File::create(&partial).map_err(WriteError::io(&partial))?;
+        let writer = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("tagalong ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_threads(1)
+            .create(BufWriter::new(file))
+            .map_err(failed(&partial))?;
+        Ok(Self { writer, channels: BTreeMap::new(), partial, path: path.to_owned() })
+    }
+
+    /// Writes a message; `captured` is its publish time and its log time.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn send<M: Message + Serialize>(
+        &mut self,
+        topic: &str,
+        captured: Stamp,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        let channel_id = match self.channels.get(topic) {
+            Some(id) => *id,
+            None => self.open::<M>(topic)?,
+        };
+        let at = captured.nanos();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: at, publish_time: at };
+        let written = self.writer.write_to_known_channel(&header, &encode(message));
+        written.map_err(failed(&self.partial))
+    }
+
+    fn open<M: Message>(&mut self, topic: &str) -> Result<u16, WriteError> {
+        let schema = self.writer.add_schema(M::TYPE, "ros2msg", M::DEFINITION.as_bytes());
+        let schema = schema.map_err(failed(&self.partial))?;
+        let channel = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
+        let id = channel.map_err(failed(&self.partial))?;
+        self.channels.insert(topic.to_owned(), id);
+        Ok(id)
+    }
+
+    /// Completes the file and gives it its name.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`], [`WriteError::Mcap`].
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        self.writer.finish().map_err(failed(&self.partial))?;
+        fs::rename(&self.partial, &self.path).map_err(WriteError::io(&self.path))
+    }
+}
+
+fn failed(path: &Path) -> impl FnOnce(McapError) -> WriteError + '_ {
+    move |source| WriteError::Mcap { path: path.to_owned(), source: Box::new(source) }
+}
