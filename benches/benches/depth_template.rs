@@ -1,5 +1,6 @@
 //! The silhouette kernels: one template at one place, everything else of a
 //! frame, and a whole frame of the pipeline.
+#![allow(clippy::expect_used, missing_docs, reason = "a broken test or bench may stop loudly")]
 
 use std::f64::consts::PI;
 use std::hint::black_box;
@@ -9,10 +10,12 @@ use std::sync::Arc;
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point2, Point3};
 use tagalong_core::{
-    Camera, DepthImage, Detector, Distortion, Frame, Funnel, Images, Motion, Pinhole, Registry, Search,
-    Stamp,
+    Camera, DepthImage, Detector, Distortion, Frame, Funnel, Images, Motion, Pinhole, Registry,
+    Search, Stamp,
 };
-use tagalong_depth_template::{Bank, DepthTemplate, DepthTemplateConfig, Direction, Matcher, Pose, render};
+use tagalong_depth_template::{
+    Bank, DepthTemplate, DepthTemplateConfig, Direction, Matcher, Pose, render,
+};
 use tagalong_pipeline::Pipeline;
 use tagalong_vision::RowSums;
 
@@ -26,7 +29,8 @@ fn camera() -> Arc<Camera> {
 /// Four people in front of a wall, on a floor, at 640x480.
 fn depth(camera: &Camera) -> DepthImage {
     let body = render(PI, 0.0);
-    let heads = [(1.8, 0.6), (2.4, -0.5), (3.0, 0.3), (4.0, -1.7)].map(|(x, y)| Point3::new(x, y, 1.6));
+    let heads =
+        [(1.8, 0.6), (2.4, -0.5), (3.0, 0.3), (4.0, -1.7)].map(|(x, y)| Point3::new(x, y, 1.6));
     DepthImage::from_fn(640, 480, |u, v| {
         let ray = camera.ray(Point2::new(u as f64, v as f64));
         let floor = if ray.y > 0.0 { 1.2 / ray.y } else { f64::INFINITY };
@@ -48,7 +52,9 @@ fn frame(camera: &Arc<Camera>, depth: &Arc<DepthImage>, index: u64) -> Frame {
 fn kernels(c: &mut Criterion) {
     let camera = camera();
     let depth = Arc::new(depth(&camera));
-    c.bench_function("row sums, 640x480 to 320x240", |b| b.iter(|| RowSums::new(black_box(&depth), 2)));
+    c.bench_function("row sums, 640x480 to 320x240", |b| {
+        b.iter(|| RowSums::new(black_box(&depth), 2))
+    });
     let rows = RowSums::new(&depth, 2);
     let matcher = Matcher::new(&DepthTemplateConfig::default(), 0.0);
     let mut bank = Bank::new(28);
@@ -61,7 +67,8 @@ fn kernels(c: &mut Criterion) {
 fn frames(c: &mut Criterion) {
     let camera = camera();
     let depth = Arc::new(depth(&camera));
-    let mut detector = DepthTemplate::new(DepthTemplateConfig::default()).expect("default settings");
+    let mut detector =
+        DepthTemplate::new(DepthTemplateConfig::default()).expect("default settings");
     c.bench_function("depth-template, discover, 640x480, 4 people", |b| {
         b.iter(|| {
             let frame = frame(&camera, &depth, 1);
@@ -72,7 +79,8 @@ fn frames(c: &mut Criterion) {
     });
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let (mut pipeline, _) = Pipeline::from_toml(CONFIG, Path::new("."), &registry).expect("shipped config");
+    let (mut pipeline, _) =
+        Pipeline::from_toml(CONFIG, Path::new("."), &registry).expect("shipped config");
     let mut index = 0;
     c.bench_function("depth-ekf, whole frame, 640x480, 4 people", |b| {
         b.iter(|| {

@@ -1,5 +1,11 @@
 //! Reading speed: a real log through the frame source, beside what decoding its
 //! images alone costs. Without `../shared/data/logs` it says that it skips.
+#![allow(
+    clippy::expect_used,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "a broken test or bench may stop loudly"
+)]
 
 use std::fs::File;
 use std::path::Path;
@@ -13,7 +19,8 @@ use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
 /// Walks the file; `images` decodes its pictures, too. Returns the messages.
 fn walk(path: &Path, images: bool) -> usize {
     let limits = Limits::default();
-    let mut walker = Walker::new(File::open(path).expect("the log"), &limits).expect("an MCAP file");
+    let mut walker =
+        Walker::new(File::open(path).expect("the log"), &limits).expect("an MCAP file");
     let mut messages = 0;
     while let Some(message) = walker.next() {
         messages += 1;
@@ -46,10 +53,13 @@ fn reading(c: &mut Criterion) {
         let (input, limits) = (InputSettings::default(), Limits::default());
         let needs = Needs { depth: true, ..Needs::default() };
         c.bench_function(&format!("{name}: messages alone"), |b| b.iter(|| walk(&path, false)));
-        c.bench_function(&format!("{name}: messages and pictures"), |b| b.iter(|| walk(&path, true)));
+        c.bench_function(&format!("{name}: messages and pictures"), |b| {
+            b.iter(|| walk(&path, true))
+        });
         c.bench_function(&format!("{name}: all frames, ready for a pipeline"), |b| {
             b.iter(|| {
-                let mut source = FrameSource::open(&path, &input, &limits, needs).expect("a healthy log");
+                let mut source =
+                    FrameSource::open(&path, &input, &limits, needs).expect("a healthy log");
                 let mut frames = 0;
                 while let Some(frame) = source.next_frame() {
                     frames += frame.frame.index;

@@ -34,8 +34,7 @@ pub fn read(path: &Path) -> Option<Vec<Annotation>> {
 }
 
 fn annotation(line: &str) -> Annotation {
-    let fields: Vec<f64> =
-        line.split(',').map(|f| f.parse().unwrap_or(f64::NAN)).collect();
+    let fields: Vec<f64> = line.split(',').map(|f| f.parse().unwrap_or(f64::NAN)).collect();
     assert_eq!(fields.len(), 17, "columns of {line}");
     Annotation {
         frame: fields[0] as u64,
@@ -72,7 +71,8 @@ pub struct Score {
 pub fn score(annotations: &[Annotation], boxes: &Boxes) -> Score {
     let mut score = Score::default();
     let mut covered: BTreeSet<(u64, u32)> = BTreeSet::new();
-    let frames: BTreeSet<u64> = annotations.iter().map(|a| a.frame).chain(boxes.keys().copied()).collect();
+    let frames: BTreeSet<u64> =
+        annotations.iter().map(|a| a.frame).chain(boxes.keys().copied()).collect();
     for frame in frames {
         let truth: Vec<&Annotation> = annotations.iter().filter(|a| a.frame == frame).collect();
         let found = boxes.get(&frame).map(Vec::as_slice).unwrap_or_default();

@@ -1,6 +1,8 @@
 //! Mistakes in a config are answered with the place, the cause and the remedy;
 //! the shipped configs have none.
 
+#![allow(clippy::unwrap_used, reason = "a broken test may stop loudly")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,10 @@
 //! The shipped `depth-ekf` config, unchanged, on every real log with depth.
 //! Without `../shared/data/logs` each test says that it skips.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a broken test or bench may stop loudly"
+)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,9 +40,14 @@ fn run(path: &Path) -> Run {
     tagalong_catalog::register(&mut registry);
     let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
     let needs = Needs { depth: true, ..Needs::default() };
-    let mut source = FrameSource::open(path, &InputSettings::default(), &Limits::default(), needs).unwrap();
-    let mut run =
-        Run { confirmed: Boxes::new(), detections: BTreeMap::new(), frames: 0, funnel: Funnel::default() };
+    let mut source =
+        FrameSource::open(path, &InputSettings::default(), &Limits::default(), needs).unwrap();
+    let mut run = Run {
+        confirmed: Boxes::new(),
+        detections: BTreeMap::new(),
+        frames: 0,
+        funnel: Funnel::default(),
+    };
     while let Some(frame) = source.next_frame() {
         let frame = frame.frame;
         let report = pipeline.step(&frame).unwrap();

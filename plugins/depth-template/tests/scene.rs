@@ -1,4 +1,5 @@
 //! The detector on painted scenes: a body from the body model in front of a wall.
+#![allow(clippy::unwrap_used, reason = "a broken test or bench may stop loudly")]
 
 use std::sync::Arc;
 
