@@ -2,6 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
@@ -51,6 +52,9 @@ pub enum Command {
         /// A log that the config should work on.
         log: Option<PathBuf>,
     },
+    /// Compares pipelines on the same logs
+    #[command(after_help = BENCH_HELP)]
+    Bench(BenchArgs),
     /// Scores tracks against the truth
     #[command(after_help = EVAL_HELP)]
     Eval(EvalArgs),
@@ -88,6 +92,16 @@ const CHECK_HELP: &str = "\
 Examples:
   tagalong check configs/depth-ekf.toml
   tagalong check configs/depth-ekf.toml robot.mcap";
+
+const BENCH_HELP: &str = "\
+Without a step: plans, runs and reports. Results are kept under a hash of everything they depend
+on; running again computes only what is missing.
+
+Examples:
+  tagalong bench --logs-dir logs -o bench --jobs 2
+  tagalong bench --configs a.toml b.toml --logs walk.mcap --seeds 5
+  tagalong bench --logs-dir logs --baseline old/report.json --fail-if 'HOTA<-0.01'
+  tagalong bench plan --logs-dir logs -o bench | jq .hash";
 
 const EVAL_HELP: &str = "\
 Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors); --format json

@@ -85,6 +85,16 @@ impl ConfigFile {
         digest.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
+    /// The files that its settings name, such as models, by the name used there.
+    pub fn files(&self) -> Vec<(String, PathBuf)> {
+        let Ok(table) = self.text.parse::<toml::Table>() else { return Vec::new() };
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let mut names = Vec::new();
+        strings(&toml::Value::Table(table), &mut names);
+        let named = names.into_iter().map(|name| (folder.join(&name), name));
+        named.filter(|(path, _)| path.is_file()).map(|(path, name)| (name, path)).collect()
+    }
+
     /// Builds the pipeline.
     ///
     /// # Errors
@@ -125,6 +135,16 @@ impl ConfigFile {
 
     fn mistake(&self, error: &ConfigError) -> Failure {
         Failure::usage(error.render(&self.path.display().to_string(), &self.text))
+    }
+}
+
+/// All texts in a value.
+fn strings(value: &toml::Value, out: &mut Vec<String>) {
+    match value {
+        toml::Value::String(text) if !text.is_empty() => out.push(text.clone()),
+        toml::Value::Array(items) => items.iter().for_each(|item| strings(item, out)),
+        toml::Value::Table(table) => table.values().for_each(|item| strings(item, out)),
+        _ => {}
     }
 }
 

@@ -15,6 +15,7 @@
 //! after SIGINT and SIGTERM.
 
 mod args;
+mod bench;
 mod commands;
 mod config_file;
 mod needs;
@@ -66,6 +67,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin } => commands::config(registry, plugin),
         Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
+        Command::Bench(args) => bench::bench(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)

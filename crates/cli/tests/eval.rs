@@ -32,31 +32,12 @@ fn shown(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Where the walker of the drawn log is, as `people.csv` says it.
-fn people(frames: u64) -> String {
-    let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
-                  visible,occluder,ignore,interpolated\n";
-    let row = |index: u64| {
-        let (depth, centre) = (2.8, 90.0 - index as f64 + 13.0);
-        let scale = 130.0 / depth;
-        let (side, top) = (0.57 * scale, 40.0 - 0.025 * scale);
-        let x = (centre - 79.5) * depth / 130.0;
-        let y = (top + 0.14 * scale - 59.5) * depth / 130.0;
-        let left = centre - 0.5 * side;
-        format!(
-            "{},1,{left},{top},{side},{side},{left},{top},{side},80,{x},{y},{depth},1,0,0,0\n",
-            index + 1
-        )
-    };
-    header.to_owned() + &(0..frames).map(row).collect::<String>()
-}
-
 /// A log, its truth, and a run over it.
 fn home() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     Drawn::of(20).write(&folder.path().join("walk.mcap"));
     common::config(folder.path(), "");
-    fs::write(folder.path().join("walk.people.csv"), people(20)).unwrap();
+    fs::write(folder.path().join("walk.people.csv"), common::people(20)).unwrap();
     let mut run = own_plugin();
     run.current_dir(folder.path()).args(["run", "nearest.toml", "walk.mcap", "-o", "out"]);
     assert!(run.output().unwrap().status.success());

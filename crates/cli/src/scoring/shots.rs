@@ -71,11 +71,6 @@ impl Shots {
         self.shots.push(shot);
     }
 
-    /// All frames.
-    pub fn all(&self) -> &[Shot] {
-        &self.shots
-    }
-
     /// The number of the last frame; 0 without any.
     pub fn last(&self) -> u32 {
         self.shots.last().map_or(0, |shot| shot.number)

@@ -158,6 +158,25 @@ fn mount() -> TFMessage {
     }
 }
 
+/// Where the walker of the drawn log is, as `people.csv` says it.
+pub fn people(frames: u64) -> String {
+    let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
+                  visible,occluder,ignore,interpolated\n";
+    let row = |index: u64| {
+        let (depth, centre) = (2.8, 90.0 - index as f64 + 13.0);
+        let scale = 130.0 / depth;
+        let (side, top) = (0.57 * scale, 40.0 - 0.025 * scale);
+        let x = (centre - 79.5) * depth / 130.0;
+        let y = (top + 0.14 * scale - 59.5) * depth / 130.0;
+        let left = centre - 0.5 * side;
+        format!(
+            "{},1,{left},{top},{side},{side},{left},{top},{side},80,{x},{y},{depth},1,0,0,0\n",
+            index + 1
+        )
+    };
+    header.to_owned() + &(0..frames).map(row).collect::<String>()
+}
+
 struct Log {
     writer: Writer<BufWriter<File>>,
     channels: BTreeMap<String, u16>,

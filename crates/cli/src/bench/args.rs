@@ -1,0 +1,116 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+/// The arguments of `tagalong bench`.
+#[derive(Args, Debug)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct BenchArgs {
+    /// One step; all three without one.
+    #[command(subcommand)]
+    pub step: Option<Step>,
+    #[command(flatten)]
+    pub plan: PlanArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
+    #[command(flatten)]
+    pub gate: GateArgs,
+    #[command(flatten)]
+    pub folder: FolderArgs,
+}
+
+/// The steps.
+#[derive(Debug, Subcommand)]
+pub enum Step {
+    /// Lists the tasks, one JSON object a line
+    #[command(after_help = "Example:\n  tagalong bench plan --logs-dir logs -o bench")]
+    Plan {
+        #[command(flatten)]
+        plan: PlanArgs,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+    /// Runs the planned tasks that have no result yet
+    #[command(after_help = "Examples:\n  tagalong bench run -o bench --jobs 4\n  \
+                            tagalong bench run -o bench --task 17")]
+    Run {
+        #[command(flatten)]
+        run: RunArgs,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+    /// Makes report.html, report.json and report.csv of the results
+    #[command(after_help = "Example:\n  tagalong bench report -o bench --baseline old.json \
+                            --fail-if 'HOTA<-0.01' --fail-if 'IDSW>0'")]
+    Report {
+        #[command(flatten)]
+        gate: GateArgs,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+    /// Writes the results as the folder tree that TrackEval scores
+    #[command(after_help = "Example:\n  tagalong bench export -o bench --trackeval tree")]
+    Export {
+        /// Where the tree goes.
+        #[arg(long, value_name = "DIR")]
+        trackeval: PathBuf,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+}
+
+/// Where a benchmark lives.
+#[derive(Args, Clone, Debug)]
+pub struct FolderArgs {
+    /// The folder of the benchmark: plan.jsonl, results, report.
+    #[arg(short, long, value_name = "DIR", default_value = "bench")]
+    pub output: PathBuf,
+}
+
+/// What is compared.
+#[derive(Args, Clone, Debug)]
+pub struct PlanArgs {
+    /// The pipelines [default: every config in configs that a log suits].
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub configs: Vec<PathBuf>,
+    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.boxes.csv, or in it.
+    #[arg(long, num_args = 1.., value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// Every log with truth in this folder.
+    #[arg(long, value_name = "DIR")]
+    pub logs_dir: Option<PathBuf>,
+    /// Runs each pipeline with this many seeds, counted from that of its config.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+}
+
+/// How tasks are run.
+#[derive(Args, Clone, Debug)]
+pub struct RunArgs {
+    /// Tasks that run at once; the results are the same.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: u16,
+    /// Only this task: its number in the plan, or its hash.
+    #[arg(long, value_name = "K|HASH")]
+    pub task: Option<String>,
+    /// Run tasks again that failed before.
+    #[arg(long)]
+    pub retry_failed: bool,
+    /// Measure times, one task at a time: the machine has nothing else to do.
+    #[arg(long)]
+    pub timing: bool,
+}
+
+/// When a benchmark is worse than it was.
+#[derive(Args, Clone, Debug)]
+pub struct GateArgs {
+    /// An earlier report.json to compare with.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Exit with 1 if a figure changed like this, for example HOTA<-0.01,
+    /// IDSW>0 or metres.MOTA<-0.02.
+    #[arg(long, value_name = "FIGURE<CHANGE", requires = "baseline", num_args = 1..)]
+    pub fail_if: Vec<String>,
+}

@@ -1,0 +1,303 @@
+//! Which pipelines run on which logs, and what identifies each of these tasks.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use tagalong_core::Registry;
+use tagalong_log::{FrameSource, Limits, LogError, Needs, read_truth};
+
+use super::args::PlanArgs;
+use crate::config_file::{ConfigFile, OuterSettings};
+use crate::needs::needs;
+use crate::outcome::{Failure, say};
+use crate::suggest::{check_log_path, toml_files};
+
+/// How files that a config names are called among the inputs.
+const FILE: &str = "file ";
+
+/// One pipeline on one log with one seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// Its number in the plan, from 1.
+    pub k: usize,
+    /// Content hash of everything that its result depends on.
+    pub hash: String,
+    /// Name of the pipeline.
+    pub pipeline: String,
+    /// Its config.
+    pub config: PathBuf,
+    /// Name of the log.
+    pub log_name: String,
+    /// The log.
+    pub log: PathBuf,
+    /// Its truth.
+    pub truth: PathBuf,
+    /// The boxes of the truth are whole bodies.
+    pub whole_bodies: bool,
+    /// The seed.
+    pub seed: u64,
+    /// What went into the hash, by name.
+    pub inputs: BTreeMap<String, String>,
+    /// The program that planned it.
+    pub version: String,
+    /// Why it cannot run, if it cannot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skip: Option<String>,
+}
+
+/// A config that was read, and what it needs.
+pub struct Candidate {
+    /// The config.
+    pub file: ConfigFile,
+    path: PathBuf,
+    first_seed: u64,
+    /// Its tables around the pipeline.
+    pub outer: OuterSettings,
+    /// The images that its pipeline needs.
+    pub needs: Needs,
+}
+
+/// A log and its truth.
+struct Annotated {
+    log: PathBuf,
+    name: String,
+    sha256: String,
+    truth: PathBuf,
+    truth_sha256: String,
+    whole_bodies: bool,
+}
+
+/// Plans a benchmark.
+///
+/// # Errors
+/// Configs or logs that cannot be read, or two of the same name.
+pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> {
+    let configs = configs(args, registry)?;
+    let logs = logs(args)?;
+    unique("configs", configs.iter().map(|config| config.file.stem()))?;
+    unique("logs", logs.iter().map(|log| log.name.clone()))?;
+    let version = version()?;
+    let mut tasks = Vec::new();
+    for log in &logs {
+        let mut tried = BTreeMap::new();
+        for config in &configs {
+            let key = format!("{:?}", (&config.outer.input, &config.outer.limits, config.needs));
+            let skip = match tried.get(&key) {
+                Some(known) => Option::clone(known),
+                None => tried.entry(key).or_insert(why_not(config, log)?).clone(),
+            };
+            for offset in 0..args.seeds {
+                let seed = config.first_seed.wrapping_add(offset);
+                let mut task = task(config, log, seed, &version, registry)?;
+                (task.k, task.skip) = (tasks.len() + 1, skip.clone());
+                tasks.push(task);
+            }
+        }
+    }
+    Ok(tasks)
+}
+
+/// Reads the config of a task again.
+///
+/// # Errors
+/// If it, or its truth, is not what it was when the task was planned.
+pub fn reread(task: &Task, registry: &Registry) -> Result<Candidate, Failure> {
+    let candidate = candidate(&task.config, registry)?;
+    let mut now = task.inputs.clone();
+    now.retain(|name, _| !name.starts_with(FILE));
+    now.insert("config".into(), config_hash(&candidate, task.seed, registry)?);
+    now.insert("truth".into(), sha256_of_file(&task.truth)?);
+    now.extend(files(&candidate)?);
+    if now == task.inputs {
+        return Ok(candidate);
+    }
+    let (config, truth) = (task.config.display(), task.truth.display());
+    Err(Failure::usage(format!("{config} or {truth} changed since it was planned; plan again")))
+}
+
+fn files(candidate: &Candidate) -> Result<BTreeMap<String, String>, Failure> {
+    let named = candidate.file.files().into_iter();
+    named.map(|(name, path)| Ok((format!("{FILE}{name}"), sha256_of_file(&path)?))).collect()
+}
+
+/// The version of this very program: plugins may differ while the number does
+/// not, so its bytes belong to it.
+///
+/// # Errors
+/// If the program cannot read itself.
+pub fn version() -> Result<String, Failure> {
+    let program = std::env::current_exe().map_err(Failure::failed)?;
+    let hash = sha256_of_file(&program)?;
+    Ok(format!("{}+{}", env!("CARGO_PKG_VERSION"), &hash[..12]))
+}
+
+fn task(
+    config: &Candidate,
+    log: &Annotated,
+    seed: u64,
+    version: &str,
+    registry: &Registry,
+) -> Result<Task, Failure> {
+    let mut inputs = BTreeMap::from([
+        ("config".to_owned(), config_hash(config, seed, registry)?),
+        ("log".to_owned(), log.sha256.clone()),
+        ("truth".to_owned(), log.truth_sha256.clone()),
+    ]);
+    inputs.extend(files(config)?);
+    let everything = format!("{version}\n{seed}\n{}\n{inputs:?}", log.whole_bodies);
+    Ok(Task {
+        k: 0,
+        hash: sha256(everything.as_bytes())[..32].to_owned(),
+        pipeline: config.file.stem(),
+        config: config.path.clone(),
+        log_name: log.name.clone(),
+        log: log.log.clone(),
+        truth: log.truth.clone(),
+        whole_bodies: log.whole_bodies,
+        seed,
+        inputs,
+        version: version.to_owned(),
+        skip: None,
+    })
+}
+
+/// Comments and order do not matter, defaults that changed do.
+fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<String, Failure> {
+    let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
+    let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved());
+    Ok(sha256(text.as_bytes()))
+}
+
+/// Why the config cannot run on the log, if it cannot.
+fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Failure> {
+    let outer = &config.outer;
+    match FrameSource::open(&log.log, &outer.input, &outer.limits, config.needs) {
+        Ok(_) => Ok(None),
+        Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
+            let text = error.to_string();
+            let first = text.lines().next().unwrap_or_default();
+            Ok(Some(first.replace(&log.log.display().to_string(), &log.name)))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<Candidate>, Failure> {
+    if !args.configs.is_empty() {
+        return args.configs.iter().map(|path| candidate(path, registry)).collect();
+    }
+    let mut found = Vec::new();
+    for path in toml_files(Path::new("configs")) {
+        match candidate(&path, registry) {
+            Ok(candidate) => found.push(candidate),
+            Err(why) => say(&format!("note: left out: {}", why.message)),
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::usage("no config in the folder configs; name some with --configs"));
+    }
+    Ok(found)
+}
+
+fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
+    let file = ConfigFile::read(path)?;
+    let (_, settings) = file.pipeline(registry, None)?;
+    let outer = file.outer()?;
+    let needs = needs(|| Ok(file.pipeline(registry, None)?.0))?;
+    Ok(Candidate { file, path: path.to_owned(), first_seed: settings.seed, outer, needs })
+}
+
+fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
+    let mut found = Vec::new();
+    for log in &args.logs {
+        check_log_path(log)?;
+        let annotated = annotated(log)?;
+        found.push(annotated.ok_or_else(|| {
+            let stem = log.with_extension("");
+            let stem = stem.display();
+            Failure::usage(format!(
+                "{} has no truth: neither {stem}.people.csv nor {stem}.boxes.csv nor a channel \
+                 {} in it",
+                log.display(),
+                tagalong_log::TRUTH_TOPIC
+            ))
+        })?);
+    }
+    for log in args.logs_dir.as_deref().map_or(Ok(Vec::new()), mcap_files)? {
+        match annotated(&log)? {
+            Some(annotated) => found.push(annotated),
+            None => say(&format!("note: left out: {} has no truth", log.display())),
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::usage("no log with truth; name some with --logs or --logs-dir"));
+    }
+    Ok(found)
+}
+
+fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let entries = fs::read_dir(folder)
+        .map_err(|error| Failure::usage(format!("cannot read {}: {error}", folder.display())))?;
+    let mut files: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
+        .collect();
+    files.sort();
+    Ok(files)
+}
+
+/// The log with its truth, if it has any.
+fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
+    let beside = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
+    let (truth, whole_bodies) = match (beside("people.csv"), beside("boxes.csv")) {
+        (Some(people), _) => (people, false),
+        (None, Some(boxes)) => (boxes, true),
+        (None, None) if read_truth(log, &Limits::default())?.is_some() => (log.to_owned(), false),
+        (None, None) => return Ok(None),
+    };
+    Ok(Some(Annotated {
+        log: log.to_owned(),
+        name: log.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        sha256: sha256_of_file(log)?,
+        truth_sha256: sha256_of_file(&truth)?,
+        truth,
+        whole_bodies,
+    }))
+}
+
+/// Names stand in tables, so they must tell things apart.
+fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Failure> {
+    let mut seen = std::collections::BTreeSet::new();
+    for name in names {
+        if !seen.insert(name.clone()) {
+            return Err(Failure::usage(format!("two {what} are called `{name}`; rename one")));
+        }
+    }
+    Ok(())
+}
+
+/// SHA-256 in hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// SHA-256 of a file's bytes.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn sha256_of_file(path: &Path) -> Result<String, Failure> {
+    let failed = |error| Failure::failed(format!("cannot read {}: {error}", path.display()));
+    let mut file = File::open(path).map_err(failed)?;
+    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut buffer).map_err(failed)? {
+            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            count => hash.update(&buffer[..count]),
+        }
+    }
+}

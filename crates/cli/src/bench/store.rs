@@ -1,0 +1,148 @@
+//! What lies in the folder of a benchmark, and how it gets there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use tagalong_eval::Sequence;
+use tagalong_report::{TaskResult, TaskTiming};
+
+use super::plan::Task;
+use crate::outcome::Failure;
+
+/// The folder of a benchmark.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// One result file.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Stored {
+    /// What the report shows.
+    pub result: TaskResult,
+    /// What was scored, for other evaluators; absent if the task failed.
+    pub recording: Option<Recording>,
+}
+
+/// A scored sequence, and what the formats want to know beside it.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Recording {
+    /// Truth and reports of all frames.
+    pub sequence: Sequence,
+    /// Frames per second.
+    pub rate_hz: f64,
+    /// Columns of the images.
+    pub width: u32,
+    /// Rows of the images.
+    pub height: u32,
+}
+
+/// One file of times.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct StoredTiming {
+    /// The machine.
+    pub machine: String,
+    /// Its times.
+    pub timing: TaskTiming,
+}
+
+impl Store {
+    /// The folder, which need not exist yet.
+    pub fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned() }
+    }
+
+    /// A file of the benchmark.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Writes a file whole or not at all.
+    ///
+    /// # Errors
+    /// A disk that fails.
+    pub fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        put(&self.path(name), bytes)
+    }
+
+    /// The plan.
+    ///
+    /// # Errors
+    /// If there is none, or it is damaged.
+    pub fn plan(&self) -> Result<Vec<Task>, Failure> {
+        let path = self.path("plan.jsonl");
+        let shown = path.display();
+        let text = fs::read_to_string(&path).map_err(|error| {
+            Failure::usage(format!("cannot read {shown}: {error}; `tagalong bench plan` writes it"))
+        })?;
+        let line = |(index, line): (usize, &str)| {
+            serde_json::from_str(line).map_err(|error| {
+                Failure::failed(format!("{shown}, line {}: {error}; plan again", index + 1))
+            })
+        };
+        text.lines().enumerate().map(line).collect()
+    }
+
+    /// The result of a task, if it is there and whole.
+    pub fn result(&self, hash: &str) -> Option<Stored> {
+        self.get(&result_name(hash))
+    }
+
+    /// True if there is a result.
+    pub fn has_result(&self, hash: &str) -> bool {
+        self.path(&result_name(hash)).is_file()
+    }
+
+    /// Keeps a result.
+    ///
+    /// # Errors
+    /// A disk that fails.
+    pub fn put_result(&self, hash: &str, stored: &Stored) -> Result<(), Failure> {
+        let json = serde_json::to_vec(stored).map_err(Failure::failed)?;
+        self.put(&result_name(hash), &json)
+    }
+
+    /// The times of a task, if they were taken.
+    pub fn timing(&self, hash: &str) -> Option<StoredTiming> {
+        self.get(&timing_name(hash))
+    }
+
+    /// Keeps times.
+    ///
+    /// # Errors
+    /// A disk that fails.
+    pub fn put_timing(&self, hash: &str, timing: &StoredTiming) -> Result<(), Failure> {
+        let json = serde_json::to_vec_pretty(timing).map_err(Failure::failed)?;
+        self.put(&timing_name(hash), &json)
+    }
+
+    fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
+        serde_json::from_slice(&fs::read(self.path(name)).ok()?).ok()
+    }
+}
+
+fn result_name(hash: &str) -> String {
+    format!("results/{hash}.json")
+}
+
+fn timing_name(hash: &str) -> String {
+    format!("timings/{hash}.json")
+}
+
+/// Writes under a name of this process and renames: several processes may
+/// write the same result, and all of them are right.
+///
+/// # Errors
+/// A disk that fails.
+pub fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(failed)?;
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial = path.with_file_name(format!("{name}.{}.partial", std::process::id()));
+    fs::write(&partial, bytes).map_err(failed)?;
+    fs::rename(&partial, path).map_err(failed)
+}

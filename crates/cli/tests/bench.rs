@@ -1,0 +1,310 @@
+//! `tagalong bench` over drawn logs: nothing is computed twice, nothing depends
+//! on how many jobs there are, and one bad pipeline does not spoil the rest.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use common::{Drawn, code, own_plugin, text};
+use serde_json::Value;
+
+/// The two logs and their truth, and a config or more.
+struct Home {
+    folder: tempfile::TempDir,
+}
+
+impl Home {
+    fn new() -> Self {
+        let home = Self { folder: tempfile::tempdir().unwrap() };
+        for (name, frames) in [("long", 24), ("short", 9)] {
+            Drawn::of(frames).write(&home.path(&format!("logs/{name}.mcap")));
+            fs::write(home.path(&format!("logs/{name}.people.csv")), common::people(frames))
+                .unwrap();
+        }
+        home.config("near", "");
+        home.config("far", "config = { max_depth_m = 3.5 }");
+        home
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        let path = self.folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        path
+    }
+
+    fn config(&self, name: &str, extra: &str) {
+        let written = common::config(self.folder.path(), extra);
+        fs::rename(written, self.path(&format!("configs/{name}.toml"))).unwrap();
+    }
+
+    fn bench(&self, arguments: &[&str]) -> Output {
+        let mut command = own_plugin();
+        command.current_dir(self.folder.path()).arg("bench").args(arguments).output().unwrap()
+    }
+
+    fn plan(&self, out: &str) -> Vec<Value> {
+        let text = fs::read_to_string(self.path(out).join("plan.jsonl")).unwrap();
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    fn report(&self, out: &str) -> Value {
+        serde_json::from_slice(&fs::read(self.path(out).join("report.json")).unwrap()).unwrap()
+    }
+}
+
+/// All files of a folder that are not times, by name.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let name = entry.file_name().into_string().unwrap();
+        match entry.path().is_dir() {
+            true => {
+                let inner = files(&entry.path()).into_iter();
+                all.extend(inner.map(|(inside, bytes)| (format!("{name}/{inside}"), bytes)));
+            }
+            false => _ = all.insert(name, fs::read(entry.path()).unwrap()),
+        }
+    }
+    all
+}
+
+fn ok(output: Output) -> String {
+    assert_eq!(code(&output), 0, "{}{}", text(&output.stdout), text(&output.stderr));
+    text(&output.stderr)
+}
+
+#[test]
+fn one_command_ends_in_a_report_and_a_second_one_computes_nothing() {
+    let home = Home::new();
+    let told = ok(home.bench(&["--logs-dir", "logs", "-o", "out"]));
+    assert!(told.contains("4 tasks run"), "{told}");
+    let before = files(&home.path("out"));
+    for name in ["plan.jsonl", "report.html", "report.json", "report.csv"] {
+        assert!(before.contains_key(name), "{name} of {:?}", before.keys());
+    }
+    assert!(!before.keys().any(|name| name.contains("partial")), "{:?}", before.keys());
+    let result = home.path("out/results").join(before_result(&home));
+    let written = fs::metadata(&result).unwrap().modified().unwrap();
+    let told = ok(home.bench(&["--logs-dir", "logs", "-o", "out"]));
+    assert!(told.contains("0 tasks run, 4 had their results"), "{told}");
+    assert_eq!(fs::metadata(&result).unwrap().modified().unwrap(), written);
+    assert!(before == files(&home.path("out")), "the second report differs");
+}
+
+fn before_result(home: &Home) -> String {
+    format!("{}.json", home.plan("out")[0]["hash"].as_str().unwrap())
+}
+
+#[test]
+fn figures_and_events_are_in_the_report() {
+    let home = Home::new();
+    ok(home.bench(&["--logs", "logs/long.mcap", "--configs", "configs/near.toml", "-o", "out"]));
+    let report = home.report("out");
+    let task = &report["tasks"][0];
+    assert_eq!((task["pipeline"].as_str(), task["log"].as_str()), (Some("near"), Some("long")));
+    assert_eq!(task["frames"].as_u64(), Some(24));
+    assert!((task["duration_s"].as_f64().unwrap() - 2.3).abs() < 1e-9, "{}", task["duration_s"]);
+    assert!(task["image"]["MOTA"].as_f64().unwrap() > 0.7, "{}", task["image"]);
+    assert!(task["metres"]["position_error_mean_m"].as_f64().unwrap() < 0.15);
+    assert!(task["nis"]["count"].as_u64().unwrap() > 10, "{}", task["nis"]);
+    let events = task["events"].as_array().unwrap();
+    assert!(events.iter().any(|event| event["kind"] == "found"), "{events:?}");
+    let html = fs::read_to_string(home.path("out/report.html")).unwrap();
+    assert!(html.contains("near") && html.contains("long"));
+}
+
+#[test]
+fn the_scores_equal_those_of_eval() {
+    let home = Home::new();
+    ok(home.bench(&["--logs", "logs/long.mcap", "--configs", "configs/near.toml", "-o", "out"]));
+    let mut run = own_plugin();
+    run.current_dir(home.folder.path());
+    run.args(["run", "configs/near.toml", "logs/long.mcap", "-o", "run"]);
+    assert!(run.output().unwrap().status.success());
+    let mut eval = own_plugin();
+    eval.current_dir(home.folder.path());
+    eval.args(["eval", "--truth", "logs/long.people.csv", "--tracks", "run", "--format", "json"]);
+    let eval: Value = serde_json::from_slice(&eval.output().unwrap().stdout).unwrap();
+    let bench = &home.report("out")["tasks"][0]["image"];
+    for figure in ["HOTA", "MOTA", "IDF1", "LocA", "position_error_mean_m"] {
+        let (a, b) = (eval[figure].as_f64().unwrap(), bench[figure].as_f64().unwrap());
+        assert!((a - b).abs() < 2e-3, "{figure}: eval {a}, bench {b}; files are rounded");
+    }
+}
+
+#[test]
+fn jobs_and_single_tasks_give_the_same_bytes() {
+    let home = Home::new();
+    home.config("panics", "config = { panic_after_frames = 4 }");
+    let arguments = |out: &'static str| ["--logs-dir", "logs", "--seeds", "2", "-o", out];
+    assert_eq!(code(&home.bench(&arguments("one"))), 1, "one pipeline fails");
+    assert_eq!(code(&home.bench(&[&arguments("two")[..], &["--jobs", "2"]].concat())), 1);
+    home.bench(&[&["plan"][..], &arguments("three")].concat());
+    let plan = home.plan("three");
+    for task in plan.iter().rev() {
+        let wanted = task["hash"].as_str().unwrap();
+        home.bench(&["run", "-o", "three", "--task", wanted]);
+    }
+    home.bench(&["report", "-o", "three"]);
+    let one = files(&home.path("one"));
+    assert_eq!(one.keys().filter(|name| name.starts_with("results/")).count(), 12);
+    for other in ["two", "three"] {
+        let other = files(&home.path(other));
+        assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+        for (name, bytes) in &one {
+            assert!(other[name] == *bytes, "{name} differs");
+        }
+    }
+}
+
+#[test]
+fn a_pipeline_that_panics_fails_alone() {
+    let home = Home::new();
+    home.config("panics", "config = { panic_after_frames = 4 }");
+    let output = home.bench(&["--logs-dir", "logs", "-o", "out"]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("2 of 6 tasks failed"), "{}", text(&output.stderr));
+    let report = home.report("out");
+    for task in report["tasks"].as_array().unwrap() {
+        let ended = task["outcome"]["ended"].as_str().unwrap();
+        match task["pipeline"].as_str().unwrap() {
+            "panics" => {
+                assert_eq!(ended, "failed");
+                let why = task["outcome"]["why"].as_str().unwrap();
+                assert!(why.contains("nearest-thing") && why.contains("frame 5"), "{why}");
+            }
+            _ => assert_eq!(ended, "done"),
+        }
+    }
+    let again = home.bench(&["run", "-o", "out"]);
+    assert!(text(&again.stderr).contains("0 tasks run"), "a failure is a result, too");
+    let retried = home.bench(&["run", "-o", "out", "--retry-failed"]);
+    assert!(text(&retried.stderr).contains("2 tasks run"), "{}", text(&retried.stderr));
+}
+
+#[test]
+fn a_log_that_lacks_depth_is_skipped_with_the_reason() {
+    let home = Home::new();
+    Drawn { depth: false, ..Drawn::of(5) }.write(&home.path("logs/mono.mcap"));
+    fs::write(home.path("logs/mono.boxes.csv"), "1,1,60,40,26,80,1,1,1\n").unwrap();
+    Drawn::of(3).write(&home.path("logs/bare.mcap"));
+    let told = ok(home.bench(&["--logs-dir", "logs", "-o", "out"]));
+    assert!(told.contains("bare.mcap has no truth"), "{told}");
+    let skipped: Vec<Value> =
+        home.plan("out").into_iter().filter(|task| task["skip"].is_string()).collect();
+    assert_eq!(skipped.len(), 2, "{skipped:?}");
+    assert!(skipped.iter().all(|task| task["log_name"] == "mono"));
+    assert!(skipped[0]["skip"].as_str().unwrap().contains("depth"), "{}", skipped[0]["skip"]);
+    let tasks = home.report("out")["tasks"].as_array().unwrap().clone();
+    assert_eq!(tasks.iter().filter(|t| t["outcome"]["ended"] == "skipped").count(), 2);
+}
+
+#[test]
+fn a_hash_changes_with_what_matters_and_with_nothing_else() {
+    let home = Home::new();
+    let plan = |out: &str| -> Vec<String> {
+        ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", out]));
+        home.plan(out).iter().map(|task| task["hash"].as_str().unwrap().to_owned()).collect()
+    };
+    let first = plan("a");
+    let path = home.path("configs/near.toml");
+    let config = fs::read_to_string(&path).unwrap();
+    fs::write(&path, format!("# a comment\n{config}")).unwrap();
+    assert_eq!(plan("b"), first, "a comment changes nothing");
+    fs::write(&path, config.replace("seed = 7", "seed = 8")).unwrap();
+    let seeded = plan("c");
+    assert_eq!((&seeded[0], &seeded[1] != &first[1]), (&first[0], true), "far, then near");
+    fs::write(home.path("logs/short.people.csv"), common::people(8)).unwrap();
+    assert!(plan("d").iter().zip(&seeded).all(|(new, old)| new != old), "other truth");
+}
+
+#[test]
+fn what_changed_since_the_plan_is_not_run() {
+    let home = Home::new();
+    ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", "out"]));
+    fs::write(home.path("logs/short.people.csv"), common::people(8)).unwrap();
+    let output = home.bench(&["run", "-o", "out"]);
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("plan again"), "{}", text(&output.stderr));
+    let early = home.bench(&["report", "-o", "out"]);
+    assert_eq!(code(&early), 1);
+    assert!(text(&early.stderr).contains("2 of 2 tasks have no result"), "{}", text(&early.stderr));
+    assert_eq!(code(&home.bench(&["run", "-o", "out", "--task", "99"])), 2);
+    assert_eq!(code(&home.bench(&["run", "-o", "nowhere"])), 2);
+}
+
+#[test]
+fn the_gate_closes_on_what_got_worse() {
+    let home = Home::new();
+    let logs = ["--logs", "logs/long.mcap", "--configs", "configs/near.toml"];
+    ok(home.bench(&[&logs[..], &["-o", "old"]].concat()));
+    let gate = ["--baseline", "old/report.json", "--fail-if", "HOTA<-0.01", "FN>0"];
+    ok(home.bench(&[&logs[..], &["-o", "same"], &gate].concat()));
+    // Nothing is nearer than this: nobody is found.
+    home.config("near", "config = { max_depth_m = 1.0 }");
+    let output = home.bench(&[&logs[..], &["-o", "new"], &gate].concat());
+    assert_eq!(code(&output), 1);
+    let told = text(&output.stderr);
+    assert!(told.contains("near  long  7  HOTA<-0.01") && told.contains("FN>0"), "{told}");
+    assert_eq!(code(&home.bench(&["report", "-o", "same", "--baseline", "no.json"])), 1);
+}
+
+#[test]
+fn times_are_taken_only_when_asked_for() {
+    let home = Home::new();
+    let logs = ["--logs", "logs/short.mcap", "-o", "out"];
+    ok(home.bench(&logs));
+    let without = files(&home.path("out"));
+    assert!(!without.keys().any(|name| name.contains("timing")), "{:?}", without.keys());
+    let told = ok(home.bench(&[&logs[..], &["--timing", "--jobs", "2"]].concat()));
+    assert!(told.contains("one task at a time"), "{told}");
+    let with = files(&home.path("out"));
+    let times: Value = serde_json::from_slice(&with["timings.json"]).unwrap();
+    assert_eq!(
+        (times["exclusive"].as_bool(), times["tasks"].as_object().unwrap().len()),
+        (Some(true), 2)
+    );
+    assert!(with["report.json"] == without["report.json"], "times are kept apart");
+}
+
+#[test]
+fn pictures_show_what_went_wrong() {
+    let home = Home::new();
+    // Truth somewhere else: a miss, and a false track.
+    let shifted = common::people(24).replace(",1,", ",2,");
+    let moved: String = shifted
+        .lines()
+        .map(|line| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if cells[0] != "frame" {
+                cells[2] = "2".into();
+            }
+            cells.join(",") + "\n"
+        })
+        .collect();
+    fs::write(home.path("logs/long.people.csv"), moved).unwrap();
+    ok(home.bench(&["--logs", "logs/long.mcap", "--configs", "configs/near.toml", "-o", "out"]));
+    let html = fs::read_to_string(home.path("out/report.html")).unwrap();
+    assert!(html.contains("data:image/png;base64,iVBOR"), "no picture in the report");
+}
+
+#[test]
+fn trackeval_gets_its_tree() {
+    let home = Home::new();
+    ok(home.bench(&["--logs-dir", "logs", "-o", "out"]));
+    ok(home.bench(&["export", "-o", "out", "--trackeval", "tree"]));
+    let tree = files(&home.path("tree"));
+    assert_eq!(tree["gt/mot_challenge/seqmaps/Tagalong-train.txt"], b"name\nlong\nshort\n");
+    for name in [
+        "gt/mot_challenge/Tagalong-train/long/seqinfo.ini",
+        "gt/mot_challenge/Tagalong-train/short/gt/gt.txt",
+        "trackers/mot_challenge/Tagalong-train/near-seed7/data/long.txt",
+        "trackers/mot_challenge/Tagalong-train/far-seed7/data/short.txt",
+    ] {
+        assert!(tree.contains_key(name), "{name} of {:?}", tree.keys());
+    }
+}
