@@ -2,7 +2,7 @@ use std::any::{Any, TypeId};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::{Camera, DepthImage, Error, GreyImage, Motion, Result, RgbImage, Stamp};
+use crate::{Camera, DepthImage, Error, GreyImage, Motion, Recorded, Result, RgbImage, Stamp};
 
 /// The images that one moment delivered. All have the size of the camera's
 /// image, and show the same view unless the name says otherwise.
@@ -44,6 +44,7 @@ pub struct Frame {
     /// The robot's motion since the previous frame.
     pub motion: Motion,
     images: Images,
+    recorded: Option<Vec<Recorded>>,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
 }
@@ -63,9 +64,21 @@ impl Frame {
             camera,
             motion,
             images,
+            recorded: None,
             grey: OnceLock::new(),
             derived: Mutex::default(),
         }
+    }
+
+    /// The same frame with what another detector recorded of it.
+    pub fn with_recorded(self, recorded: Option<Vec<Recorded>>) -> Self {
+        Self { recorded, ..self }
+    }
+
+    /// What another detector recorded of this moment; `None` where the log is
+    /// not read for it (`[input] detections_topic`).
+    pub fn recorded(&self) -> Option<&[Recorded]> {
+        self.recorded.as_deref()
     }
 
     /// The images as they came.

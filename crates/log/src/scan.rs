@@ -26,6 +26,8 @@ pub(crate) enum Type {
     CameraInfo,
     Tf,
     Odometry,
+    Detections2D,
+    Detections3D,
     Other,
 }
 
@@ -39,6 +41,8 @@ impl Type {
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
+            ("vision_msgs", "Detection2DArray") => Self::Detections2D,
+            ("vision_msgs", "Detection3DArray") => Self::Detections3D,
             _ => Self::Other,
         }
     }
@@ -238,7 +242,7 @@ impl Gathering {
             Type::Odometry => topic.take_odometry(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data),
-            Type::Other => Some(()),
+            Type::Detections2D | Type::Detections3D | Type::Other => Some(()),
         };
         if done.is_none() {
             self.topic(&channel.topic, "", "").undecodable += 1;

@@ -16,6 +16,7 @@ pub(crate) struct Chosen {
     pub(crate) depth_info: Option<String>,
     pub(crate) right_info: Option<String>,
     pub(crate) odometry: Option<String>,
+    pub(crate) detections: Option<String>,
 }
 
 /// Chooses topics as named in the settings, else by type, encoding and name.
@@ -26,6 +27,7 @@ pub(crate) struct Chosen {
 pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result<Chosen, LogError> {
     let images = &[Type::Image, Type::CompressedImage][..];
     let infos = &[Type::CameraInfo][..];
+    let detections = &[Type::Detections2D, Type::Detections3D][..];
     let named = |key, topic: &Option<String>, types| named(scan, key, topic.as_deref(), types);
     let depth =
         named("depth_topic", &input.depth_topic, images)?.or_else(|| best(scan, depth_rank));
@@ -47,6 +49,7 @@ pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result
         depth,
         right,
         odometry,
+        detections: named("detections_topic", &input.detections_topic, detections)?,
     };
     check(scan, &chosen, needs)?;
     Ok(chosen)

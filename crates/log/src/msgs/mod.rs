@@ -21,7 +21,8 @@ use re_cdr::{BigEndian, LittleEndian};
 pub use sensor::{CameraInfo, CompressedImage, Image, RegionOfInterest};
 use serde::{Deserialize, Serialize};
 pub use vision::{
-    BoundingBox3D, Detection3D, Detection3DArray, ObjectHypothesis, ObjectHypothesisWithPose,
+    BoundingBox2D, BoundingBox3D, Detection2D, Detection2DArray, Detection3D, Detection3DArray,
+    ObjectHypothesis, ObjectHypothesisWithPose, Point2D, Pose2D,
 };
 
 /// A message type that can be a channel of a log.

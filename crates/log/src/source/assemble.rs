@@ -9,6 +9,7 @@ use tagalong_core::{
 
 use super::intake::Intake;
 use super::pairing::Payload;
+use super::recorded::recorded;
 use super::tally::Tally;
 use super::{LogFrame, Plan};
 use crate::camera_info::{CalibrationError, check_size};
@@ -52,6 +53,7 @@ impl Assembler {
         let tolerance_s = plan.input.pair_tolerance_s;
         let depth = intake.depth.take(image.stamp, next, tolerance_s);
         let right = intake.right.take(image.stamp, next, tolerance_s);
+        let detections = intake.detections.take(image.stamp, next, tolerance_s);
         if plan.has_second_depth() && depth.is_none() {
             tally.count("colour_without_depth");
         }
@@ -74,7 +76,13 @@ impl Assembler {
         }
         let lacks = plan.needs.depth && images.depth.is_none()
             || plan.needs.right && images.right.is_none();
-        (!lacks).then(|| self.finish(plan, image.stamp, camera, images, intake, tally))
+        if lacks {
+            return None;
+        }
+        let recorded = recorded(plan, detections, intake, tally);
+        let mut item = self.finish(plan, image.stamp, camera, images, intake, tally);
+        item.frame = item.frame.with_recorded(recorded);
+        Some(item)
     }
 
     /// The image that makes the frame.

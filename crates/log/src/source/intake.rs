@@ -6,7 +6,7 @@ use super::pairing::{Arrival, Payload, Reorder, Waiting};
 use super::tally::Tally;
 use crate::InputSettings;
 use crate::mcap_walk::Message;
-use crate::msgs::{CameraInfo, CdrError, CompressedImage, Image, Odometry, TFMessage, decode};
+use crate::msgs::{CameraInfo, CdrError, CompressedImage, Header, Image, Odometry, TFMessage, decode};
 use crate::odometry::PoseBuffer;
 use crate::scan::{Scan, Type, is_static};
 use crate::tf::TfBuffer;
@@ -21,6 +21,7 @@ pub(super) struct Intake {
     pub(super) frames: Reorder,
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
+    pub(super) detections: Waiting,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
 }
@@ -37,6 +38,7 @@ impl Intake {
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
+            detections: Waiting::default(),
             tf,
             poses: PoseBuffer::default(),
         }
@@ -51,6 +53,8 @@ impl Intake {
             payload(message).map(|image| self.depth.push(image))
         } else if topic == self.chosen.right.as_ref() {
             payload(message).map(|image| self.right.push(image))
+        } else if topic == self.chosen.detections.as_ref() {
+            headed(message).map(|detections| self.detections.push(detections))
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
         } else if topic == self.chosen.colour_info.as_ref() {
@@ -76,6 +80,7 @@ impl Intake {
                 if let Some(newest) = newest {
                     self.depth.set_aside(newest);
                     self.right.set_aside(newest);
+                    self.detections.set_aside(newest);
                 }
             }
         }
@@ -118,8 +123,15 @@ impl Intake {
         if self.frames.is_flushed() {
             self.depth.restore();
             self.right.restore();
+            self.detections.restore();
         }
     }
+}
+
+/// A message that begins with a header.
+fn headed(message: &Message<'_>) -> Result<Payload, CdrError> {
+    let header: Header = decode(message.data)?;
+    Ok(Payload { stamp: header.stamp(), frame_id: header.frame_id, data: message.data.to_vec() })
 }
 
 /// The stamp and frame of an image message, and its bytes.

@@ -4,6 +4,7 @@ mod assemble;
 mod intake;
 mod mount;
 mod pairing;
+mod recorded;
 mod tally;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,49 @@
+//! `det.txt` of the MOTChallenge.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tagalong_core::{Error, Recorded, Rect, Result};
+
+/// Boxes by the number of their frame, from 1.
+pub(crate) type Boxes = BTreeMap<u64, Vec<Recorded>>;
+
+/// Reads a file of boxes.
+///
+/// # Errors
+/// A file that cannot be read, or a line that is no detection: names both.
+pub(crate) fn read(path: &Path) -> Result<Boxes> {
+    let shown = path.display();
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Error::Settings(format!("cannot read boxes `{shown}`: {error}")))?;
+    let mut boxes = Boxes::new();
+    for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let (frame, recorded) = parse(line).map_err(|why| {
+            Error::Settings(format!("boxes `{shown}`, line {}: {why}", index + 1))
+        })?;
+        boxes.entry(frame).or_default().push(recorded);
+    }
+    Ok(boxes)
+}
+
+fn parse(line: &str) -> std::result::Result<(u64, Recorded), String> {
+    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    let number = |index: usize, name: &str| -> std::result::Result<f64, String> {
+        let text = fields.get(index).ok_or_else(|| {
+            format!("{} fields; expected frame, -1, x, y, width, height, score", fields.len())
+        })?;
+        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| format!("`{name}` is `{text}`, expected a number"))
+    };
+    let frame = number(0, "frame")?;
+    if frame < 1.0 || frame.fract() != 0.0 {
+        return Err(format!("frame {frame}; frames are numbered from 1"));
+    }
+    let region =
+        Rect::new(number(2, "x")?, number(3, "y")?, number(4, "width")?, number(5, "height")?);
+    if region.width <= 0.0 || region.height <= 0.0 {
+        return Err("a box without area".into());
+    }
+    let score = if fields.len() > 6 { number(6, "score")? } else { 1.0 };
+    Ok((frame as u64, Recorded { region: Some(region), head: None, score }))
+}

@@ -1,0 +1,87 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a recorded box is drawn around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Body {
+    /// The whole person, from head to feet.
+    Full,
+    /// Head and shoulders, as a square.
+    Upper,
+}
+
+/// What the recorded score means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ScoreScale {
+    /// A probability, 0 to 1.
+    Probability,
+    /// Log-odds, or a margin like that of an SVM: 0 is undecided.
+    LogOdds,
+}
+
+/// Settings of `recorded-detections`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score;
+    /// frames from 1, pixels), relative to the config. Empty: the topic of the
+    /// log that `[input] detections_topic` names.
+    pub path: String,
+    /// Boxes with a lower score are dropped, on the recorded scale.
+    pub min_score: f64,
+    /// What the score means.
+    pub score: ScoreScale,
+    /// What the boxes are drawn around.
+    pub body: Body,
+    /// How tall a person is taken to be whose whole body fills a box, m.
+    pub height_m: f64,
+    /// Standard deviation of a box's place, pixels.
+    pub sigma_px: f64,
+    /// Standard deviation of the depth of a face read from the depth image, m.
+    pub sigma_depth_m: f64,
+    /// Standard deviation of a distance that only the size of the box tells, as
+    /// a fraction of the distance.
+    pub sigma_distance: f64,
+    /// Standard deviation of a recorded position in space, m.
+    pub sigma_position_m: f64,
+    /// A search near a track takes boxes that overlap the expected one by this
+    /// much (IoU), or ...
+    pub near_overlap: f64,
+    /// ... positions this near on the floor, m.
+    pub near_m: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            path: String::new(),
+            min_score: 0.3,
+            score: ScoreScale::Probability,
+            body: Body::Full,
+            height_m: 1.7,
+            sigma_px: 4.0,
+            sigma_depth_m: 0.1,
+            sigma_distance: 0.2,
+            sigma_position_m: 0.15,
+            near_overlap: 0.3,
+            near_m: 0.8,
+        }
+    }
+}
+
+impl Config {
+    /// What is wrong with the values, if anything.
+    pub(crate) fn mistake(&self) -> Option<String> {
+        let positive = [
+            ("height_m", self.height_m),
+            ("sigma_px", self.sigma_px),
+            ("sigma_depth_m", self.sigma_depth_m),
+            ("sigma_distance", self.sigma_distance),
+            ("sigma_position_m", self.sigma_position_m),
+        ];
+        let wrong = positive.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite()));
+        wrong.map(|(key, value)| format!("{key} is {value}; it must be above 0"))
+    }
+}

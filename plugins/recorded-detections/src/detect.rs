@@ -1,0 +1,165 @@
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{
+    Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_BELOW_TOP_M,
+    HEAD_RADIUS_M, Recorded, Rect, Result, Search, Track, UPPER_BODY_SIDE_M,
+};
+
+use crate::NAME;
+use crate::boxes::{Boxes, read};
+use crate::config::{Body, Config, ScoreScale};
+
+/// Half of the part of a face that is looked at for its depth, m.
+const HALF_FACE_M: f64 = 0.07;
+
+/// Depth readings that a face needs to be believed.
+const LEAST_READINGS: usize = 4;
+
+/// Probabilities are kept this far from 0 and 1.
+const SURE: f64 = 1e-3;
+
+/// Gives back what another detector recorded, with a place for each box.
+pub struct RecordedDetections {
+    config: Config,
+    /// The boxes of the file; `None`: those of the log.
+    boxes: Option<Boxes>,
+}
+
+impl RecordedDetections {
+    /// A detector with these settings.
+    ///
+    /// # Errors
+    /// Settings that cannot work, or a file that cannot be read.
+    pub fn new(config: Config, context: &Context) -> Result<Self> {
+        if let Some(mistake) = config.mistake() {
+            return Err(Error::Settings(mistake));
+        }
+        let boxes = match config.path.as_str() {
+            "" => None,
+            path => Some(read(&context.base_dir.join(path))?),
+        };
+        Ok(Self { config, boxes })
+    }
+
+    /// What was recorded of a frame.
+    fn recorded<'a>(&'a self, frame: &'a Frame, funnel: &mut Funnel) -> &'a [Recorded] {
+        let found = match &self.boxes {
+            Some(boxes) => Some(boxes.get(&frame.index).map_or(&[][..], Vec::as_slice)),
+            None => frame.recorded(),
+        };
+        if found.is_none() {
+            funnel.drop_many("nothing recorded", 1);
+        }
+        found.unwrap_or_default()
+    }
+
+    fn detection(&self, frame: &Frame, recorded: &Recorded) -> Option<Detection> {
+        let camera = &*frame.camera;
+        let (region, position, covariance) = match (recorded.head, recorded.region) {
+            (Some(head), region) => {
+                let variance = self.config.sigma_position_m.powi(2);
+                let region = region.unwrap_or_else(|| camera.upper_body(&head));
+                (region, head, Matrix3::identity() * variance)
+            }
+            (None, Some(region)) => self.placed(frame, &self.upper_body(&region))?,
+            (None, None) => return None,
+        };
+        let inside = region.clipped(camera.width, camera.height).area() > 0.0;
+        let score = self.log_odds(recorded.score);
+        let detection = Detection { region, position, covariance, score, source: NAME };
+        (inside && detection.is_sane()).then_some(detection)
+    }
+
+    fn upper_body(&self, region: &Rect) -> Rect {
+        match self.config.body {
+            Body::Upper => *region,
+            Body::Full => region.upper_body_of_standing(self.config.height_m),
+        }
+    }
+
+    /// A place for an upper-body square: by the depth image where it shows the
+    /// face, else by the square's size, with the uncertainty of either.
+    fn placed(&self, frame: &Frame, region: &Rect) -> Option<(Rect, Point3<f64>, Matrix3<f64>)> {
+        let camera = &*frame.camera;
+        let measured = frame.images().depth.as_deref().and_then(|depth| face_depth(depth, region));
+        let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / region.width;
+        let (face_m, sigma_m) = match measured {
+            Some(depth_m) => (depth_m, self.config.sigma_depth_m),
+            None => (by_size, by_size * self.config.sigma_distance),
+        };
+        let sane = face_m.is_finite() && face_m > 0.05;
+        sane.then(|| {
+            let depth_m = face_m + HEAD_RADIUS_M;
+            let position = camera.head_of(region, face_m);
+            let centre = region.centre();
+            let covariance = camera.covariance(centre, depth_m, self.config.sigma_px, sigma_m);
+            (*region, position, covariance)
+        })
+    }
+
+    fn log_odds(&self, score: f64) -> f64 {
+        match self.config.score {
+            ScoreScale::LogOdds => score,
+            ScoreScale::Probability => {
+                let sure = score.clamp(SURE, 1.0 - SURE);
+                (sure / (1.0 - sure)).ln()
+            }
+        }
+    }
+
+    /// How well a detection fits a track, if it is near it at all.
+    fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
+        let overlap = track.estimate.region.iou(&detection.region);
+        let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
+        // A box whose distance is a guess is near if it overlaps.
+        let guessed = detection.covariance.diagonal().xy().max() > 0.25 * self.config.near_m;
+        let near = away_m <= self.config.near_m || guessed && overlap >= self.config.near_overlap;
+        near.then(|| overlap - away_m)
+    }
+}
+
+/// The median depth of the face in an upper-body square, if there are enough
+/// readings.
+fn face_depth(depth: &DepthImage, region: &Rect) -> Option<f64> {
+    let px_per_m = region.width / UPPER_BODY_SIDE_M;
+    let half = HALF_FACE_M * px_per_m;
+    let (x, y) = (region.centre().x, region.y + HEAD_BELOW_TOP_M * px_per_m);
+    let face = Rect::new(x - half, y - half, 2.0 * half, 2.0 * half);
+    let face = face.clipped(depth.width(), depth.height());
+    let (left, right) = (face.x as usize, face.right() as usize);
+    let rows = face.y as usize..face.bottom() as usize;
+    let mut readings: Vec<f32> = rows
+        .flat_map(|y| depth.row(y)[left..right.max(left)].iter().copied())
+        .filter(|metres| metres.is_finite())
+        .collect();
+    readings.sort_by(f32::total_cmp);
+    let enough = readings.len() >= LEAST_READINGS;
+    enough.then(|| f64::from(readings[readings.len() / 2]))
+}
+
+impl Detector for RecordedDetections {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        let mut found = Vec::new();
+        for recorded in self.recorded(frame, funnel) {
+            if recorded.score < self.config.min_score {
+                funnel.drop_at("recorded score", recorded.region.unwrap_or_default());
+                continue;
+            }
+            match self.detection(frame, recorded) {
+                Some(detection) => found.push(detection),
+                None => funnel.drop_at("outside", recorded.region.unwrap_or_default()),
+            }
+        }
+        if let Search::Near(track) = search {
+            let mut near: Vec<(f64, Detection)> =
+                found.into_iter().filter_map(|d| Some((self.fit(track, &d)?, d))).collect();
+            near.sort_by(|a, b| b.0.total_cmp(&a.0));
+            found = near.into_iter().map(|(_, detection)| detection).collect();
+        }
+        Ok(found)
+    }
+}

@@ -1,0 +1,151 @@
+use std::sync::Arc;
+
+use nalgebra::{Matrix5, Point3, Vector2};
+use tagalong_core::{
+    Camera, Context, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel,
+    HEAD_RADIUS_M, Images, Motion, Person, Pinhole, Recorded, Rect, Registry, Search, Stamp, Track,
+    TrackId, Wheels,
+};
+
+use super::*;
+
+const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
+
+fn camera() -> Arc<Camera> {
+    let lens = Pinhole { fx: 520.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    Arc::new(Camera::mounted(lens, 640, 480, 1.4, 0.0, 0.0))
+}
+
+fn frame(index: u64, depth_m: Option<f32>) -> Frame {
+    let depth = depth_m.map(|metres| Arc::new(DepthImage::filled(640, 480, metres)));
+    let images = Images { depth, ..Images::default() };
+    Frame::new(index, Stamp::from_nanos(index * 100), camera(), Motion::at_rest(0.1), images)
+}
+
+fn context(folder: &std::path::Path) -> Context {
+    let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+    Context { seed: 1, base_dir: folder.to_owned(), wheels }
+}
+
+fn of_file(text: &str, config: Config) -> tagalong_core::Result<RecordedDetections> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("det.txt"), text).unwrap();
+    RecordedDetections::new(Config { path: "det.txt".into(), ..config }, &context(folder.path()))
+}
+
+fn detect(detector: &mut RecordedDetections, frame: &Frame) -> Vec<Detection> {
+    detector.detect(frame, &EVERYWHERE, &mut Funnel::default()).unwrap()
+}
+
+/// A person at this head position, as a whole-body box of the file.
+fn whole_body(head: Point3<f64>) -> String {
+    let upper = camera().upper_body(&head);
+    let px_per_m = upper.width / 0.57;
+    let (width, height) = (0.5 * px_per_m, 1.7 * px_per_m);
+    let (x, y) = (upper.centre().x - 0.5 * width, upper.y + 0.025 * px_per_m);
+    format!("2,-1,{x},{y},{width},{height},0.9,-1,-1,-1\n")
+}
+
+#[test]
+fn it_conforms() {
+    let mut registry = Registry::default();
+    register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn a_whole_body_becomes_an_upper_body_with_a_place() {
+    let head = Point3::new(3.0, 0.4, 1.585);
+    let mut detector = of_file(&whole_body(head), Config::default()).unwrap();
+    assert!(detect(&mut detector, &frame(1, None)).is_empty(), "it is of frame 2");
+    let by_size = &detect(&mut detector, &frame(2, None))[0];
+    assert!((by_size.position - head).norm() < 0.05, "{}", by_size.position);
+    assert!(by_size.region.iou(&camera().upper_body(&head)) > 0.95);
+    assert!(by_size.covariance[(0, 0)].sqrt() > 0.5, "a distance by size is a guess");
+    let face_m = (camera().depth_of(&head) - HEAD_RADIUS_M) as f32;
+    let by_depth = &detect(&mut detector, &frame(2, Some(face_m)))[0];
+    assert!((by_depth.position - head).norm() < 0.02, "{}", by_depth.position);
+    assert!(by_depth.covariance[(0, 0)].sqrt() < 0.15);
+}
+
+#[test]
+fn depth_beats_the_size_and_holes_do_not_count() {
+    let head = Point3::new(3.0, 0.0, 1.585);
+    let mut detector = of_file(&whole_body(head), Config::default()).unwrap();
+    let near = &detect(&mut detector, &frame(2, Some(2.0)))[0];
+    assert!((near.position.x - 2.08).abs() < 0.02, "{}", near.position);
+    let holes = &detect(&mut detector, &frame(2, Some(f32::NAN)))[0];
+    assert!((holes.position - head).norm() < 0.05, "{}", holes.position);
+}
+
+#[test]
+fn low_scores_are_dropped_and_counted() {
+    let text = "1,-1,100,100,50,170,0.2\n1,-1,300,100,50,170,0.8\n";
+    let mut detector = of_file(text, Config::default()).unwrap();
+    let mut funnel = Funnel::default();
+    let found = detector.detect(&frame(1, None), &EVERYWHERE, &mut funnel).unwrap();
+    assert_eq!((found.len(), funnel.count("recorded score")), (1, 1));
+    assert!((found[0].score - 4.0_f64.ln()).abs() < 1e-9, "log-odds of 0.8");
+    let log_odds = Config { score: ScoreScale::LogOdds, min_score: -5.0, ..Config::default() };
+    let mut detector = of_file(text, log_odds).unwrap();
+    assert_eq!(detect(&mut detector, &frame(1, None))[0].score, 0.2);
+}
+
+#[test]
+fn recorded_positions_of_the_log_are_taken_as_they_are() {
+    let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
+    let head = Point3::new(2.5, -0.3, 1.6);
+    let recorded = Recorded { region: None, head: Some(head), score: 0.9 };
+    let frame = frame(1, None).with_recorded(Some(vec![recorded]));
+    let found = detect(&mut detector, &frame);
+    assert_eq!(found[0].position, head);
+    assert_eq!(found[0].region, camera().upper_body(&head));
+}
+
+#[test]
+fn a_log_that_is_not_read_for_boxes_is_told_in_the_funnel() {
+    let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
+    let mut funnel = Funnel::default();
+    assert!(detector.detect(&frame(1, None), &EVERYWHERE, &mut funnel).unwrap().is_empty());
+    assert_eq!(funnel.count("nothing recorded"), 1);
+}
+
+#[test]
+fn a_search_near_a_track_finds_the_right_box_first() {
+    let (left, right) = (Point3::new(3.0, 0.5, 1.585), Point3::new(3.0, -0.4, 1.585));
+    let text = whole_body(left) + &whole_body(right);
+    let mut detector = of_file(&text, Config::default()).unwrap();
+    let person = Person { position: right, velocity: Vector2::zeros() };
+    let region = camera().upper_body(&right);
+    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
+    let track = Track {
+        id: TrackId(1),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 3,
+        unseen_s: 0.0,
+        score: 2.0,
+    };
+    let near = Search::Near(&track);
+    let found = detector.detect(&frame(2, None), &near, &mut Funnel::default()).unwrap();
+    assert_eq!(found.len(), 1);
+    assert!((found[0].position - right).norm() < 0.1, "{}", found[0].position);
+}
+
+#[test]
+fn mistakes_are_named_by_file_and_line() {
+    let message = |text: &str| of_file(text, Config::default()).err().unwrap().to_string();
+    assert!(message("1,-1,5,5,9,9,1\n2,-1,5,5\n").contains("det.txt`, line 2: 4 fields"));
+    assert!(message("0,-1,5,5,9,9,1\n").contains("numbered from 1"));
+    assert!(message("1,-1,5,x,9,9,1\n").contains("`y` is `x`"));
+    assert!(message("1,-1,5,5,0,9,1\n").contains("without area"));
+    let config = Config { path: "none.txt".into(), ..Config::default() };
+    let error = RecordedDetections::new(config, &context("nowhere".as_ref())).err().unwrap();
+    assert!(error.to_string().contains("none.txt"), "{error}");
+    let wrong = Config { height_m: 0.0, ..Config::default() };
+    assert!(RecordedDetections::new(wrong, &context(".".as_ref())).is_err());
+    assert_eq!(Rect::default().area(), 0.0);
+}
