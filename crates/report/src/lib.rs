@@ -1,7 +1,40 @@
 //! Benchmark results as a self-contained web page, as JSON and as a table.
+//!
+//! A [`Benchmark`] holds one [`TaskResult`] per pipeline, log and seed.
+//! [`html`] makes a page of it that asks the network for nothing, works without
+//! JavaScript, in light and dark and on paper; [`json`] and [`csv`] are for
+//! programs. [`Summary`] holds the means and their intervals, [`compare`] lists
+//! where two pipelines differ.
+//!
+//! ```
+//! use tagalong_report::{Benchmark, TaskResult, html};
+//!
+//! let task = TaskResult { pipeline: "<ekf>".into(), log: "lab".into(), ..Default::default() };
+//! let benchmark = Benchmark { version: "0.1.0".into(), tasks: vec![task] };
+//! let page = html(&benchmark, None);
+//! assert!(page.starts_with("<!DOCTYPE html>") && page.contains("&lt;ekf&gt;"));
+//! ```
+//!
+//! # Why times are kept apart
+//!
+//! Everything in a [`Benchmark`] follows from configs, logs and seeds, so the
+//! files made from it are the same bytes wherever and however often it is run.
+//! [`Timings`] are not, so they come beside it, and the page shows them only if
+//! the machine had nothing else to do.
 
+mod chart;
+mod compare;
+mod figures;
+mod files;
 mod model;
+mod page;
+mod summary;
+mod view;
 
+pub use compare::{Difference, SAME_EVENT_S, compare};
+pub use files::{csv, json};
 pub use model::{
     Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
 };
+pub use page::html;
+pub use summary::{CONFIDENCE, Estimate, PairSummary, PipelineSummary, Summary};

@@ -1,0 +1,135 @@
+/// How values become places.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Scale {
+    Linear,
+    /// For values above zero; what is not is drawn at the low end.
+    Log,
+}
+
+/// A range of values and the places of its ends.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Axis {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+    scale: Scale,
+}
+
+impl Axis {
+    /// An axis from `low` at the place `from` to `high` at `to`. A range that
+    /// is empty or not finite is widened to one that can be drawn.
+    pub fn new(scale: Scale, [low, high]: [f64; 2], [from, to]: [f64; 2]) -> Self {
+        let [low, high] = match scale {
+            Scale::Linear => drawable([low, high]),
+            Scale::Log => drawable_log([low, high]),
+        };
+        Self { low, high, from, to, scale }
+    }
+
+    /// An axis around the finite values, from zero or from the power of ten
+    /// below them, to a round value above.
+    pub fn around(scale: Scale, values: impl IntoIterator<Item = f64>, places: [f64; 2]) -> Self {
+        let finite = values.into_iter().filter(|v| v.is_finite());
+        match scale {
+            Scale::Linear => {
+                let [low, high] = finite.fold([0.0_f64, 0.0], |[l, h], v| [l.min(v), h.max(v)]);
+                let step = step_of(high - low, 5.0);
+                Self::new(scale, [(low / step).floor() * step, (high / step).ceil() * step], places)
+            }
+            Scale::Log => {
+                let positive: Vec<f64> = finite.filter(|v| *v > 0.0).collect();
+                let low = positive.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = positive.iter().copied().fold(0.0, f64::max);
+                Self::new(scale, [decade(low, f64::floor), decade(high, f64::ceil)], places)
+            }
+        }
+    }
+
+    /// Where a value lies, within the ends of the axis; nothing if it is no number.
+    pub fn at(&self, value: f64) -> Option<f64> {
+        if value.is_nan() {
+            return None;
+        }
+        let value = value.clamp(self.low, self.high);
+        let part = match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Log => (value / self.low).log10() / (self.high / self.low).log10(),
+        };
+        Some(self.from + part.clamp(0.0, 1.0) * (self.to - self.from))
+    }
+
+    /// Round values within the axis, as text, and where they lie.
+    pub fn ticks(&self) -> Vec<(String, f64)> {
+        let values = match self.scale {
+            Scale::Linear => self.linear_ticks(),
+            Scale::Log => self.log_ticks(),
+        };
+        values.into_iter().filter_map(|(text, v)| Some((text, self.at(v)?))).collect()
+    }
+
+    fn linear_ticks(&self) -> Vec<(String, f64)> {
+        let step = step_of(self.high - self.low, 5.0);
+        let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+        let first = (self.low / step).ceil();
+        let last = (self.high / step + 1e-9).floor();
+        let count = (last - first).clamp(0.0, 20.0) as u32;
+        let value = |i: u32| (first + f64::from(i)) * step;
+        (0..=count).map(|i| (minus(&format!("{:.decimals$}", value(i))), value(i))).collect()
+    }
+
+    fn log_ticks(&self) -> Vec<(String, f64)> {
+        let first = self.low.log10().ceil() as i32;
+        let last = (self.high.log10() + 1e-9).floor() as i32;
+        (first..=last.min(first + 20))
+            .map(|exponent| (power(exponent), 10_f64.powi(exponent)))
+            .collect()
+    }
+}
+
+/// A round step that divides a range into about `parts`: 1, 2 or 5 times a
+/// power of ten.
+fn step_of(range: f64, parts: f64) -> f64 {
+    if !(range.is_finite() && range > 0.0) {
+        return 1.0;
+    }
+    let rough = range / parts;
+    let unit = 10_f64.powf(rough.log10().floor());
+    let times = [1.0, 2.0, 5.0].into_iter().find(|t| t * unit >= rough * 0.999).unwrap_or(10.0);
+    times * unit
+}
+
+/// The widest ends that are drawn, so that differences stay finite.
+const FARTHEST: f64 = 1e12;
+
+fn drawable([low, high]: [f64; 2]) -> [f64; 2] {
+    let low = if low.is_nan() { 0.0 } else { low.clamp(-FARTHEST, FARTHEST) };
+    let high = if high.is_nan() { low } else { high.clamp(-FARTHEST, FARTHEST) };
+    let least = (low.abs() * 1e-6).max(1e-9);
+    if high - low >= least { [low, high] } else { [low, low + least.max(1.0)] }
+}
+
+fn drawable_log([low, high]: [f64; 2]) -> [f64; 2] {
+    let low = if low.is_finite() && low > 0.0 { low.clamp(1e-9, FARTHEST) } else { 0.1 };
+    let high = if high.is_finite() { high.min(FARTHEST) } else { low };
+    if high >= low * 1.1 { [low, high] } else { [low, low * 10.0] }
+}
+
+fn decade(value: f64, round: fn(f64) -> f64) -> f64 {
+    10_f64.powf(round(value.log10()))
+}
+
+fn power(exponent: i32) -> String {
+    if (-4..=5).contains(&exponent) {
+        let decimals = usize::try_from(-exponent).unwrap_or(0);
+        format!("{:.decimals$}", 10_f64.powi(exponent))
+    } else {
+        format!("1e{exponent}")
+    }
+}
+
+/// With a true minus sign, which screen readers read and which is as wide as a plus.
+pub fn minus(text: &str) -> String {
+    let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    text.replace('-', if zero { "" } else { "\u{2212}" })
+}

@@ -1,0 +1,120 @@
+use maud::{Markup, html};
+
+use super::{
+    Axis, Plot, Scale, Words, axes, dashes, hint, mark, picture, points, px, series_class,
+};
+use crate::model::Trajectory;
+
+/// The part of the floor that is drawn: a square, in metres.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Extent {
+    x_m: [f64; 2],
+    y_m: [f64; 2],
+}
+
+const SIZE: (f64, f64) = (380.0, 390.0);
+const PLOT: Plot = Plot { left: 56.0, right: 370.0, top: 16.0, bottom: 330.0 };
+
+/// A pause after which a line does not go on, in seconds.
+const PAUSE_S: f64 = 1.0;
+
+/// Places closer than this on the picture are drawn once.
+const NEAR: f64 = 1.5;
+
+impl Extent {
+    /// The smallest square with some room around everything; nothing without a place.
+    pub fn around<'a>(all: impl IntoIterator<Item = &'a Trajectory>) -> Option<Self> {
+        let mut places = all.into_iter().flat_map(|t| &t.points).filter(|p| drawable(p));
+        let &[_, x, y] = places.next()?;
+        let (mut low, mut high) = ([x, y], [x, y]);
+        for &[_, x, y] in places {
+            low = [low[0].min(x), low[1].min(y)];
+            high = [high[0].max(x), high[1].max(y)];
+        }
+        let half = 0.55 * (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
+        let around = |i: usize| {
+            let centre = 0.5 * (low[i] + high[i]);
+            [centre - half, centre + half]
+        };
+        Some(Self { x_m: around(0), y_m: around(1) })
+    }
+}
+
+/// Far beyond any floor; such a place would hide all others.
+fn drawable(point: &[f64; 3]) -> bool {
+    point.iter().all(|v| v.is_finite()) && point[1].abs().max(point[2].abs()) < 1e5
+}
+
+/// A plan view: x (ahead) runs up, y (left) runs left, both at one scale.
+/// People are wide pale lines, tracks are thin ones with their number at the end.
+pub fn plan(
+    truth: &[Trajectory],
+    tracks: &[Trajectory],
+    extent: Extent,
+    words: &Words<'_>,
+) -> Markup {
+    let ahead = Axis::new(Scale::Linear, extent.x_m, [PLOT.bottom, PLOT.top]);
+    let left = Axis::new(Scale::Linear, extent.y_m, [PLOT.right, PLOT.left]);
+    let lines = |t: &Trajectory| lines(t, &left, &ahead);
+    let body = html! {
+        (axes(PLOT, &left, &ahead, ["y: metres to the left", "x: metres ahead"]))
+        @for person in truth {
+            g class="truth" {
+                @for line in lines(person) { (truth_line(&line)) }
+                (hint(&format!("person {}", person.id)))
+            }
+        }
+        @for (index, track) in tracks.iter().enumerate() { (track_lines(index, track, &lines(track))) }
+    };
+    picture(words, SIZE, &body)
+}
+
+fn truth_line(line: &[(f64, f64)]) -> Markup {
+    html! {
+        polyline class="person" points=(points(line.iter().copied())) {}
+        @if let &[(x, y)] = line { circle class="place" cx=(px(x)) cy=(px(y)) r="7" {} }
+    }
+}
+
+fn track_lines(index: usize, track: &Trajectory, lines: &[Vec<(f64, f64)>]) -> Markup {
+    let Some(&end) = lines.last().and_then(|line| line.last()) else { return html! {} };
+    let end_anchored = end.0 > PLOT.right - 24.0;
+    let (dx, anchor) = if end_anchored { (-7.0, "end") } else { (7.0, "start") };
+    html! {
+        g.(series_class(index)) {
+            @for line in lines {
+                polyline class="stroke" points=(points(line.iter().copied()))
+                    stroke-dasharray=(dashes(index)) {}
+            }
+            (mark(index, end, 3.5))
+            text class="label" x=(px(end.0 + dx)) y=(px(end.1 - 5.0)) text-anchor=(anchor) {
+                (track.id)
+            }
+            (hint(&format!("track {}", track.id)))
+        }
+    }
+}
+
+/// The lines of a trajectory between its pauses, as places on the picture.
+fn lines(trajectory: &Trajectory, left: &Axis, ahead: &Axis) -> Vec<Vec<(f64, f64)>> {
+    let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut before_s = f64::NEG_INFINITY;
+    for point in trajectory.points.iter().filter(|p| drawable(p)) {
+        let [t_s, x_m, y_m] = *point;
+        let (Some(x), Some(y)) = (left.at(y_m), ahead.at(x_m)) else { continue };
+        let goes_on = t_s - before_s <= PAUSE_S;
+        before_s = t_s;
+        match lines.last_mut().filter(|_| goes_on) {
+            Some(line) => extend(line, (x, y)),
+            None => lines.push(vec![(x, y)]),
+        }
+    }
+    lines
+}
+
+fn extend(line: &mut Vec<(f64, f64)>, at: (f64, f64)) {
+    let far = line.last().is_none_or(|last| (at.0 - last.0).hypot(at.1 - last.1) >= NEAR);
+    if far {
+        line.push(at);
+    }
+}

@@ -1,0 +1,170 @@
+//! Where two pipelines differ.
+
+use std::collections::BTreeMap;
+
+use crate::model::{Benchmark, EventRow, TaskResult};
+use crate::view::View;
+
+/// Events of two pipelines that are at most this far apart are the same.
+pub const SAME_EVENT_S: f64 = 0.5;
+
+/// Something that happened to one of two pipelines only.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Difference<'a> {
+    /// The log.
+    pub log: &'a str,
+    /// The seed.
+    pub seed: u64,
+    /// The pipeline to which it happened.
+    pub pipeline: &'a str,
+    /// What happened.
+    pub event: &'a EventRow,
+}
+
+/// Lists what happened to only one of the pipelines `a` and `b`, by log and
+/// seed, then in the order of time, on the logs that both finished.
+///
+/// Two events are the same if they are of one kind, concern the same person and
+/// lie at most half a second apart. Ids of tracks mean nothing from one pipeline
+/// to the next and are not compared.
+pub fn compare<'a>(benchmark: &'a Benchmark, a: &str, b: &str) -> Vec<Difference<'a>> {
+    compare_in(&View::new(benchmark), a, b)
+}
+
+pub fn compare_in<'a>(view: &View<'a>, a: &str, b: &str) -> Vec<Difference<'a>> {
+    let mut all = Vec::new();
+    for of_a in view.done(a) {
+        let same = |t: &&TaskResult| t.log == of_a.log && t.seed == of_a.seed;
+        let Some(of_b) = view.done(b).find(same) else { continue };
+        let mut here = only_one(of_a, of_b);
+        here.sort_by(|x, y| {
+            x.event.t_s.total_cmp(&y.event.t_s).then_with(|| x.pipeline.cmp(y.pipeline))
+        });
+        all.extend(here);
+    }
+    all.sort_by(|x, y| (x.log, x.seed).cmp(&(y.log, y.seed)));
+    all
+}
+
+/// Kind of an event and the person concerned.
+type Key<'a> = (&'a str, Option<i64>);
+
+fn only_one<'a>(a: &'a TaskResult, b: &'a TaskResult) -> Vec<Difference<'a>> {
+    let in_a = by_key(a);
+    let in_b = by_key(b);
+    let keys: std::collections::BTreeSet<Key<'_>> =
+        in_a.keys().chain(in_b.keys()).copied().collect();
+    let mut out = Vec::new();
+    for key in keys {
+        let of =
+            |map: &BTreeMap<Key<'a>, Vec<&'a EventRow>>| map.get(&key).cloned().unwrap_or_default();
+        let (only_a, only_b) = unmatched(&of(&in_a), &of(&in_b));
+        let told = |task: &'a TaskResult, event| Difference {
+            log: &task.log,
+            seed: task.seed,
+            pipeline: &task.pipeline,
+            event,
+        };
+        out.extend(only_a.into_iter().map(|e| told(a, e)));
+        out.extend(only_b.into_iter().map(|e| told(b, e)));
+    }
+    out
+}
+
+/// Events that can be placed in time, in the order of time.
+fn by_key(task: &TaskResult) -> BTreeMap<Key<'_>, Vec<&EventRow>> {
+    let mut map: BTreeMap<Key<'_>, Vec<&EventRow>> = BTreeMap::new();
+    for event in task.events.iter().filter(|e| e.t_s.is_finite()) {
+        map.entry((&event.kind, event.person)).or_default().push(event);
+    }
+    map.values_mut().for_each(|events| events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s)));
+    map
+}
+
+/// Pairs two lists in the order of time; taking the earliest possible partner
+/// leaves as few as possible alone, since all may wait equally long.
+fn unmatched<'a>(a: &[&'a EventRow], b: &[&'a EventRow]) -> (Vec<&'a EventRow>, Vec<&'a EventRow>) {
+    let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
+    let (mut i, mut j) = (0, 0);
+    while i < a.len() && j < b.len() {
+        let apart_s = b[j].t_s - a[i].t_s;
+        if apart_s.abs() <= SAME_EVENT_S {
+            (i, j) = (i + 1, j + 1);
+        } else if apart_s > 0.0 {
+            only_a.push(a[i]);
+            i += 1;
+        } else {
+            only_b.push(b[j]);
+            j += 1;
+        }
+    }
+    only_a.extend(&a[i..]);
+    only_b.extend(&b[j..]);
+    (only_a, only_b)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn at(t_s: f64) -> EventRow {
+        EventRow { t_s, kind: "miss".into(), person: Some(1), ..EventRow::default() }
+    }
+
+    /// The most pairs that any pairing has, by trying all.
+    fn most_pairs(a: &[f64], b: &[f64]) -> usize {
+        let Some((&first, rest)) = a.split_first() else { return 0 };
+        let without = most_pairs(rest, b);
+        let with = (0..b.len()).filter(|&j| (b[j] - first).abs() <= SAME_EVENT_S).map(|j| {
+            let mut left = b.to_vec();
+            left.remove(j);
+            1 + most_pairs(rest, &left)
+        });
+        with.max().unwrap_or(0).max(without)
+    }
+
+    proptest! {
+        #[test]
+        fn as_few_events_as_possible_stay_alone(
+            mut a in prop::collection::vec(0u8..20, 0..6),
+            mut b in prop::collection::vec(0u8..20, 0..6),
+        ) {
+            a.sort_unstable();
+            b.sort_unstable();
+            let seconds = |v: &[u8]| v.iter().map(|&x| f64::from(x) * 0.2).collect::<Vec<_>>();
+            let (a, b) = (seconds(&a), seconds(&b));
+            let rows = |v: &[f64]| v.iter().map(|&t| at(t)).collect::<Vec<_>>();
+            let (in_a, in_b) = (rows(&a), rows(&b));
+            let (only_a, only_b) =
+                unmatched(&in_a.iter().collect::<Vec<_>>(), &in_b.iter().collect::<Vec<_>>());
+            let pairs = most_pairs(&a, &b);
+            prop_assert_eq!(only_a.len(), a.len() - pairs);
+            prop_assert_eq!(only_b.len(), b.len() - pairs);
+        }
+    }
+
+    #[test]
+    fn differences_are_listed_in_time_and_name_the_pipeline() {
+        let task = |pipeline: &str, events| TaskResult {
+            pipeline: pipeline.into(),
+            log: "log".into(),
+            events,
+            ..TaskResult::default()
+        };
+        let stranger = EventRow { person: Some(2), ..at(1.0) };
+        let tasks = vec![
+            task("a", vec![at(1.0), at(9.0)]),
+            task("b", vec![stranger, at(1.4), at(3.0)]),
+            task("c", vec![]),
+        ];
+        let benchmark = Benchmark { version: String::new(), tasks };
+        let told: Vec<_> = compare(&benchmark, "a", "b")
+            .iter()
+            .map(|d| (d.pipeline, d.event.t_s, d.event.person))
+            .collect();
+        assert_eq!(told, [("b", 1.0, Some(2)), ("b", 3.0, Some(1)), ("a", 9.0, Some(1))]);
+        assert!(compare(&benchmark, "a", "unknown").is_empty());
+    }
+}

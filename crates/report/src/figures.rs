@@ -1,0 +1,184 @@
+//! The figures of the headline: what they are called and which way is better.
+
+use tagalong_eval::Scores;
+
+use crate::model::TaskResult;
+
+/// Where tracks and truth were compared.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Place {
+    Image,
+    Floor,
+}
+
+impl Place {
+    pub const ALL: [Self; 2] = [Self::Image, Self::Floor];
+
+    /// As the keys of figures begin.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Image => "image",
+            Self::Floor => "metres",
+        }
+    }
+
+    pub const fn scores(self, task: &TaskResult) -> Option<&Scores> {
+        match self {
+            Self::Image => task.image.as_ref(),
+            Self::Floor => task.metres.as_ref(),
+        }
+    }
+}
+
+/// A figure of a task.
+pub struct Figure {
+    /// As [`Scores`] names it.
+    pub name: &'static str,
+    /// `s` or `m`; nothing for rates and counts.
+    pub unit: &'static str,
+    pub decimals: usize,
+    pub higher_is_better: bool,
+    /// What it says, in one line.
+    pub meaning: &'static str,
+    /// Where it is shown.
+    pub places: &'static [Place],
+    /// Pipelines are compared by it in pairs.
+    pub compared: bool,
+    of: fn(&Scores) -> Option<f64>,
+}
+
+impl Figure {
+    /// The figure of a task, if it is a number.
+    pub fn of(&self, place: Place, task: &TaskResult) -> Option<f64> {
+        place.scores(task).and_then(self.of).filter(|v| v.is_finite())
+    }
+
+    /// What it is called in `report.json`.
+    pub fn key(&self, place: Place) -> String {
+        format!("{}.{}", place.key(), self.name)
+    }
+
+    /// True if `a` is better than `b`.
+    pub fn better(&self, a: f64, b: f64) -> bool {
+        if self.higher_is_better { a > b } else { a < b }
+    }
+
+    /// The figures of a place.
+    pub fn at(place: Place) -> impl Iterator<Item = &'static Self> {
+        FIGURES.iter().filter(move |f| f.places.contains(&place))
+    }
+}
+
+/// The figure that ranks pipelines.
+pub const MAIN: &Figure = &FIGURES[0];
+
+const BOTH: &[Place] = &Place::ALL;
+
+const RATE: Figure = Figure {
+    name: "",
+    unit: "",
+    decimals: 3,
+    higher_is_better: true,
+    meaning: "",
+    places: BOTH,
+    compared: false,
+    of: |_| None,
+};
+
+const FIGURES: &[Figure] = &[
+    Figure {
+        name: "HOTA",
+        meaning: "Finding people and keeping them apart, in balance. 1 is perfect.",
+        compared: true,
+        of: |s| s.hota,
+        ..RATE
+    },
+    Figure {
+        name: "DetA",
+        meaning: "The part of HOTA for finding people.",
+        of: |s| s.det_a,
+        ..RATE
+    },
+    Figure {
+        name: "AssA",
+        meaning: "The part of HOTA for keeping each person under one number.",
+        of: |s| s.ass_a,
+        ..RATE
+    },
+    Figure {
+        name: "MOTA",
+        meaning: "1 less all misses, false reports and switches per person in view; may be negative.",
+        compared: true,
+        of: |s| s.mota,
+        ..RATE
+    },
+    Figure {
+        name: "IDF1",
+        meaning: "How much of the time each person carries the same one number.",
+        compared: true,
+        of: |s| s.idf1,
+        ..RATE
+    },
+    Figure {
+        name: "LAMR",
+        higher_is_better: false,
+        meaning: "People missed, averaged from one false report in 100 images to one in each.",
+        places: &[Place::Image],
+        compared: true,
+        of: |s| s.lamr,
+        ..RATE
+    },
+    Figure {
+        name: "IDSW",
+        decimals: 1,
+        higher_is_better: false,
+        meaning: "How often a person's number changes, per log.",
+        of: |s| Some(s.idsw as f64),
+        ..RATE
+    },
+    Figure {
+        name: "fp_per_frame",
+        decimals: 2,
+        higher_is_better: false,
+        meaning: "Reports where nobody is, per frame. Counts on empty logs too.",
+        compared: true,
+        of: |s| s.fp_per_frame,
+        ..RATE
+    },
+    Figure {
+        name: "time_to_confirm_mean_s",
+        unit: "s",
+        decimals: 2,
+        higher_is_better: false,
+        meaning: "Time from coming into view to the first match; people never found do not enter.",
+        places: &[Place::Image],
+        of: |s| s.time_to_confirm_mean_s,
+        ..RATE
+    },
+    Figure {
+        name: "wrong_person_s",
+        unit: "s",
+        decimals: 2,
+        higher_is_better: false,
+        meaning: "Time that tracks spend on another person than they began with, per log.",
+        of: |s| Some(s.wrong_person_s),
+        ..RATE
+    },
+    Figure {
+        name: "position_error_mean_m",
+        unit: "m",
+        decimals: 3,
+        higher_is_better: false,
+        meaning: "Distance between a track and its person on the floor.",
+        places: &[Place::Floor],
+        compared: true,
+        of: |s| s.position_error_mean_m,
+    },
+    Figure {
+        name: "OSPA",
+        higher_is_better: false,
+        meaning: "One distance for wrong places and wrong numbers of people.",
+        of: |s| s.ospa,
+        ..RATE
+    },
+];

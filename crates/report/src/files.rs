@@ -1,0 +1,133 @@
+//! The results as files for programs: JSON and CSV.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+use tagalong_eval::Scores;
+
+use crate::figures::Place;
+use crate::model::{Benchmark, Outcome, TaskResult};
+use crate::summary::Summary;
+use crate::view::View;
+
+#[derive(Serialize)]
+struct Json<'a> {
+    version: &'a str,
+    summary: Summary,
+    tasks: Vec<TaskResult>,
+}
+
+/// `report.json`: the tasks in a fixed order, and the [`Summary`] under
+/// `summary`. Pictures are left out, since they belong to the page. The text can
+/// be read back as a [`Benchmark`], for instance as the baseline of a gate.
+///
+/// # Errors
+///
+/// None with the types of this crate; the error is that of the JSON writer.
+pub fn json(benchmark: &Benchmark) -> serde_json::Result<String> {
+    let view = View::new(benchmark);
+    let without_pictures = |task: &&TaskResult| {
+        let mut task = (*task).clone();
+        task.events.iter_mut().for_each(|event| event.picture_png_base64 = None);
+        task
+    };
+    let tasks = view.tasks.iter().map(without_pictures).collect();
+    let file = Json { version: view.version, summary: Summary::new(benchmark), tasks };
+    serde_json::to_string_pretty(&file).map(|text| text + "\n")
+}
+
+/// `report.csv`: a header and one row per task (RFC 4180). Figures in the image
+/// begin with `image.`, those on the floor with `metres.`; what makes no sense
+/// for a task is empty.
+pub fn csv(benchmark: &Benchmark) -> String {
+    let names = figure_names();
+    let mut rows = vec![header(&names)];
+    rows.extend(View::new(benchmark).tasks.iter().map(|task| row(task, &names)));
+    rows.iter().map(|cells| line(cells)).collect()
+}
+
+fn figure_names() -> BTreeSet<String> {
+    flat(&Scores::default()).keys().cloned().collect()
+}
+
+fn flat(scores: &Scores) -> Map<String, Value> {
+    match serde_json::to_value(scores) {
+        Ok(Value::Object(map)) => map,
+        _ => Map::new(),
+    }
+}
+
+fn header(names: &BTreeSet<String>) -> Vec<String> {
+    let first = [
+        "pipeline",
+        "log",
+        "seed",
+        "hash",
+        "outcome",
+        "why",
+        "frames",
+        "duration_s",
+        "data_lost",
+        "nis_mean",
+        "nis_lower",
+        "nis_upper",
+        "nis_count",
+        "dropped",
+        "events",
+    ];
+    let figures = Place::ALL
+        .iter()
+        .flat_map(|place| names.iter().map(move |name| format!("{}.{name}", place.key())));
+    first.map(str::to_owned).into_iter().chain(figures).collect()
+}
+
+fn row(task: &TaskResult, names: &BTreeSet<String>) -> Vec<String> {
+    let (outcome, why) = match &task.outcome {
+        Outcome::Done => ("done", ""),
+        Outcome::Failed { why } => ("failed", why.as_str()),
+        Outcome::Skipped { why } => ("skipped", why.as_str()),
+    };
+    let nis = |of: fn(&tagalong_eval::Consistency) -> String| {
+        task.nis.as_ref().map_or_else(String::new, of)
+    };
+    let mut cells = vec![
+        task.pipeline.clone(),
+        task.log.clone(),
+        task.seed.to_string(),
+        task.hash.clone(),
+        outcome.to_owned(),
+        why.to_owned(),
+        task.frames.to_string(),
+        task.duration_s.to_string(),
+        task.data_lost.to_string(),
+        nis(|n| n.mean.to_string()),
+        nis(|n| n.lower.to_string()),
+        nis(|n| n.upper.to_string()),
+        nis(|n| n.count.to_string()),
+        task.funnel.iter().map(|d| d.count).sum::<u64>().to_string(),
+        task.events.len().to_string(),
+    ];
+    for place in Place::ALL {
+        let scores = place.scores(task).map(flat).unwrap_or_default();
+        cells.extend(names.iter().map(|name| number(scores.get(name))));
+    }
+    cells
+}
+
+fn number(value: Option<&Value>) -> String {
+    value.filter(|v| !v.is_null()).map(Value::to_string).unwrap_or_default()
+}
+
+fn line(cells: &[String]) -> String {
+    let quoted: Vec<String> = cells.iter().map(|cell| quote(cell)).collect();
+    quoted.join(",") + "\r\n"
+}
+
+fn quote(cell: &str) -> String {
+    if cell.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.to_owned()
+    }
+}

@@ -1,0 +1,138 @@
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::{Page, cell, column, number, table};
+use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan};
+use crate::model::TaskResult;
+
+impl Page<'_> {
+    pub(super) fn miss_rates(&self) -> Option<Markup> {
+        let charts: Vec<Markup> =
+            self.view.logs.iter().filter_map(|log| self.miss_rate(log)).collect();
+        (!charts.is_empty()).then(|| html! {
+            p {
+                "People missed against false reports, as the least score that is accepted falls. Lower is better. "
+                "LAMR is the geometric mean of the curve at nine places in the shaded band."
+            }
+            p class="legend" {
+                @for (series, name) in self.view.pipelines.iter().enumerate() { (key(series, name)) " " }
+            }
+            div class="charts" { @for chart in &charts { (chart) } }
+        })
+    }
+
+    fn miss_rate(&self, log: &str) -> Option<Markup> {
+        let tasks = self.drawn(log).filter(|t| !t.lamr_curve.is_empty());
+        let curves: Vec<Curve<'_>> = tasks
+            .map(|t| Curve {
+                name: &t.pipeline,
+                series: self.series(&t.pipeline),
+                points: &t.lamr_curve,
+            })
+            .collect();
+        let title = format!("Miss rate on {log}");
+        let words = Words {
+            title: &title,
+            says: "One line per pipeline; LAMR in the tables is their average.",
+        };
+        (!curves.is_empty()).then(|| {
+            html! {
+                figure { (miss_rate(&curves, &words)) figcaption { (log) } }
+            }
+        })
+    }
+
+    /// The tasks of a log that stand for their pipelines.
+    fn drawn(&self, log: &str) -> impl Iterator<Item = &TaskResult> {
+        self.view.pipelines.iter().filter_map(move |p| self.view.drawn(p, log))
+    }
+
+    pub(super) fn plans(&self) -> Option<Markup> {
+        let logs: Vec<Markup> =
+            self.view.logs.iter().filter_map(|log| self.plans_of(log)).collect();
+        (!logs.is_empty()).then(|| html! {
+            p {
+                "Where people were (wide and pale) and where the tracks put them (thin, with the number of the track at its end), "
+                "in the odometry frame. A change of line along one person is a change of number."
+            }
+            @for log in &logs { (log) }
+        })
+    }
+
+    fn plans_of(&self, log: &str) -> Option<Markup> {
+        let tasks: Vec<&TaskResult> = self.drawn(log).collect();
+        let extent = Extent::around(tasks.iter().flat_map(|t| t.truth.iter().chain(&t.tracks)))?;
+        Some(html! {
+            details class="print" open {
+                summary { (log) }
+                div class="charts" { @for task in &tasks { (plan_of(task, extent, self.series(&task.pipeline))) } }
+            }
+        })
+    }
+
+    pub(super) fn funnels(&self) -> Option<Markup> {
+        let tables: Vec<Markup> =
+            self.view.pipelines.iter().filter_map(|p| self.funnel(p)).collect();
+        (!tables.is_empty()).then(|| html! {
+            p { "Each test in its order and how many candidates it dropped, over all logs. A person who is never found was dropped by one of these." }
+            div class="funnels" { @for table in &tables { (table) } }
+        })
+    }
+
+    fn funnel(&self, pipeline: &str) -> Option<Markup> {
+        let mut order: Vec<&str> = Vec::new();
+        let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+        for dropped in self.view.done(pipeline).flat_map(|t| &t.funnel) {
+            if !counts.contains_key(dropped.test.as_str()) {
+                order.push(&dropped.test);
+            }
+            *counts.entry(&dropped.test).or_default() += dropped.count;
+        }
+        let most = *counts.values().max()? as f64;
+        let all = counts.values().sum::<u64>().max(1) as f64;
+        let head = html! { (column("Test", None)) (column("Dropped", None)) (column("Share", None)) th scope="col" class="picture" { "Dropped, as a bar" } };
+        let row = |test: &str| {
+            let count = counts[test] as f64;
+            html! {
+                tr {
+                    th scope="row" { (test) }
+                    (cell(count, &html! { (thousands(counts[test])) }))
+                    (cell(count / all, &html! { (number(100.0 * count / all, 1)) " %" }))
+                    td { (bar(count, None, most)) }
+                }
+            }
+        };
+        let body = html! { @for test in &order { (row(test)) } };
+        Some(table(
+            &format!("Funnel of {pipeline}"),
+            &key(self.series(pipeline), pipeline),
+            &head,
+            &body,
+        ))
+    }
+}
+
+fn plan_of(task: &TaskResult, extent: Extent, series: usize) -> Markup {
+    let title = format!("{} on {} from above", task.pipeline, task.log);
+    let says = format!("{} tracks and {} people.", task.tracks.len(), task.truth.len());
+    html! {
+        figure {
+            (plan(&task.truth, &task.tracks, extent, &Words { title: &title, says: &says }))
+            figcaption { (key(series, &task.pipeline)) ", seed " (task.seed) ": " (says) }
+        }
+    }
+}
+
+/// Digits in groups of three, by thin spaces.
+fn thousands(count: u64) -> String {
+    let digits = count.to_string();
+    let mut out = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            out.push('\u{202f}');
+        }
+        out.push(digit);
+    }
+    out
+}

@@ -1,0 +1,115 @@
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::{Page, amount, cell, column, number, optional_cell, table};
+use crate::chart::key;
+use crate::model::{EventRow, TaskResult};
+
+impl Page<'_> {
+    pub(super) fn events(&self) -> Option<Markup> {
+        let tasks: Vec<&TaskResult> =
+            self.view.tasks.iter().copied().filter(|t| !t.events.is_empty()).collect();
+        (!tasks.is_empty()).then(|| {
+            html! {
+                (self.event_counts(&tasks))
+                div class="filters" hidden { span class="unseen" { "Show kinds of events" } }
+                @for task in tasks { (self.events_of(task)) }
+            }
+        })
+    }
+
+    /// How often each kind happened to each pipeline.
+    fn event_counts(&self, tasks: &[&TaskResult]) -> Markup {
+        let mut counts: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
+        for task in tasks {
+            for event in &task.events {
+                *counts.entry(&event.kind).or_default().entry(&task.pipeline).or_default() += 1;
+            }
+        }
+        let head =
+            html! { (column("Kind", None)) @for p in &self.view.pipelines { (column(p, None)) } };
+        let body = html! {
+            @for (name, of) in &counts {
+                tr {
+                    th scope="row" { (kind(name)) }
+                    @for p in &self.view.pipelines { (cell(of.get(p).copied().unwrap_or(0) as f64, &html! { (of.get(p).copied().unwrap_or(0)) })) }
+                }
+            }
+        };
+        table(
+            "Events by kind",
+            &html! { "Events by kind and pipeline, over all tasks." },
+            &head,
+            &body,
+        )
+    }
+
+    fn events_of(&self, task: &TaskResult) -> Markup {
+        let name = format!("Events of {} on {}, seed {}", task.pipeline, task.log, task.seed);
+        let head = html! {
+            (column("Time [s]", None)) (column("Frame", None)) (column("Kind", None))
+            (column("Person", None)) (column("Track", None)) (column("What", None))
+        };
+        let mut events: Vec<&EventRow> = task.events.iter().collect();
+        events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        let body = html! { @for event in events { (row(event)) } };
+        let caption = html! { "In time; a time is counted from the first frame of the log." };
+        html! {
+            details class="events" {
+                summary {
+                    (key(self.series(&task.pipeline), &task.pipeline)) " on " (task.log) ", seed " (task.seed)
+                    span class="aside" { (amount(task.events.len(), "event")) }
+                }
+                (table(&name, &caption, &head, &body))
+            }
+        }
+    }
+}
+
+fn row(event: &EventRow) -> Markup {
+    html! {
+        tr data-kind=(event.kind) {
+            (cell(event.t_s, &html! { (number(event.t_s, 2)) }))
+            (cell(event.frame as f64, &html! { (event.frame) }))
+            td { (kind(&event.kind)) }
+            (optional_cell(event.person.map(|id| id as f64), 0))
+            (optional_cell(event.track.map(|id| id as f64), 0))
+            td { (picture(event)) (event.text) }
+        }
+    }
+}
+
+/// A kind of event with a sign of its own, since colour alone does not tell.
+pub(super) fn kind(kind: &str) -> Markup {
+    let (sign, name) = match kind {
+        "miss" => ("○", "miss"),
+        "found" => ("●", "found"),
+        "switch" => ("⇄", "id switch"),
+        "wrong-person" => ("✕", "wrong person"),
+        "false-track" => ("△", "false track"),
+        other => ("·", other),
+    };
+    let class = if kind == "found" { "kind" } else { "kind bad" };
+    html! { span class=(class) { span aria-hidden="true" { (sign) " " } (name) } }
+}
+
+/// The picture of an event, if it is one: anything else than base64 stays out.
+pub(super) fn picture(event: &EventRow) -> Markup {
+    let data = event.picture_png_base64.as_deref().filter(|data| is_base64(data));
+    html! {
+        @if let Some(data) = data {
+            img src=(format!("data:image/png;base64,{data}")) loading="lazy"
+                alt=(format!("The place in frame {}", event.frame));
+        }
+    }
+}
+
+fn is_base64(data: &str) -> bool {
+    !data.is_empty()
+        && data.len().is_multiple_of(4)
+        && data
+            .trim_end_matches('=')
+            .bytes()
+            .all(|b| b.is_ascii_alphanumeric() || matches!(b, b'+' | b'/'))
+}

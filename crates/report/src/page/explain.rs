@@ -1,0 +1,53 @@
+use std::collections::BTreeSet;
+
+use maud::{Markup, html};
+
+use super::Page;
+use super::headline::figure_name;
+use crate::figures::{Figure, Place};
+
+impl Page<'_> {
+    pub(super) fn explain(&self) -> Markup {
+        html! {
+            dl { (figures()) }
+            h3 { "What the intervals mean" }
+            p {
+                "A figure is formed per log, over the seeds first, and then averaged over logs: each log counts once, however long it is. "
+                "Its 95 % interval comes from a bootstrap that draws logs, not frames, because frames of one recording resemble each other. "
+                "With few logs such an interval is too narrow rather than too wide: it cannot know places it has not seen. "
+                "A single log has none. Differences between two pipelines are drawn in pairs, log by log. "
+                "Rates of people found have Wilson intervals."
+            }
+            h3 { "What is left out" }
+            p {
+                "People and boxes marked as ignored in the truth count neither for nor against a pipeline. Failed and skipped tasks enter no mean. "
+                "On a log without people only false reports have a meaning; the other figures are absent there."
+            }
+            h3 { "Where it comes from" }
+            p {
+                "HOTA, CLEAR (MOTA) and identity (IDF1) figures follow TrackEval, the log-average miss rate follows the Caltech protocol, "
+                "with matches at a similarity of 0.5. report.json and report.csv beside this page hold the same results for programs."
+            }
+        }
+    }
+}
+
+fn figures() -> Markup {
+    let mut known = BTreeSet::new();
+    let all = Place::ALL
+        .into_iter()
+        .flat_map(Figure::at)
+        .filter(|f| known.insert(f.name))
+        .collect::<Vec<_>>();
+    html! {
+        @for figure in all {
+            dt { (figure_name(figure)) " " span class="ends" { (if figure.higher_is_better { "higher is better" } else { "lower is better" }) } }
+            dd { (figure.meaning) }
+        }
+        dt { "NIS" }
+        dd {
+            "Squares of a filter's surprises over their own variance. Above its bounds the filter is too sure of itself, "
+            "below them too timid."
+        }
+    }
+}

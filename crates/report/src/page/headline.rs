@@ -1,0 +1,236 @@
+use maud::{Markup, html};
+
+use super::{Page, amount, cell, column, no_cell, number, table};
+use crate::chart::{interval, key};
+use crate::figures::{Figure, MAIN, Place};
+use crate::summary::{Estimate, PipelineSummary, per_log};
+
+impl Page<'_> {
+    pub(super) fn headline(&self) -> Markup {
+        if self.view.tasks.is_empty() {
+            return html! { p { "This benchmark has no tasks yet." } };
+        }
+        let shown: Vec<Place> = Place::ALL.into_iter().filter(|p| self.has(*p)).collect();
+        html! {
+            @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
+            @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
+            @for place in shown {
+                h3 { (place_name(place)) }
+                (self.headline_table(place))
+                (self.log_table(place))
+            }
+        }
+    }
+
+    fn has(&self, place: Place) -> bool {
+        self.view.tasks.iter().any(|task| place.scores(task).is_some())
+    }
+
+    /// Who is ahead by the main figure, and whether that is more than chance.
+    fn verdict(&self) -> Option<Markup> {
+        let place = Place::ALL.into_iter().find(|p| self.ranked(*p).len() > 1)?;
+        let ranked = self.ranked(place);
+        let (first, second) = (ranked.first()?, ranked.get(1)?);
+        let key = MAIN.key(place);
+        let names = [&first.0.pipeline, &second.0.pipeline];
+        let pair = self
+            .summary
+            .pairs
+            .iter()
+            .find(|p| p.figure == key && names.contains(&&p.a) && names.contains(&&p.b));
+        let clear = pair.is_some_and(|p| p.is_clear());
+        Some(html! {
+            strong { (first.0.pipeline) } " has the highest " (MAIN.name) " " (place_where(place)) ", "
+            (number(first.1.mean, 3)) ", then " strong { (second.0.pipeline) } " with "
+            (number(second.1.mean, 3)) ". "
+            @if clear { "The interval of their difference excludes zero." }
+            @else { "These logs do not tell the two apart: the interval of their difference includes zero or cannot be formed." }
+        })
+    }
+
+    /// Pipelines with the most logs, best first.
+    fn ranked(&self, place: Place) -> Vec<(&PipelineSummary, Estimate)> {
+        let key = MAIN.key(place);
+        let of = |p| Some((p, *PipelineSummary::figures(p).get(&key)?));
+        let mut all: Vec<_> = self.summary.pipelines.iter().filter_map(of).collect();
+        let most = all.iter().map(|(_, e)| e.logs).max().unwrap_or(0);
+        all.retain(|(_, e)| e.logs == most);
+        all.sort_by(|a, b| b.1.mean.total_cmp(&a.1.mean));
+        all
+    }
+
+    fn headline_table(&self, place: Place) -> Markup {
+        let figures: Vec<&Figure> = Figure::at(place).filter(|f| self.is_known(f, place)).collect();
+        let most = self.summary.pipelines.iter().map(|p| p.done).max().unwrap_or(0);
+        let head = html! {
+            (column("Pipeline", None))
+            (column("Done", Some("Tasks that ran to their end, of those planned")))
+            @if place == Place::Image { (column("People found", Some("Found at all, with 95 % interval"))) }
+            @for figure in &figures { (figure_head(figure)) }
+        };
+        let body = html! {
+            @for summary in &self.summary.pipelines {
+                tr data-series=(self.series(&summary.pipeline)) {
+                    th scope="row" { (key(self.series(&summary.pipeline), &summary.pipeline)) }
+                    (done_cell(summary, most))
+                    @if place == Place::Image { (people_cell(summary)) }
+                    @for figure in &figures { (self.figure_cell(summary, figure, place)) }
+                }
+            }
+        };
+        let caption = html! {
+            "Means over logs with 95 % intervals " (place_where(place)) ". "
+            span class="best" { "★ best" } " of the pipelines with the most logs."
+        };
+        table(&format!("Results {}", place_where(place)), &caption, &head, &body)
+    }
+
+    fn is_known(&self, figure: &Figure, place: Place) -> bool {
+        let key = figure.key(place);
+        self.summary.pipelines.iter().any(|p| p.figures.contains_key(&key))
+    }
+
+    fn figure_cell(&self, summary: &PipelineSummary, figure: &Figure, place: Place) -> Markup {
+        let key = figure.key(place);
+        let Some(estimate) = summary.figures.get(&key) else { return no_cell() };
+        let all: Vec<&Estimate> =
+            self.summary.pipelines.iter().filter_map(|p| p.figures.get(&key)).collect();
+        let most = all.iter().map(|e| e.logs).max().unwrap_or(0);
+        let picture = (figure.name == MAIN.name)
+            .then(|| interval(estimate.mean, estimate.interval, range(&all)));
+        cell(
+            estimate.mean,
+            &html! {
+                span class=(if estimate.best { "value best" } else { "value" }) {
+                    @if estimate.best { "★ " } (number(estimate.mean, figure.decimals))
+                    @if estimate.best { span class="unseen" { " best" } }
+                }
+                @if let Some(ends) = estimate.interval { " " (ends_of(ends, figure.decimals)) }
+                @if estimate.logs < most { span class="fewer" { (amount(estimate.logs as usize, "log")) " only" } }
+                @if let Some(picture) = picture { (picture) }
+            },
+        )
+    }
+
+    /// The main figure of each pipeline on each log.
+    fn log_table(&self, place: Place) -> Markup {
+        let columns: Vec<_> =
+            self.view.pipelines.iter().map(|p| (*p, per_log(&self.view, p, MAIN, place))).collect();
+        let logs =
+            self.view.logs.iter().filter(|log| columns.iter().any(|(_, v)| v.contains_key(*log)));
+        let head = html! {
+            (column("Log", None))
+            @for (name, _) in &columns { (column(name, None)) }
+        };
+        let row = |log: &str| {
+            let best = columns
+                .iter()
+                .filter_map(|(_, v)| v.get(log))
+                .copied()
+                .fold(f64::NEG_INFINITY, f64::max);
+            html! {
+                tr {
+                    th scope="row" { (log) }
+                    @for (_, values) in &columns { (log_cell(values.get(log).copied(), best, columns.len())) }
+                }
+            }
+        };
+        let body = html! { @for log in logs { (row(log)) } };
+        let name = format!("{} of each log {}", MAIN.name, place_where(place));
+        html! {
+            details class="print" {
+                summary { (name) }
+                (table(&name, &html! { (name) ", mean over seeds." }, &head, &body))
+            }
+        }
+    }
+}
+
+fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
+    let Some(value) = value else { return no_cell() };
+    let best = columns > 1 && value >= best;
+    cell(
+        value,
+        &html! {
+            span class=(if best { "value best" } else { "value" }) {
+                @if best { "★ " } (number(value, 3)) @if best { span class="unseen" { " best" } }
+            }
+        },
+    )
+}
+
+impl PipelineSummary {
+    const fn figures(&self) -> &std::collections::BTreeMap<String, Estimate> {
+        &self.figures
+    }
+}
+
+fn figure_head(figure: &Figure) -> Markup {
+    let arrow = if figure.higher_is_better { "↑" } else { "↓" };
+    let way = if figure.higher_is_better { "higher is better" } else { "lower is better" };
+    html! {
+        th scope="col" title=(format!("{} ({way})", short_title(figure.meaning))) {
+            (figure_name(figure)) " " span aria-hidden="true" { (arrow) }
+            span class="unseen" { " " (way) }
+        }
+    }
+}
+
+/// The first sentence, since hints should be short.
+fn short_title(meaning: &str) -> &str {
+    meaning.split(['.', ';', ',']).next().unwrap_or(meaning)
+}
+
+/// As a heading: short, with its unit.
+pub(super) fn figure_name(figure: &Figure) -> String {
+    let name = match figure.name {
+        "fp_per_frame" => "False / frame",
+        "time_to_confirm_mean_s" => "To confirm",
+        "wrong_person_s" => "Wrong person",
+        "position_error_mean_m" => "Position error",
+        name => name,
+    };
+    if figure.unit.is_empty() { name.to_owned() } else { format!("{name} [{}]", figure.unit) }
+}
+
+fn done_cell(summary: &PipelineSummary, most: u64) -> Markup {
+    let planned = summary.done + summary.failed + summary.skipped;
+    let class = if summary.done < most || summary.failed > 0 { "number fewer" } else { "number" };
+    html! { td class=(class) data-value=(summary.done) { (summary.done) " / " (planned) } }
+}
+
+fn people_cell(summary: &PipelineSummary) -> Markup {
+    let Some(found) = summary.people_found else { return no_cell() };
+    let count = (found.estimate * summary.people as f64).round() as u64;
+    cell(
+        found.estimate,
+        &html! {
+            span class="value" { (count) " of " (summary.people) } " " (ends_of([found.lower, found.upper], 2))
+        },
+    )
+}
+
+pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
+    html! { span class="ends" { (number(low, decimals)) " to " (number(high, decimals)) } }
+}
+
+/// From the lowest to the highest end of all.
+fn range(all: &[&Estimate]) -> [f64; 2] {
+    let ends =
+        all.iter().flat_map(|e| e.interval.unwrap_or([e.mean, e.mean]).into_iter().chain([e.mean]));
+    ends.fold([0.0, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)])
+}
+
+pub(super) const fn place_name(place: Place) -> &'static str {
+    match place {
+        Place::Image => "In the image (overlap of boxes)",
+        Place::Floor => "On the floor (metres)",
+    }
+}
+
+pub(super) const fn place_where(place: Place) -> &'static str {
+    match place {
+        Place::Image => "in the image",
+        Place::Floor => "on the floor",
+    }
+}

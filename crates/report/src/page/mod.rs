@@ -1,0 +1,186 @@
+//! The page.
+
+mod charts;
+mod events;
+mod explain;
+mod headline;
+mod pairs;
+mod speed;
+mod tasks;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use crate::chart::minus;
+use crate::model::{Benchmark, Outcome, Timings};
+use crate::summary::Summary;
+use crate::view::View;
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// Everything that the sections are made from.
+struct Page<'a> {
+    view: View<'a>,
+    summary: Summary,
+    /// Only if they mean something.
+    timings: Option<&'a Timings>,
+    /// There are some, but the machine was busy.
+    timings_left_out: bool,
+}
+
+/// The report as one HTML page without any reference to another file.
+///
+/// Times are shown only if [`Timings::exclusive`] says that they mean something;
+/// without them the page depends on nothing but the benchmark, and not on the
+/// order of its tasks.
+pub fn html(benchmark: &Benchmark, timings: Option<&Timings>) -> String {
+    let page = Page {
+        view: View::new(benchmark),
+        summary: Summary::new(benchmark),
+        timings: timings.filter(|t| t.exclusive),
+        timings_left_out: timings.is_some_and(|t| !t.exclusive),
+    };
+    page.whole().into_string()
+}
+
+/// A section: its anchor, its heading and what it holds.
+struct Section {
+    anchor: &'static str,
+    heading: &'static str,
+    body: Markup,
+}
+
+impl Page<'_> {
+    fn whole(&self) -> Markup {
+        let sections = self.sections();
+        html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    meta name="color-scheme" content="light dark";
+                    title { "Tagalong benchmark" }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    a class="skip" href="#main" { "Skip to the results" }
+                    header class="top" {
+                        h1 { "Tagalong benchmark" }
+                        p class="facts" { (self.facts()) }
+                        nav aria-label="Sections" {
+                            ul { @for s in &sections { li { a href=(format!("#{}", s.anchor)) { (s.heading) } } } }
+                        }
+                    }
+                    main id="main" tabindex="-1" {
+                        @for section in &sections {
+                            section id=(section.anchor) aria-labelledby=(format!("h-{}", section.anchor)) {
+                                h2 id=(format!("h-{}", section.anchor)) { (section.heading) }
+                                (section.body)
+                            }
+                        }
+                    }
+                    footer { p { "Made by Tagalong " (self.view.version) "." } }
+                    script { (PreEscaped(SCRIPT)) }
+                }
+            }
+        }
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        let section = |anchor, heading, body| Some(Section { anchor, heading, body });
+        let some = |anchor, heading, body: Option<Markup>| {
+            body.map(|body| Section { anchor, heading, body })
+        };
+        [
+            section("results", "Results", self.headline()),
+            some("failed", "Failed and skipped", self.failed()),
+            some("pairs", "Pipelines side by side", self.pairs()),
+            section("speed", "Accuracy and time", self.speed()),
+            some("miss-rate", "Miss rate", self.miss_rates()),
+            some("floor", "Seen from above", self.plans()),
+            some("funnel", "Why candidates were dropped", self.funnels()),
+            some("events", "What happened when", self.events()),
+            some("tasks", "All tasks", self.all_tasks()),
+            section("reading", "How to read this", self.explain()),
+            some("inputs", "Versions and hashes", self.inputs()),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    fn facts(&self) -> Markup {
+        let count =
+            |is: fn(&Outcome) -> bool| self.view.tasks.iter().filter(|t| is(&t.outcome)).count();
+        let failed = count(|o| matches!(o, Outcome::Failed { .. }));
+        let skipped = count(|o| matches!(o, Outcome::Skipped { .. }));
+        html! {
+            (amount(self.view.pipelines.len(), "pipeline")) " on "
+            (amount(self.view.logs.len(), "log")) ", "
+            (amount(self.view.tasks.len(), "task")) ": "
+            (count(|o| *o == Outcome::Done)) " done"
+            @if failed > 0 { ", " strong class="bad" { (failed) " failed" } }
+            @if skipped > 0 { ", " (skipped) " skipped" }
+            ". Tagalong " (self.view.version) "."
+        }
+    }
+
+    /// The number of a pipeline, for colour, shape and dashes.
+    fn series(&self, pipeline: &str) -> usize {
+        self.view.pipelines.iter().position(|p| *p == pipeline).unwrap_or(0)
+    }
+}
+
+fn amount(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// A number for people; nothing but a dash if it is none.
+fn number(value: f64, decimals: usize) -> String {
+    if value.is_finite() { minus(&format!("{value:.decimals$}")) } else { "–".to_owned() }
+}
+
+/// A difference, always with its sign.
+fn signed(value: f64, decimals: usize) -> String {
+    let text = number(value, decimals);
+    if value > 0.0 && text.chars().any(|c| ('1'..='9').contains(&c)) {
+        format!("+{text}")
+    } else {
+        text
+    }
+}
+
+/// A heading cell by which the table can be sorted.
+fn column(name: &str, hint: Option<&str>) -> Markup {
+    html! { th scope="col" title=[hint] { (name) } }
+}
+
+/// A table that scrolls by itself if it is wider than the page.
+fn table(name: &str, caption: &Markup, head: &Markup, body: &Markup) -> Markup {
+    html! {
+        section class="scroll" tabindex="0" aria-label=(name) {
+            table class="sortable" {
+                caption { (caption) }
+                thead { tr { (head) } }
+                tbody { (body) }
+            }
+        }
+    }
+}
+
+/// A cell with a number, and the number itself for sorting.
+fn cell(value: f64, shown: &Markup) -> Markup {
+    html! { td class="number" data-value=[value.is_finite().then_some(value)] { (shown) } }
+}
+
+/// A cell with nothing in it.
+fn no_cell() -> Markup {
+    html! { td class="number none" { "–" } }
+}
+
+fn optional_cell(value: Option<f64>, decimals: usize) -> Markup {
+    value
+        .filter(|v| v.is_finite())
+        .map_or_else(no_cell, |v| cell(v, &html! { (number(v, decimals)) }))
+}

@@ -1,0 +1,135 @@
+use maud::{Markup, html};
+
+use super::events::{kind, picture};
+use super::headline::{ends_of, place_where};
+use super::{Page, amount, cell, column, no_cell, number, signed, table};
+use crate::chart::key;
+use crate::compare::{Difference, SAME_EVENT_S, compare_in};
+use crate::figures::{Figure, Place};
+use crate::summary::PairSummary;
+
+/// Differences listed per pair; the rest is counted.
+const MOST_LISTED: usize = 200;
+
+/// Pairs whose differences are listed.
+const MOST_PAIRS: usize = 45;
+
+impl Page<'_> {
+    pub(super) fn pairs(&self) -> Option<Markup> {
+        if self.view.pipelines.len() < 2 {
+            return None;
+        }
+        Some(html! {
+            p {
+                "Each pair is compared on the logs that both finished, log by log, so that a hard log counts "
+                "the same for both. " strong { "Clear" } " means that the 95 % interval of the mean difference excludes zero."
+            }
+            @for (a, b) in self.pair_names().take(MOST_PAIRS) { (self.pair(a, b)) }
+            @if self.pair_names().count() > MOST_PAIRS {
+                p { "Further pairs are in report.json." }
+            }
+        })
+    }
+
+    fn pair_names(&self) -> impl Iterator<Item = (&str, &str)> {
+        let names = &self.view.pipelines;
+        names.iter().enumerate().flat_map(|(i, a)| names[i + 1..].iter().map(move |b| (*a, *b)))
+    }
+
+    fn pair(&self, a: &str, b: &str) -> Markup {
+        let rows: Vec<&PairSummary> =
+            self.summary.pairs.iter().filter(|p| p.a == a && p.b == b).collect();
+        let clear = rows.iter().filter(|p| p.is_clear()).count();
+        let differences = compare_in(&self.view, a, b);
+        html! {
+            details class="pair print" open[self.view.pipelines.len() == 2] {
+                summary {
+                    (key(self.series(a), a)) " against " (key(self.series(b), b))
+                    span class="aside" {
+                        @if rows.is_empty() { "no log in common" }
+                        @else { (clear) " of " (amount(rows.len(), "figure")) " clear, " (amount(differences.len(), "event")) " differ" }
+                    }
+                }
+                @if !rows.is_empty() { (gain_table(a, b, &rows)) }
+                (self.differences(a, b, &differences))
+            }
+        }
+    }
+
+    fn differences(&self, a: &str, b: &str, all: &[Difference<'_>]) -> Markup {
+        if all.is_empty() {
+            return html! { p { "No event happened to one of them only." } };
+        }
+        let name = format!("Where {a} and {b} differ");
+        let head = html! {
+            (column("Log", None)) (column("Seed", None)) (column("Time [s]", None)) (column("Frame", None))
+            (column("Only with", None)) (column("Kind", None)) (column("What", None))
+        };
+        let row = |d: &Difference<'_>| {
+            html! {
+                tr data-kind=(d.event.kind) {
+                    th scope="row" { (d.log) }
+                    (cell(d.seed as f64, &html! { (d.seed) }))
+                    (cell(d.event.t_s, &html! { (number(d.event.t_s, 2)) }))
+                    (cell(d.event.frame as f64, &html! { (d.event.frame) }))
+                    td { (key(self.series(d.pipeline), d.pipeline)) }
+                    td { (kind(&d.event.kind)) }
+                    td { (picture(d.event)) (d.event.text) }
+                }
+            }
+        };
+        let body = html! { @for d in all.iter().take(MOST_LISTED) { (row(d)) } };
+        let caption = html! {
+            "Events that happened to one of them only, in time. Events of one kind and person within "
+            (number(SAME_EVENT_S, 1)) " s of each other count as the same."
+            @if all.len() > MOST_LISTED { " The first " (MOST_LISTED) " of " (all.len()) "." }
+        };
+        table(&name, &caption, &head, &body)
+    }
+}
+
+fn gain_table(a: &str, b: &str, rows: &[&PairSummary]) -> Markup {
+    let head = html! {
+        (column("Figure", None)) (column("Where", None)) (column("Logs", None))
+        (column(&format!("{b} less {a}"), None)) (column("95 % interval", None))
+        (column("p", Some("Probability of such a difference by chance"))) (column("Better", None))
+    };
+    let body = html! {
+        @for place in Place::ALL {
+            @for figure in Figure::at(place) {
+                @let key = figure.key(place);
+                @if let Some(row) = rows.iter().find(|r| r.figure == key) { (gain_row(row, figure, place)) }
+            }
+        }
+    };
+    table(
+        &format!("Figures of {a} and {b}"),
+        &html! { "Mean differences over the logs in common." },
+        &head,
+        &body,
+    )
+}
+
+fn gain_row(row: &PairSummary, figure: &Figure, place: Place) -> Markup {
+    let winner = if figure.better(row.difference, 0.0) { &row.b } else { &row.a };
+    let better = match (row.difference == 0.0, row.is_clear()) {
+        (true, _) => html! { "equal" },
+        (false, true) => html! { strong { (winner) } ", clear" },
+        (false, false) => html! { (winner) ", not clear" },
+    };
+    html! {
+        tr {
+            th scope="row" { (super::headline::figure_name(figure)) }
+            td { (place_where(place)) }
+            (cell(row.logs as f64, &html! { (row.logs) }))
+            (cell(row.difference, &html! { (signed(row.difference, figure.decimals)) }))
+            @if let Some(ends) = row.interval { (cell(ends[0], &ends_of(ends, figure.decimals))) } @else { (no_cell()) }
+            @if let Some(p) = row.p_value { (cell(p, &html! { (p_text(p)) })) } @else { (no_cell()) }
+            td { (better) }
+        }
+    }
+}
+
+fn p_text(p: f64) -> String {
+    if p < 0.001 { "< 0.001".to_owned() } else { number(p, 3) }
+}

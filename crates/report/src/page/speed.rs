@@ -1,0 +1,133 @@
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::headline::place_where;
+use super::{Page, cell, column, number, table};
+use crate::chart::{Mark, Words, bar, front, key};
+use crate::figures::{MAIN, Place};
+use crate::model::{TaskTiming, Timings};
+
+impl Page<'_> {
+    pub(super) fn speed(&self) -> Markup {
+        let Some(timings) = self.timings else {
+            return html! {
+                p {
+                    @if self.timings_left_out { "The times are left out, because the machine had other work while they were taken. " }
+                    @else { "No times were taken. " }
+                    "Run the benchmark with " code { "--timing" } " on a machine that does nothing else, to see accuracy against time here."
+                }
+            };
+        };
+        html! {
+            p { "Times per frame, without reading and decoding, on: " (timings.machine) "." }
+            @if let Some(chart) = self.front(timings) { (chart) }
+            (self.stages(timings))
+        }
+    }
+
+    /// Times of the finished tasks of a pipeline.
+    fn times<'t>(&self, timings: &'t Timings, pipeline: &str) -> Vec<&'t TaskTiming> {
+        self.view.done(pipeline).filter_map(|task| timings.tasks.get(&task.hash)).collect()
+    }
+
+    fn front(&self, timings: &Timings) -> Option<Markup> {
+        let place = Place::ALL.into_iter().find(|p| {
+            self.summary.pipelines.iter().any(|s| s.figures.contains_key(&MAIN.key(*p)))
+        })?;
+        let of = |(series, name): (usize, &&'_ str)| {
+            let accuracy = self.summary.pipeline(name)?.figures.get(&MAIN.key(place))?.mean;
+            let ms = mean(self.times(timings, name).iter().map(|t| t.frame_ms_p50))?;
+            Some((series, (*name).to_owned(), ms, accuracy))
+        };
+        let known: Vec<_> = self.view.pipelines.iter().enumerate().filter_map(of).collect();
+        let marks: Vec<Mark<'_>> = known
+            .iter()
+            .map(|(series, name, ms, accuracy)| Mark {
+                name,
+                series: *series,
+                ms: *ms,
+                accuracy: *accuracy,
+            })
+            .collect();
+        if marks.is_empty() {
+            return None;
+        }
+        let words = Words {
+            title: "Accuracy against time",
+            says: "Each pipeline at its median time per frame and its accuracy; the same figures stand in the tables.",
+        };
+        let accuracy_name = format!("{} {}", MAIN.name, place_where(place));
+        Some(html! {
+            figure {
+                (front(&marks, &accuracy_name, &words))
+                figcaption { "Up and to the left is better. The line joins those that no other pipeline beats in both." }
+            }
+        })
+    }
+
+    fn stages(&self, timings: &Timings) -> Markup {
+        let all: Vec<_> =
+            self.view.pipelines.iter().map(|p| (*p, self.times(timings, p))).collect();
+        let rows: Vec<_> =
+            all.iter().flat_map(|(p, t)| stage_rows(t).into_iter().map(|r| (*p, r))).collect();
+        let most = rows.iter().map(|(_, r)| r.p95_ms).filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let head = html! {
+            (column("Pipeline", None)) (column("Stage", None))
+            (column("p50 [ms]", Some("Half of the frames took less"))) (column("p95 [ms]", Some("95 % of the frames took less")))
+            th scope="col" class="picture" { "p50 as a bar, p95 as a line" }
+        };
+        let body = html! {
+            @for (pipeline, row) in &rows {
+                tr.total[row.is_total] data-series=(self.series(pipeline)) {
+                    th scope="row" { (key(self.series(pipeline), pipeline)) }
+                    td { (row.stage) }
+                    (cell(row.p50_ms, &html! { (number(row.p50_ms, 2)) }))
+                    (cell(row.p95_ms, &html! { (number(row.p95_ms, 2)) }))
+                    td { (bar(row.p50_ms, Some(row.p95_ms), most)) }
+                }
+            }
+        };
+        table(
+            "Times of the stages",
+            &html! { "Time per frame and stage, mean over the tasks of a pipeline." },
+            &head,
+            &body,
+        )
+    }
+}
+
+struct StageRow {
+    stage: String,
+    p50_ms: f64,
+    p95_ms: f64,
+    is_total: bool,
+}
+
+/// The whole frame, then the stages in their order.
+fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
+    let Some(p50_ms) = mean(times.iter().map(|t| t.frame_ms_p50)) else { return Vec::new() };
+    let p95_ms = mean(times.iter().map(|t| t.frame_ms_p95)).unwrap_or(f64::NAN);
+    let mut rows = vec![StageRow { stage: "whole frame".into(), p50_ms, p95_ms, is_total: true }];
+    let mut by_stage: BTreeMap<&str, Vec<[f64; 2]>> = BTreeMap::new();
+    let mut order: Vec<&str> = Vec::new();
+    for stage in times.iter().flat_map(|t| &t.stages) {
+        if !order.contains(&stage.stage.as_str()) {
+            order.push(&stage.stage);
+        }
+        by_stage.entry(&stage.stage).or_default().push([stage.p50_ms, stage.p95_ms]);
+    }
+    rows.extend(order.into_iter().map(|stage| StageRow {
+        stage: stage.to_owned(),
+        p50_ms: mean(by_stage[stage].iter().map(|t| t[0])).unwrap_or(f64::NAN),
+        p95_ms: mean(by_stage[stage].iter().map(|t| t[1])).unwrap_or(f64::NAN),
+        is_total: false,
+    }));
+    rows
+}
+
+/// The mean of what is a number.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)
+}

@@ -1,0 +1,159 @@
+use std::collections::BTreeSet;
+
+use maud::{Markup, html};
+
+use super::{Page, cell, column, no_cell, number, optional_cell, table};
+use crate::chart::key;
+use crate::figures::Place;
+use crate::model::{Outcome, TaskResult};
+
+impl Page<'_> {
+    pub(super) fn failed(&self) -> Option<Markup> {
+        let not_done: Vec<_> =
+            self.view.tasks.iter().filter_map(|t| Some((*t, reason(&t.outcome)?))).collect();
+        let lost: Vec<&TaskResult> =
+            self.view.tasks.iter().copied().filter(|t| t.data_lost).collect();
+        let head = html! { (column("Pipeline", None)) (column("Log", None)) (column("Seed", None)) (column("Outcome", None)) (column("Why", None)) };
+        let row = |task: &TaskResult, (outcome, why): (&str, &str)| {
+            html! {
+                tr {
+                    th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
+                    td { (task.log) }
+                    (cell(task.seed as f64, &html! { (task.seed) }))
+                    td { @if outcome == "failed" { strong class="bad" { "✕ failed" } } @else { (outcome) } }
+                    td class="why" { (why) }
+                }
+            }
+        };
+        let body = html! { @for (task, why) in &not_done { (row(task, *why)) } };
+        (!not_done.is_empty() || !lost.is_empty()).then(|| html! {
+            p { "None of these enters a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
+            @if !not_done.is_empty() {
+                (table("Failed and skipped tasks", &html! { "Tasks without a result." }, &head, &body))
+            }
+            @if !lost.is_empty() {
+                p { "Part of the log was lost or unusable in: " @for (i, t) in lost.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } ". These count." }
+            }
+        })
+    }
+
+    pub(super) fn all_tasks(&self) -> Option<Markup> {
+        if self.view.tasks.is_empty() {
+            return None;
+        }
+        let body = html! { @for task in &self.view.tasks { (self.task_row(task)) } };
+        let caption = html! { "In the image where boxes are known, else on the floor. report.csv has every figure of both." };
+        Some(html! {
+            details class="print" {
+                summary { "One row per pipeline, log and seed" }
+                (table("All tasks", &caption, &task_head(), &body))
+            }
+        })
+    }
+
+    fn task_row(&self, task: &TaskResult) -> Markup {
+        let scores = Place::ALL.iter().find_map(|p| p.scores(task));
+        let floor = task.metres.as_ref();
+        html! {
+            tr data-series=(self.series(&task.pipeline)) {
+                th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
+                td { (task.log) }
+                (cell(task.seed as f64, &html! { (task.seed) }))
+                td { (reason(&task.outcome).map_or("done", |(outcome, _)| outcome)) }
+                (cell(task.frames as f64, &html! { (task.frames) }))
+                (cell(task.duration_s, &html! { (number(task.duration_s, 1)) }))
+                @for value in [scores.and_then(|s| s.hota), scores.and_then(|s| s.mota), scores.and_then(|s| s.idf1), scores.and_then(|s| s.lamr)] {
+                    (optional_cell(value, 3))
+                }
+                @for count in [scores.map(|s| s.tp), scores.map(|s| s.fp), scores.map(|s| s.fn_), scores.map(|s| s.idsw), scores.map(|s| s.frag)] {
+                    (optional_cell(count.map(|c| c as f64), 0))
+                }
+                @if let Some(s) = scores { td class="number" { (s.mt) " / " (s.pt) " / " (s.ml) } } @else { (no_cell()) }
+                (optional_cell(floor.and_then(|s| s.position_error_mean_m), 3))
+                (nis_cell(task))
+            }
+        }
+    }
+
+    pub(super) fn inputs(&self) -> Option<Markup> {
+        if self.view.tasks.is_empty() {
+            return None;
+        }
+        let names: BTreeSet<&str> =
+            self.view.tasks.iter().flat_map(|t| t.inputs.keys()).map(String::as_str).collect();
+        let head = html! {
+            (column("Pipeline", None)) (column("Log", None)) (column("Seed", None)) (column("Task", None))
+            @for name in &names { (column(name, None)) }
+        };
+        let body = html! {
+            @for task in &self.view.tasks {
+                tr {
+                    th scope="row" { (task.pipeline) }
+                    td { (task.log) }
+                    (cell(task.seed as f64, &html! { (task.seed) }))
+                    td { (hash(&task.hash)) }
+                    @for name in &names { td { @if let Some(value) = task.inputs.get(*name) { (hash(value)) } @else { "–" } } }
+                }
+            }
+        };
+        let caption = html! { "The beginning of each SHA-256; the whole ones are in report.json." };
+        Some(html! {
+            p { "Tagalong " (self.view.version) ". A task with the same hash has the same result, to the byte." }
+            details { summary { "Hashes of tasks and inputs" } (table("Hashes", &caption, &head, &body)) }
+        })
+    }
+}
+
+/// How and why a task did not end.
+fn reason(outcome: &Outcome) -> Option<(&'static str, &str)> {
+    match outcome {
+        Outcome::Done => None,
+        Outcome::Failed { why } => Some(("failed", why)),
+        Outcome::Skipped { why } => Some(("skipped", why)),
+    }
+}
+
+fn task_head() -> Markup {
+    let plain = [
+        "Pipeline",
+        "Log",
+        "Seed",
+        "Outcome",
+        "Frames",
+        "Length [s]",
+        "HOTA",
+        "MOTA",
+        "IDF1",
+        "LAMR",
+        "TP",
+        "FP",
+        "FN",
+        "IDSW",
+        "Frag",
+    ];
+    html! {
+        @for name in plain { (column(name, None)) }
+        (column("MT / PT / ML", Some("People tracked mostly, partly and hardly")))
+        (column("Error [m]", Some("Mean position error on the floor")))
+        (column("NIS", Some("Mean, its bounds, and what they say of the filter")))
+    }
+}
+
+fn nis_cell(task: &TaskResult) -> Markup {
+    let Some(nis) = task.nis.filter(|n| n.mean.is_finite()) else { return no_cell() };
+    let verdict = match (nis.mean < nis.lower, nis.mean > nis.upper) {
+        (true, _) => "too timid",
+        (_, true) => "too sure",
+        _ => "honest",
+    };
+    cell(
+        nis.mean,
+        &html! {
+            (number(nis.mean, 2)) " " span class="ends" { (number(nis.lower, 2)) " to " (number(nis.upper, 2)) ", " (verdict) }
+        },
+    )
+}
+
+fn hash(text: &str) -> Markup {
+    html! { code { (text.chars().take(12).collect::<String>()) } }
+}

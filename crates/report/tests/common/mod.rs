@@ -1,0 +1,198 @@
+//! Made-up results, shaped like real ones. None of them was measured.
+
+use std::collections::BTreeMap;
+
+use tagalong_eval::{Consistency, CurvePoint, Scores};
+use tagalong_report::{
+    Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
+};
+
+/// A drawing of a person in a frame, 48 x 64 pixels: PNG in base64.
+const PICTURE: &str = "iVBORw0KGgoAAAANSUhEUgAAADAAAABACAAAAAB5S6uaAAAA3UlEQVR42s3LYQqDMAyGYQ/Wk/SIQ0SKiIiIiMhu\
+lWUppK3a0DGRvD+T76neP1YpBDsGhX23HuxFPQU2DLaiaHYNrK8U2FARsDYjPFgxWOMSED9odgbW5sRTYMFgiTqA\
+6EMzjWDGYI5L9vGDZneAObPPAyaHqwcTBlNRNLsFmFAJMGknMGIwcuYc/2iWAnNdDph8/4ABg4ESwMAzjaDHoKcE\
+0PNMI+gw6CgBdDzTCBwGjhKA45lG0GLQUgJoeaYRNBg0lAAanmkENQY1JYCaZ08BnwD8gMArJIAwUgg+zIHCZKlW\
+pIkAAAAASUVORK5CYII=";
+
+/// Numbers between 0 and 1 that look random and are always the same.
+struct Wobble(u64);
+
+impl Wobble {
+    fn next(&mut self) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn around(&mut self, middle: f64, spread: f64) -> f64 {
+        middle + spread * (2.0 * self.next() - 1.0)
+    }
+}
+
+/// Results of invented pipelines on invented logs.
+pub fn benchmark(pipelines: &[&str], logs: &[&str]) -> Benchmark {
+    let mut tasks = Vec::new();
+    for (p, pipeline) in pipelines.iter().enumerate() {
+        for (l, log) in logs.iter().enumerate() {
+            tasks.push(task(pipeline, log, 0.55 + 0.08 * p as f64, (97 * p + l) as u64));
+        }
+    }
+    Benchmark { version: "0.0.0-sample".into(), tasks }
+}
+
+fn task(pipeline: &str, log: &str, level: f64, seed: u64) -> TaskResult {
+    let mut wobble = Wobble(seed + 1);
+    let level = wobble.around(level, 0.1).clamp(0.05, 0.97);
+    let hash = format!("{:016x}{:016x}", seed.wrapping_mul(0x9E37_79B9_7F4A_7C15), seed);
+    let truth = people(seed);
+    TaskResult {
+        pipeline: pipeline.into(),
+        log: log.into(),
+        seed: 1,
+        inputs: [("config", "c0ffee"), ("log", "10600d"), ("truth", "7274746")]
+            .map(|(name, start)| (name.to_owned(), format!("{start}{hash}")))
+            .into(),
+        hash,
+        frames: 412,
+        duration_s: 27.4,
+        image: Some(scores(&mut wobble, level)),
+        metres: Some(scores(&mut wobble, level - 0.04)),
+        lamr_curve: curve(level),
+        nis: Consistency::of(&[1.4, 2.2, 3.0, 0.7, 2.9], 2, 0.95),
+        funnel: [("boundary test", 183_204), ("size", 20_411), ("margin", 902), ("gate", 4_077)]
+            .map(|(test, count)| Dropped { test: test.into(), count })
+            .into(),
+        tracks: tracks(&truth, &mut wobble),
+        truth,
+        events: events(&mut wobble),
+        ..TaskResult::default()
+    }
+}
+
+fn scores(wobble: &mut Wobble, level: f64) -> Scores {
+    let truths = 800;
+    let tp = (level * truths as f64) as u64;
+    let fp = (40.0 * wobble.next()) as u64;
+    let idsw = (6.0 * wobble.next()) as u64;
+    Scores {
+        hota: Some(level),
+        det_a: Some(level + 0.03),
+        ass_a: Some(level - 0.03),
+        loc_a: Some(0.82),
+        mota: Some(level - 0.1),
+        motp: Some(0.8),
+        idf1: Some(level + 0.02),
+        lamr: Some(1.0 - level),
+        fp_per_frame: Some(fp as f64 / 412.0),
+        ospa: Some(0.6 - 0.4 * level),
+        position_error_mean_m: Some(wobble.around(0.12, 0.05)),
+        time_to_confirm_mean_s: Some(wobble.around(0.5, 0.3)),
+        wrong_person_s: 2.0 * wobble.next(),
+        idsw,
+        fp,
+        tp,
+        fn_: truths - tp,
+        frag: idsw + 3,
+        mt: 3,
+        pt: 1,
+        ml: 1,
+        truth_ids: 5,
+        never_confirmed: u64::from(level < 0.6),
+        truths,
+        frames: 412,
+        ..Scores::default()
+    }
+}
+
+fn curve(level: f64) -> Vec<CurvePoint> {
+    (0..120)
+        .map(|i| {
+            let part = f64::from(i) / 119.0;
+            let miss_rate = 1.0 - level * (1.0 - (-4.0 * part).exp());
+            CurvePoint { score: 1.0 - part, fppi: 1.6 * part.powi(3), miss_rate, precision: 0.9 }
+        })
+        .collect()
+}
+
+fn people(seed: u64) -> Vec<Trajectory> {
+    let phase = seed as f64;
+    let walk = |id: i64, from: f64| Trajectory {
+        id,
+        points: (0..270)
+            .map(|i| {
+                let t_s = 0.1 * f64::from(i);
+                let turn = 0.12 * t_s + phase;
+                [t_s, from + 0.12 * t_s + 1.2 * turn.sin(), (from - 3.0) + 1.6 * turn.cos()]
+            })
+            .collect(),
+    };
+    vec![walk(1, 2.0), walk(2, 4.0)]
+}
+
+fn tracks(truth: &[Trajectory], wobble: &mut Wobble) -> Vec<Trajectory> {
+    let mut tracks = Vec::new();
+    for person in truth {
+        for (part, points) in person.points.chunks(140).enumerate() {
+            let noisy = points
+                .iter()
+                .skip(8)
+                .map(|&[t_s, x, y]| [t_s, wobble.around(x, 0.06), wobble.around(y, 0.06)]);
+            tracks.push(Trajectory { id: 10 * person.id + part as i64, points: noisy.collect() });
+        }
+    }
+    tracks
+}
+
+fn events(wobble: &mut Wobble) -> Vec<EventRow> {
+    let told = [
+        ("found", "Person 1 is found as track 10."),
+        ("miss", "Person 1 is lost; the last track was 10."),
+        ("switch", "Person 1 goes on as track 11 instead of 10."),
+        ("false-track", "Track 12 is where nobody is."),
+        ("wrong-person", "Track 11, which began with person 1, is on person 2."),
+    ];
+    let event = |(i, (kind, text)): (usize, (&str, &str))| {
+        let t_s = wobble.around(4.0 + 5.0 * i as f64, 2.0);
+        EventRow {
+            frame: (15.0 * t_s) as u64 + 1,
+            t_s,
+            kind: kind.into(),
+            track: Some(10 + i as i64),
+            person: (kind != "false-track").then_some(1),
+            text: text.into(),
+            picture_png_base64: Some(PICTURE.into()),
+        }
+    };
+    told.into_iter().enumerate().map(event).collect()
+}
+
+/// Spoils one task, so that the page has something to complain about.
+pub fn spoil(benchmark: &mut Benchmark, outcome: Outcome) {
+    if let Some(task) = benchmark.tasks.last_mut() {
+        let (pipeline, log, hash) = (task.pipeline.clone(), task.log.clone(), task.hash.clone());
+        *task = TaskResult { pipeline, log, hash, seed: 1, outcome, ..TaskResult::default() };
+    }
+}
+
+/// Invented times for all tasks.
+pub fn timings(benchmark: &Benchmark) -> Timings {
+    let mut wobble = Wobble(7);
+    let mut tasks = BTreeMap::new();
+    let first = benchmark.tasks.first().map_or("", |t| t.pipeline.as_str());
+    for task in &benchmark.tasks {
+        let slow = if task.pipeline == first {
+            1.0
+        } else {
+            2.6 + 0.9 * task.pipeline.len() as f64 / 10.0
+        };
+        let stages = ["detect", "verify", "associate", "filter"].map(|stage| {
+            let p50_ms = wobble.around(1.1, 0.8) * slow;
+            StageTiming { stage: stage.into(), p50_ms, p95_ms: 1.8 * p50_ms }
+        });
+        let frame_ms_p50 = stages.iter().map(|s| s.p50_ms).sum();
+        let timing =
+            TaskTiming { frame_ms_p50, frame_ms_p95: 1.7 * frame_ms_p50, stages: stages.into() };
+        tasks.insert(task.hash.clone(), timing);
+    }
+    Timings { exclusive: true, machine: "an invented machine".into(), tasks }
+}

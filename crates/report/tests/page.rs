@@ -1,0 +1,223 @@
+//! The page and the files beside it, on made-up results.
+
+mod common;
+
+use tagalong_eval::Scores;
+use tagalong_report::{
+    Benchmark, EventRow, Outcome, Summary, TaskResult, Timings, Trajectory, csv, html, json,
+};
+
+const HOSTILE: &str = "<script>alert(1)</script>\"'&";
+
+fn two_by_three() -> Benchmark {
+    common::benchmark(&["alpha", "beta"], &["hall", "lab", "yard"])
+}
+
+/// What the page asks for from elsewhere.
+fn requests(page: &str) -> Vec<String> {
+    let links = page.match_indices("http").map(|(at, _)| &page[at..]);
+    let urls = page.match_indices("url(").map(|(at, _)| &page[at..]);
+    let sources = page.match_indices("src=\"").map(|(at, _)| &page[at..]);
+    let imports = page.match_indices("@import").map(|(at, _)| &page[at..]);
+    let sources = sources.filter(|s| !s.starts_with("src=\"data:image/png;base64,"));
+    let all = links.chain(urls).chain(sources).chain(imports);
+    all.map(|text| text.chars().take(60).collect()).collect()
+}
+
+#[test]
+fn the_page_asks_nothing_of_the_network() {
+    let benchmark = two_by_three();
+    let page = html(&benchmark, Some(&common::timings(&benchmark)));
+    assert_eq!(requests(&page), [] as [&str; 0]);
+    assert!(!page.contains("<link"));
+    assert!(page.contains("src=\"data:image/png;base64,"), "the pictures are inside");
+}
+
+#[test]
+fn hostile_names_are_escaped_everywhere() {
+    let mut benchmark = two_by_three();
+    for task in &mut benchmark.tasks {
+        task.pipeline += HOSTILE;
+        task.log += HOSTILE;
+        task.hash += HOSTILE;
+        task.inputs.insert(HOSTILE.into(), HOSTILE.into());
+        task.funnel.iter_mut().for_each(|f| f.test += HOSTILE);
+        for event in &mut task.events {
+            event.kind += HOSTILE;
+            event.text += HOSTILE;
+            event.picture_png_base64 = Some(format!("{HOSTILE}AAA"));
+        }
+    }
+    benchmark.version = HOSTILE.into();
+    common::spoil(&mut benchmark, Outcome::Failed { why: HOSTILE.into() });
+    let mut timings = common::timings(&benchmark);
+    timings.machine = HOSTILE.into();
+    for timing in timings.tasks.values_mut() {
+        timing.stages.iter_mut().for_each(|s| s.stage += HOSTILE);
+    }
+    let page = html(&benchmark, Some(&timings));
+    assert!(!page.contains("<script>alert"));
+    assert!(page.contains("&lt;script&gt;alert(1)&lt;/script&gt;&quot;"));
+    assert!(!page.contains("<img"), "what is not base64 is no picture");
+}
+
+#[test]
+fn the_order_of_the_tasks_changes_no_byte() {
+    let benchmark = two_by_three();
+    let mut turned = benchmark.clone();
+    turned.tasks.reverse();
+    assert_eq!(html(&benchmark, None), html(&turned, None));
+    assert_eq!(json(&benchmark).unwrap(), json(&turned).unwrap());
+    assert_eq!(csv(&benchmark), csv(&turned));
+}
+
+#[test]
+fn times_show_only_if_the_machine_was_free() {
+    let benchmark = two_by_three();
+    let free = common::timings(&benchmark);
+    let busy = Timings { exclusive: false, ..free.clone() };
+    assert!(html(&benchmark, Some(&free)).contains("an invented machine"));
+    let page = html(&benchmark, Some(&busy));
+    assert!(!page.contains("an invented machine") && page.contains("had other work"));
+    let other = Timings { exclusive: false, ..Timings::default() };
+    assert_eq!(page, html(&benchmark, Some(&other)));
+}
+
+#[test]
+fn small_and_odd_benchmarks_make_a_page() {
+    let empty = Benchmark::default();
+    assert!(html(&empty, Some(&Timings::default())).contains("no tasks yet"));
+    let one = common::benchmark(&["only"], &["lab"]);
+    let page = html(&one, None);
+    assert!(!page.contains("side by side") && page.contains("only"));
+    assert!(!page.contains("★ 0."), "nobody is best alone");
+    let mut failed = common::benchmark(&["only"], &["lab"]);
+    common::spoil(&mut failed, Outcome::Failed { why: "panicked at frame 7".into() });
+    let page = html(&failed, None);
+    assert!(page.contains("panicked at frame 7") && page.contains("1 failed"));
+    common::spoil(&mut failed, Outcome::Skipped { why: "the log has no depth".into() });
+    assert!(html(&failed, None).contains("the log has no depth"));
+}
+
+#[test]
+fn what_is_no_number_is_left_out() {
+    let mut benchmark = two_by_three();
+    let mut timings = common::timings(&benchmark);
+    for task in &mut benchmark.tasks {
+        let scores = Scores {
+            hota: Some(f64::NAN),
+            mota: None,
+            wrong_person_s: f64::INFINITY,
+            ..Scores::default()
+        };
+        (task.image, task.metres, task.duration_s) = (Some(scores), Some(scores), f64::NAN);
+        task.lamr_curve.iter_mut().for_each(|p| p.fppi = f64::NAN);
+        task.tracks
+            .push(Trajectory { id: 9, points: vec![[f64::NAN; 3], [0.0, f64::INFINITY, 1.0]] });
+        task.events.push(EventRow { t_s: f64::NAN, ..EventRow::default() });
+        task.nis.as_mut().unwrap().mean = f64::NAN;
+    }
+    for timing in timings.tasks.values_mut() {
+        timing.frame_ms_p50 = f64::NAN;
+        timing.stages[0].p95_ms = f64::INFINITY;
+    }
+    let page = html(&benchmark, Some(&timings));
+    assert!(!page.contains("NaN") && !page.contains(">inf"));
+    csv(&benchmark);
+}
+
+#[test]
+fn every_anchor_leads_somewhere_and_ids_are_unique() {
+    let mut benchmark = two_by_three();
+    common::spoil(&mut benchmark, Outcome::Failed { why: "x".into() });
+    let page = html(&benchmark, Some(&common::timings(&benchmark)));
+    let of = |start: &str| -> Vec<String> {
+        page.split(start)
+            .skip(1)
+            .filter_map(|rest| rest.split('"').next())
+            .map(str::to_owned)
+            .collect()
+    };
+    let ids = of(" id=\"");
+    let mut unique = ids.clone();
+    unique.sort();
+    unique.dedup();
+    assert_eq!(unique.len(), ids.len());
+    assert!(of("href=\"#").iter().all(|anchor| ids.contains(anchor)));
+    assert!(of("href=\"#").len() > 8);
+}
+
+#[test]
+fn json_reads_back_as_the_same_benchmark() {
+    let mut benchmark = two_by_three();
+    common::spoil(&mut benchmark, Outcome::Skipped { why: "no depth".into() });
+    let text = json(&benchmark).unwrap();
+    let back: Benchmark = serde_json::from_str(&text).unwrap();
+    for task in &mut benchmark.tasks {
+        task.events.iter_mut().for_each(|e| e.picture_png_base64 = None);
+    }
+    assert_eq!(back, benchmark);
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let summary: Summary = serde_json::from_value(summary["summary"].clone()).unwrap();
+    assert_eq!(summary, Summary::new(&benchmark));
+}
+
+#[test]
+fn csv_has_one_row_per_task_and_quotes_what_needs_it() {
+    let mut benchmark = two_by_three();
+    common::spoil(&mut benchmark, Outcome::Failed { why: "said \"no\", then\nstopped".into() });
+    let text = csv(&benchmark);
+    let lines: Vec<&str> = text.split("\r\n").collect();
+    assert_eq!(lines.len(), 1 + 6 + 1);
+    let columns: Vec<&str> = lines[0].split(',').collect();
+    assert_eq!(lines[1].split(',').count(), columns.len());
+    let at = columns.iter().position(|c| *c == "image.HOTA").unwrap();
+    let hota: f64 = lines[1].split(',').nth(at).unwrap().parse().unwrap();
+    assert_eq!(Some(hota), benchmark.tasks[0].image.unwrap().hota);
+    assert!(lines[6].contains("\"said \"\"no\"\", then\nstopped\""));
+}
+
+fn with_hota(values: &[(&str, &str, f64)]) -> Benchmark {
+    let task = |&(pipeline, log, hota): &(&str, &str, f64)| TaskResult {
+        pipeline: pipeline.into(),
+        log: log.into(),
+        image: Some(Scores { hota: Some(hota), ..Scores::default() }),
+        ..TaskResult::default()
+    };
+    Benchmark { version: String::new(), tasks: values.iter().map(task).collect() }
+}
+
+#[test]
+fn means_are_over_logs_and_the_best_needs_all_of_them() {
+    let mut values =
+        vec![("a", "x", 0.5), ("a", "y", 0.6), ("b", "x", 0.6), ("b", "y", 0.8), ("c", "x", 0.9)];
+    values.push(("a", "y", 0.8));
+    let summary = Summary::new(&with_hota(&values));
+    let hota = |name: &str| summary.pipeline(name).unwrap().figures["image.HOTA"];
+    assert!((hota("a").mean - 0.6).abs() < 1e-12, "two runs of y are one log");
+    let [low, high] = hota("a").interval.unwrap();
+    assert!((low - 0.5).abs() < 1e-12 && (high - 0.7).abs() < 1e-12);
+    assert_eq!((hota("a").best, hota("b").best, hota("c").best), (false, true, false));
+    assert_eq!((hota("c").logs, hota("c").interval), (1, None));
+    let pair = |a: &str, b: &str| {
+        summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == "image.HOTA").unwrap()
+    };
+    assert!((pair("a", "b").difference - 0.1).abs() < 1e-12 && pair("a", "b").is_clear());
+    assert_eq!((pair("a", "c").logs, pair("a", "c").is_clear()), (1, false));
+}
+
+#[test]
+fn people_are_counted_once_whatever_the_number_of_seeds() {
+    let scores = Scores { truth_ids: 4, never_confirmed: 1, ..Scores::default() };
+    let task = |seed| TaskResult {
+        pipeline: "a".into(),
+        seed,
+        image: Some(scores),
+        ..TaskResult::default()
+    };
+    let benchmark = Benchmark { version: String::new(), tasks: vec![task(1), task(2)] };
+    let summary = Summary::new(&benchmark);
+    let found = summary.pipelines[0].people_found.unwrap();
+    assert_eq!((found.estimate, summary.pipelines[0].people), (0.75, 4));
+    assert!(found.lower < 0.75 && found.upper > 0.75);
+}
