@@ -63,8 +63,10 @@ fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
 /// A disk that fails.
 pub fn write(store: &Store, benchmark: &Benchmark) -> Result<(), Failure> {
     let timings = timings(store, benchmark);
-    let json = serde_json::to_string_pretty(benchmark).map_err(Failure::failed)? + "\n";
+    let json = tagalong_report::json(benchmark).map_err(Failure::failed)?;
     store.put("report.json", json.as_bytes())?;
+    store.put("report.csv", tagalong_report::csv(benchmark).as_bytes())?;
+    store.put("report.html", tagalong_report::html(benchmark, timings.as_ref()).as_bytes())?;
     if let Some(timings) = &timings {
         let json = serde_json::to_string_pretty(timings).map_err(Failure::failed)? + "\n";
         store.put("timings.json", json.as_bytes())?;

@@ -11,7 +11,11 @@ use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 use nalgebra::Isometry3;
 use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
-use tagalong_log::msgs::{CameraInfo, Header, Image, Message, TFMessage, TransformStamped, encode};
+use tagalong_log::msgs::{
+    BoundingBox2D, CameraInfo, Detection2D, Detection2DArray, Header, Image, Message,
+    ObjectHypothesis, ObjectHypothesisWithPose, Point2D, Pose2D, TFMessage, TransformStamped,
+    encode,
+};
 use tagalong_log::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame};
 
 pub const WIDTH: usize = 160;
@@ -64,11 +68,13 @@ pub struct Drawn {
     pub twice: u64,
     /// Truth that stands in the log itself.
     pub truth: Vec<TruthFrame>,
+    /// Boxes of the walker on `/detections`, as another program records them.
+    pub boxes: bool,
 }
 
 impl Drawn {
     pub fn of(frames: u64) -> Self {
-        Self { frames, depth: true, twice: 0, truth: Vec::new() }
+        Self { frames, depth: true, twice: 0, truth: Vec::new(), boxes: false }
     }
 
     /// Writes a log of somebody who walks to the left, ten frames a second.
@@ -90,12 +96,30 @@ impl Drawn {
         log.send("/camera/color/camera_info", stamp, &info(&header));
         let colour = colour(index);
         log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", 3, &colour));
+        if self.boxes {
+            log.send("/detections", stamp, &boxes(&header, index));
+        }
         if self.depth {
             log.send("/camera/depth/camera_info", stamp, &info(&header));
             let depth = depth(index);
             log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", 2, &depth));
         }
     }
+}
+
+/// The walker's whole body: 1.7 m at 2.8 m are 79 pixels.
+fn boxes(header: &Header, index: u64) -> Detection2DArray {
+    let centre = walker(index).start as f64 + 13.0;
+    let position = Point2D { x: centre, y: 40.0 + 39.5 };
+    let center = Pose2D { position, theta: 0.0 };
+    let hypothesis = ObjectHypothesis { class_id: "person".into(), score: 0.9 };
+    let detection = Detection2D {
+        header: header.clone(),
+        results: vec![ObjectHypothesisWithPose { hypothesis, ..Default::default() }],
+        bbox: BoundingBox2D { center, size_x: 26.0, size_y: 79.0 },
+        id: String::new(),
+    };
+    Detection2DArray { header: header.clone(), detections: vec![detection] }
 }
 
 /// Columns that the walker covers.

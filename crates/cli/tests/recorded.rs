@@ -1,0 +1,58 @@
+//! The shipped `configs/recorded.toml` on a log in which another program has
+//! recorded its boxes.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{Drawn, code, tagalong, text};
+use serde_json::Value;
+
+fn shipped() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/recorded.toml")
+}
+
+/// Runs over a log and scores what came out.
+fn scores(log: &Drawn, similarity: &str) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    log.write(&folder.path().join("walk.mcap"));
+    fs::write(folder.path().join("walk.people.csv"), common::people(20)).unwrap();
+    let mut run = tagalong();
+    run.current_dir(folder.path()).arg("run").arg(shipped()).args(["walk.mcap", "-o", "out"]);
+    let output = run.output().unwrap();
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let mut eval = tagalong();
+    eval.current_dir(folder.path()).args(["eval", "--truth", "walk.people.csv"]);
+    eval.args(["--tracks", "out", "--format", "json", "--similarity", similarity]);
+    serde_json::from_slice(&eval.output().unwrap().stdout).unwrap()
+}
+
+#[test]
+fn boxes_of_the_log_are_tracked() {
+    let log = Drawn { boxes: true, ..Drawn::of(20) };
+    let image = scores(&log, "iou");
+    assert!(image["MOTA"].as_f64().unwrap() > 0.7, "{image}");
+    assert_eq!(image["track_ids"].as_u64(), Some(1), "{image}");
+    let floor = scores(&log, "metres");
+    assert!(floor["position_error_mean_m"].as_f64().unwrap() < 0.15, "{floor}");
+}
+
+#[test]
+fn without_depth_the_size_of_the_box_tells_the_distance() {
+    let floor = scores(&Drawn { boxes: true, depth: false, ..Drawn::of(20) }, "metres");
+    assert!(floor["position_error_mean_m"].as_f64().unwrap() < 0.5, "{floor}");
+}
+
+#[test]
+fn a_log_without_boxes_is_refused_with_the_name_of_the_topic() {
+    let folder = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&folder.path().join("walk.mcap"));
+    let mut run = tagalong();
+    let output = run.current_dir(folder.path()).arg("run").arg(shipped()).arg("walk.mcap");
+    let output = output.output().unwrap();
+    assert_eq!(code(&output), 1);
+    let told = text(&output.stderr);
+    assert!(told.contains("/detections") && told.contains("detections_topic"), "{told}");
+}
