@@ -16,15 +16,7 @@ tagalong=${TAGALONG:-$root/target/release/tagalong}
 venv=${TAGALONG_HQ_VENV:-$root/target/hq-venv}
 logs=$1
 work=$(mktemp -d)
-HQ_SERVER_DIR=$work/hq-server
-export HQ_SERVER_DIR
-hq=
-
-finish() {
-    if [ -n "$hq" ]; then "$hq" server stop > /dev/null 2>&1 || true; fi
-    rm -rf "$work"
-}
-trap finish EXIT
+trap 'rm -rf "$work"' EXIT
 
 plan() {
     "$tagalong" bench plan --configs "$root"/configs/*.toml --logs-dir "$logs" -o "$1" 2> /dev/null
@@ -49,20 +41,15 @@ if ! command -v python3 > /dev/null; then
     echo "hyperqueue: skipped: python3 is not installed" >&2
     exit 0
 fi
-if [ ! -x "$venv/bin/hq" ]; then
+if [ ! -f "$venv/installed" ]; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install --quiet 'hyperqueue==0.27.*'
+    touch "$venv/installed"
 fi
-hq=$venv/bin/hq
 plan "$work/hyperqueue" > /dev/null
-"$hq" server start > "$work/server.log" 2>&1 &
-for _ in 1 2 3 4 5 6 7 8 9 10; do
-    if "$hq" server info > /dev/null 2>&1; then break; fi
-    sleep 1
-done
-"$hq" worker start --cpus 2 > "$work/worker.log" 2>&1 &
-TAGALONG=$tagalong; BENCH=$work/hyperqueue
-timeout 300 "$hq" submit --wait --array "1-$count" --cwd "$PWD" \
-    --stdout none --stderr none --env "TAGALONG=$TAGALONG" --env "BENCH=$BENCH" \
-    sh -c '"$TAGALONG" bench run -o "$BENCH" --task $HQ_TASK_ID' > "$work/submit.log"
+HOME=$work timeout 300 "$venv/bin/python" "$here/hyperqueue_bench.py" \
+    "$tagalong" "$work/hyperqueue" 2 > "$work/hyperqueue.log" 2>&1 || {
+    cat "$work/hyperqueue.log"
+    exit 1
+}
 same hyperqueue

@@ -9,7 +9,7 @@ import sys
 import numpy
 
 # TrackEval was written for numpy 1, which had these names for Python's types.
-numpy.float, numpy.int, numpy.bool = float, int, bool
+numpy.float, numpy.int = float, int
 
 import trackeval  # noqa: E402
 

@@ -217,7 +217,7 @@ fn a_hash_changes_with_what_matters_and_with_nothing_else() {
     assert_eq!(plan("b"), first, "a comment changes nothing");
     fs::write(&path, config.replace("seed = 7", "seed = 8")).unwrap();
     let seeded = plan("c");
-    assert_eq!((&seeded[0], &seeded[1] != &first[1]), (&first[0], true), "far, then near");
+    assert_eq!((&seeded[0], seeded[1] != first[1]), (&first[0], true), "far, then near");
     fs::write(home.path("logs/short.people.csv"), common::people(8)).unwrap();
     assert!(plan("d").iter().zip(&seeded).all(|(new, old)| new != old), "other truth");
 }

@@ -113,7 +113,7 @@ impl RecordedDetections {
         // A box whose distance is a guess is near if it overlaps.
         let guessed = detection.covariance.diagonal().xy().max() > 0.25 * self.config.near_m;
         let near = away_m <= self.config.near_m || guessed && overlap >= self.config.near_overlap;
-        near.then(|| overlap - away_m)
+        near.then_some(overlap - away_m)
     }
 }
 
