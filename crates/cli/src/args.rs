@@ -101,7 +101,8 @@ Examples:
   tagalong bench --logs-dir logs -o bench --jobs 2
   tagalong bench --configs a.toml b.toml --logs walk.mcap --seeds 5
   tagalong bench --logs-dir logs --baseline old/report.json --fail-if 'HOTA<-0.01'
-  tagalong bench plan --logs-dir logs -o bench | jq .hash";
+  tagalong bench plan --logs-dir logs -o bench | jq .hash
+  tagalong bench export -o bench --trackeval tree";
 
 const EVAL_HELP: &str = "\
 Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors); --format json

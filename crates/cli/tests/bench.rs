@@ -223,6 +223,23 @@ fn a_hash_changes_with_what_matters_and_with_nothing_else() {
 }
 
 #[test]
+fn files_that_a_config_names_belong_to_the_hash() {
+    let home = Home::new();
+    let config = "[[detectors]]\nplugin = \"recorded-detections\"\nroles = [\"discover\"]\n\
+                  config = { path = \"../det.txt\" }\n[filter]\nplugin = \"ekf\"\n";
+    fs::write(home.path("configs/boxes.toml"), config).unwrap();
+    let hash = |out: &str, boxes: &str| {
+        fs::write(home.path("det.txt"), boxes).unwrap();
+        let only = ["--logs", "logs/short.mcap", "--configs", "configs/boxes.toml"];
+        ok(home.bench(&[&["plan", "-o", out][..], &only].concat()));
+        home.plan(out)[0]["hash"].clone()
+    };
+    let first = hash("a", "1,-1,90,40,26,79,0.9\n");
+    assert_eq!(hash("b", "1,-1,90,40,26,79,0.9\n"), first);
+    assert_ne!(hash("c", "1,-1,90,40,26,79,0.8\n"), first);
+}
+
+#[test]
 fn what_changed_since_the_plan_is_not_run() {
     let home = Home::new();
     ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", "out"]));

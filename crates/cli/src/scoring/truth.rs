@@ -230,7 +230,8 @@ impl Place {
             Self::Floor(place) => Some(place),
             Self::HeadInCamera(surface) => {
                 let surface = Point3::from(surface);
-                let centre = surface + surface.coords.normalize() * HEAD_RADIUS_M;
+                let ray = surface.coords.try_normalize(1e-6)?;
+                let centre = surface + ray * HEAD_RADIUS_M;
                 let head = robot_from_camera? * centre;
                 Some([head.x, head.y])
             }
