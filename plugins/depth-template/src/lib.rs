@@ -2,10 +2,10 @@
 //! (P1 section 2.2, P4 section II).
 //!
 //! The path of a pixel: is it at a height and depth where a head can be
-//! ([`volume`](DepthTemplateConfig::min_head_height_m)), is the scene farther away
+//! ([`DepthTemplateConfig::min_head_height_m`]), is the scene farther away
 //! left, right and above of it (P4's boundary points), is what it belongs to as
 //! wide as a head, is there a body below; then, does the silhouette of one of
-//! three body directions fit ([`matching`])? What is left is grouped into
+//! three body directions fit ([`Matcher`])? What is left is grouped into
 //! people.
 //!
 //! Why not the printed squared difference of depths against one background
