@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use serde::Serialize;
 use serde_json::{Map, Value};
 use tagalong_eval::Scores;
 
@@ -11,14 +10,7 @@ use crate::model::{Benchmark, Outcome, TaskResult};
 use crate::summary::Summary;
 use crate::view::View;
 
-#[derive(Serialize)]
-struct Json<'a> {
-    version: &'a str,
-    summary: Summary,
-    tasks: Vec<TaskResult>,
-}
-
-/// `report.json`: the tasks in a fixed order, and the [`Summary`] under
+/// `report.json`: one task a line in a fixed order, and the [`Summary`] under
 /// `summary`. Pictures are left out, since they belong to the page. The text can
 /// be read back as a [`Benchmark`], for instance as the baseline of a gate.
 ///
@@ -27,14 +19,18 @@ struct Json<'a> {
 /// None with the types of this crate; the error is that of the JSON writer.
 pub fn json(benchmark: &Benchmark) -> serde_json::Result<String> {
     let view = View::new(benchmark);
-    let without_pictures = |task: &&TaskResult| {
-        let mut task = (*task).clone();
-        task.events.iter_mut().for_each(|event| event.picture_png_base64 = None);
-        task
-    };
-    let tasks = view.tasks.iter().map(without_pictures).collect();
-    let file = Json { version: view.version, summary: Summary::new(benchmark), tasks };
-    serde_json::to_string_pretty(&file).map(|text| text + "\n")
+    let tasks: Vec<String> =
+        view.tasks.iter().map(|task| task_json(task)).collect::<serde_json::Result<_>>()?;
+    let version = serde_json::to_string(view.version)?;
+    let summary = serde_json::to_string(&Summary::new(benchmark))?;
+    let tasks = tasks.join(",\n");
+    Ok(format!("{{\"version\":{version},\n\"summary\":{summary},\n\"tasks\":[\n{tasks}\n]}}\n"))
+}
+
+fn task_json(task: &TaskResult) -> serde_json::Result<String> {
+    let mut task = task.clone();
+    task.events.iter_mut().for_each(|event| event.picture_png_base64 = None);
+    serde_json::to_string(&task)
 }
 
 /// `report.csv`: a header and one row per task (RFC 4180). Figures in the image

@@ -27,8 +27,8 @@ impl Axis {
         Self { low, high, from, to, scale }
     }
 
-    /// An axis around the finite values, from zero or from the power of ten
-    /// below them, to a round value above.
+    /// An axis around the finite values, from zero (linear) or from the round
+    /// value below them (log), to a round value above.
     pub fn around(scale: Scale, values: impl IntoIterator<Item = f64>, places: [f64; 2]) -> Self {
         let finite = values.into_iter().filter(|v| v.is_finite());
         match scale {
@@ -41,7 +41,7 @@ impl Axis {
                 let positive: Vec<f64> = finite.filter(|v| *v > 0.0).collect();
                 let low = positive.iter().copied().fold(f64::INFINITY, f64::min);
                 let high = positive.iter().copied().fold(0.0, f64::max);
-                Self::new(scale, [decade(low, f64::floor), decade(high, f64::ceil)], places)
+                Self::new(scale, [round_below(low), round_above(high)], places)
             }
         }
     }
@@ -78,12 +78,15 @@ impl Axis {
         (0..=count).map(|i| (minus(&format!("{:.decimals$}", value(i))), value(i))).collect()
     }
 
+    /// Powers of ten; within less than two of them also 2 and 5 times those.
     fn log_ticks(&self) -> Vec<(String, f64)> {
-        let first = self.low.log10().ceil() as i32;
+        let first = self.low.log10().floor() as i32;
         let last = (self.high.log10() + 1e-9).floor() as i32;
-        (first..=last.min(first + 20))
-            .map(|exponent| (power(exponent), 10_f64.powi(exponent)))
-            .collect()
+        let times: &[f64] = if self.high / self.low <= 100.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let all = (first..=last.min(first + 20))
+            .flat_map(|exponent| times.iter().map(move |t| (exponent, t * 10_f64.powi(exponent))));
+        let inside = |v: f64| self.low * 0.999 <= v && v <= self.high * 1.001;
+        all.filter(|(_, v)| inside(*v)).map(|(e, v)| (rounded(e, v), v)).collect()
     }
 }
 
@@ -115,16 +118,24 @@ fn drawable_log([low, high]: [f64; 2]) -> [f64; 2] {
     if high >= low * 1.1 { [low, high] } else { [low, low * 10.0] }
 }
 
-fn decade(value: f64, round: fn(f64) -> f64) -> f64 {
-    10_f64.powf(round(value.log10()))
+/// The greatest of 1, 2 and 5 times a power of ten that is not above the value.
+fn round_below(value: f64) -> f64 {
+    let unit = 10_f64.powf(value.log10().floor());
+    [5.0, 2.0].into_iter().map(|t| t * unit).find(|v| *v <= value).unwrap_or(unit)
 }
 
-fn power(exponent: i32) -> String {
+/// The least of 1, 2 and 5 times a power of ten that is not below the value.
+fn round_above(value: f64) -> f64 {
+    let unit = 10_f64.powf(value.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|t| t * unit).find(|v| *v >= value).unwrap_or(10.0 * unit)
+}
+
+fn rounded(exponent: i32, value: f64) -> String {
     if (-4..=5).contains(&exponent) {
         let decimals = usize::try_from(-exponent).unwrap_or(0);
-        format!("{:.decimals$}", 10_f64.powi(exponent))
+        format!("{value:.decimals$}")
     } else {
-        format!("1e{exponent}")
+        format!("{value:e}")
     }
 }
 

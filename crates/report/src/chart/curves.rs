@@ -19,12 +19,16 @@ pub struct Curve<'a> {
 const SIZE: (f64, f64) = (480.0, 300.0);
 const PLOT: Plot = Plot { left: 58.0, right: 468.0, top: 12.0, bottom: 250.0 };
 
+/// Below this a curve is drawn at the edge: few logs are long enough to tell.
+const LEAST_FPPI: f64 = 1e-3;
+
 /// Miss rate over false positives per image, one line per pipeline. The band is
 /// where the log-average miss rate reads the curve.
 pub fn miss_rate(curves: &[Curve<'_>], words: &Words<'_>) -> Markup {
     let reference = [REFERENCE_FPPI[0], REFERENCE_FPPI[8]];
-    let all = curves.iter().flat_map(|c| c.points).map(|p| p.fppi).chain(reference);
-    let x = Axis::around(Scale::Log, all, [PLOT.left, PLOT.right]);
+    let most = curves.iter().flat_map(|c| c.points).map(|p| p.fppi).filter(|v| v.is_finite());
+    let range = [LEAST_FPPI, most.fold(reference[1], f64::max)];
+    let x = Axis::new(Scale::Log, range, [PLOT.left, PLOT.right]);
     let y = Axis::new(Scale::Linear, [0.0, 1.0], [PLOT.bottom, PLOT.top]);
     let band = [x.at(reference[0]), x.at(reference[1])].map(Option::unwrap_or_default);
     let body = html! {

@@ -2,7 +2,7 @@ use maud::{Markup, html};
 
 use super::{Axis, Scale, px};
 
-const WIDTH: f64 = 140.0;
+const WIDTH: f64 = 120.0;
 
 /// A bar from zero in a cell of a table; `whisker` is a second, greater value.
 /// The numbers stand beside it, so it is hidden from screen readers.
@@ -11,7 +11,7 @@ pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
     let Some(end) = axis.at(value) else { return html! {} };
     let far = whisker.and_then(|w| axis.at(w));
     html! {
-        svg class="inline" viewBox="0 0 140 14" width="140" height="14" aria-hidden="true" {
+        svg class="inline" viewBox="0 0 120 14" width="120" height="14" aria-hidden="true" {
             rect class="bar" x="1" y="2" height="10" width=(px((end - 1.0).max(0.0))) {}
             @if let Some(far) = far {
                 line class="whisker" x1=(px(end.min(far))) x2=(px(far)) y1="7" y2="7" {}
@@ -28,8 +28,8 @@ pub fn interval(estimate: f64, ends: Option<[f64; 2]>, range: [f64; 2]) -> Marku
     let ends = ends.and_then(|[low, high]| Some([axis.at(low)?, axis.at(high)?]));
     let zero = (range[0] < 0.0 && range[1] > 0.0).then(|| axis.at(0.0)).flatten();
     html! {
-        svg class="inline" viewBox="0 0 140 14" width="140" height="14" aria-hidden="true" {
-            line class="rail" x1="1" x2="139" y1="7" y2="7" {}
+        svg class="inline" viewBox="0 0 120 14" width="120" height="14" aria-hidden="true" {
+            line class="rail" x1="1" x2="119" y1="7" y2="7" {}
             @if let Some(zero) = zero {
                 line class="zero" x1=(px(zero)) x2=(px(zero)) y1="0" y2="14" {}
             }

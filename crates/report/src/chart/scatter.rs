@@ -25,27 +25,66 @@ pub fn front(marks: &[Mark<'_>], accuracy_name: &str, words: &Words<'_>) -> Mark
     let y = Axis::around(Scale::Linear, accuracies, [PLOT.bottom, PLOT.top]);
     let place = |m: &Mark<'_>| Some((x.at(m.ms)?, y.at(m.accuracy)?));
     let stairs = stairs(&unbeaten(marks), place);
+    let drawn: Vec<_> = marks.iter().filter_map(|m| Some((m, place(m)?))).collect();
+    let named: Vec<_> = drawn.iter().map(|&(m, at)| (m.name, at)).collect();
     let body = html! {
         (axes(PLOT, &x, &y, ["milliseconds per frame (median, log scale)", accuracy_name]))
         @if stairs.len() > 1 { polyline class="front" points=(points(stairs)) {} }
-        @for m in marks {
-            @if let Some(at) = place(m) {
-                g.(series_class(m.series)) data-series=(m.series) {
-                    (mark(m.series, at, 6.0))
-                    (label(m.name, at))
-                    (hint(&format!("{}: {:.3} at {:.2} ms", m.name, m.accuracy, m.ms)))
-                }
+        @for ((m, at), (x, y, anchor)) in drawn.iter().zip(labels(&named)) {
+            g.(series_class(m.series)) data-series=(m.series) {
+                (mark(m.series, *at, 6.0))
+                text class="label" x=(px(x)) y=(px(y)) text-anchor=(anchor) { (m.name) }
+                (hint(&format!("{}: {:.3} at {:.2} ms", m.name, m.accuracy, m.ms)))
             }
         }
     };
     picture(words, SIZE, &body)
 }
 
-/// The name beside a mark, on the side with more room.
-fn label(name: &str, (x, y): (f64, f64)) -> Markup {
-    let left = x > 0.5 * (PLOT.left + PLOT.right);
-    let (dx, anchor) = if left { (-11.0, "end") } else { (11.0, "start") };
-    html! { text class="label" x=(px(x + dx)) y=(px(y + 4.0)) text-anchor=(anchor) { (name) } }
+/// A rectangle: left, top, right, bottom.
+type Box4 = [f64; 4];
+
+/// Where the name of each mark goes: beside, above or below it, where it covers
+/// no mark and no earlier name; where there is room if there is no such place.
+fn labels(marks: &[(&str, (f64, f64))]) -> Vec<(f64, f64, &'static str)> {
+    let mut taken: Vec<Box4> =
+        marks.iter().map(|&(_, (x, y))| [x - 7.0, y - 7.0, x + 7.0, y + 7.0]).collect();
+    let mut placed = Vec::new();
+    for &(name, (x, y)) in marks {
+        let sides = [
+            (x + 11.0, y + 4.0, "start"),
+            (x - 11.0, y + 4.0, "end"),
+            (x, y - 12.0, "middle"),
+            (x, y + 21.0, "middle"),
+            (x + 5.0, y - 12.0, "end"),
+            (x + 5.0, y + 21.0, "end"),
+        ];
+        let right_half = x > 0.5 * (PLOT.left + PLOT.right);
+        let is_free = |side: &&(f64, f64, &str)| {
+            let own = label_box(name, **side);
+            let inside = own[0] >= PLOT.left && own[2] <= PLOT.right;
+            inside && own[3] <= PLOT.bottom && !taken.iter().any(|other| overlap(&own, other))
+        };
+        let side = *sides.iter().find(is_free).unwrap_or(&sides[usize::from(right_half)]);
+        taken.push(label_box(name, side));
+        placed.push(side);
+    }
+    placed
+}
+
+/// About the room that a name takes.
+fn label_box(name: &str, (x, y, anchor): (f64, f64, &str)) -> Box4 {
+    let width = 7.0 * name.chars().count() as f64;
+    let left = match anchor {
+        "end" => x - width,
+        "middle" => x - 0.5 * width,
+        _ => x,
+    };
+    [left, y - 12.0, left + width, y + 3.0]
+}
+
+fn overlap(a: &Box4, b: &Box4) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
 /// Those that no other beats in both, fastest first.
@@ -79,6 +118,16 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn names_do_not_cover_each_other() {
+        let marks =
+            [("alpha", (300.0, 100.0)), ("beta", (306.0, 108.0)), ("gamma", (320.0, 100.0))];
+        let placed = labels(&marks);
+        let boxes: Vec<_> = marks.iter().zip(placed).map(|(m, p)| label_box(m.0, p)).collect();
+        assert!(!overlap(&boxes[0], &boxes[1]) && !overlap(&boxes[1], &boxes[2]));
+        assert!(!overlap(&boxes[0], &boxes[2]));
+    }
 
     proptest! {
         #[test]

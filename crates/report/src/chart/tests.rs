@@ -109,7 +109,9 @@ fn ticks_are_round() {
     let linear = Axis::around(Scale::Linear, [0.13, 0.87], [0.0, 1.0]);
     assert_eq!(texts(linear), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
     let log = Axis::around(Scale::Log, [0.03, 2.0], [0.0, 1.0]);
-    assert_eq!(texts(log), ["0.01", "0.1", "1", "10"]);
+    assert_eq!(texts(log), ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2"]);
+    let wide = Axis::new(Scale::Log, [0.001, 1.0], [0.0, 1.0]);
+    assert_eq!(texts(wide), ["0.001", "0.01", "0.1", "1"]);
     let around_zero = Axis::new(Scale::Linear, [-1.0, 1.0], [0.0, 1.0]);
     assert_eq!(texts(around_zero), ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]);
 }

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 
 use super::{Page, cell, column, number, table};
-use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan};
+use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
 use crate::model::TaskResult;
 
 impl Page<'_> {
@@ -75,7 +75,7 @@ impl Page<'_> {
         let tables: Vec<Markup> =
             self.view.pipelines.iter().filter_map(|p| self.funnel(p)).collect();
         (!tables.is_empty()).then(|| html! {
-            p { "Each test in its order and how many candidates it dropped, over all logs. A person who is never found was dropped by one of these." }
+            p { "Each test in its order and how many candidates it dropped, over all logs. When somebody is never found, look here first." }
             div class="funnels" { @for table in &tables { (table) } }
         })
     }
@@ -95,7 +95,7 @@ impl Page<'_> {
         let row = |test: &str| {
             let count = counts[test] as f64;
             html! {
-                tr {
+                tr.(series_class(self.series(pipeline))) {
                     th scope="row" { (test) }
                     (cell(count, &html! { (thousands(counts[test])) }))
                     (cell(count / all, &html! { (number(100.0 * count / all, 1)) " %" }))

@@ -1,7 +1,7 @@
 use maud::{Markup, html};
 
 use super::{Page, amount, cell, column, no_cell, number, table};
-use crate::chart::{interval, key};
+use crate::chart::{interval, key, series_class};
 use crate::figures::{Figure, MAIN, Place};
 use crate::summary::{Estimate, PipelineSummary, per_log};
 
@@ -39,7 +39,13 @@ impl Page<'_> {
             .iter()
             .find(|p| p.figure == key && names.contains(&&p.a) && names.contains(&&p.b));
         let clear = pair.is_some_and(|p| p.is_clear());
+        let left_out = self
+            .summary
+            .pipelines
+            .iter()
+            .any(|p| p.figures.get(&key).is_some_and(|e| e.logs < first.1.logs));
         Some(html! {
+            @if left_out { "Of the pipelines with the most logs, " (first.1.logs) ", " }
             strong { (first.0.pipeline) } " has the highest " (MAIN.name) " " (place_where(place)) ", "
             (number(first.1.mean, 3)) ", then " strong { (second.0.pipeline) } " with "
             (number(second.1.mean, 3)) ". "
@@ -70,7 +76,7 @@ impl Page<'_> {
         };
         let body = html! {
             @for summary in &self.summary.pipelines {
-                tr data-series=(self.series(&summary.pipeline)) {
+                tr.(series_class(self.series(&summary.pipeline))) data-series=(self.series(&summary.pipeline)) {
                     th scope="row" { (key(self.series(&summary.pipeline), &summary.pipeline)) }
                     (done_cell(summary, most))
                     @if place == Place::Image { (people_cell(summary)) }
@@ -211,7 +217,13 @@ fn people_cell(summary: &PipelineSummary) -> Markup {
 }
 
 pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
-    html! { span class="ends" { (number(low, decimals)) " to " (number(high, decimals)) } }
+    html! { span class="ends" { (span_of([low, high], decimals)) } }
+}
+
+/// Two ends as one text; a dash would look like a sign where one is negative.
+pub(super) fn span_of([low, high]: [f64; 2], decimals: usize) -> String {
+    let between = if low < 0.0 || high < 0.0 { " to " } else { "–" };
+    format!("{}{between}{}", number(low, decimals), number(high, decimals))
 }
 
 /// From the lowest to the highest end of all.

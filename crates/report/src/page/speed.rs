@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::headline::place_where;
 use super::{Page, cell, column, number, table};
-use crate::chart::{Mark, Words, bar, front, key};
+use crate::chart::{Mark, Words, bar, front, key, series_class};
 use crate::figures::{MAIN, Place};
 use crate::model::{TaskTiming, Timings};
 
@@ -79,7 +79,7 @@ impl Page<'_> {
         };
         let body = html! {
             @for (pipeline, row) in &rows {
-                tr.total[row.is_total] data-series=(self.series(pipeline)) {
+                tr class=(row.class(self.series(pipeline))) data-series=(self.series(pipeline)) {
                     th scope="row" { (key(self.series(pipeline), pipeline)) }
                     td { (row.stage) }
                     (cell(row.p50_ms, &html! { (number(row.p50_ms, 2)) }))
@@ -102,6 +102,13 @@ struct StageRow {
     p50_ms: f64,
     p95_ms: f64,
     is_total: bool,
+}
+
+impl StageRow {
+    fn class(&self, series: usize) -> String {
+        let total = if self.is_total { "total " } else { "" };
+        format!("{total}{}", series_class(series))
+    }
 }
 
 /// The whole frame, then the stages in their order.

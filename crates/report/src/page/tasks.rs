@@ -2,6 +2,7 @@ use std::collections::BTreeSet;
 
 use maud::{Markup, html};
 
+use super::headline::span_of;
 use super::{Page, cell, column, no_cell, number, optional_cell, table};
 use crate::chart::key;
 use crate::figures::Place;
@@ -46,7 +47,7 @@ impl Page<'_> {
         Some(html! {
             details class="print" {
                 summary { "One row per pipeline, log and seed" }
-                (table("All tasks", &caption, &task_head(), &body))
+                (table("Every task in one row", &caption, &task_head(), &body))
             }
         })
     }
@@ -149,7 +150,7 @@ fn nis_cell(task: &TaskResult) -> Markup {
     cell(
         nis.mean,
         &html! {
-            (number(nis.mean, 2)) " " span class="ends" { (number(nis.lower, 2)) " to " (number(nis.upper, 2)) ", " (verdict) }
+            (number(nis.mean, 2)) " " span class="ends" { (span_of([nis.lower, nis.upper], 2)) ", " (verdict) }
         },
     )
 }
