@@ -12,9 +12,9 @@ use mcap::{WriteOptions, Writer};
 use nalgebra::Isometry3;
 use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
 use tagalong_log::msgs::{
-    BoundingBox2D, CameraInfo, Detection2D, Detection2DArray, Header, Image, Message,
-    ObjectHypothesis, ObjectHypothesisWithPose, Point2D, Pose2D, TFMessage, TransformStamped,
-    encode,
+    BoundingBox2D, BoundingBox3D, CameraInfo, Detection2D, Detection2DArray, Detection3D,
+    Detection3DArray, Header, Image, Message, ObjectHypothesis, ObjectHypothesisWithPose, Point2D,
+    Pose, Pose2D, TFMessage, TransformStamped, Vector3, encode,
 };
 use tagalong_log::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame};
 
@@ -70,11 +70,13 @@ pub struct Drawn {
     pub truth: Vec<TruthFrame>,
     /// Boxes of the walker on `/detections`, as another program records them.
     pub boxes: bool,
+    /// The same in space, in the frame of the camera.
+    pub in_space: bool,
 }
 
 impl Drawn {
     pub fn of(frames: u64) -> Self {
-        Self { frames, depth: true, twice: 0, truth: Vec::new(), boxes: false }
+        Self { frames, depth: true, twice: 0, truth: Vec::new(), boxes: false, in_space: false }
     }
 
     /// Writes a log of somebody who walks to the left, ten frames a second.
@@ -96,6 +98,9 @@ impl Drawn {
         log.send("/camera/color/camera_info", stamp, &info(&header));
         let colour = colour(index);
         log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", 3, &colour));
+        if self.in_space {
+            log.send("/detections", stamp, &space(&header, index));
+        }
         if self.boxes {
             log.send("/detections", stamp, &boxes(&header, index));
         }
@@ -120,6 +125,22 @@ fn boxes(header: &Header, index: u64) -> Detection2DArray {
         id: String::new(),
     };
     Detection2DArray { header: header.clone(), detections: vec![detection] }
+}
+
+/// The walker from the floor to the crown, 1.62 m up, seen from 1.2 m.
+fn space(header: &Header, index: u64) -> Detection3DArray {
+    let centre = walker(index).start as f64 + 13.0;
+    let x = (centre - 79.5) * 2.88 / 130.0;
+    let center = Pose::from(&Isometry3::translation(x, 1.2 - 0.81, 2.88));
+    let size = Vector3 { x: 0.5, y: 1.62, z: 0.5 };
+    let hypothesis = ObjectHypothesis { class_id: "person".into(), score: 0.9 };
+    let detection = Detection3D {
+        header: header.clone(),
+        results: vec![ObjectHypothesisWithPose { hypothesis, ..Default::default() }],
+        bbox: BoundingBox3D { center, size },
+        id: String::new(),
+    };
+    Detection3DArray { header: header.clone(), detections: vec![detection] }
 }
 
 /// Columns that the walker covers.
