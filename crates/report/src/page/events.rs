@@ -10,11 +10,12 @@ impl Page<'_> {
     pub(super) fn events(&self) -> Option<Markup> {
         let tasks: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| !t.events.is_empty()).collect();
+        let numbered = self.view.tasks.iter().enumerate().filter(|(_, t)| !t.events.is_empty());
         (!tasks.is_empty()).then(|| {
             html! {
                 (self.event_counts(&tasks))
                 div class="filters" hidden { span class="unseen" { "Show kinds of events" } }
-                @for task in tasks { (self.events_of(task)) }
+                @for (number, task) in numbered { (self.events_of(number, task)) }
             }
         })
     }
@@ -45,15 +46,16 @@ impl Page<'_> {
         )
     }
 
-    fn events_of(&self, task: &TaskResult) -> Markup {
+    fn events_of(&self, number: usize, task: &TaskResult) -> Markup {
         let name = format!("Events of {} on {}, seed {}", task.pipeline, task.log, task.seed);
         let head = html! {
             (column("Time [s]", None)) (column("Frame", None)) (column("Kind", None))
             (column("Person", None)) (column("Track", None)) (column("What", None))
         };
-        let mut events: Vec<&EventRow> = task.events.iter().collect();
-        events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-        let body = html! { @for event in events { (row(event)) } };
+        let mut events: Vec<(usize, &EventRow)> = task.events.iter().enumerate().collect();
+        events.sort_by(|a, b| a.1.t_s.total_cmp(&b.1.t_s));
+        let body =
+            html! { @for (index, event) in events { (row(event, &event_id(number, index))) } };
         let caption = html! { "In time; a time is counted from the first frame of the log." };
         html! {
             details class="events" {
@@ -67,9 +69,14 @@ impl Page<'_> {
     }
 }
 
-fn row(event: &EventRow) -> Markup {
+/// The anchor of an event, by the places of its task and of itself.
+pub(super) fn event_id(task: usize, event: usize) -> String {
+    format!("event-{task}-{event}")
+}
+
+fn row(event: &EventRow, id: &str) -> Markup {
     html! {
-        tr data-kind=(event.kind) {
+        tr id=(id) data-kind=(event.kind) {
             (cell(event.t_s, &html! { (number(event.t_s, 2)) }))
             (cell(event.frame as f64, &html! { (event.frame) }))
             td { (kind(&event.kind)) }

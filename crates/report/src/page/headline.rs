@@ -45,7 +45,7 @@ impl Page<'_> {
             .iter()
             .any(|p| p.figures.get(&key).is_some_and(|e| e.logs < first.1.logs));
         Some(html! {
-            @if left_out { "Of the pipelines with the most logs, " (first.1.logs) ", " }
+            @if left_out { "Of the pipelines with " (amount(first.1.logs as usize, "log")) ", " }
             strong { (first.0.pipeline) } " has the highest " (MAIN.name) " " (place_where(place)) ", "
             (number(first.1.mean, 3)) ", then " strong { (second.0.pipeline) } " with "
             (number(second.1.mean, 3)) ". "

@@ -1,6 +1,6 @@
 use maud::{Markup, html};
 
-use super::events::{kind, picture};
+use super::events::{event_id, kind};
 use super::headline::{ends_of, place_where};
 use super::{Page, amount, cell, column, no_cell, number, signed, table};
 use crate::chart::key;
@@ -71,10 +71,10 @@ impl Page<'_> {
                     th scope="row" { (d.log) }
                     (cell(d.seed as f64, &html! { (d.seed) }))
                     (cell(d.event.t_s, &html! { (number(d.event.t_s, 2)) }))
-                    (cell(d.event.frame as f64, &html! { (d.event.frame) }))
+                    (cell(d.event.frame as f64, &self.link(d)))
                     td { (key(self.series(d.pipeline), d.pipeline)) }
                     td { (kind(&d.event.kind)) }
-                    td { (picture(d.event)) (d.event.text) }
+                    td {  (d.event.text) }
                 }
             }
         };
@@ -85,6 +85,18 @@ impl Page<'_> {
             @if all.len() > MOST_LISTED { " The first " (MOST_LISTED) " of " (all.len()) "." }
         };
         table(&name, &caption, &head, &body)
+    }
+
+    /// The frame of an event, as a link to its row and picture.
+    fn link(&self, d: &Difference<'_>) -> Markup {
+        let found = self.view.tasks.iter().enumerate().find_map(|(task, of)| {
+            let index = of.events.iter().position(|event| std::ptr::eq(event, d.event))?;
+            Some(event_id(task, index))
+        });
+        html! {
+            @if let Some(id) = found { a href=(format!("#{id}")) { (d.event.frame) } }
+            @else { (d.event.frame) }
+        }
     }
 }
 

@@ -19,7 +19,7 @@ impl Page<'_> {
             html! {
                 tr {
                     th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
-                    td { (task.log) }
+                    td class="log" { (task.log) }
                     (cell(task.seed as f64, &html! { (task.seed) }))
                     td { @if outcome == "failed" { strong class="bad" { "✕ failed" } } @else { (outcome) } }
                     td class="why" { (why) }
@@ -58,7 +58,7 @@ impl Page<'_> {
         html! {
             tr data-series=(self.series(&task.pipeline)) {
                 th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
-                td { (task.log) }
+                td class="log" { (task.log) }
                 (cell(task.seed as f64, &html! { (task.seed) }))
                 td { (reason(&task.outcome).map_or("done", |(outcome, _)| outcome)) }
                 (cell(task.frames as f64, &html! { (task.frames) }))
@@ -90,7 +90,7 @@ impl Page<'_> {
             @for task in &self.view.tasks {
                 tr {
                     th scope="row" { (task.pipeline) }
-                    td { (task.log) }
+                    td class="log" { (task.log) }
                     (cell(task.seed as f64, &html! { (task.seed) }))
                     td { (hash(&task.hash)) }
                     @for name in &names { td { @if let Some(value) = task.inputs.get(*name) { (hash(value)) } @else { "–" } } }
