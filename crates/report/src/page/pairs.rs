@@ -74,7 +74,7 @@ impl Page<'_> {
                     (cell(d.event.frame as f64, &self.link(d)))
                     td { (key(self.series(d.pipeline), d.pipeline)) }
                     td { (kind(&d.event.kind)) }
-                    td {  (d.event.text) }
+                    td { (d.event.text) }
                 }
             }
         };
