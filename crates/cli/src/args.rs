@@ -160,6 +160,16 @@ pub enum Format {
     Json,
 }
 
+impl RunArgs {
+    /// The log that is read.
+    pub fn log(&self) -> &Path {
+        self.log.as_deref().unwrap_or(Path::new(SAMPLE))
+    }
+}
+
+/// Where the drawn log goes that stands in for a real one.
+const SAMPLE: &str = "runs/sample.mcap";
+
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
@@ -185,13 +195,3 @@ mod tests {
         assert!(Cli::try_parse_from(["tagalong", "run", "a", "b", "--threads", "2"]).is_ok());
     }
 }
-
-impl RunArgs {
-    /// The log that is read.
-    pub fn log(&self) -> &Path {
-        self.log.as_deref().unwrap_or(Path::new(SAMPLE))
-    }
-}
-
-/// Where the drawn log goes that stands in for a real one.
-const SAMPLE: &str = "runs/sample.mcap";
