@@ -19,6 +19,9 @@ const COPY: &str = "target/try-new-plugin";
 /// for those of the other.
 const BUILD: &str = "target/try-new-plugin-build";
 
+/// Nobody waits for these programs, so that the dependencies need not be fast.
+const QUICK_BUILD: &str = r#"profile.dev.package."*".opt-level = 1"#;
+
 /// Runs the whole trial.
 pub fn try_out(workspace: &Workspace) -> Result<()> {
     let copy = copy_of(workspace)?;
@@ -34,6 +37,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     let cargo = |step: &str, args: &[&str], packages: &[String]| -> Result<()> {
         eprintln!("new-plugin --try: {step}");
         let mut cargo = Command::new("cargo");
+        cargo.args(["--config", QUICK_BUILD]);
         let (before, after) = match args.iter().position(|arg| *arg == "--") {
             Some(at) => args.split_at(at),
             None => (args, &[][..]),
