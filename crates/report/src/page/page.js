@@ -27,6 +27,7 @@
     table.tBodies[0].append(...rows);
   };
   const next = { none: "ascending", ascending: "descending", descending: "none" };
+  const headings = [];
   for (const table of all("table.sortable")) {
     const original = [...table.tBodies[0].rows];
     if (original.length < 2) continue;
@@ -36,6 +37,7 @@
       button.type = "button";
       button.append(...head.childNodes);
       head.append(button);
+      headings.push([head, button]);
       button.addEventListener("click", () => {
         const direction = next[head.getAttribute("aria-sort") || "none"];
         for (const other of heads) other.removeAttribute("aria-sort");
@@ -79,14 +81,20 @@
     element.addEventListener("pointerleave", () => show(null));
   }
 
-  // On paper nothing can be opened.
+  // On paper nothing can be opened, and headings that repeat on the next page
+  // lose what stands in buttons.
   let opened = [];
   addEventListener("beforeprint", () => {
     opened = all("details.print:not([open])");
     for (const details of opened) details.open = true;
+    for (const [head, button] of headings) head.replaceChildren(...button.childNodes);
   });
   addEventListener("afterprint", () => {
     for (const details of opened) details.open = false;
+    for (const [head, button] of headings) {
+      button.append(...head.childNodes);
+      head.append(button);
+    }
   });
 
   // A link to something folded away opens it.
