@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::{Page, cell, column, number, table};
+use super::{Page, amount, cell, column, number, table};
 use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
 use crate::model::TaskResult;
 
@@ -115,7 +115,10 @@ impl Page<'_> {
 
 fn plan_of(task: &TaskResult, extent: Extent, series: usize) -> Markup {
     let title = format!("{} on {} from above", task.pipeline, task.log);
-    let says = format!("{} tracks and {} people.", task.tracks.len(), task.truth.len());
+    let says = match task.truth.len() {
+        1 => format!("{} and 1 person.", amount(task.tracks.len(), "track")),
+        people => format!("{} and {people} people.", amount(task.tracks.len(), "track")),
+    };
     html! {
         figure {
             (plan(&task.truth, &task.tracks, extent, &Words { title: &title, says: &says }))
