@@ -57,8 +57,9 @@ impl Page<'_> {
     /// Pipelines with the most logs, best first.
     fn ranked(&self, place: Place) -> Vec<(&PipelineSummary, Estimate)> {
         let key = MAIN.key(place);
-        let of = |p| Some((p, *PipelineSummary::figures(p).get(&key)?));
-        let mut all: Vec<_> = self.summary.pipelines.iter().filter_map(of).collect();
+        let pipelines = self.summary.pipelines.iter();
+        let mut all: Vec<(&PipelineSummary, Estimate)> =
+            pipelines.filter_map(|p| Some((p, *p.figures.get(&key)?))).collect();
         let most = all.iter().map(|(_, e)| e.logs).max().unwrap_or(0);
         all.retain(|(_, e)| e.logs == most);
         all.sort_by(|a, b| b.1.mean.total_cmp(&a.1.mean));
@@ -163,12 +164,6 @@ fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
             }
         },
     )
-}
-
-impl PipelineSummary {
-    const fn figures(&self) -> &std::collections::BTreeMap<String, Estimate> {
-        &self.figures
-    }
 }
 
 fn figure_head(figure: &Figure) -> Markup {
