@@ -53,12 +53,8 @@ impl Gait {
         Self { leg_m, relative_speed: (speed_mps / leg_m).clamp(0.0, 2.3) }
     }
 
-    /// Way that one cycle of two steps covers, m: 1.346 sqrt(RV) leg lengths.
-    pub fn cycle_length_m(&self) -> f64 {
-        1.346 * self.relative_speed.sqrt() * self.leg_m
-    }
-
-    /// Duration of a cycle, s; infinite at rest.
+    /// Duration of a cycle of two steps, s, in which the body covers 1.346
+    /// sqrt(RV) leg lengths; infinite at rest.
     pub fn cycle_s(&self) -> f64 {
         1.346 / self.relative_speed.sqrt()
     }
@@ -138,7 +134,7 @@ mod tests {
         let gait = Gait::new(1.70, 1.3);
         assert!((gait.relative_speed - 1.56).abs() < 0.01);
         assert!((gait.cycle_s() - 1.08).abs() < 0.01, "{}", gait.cycle_s());
-        assert!((0.5 * gait.cycle_length_m() - 0.70).abs() < 0.01);
+        assert!((0.5 * 1.3 * gait.cycle_s() - 0.70).abs() < 0.01);
         let (low, high) = range(|phase| gait.pelvis(phase).up_m);
         assert!((high - low - 0.04).abs() < 0.003, "{}", high - low);
         let (right, left) = range(|phase| gait.pelvis(phase).left_m);
@@ -168,7 +164,8 @@ mod tests {
         #[test]
         fn one_cycle_takes_its_length_at_its_speed(h in 1.4..2.0f64, v in 0.2..1.55f64) {
             let gait = Gait::new(h, v);
-            prop_assert!((gait.cycle_length_m() - v * gait.cycle_s()).abs() < 1e-9);
+            let length_m = 1.346 * (v / (LEG * h)).sqrt() * LEG * h;
+            prop_assert!((length_m - v * gait.cycle_s()).abs() < 1e-9);
         }
 
         #[test]
