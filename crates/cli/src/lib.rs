@@ -24,6 +24,7 @@ mod run;
 mod sample;
 mod scoring;
 mod signals;
+mod simulate;
 mod suggest;
 
 use std::process::ExitCode;
@@ -67,6 +68,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Config { plugin } => commands::config(registry, plugin),
         Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
         Command::Eval(args) => commands::eval(args),
+        Command::Simulate(args) => simulate::simulate(args),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }
