@@ -4,6 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
+use crate::simulate::SimulateArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.
@@ -58,6 +59,9 @@ pub enum Command {
     /// Scores tracks against the truth
     #[command(after_help = EVAL_HELP)]
     Eval(EvalArgs),
+    /// Draws the log of a robot among people, with the truth, from a scene
+    #[command(after_help = SIMULATE_HELP)]
+    Simulate(SimulateArgs),
     /// Says what a log contains and what a pipeline could use of it
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -112,6 +116,14 @@ Examples:
   tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf
   tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf --similarity metres
   tagalong eval --truth MOT17-04/gt/gt.txt --tracks MOT17-04.txt --format json | jq .HOTA";
+
+const SIMULATE_HELP: &str = "\
+Same scene and seed, same bytes.
+
+Examples:
+  tagalong simulate configs/scenes/crossing.toml
+  tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7
+  tagalong simulate configs/scenes/crossing.toml --gallery pictures";
 
 const INSPECT_HELP: &str = "\
 Examples:

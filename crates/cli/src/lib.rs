@@ -25,6 +25,7 @@ mod run;
 mod sample;
 mod scoring;
 mod signals;
+mod simulate;
 mod suggest;
 
 use std::process::ExitCode;
@@ -69,6 +70,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
         Command::Bench(args) => bench::bench(args, registry),
         Command::Eval(args) => commands::eval(args),
+        Command::Simulate(args) => simulate::simulate(args),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }

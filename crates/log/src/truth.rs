@@ -45,6 +45,12 @@ pub struct TruthPerson {
     /// The part of it that can be seen, likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub visible_px: Option<[f64; 4]>,
+    /// Middle of the trunk in the robot frame, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torso_in_robot_m: Option<[f64; 3]>,
+    /// Who hides most of what cannot be seen of the upper body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub occluder: Option<i64>,
     /// Visible fraction of the upper body, 0 to 1.
     #[serde(default = "whole")]
     pub visible: f64,

@@ -4,7 +4,7 @@
 //! with upper-body boxes, ids and trails; what was dropped is drawn faintly with
 //! the test that dropped it. On the right the same people from above.
 
-mod canvas;
+pub mod canvas;
 mod image_view;
 mod plan_view;
 mod trails;
@@ -14,7 +14,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use canvas::{Canvas, Ink};
+use self::canvas::{Canvas, Ink};
 use nalgebra::Isometry2;
 use tagalong_core::{Camera, Images, RgbImage};
 use tagalong_pipeline::FrameReport;
@@ -83,7 +83,8 @@ fn colour_of(id: u32) -> Ink {
     Ink::solid(COLOURS[id as usize % COLOURS.len()])
 }
 
-fn write_png(path: &Path, image: &RgbImage) -> Result<(), png::EncodingError> {
+/// Writes a picture.
+pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), png::EncodingError> {
     let file = BufWriter::new(File::create(path)?);
     let mut encoder = png::Encoder::new(file, image.width() as u32, image.height() as u32);
     encoder.set_color(png::ColorType::Rgb);

@@ -10,6 +10,7 @@ use tagalong_core::Stamp;
 
 use super::WriteError;
 use crate::msgs::{Message, encode};
+use crate::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame};
 
 /// Writes any ROS 2 messages to an MCAP file, as a robot's recorder would. The
 /// file has a partial name until [`MessageLog::finish`].
@@ -53,18 +54,44 @@ impl MessageLog {
     ) -> Result<(), WriteError> {
         let channel_id = match self.channels.get(topic) {
             Some(id) => *id,
-            None => self.open::<M>(topic)?,
+            None => self.open(topic, (M::TYPE, "ros2msg", M::DEFINITION), "cdr")?,
         };
-        let at = captured.nanos();
+        self.put(channel_id, captured, &encode(message))
+    }
+
+    /// Writes the truth of an image to [`TRUTH_TOPIC`]; `recorded` is its
+    /// publish time and its log time.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn send_truth(&mut self, recorded: Stamp, truth: &TruthFrame) -> Result<(), WriteError> {
+        let channel_id = match self.channels.get(TRUTH_TOPIC) {
+            Some(id) => *id,
+            None => {
+                let schema = TruthFrame::schema();
+                self.open(TRUTH_TOPIC, (TRUTH_SCHEMA, "jsonschema", &schema), "json")?
+            }
+        };
+        self.put(channel_id, recorded, &truth.encode())
+    }
+
+    fn put(&mut self, channel_id: u16, at: Stamp, data: &[u8]) -> Result<(), WriteError> {
+        let at = at.nanos();
         let header = MessageHeader { channel_id, sequence: 0, log_time: at, publish_time: at };
-        let written = self.writer.write_to_known_channel(&header, &encode(message));
+        let written = self.writer.write_to_known_channel(&header, data);
         written.map_err(failed(&self.partial))
     }
 
-    fn open<M: Message>(&mut self, topic: &str) -> Result<u16, WriteError> {
-        let schema = self.writer.add_schema(M::TYPE, "ros2msg", M::DEFINITION.as_bytes());
+    /// Opens a channel; a schema is its name, its encoding and its text.
+    fn open(
+        &mut self,
+        topic: &str,
+        (name, encoding, text): (&str, &str, &str),
+        messages: &str,
+    ) -> Result<u16, WriteError> {
+        let schema = self.writer.add_schema(name, encoding, text.as_bytes());
         let schema = schema.map_err(failed(&self.partial))?;
-        let channel = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
+        let channel = self.writer.add_channel(schema, topic, messages, &BTreeMap::new());
         let id = channel.map_err(failed(&self.partial))?;
         self.channels.insert(topic.to_owned(), id);
         Ok(id)

@@ -1,0 +1,202 @@
+use std::path::Path;
+
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use tagalong_core::{Camera, DepthImage, GreyImage, Lens, Rect, RgbImage, Stamp};
+use tagalong_log::msgs::{
+    CameraInfo, CompressedImage, Header, Image, Odometry, StringMsg, TFMessage, TransformStamped,
+};
+use tagalong_log::write::{MessageLog, WriteError};
+use tagalong_log::{TruthFrame, TruthPerson};
+use tagalong_sim::{Event, OdometryReading, Scene, Shot, Truth};
+
+/// The moment at which every drawn log starts.
+const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
+const CAMERA_FRAME: &str = "camera_color_optical_frame";
+/// As cameras of robots send it.
+const JPEG_QUALITY: u8 = 85;
+/// Where the scene itself is kept.
+const SCENE_TOPIC: &str = "/simulation/scene";
+
+/// Writes what the robot records, under the topics that robots use.
+pub struct Recorder {
+    log: MessageLog,
+    camera: Camera,
+    baseline_m: f64,
+}
+
+impl Recorder {
+    /// Starts a log with the scene and the mount of the camera.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the disk says no.
+    pub fn create(path: &Path, scene: &Scene, camera: &Camera) -> Result<Self, WriteError> {
+        let mut log = MessageLog::create(path)?;
+        let text = toml::to_string(scene).unwrap_or_default();
+        log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
+        log.send("/tf_static", EPOCH, &mount(camera))?;
+        Ok(Self { log, camera: camera.clone(), baseline_m: scene.camera.baseline_m })
+    }
+
+    /// Writes one thing.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the disk says no.
+    pub fn write(&mut self, event: &Event) -> Result<(), WriteError> {
+        match event {
+            Event::Odometry(reading) => {
+                self.log.send("/odom", after(reading.at_ns), &odometry(reading))
+            }
+            Event::Shot(shot) => self.shot(shot),
+        }
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the disk says no.
+    pub fn finish(self) -> Result<(), WriteError> {
+        self.log.finish()
+    }
+
+    fn shot(&mut self, shot: &Shot) -> Result<(), WriteError> {
+        let (captured, recorded) = (after(shot.captured_ns), after(shot.recorded_ns));
+        let header = Header::new(captured, CAMERA_FRAME);
+        let images = &shot.images;
+        if let Some(colour) = &images.colour {
+            self.info("color", recorded, &header, 0.0)?;
+            self.colour(recorded, &header, colour)?;
+        }
+        if let Some(depth) = &images.depth {
+            self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
+            self.depth(recorded, &header, depth)?;
+        }
+        let pair = [("left", &images.grey, 0.0), ("right", &images.right, self.baseline_m)];
+        for (side, image, aside_m) in pair {
+            if let Some(image) = image {
+                self.info(side, recorded, &header, aside_m)?;
+                self.grey(side, recorded, &header, image)?;
+            }
+        }
+        self.log.send_truth(recorded, &truth(captured, &shot.truth))
+    }
+
+    fn colour(&mut self, at: Stamp, header: &Header, image: &RgbImage) -> Result<(), WriteError> {
+        let data = jpeg(image);
+        let format = "rgb8; jpeg compressed bgr8".into();
+        let message = CompressedImage { header: header.clone(), format, data: &data };
+        self.log.send("/camera/color/image_raw/compressed", at, &message)
+    }
+
+    fn depth(&mut self, at: Stamp, header: &Header, depth: &DepthImage) -> Result<(), WriteError> {
+        let data: Vec<u8> = depth.pixels().iter().flat_map(|z| millimetres(*z)).collect();
+        let message = self.raw(header, "16UC1", 2, &data);
+        self.log.send("/camera/aligned_depth_to_color/image_raw", at, &message)
+    }
+
+    fn grey(
+        &mut self,
+        side: &str,
+        at: Stamp,
+        header: &Header,
+        image: &GreyImage,
+    ) -> Result<(), WriteError> {
+        let message = self.raw(header, "mono8", 1, image.pixels());
+        self.log.send(&format!("/camera/{side}/image_rect"), at, &message)
+    }
+
+    fn raw<'a>(&self, header: &Header, encoding: &str, bytes: u32, data: &'a [u8]) -> Image<'a> {
+        let (width, height) = (self.camera.width as u32, self.camera.height as u32);
+        let encoding = encoding.into();
+        let step = bytes * width;
+        Image { header: header.clone(), height, width, encoding, is_bigendian: 0, step, data }
+    }
+
+    /// The calibration of a camera that stands `aside_m` to the right.
+    fn info(
+        &mut self,
+        name: &str,
+        at: Stamp,
+        header: &Header,
+        aside_m: f64,
+    ) -> Result<(), WriteError> {
+        let Lens::Pinhole(lens) = self.camera.lens else { return Ok(()) };
+        let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
+        let info = CameraInfo {
+            header: header.clone(),
+            height: self.camera.height as u32,
+            width: self.camera.width as u32,
+            distortion_model: "plumb_bob".into(),
+            d: vec![0.0; 5],
+            k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            p: [fx, 0.0, cx, -fx * aside_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ..CameraInfo::default()
+        };
+        self.log.send(&format!("/camera/{name}/camera_info"), at, &info)
+    }
+}
+
+fn after(start_ns: u64) -> Stamp {
+    Stamp::from_nanos(EPOCH.nanos() + start_ns)
+}
+
+fn jpeg(image: &RgbImage) -> Vec<u8> {
+    let mut out = Vec::new();
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let written = JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY).encode(
+        image.pixels().as_flattened(),
+        width,
+        height,
+        ExtendedColorType::Rgb8,
+    );
+    debug_assert!(written.is_ok(), "scenes have at most 4096 columns and rows");
+    out
+}
+
+/// 0 is "no reading", as in REP 118.
+fn millimetres(depth_m: f32) -> [u8; 2] {
+    let millimetres = if depth_m.is_finite() { (1000.0 * depth_m).round() as u16 } else { 0 };
+    millimetres.to_le_bytes()
+}
+
+fn mount(camera: &Camera) -> TFMessage {
+    TFMessage {
+        transforms: vec![TransformStamped {
+            header: Header::new(EPOCH, "base_link"),
+            child_frame_id: CAMERA_FRAME.into(),
+            transform: (&camera.robot_from_camera).into(),
+        }],
+    }
+}
+
+fn odometry(reading: &OdometryReading) -> Odometry {
+    let planar = reading.odom_from_robot;
+    let at = Translation3::new(planar.translation.x, planar.translation.y, 0.0);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
+    let mut odometry = Odometry {
+        header: Header::new(after(reading.at_ns), "odom"),
+        child_frame_id: "base_link".into(),
+        ..Odometry::default()
+    };
+    odometry.pose.pose = (&Isometry3::from_parts(at, turn)).into();
+    odometry.twist.twist.linear.x = reading.speed_mps;
+    odometry.twist.twist.angular.z = reading.turn_rate;
+    odometry
+}
+
+fn truth(captured: Stamp, people: &[Truth]) -> TruthFrame {
+    let corners = |rect: Rect| [rect.x, rect.y, rect.width, rect.height];
+    let person = |truth: &Truth| TruthPerson {
+        id: i64::from(truth.id),
+        head_in_robot_m: Some(truth.head_in_robot.coords.into()),
+        torso_in_robot_m: Some(truth.torso_in_robot.coords.into()),
+        upper_body_px: truth.upper_body.map(corners),
+        visible_px: truth.visible.map(corners),
+        visible: truth.visible_fraction,
+        occluder: truth.occluder.map(i64::from),
+        ignore: truth.ignore,
+    };
+    TruthFrame { stamp_ns: captured.nanos(), people: people.iter().map(person).collect() }
+}

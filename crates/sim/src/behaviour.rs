@@ -1,0 +1,293 @@
+//! What people do: they walk along their ways, keep off each other and off
+//! furniture, and some of them play tricks when the robot cannot see them.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::body::Stance;
+use crate::gait::Gait;
+use crate::person::Person;
+use crate::scene::{AtEnd, PersonSettings, Trick};
+
+/// How fast a walker's velocity can change, m/s².
+const MAX_ACCELERATION: f64 = 1.2;
+/// How fast a body turns, rad/s.
+const MAX_TURN: f64 = 2.6;
+/// A point of the path is reached at this distance, m.
+const REACHED_M: f64 = 0.25;
+/// Strength, m/s², and reach, m, of the push between people (Helbing & Molnár
+/// 1995, with the reach of indoor crowds).
+const PUSH: f64 = 2.2;
+const PUSH_REACH_M: f64 = 0.45;
+/// For how long somebody who plays [`Trick::Stop`] stays hidden, s.
+const HIDE_S: f64 = 3.0;
+
+/// A round thing that people walk around.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Obstacle {
+    /// Where it stands, m.
+    pub at: Point2<f64>,
+    /// Its radius, m.
+    pub radius_m: f64,
+}
+
+/// A person on the way.
+#[derive(Clone, Debug)]
+pub struct Walker {
+    /// Size and appearance.
+    pub person: Person,
+    /// Where they are and how they stand.
+    pub stance: Stance,
+    settings: PersonSettings,
+    velocity: Vector2<f64>,
+    /// Index into the path of the point ahead; past its end on arrival.
+    ahead: usize,
+    waits_until_s: f64,
+    tricked: bool,
+}
+
+impl Walker {
+    /// Somebody at the first point of the path, which must exist.
+    pub fn new(person: Person, settings: PersonSettings) -> Self {
+        let points: Vec<Point2<f64>> = settings.path.iter().map(|p| Point2::from(*p)).collect();
+        let way = points.get(1).map_or(Vector2::x(), |next| next - points[0]);
+        let heading_rad = settings.heading_deg.map_or(way.y.atan2(way.x), f64::to_radians);
+        let stance = Stance { place: points[0], heading_rad, speed_mps: 0.0, phase: 0.0 };
+        let waits_until_s = settings.start_s;
+        Self {
+            person,
+            stance,
+            settings,
+            velocity: Vector2::zeros(),
+            ahead: 1,
+            waits_until_s,
+            tricked: false,
+        }
+    }
+
+    /// Moves by a short time. `keep_off` are the places of everybody else, the
+    /// robot included.
+    pub fn step(&mut self, now_s: f64, dt: f64, keep_off: &[Point2<f64>], obstacles: &[Obstacle]) {
+        self.look_ahead();
+        let wanted = if now_s < self.waits_until_s { Vector2::zeros() } else { self.wanted() };
+        let mut change = (wanted - self.velocity) / 0.5;
+        // Who stands lets the others do the avoiding.
+        if wanted != Vector2::zeros() {
+            change += keep_off.iter().map(|p| self.push(p, 0.6)).sum::<Vector2<f64>>();
+            change +=
+                obstacles.iter().map(|o| self.push(&o.at, 0.25 + o.radius_m)).sum::<Vector2<f64>>();
+        }
+        let limit = MAX_ACCELERATION.max(2.0 * self.velocity.norm());
+        self.velocity += change.cap_magnitude(limit) * dt;
+        self.velocity = self.velocity.cap_magnitude(1.3 * self.settings.speed_mps.max(0.1));
+        self.stance.place += self.velocity * dt;
+        self.stance.speed_mps = self.velocity.norm();
+        self.turn(dt);
+        self.stride(dt);
+    }
+
+    /// Goes on to the next point of the path where one is reached.
+    fn look_ahead(&mut self) {
+        let path = &self.settings.path;
+        let reached =
+            |point: &[f64; 2]| (self.stance.place - Point2::from(*point)).norm() < REACHED_M;
+        if path.len() < 2 || !path.get(self.ahead).is_some_and(reached) {
+            return;
+        }
+        self.ahead += 1;
+        if self.ahead == path.len() {
+            match self.settings.at_end {
+                AtEnd::Stop => {}
+                AtEnd::Loop => self.ahead = 0,
+                AtEnd::Return => self.reverse(),
+            }
+        }
+    }
+
+    /// From here back along the path.
+    fn reverse(&mut self) {
+        let left = self.settings.path.len().saturating_sub(self.ahead);
+        self.settings.path.reverse();
+        self.ahead = (left + 1).min(self.settings.path.len() - 1);
+        if left == 0 {
+            self.ahead = 1;
+        }
+    }
+
+    fn wanted(&self) -> Vector2<f64> {
+        let Some(goal) = self.settings.path.get(self.ahead) else { return Vector2::zeros() };
+        let way = Point2::from(*goal) - self.stance.place;
+        let last =
+            self.ahead + 1 == self.settings.path.len() && self.settings.at_end == AtEnd::Stop;
+        // Brakes in time for the end, and slows down while facing elsewhere.
+        let speed = if last {
+            self.settings.speed_mps.min(1.2 * way.norm())
+        } else {
+            self.settings.speed_mps
+        };
+        let off = angle_between(way.y.atan2(way.x), self.stance.heading_rad).abs();
+        way.try_normalize(1e-6).unwrap_or_default() * speed * (1.0 - 0.7 * (off / 1.5).min(1.0))
+    }
+
+    /// The push away from a place, stronger from ahead than from behind, with a
+    /// part to the right so that people who meet head-on pass each other.
+    fn push(&self, from: &Point2<f64>, radius_m: f64) -> Vector2<f64> {
+        let away = self.stance.place - from;
+        let distance = away.norm();
+        if !(1e-6..2.5 + radius_m).contains(&distance) {
+            return Vector2::zeros();
+        }
+        let away = away / distance;
+        let heading = Vector2::new(self.stance.heading_rad.cos(), self.stance.heading_rad.sin());
+        let ahead = 0.5 * (1.0 - heading.dot(&away));
+        let right = Vector2::new(heading.y, -heading.x);
+        let strength = PUSH * ((radius_m - distance) / PUSH_REACH_M).exp().min(3.0);
+        (away + right * (0.9 * ahead)) * strength * (0.25 + 0.75 * ahead)
+    }
+
+    fn turn(&mut self, dt: f64) {
+        let v = self.velocity;
+        if self.stance.speed_mps > 0.08 {
+            let off = angle_between(v.y.atan2(v.x), self.stance.heading_rad);
+            self.stance.heading_rad += off.clamp(-MAX_TURN * dt, MAX_TURN * dt);
+        } else if self.settings.spin_deg_per_s != 0.0 {
+            self.stance.heading_rad += self.settings.spin_deg_per_s.to_radians() * dt;
+        } else if let Some(goal) = self.settings.path.get(self.ahead) {
+            let way = Point2::from(*goal) - self.stance.place;
+            let off = angle_between(way.y.atan2(way.x), self.stance.heading_rad);
+            self.stance.heading_rad += off.clamp(-MAX_TURN * dt, MAX_TURN * dt);
+        }
+    }
+
+    fn stride(&mut self, dt: f64) {
+        let cycle_s = Gait::new(self.person.build.height_m, self.stance.speed_mps).cycle_s();
+        self.stance.phase = (self.stance.phase + dt / cycle_s).rem_euclid(1.0);
+    }
+
+    fn plays(&mut self, trick: Trick) -> bool {
+        let plays = self.settings.trick == trick && !self.tricked;
+        self.tricked |= plays;
+        plays
+    }
+}
+
+/// Lets those play their tricks who are hidden; `hidden_by[i]` says behind whom
+/// walker `i` is.
+pub fn play_tricks(walkers: &mut [Walker], hidden_by: &[Option<usize>], now_s: f64) {
+    for (i, hider) in hidden_by.iter().enumerate() {
+        let Some(hider) = *hider else { continue };
+        if walkers[i].plays(Trick::TurnBack) {
+            walkers[i].reverse();
+        } else if walkers[i].plays(Trick::Stop) {
+            walkers[i].waits_until_s = now_s + HIDE_S;
+        } else if walkers[i].plays(Trick::Swap) {
+            let (mine, theirs) = (walkers[i].way(), walkers[hider].way());
+            walkers[i].take(theirs);
+            walkers[hider].take(mine);
+            walkers[hider].tricked = true;
+        }
+    }
+}
+
+impl Walker {
+    fn way(&self) -> (Vec<[f64; 2]>, usize, AtEnd) {
+        (self.settings.path.clone(), self.ahead, self.settings.at_end)
+    }
+
+    fn take(&mut self, (path, ahead, at_end): (Vec<[f64; 2]>, usize, AtEnd)) {
+        self.settings.path = path;
+        self.ahead = ahead;
+        self.settings.at_end = at_end;
+    }
+}
+
+/// Behind whom each walker is, seen from a place: the middle of their body lies
+/// behind somebody at least 0.3 m nearer, 0.2 m to either side of whose middle
+/// count as body.
+pub fn hidden_by(walkers: &[Walker], seen_from: &Point2<f64>) -> Vec<Option<usize>> {
+    let polar: Vec<(f64, f64)> = walkers
+        .iter()
+        .map(|w| w.stance.place - seen_from)
+        .map(|way| (way.norm(), way.y.atan2(way.x)))
+        .collect();
+    let hides = |near: (f64, f64), far: (f64, f64)| {
+        near.0 + 0.3 < far.0 && angle_between(near.1, far.1).abs() < (0.2 / near.0.max(0.3)).atan()
+    };
+    polar.iter().map(|far| polar.iter().position(|near| hides(*near, *far))).collect()
+}
+
+/// `a - b`, within half a turn.
+fn angle_between(a: f64, b: f64) -> f64 {
+    (a - b).sin().atan2((a - b).cos())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn walker(path: &[[f64; 2]], trick: Trick) -> Walker {
+        let settings = PersonSettings { path: path.to_vec(), trick, ..PersonSettings::default() };
+        Walker::new(Person::random(&mut Random::new(1, 0)), settings)
+    }
+
+    /// Walks for some time; calls `see` after every step.
+    fn walk(walkers: &mut [Walker], seconds: f64, mut see: impl FnMut(&[Walker])) {
+        for step in 0..(seconds / 0.02) as usize {
+            let now_s = step as f64 * 0.02;
+            let hidden = hidden_by(walkers, &Point2::origin());
+            play_tricks(walkers, &hidden, now_s);
+            for i in 0..walkers.len() {
+                let others: Vec<_> = (0..walkers.len())
+                    .filter(|j| *j != i)
+                    .map(|j| walkers[j].stance.place)
+                    .collect();
+                walkers[i].step(now_s, 0.02, &others, &[]);
+            }
+            see(walkers);
+        }
+    }
+
+    #[test]
+    fn a_walker_arrives_and_stops_there() {
+        let mut walkers = [walker(&[[1.0, 1.0], [4.0, 1.0], [4.0, 3.0]], Trick::None)];
+        let mut fastest = 0f64;
+        walk(&mut walkers, 12.0, |w| fastest = fastest.max(w[0].stance.speed_mps));
+        assert!((walkers[0].stance.place - Point2::new(4.0, 3.0)).norm() < 0.3);
+        assert!(walkers[0].stance.speed_mps < 0.02 && (fastest - 1.1).abs() < 0.1, "{fastest}");
+    }
+
+    #[test]
+    fn people_who_meet_head_on_pass_each_other_without_touching() {
+        let mut walkers = [
+            walker(&[[1.0, 1.0], [7.0, 1.0]], Trick::None),
+            walker(&[[7.0, 1.0], [1.0, 1.0]], Trick::None),
+        ];
+        let mut nearest = f64::MAX;
+        walk(&mut walkers, 12.0, |w| {
+            nearest = nearest.min((w[0].stance.place - w[1].stance.place).norm())
+        });
+        assert!(nearest > 0.4, "{nearest}");
+        assert!(walkers[0].stance.place.x > 6.0 && walkers[1].stance.place.x < 2.0);
+    }
+
+    #[test]
+    fn tricks_are_played_behind_somebody() {
+        let stands = || walker(&[[2.0, 0.0]], Trick::None);
+        let passes = |trick| walker(&[[4.0, -2.0], [4.0, 2.0]], trick);
+        let mut back = [stands(), passes(Trick::TurnBack)];
+        walk(&mut back, 8.0, |_| {});
+        assert!(back[1].stance.place.y < -1.5, "{}", back[1].stance.place);
+        let mut straight = [stands(), passes(Trick::None)];
+        walk(&mut straight, 8.0, |_| {});
+        assert!(straight[1].stance.place.y > 1.5);
+        let mut stop = [stands(), passes(Trick::Stop)];
+        let mut hidden_steps = 0;
+        walk(&mut stop, 8.0, |w| {
+            hidden_steps += usize::from(hidden_by(w, &Point2::origin())[1] == Some(0));
+        });
+        assert!(hidden_steps as f64 * 0.02 > 2.5, "{hidden_steps}");
+        let mut swap = [walker(&[[3.0, 2.0], [3.0, -2.0]], Trick::None), passes(Trick::Swap)];
+        walk(&mut swap, 9.0, |_| {});
+        assert!(swap[0].stance.place.y > 1.0 && swap[1].stance.place.y < -1.0, "sides are swapped");
+    }
+}

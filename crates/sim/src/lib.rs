@@ -1,0 +1,48 @@
+//! Drawn worlds: rooms with people in them, seen by the sensors of a moving
+//! robot, and the truth about all of it.
+//!
+//! Real logs with exact truth are rare. A drawn one replaces them only if it is
+//! hard in the ways in which real ones are: people have the sizes, the gait and
+//! the habits of people, furniture has the silhouettes of people, depth has
+//! steps, holes and shadows, odometry drifts, and the camera is not quite where
+//! the log says that it is.
+//!
+//! A [`Scene`] is read from TOML; a [`Simulation`] hands out [`Event`]s in the
+//! order in which a robot would have recorded them. The caller may steer the
+//! robot between two events: images are drawn from where it really is.
+//! The same scene gives the same events on any number of threads.
+//!
+//! ```
+//! use tagalong_sim::{Event, Scene, Simulation};
+//! let scene = Scene::parse("duration_s = 0.2\n[camera]\nwidth = 32\nheight = 24\n").unwrap();
+//! let mut simulation = Simulation::new(&scene, 2);
+//! let mut images = 0;
+//! while let Some(event) = simulation.next_event() {
+//!     images += usize::from(matches!(event, Event::Shot(_)));
+//! }
+//! assert_eq!(images, 2);
+//! ```
+//!
+//! World coordinates have X along the room, Y across it and Z up, in metres.
+
+mod behaviour;
+mod body;
+mod gait;
+mod material;
+mod person;
+mod random;
+mod render;
+mod robot;
+mod room;
+mod scene;
+mod sensor;
+mod shape;
+mod simulation;
+mod world;
+
+pub use person::Extra;
+pub use scene::{
+    AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
+    LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Trick,
+};
+pub use simulation::{Event, OdometryReading, Shot, Simulation, Truth};

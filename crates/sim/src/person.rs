@@ -1,0 +1,301 @@
+//! People as solids: flesh, clothes, hair and what they carry, on a skeleton.
+
+use nalgebra::{Point3, Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::body::{Build, Skeleton};
+use crate::material::{Colour, Material, Pattern, scaled};
+use crate::random::Random;
+use crate::shape::{Form, Shape};
+
+/// What somebody wears and carries.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// Face and hands.
+    pub skin: Colour,
+    /// Hair.
+    pub hair: Colour,
+    /// Hair reaches the shoulders.
+    pub long_hair: bool,
+    /// Body and arms.
+    pub top: Material,
+    /// Legs.
+    pub trousers: Material,
+    /// Feet.
+    pub shoes: Material,
+    /// Things put on over it.
+    pub extras: Vec<Extra>,
+}
+
+/// Something that changes a silhouette.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extra {
+    /// A coat down to the knees, of the top's cloth.
+    Coat,
+    /// A backpack.
+    Backpack,
+    /// A brimmed hat.
+    Hat,
+    /// A bag in the left hand.
+    Bag,
+}
+
+const SKINS: &[Colour] = &[
+    [0.62, 0.42, 0.33],
+    [0.52, 0.33, 0.25],
+    [0.38, 0.22, 0.15],
+    [0.22, 0.12, 0.08],
+    [0.12, 0.065, 0.045],
+];
+const HAIRS: &[Colour] =
+    &[[0.02, 0.015, 0.012], [0.06, 0.035, 0.02], [0.15, 0.08, 0.04], [0.4, 0.28, 0.13], [0.35; 3]];
+const CLOTHS: &[Colour] = &[
+    [0.35, 0.05, 0.05],
+    [0.05, 0.12, 0.32],
+    [0.06, 0.22, 0.1],
+    [0.55, 0.5, 0.42],
+    [0.05; 3],
+    [0.7; 3],
+    [0.4, 0.27, 0.08],
+    [0.2, 0.08, 0.25],
+    [0.12, 0.3, 0.35],
+    [0.25; 3],
+];
+const TROUSERS: &[Colour] =
+    &[[0.03, 0.045, 0.1], [0.025; 3], [0.16; 3], [0.3, 0.24, 0.15], [0.08, 0.12, 0.2]];
+
+impl Look {
+    /// Somebody's clothes.
+    pub fn random(random: &mut Random) -> Self {
+        let (cloth, second) = (random.pick(CLOTHS), random.pick(CLOTHS));
+        let pattern = random.pick(&[
+            Pattern::Plain,
+            Pattern::Plain,
+            Pattern::Stripes(0.07),
+            Pattern::Checks(0.06),
+            Pattern::Mottled(0.05),
+        ]);
+        let chances =
+            [(Extra::Coat, 0.15), (Extra::Backpack, 0.2), (Extra::Hat, 0.12), (Extra::Bag, 0.15)];
+        // Dyes that look black reflect infrared, carbon black does not.
+        let infrared = if random.chance(0.12) { 0.06 } else { random.between(0.3, 0.8) };
+        Self {
+            skin: random.pick(SKINS),
+            hair: random.pick(HAIRS),
+            long_hair: random.chance(0.35),
+            top: Material::patterned(cloth, second, pattern).with_infrared(infrared),
+            trousers: Material::patterned(random.pick(TROUSERS), [0.1; 3], Pattern::Plain)
+                .with_infrared(random.between(0.2, 0.6)),
+            shoes: Material::plain(scaled(random.pick(TROUSERS), 0.8)),
+            extras: chances.iter().filter(|(_, p)| random.chance(*p)).map(|(e, _)| *e).collect(),
+        }
+    }
+}
+
+/// A person to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Person {
+    /// The size.
+    pub build: Build,
+    /// The appearance.
+    pub look: Look,
+}
+
+impl Person {
+    /// Somebody of the population.
+    pub fn random(random: &mut Random) -> Self {
+        Self { build: Build::random(random), look: Look::random(random) }
+    }
+
+    /// The solids of the person, those of the upper body (head, trunk above the
+    /// hips, arms) first; also how many these are.
+    pub fn shapes(&self, skeleton: &Skeleton) -> (Vec<Shape>, usize) {
+        let mut drawing = Drawing {
+            s: skeleton,
+            h: self.build.height_m,
+            w: self.build.height_m * self.build.breadth,
+            look: &self.look,
+            shapes: Vec::with_capacity(32),
+        };
+        drawing.head();
+        drawing.trunk();
+        drawing.arms();
+        drawing.extras();
+        let upper = drawing.shapes.len();
+        drawing.legs();
+        (drawing.shapes, upper)
+    }
+}
+
+struct Drawing<'a> {
+    s: &'a Skeleton,
+    h: f64,
+    /// Height times breadth: for widths.
+    w: f64,
+    look: &'a Look,
+    shapes: Vec<Shape>,
+}
+
+impl Drawing<'_> {
+    fn head(&mut self) {
+        let (h, turn) = (self.h, self.s.world_from_head);
+        let skin = Material::plain(self.look.skin).with_infrared(0.6);
+        let hair =
+            Material::patterned(self.look.hair, self.look.hair, Pattern::Plain).with_infrared(0.35);
+        let half = Vector3::new(0.056, 0.045, 0.065) * h;
+        let pattern = Pattern::Head { half, hairline: 0.62 };
+        let face = Material { second: self.look.hair, pattern, ..skin };
+        self.ellipsoid(self.s.head, turn, half, face);
+        let at = |x: f64, y: f64, z: f64| self.s.head + turn * (Vector3::new(x, y, z) * h);
+        let (bridge, tip) = (at(0.053, 0.0, 0.008), at(0.060, 0.0, -0.016));
+        let jaw = at(0.016, 0.0, -0.040);
+        let ears = [at(-0.003, 0.045, -0.004), at(-0.003, -0.045, -0.004)];
+        let (crown, back) = (at(-0.008, 0.0, 0.022), at(-0.026, 0.0, -0.045));
+        self.limb(bridge, tip, 0.0045 * h, 0.0085 * h, skin);
+        self.ellipsoid(jaw, turn, Vector3::new(0.036, 0.034, 0.032) * h, skin);
+        for ear in ears {
+            self.ellipsoid(ear, turn, Vector3::new(0.010, 0.005, 0.017) * h, skin);
+        }
+        self.ellipsoid(crown, turn, Vector3::new(0.052, 0.049, 0.050) * h, hair);
+        if self.look.long_hair {
+            self.ellipsoid(back, turn, Vector3::new(0.036, 0.054, 0.085) * h, hair);
+        }
+        let neck = self.s.chest - Vector3::new(0.0, 0.0, 0.02 * h);
+        self.limb(neck, self.s.head, 0.036 * h, 0.030 * h, skin);
+    }
+
+    fn trunk(&mut self) {
+        let (h, w, turn) = (self.h, self.w, self.s.world_from_thorax);
+        let top = self.look.top;
+        let down = |z: f64| self.s.chest + turn * Vector3::new(0.005 * h, 0.0, -z * h);
+        let (chest, belly) = (down(0.085), down(0.185));
+        let collar = [0.07, -0.07]
+            .map(|y| self.s.chest + turn * Vector3::new(-0.006 * h, y * w, -0.024 * h));
+        let slope = [0.012, -0.012]
+            .map(|y| self.s.chest + turn * Vector3::new(-0.008 * h, y * w, 0.006 * h));
+        self.limb(collar[0], collar[1], 0.046 * h, 0.046 * h, top);
+        for (neck, shoulder) in slope.into_iter().zip(self.s.shoulders) {
+            self.limb(neck, shoulder, 0.036 * h, 0.030 * h, top);
+        }
+        self.ellipsoid(chest, turn, Vector3::new(0.068 * h, 0.102 * w, 0.115 * h), top);
+        self.ellipsoid(belly, turn, Vector3::new(0.064 * h, 0.090 * w, 0.120 * h), top);
+    }
+
+    fn arms(&mut self) {
+        let (h, w) = (self.h, self.w);
+        let skin = Material::plain(self.look.skin).with_infrared(0.6);
+        for side in 0..2 {
+            let (shoulder, elbow) = (self.s.shoulders[side], self.s.elbows[side]);
+            let wrist = self.s.wrists[side];
+            let hand = wrist + (wrist - elbow).normalize() * (0.055 * h);
+            self.limb(shoulder, elbow, 0.034 * w, 0.026 * w, self.look.top);
+            self.limb(elbow, wrist, 0.026 * w, 0.018 * w, self.look.top);
+            self.limb(wrist, hand, 0.016 * w, 0.020 * w, skin);
+        }
+    }
+
+    fn legs(&mut self) {
+        let (h, w, trousers) = (self.h, self.w, self.look.trousers);
+        let turn = self.s.world_from_pelvis;
+        let seat = self.s.pelvis + Vector3::new(0.0, 0.0, 0.015 * h);
+        self.ellipsoid(seat, turn, Vector3::new(0.066 * h, 0.098 * w, 0.070 * h), trousers);
+        for side in 0..2 {
+            let (hip, knee) = (self.s.hips[side], self.s.knees[side]);
+            let ankle = self.s.ankles[side];
+            let calf = knee + (ankle - knee) * 0.35;
+            self.limb(hip, knee, 0.054 * w, 0.036 * w, trousers);
+            self.limb(knee, calf, 0.036 * w, 0.035 * w, trousers);
+            self.limb(calf, ankle, 0.035 * w, 0.026 * w, trousers);
+            self.limb(self.s.heels[side], self.s.toes[side], 0.024 * h, 0.018 * h, self.look.shoes);
+        }
+    }
+
+    fn extras(&mut self) {
+        for extra in &self.look.extras {
+            match extra {
+                Extra::Coat => self.coat(),
+                Extra::Backpack => self.backpack(),
+                Extra::Hat => self.hat(),
+                Extra::Bag => self.bag(),
+            }
+        }
+    }
+
+    fn coat(&mut self) {
+        let (h, w, turn) = (self.h, self.w, self.s.world_from_pelvis);
+        let upper = self.s.pelvis + Vector3::new(0.0, 0.0, 0.06 * h);
+        let hem = self.s.pelvis - Vector3::new(0.0, 0.0, 0.13 * h);
+        self.ellipsoid(upper, turn, Vector3::new(0.078 * h, 0.108 * w, 0.16 * h), self.look.top);
+        for sign in [1.0, -1.0] {
+            let out = turn * Vector3::new(0.0, sign * 0.035 * w, 0.0);
+            self.limb(upper + out, hem + out, 0.07 * h, 0.078 * h, self.look.top);
+        }
+    }
+
+    fn backpack(&mut self) {
+        let turn = self.s.world_from_thorax;
+        let at = self.s.chest + turn * (Vector3::new(-0.105, 0.0, -0.11) * self.h);
+        let cloth =
+            Material::patterned([0.06, 0.07, 0.09], [0.2, 0.05, 0.04], Pattern::Stripes(0.25));
+        self.ellipsoid(at, turn, Vector3::new(0.062, 0.085, 0.14) * self.h, cloth);
+    }
+
+    fn hat(&mut self) {
+        let (h, turn) = (self.h, self.s.world_from_head);
+        let felt = Material::plain(scaled(self.look.trousers.colour, 1.3));
+        let up = |z: f64| self.s.head + Vector3::new(0.0, 0.0, z * h);
+        self.ellipsoid(up(0.040), turn, Vector3::new(0.058, 0.052, 0.045) * h, felt);
+        self.ellipsoid(up(0.038), turn, Vector3::new(0.088, 0.078, 0.006) * h, felt);
+    }
+
+    fn bag(&mut self) {
+        let leather = Material::plain([0.12, 0.06, 0.03]);
+        let at = self.s.wrists[0] - Vector3::new(0.0, 0.0, 0.17 * self.h);
+        let half = Vector3::new(0.16, 0.05, 0.12);
+        let block = Shape::new(Form::Block(half), at, self.s.world_from_pelvis, leather);
+        self.shapes.push(block);
+    }
+
+    fn ellipsoid(
+        &mut self,
+        at: Point3<f64>,
+        turn: Rotation3<f64>,
+        half: Vector3<f64>,
+        of: Material,
+    ) {
+        self.shapes.push(Shape::new(Form::Ellipsoid(half), at, turn, of));
+    }
+
+    fn limb(&mut self, from: Point3<f64>, to: Point3<f64>, first: f64, second: f64, of: Material) {
+        let forward = self.s.world_from_thorax * Vector3::x();
+        self.shapes.push(Shape::limb((from, to), (first, second), forward, of));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+
+    use super::*;
+    use crate::body::Stance;
+
+    #[test]
+    fn the_top_of_the_head_is_at_the_height_of_the_body() {
+        let mut random = Random::new(8, 0);
+        for _ in 0..20 {
+            let mut person = Person::random(&mut random);
+            person.look.extras.clear();
+            let stance =
+                Stance { place: Point2::origin(), heading_rad: 1.0, speed_mps: 0.0, phase: 0.0 };
+            let (shapes, upper) = person.shapes(&Skeleton::new(&person.build, &stance));
+            let (down, from) = (-Vector3::z(), Point3::new(0.0, 0.0, 3.0));
+            let from = from
+                + Rotation3::from_axis_angle(&Vector3::z_axis(), 1.0)
+                    * Vector3::new(0.015, 0.0, 0.0);
+            let first =
+                shapes[..upper].iter().filter_map(|s| s.meet(&from, &down)).fold(9.0, f64::min);
+            assert!((3.0 - first - person.build.height_m).abs() < 0.02, "{first}");
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! A differential drive that answers late and slowly, along a path or steered
+//! from outside, and the odometry that believes its encoders.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry2, Point2, Vector2};
+use tagalong_core::{Motion, WheelSpeeds, Wheels};
+
+use crate::random::Random;
+use crate::scene::RobotSettings;
+
+/// A point of the path is reached at this distance, m.
+const REACHED_M: f64 = 0.2;
+/// Nods by this much per m/s² of braking, rad.
+const NOD_RAD: f64 = 0.008;
+/// Time constant of the nod, s.
+const NOD_S: f64 = 0.15;
+
+/// The robot on its way.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    settings: RobotSettings,
+    /// Where it really is in the world.
+    pub pose: Isometry2<f64>,
+    /// Where its odometry believes to be, in a frame that starts at zero.
+    pub odometry: Isometry2<f64>,
+    /// Speeds of the wheels over ground, m/s.
+    wheels: [f64; 2],
+    /// What the encoders say, m/s.
+    measured: [f64; 2],
+    /// Wheels that are larger than believed, as factors.
+    radius: [f64; 2],
+    half_separation_m: f64,
+    commands: VecDeque<(f64, WheelSpeeds)>,
+    command: WheelSpeeds,
+    steered: bool,
+    ahead: usize,
+    nod_rad: f64,
+    random: Random,
+}
+
+impl Robot {
+    /// A robot at rest at its start.
+    pub fn new(settings: &RobotSettings, mut random: Random) -> Self {
+        let bias = settings.wheel_bias;
+        let mut about_one = || 1.0 + bias * random.normal();
+        let (radius, separation) = ([about_one(), about_one()], about_one());
+        let start = Vector2::from(settings.start);
+        Self {
+            pose: Isometry2::new(start, settings.heading_deg.to_radians()),
+            odometry: Isometry2::identity(),
+            wheels: [0.0; 2],
+            measured: [0.0; 2],
+            radius,
+            half_separation_m: settings.half_separation_m * separation,
+            commands: VecDeque::new(),
+            command: WheelSpeeds::STOP,
+            steered: false,
+            ahead: 0,
+            nod_rad: 0.0,
+            random,
+            settings: settings.clone(),
+        }
+    }
+
+    /// Commands wheel speeds from outside; from then on the path is left alone.
+    pub fn steer(&mut self, now_s: f64, command: WheelSpeeds) {
+        self.steered = true;
+        self.commands.push_back((now_s + self.settings.latency_s, command));
+    }
+
+    /// Moves by a short time.
+    pub fn step(&mut self, now_s: f64, dt: f64) {
+        if !self.steered {
+            let command = self.along_path();
+            self.commands.push_back((now_s + self.settings.latency_s, command));
+        }
+        while let Some(command) = self.commands.front().filter(|c| c.0 <= now_s).map(|c| c.1) {
+            self.command = command;
+            self.commands.pop_front();
+        }
+        self.drive(dt);
+    }
+
+    fn drive(&mut self, dt: f64) {
+        let before = self.speed_mps();
+        let part = dt / self.settings.response_s.max(dt);
+        let targets = [self.command.left, self.command.right];
+        for side in 0..2 {
+            self.wheels[side] += (targets[side] - self.wheels[side]) * part;
+            // The wheel slips; the encoder sees the wheel and not the ground.
+            let slip = 1.0 + self.settings.slip * self.random.normal();
+            self.measured[side] = self.wheels[side] / self.radius[side] * slip;
+        }
+        let acceleration = (self.speed_mps() - before) / dt;
+        self.nod_rad += (-NOD_RAD * acceleration - self.nod_rad) * (dt / NOD_S).min(1.0);
+        let separation = |half_separation_m| Wheels { half_separation_m, slip: 0.0 };
+        let moved =
+            |[left, right]: [f64; 2], d: f64| Motion::from_wheels(left, right, &separation(d), dt);
+        self.pose *= moved(self.wheels, self.half_separation_m).isometry();
+        self.odometry *= moved(self.measured, self.settings.half_separation_m).isometry();
+    }
+
+    /// Speeds that lead to the point ahead.
+    fn along_path(&mut self) -> WheelSpeeds {
+        let Some(goal) = self.settings.path.get(self.ahead) else { return WheelSpeeds::STOP };
+        let way = self.pose.inverse_transform_point(&Point2::from(*goal)).coords;
+        if way.norm() < REACHED_M {
+            self.ahead += 1;
+        }
+        let off = way.y.atan2(way.x);
+        let last = self.ahead + 1 >= self.settings.path.len();
+        let limit = if last { way.norm() } else { f64::INFINITY };
+        let speed = self.settings.speed_mps.min(limit) * off.cos().max(0.0).powi(2);
+        let turn = (1.6 * off).clamp(-0.9, 0.9) * self.settings.half_separation_m;
+        WheelSpeeds { left: speed - turn, right: speed + turn }
+    }
+
+    /// Forward, over ground, m/s.
+    pub fn speed_mps(&self) -> f64 {
+        0.5 * (self.wheels[0] + self.wheels[1])
+    }
+
+    /// About the vertical, rad/s.
+    pub fn turn_rate(&self) -> f64 {
+        (self.wheels[1] - self.wheels[0]) / (2.0 * self.half_separation_m)
+    }
+
+    /// Forward speed, m/s, and turn rate, rad/s, as the encoders see them.
+    pub fn measured(&self) -> (f64, f64) {
+        let [left, right] = self.measured;
+        (0.5 * (left + right), (right - left) / (2.0 * self.settings.half_separation_m))
+    }
+
+    /// Nose down, rad.
+    pub fn nod_rad(&self) -> f64 {
+        self.nod_rad
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn robot(settings: RobotSettings) -> Robot {
+        Robot::new(&settings, Random::new(5, 1))
+    }
+
+    fn run(robot: &mut Robot, seconds: f64) {
+        for step in 0..(seconds / 0.02) as usize {
+            robot.step(step as f64 * 0.02, 0.02);
+        }
+    }
+
+    #[test]
+    fn the_path_is_driven_and_odometry_drifts_a_little() {
+        let mut robot =
+            robot(RobotSettings { path: vec![[4.0, 3.0], [4.0, 5.0]], ..RobotSettings::default() });
+        run(&mut robot, 25.0);
+        assert!((robot.pose.translation.vector - Vector2::new(4.0, 5.0)).norm() < 0.3);
+        let start = Isometry2::new(Vector2::new(1.0, 3.0), 0.0);
+        let believed = start * robot.odometry;
+        let error = (believed.translation.vector - robot.pose.translation.vector).norm();
+        assert!(error > 1e-3 && error < 0.5, "{error}");
+    }
+
+    #[test]
+    fn a_command_works_after_its_latency_and_then_gradually() {
+        let mut robot = robot(RobotSettings::default());
+        robot.steer(0.0, WheelSpeeds { left: 0.4, right: 0.4 });
+        run(&mut robot, 0.09);
+        assert_eq!(robot.speed_mps(), 0.0);
+        run(&mut robot, 0.30);
+        assert!(robot.speed_mps() > 0.1 && robot.speed_mps() < 0.38, "{}", robot.speed_mps());
+        run(&mut robot, 2.0);
+        assert!((robot.speed_mps() - 0.4).abs() < 1e-3 && robot.turn_rate().abs() < 1e-9);
+    }
+}

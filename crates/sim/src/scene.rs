@@ -1,0 +1,409 @@
+//! Scenes as TOML: everything that a drawn log depends on, the seed included.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::ConfigError;
+
+use crate::person::Extra;
+
+/// A scene. Lengths are in metres; the room's corner is the origin, X runs
+/// along its length, Y along its width; angles turn from X towards Y.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scene {
+    /// What the scene is for.
+    pub about: String,
+    /// Where all chance comes from.
+    pub seed: u64,
+    /// Length of the log, s.
+    pub duration_s: f64,
+    /// Wanderers with random looks and ways, besides `people`.
+    pub crowd: usize,
+    /// The room.
+    pub room: RoomSettings,
+    /// The light.
+    pub light: LightSettings,
+    /// The camera.
+    pub camera: CameraSettings,
+    /// The robot.
+    pub robot: RobotSettings,
+    /// What goes wrong on the way into the log.
+    pub faults: FaultSettings,
+    /// What stands around.
+    pub furniture: Vec<Furniture>,
+    /// Who is there.
+    pub people: Vec<PersonSettings>,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            about: String::new(),
+            seed: 1,
+            duration_s: 10.0,
+            crowd: 0,
+            room: RoomSettings::default(),
+            light: LightSettings::default(),
+            camera: CameraSettings::default(),
+            robot: RobotSettings::default(),
+            faults: FaultSettings::default(),
+            furniture: Vec::new(),
+            people: Vec::new(),
+        }
+    }
+}
+
+impl Scene {
+    /// Reads a scene.
+    ///
+    /// # Errors
+    /// An unknown key, a wrong type or an impossible value, with its place.
+    pub fn parse(text: &str) -> Result<Self, ConfigError> {
+        let scene: Self = toml::from_str(text)?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    fn check(&self) -> Result<(), ConfigError> {
+        let camera = &self.camera;
+        let rules = [
+            (self.duration_s > 0.0 && self.duration_s <= 3600.0, "duration_s must be in 0 to 3600"),
+            (
+                self.room.size_m.iter().all(|m| (1.0..=200.0).contains(m)),
+                "room.size_m must be in 1 to 200",
+            ),
+            ((2.0..=20.0).contains(&self.room.height_m), "room.height_m must be in 2 to 20"),
+            (
+                (8..=4096).contains(&camera.width) && (8..=4096).contains(&camera.height),
+                "camera.width and camera.height must be in 8 to 4096",
+            ),
+            (
+                (10.0..=150.0).contains(&camera.field_of_view_deg),
+                "camera.field_of_view_deg must be in 10 to 150",
+            ),
+            ((0.1..=100.0).contains(&camera.rate_hz), "camera.rate_hz must be in 0.1 to 100"),
+            (
+                camera.max_depth_m > camera.min_depth_m,
+                "camera.max_depth_m must be above min_depth_m",
+            ),
+            (self.people.len() + self.crowd <= 200, "there must be at most 200 people"),
+            (
+                self.people.iter().all(|p| !p.path.is_empty()),
+                "every person needs a path of one point at least",
+            ),
+            (
+                self.people.iter().all(|p| (0.0..=2.0).contains(&p.speed_mps)),
+                "speed_mps must be in 0 to 2",
+            ),
+        ];
+        match rules.iter().find(|(holds, _)| !holds) {
+            Some((_, message)) => Err(ConfigError::new(*message)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The room.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RoomSettings {
+    /// Length and width, m.
+    pub size_m: [f64; 2],
+    /// Height, m.
+    pub height_m: f64,
+    /// The walls have wallpaper; without it stereo finds nothing on them.
+    pub wallpaper: bool,
+    /// The floor.
+    pub floor: Floor,
+    /// Pieces of furniture of any kind at random places along the walls.
+    pub clutter: usize,
+}
+
+impl Default for RoomSettings {
+    fn default() -> Self {
+        Self {
+            size_m: [9.0, 6.0],
+            height_m: 2.8,
+            wallpaper: false,
+            floor: Floor::Planks,
+            clutter: 0,
+        }
+    }
+}
+
+/// What the floor is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Floor {
+    /// Boards.
+    Planks,
+    /// Tiles.
+    Tiles,
+    /// Carpet.
+    Carpet,
+}
+
+/// The light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LightSettings {
+    /// Illuminance of the floor below a lamp, lx.
+    pub lux: f64,
+    /// Lamps along the room.
+    pub lamps: usize,
+    /// Light from everywhere as a fraction of `lux`.
+    pub ambient: f64,
+}
+
+impl Default for LightSettings {
+    fn default() -> Self {
+        Self { lux: 350.0, lamps: 2, ambient: 0.35 }
+    }
+}
+
+/// What the camera delivers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CameraKind {
+    /// Colour and registered depth of a structured-light camera.
+    Rgbd,
+    /// A rectified pair of grey images.
+    Stereo,
+}
+
+/// The camera on the robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraSettings {
+    /// What it delivers.
+    pub kind: CameraKind,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Horizontal field of view, degrees.
+    pub field_of_view_deg: f64,
+    /// Images per second.
+    pub rate_hz: f64,
+    /// Height above the floor, m.
+    pub height_m: f64,
+    /// Looks this far down, degrees.
+    pub pitch_down_deg: f64,
+    /// Distance of the two cameras, or of camera and projector, m.
+    pub baseline_m: f64,
+    /// Nearest depth that is measured, m.
+    pub min_depth_m: f64,
+    /// Farthest depth that is measured, m.
+    pub max_depth_m: f64,
+    /// Exposure time, s.
+    pub exposure_s: f64,
+    /// The mount differs from what the log says by about this, degrees and (in
+    /// hundredths) metres.
+    pub mount_error_deg: f64,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            kind: CameraKind::Rgbd,
+            width: 640,
+            height: 480,
+            field_of_view_deg: 58.0,
+            rate_hz: 10.0,
+            height_m: 1.2,
+            pitch_down_deg: 0.0,
+            baseline_m: 0.075,
+            min_depth_m: 0.5,
+            max_depth_m: 8.0,
+            exposure_s: 0.012,
+            mount_error_deg: 0.4,
+        }
+    }
+}
+
+/// The robot and its way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotSettings {
+    /// Where it starts, m.
+    pub start: [f64; 2],
+    /// Where it looks at the start, degrees.
+    pub heading_deg: f64,
+    /// Points that it drives to one after the other; none is a robot at rest.
+    pub path: Vec<[f64; 2]>,
+    /// Speed, m/s.
+    pub speed_mps: f64,
+    /// Half the distance between the wheels, m.
+    pub half_separation_m: f64,
+    /// Time constant of the wheel speeds, s.
+    pub response_s: f64,
+    /// From a command to its effect, s.
+    pub latency_s: f64,
+    /// Standard deviation of the radius of each wheel and of their distance as
+    /// fractions; unknown to the odometry.
+    pub wheel_bias: f64,
+    /// Standard deviation of a wheel's slip as a fraction of its travel in one
+    /// step of the odometry.
+    pub slip: f64,
+}
+
+impl Default for RobotSettings {
+    fn default() -> Self {
+        Self {
+            start: [1.0, 3.0],
+            heading_deg: 0.0,
+            path: Vec::new(),
+            speed_mps: 0.5,
+            half_separation_m: 0.167,
+            response_s: 0.2,
+            latency_s: 0.1,
+            wheel_bias: 0.005,
+            slip: 0.02,
+        }
+    }
+}
+
+/// What goes wrong on the way into the log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FaultSettings {
+    /// Fraction of images that never arrive.
+    pub dropped: f64,
+    /// Fraction of images that are recorded late, up to 0.15 s.
+    pub late: f64,
+}
+
+impl Default for FaultSettings {
+    fn default() -> Self {
+        Self { dropped: 0.01, late: 0.02 }
+    }
+}
+
+/// A piece of furniture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Furniture {
+    /// What it is.
+    pub kind: FurnitureKind,
+    /// Where it stands, m.
+    pub at: [f64; 2],
+    /// Where its front looks, degrees.
+    #[serde(default)]
+    pub heading_deg: f64,
+}
+
+/// Furniture, most of it with the silhouette of a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FurnitureKind {
+    /// A stand with a coat and a hat.
+    CoatStand,
+    /// A chair with a jacket over its back.
+    DrapedChair,
+    /// A lamp with a shade at head height.
+    FloorLamp,
+    /// A tall plant in a pot.
+    Plant,
+    /// A round pillar up to the ceiling.
+    Pillar,
+    /// A sheet on a panel that shows a person.
+    Poster,
+    /// A person cut out of cardboard.
+    CardboardFigure,
+    /// A desk with a monitor.
+    Desk,
+    /// A shelf with books.
+    Shelf,
+}
+
+/// What somebody does when the robot cannot see them for the first time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Trick {
+    /// Nothing special.
+    #[default]
+    None,
+    /// Turns round and goes back.
+    TurnBack,
+    /// Stays behind whoever hides them for three seconds.
+    Stop,
+    /// Takes over the way of whoever hides them, who takes over theirs.
+    Swap,
+}
+
+/// What somebody does at the end of the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AtEnd {
+    /// Stays there.
+    #[default]
+    Stop,
+    /// Goes back the same way, and so on.
+    Return,
+    /// Goes on to the first point, and so on.
+    Loop,
+}
+
+/// A person.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PersonSettings {
+    /// Points to walk through; the first is where they start.
+    pub path: Vec<[f64; 2]>,
+    /// Preferred speed, m/s.
+    pub speed_mps: f64,
+    /// Stands until then, s.
+    pub start_s: f64,
+    /// What follows the end of the path.
+    pub at_end: AtEnd,
+    /// What they do when hidden.
+    pub trick: Trick,
+    /// Direction of the face at the start, degrees; the way ahead if left out.
+    pub heading_deg: Option<f64>,
+    /// Turns on the spot, degrees per second.
+    pub spin_deg_per_s: f64,
+    /// Body height, m; by chance if left out.
+    pub height_m: Option<f64>,
+    /// People with the same number look alike; by chance if left out.
+    pub look: Option<u64>,
+    /// Things put on or carried; by chance if left out.
+    pub extras: Option<Vec<Extra>>,
+}
+
+impl Default for PersonSettings {
+    fn default() -> Self {
+        Self {
+            path: Vec::new(),
+            speed_mps: 1.1,
+            start_s: 0.0,
+            at_end: AtEnd::Stop,
+            trick: Trick::None,
+            heading_deg: None,
+            spin_deg_per_s: 0.0,
+            height_m: None,
+            look: None,
+            extras: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_key_is_named_with_its_line_and_the_right_one() {
+        let text = "seed = 3\n[room]\nwalpaper = true\n";
+        let error = Scene::parse(text).unwrap_err().render("s.toml", text);
+        assert!(error.starts_with("s.toml:3:1"), "{error}");
+        assert!(error.contains("did you mean `wallpaper`?"), "{error}");
+    }
+
+    #[test]
+    fn impossible_values_are_refused() {
+        for text in ["duration_s = 0.0", "[camera]\nwidth = 0", "[[people]]\nspeed_mps = 1.0"] {
+            assert!(Scene::parse(text).is_err(), "{text}");
+        }
+        assert_eq!(Scene::parse("").unwrap(), Scene::default());
+    }
+}

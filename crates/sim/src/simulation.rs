@@ -1,0 +1,480 @@
+//! A scene in motion: what a robot would record, in the order in which it would.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{
+    Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
+};
+use tagalong_core::{Camera, Distortion, Image, Images, Pinhole, Rect, WheelSpeeds};
+
+use crate::behaviour::{Obstacle, Walker, hidden_by, play_tricks};
+use crate::body::Skeleton;
+use crate::person::{Look, Person};
+use crate::random::Random;
+use crate::render::{Visibility, draw, visibility};
+use crate::robot::Robot;
+use crate::room;
+use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Scene};
+use crate::sensor::{DepthSensor, Exposure, Moment};
+use crate::world::{Hit, Lamp, Object, World};
+
+/// People, robot and odometry move in steps of this many nanoseconds.
+const STEP_NS: u64 = 20_000_000;
+/// Below this visible fraction nobody can be expected to find somebody.
+const LEAST_VISIBLE: f64 = 0.2;
+
+/// Something that the robot records.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The odometry.
+    Odometry(OdometryReading),
+    /// An image, or a pair of them, with the truth.
+    Shot(Box<Shot>),
+}
+
+/// What the odometry believes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OdometryReading {
+    /// Since the start, ns.
+    pub at_ns: u64,
+    /// The robot in the frame of the odometry, m and rad.
+    pub odom_from_robot: Isometry2<f64>,
+    /// Forward, m/s.
+    pub speed_mps: f64,
+    /// About the vertical, rad/s.
+    pub turn_rate: f64,
+}
+
+/// What the camera delivers, and what is true at that moment.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// Since the start, ns.
+    pub captured_ns: u64,
+    /// When it is written to the log, ns; not before it was captured.
+    pub recorded_ns: u64,
+    /// Colour and depth, or the grey images of a stereo pair.
+    pub images: Images,
+    /// Everybody.
+    pub truth: Vec<Truth>,
+    /// The robot in the world, m and rad.
+    pub world_from_robot: Isometry2<f64>,
+}
+
+/// Where one person really is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// Number of the person, from 1.
+    pub id: u16,
+    /// Centre of the head in the robot frame, m.
+    pub head_in_robot: Point3<f64>,
+    /// Middle of the trunk in the robot frame, m.
+    pub torso_in_robot: Point3<f64>,
+    /// The upper-body square clipped to the image; `None` outside.
+    pub upper_body: Option<Rect>,
+    /// The part that is seen.
+    pub visible: Option<Rect>,
+    /// Seen fraction of the upper body.
+    pub visible_fraction: f64,
+    /// Who hides most of the rest.
+    pub occluder: Option<u16>,
+    /// Hardly seen: neither a miss nor a false alarm.
+    pub ignore: bool,
+}
+
+/// A scene in motion. Same scene, same events, whatever the number of threads.
+pub struct Simulation {
+    scene: Scene,
+    camera: Camera,
+    /// The camera as it is really mounted.
+    true_camera: Camera,
+    fixed: Vec<Object>,
+    lamps: Vec<Lamp>,
+    obstacles: Vec<Obstacle>,
+    walkers: Vec<Walker>,
+    robot: Robot,
+    exposures: [Exposure; 2],
+    chance: Random,
+    now_ns: u64,
+    shots: u64,
+    waiting: BTreeMap<(u64, u64), Event>,
+    counter: u64,
+    threads: usize,
+}
+
+impl Simulation {
+    /// The start of a scene. `threads` draw the images.
+    pub fn new(scene: &Scene, threads: usize) -> Self {
+        let stream = |number| Random::new(scene.seed, number);
+        let mut pieces = scene.furniture.clone();
+        pieces.extend(room::clutter(&scene.room, &mut stream(1)));
+        let mut fixed = vec![room::room(&scene.room)];
+        fixed.extend(pieces.iter().map(|piece| room::furniture(piece, scene.room.height_m)));
+        let camera = camera(scene);
+        let true_camera = shaken(&camera, scene.camera.mount_error_deg, &mut stream(2));
+        Self {
+            true_camera,
+            camera,
+            fixed,
+            lamps: room::lamps(&scene.room, &scene.light),
+            obstacles: pieces.iter().map(obstacle).collect(),
+            walkers: walkers(scene, &mut stream(3)),
+            robot: Robot::new(&scene.robot, stream(4)),
+            exposures: [Exposure::default(); 2],
+            chance: stream(5),
+            now_ns: 0,
+            shots: 0,
+            waiting: BTreeMap::new(),
+            counter: 0,
+            threads,
+            scene: scene.clone(),
+        }
+    }
+
+    /// The camera as the log describes it.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Commands the wheels from now on: the loop is closed, the scene's path
+    /// for the robot is left alone.
+    pub fn steer(&mut self, command: WheelSpeeds) {
+        self.robot.steer(self.now_ns as f64 * 1e-9, command);
+    }
+
+    /// The next thing that the robot records; `None` at the end of the scene.
+    pub fn next_event(&mut self) -> Option<Event> {
+        let end_ns = (self.scene.duration_s * 1e9) as u64;
+        loop {
+            let due = self.waiting.first_key_value().is_some_and(|(key, _)| key.0 <= self.now_ns);
+            if due || self.now_ns >= end_ns {
+                return self.waiting.pop_first().map(|(_, event)| event);
+            }
+            self.step();
+        }
+    }
+
+    fn step(&mut self) {
+        let due_ns = (self.shots as f64 * 1e9 / self.scene.camera.rate_hz) as u64;
+        let odometry = self.read_odometry();
+        self.record(self.now_ns, odometry);
+        if self.now_ns >= due_ns {
+            self.shots += 1;
+            self.shoot();
+        }
+        let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
+        self.robot.step(now_s, dt);
+        self.walk(now_s, dt);
+        self.now_ns += STEP_NS;
+    }
+
+    fn walk(&mut self, now_s: f64, dt: f64) {
+        let robot = Point2::from(self.robot.pose.translation.vector);
+        let hidden = hidden_by(&self.walkers, &robot);
+        play_tricks(&mut self.walkers, &hidden, now_s);
+        let places: Vec<_> = self.walkers.iter().map(|w| w.stance.place).collect();
+        for (i, walker) in self.walkers.iter_mut().enumerate() {
+            let others = places.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, p)| *p);
+            let keep_off: Vec<_> = others.chain([robot]).collect();
+            walker.step(now_s, dt, &keep_off, &self.obstacles);
+        }
+    }
+
+    fn record(&mut self, at_ns: u64, event: Event) {
+        self.waiting.insert((at_ns, self.counter), event);
+        self.counter += 1;
+    }
+
+    fn read_odometry(&self) -> Event {
+        let (speed_mps, turn_rate) = self.robot.measured();
+        let odom_from_robot = self.robot.odometry;
+        Event::Odometry(OdometryReading {
+            at_ns: self.now_ns,
+            odom_from_robot,
+            speed_mps,
+            turn_rate,
+        })
+    }
+
+    fn shoot(&mut self) {
+        let faults = &self.scene.faults;
+        let (dropped, late) = (self.chance.chance(faults.dropped), self.chance.chance(faults.late));
+        let delay_ns = (self.chance.between(0.05, 0.15) * 1e9) as u64;
+        if dropped {
+            return;
+        }
+        let recorded_ns = self.now_ns + if late { delay_ns } else { 0 };
+        let shot = self.shot(recorded_ns);
+        self.record(recorded_ns, Event::Shot(Box::new(shot)));
+    }
+
+    fn shot(&mut self, recorded_ns: u64) -> Shot {
+        let (world, uppers) = self.world();
+        let pose = self.world_from_robot();
+        let seen = draw(&world, &self.true_camera, &pose, self.threads);
+        let truth = self.truth(&world, &uppers, &seen, &pose);
+        let images = match self.scene.camera.kind {
+            CameraKind::Rgbd => self.rgbd(&seen),
+            CameraKind::Stereo => self.stereo(&world, &seen, &pose),
+        };
+        let world_from_robot = self.robot.pose;
+        Shot { captured_ns: self.now_ns, recorded_ns, images, truth, world_from_robot }
+    }
+
+    /// Everything there is now, and how many solids of each person are upper body.
+    fn world(&self) -> (World, Vec<usize>) {
+        let mut objects = self.fixed.clone();
+        let mut uppers = Vec::new();
+        for (walker, id) in self.walkers.iter().zip(1..) {
+            let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
+            let (shapes, upper) = walker.person.shapes(&skeleton);
+            objects.push(Object::new(shapes, Some(id), true));
+            uppers.push(upper);
+        }
+        let light = &self.scene.light;
+        let world =
+            World { objects, lamps: self.lamps.clone(), ambient_lux: light.lux * light.ambient };
+        (world, uppers)
+    }
+
+    /// The robot's body in the world; it nods when it brakes.
+    fn world_from_robot(&self) -> Isometry3<f64> {
+        let planar = self.robot.pose;
+        let nod = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.robot.nod_rad());
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
+        let at = planar.translation.vector;
+        Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), yaw * nod)
+    }
+
+    fn moment(&self, eye: u64, gain: f64) -> Moment {
+        let turned = self.robot.turn_rate() * self.scene.camera.exposure_s;
+        let seed = self.scene.seed.rotate_left(20) ^ (self.shots << 2) ^ eye;
+        Moment { seed, smear_px: turned * self.camera.focal_px(), gain }
+    }
+
+    fn rgbd(&mut self, seen: &Image<Hit>) -> Images {
+        let settings = &self.scene.camera;
+        let sensor = DepthSensor {
+            focal_px: self.camera.focal_px(),
+            baseline_m: settings.baseline_m,
+            range_m: [settings.min_depth_m, settings.max_depth_m],
+        };
+        let moment = self.moment(0, 1.0);
+        let colour = self.exposures[0].colour(seen, &moment);
+        let depth = sensor.measure(seen, moment.seed);
+        Images { colour: Some(Arc::new(colour)), depth: Some(Arc::new(depth)), ..Images::default() }
+    }
+
+    fn stereo(&mut self, world: &World, left: &Image<Hit>, pose: &Isometry3<f64>) -> Images {
+        let mut camera = self.true_camera.clone();
+        // A fifth of a pixel is what rectification leaves.
+        let tilt = 0.2 / camera.focal_px();
+        let aside = Translation3::new(self.scene.camera.baseline_m, 0.0, 0.0);
+        let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
+        camera.robot_from_camera *= Isometry3::from_parts(aside, tilt);
+        let right = draw(world, &camera, pose, self.threads);
+        let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
+        let grey = self.exposures[0].grey(left, &moments[0]);
+        let right = self.exposures[1].grey(&right, &moments[1]);
+        Images { grey: Some(Arc::new(grey)), right: Some(Arc::new(right)), ..Images::default() }
+    }
+
+    fn truth(
+        &self,
+        world: &World,
+        uppers: &[usize],
+        seen: &Image<Hit>,
+        pose: &Isometry3<f64>,
+    ) -> Vec<Truth> {
+        let people = world.objects.iter().filter_map(|o| Some((o.person?, o)));
+        let walkers = self.walkers.iter().zip(uppers);
+        let truth = people.zip(walkers).map(|((id, object), (walker, upper))| {
+            let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
+            let upper = &object.shapes[..*upper];
+            self.truth_of(id, &skeleton, pose, |area| {
+                visibility(seen, &self.true_camera, pose, (id, upper), area)
+            })
+        });
+        truth.collect()
+    }
+
+    fn truth_of(
+        &self,
+        id: u16,
+        skeleton: &Skeleton,
+        pose: &Isometry3<f64>,
+        look: impl Fn([usize; 4]) -> Visibility,
+    ) -> Truth {
+        let camera = &self.true_camera;
+        let head = pose.inverse_transform_point(&skeleton.head);
+        let torso = nalgebra::center(&skeleton.pelvis, &skeleton.chest);
+        let whole = camera.upper_body(&head);
+        let clipped = whole.clipped(camera.width, camera.height);
+        let inside = clipped.width >= 2.0 && clipped.height >= 2.0;
+        let seen = if inside { look(pixels(&clipped)) } else { Visibility::default() };
+        let in_image = if whole.area() > 0.0 { clipped.area() / whole.area() } else { 0.0 };
+        Truth {
+            id,
+            head_in_robot: head,
+            torso_in_robot: pose.inverse_transform_point(&torso),
+            upper_body: inside.then_some(clipped),
+            visible: seen.bounds_px.map(|[x, y, r, b]| Rect::new(x, y, r - x, b - y)),
+            visible_fraction: seen.fraction * in_image,
+            occluder: seen.occluder,
+            ignore: seen.fraction * in_image < LEAST_VISIBLE,
+        }
+    }
+}
+
+/// Left, top, right, bottom.
+fn pixels(area: &Rect) -> [usize; 4] {
+    [area.x as usize, area.y as usize, area.right() as usize, area.bottom() as usize]
+}
+
+fn camera(scene: &Scene) -> Camera {
+    let settings = &scene.camera;
+    let (w, h) = (settings.width as f64, settings.height as f64);
+    let f = 0.5 * w / (0.5 * settings.field_of_view_deg.to_radians()).tan();
+    let lens = Pinhole {
+        fx: f,
+        fy: f,
+        cx: 0.5 * (w - 1.0),
+        cy: 0.5 * (h - 1.0),
+        distortion: Distortion::None,
+    };
+    let pitch = settings.pitch_down_deg.to_radians();
+    Camera::mounted(lens, settings.width, settings.height, settings.height_m, pitch, 0.0)
+}
+
+/// The camera as somebody mounted it who aimed at what the log says.
+fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
+    let mut error = || degrees * random.normal().clamp(-2.0, 2.0);
+    let angles = Vector3::new(error(), error(), error()).map(f64::to_radians);
+    let shift = Vector3::new(error(), error(), error()) * 0.01;
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::new(angles));
+    let off = Isometry3::from_parts(Translation3::from(shift), turn);
+    Camera { robot_from_camera: camera.robot_from_camera * off, ..camera.clone() }
+}
+
+fn obstacle(piece: &Furniture) -> Obstacle {
+    let radius_m = match piece.kind {
+        FurnitureKind::Desk => 0.75,
+        FurnitureKind::Shelf => 0.45,
+        _ => 0.3,
+    };
+    Obstacle { at: Point2::from(piece.at), radius_m }
+}
+
+fn walkers(scene: &Scene, random: &mut Random) -> Vec<Walker> {
+    let wanderers: Vec<PersonSettings> =
+        (0..scene.crowd).map(|_| wanderer(scene, random)).collect();
+    scene.people.iter().cloned().chain(wanderers).map(|p| somebody(p, random)).collect()
+}
+
+fn somebody(settings: PersonSettings, random: &mut Random) -> Walker {
+    let mut person = Person::random(random);
+    if let Some(look) = settings.look {
+        person.look = Look::random(&mut Random::new(look, 7));
+    }
+    if let Some(extras) = &settings.extras {
+        person.look.extras.clone_from(extras);
+    }
+    if let Some(height_m) = settings.height_m {
+        person.build.height_m = height_m;
+    }
+    Walker::new(person, settings)
+}
+
+/// Somebody who walks between random points of the room.
+fn wanderer(scene: &Scene, random: &mut Random) -> PersonSettings {
+    let [x, y] = scene.room.size_m;
+    let mut point = || [random.between(0.2, 0.92) * x, random.between(0.15, 0.85) * y];
+    let path = vec![point(), point(), point(), point()];
+    let (speed_mps, start_s) = (random.between(0.6, 1.3), random.between(0.0, 2.0));
+    PersonSettings { path, speed_mps, start_s, at_end: AtEnd::Loop, ..PersonSettings::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: &str = "seed = 4\nduration_s = 1.0\n[camera]\nwidth = 96\nheight = 72\n\
+        [room]\nclutter = 3\n[[people]]\npath = [[4.0, 3.0]]\nheight_m = 1.7\n\
+        [[people]]\npath = [[6.0, 3.0]]\nheight_m = 1.6\n";
+
+    fn events(text: &str, threads: usize) -> Vec<Event> {
+        let mut simulation = Simulation::new(&Scene::parse(text).unwrap(), threads);
+        std::iter::from_fn(|| simulation.next_event()).collect()
+    }
+
+    fn shots(text: &str, threads: usize) -> Vec<Shot> {
+        let of = |event| if let Event::Shot(shot) = event { Some(*shot) } else { None };
+        events(text, threads).into_iter().filter_map(of).collect()
+    }
+
+    #[test]
+    fn the_same_scene_is_the_same_whatever_the_number_of_threads() {
+        let (one, three) = (shots(SMALL, 1), shots(SMALL, 3));
+        assert!(one.len() >= 9 && one.len() == three.len());
+        for (a, b) in one.iter().zip(&three) {
+            assert_eq!(a.images.colour, b.images.colour);
+            assert_eq!(a.truth, b.truth);
+        }
+        let other = shots(&SMALL.replace("seed = 4", "seed = 5"), 1);
+        assert_ne!(one[0].images.colour, other[0].images.colour);
+    }
+
+    #[test]
+    fn truth_agrees_with_depth_and_knows_who_hides_whom() {
+        let shot = &shots(SMALL, 2)[0];
+        let (near, far) = (&shot.truth[0], &shot.truth[1]);
+        assert!((near.head_in_robot.x - 3.0).abs() < 0.05 && near.visible_fraction > 0.95);
+        assert!(far.visible_fraction < 0.5 && far.occluder == Some(1), "{far:?}");
+        let area = near.upper_body.unwrap();
+        let (x, y) = (area.centre().x as i64, (area.y + 0.45 * area.height) as i64);
+        let depth = f64::from(shot.images.depth.as_ref().unwrap().get(x, y).unwrap());
+        assert!((depth - 2.9).abs() < 0.15, "{depth}");
+    }
+
+    #[test]
+    fn a_stereo_pair_is_shifted_by_the_disparity() {
+        let text = SMALL.replace("[camera]\n", "[camera]\nkind = \"stereo\"\nbaseline_m = 0.12\n");
+        let images = &shots(&text, 2)[0].images;
+        let (left, right) = (images.grey.as_ref().unwrap(), images.right.as_ref().unwrap());
+        let difference = |shift: i64| -> i64 {
+            let pairs = (44..52).flat_map(|x| (24..40).map(move |y| (x, y)));
+            pairs
+                .map(|(x, y)| {
+                    let a = i64::from(left.get(x, y).unwrap());
+                    (a - i64::from(right.get(x - shift, y).unwrap())).abs()
+                })
+                .sum()
+        };
+        let best = (0..8).min_by_key(|shift| difference(*shift)).unwrap();
+        // f = 86.6 px, depth 2.9 m.
+        assert_eq!(best, 4, "{:?}", (0..8).map(difference).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn events_come_in_the_order_of_recording_and_late_images_after_their_time() {
+        let text = format!("{SMALL}[faults]\nlate = 0.5\ndropped = 0.2\n");
+        let recorded = |event: &Event| match event {
+            Event::Odometry(reading) => reading.at_ns,
+            Event::Shot(shot) => shot.recorded_ns,
+        };
+        let events = events(&text, 2);
+        assert!(events.windows(2).all(|pair| recorded(&pair[0]) <= recorded(&pair[1])));
+        let shots: Vec<_> = shots(&text, 2);
+        assert!(shots.iter().any(|s| s.recorded_ns > s.captured_ns) && shots.len() < 10);
+    }
+
+    #[test]
+    fn a_steered_robot_leaves_its_path() {
+        let scene = Scene::parse("duration_s = 3.0\n[camera]\nwidth = 16\nheight = 16\n").unwrap();
+        let mut simulation = Simulation::new(&scene, 1);
+        while simulation.next_event().is_some() {
+            simulation.steer(WheelSpeeds { left: 0.3, right: 0.3 });
+        }
+        assert!(simulation.robot.pose.translation.vector.x > 1.5);
+    }
+}
