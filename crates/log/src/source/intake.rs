@@ -6,7 +6,9 @@ use super::pairing::{Arrival, Payload, Reorder, Waiting};
 use super::tally::Tally;
 use crate::InputSettings;
 use crate::mcap_walk::Message;
-use crate::msgs::{CameraInfo, CdrError, CompressedImage, Header, Image, Odometry, TFMessage, decode};
+use crate::msgs::{
+    CameraInfo, CdrError, CompressedImage, Header, Image, Odometry, TFMessage, decode,
+};
 use crate::odometry::PoseBuffer;
 use crate::scan::{Scan, Type, is_static};
 use crate::tf::TfBuffer;
