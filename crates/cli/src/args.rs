@@ -20,11 +20,9 @@ const EXIT_CODES: &str = "\
 Examples:
   tagalong inspect robot.mcap
   tagalong run configs/depth-ekf.toml robot.mcap --overlay
-  tagalong config depth-template
 
-Results go to stdout, talk goes to stderr.
-Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3 finished but part of the log was lost,
-130 and 143 stopped by Ctrl-C or SIGTERM (the files are valid up to there).";
+Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3
+finished but part of the log was lost, 130 and 143 stopped by a signal (the files are valid).";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]

@@ -86,11 +86,11 @@ impl Robot {
         let before = self.speed_mps();
         let part = dt / self.settings.response_s.max(dt);
         let targets = [self.command.left, self.command.right];
-        for side in 0..2 {
-            self.wheels[side] += (targets[side] - self.wheels[side]) * part;
+        let wheels = self.wheels.iter_mut().zip(&mut self.measured);
+        for (((wheel, measured), target), radius) in wheels.zip(targets).zip(self.radius) {
+            *wheel += (target - *wheel) * part;
             // The wheel slips; the encoder sees the wheel and not the ground.
-            let slip = 1.0 + self.settings.slip * self.random.normal();
-            self.measured[side] = self.wheels[side] / self.radius[side] * slip;
+            *measured = *wheel / radius * (1.0 + self.settings.slip * self.random.normal());
         }
         let acceleration = (self.speed_mps() - before) / dt;
         self.nod_rad += (-NOD_RAD * acceleration - self.nod_rad) * (dt / NOD_S).min(1.0);

@@ -34,6 +34,8 @@ pub struct Shape {
     pub world_from_own: Rotation3<f64>,
     /// What it is made of.
     pub material: Material,
+    /// Centre and squared radius of a ball around it.
+    ball: (Point3<f64>, f64),
 }
 
 impl Shape {
@@ -44,7 +46,10 @@ impl Shape {
         world_from_own: Rotation3<f64>,
         material: Material,
     ) -> Self {
-        Self { form, origin, world_from_own, material }
+        let mut shape = Self { form, origin, world_from_own, material, ball: (origin, 0.0) };
+        let (centre, radius) = shape.bound();
+        shape.ball = (centre, radius * radius);
+        shape
     }
 
     /// A capsule between two points; `forward` fixes how a texture lies on it.
@@ -78,6 +83,14 @@ impl Shape {
                 (self.origin + self.world_from_own * Vector3::new(0.0, 0.0, along), radius)
             }
         }
+    }
+
+    /// False if a ray passes by the ball around the solid: the cheap question
+    /// to ask first. `per_length` is one over the squared length of the ray.
+    pub fn near(&self, eye: &Point3<f64>, ray: &Vector3<f64>, per_length: f64) -> bool {
+        let way = self.ball.0 - eye;
+        let along = way.dot(ray);
+        way.norm_squared() - along * along * per_length <= self.ball.1
     }
 
     /// A point of the world in the solid's own axes.
@@ -231,6 +244,8 @@ mod tests {
             match (found, slow(&form, &start, &ray)) {
                 (Some(t), Some(expected)) => {
                     prop_assert!((t - expected).abs() < 3e-3, "{t} {expected} {form:?}");
+                    let turned = turn * ray;
+                    prop_assert!(shape.near(&eye, &turned, 1.0 / turned.norm_squared()));
                     let point = eye + turn * ray * t;
                     let normal = shape.normal(&shape.own(&point));
                     prop_assert!(normal.dot(&(turn * ray)) < 1e-6);

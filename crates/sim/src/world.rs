@@ -87,8 +87,10 @@ impl World {
         ray: &Vector3<f64>,
     ) -> Hit {
         let mut best: Option<(f64, usize, &Shape)> = None;
+        let per_length = 1.0 / ray.norm_squared();
         for (object, shape) in solids {
-            if let Some(t) = shape.meet(eye, ray)
+            if shape.near(eye, ray, per_length)
+                && let Some(t) = shape.meet(eye, ray)
                 && best.is_none_or(|(nearest, ..)| t < nearest)
             {
                 best = Some((t, object, shape));
@@ -137,7 +139,8 @@ impl World {
     fn shadowed(&self, start: &Point3<f64>, along: &Vector3<f64>, length: f64) -> bool {
         let objects =
             self.objects.iter().filter(|o| o.casts_shadow && o.near(start, along, length));
-        objects.flat_map(|o| &o.shapes).any(|s| s.meet(start, along).is_some_and(|t| t < length))
+        let mut near = objects.flat_map(|o| &o.shapes).filter(|s| s.near(start, along, 1.0));
+        near.any(|s| s.meet(start, along).is_some_and(|t| t < length))
     }
 }
 

@@ -63,7 +63,8 @@ fn read(path: &Path, seed: Option<u64>) -> Result<Scene, Failure> {
     Ok(scene)
 }
 
-fn threads(asked: Option<u8>) -> usize {
+/// As many threads as asked for, else as many as there are.
+pub fn threads(asked: Option<u8>) -> usize {
     asked.map_or_else(|| available_parallelism().map_or(1, usize::from), usize::from)
 }
 

@@ -1,0 +1,72 @@
+//! `tagalong simulate`: the logs it writes, and what it says to wrong scenes.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{code, tagalong, text};
+use tagalong_log::{Limits, read_truth};
+use tagalong_sim::Scene;
+
+const SMALL: &str = "duration_s = 0.6\n[camera]\nwidth = 64\nheight = 48\n[faults]\ndropped = 0.0\n\
+    [[people]]\npath = [[4.0, 3.0], [4.0, 5.0]]\n";
+
+fn simulate(folder: &Path, arguments: &[&str]) -> std::process::Output {
+    let mut command = tagalong();
+    command.current_dir(folder).arg("simulate").args(arguments).output().unwrap()
+}
+
+#[test]
+fn the_same_scene_and_seed_are_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SMALL).unwrap();
+    let log = |name: &str, more: &[&str]| {
+        let output = simulate(folder.path(), &[&["s.toml", "-o", name], more].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        fs::read(folder.path().join(name)).unwrap()
+    };
+    let first = log("a.mcap", &["--threads", "1"]);
+    assert_eq!(first, log("b.mcap", &["--threads", "3"]));
+    assert_ne!(first, log("c.mcap", &["--seed", "9"]));
+    let truth = read_truth(&folder.path().join("a.mcap"), &Limits::default()).unwrap().unwrap();
+    assert_eq!((truth.len(), truth[0].people.len(), truth[0].people[0].id), (6, 1, 1));
+    let inspected = tagalong().arg("inspect").arg(folder.path().join("a.mcap")).output().unwrap();
+    let told = text(&inspected.stdout);
+    assert!(told.contains("a pipeline can use: colour, depth, odometry"), "{told}");
+}
+
+#[test]
+fn pictures_show_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SMALL).unwrap();
+    let output = simulate(folder.path(), &["s.toml", "--gallery", "pictures"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let pictures = fs::read_dir(folder.path().join("pictures")).unwrap().count();
+    assert!((3..=6).contains(&pictures), "{pictures}");
+}
+
+#[test]
+fn a_wrong_scene_is_told_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), "seed = 1\n[room]\nheigth_m = 3.0\n").unwrap();
+    let output = simulate(folder.path(), &["s.toml"]);
+    assert_eq!(code(&output), 2);
+    let told = text(&output.stderr);
+    assert!(told.contains("s.toml:3:1") && told.contains("did you mean `height_m`?"), "{told}");
+    assert_eq!(code(&simulate(folder.path(), &["absent.toml"])), 2);
+}
+
+#[test]
+fn every_shipped_scene_can_be_read_and_says_what_it_is_for() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
+    let mut scenes = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let text = fs::read_to_string(&path).unwrap();
+        let scene = Scene::parse(&text).map_err(|error| error.render("scene", &text));
+        assert!(!scene.unwrap().about.is_empty(), "{}", path.display());
+        scenes += 1;
+    }
+    assert!(scenes >= 10);
+}
