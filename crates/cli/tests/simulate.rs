@@ -1,4 +1,5 @@
 //! `tagalong simulate`: the logs it writes, and what it says to wrong scenes.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
 
 mod common;
 

@@ -18,21 +18,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("report", &["core", "eval"]),
     ("conformance", &["core"]),
     ("catalog", &["core", "plugins"]),
-    (
-        "cli",
-        &[
-            "core",
-            "vision",
-            "stereo",
-            "pipeline",
-            "log",
-            "sim",
-            "eval",
-            "report",
-            "catalog",
-            "conformance",
-        ],
-    ),
+    ("cli", &["core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "catalog"]),
     ("xtask", &[]),
 ];
 
