@@ -1,6 +1,7 @@
 //! What a mistyped or unusable path probably meant.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use tagalong_core::nearest;
@@ -46,7 +47,7 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
         return Err(Failure::failed(format!("{shown}: no such file{}", log_hint(path))));
     }
     if path.is_dir() {
-        let hint = match mcap_files(path).first() {
+        let hint = match mcap_files(path).unwrap_or_default().first() {
             Some(file) => format!("give a file in it, for example {}", file.display()),
             None => "and it contains no .mcap file".to_owned(),
         };
@@ -77,20 +78,23 @@ fn conversion(path: &Path, extension: &str) -> String {
     )
 }
 
-fn mcap_files(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
-    let mut files: Vec<PathBuf> = entries
+/// The MCAP files of a folder, by name.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn mcap_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = fs::read_dir(folder)?
         .flatten()
         .map(|entry| entry.path())
         .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
         .collect();
     files.sort();
-    files
+    Ok(files)
 }
 
 fn log_hint(wanted: &Path) -> String {
     let folder = wanted.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let files = mcap_files(folder);
+    let files = mcap_files(folder).unwrap_or_default();
     let names: Vec<&str> = files.iter().filter_map(|f| f.file_name()?.to_str()).collect();
     let name = wanted.file_name().and_then(|n| n.to_str()).unwrap_or_default();
     nearest(name, names).map_or(String::new(), |best| {

@@ -1,7 +1,7 @@
 //! Which pipelines run on which logs, and what identifies each of these tasks.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use super::args::PlanArgs;
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::needs::needs;
 use crate::outcome::{Failure, say};
-use crate::suggest::{check_log_path, toml_files};
+use crate::suggest::{self, check_log_path, toml_files};
 
 /// How files that a config names are called among the inputs.
 const FILE: &str = "file ";
@@ -240,15 +240,8 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
 }
 
 fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let entries = fs::read_dir(folder)
-        .map_err(|error| Failure::usage(format!("cannot read {}: {error}", folder.display())))?;
-    let mut files: Vec<PathBuf> = entries
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
-        .collect();
-    files.sort();
-    Ok(files)
+    suggest::mcap_files(folder)
+        .map_err(|error| Failure::usage(format!("cannot read {}: {error}", folder.display())))
 }
 
 /// The log with its truth, if it has any.

@@ -204,24 +204,26 @@ fn a_followed_person_who_is_discovered_again_stays_one() {
     assert_eq!(reports[3].funnel.count("same person"), 1);
 }
 
+/// One script discovers, another one follows.
+const TWO_SCRIPTS: &str = "
+    [[detectors]]
+    plugin = 'script'
+    roles = ['discover']
+    [[detectors]]
+    plugin = 'script'
+    roles = ['follow']
+    config = { script = 1 }
+    [filter]
+    plugin = 'steady'
+";
+
 #[test]
 fn the_better_sighting_of_a_followed_person_is_kept() {
-    let config = "
-        [[detectors]]
-        plugin = 'script'
-        roles = ['discover']
-        [[detectors]]
-        plugin = 'script'
-        roles = ['follow']
-        config = { script = 1 }
-        [filter]
-        plugin = 'steady'
-    ";
     let world = World::of((0..4).map(|_| vec![scored(2.0, person(3.0, 0.0))]));
     for index in 2..5 {
         world.show(1, index, vec![person(3.1, 0.0)]);
     }
-    let reports = world.run(config, 4, 0.1);
+    let reports = world.run(TWO_SCRIPTS, 4, 0.1);
     assert_eq!(place_of(&reports[3], 1), Some((3.0, 0.0)));
     assert_eq!(ids(&reports[3]), [1]);
 }
@@ -243,20 +245,9 @@ fn a_search_for_one_person_does_not_steal_anothers_sighting() {
 
 #[test]
 fn a_search_near_a_track_starts_nobody() {
-    let config = "
-        [[detectors]]
-        plugin = 'script'
-        roles = ['discover']
-        [[detectors]]
-        plugin = 'script'
-        roles = ['follow']
-        config = { script = 1 }
-        [filter]
-        plugin = 'steady'
-    ";
     let world = World::of([vec![person(3.0, 0.0)], vec![]]);
     world.show(1, 2, vec![person(3.0, 0.0), person(3.0, 0.45)]);
-    let report = world.run(config, 2, 0.1).remove(1);
+    let report = world.run(TWO_SCRIPTS, 2, 0.1).remove(1);
     assert_eq!(ids(&report), [1]);
 }
 
