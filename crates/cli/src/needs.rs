@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use tagalong_core::{
     Camera, DepthImage, Distortion, Error, Frame, GreyImage, Images, Motion, Pinhole, RgbImage,
-    Stamp,
+    RightImage, Stamp,
 };
 use tagalong_log::Needs;
 use tagalong_pipeline::{Pipeline, StepError};
@@ -65,7 +65,10 @@ fn blank(index: u64, given: Needs) -> Frame {
         colour: given.colour.then(|| Arc::new(RgbImage::filled(width, height, [90; 3]))),
         grey: None,
         depth: given.depth.then(|| Arc::new(DepthImage::filled(width, height, f32::NAN))),
-        right: given.right.then(|| Arc::new(GreyImage::filled(width, height, 90))),
+        right: given.right.then(|| {
+            let image = GreyImage::filled(width, height, 90);
+            Arc::new(RightImage { image, baseline_m: 0.1 })
+        }),
     };
     let stamp = Stamp::from_nanos(1_000_000_000 + index * 100_000_000);
     Frame::new(index, stamp, camera, Motion::at_rest(0.1), images)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
     Camera, DepthImage, Detection, Distortion, Estimate, Frame, Image, Images, Motion, Person,
-    Pinhole, RgbImage, Stamp, Track, TrackId,
+    Pinhole, RgbImage, RightImage, Stamp, Track, TrackId,
 };
 
 use crate::figure::{Figure, World};
@@ -69,7 +69,7 @@ pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
             colour: Some(Arc::new(RgbImage::filled(w, h, [grey; 3]))),
             grey: Some(Arc::new(Image::filled(w, h, grey))),
             depth: Some(Arc::new(DepthImage::filled(w, h, depth))),
-            right: Some(Arc::new(Image::filled(w, h, grey))),
+            right: Some(Arc::new(RightImage { image: Image::filled(w, h, grey), baseline_m: 0.1 })),
         };
         frame(1, camera, images)
     };
@@ -133,14 +133,19 @@ pub(crate) fn sighting(
 
 /// The same images seen in a mirror.
 pub(crate) fn mirrored(images: &Images) -> Images {
-    fn flip<P: Copy>(image: &Arc<Image<P>>) -> Arc<Image<P>> {
+    fn reversed<P: Copy>(image: &Image<P>) -> Image<P> {
         let (w, h) = (image.width(), image.height());
-        Arc::new(Image::from_fn(w, h, |x, y| image.row(y)[w - 1 - x]))
+        Image::from_fn(w, h, |x, y| image.row(y)[w - 1 - x])
+    }
+    fn flip<P: Copy>(image: &Arc<Image<P>>) -> Arc<Image<P>> {
+        Arc::new(reversed(image))
     }
     Images {
         colour: images.colour.as_ref().map(flip),
         grey: images.grey.as_ref().map(flip),
         depth: images.depth.as_ref().map(flip),
-        right: images.right.as_ref().map(flip),
+        right: images.right.as_ref().map(|right| {
+            Arc::new(RightImage { image: reversed(&right.image), baseline_m: right.baseline_m })
+        }),
     }
 }

@@ -15,7 +15,16 @@ pub struct Images {
     /// Depth, registered to the colour image.
     pub depth: Option<Arc<DepthImage>>,
     /// The right-hand image of a rectified stereo pair.
-    pub right: Option<Arc<GreyImage>>,
+    pub right: Option<Arc<RightImage>>,
+}
+
+/// The right-hand image of a rectified stereo pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RightImage {
+    /// The image.
+    pub image: GreyImage,
+    /// How far the right camera is from the left one, m.
+    pub baseline_m: f64,
 }
 
 /// Something computed from a frame that several plugins want; see
@@ -81,6 +90,13 @@ impl Frame {
         self.recorded.as_deref()
     }
 
+    /// The same moment with a depth image.
+    pub fn with_depth(&self, depth: Arc<DepthImage>) -> Self {
+        let images = Images { depth: Some(depth), ..self.images.clone() };
+        Self::new(self.index, self.stamp, Arc::clone(&self.camera), self.motion, images)
+            .with_recorded(self.recorded.clone())
+    }
+
     /// The images as they came.
     pub fn images(&self) -> &Images {
         &self.images
@@ -106,7 +122,7 @@ impl Frame {
     ///
     /// # Errors
     /// [`Error::MissingImage`] where the log carries none.
-    pub fn right(&self) -> Result<&GreyImage> {
+    pub fn right(&self) -> Result<&RightImage> {
         self.images.right.as_deref().ok_or(Error::MissingImage { what: "right stereo" })
     }
 

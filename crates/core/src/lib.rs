@@ -49,7 +49,7 @@ pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Search, Verifier};
 pub use error::{Error, Result};
 pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Support};
-pub use frame::{Derived, Frame, Images};
+pub use frame::{Derived, Frame, Images, RightImage};
 pub use funnel::{Dropped, Funnel};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use motion::{Motion, Wheels, planar_pose};

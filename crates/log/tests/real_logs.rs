@@ -99,7 +99,7 @@ fn the_baseline_of_a_stereo_pair_is_known() {
     let mut source = open(&folder, "kitti-stereo", &InputSettings::default(), needs);
     assert!((source.facts().baseline_m.unwrap() - 0.5327).abs() < 1e-3);
     let frame = source.next_frame().unwrap().frame;
-    assert_eq!(frame.right().unwrap().width(), frame.colour().unwrap().width());
+    assert_eq!(frame.right().unwrap().image.width(), frame.colour().unwrap().width());
 }
 
 /// The floor that is fitted where tf is not used agrees with the tf, which was

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{
     Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
 };
-use tagalong_core::{Camera, Distortion, Image, Images, Pinhole, Rect, WheelSpeeds};
+use tagalong_core::{Camera, Distortion, Image, Images, Pinhole, Rect, RightImage, WheelSpeeds};
 
 use crate::behaviour::{Obstacle, Walker, hidden_by, play_tricks};
 use crate::body::Skeleton;
@@ -275,7 +275,8 @@ impl Simulation {
         let right = draw(world, &camera, pose, self.threads);
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
-        let right = self.exposures[1].grey(&right, &moments[1]);
+        let image = self.exposures[1].grey(&right, &moments[1]);
+        let right = RightImage { image, baseline_m: self.scene.camera.baseline_m };
         Images { grey: Some(Arc::new(grey)), right: Some(Arc::new(right)), ..Images::default() }
     }
 
@@ -440,7 +441,7 @@ mod tests {
     fn a_stereo_pair_is_shifted_by_the_disparity() {
         let text = SMALL.replace("[camera]\n", "[camera]\nkind = \"stereo\"\nbaseline_m = 0.12\n");
         let images = &shots(&text, 2)[0].images;
-        let (left, right) = (images.grey.as_ref().unwrap(), images.right.as_ref().unwrap());
+        let (left, right) = (images.grey.as_ref().unwrap(), &images.right.as_ref().unwrap().image);
         let difference = |shift: i64| -> i64 {
             let pairs = (44..52).flat_map(|x| (24..40).map(move |y| (x, y)));
             pairs

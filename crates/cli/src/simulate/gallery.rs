@@ -58,7 +58,11 @@ fn picture(shot: &Shot) -> RgbImage {
 fn side_by_side(images: &Images) -> (RgbImage, RgbImage) {
     let grey = |image: &tagalong_core::GreyImage| image.map(|v| [v; 3]);
     let first = images.colour.as_deref().cloned().or(images.grey.as_deref().map(grey));
-    let second = images.depth.as_deref().map(shades).or(images.right.as_deref().map(grey));
+    let second = images
+        .depth
+        .as_deref()
+        .map(shades)
+        .or(images.right.as_deref().map(|right| grey(&right.image)));
     (first.unwrap_or_default(), second.unwrap_or_default())
 }
 

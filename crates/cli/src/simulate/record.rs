@@ -23,7 +23,6 @@ const SCENE_TOPIC: &str = "/simulation/scene";
 pub struct Recorder {
     log: MessageLog,
     camera: Camera,
-    baseline_m: f64,
 }
 
 impl Recorder {
@@ -36,7 +35,7 @@ impl Recorder {
         let text = toml::to_string(scene).unwrap_or_default();
         log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
         log.send("/tf_static", EPOCH, &mount(camera))?;
-        Ok(Self { log, camera: camera.clone(), baseline_m: scene.camera.baseline_m })
+        Ok(Self { log, camera: camera.clone() })
     }
 
     /// Writes one thing.
@@ -72,12 +71,11 @@ impl Recorder {
             self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
             self.depth(recorded, &header, depth)?;
         }
-        let pair = [("left", &images.grey, 0.0), ("right", &images.right, self.baseline_m)];
-        for (side, image, aside_m) in pair {
-            if let Some(image) = image {
-                self.info(side, recorded, &header, aside_m)?;
-                self.grey(side, recorded, &header, image)?;
-            }
+        let left = images.grey.as_deref().map(|image| ("left", image, 0.0));
+        let right = images.right.as_deref().map(|right| ("right", &right.image, right.baseline_m));
+        for (side, image, aside_m) in left.into_iter().chain(right) {
+            self.info(side, recorded, &header, aside_m)?;
+            self.grey(side, recorded, &header, image)?;
         }
         self.log.send_truth(recorded, &truth(captured, &shot.truth))
     }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    Camera, DepthImage, Distortion, Frame, Images, Lens, Motion, Pinhole, Stamp, planar_pose,
+    Camera, DepthImage, Distortion, Frame, Images, Lens, Motion, Pinhole, RightImage, Stamp,
+    planar_pose,
 };
 
 use super::intake::Intake;
@@ -72,7 +73,7 @@ impl Assembler {
         }
         // A second picture to decode is only worth it for those who look at it.
         if let Some(right) = right.filter(|_| plan.needs.right) {
-            images.right = right_image(plan, &right, size, tally);
+            images.right = right_image(plan, &right, size, tally).map(Arc::new);
         }
         let lacks = plan.needs.depth && images.depth.is_none()
             || plan.needs.right && images.right.is_none();
@@ -265,17 +266,18 @@ fn right_image(
     right: &Payload,
     size: (usize, usize),
     tally: &mut Tally,
-) -> Option<Arc<tagalong_core::GreyImage>> {
+) -> Option<RightImage> {
     let pixels = pixels(plan, plan.chosen.right.as_ref()?, right, tally)?;
     if pixels.size() != size {
         tally.lose("right_of_other_size", || "the right image has another size".into());
         return None;
     }
-    match pixels {
-        Pixels::Colour(colour) => Some(Arc::new(colour.to_grey())),
-        Pixels::Grey(grey) => Some(Arc::new(grey)),
-        Pixels::Depth(_) => None,
-    }
+    let image = match pixels {
+        Pixels::Colour(colour) => colour.to_grey(),
+        Pixels::Grey(grey) => grey,
+        Pixels::Depth(_) => return None,
+    };
+    Some(RightImage { image, baseline_m: plan.baseline_m? })
 }
 
 /// Decodes an image message; a failure is counted as lost.
