@@ -42,6 +42,7 @@ mod registry;
 mod settings;
 mod time;
 mod track;
+mod trainer;
 
 pub use camera::{Camera, Distortion, Lens, Pinhole};
 pub use control::{Controller, Scene, WheelSpeeds};
@@ -60,6 +61,7 @@ pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use settings::{ConfigError, Settings, Value, commented_defaults, parse_settings};
 pub use time::Stamp;
 pub use track::{Track, TrackId};
+pub use trainer::{Example, Fitted, Trainer};
 
 /// Distance from the visible surface of a head to its centre, in metres.
 ///

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use toml::Spanned;
 
 use crate::{
-    ConfigError, Controller, Detector, Filter, Result, Settings, Value, Verifier, Wheels,
+    ConfigError, Controller, Detector, Filter, Result, Settings, Trainer, Value, Verifier, Wheels,
     commented_defaults, nearest, parse_settings,
 };
 
@@ -98,6 +98,7 @@ impl PluginInfo {
 #[derive(Default)]
 pub struct Registry {
     plugins: BTreeMap<&'static str, PluginInfo>,
+    trainers: BTreeMap<&'static str, Build<Box<dyn Trainer>>>,
 }
 
 impl Registry {
@@ -155,6 +156,21 @@ impl Registry {
     ) {
         let maker = Maker::Controller(boxed(build, |plugin| Box::new(plugin)));
         self.add::<C>(name, Kind::Controller, summary, maker);
+    }
+
+    /// Registers who makes the model file of a plugin; `C` are the settings of
+    /// the plugin itself.
+    ///
+    /// # Panics
+    /// If there is no such plugin yet, or it has a trainer already.
+    pub fn trainer<C: Settings, P: Trainer + 'static>(
+        &mut self,
+        name: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        assert!(self.plugins.contains_key(name), "no plugin is called `{name}` to be trained");
+        let previous = self.trainers.insert(name, boxed(build, |trainer| Box::new(trainer)));
+        assert!(previous.is_none(), "two trainers for `{name}`");
     }
 
     fn add<C: Settings>(
@@ -255,6 +271,33 @@ impl Registry {
         }
     }
 
+    /// Builds the trainer of a plugin from the plugin's settings.
+    ///
+    /// # Errors
+    /// A plugin that cannot be trained (names those that can), or bad settings.
+    pub fn build_trainer(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn Trainer>, ConfigError> {
+        match self.trainers.get(name) {
+            Some(build) => build(config, context),
+            None => Err(self.untrainable(name)),
+        }
+    }
+
+    fn untrainable(&self, name: &str) -> ConfigError {
+        let names: Vec<_> = self.trainers.keys().copied().collect();
+        ConfigError::new(match self.plugins.get(name) {
+            Some(info) => {
+                let list = names.join(", ");
+                format!("the {} `{name}` cannot be trained; available: {list}", info.kind)
+            }
+            None => unknown("plugin", name, names),
+        })
+    }
+
     fn of_kind(&self, name: &str, kind: Kind) -> std::result::Result<&PluginInfo, ConfigError> {
         match self.plugins.get(name) {
             Some(info) if info.kind == kind => Ok(info),
@@ -298,4 +341,71 @@ fn unknown(thing: &str, name: &str, available: Vec<&str>) -> String {
     let hint = nearest(name, available.iter().copied())
         .map_or(String::new(), |better| format!(" did you mean `{better}`?"));
     format!("unknown {thing} `{name}`;{hint} available: {}", available.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use schemars::JsonSchema;
+    use serde::{Deserialize, Serialize};
+
+    use super::*;
+    use crate::{Detection, Example, Fitted, Frame};
+
+    #[derive(Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    struct Config {}
+
+    struct Counting;
+
+    impl Verifier for Counting {
+        fn margin(&mut self, _: &Frame, _: &Detection) -> Result<f64> {
+            Ok(0.0)
+        }
+    }
+
+    impl Trainer for Counting {
+        fn add(&mut self, _: &Frame, _: &Detection, _: Example) -> Result<()> {
+            Ok(())
+        }
+
+        fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+            progress(1.0);
+            Ok(Fitted::default())
+        }
+    }
+
+    fn registry() -> Registry {
+        let mut registry = Registry::default();
+        registry.verifier("counting", "counts", |_: Config, _| Ok(Counting));
+        registry.verifier("fixed", "never learns", |_: Config, _| Ok(Counting));
+        registry.trainer("counting", |_: Config, _| Ok(Counting));
+        registry
+    }
+
+    fn refusal(name: &str) -> String {
+        let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+        let context = Context { seed: 0, base_dir: PathBuf::new(), wheels };
+        let built = registry().build_trainer(name, None, &context);
+        built.map_or_else(|error| error.to_string(), |_| String::new())
+    }
+
+    #[test]
+    fn a_trainer_is_found_under_the_name_of_its_plugin() {
+        assert_eq!(refusal("counting"), "");
+    }
+
+    #[test]
+    fn who_cannot_be_trained_is_answered_with_who_can() {
+        let fixed = "the verifier `fixed` cannot be trained; available: counting";
+        assert_eq!(refusal("fixed"), fixed);
+        assert!(refusal("countng").contains("did you mean `counting`?"));
+    }
+
+    #[test]
+    #[should_panic(expected = "no plugin is called `counting`")]
+    fn a_trainer_needs_its_plugin() {
+        Registry::default().trainer("counting", |_: Config, _| Ok(Counting));
+    }
 }
