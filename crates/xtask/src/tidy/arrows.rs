@@ -16,9 +16,16 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sim", &["core"]),
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
+    ("trials", &["core", "pipeline", "stereo", "sim", "eval"]),
     ("conformance", &["core"]),
     ("catalog", &["core", "plugins"]),
-    ("cli", &["core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "catalog"]),
+    (
+        "cli",
+        &[
+            "core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "trials",
+            "catalog",
+        ],
+    ),
     ("xtask", &[]),
 ];
 

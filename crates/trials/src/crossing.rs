@@ -1,0 +1,207 @@
+use std::collections::BTreeSet;
+
+use nalgebra::Vector2;
+use tagalong_core::{Camera, Track, TrackId};
+use tagalong_sim::Truth;
+
+use crate::{Run, Trial};
+
+/// When a crossing counts as a success: P3, Table I, asks that both people are
+/// tracked in all frames, without saying what tracked means. Here it is a place
+/// within half the width of the shoulders, by one and the same track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// A newcomer must have a track after this time in view, s.
+    pub settle_s: f64,
+    /// Largest error of a head, m: half the shoulder width of somebody 1.7 m
+    /// tall (0.1295 of the height).
+    pub max_error_m: f64,
+    /// Look at the error across the line of sight alone, as the papers do, whose
+    /// errors are pixels; otherwise at the distance on the floor.
+    pub across_only: bool,
+    /// Somebody counts while this fraction of the upper body is in the image,
+    /// hidden or not.
+    pub min_in_image: f64,
+}
+
+impl Default for Crossing {
+    fn default() -> Self {
+        Self { settle_s: 1.0, max_error_m: 0.22, across_only: false, min_in_image: 0.75 }
+    }
+}
+
+/// A success.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Span {
+    /// Error of each head in each frame, m.
+    pub errors_m: Vec<f64>,
+}
+
+/// Why a crossing is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Failing {
+    /// Somebody was in view for `settle_s` without a track.
+    NotFound {
+        /// The person.
+        person: u16,
+    },
+    /// A person's track ended.
+    Lost {
+        /// The person.
+        person: u16,
+        /// When, s since the start.
+        at_s: f64,
+    },
+    /// A person's track was elsewhere, on somebody else perhaps.
+    Astray {
+        /// The person.
+        person: u16,
+        /// When, s since the start.
+        at_s: f64,
+    },
+    /// Nobody was ever in view.
+    Nobody,
+}
+
+/// Judges a crossing: everybody who is in view must keep one track in all
+/// frames. Predicted tracks count, for somebody who is hidden can only be
+/// predicted.
+///
+/// # Errors
+/// The first thing that went wrong, person by person.
+pub fn crossing(trial: &Trial, run: &Run, rules: &Crossing) -> Result<Span, Failing> {
+    let people: BTreeSet<u16> =
+        trial.moments.iter().flat_map(|moment| &moment.truth).map(|truth| truth.id).collect();
+    let mut span = Span::default();
+    let mut taken = BTreeSet::new();
+    for person in people {
+        follow(trial, run, rules, person, &mut taken, &mut span)?;
+    }
+    if span.errors_m.is_empty() { Err(Failing::Nobody) } else { Ok(span) }
+}
+
+/// One person through all frames.
+fn follow(
+    trial: &Trial,
+    run: &Run,
+    rules: &Crossing,
+    person: u16,
+    taken: &mut BTreeSet<TrackId>,
+    span: &mut Span,
+) -> Result<(), Failing> {
+    let mut own = None;
+    let mut in_view_since = None;
+    for (moment, report) in trial.moments.iter().zip(&run.reports) {
+        let truth = moment.truth.iter().find(|truth| truth.id == person);
+        let inside = |t: &&Truth| in_image(t, &trial.camera) >= rules.min_in_image;
+        let Some(truth) = truth.filter(inside) else { continue };
+        if !report.outcome.is_processed() {
+            continue;
+        }
+        let at_s = moment.stamp.nanos() as f64 / 1e9;
+        let since = *in_view_since.get_or_insert(at_s);
+        let error = |track: &Track| rules.error_m(truth, track, &trial.camera);
+        let mut confirmed = report.tracks.iter().filter(|track| track.confirmed);
+        match own {
+            None => {
+                own = confirmed
+                    .find(|t| !taken.contains(&t.id) && error(t) <= rules.max_error_m)
+                    .map(|track| track.id);
+                if own.is_none() && at_s - since > rules.settle_s {
+                    return Err(Failing::NotFound { person });
+                }
+                taken.extend(own);
+            }
+            Some(id) => {
+                let track = confirmed.find(|track| track.id == id);
+                let error = track.map(error).ok_or(Failing::Lost { person, at_s })?;
+                if error > rules.max_error_m {
+                    return Err(Failing::Astray { person, at_s });
+                }
+                span.errors_m.push(error);
+            }
+        }
+    }
+    Ok(())
+}
+
+impl Crossing {
+    fn error_m(&self, truth: &Truth, track: &Track, camera: &Camera) -> f64 {
+        let off = (track.estimate.person.position - truth.head_in_robot).xy();
+        if !self.across_only {
+            return off.norm();
+        }
+        let eye = camera.robot_from_camera.translation.vector;
+        let sight = (truth.head_in_robot.coords - eye).xy();
+        let across = Vector2::new(-sight.y, sight.x).try_normalize(1e-6);
+        across.map_or(off.norm(), |across| off.dot(&across).abs())
+    }
+}
+
+/// The fraction of the upper body that is in the image, hidden or not.
+pub(crate) fn in_image(truth: &Truth, camera: &Camera) -> f64 {
+    let whole = camera.upper_body(&truth.head_in_robot);
+    let inside = whole.clipped(camera.width, camera.height);
+    if whole.area() > 0.0 { inside.area() / whole.area() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::trial;
+
+    fn judged(tracks: &[(u32, &[Option<(f64, f64)>])]) -> Result<Span, Failing> {
+        let people: [&[_]; 2] = [&[(3.0, 0.5, 1.0); 20], &[(4.0, -0.5, 1.0); 20]];
+        let trial = trial(&people, tracks);
+        crossing(&trial, &trial.runs[0], &Crossing::default())
+    }
+
+    #[test]
+    fn good_tracks_are_a_success_with_their_errors() {
+        let span = judged(&[(1, &[Some((3.0, 0.6)); 20]), (2, &[Some((4.0, -0.5)); 20])]).unwrap();
+        assert_eq!(span.errors_m.len(), 2 * 19);
+        assert!((span.errors_m[0] - 0.1).abs() < 1e-12 && span.errors_m[20] < 1e-12);
+    }
+
+    #[test]
+    fn swaps_losses_and_misses_are_told_apart() {
+        let mut first = [Some((3.0, 0.5)); 20];
+        let mut second = [Some((4.0, -0.5)); 20];
+        first[12..].fill(Some((4.0, -0.5)));
+        second[12..].fill(Some((3.0, 0.5)));
+        let swapped = judged(&[(1, &first), (2, &second)]);
+        assert_eq!(swapped, Err(Failing::Astray { person: 1, at_s: 1.2 }));
+        second[12..].fill(None);
+        let lost = judged(&[(1, &[Some((3.0, 0.5)); 20]), (2, &second)]);
+        assert_eq!(lost, Err(Failing::Lost { person: 2, at_s: 1.2 }));
+        let missed = judged(&[(1, &[Some((3.0, 0.5)); 20])]);
+        assert_eq!(missed, Err(Failing::NotFound { person: 2 }));
+    }
+
+    #[test]
+    fn one_track_is_not_enough_for_two() {
+        let people: [&[_]; 2] = [&[(3.0, 0.0, 1.0); 20], &[(3.1, 0.0, 1.0); 20]];
+        let trial = trial(&people, &[(1, &[Some((3.0, 0.0)); 20])]);
+        let judged = crossing(&trial, &trial.runs[0], &Crossing::default());
+        assert_eq!(judged, Err(Failing::NotFound { person: 2 }));
+    }
+
+    #[test]
+    fn along_the_view_papers_see_no_error() {
+        let off = [Some((3.5, 0.0)); 20];
+        let trial = trial(&[&[(3.0, 0.0, 1.0); 20]], &[(1, &off)]);
+        let rules = Crossing { across_only: true, ..Crossing::default() };
+        assert!(crossing(&trial, &trial.runs[0], &rules).is_ok());
+        assert!(crossing(&trial, &trial.runs[0], &Crossing::default()).is_err());
+    }
+
+    #[test]
+    fn who_leaves_the_image_need_not_be_tracked() {
+        let mut places = [(3.0, 0.0, 1.0); 20];
+        places[10..].fill((3.0, 9.0, 0.0));
+        let mut track = [Some((3.0, 0.0)); 20];
+        track[10..].fill(None);
+        let trial = trial(&[&places], &[(1, &track)]);
+        assert!(crossing(&trial, &trial.runs[0], &Crossing::default()).is_ok());
+    }
+}

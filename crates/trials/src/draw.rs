@@ -1,0 +1,177 @@
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::Isometry2;
+use tagalong_core::{Camera, DepthImage, Frame, Images, Motion, Stamp, WheelSpeeds};
+use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+
+/// Standard deviation of odometry as a fraction of the travel, as the log
+/// reader takes it where its `[input] odometry_sigma` is left out.
+pub const ODOMETRY_SIGMA: f64 = 0.02;
+/// Images that come up to this many frames late are put in order, as the log
+/// reader does.
+const REORDERED: usize = 3;
+/// Odometry is kept for this long, ns: longer than any image is late.
+const KEPT_NS: u64 = 1_000_000_000;
+
+/// What one moment of a scene is for a pipeline, and what is true of it.
+pub struct Drawn {
+    /// The frame.
+    pub frame: Frame,
+    /// Everybody.
+    pub truth: Vec<Truth>,
+    /// The robot in the odometry frame, as it believes, m and rad.
+    pub odom_from_robot: Isometry2<f64>,
+    /// The robot in the world, as it is, m and rad.
+    pub world_from_robot: Isometry2<f64>,
+}
+
+/// A scene as the frames of a log.
+pub struct Draw {
+    simulation: Simulation,
+    camera: Arc<Camera>,
+    odometry: BTreeMap<u64, Isometry2<f64>>,
+    /// Images by their stamps, ns.
+    waiting: BTreeMap<u64, Shot>,
+    patience: usize,
+    previous: Option<(Stamp, Isometry2<f64>)>,
+    index: u64,
+}
+
+impl Draw {
+    /// Frames in the order of their stamps, as out of a log; `threads` draw.
+    pub fn new(scene: &Scene, threads: usize) -> Self {
+        Self::with_patience(scene, threads, REORDERED)
+    }
+
+    /// Frames in the order in which they arrive, as on a robot, which may be
+    /// steered between them.
+    pub fn live(scene: &Scene, threads: usize) -> Self {
+        Self::with_patience(scene, threads, 0)
+    }
+
+    fn with_patience(scene: &Scene, threads: usize, patience: usize) -> Self {
+        let simulation = Simulation::new(scene, threads);
+        Self {
+            camera: Arc::new(simulation.camera().clone()),
+            simulation,
+            odometry: BTreeMap::new(),
+            waiting: BTreeMap::new(),
+            patience,
+            previous: None,
+            index: 0,
+        }
+    }
+
+    /// Commands the wheels from now on; see [`Simulation::steer`].
+    pub fn steer(&mut self, command: WheelSpeeds) {
+        self.simulation.steer(command);
+    }
+
+    /// The next frame; `None` at the end of the scene.
+    pub fn next_frame(&mut self) -> Option<Drawn> {
+        while self.waiting.len() <= self.patience {
+            match self.simulation.next_event() {
+                Some(Event::Odometry(reading)) => {
+                    self.odometry.insert(reading.at_ns, reading.odom_from_robot);
+                    self.odometry = self.odometry.split_off(&reading.at_ns.saturating_sub(KEPT_NS));
+                }
+                Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.captured_ns, *shot)),
+                None => break,
+            }
+        }
+        let (_, shot) = self.waiting.pop_first()?;
+        Some(self.drawn(shot))
+    }
+
+    fn drawn(&mut self, shot: Shot) -> Drawn {
+        self.index += 1;
+        let stamp = Stamp::from_nanos(shot.captured_ns);
+        // The odometry speaks at every step of the simulation, so at this one.
+        let odom_from_robot = self
+            .odometry
+            .range(..=shot.captured_ns)
+            .next_back()
+            .map_or_else(Isometry2::identity, |(_, pose)| *pose);
+        let motion = self.motion(stamp, odom_from_robot);
+        let camera = Arc::clone(&self.camera);
+        Drawn {
+            frame: Frame::new(self.index, stamp, camera, motion, as_logged(shot.images)),
+            truth: shot.truth,
+            odom_from_robot,
+            world_from_robot: shot.world_from_robot,
+        }
+    }
+
+    /// From the frame before; none to a frame that is older than that.
+    fn motion(&mut self, stamp: Stamp, here: Isometry2<f64>) -> Motion {
+        let before = self.previous.filter(|(then, _)| *then < stamp);
+        if before.is_some() || self.previous.is_none() {
+            self.previous = Some((stamp, here));
+        }
+        before.map_or(Motion::at_rest(0.0), |(then, pose)| {
+            Motion::between(&pose, &here, stamp.seconds_since(then), ODOMETRY_SIGMA)
+        })
+    }
+}
+
+/// Depth travels as millimetres.
+fn as_logged(images: Images) -> Images {
+    let round = |depth: Arc<DepthImage>| Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001));
+    Images { depth: images.depth.map(round), ..images }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "seed = 3\nduration_s = 4.0\n[camera]\nwidth = 32\nheight = 24\n\
+        rate_hz = 20.0\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.2\n\
+        [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+
+    fn drawn(mut draw: Draw) -> Vec<Drawn> {
+        std::iter::from_fn(|| draw.next_frame()).collect()
+    }
+
+    fn stamps(all: &[Drawn]) -> Vec<u64> {
+        all.iter().map(|drawn| drawn.frame.stamp.nanos() / 1_000_000).collect()
+    }
+
+    fn scene() -> Scene {
+        Scene::parse(SCENE).unwrap()
+    }
+
+    #[test]
+    fn late_frames_are_in_order_in_a_log_and_not_on_a_robot() {
+        let (log, live) = (drawn(Draw::new(&scene(), 1)), drawn(Draw::live(&scene(), 1)));
+        let sorted = |all: &[Drawn]| all.windows(2).all(|p| p[0].frame.stamp < p[1].frame.stamp);
+        assert!(sorted(&log), "{:?}", stamps(&log));
+        assert!(!sorted(&live), "{:?}", stamps(&live));
+        assert!(log.len() == live.len() && log.len() < 80);
+    }
+
+    #[test]
+    fn motions_add_up_to_the_odometry() {
+        for draw in [Draw::new(&scene(), 1), Draw::live(&scene(), 1)] {
+            let all = drawn(draw);
+            let sum =
+                all.iter().fold(all[0].odom_from_robot, |pose, d| pose * d.frame.motion.isometry());
+            let last = all.iter().max_by_key(|d| d.frame.stamp).unwrap();
+            assert!(
+                (sum.translation.vector - last.odom_from_robot.translation.vector).norm() < 1e-9
+            );
+            assert!(sum.translation.vector.norm() > 0.3, "{sum}");
+        }
+    }
+
+    #[test]
+    fn a_steered_robot_goes_where_it_is_told() {
+        let mut draw = Draw::live(&scene(), 1);
+        let mut last = Isometry2::identity();
+        while let Some(drawn) = draw.next_frame() {
+            last = drawn.world_from_robot;
+            draw.steer(WheelSpeeds { left: -0.2, right: -0.2 });
+        }
+        assert!(last.translation.x < 0.85, "{last}");
+    }
+}

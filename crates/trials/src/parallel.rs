@@ -1,0 +1,52 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tagalong_core::Registry;
+use tagalong_sim::Scene;
+
+use crate::{Contender, Trial, TrialError};
+
+/// Draws all scenes, takes all contenders over each, and keeps what `keep` makes
+/// of the trials, in the order of the scenes. `threads` trials run at a time;
+/// `done` hears after each how many are through.
+///
+/// # Errors
+/// The error of the first scene, in the order of the list, that has one.
+pub fn each<T: Send>(
+    scenes: &[Scene],
+    contenders: &[Contender],
+    registry: &Registry,
+    threads: usize,
+    keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
+    done: impl Fn(usize) + Sync,
+) -> Result<Vec<T>, TrialError> {
+    let (next, through) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let work = || {
+        let mut kept = Vec::new();
+        while let Some((at, scene)) = take(scenes, &next) {
+            let result = Trial::new(scene, contenders, registry, 1).and_then(&keep);
+            let failed = result.is_err();
+            kept.push((at, result));
+            done(through.fetch_add(1, Ordering::Relaxed) + 1);
+            if failed {
+                // The others need not go on.
+                next.store(scenes.len(), Ordering::Relaxed);
+            }
+        }
+        kept
+    };
+    let mut all = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
+        let mut all = work();
+        for other in others {
+            all.extend(other.join().map_err(|_| TrialError::Panicked)?);
+        }
+        Ok::<_, TrialError>(all)
+    })?;
+    all.sort_by_key(|(at, _)| *at);
+    all.into_iter().map(|(_, result)| result).collect()
+}
+
+fn take<'a>(scenes: &'a [Scene], next: &AtomicUsize) -> Option<(usize, &'a Scene)> {
+    let at = next.fetch_add(1, Ordering::Relaxed);
+    scenes.get(at).map(|scene| (at, scene))
+}

@@ -1,0 +1,88 @@
+//! Trials written by hand.
+
+use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
+use tagalong_core::{Camera, Distortion, Estimate, Funnel, Person, Pinhole, Stamp, Track, TrackId};
+use tagalong_pipeline::{FrameReport, Outcome};
+use tagalong_sim::Truth;
+
+use crate::{Moment, Run, Trial};
+
+/// Frames per second.
+pub const RATE_HZ: f64 = 10.0;
+
+/// Where somebody is, and how much is seen of them.
+pub type Place = (f64, f64, f64);
+
+fn camera() -> Camera {
+    let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+    Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0)
+}
+
+/// A robot at rest, and for each person and each track a place in every frame.
+pub fn trial(people: &[&[Place]], tracks: &[(u32, &[Option<(f64, f64)>])]) -> Trial {
+    let frames = people[0].len();
+    let camera = camera();
+    let moments = (0..frames).map(|at| moment(at, people, &camera)).collect();
+    let reports = (0..frames).map(|at| report(at, tracks, &camera)).collect();
+    let runs = vec![Run { pipeline: "hand".into(), reports }];
+    Trial { seed: 1, camera, moments, runs }
+}
+
+fn stamp(at: usize) -> Stamp {
+    Stamp::default().plus_seconds(at as f64 / RATE_HZ)
+}
+
+fn moment(at: usize, people: &[&[Place]], camera: &Camera) -> Moment {
+    let truth = (1..).zip(people).map(|(id, places)| {
+        let (x, y, visible_fraction) = places[at];
+        let head = Point3::new(x, y, 1.6);
+        Truth {
+            id,
+            head_in_robot: head,
+            torso_in_robot: head,
+            upper_body: Some(camera.upper_body(&head)),
+            visible: None,
+            visible_fraction,
+            occluder: (visible_fraction < 1.0).then_some(if id == 1 { 2 } else { 1 }),
+            ignore: visible_fraction < 0.2,
+        }
+    });
+    Moment {
+        stamp: stamp(at),
+        truth: truth.collect(),
+        odom_from_robot: Isometry2::identity(),
+        world_from_robot: Isometry2::identity(),
+    }
+}
+
+fn report(at: usize, tracks: &[(u32, &[Option<(f64, f64)>])], camera: &Camera) -> FrameReport {
+    let track = |(id, places): &(u32, &[Option<(f64, f64)>])| {
+        let (x, y) = places[at]?;
+        let position = Point3::new(x, y, 1.6);
+        let person = Person { position, velocity: Vector2::zeros() };
+        let region = camera.upper_body(&position);
+        Some(Track {
+            id: TrackId(*id),
+            estimate: Estimate { person, covariance: SMatrix::identity(), region },
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 1.0,
+        })
+    };
+    FrameReport {
+        index: at as u64 + 1,
+        stamp: stamp(at),
+        outcome: Outcome::Tracked,
+        candidates: Vec::new(),
+        funnel: Funnel::default(),
+        tracks: tracks.iter().filter_map(track).collect(),
+        target: None,
+        command: None,
+        nis: Vec::new(),
+        timings: Vec::new(),
+        ended: Vec::new(),
+    }
+}
