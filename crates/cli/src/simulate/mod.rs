@@ -91,3 +91,46 @@ pub fn record(mut simulation: Simulation, scene: &Scene, path: &Path) -> Result<
     recorder.finish()?;
     Ok(images)
 }
+
+#[cfg(test)]
+mod tests {
+    use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+    use tagalong_trials::Draw;
+
+    use super::*;
+
+    const SCENE: &str = "seed = 3\nduration_s = 3.0\n[camera]\nwidth = 64\nheight = 48\n\
+        rate_hz = 20.0\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.1\n\
+        [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+
+    /// Trials skip the log; they must see what a pipeline sees that reads it.
+    #[test]
+    fn a_recorded_scene_gives_the_frames_of_a_trial() {
+        let scene = Scene::parse(SCENE).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.mcap");
+        record(Simulation::new(&scene, 1), &scene, &path).unwrap();
+        let needs = Needs { depth: true, ..Needs::default() };
+        let mut source =
+            FrameSource::open(&path, &InputSettings::default(), &Limits::default(), needs).unwrap();
+        let mut draw = Draw::new(&scene, 1);
+        let mut frames = 0;
+        while let Some(logged) = source.next_frame() {
+            let drawn = draw.next_frame().unwrap().frame;
+            let (a, b) = (logged.frame.motion, drawn.motion);
+            let differences =
+                [a.forward - b.forward, a.left - b.left, a.turn - b.turn, a.dt - b.dt];
+            assert!(differences.iter().all(|d| d.abs() < 1e-9), "{a:?} {b:?}");
+            assert!((a.covariance - b.covariance).norm() < 1e-9, "{a:?} {b:?}");
+            assert_eq!(logged.frame.index, drawn.index);
+            let pose = |frame: &tagalong_core::Frame| frame.camera.robot_from_camera;
+            let off = pose(&logged.frame).inverse() * pose(&drawn);
+            assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9);
+            let (a, b) = (logged.frame.depth().unwrap(), drawn.depth().unwrap());
+            let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
+            assert!(a.pixels().iter().zip(b.pixels()).all(same));
+            frames += 1;
+        }
+        assert!(frames > 40 && draw.next_frame().is_none(), "{frames}");
+    }
+}
