@@ -29,14 +29,18 @@ mod behaviour;
 mod body;
 mod gait;
 mod material;
+mod parallel;
 mod person;
 mod random;
 mod render;
 mod robot;
 mod room;
 mod scene;
+mod seen;
 mod sensor;
+mod shadow;
 mod shape;
+mod sight;
 mod simulation;
 mod world;
 

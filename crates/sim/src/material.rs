@@ -67,10 +67,10 @@ impl Material {
     pub fn at(&self, own: &Vector3<f64>) -> Colour {
         match self.pattern {
             Pattern::Plain => self.colour,
-            Pattern::Stripes(period) => self.blend(own.z.rem_euclid(period) > 0.5 * period),
+            Pattern::Stripes(period) => self.blend(part(own.z / period) > 0.5),
             Pattern::Checks(side) => {
-                let cells = own.map(|v| (v / side).floor() as i64).sum();
-                self.blend(cells.rem_euclid(2) == 1)
+                let cells = own.map(|v| floor(v / side));
+                self.blend((cells.x ^ cells.y ^ cells.z) & 1 == 1)
             }
             Pattern::Mottled(size) => mixed(self.colour, self.second, clouds(own, size)),
             Pattern::Planks(width) => self.planks(own, width),
@@ -86,10 +86,9 @@ impl Material {
     }
 
     fn planks(&self, own: &Vector3<f64>, width: f64) -> Colour {
-        let row = (own.y / width).floor();
-        let shift = uniform_at(11, row as i64 as u64);
-        let board = (own.x / (8.0 * width) + shift).floor();
-        let tone = uniform_at(row as i64 as u64, board as i64 as u64);
+        let row = floor(own.y / width) as u64;
+        let board = floor(own.x / (8.0 * width) + uniform_at(11, row)) as u64;
+        let tone = uniform_at(row, board);
         let grain = clouds(&Vector3::new(own.x * 0.1, own.y, 0.0), 0.15 * width);
         mixed(self.colour, self.second, 0.6 * tone + 0.4 * grain)
     }
@@ -161,12 +160,28 @@ fn clouds(own: &Vector3<f64>, size: f64) -> f64 {
     0.65 * value_noise(&(own / size)) + 0.35 * value_noise(&(own * (2.3 / size)))
 }
 
+/// The largest whole number that is not larger. `f64::floor` calls a function
+/// where the processor need not have an instruction for it.
+fn floor(value: f64) -> i64 {
+    let towards_zero = value as i64;
+    towards_zero - i64::from(value < towards_zero as f64)
+}
+
+/// What is left of a number above [`floor`].
+fn part(value: f64) -> f64 {
+    value - floor(value) as f64
+}
+
+fn smooth(part: f64) -> f64 {
+    part * part * (3.0 - 2.0 * part)
+}
+
 /// Random values at the corners of a grid, smoothly joined.
 fn value_noise(p: &Vector3<f64>) -> f64 {
-    let cell = p.map(f64::floor);
-    let part = (p - cell).map(|v| v * v * (3.0 - 2.0 * v));
+    let cell = p.map(floor);
+    let part = p.map(|v| smooth(part(v)));
     let corner = |i: u64| {
-        let at = |axis: usize| cell[axis] as i64 + ((i >> axis) & 1) as i64;
+        let at = |axis: usize| cell[axis] + ((i >> axis) & 1) as i64;
         let key = at(0).wrapping_mul(73_856_093) ^ at(1).wrapping_mul(19_349_663);
         uniform_at(3, (key ^ at(2).wrapping_mul(83_492_791)) as u64)
     };

@@ -1,14 +1,14 @@
 //! Casts a ray through every pixel. The image is divided into tiles; a tile
-//! looks only at the solids whose surrounding ball it can see. Tiles do not
-//! depend on each other, so that any number of threads draws the same image.
+//! looks only at the solids that reach into the pyramid behind it, nearest first.
+//! Strips of tiles do not depend on each other, so that any number of threads
+//! draws the same image.
 
-use std::sync::{Mutex, PoisonError};
-use std::thread;
-
-use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 use tagalong_core::{Camera, Image};
 
+use crate::parallel::in_pieces;
 use crate::shape::Shape;
+use crate::sight::{Sight, before, between};
 use crate::world::{Hit, World};
 
 /// Side of a tile, pixels.
@@ -22,78 +22,104 @@ pub fn draw(
     world_from_robot: &Isometry3<f64>,
     threads: usize,
 ) -> Image<Hit> {
-    let view = View { world, camera, pose: world_from_robot * camera.robot_from_camera };
-    let mut image = Image::filled(camera.width, camera.height, Hit::default());
-    let strips = image.pixels_mut().chunks_mut(TILE * camera.width).enumerate();
-    let strips = Mutex::new(strips);
-    thread::scope(|scope| {
-        for _ in 0..threads.max(1) {
-            scope.spawn(|| {
-                while let Some((number, pixels)) = next(&strips) {
-                    view.strip(number * TILE, pixels);
-                }
-            });
-        }
-    });
-    image
+    View { world, camera, pose: &|_| *world_from_robot, lit: true }.draw(threads)
 }
 
-/// The next piece of work; the lock is held no longer than that.
-fn next<T>(work: &Mutex<impl Iterator<Item = T>>) -> Option<T> {
-    work.lock().unwrap_or_else(PoisonError::into_inner).next()
-}
-
-struct View<'a> {
-    world: &'a World,
-    camera: &'a Camera,
-    pose: Isometry3<f64>,
+/// A camera in a world.
+pub struct View<'a> {
+    /// What there is to see.
+    pub world: &'a World,
+    /// The camera.
+    pub camera: &'a Camera,
+    /// The robot in the world when a part of the image is taken: the upper edge
+    /// is 0, the lower 1.
+    pub pose: &'a (dyn Fn(f64) -> Isometry3<f64> + Sync),
+    /// Without it there are no colours, and the image is drawn several times
+    /// faster.
+    pub lit: bool,
 }
 
 impl View<'_> {
-    fn ray(&self, column: usize, row: usize) -> Vector3<f64> {
-        self.pose.rotation * self.camera.ray(Point2::new(column as f64, row as f64))
-    }
-
-    fn eye(&self) -> Point3<f64> {
-        Point3::from(self.pose.translation.vector)
+    /// For each pixel what its ray meets.
+    pub fn draw(&self, threads: usize) -> Image<Hit> {
+        let mut image = Image::filled(self.camera.width, self.camera.height, Hit::NOTHING);
+        in_pieces(image.pixels_mut(), TILE * self.camera.width, threads, |number, pixels| {
+            self.strip(number * TILE, pixels);
+        });
+        image
     }
 
     fn strip(&self, top: usize, pixels: &mut [Hit]) {
         let width = self.camera.width;
         let rows = pixels.len() / width;
+        let middle = (top as f64 + 0.5 * rows as f64) / self.camera.height as f64;
+        let eye = Eye::new(self.camera, &(self.pose)(middle));
+        let sights = before(self.world.solids(), &eye.at, &eye.forward());
+        let edge = |y: usize| [eye.corner(0, y), eye.corner(width, y)];
+        let strip = between(&sights, edge(top), edge(top + rows));
         for left in (0..width).step_by(TILE) {
-            let columns = TILE.min(width - left);
-            let seen = self.visible(left, top, columns, rows);
+            let right = width.min(left + TILE);
+            let edge = |x: usize| [eye.corner(x, top), eye.corner(x, top + rows)];
+            let tile = between(strip.iter().copied(), edge(left), edge(right));
             for row in 0..rows {
-                for column in left..left + columns {
-                    let ray = self.ray(column, top + row);
-                    let hit = self.world.first(seen.iter().copied(), &self.eye(), &ray);
-                    pixels[row * width + column] = hit;
+                for column in left..right {
+                    let ray = eye.ray(column as f64, (top + row) as f64);
+                    pixels[row * width + column] = self.look(&tile, &eye.at, &ray);
                 }
             }
         }
     }
 
-    /// The solids whose surrounding ball reaches into the cone around a tile.
-    fn visible(
-        &self,
-        left: usize,
-        top: usize,
-        columns: usize,
-        rows: usize,
-    ) -> Vec<(usize, &Shape)> {
-        let corners = [(0, 0), (columns - 1, 0), (0, rows - 1), (columns - 1, rows - 1)]
-            .map(|(x, y)| self.ray(left + x, top + y).normalize());
-        let axis = corners.iter().sum::<Vector3<f64>>().normalize();
-        let opening = corners.iter().map(|c| axis.angle(c)).fold(0.0, f64::max) + 1e-6;
-        let eye = self.eye();
-        let reaches = |shape: &Shape| {
-            let (centre, radius) = shape.bound();
-            let way = centre - eye;
-            let distance = way.norm();
-            distance <= radius || axis.angle(&way) <= opening + (radius / distance).asin()
-        };
-        self.world.solids().filter(|(_, shape)| reaches(shape)).collect()
+    fn look(&self, tile: &[&Sight], eye: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
+        first(tile, ray).map_or(Hit::NOTHING, |(t, sight)| {
+            self.world.hit(t, sight.object, sight.shape, (eye, ray), self.lit)
+        })
+    }
+}
+
+/// The first solid that a ray of depth one meets, of solids that are sorted.
+fn first<'s, 'a>(sights: &[&'s Sight<'a>], ray: &Vector3<f64>) -> Option<(f64, &'s Sight<'a>)> {
+    let mut best = None;
+    let mut best_t = f64::INFINITY;
+    for sight in sights {
+        if sight.nearest > best_t {
+            break;
+        }
+        if let Some(t) = sight.seen.meet(ray)
+            && t < best_t
+        {
+            best_t = t;
+            best = Some((t, *sight));
+        }
+    }
+    best
+}
+
+/// Where a camera stands and looks.
+struct Eye<'a> {
+    camera: &'a Camera,
+    at: Point3<f64>,
+    world_from_camera: Matrix3<f64>,
+}
+
+impl<'a> Eye<'a> {
+    fn new(camera: &'a Camera, world_from_robot: &Isometry3<f64>) -> Self {
+        let pose = world_from_robot * camera.robot_from_camera;
+        let world_from_camera = pose.rotation.to_rotation_matrix().into_inner();
+        Self { camera, at: Point3::from(pose.translation.vector), world_from_camera }
+    }
+
+    fn ray(&self, column: f64, row: f64) -> Vector3<f64> {
+        self.world_from_camera * self.camera.ray(Point2::new(column, row))
+    }
+
+    /// The ray through the upper left corner of a pixel.
+    fn corner(&self, column: usize, row: usize) -> Vector3<f64> {
+        self.ray(column as f64 - 0.5, row as f64 - 0.5)
+    }
+
+    fn forward(&self) -> Vector3<f64> {
+        self.world_from_camera.column(2).into()
     }
 }
 
@@ -119,8 +145,8 @@ pub fn visibility(
     (person, shapes): (u16, &[Shape]),
     area: [usize; 4],
 ) -> Visibility {
-    let pose = world_from_robot * camera.robot_from_camera;
-    let eye = Point3::from(pose.translation.vector);
+    let eye = Eye::new(camera, world_from_robot);
+    let alone: Vec<_> = shapes.iter().map(|shape| shape.seen_from(&eye.at)).collect();
     let [left, top, right, bottom] = area;
     let step = ((right - left).max(bottom - top) / 40).max(1);
     let (mut whole, mut seen) = (0u32, 0u32);
@@ -128,8 +154,8 @@ pub fn visibility(
     let mut hiders = std::collections::BTreeMap::<u16, u32>::new();
     for row in (top..bottom).step_by(step) {
         for column in (left..right).step_by(step) {
-            let ray = pose.rotation * camera.ray(Point2::new(column as f64, row as f64));
-            if !shapes.iter().any(|shape| shape.meet(&eye, &ray).is_some()) {
+            let ray = eye.ray(column as f64, row as f64);
+            if !alone.iter().any(|seen| seen.meet(&ray).is_some()) {
                 continue;
             }
             whole += 1;
@@ -148,4 +174,51 @@ pub fn visibility(
     let occluder = hiders.into_iter().max_by_key(|(_, count)| *count).map(|(id, _)| id);
     let fraction = if whole == 0 { 0.0 } else { f64::from(seen) / f64::from(whole) };
     Visibility { fraction, bounds_px: bounds, occluder }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+    use tagalong_core::{Distortion, Pinhole};
+
+    use super::*;
+    use crate::material::Material;
+    use crate::shape::Form;
+    use crate::world::{Lamp, Object};
+
+    fn shape(form: usize, at: [f64; 3], turn: f64) -> Shape {
+        let form = match form {
+            0 => Form::Ellipsoid(Vector3::new(0.3, 0.15, 0.5)),
+            1 => Form::Block(Vector3::new(0.2, 1.5, 0.05)),
+            _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
+        };
+        let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
+        Shape::new(form, Point3::from(at), turn, Material::plain([0.1 * turn.angle(); 3]))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn tiles_lose_nothing_that_a_ray_meets(
+            solids in prop::collection::vec(
+                (0..3usize, prop::array::uniform3(-3.0..3.0f64), -3.0..3.0f64), 0..20),
+            pitch in -0.5..0.5f64, yaw in -3.0..3.0f64,
+        ) {
+            let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 23.5, cy: 17.0, distortion: Distortion::None };
+            let camera = Camera::mounted(lens, 50, 37, 0.2, pitch, 0.1);
+            let objects = solids.into_iter().enumerate().map(|(i, (form, at, turn))| {
+                Object::new(vec![shape(form, at, turn)], Some(i as u16), true)
+            });
+            let lamp = Lamp { at: Point3::new(0.0, 1.0, 2.5), lux_at_1m: 500.0 };
+            let world = World::new(objects.collect(), vec![lamp], 100.0);
+            let pose = Isometry3::rotation(Vector3::z() * yaw);
+            let image = draw(&world, &camera, &pose, 2);
+            let eye = Eye::new(&camera, &pose);
+            for (at, hit) in image.pixels().iter().enumerate() {
+                let ray = eye.ray((at % 50) as f64, (at / 50) as f64);
+                prop_assert_eq!(*hit, world.first(world.solids(), &eye.at, &ray));
+            }
+        }
+    }
 }

@@ -86,6 +86,10 @@ impl Scene {
                 camera.max_depth_m > camera.min_depth_m,
                 "camera.max_depth_m must be above min_depth_m",
             ),
+            (
+                camera.colour || camera.kind == CameraKind::Rgbd,
+                "camera.colour = false needs camera.kind = \"rgbd\": it has depth besides",
+            ),
             (self.people.len() + self.crowd <= 200, "there must be at most 200 people"),
             (
                 self.people.iter().all(|p| !p.path.is_empty()),
@@ -177,6 +181,9 @@ pub enum CameraKind {
 pub struct CameraSettings {
     /// What it delivers.
     pub kind: CameraKind,
+    /// Without it an `rgbd` camera delivers depth only, and images are drawn
+    /// several times faster.
+    pub colour: bool,
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -206,6 +213,7 @@ impl Default for CameraSettings {
     fn default() -> Self {
         Self {
             kind: CameraKind::Rgbd,
+            colour: true,
             width: 640,
             height: 480,
             field_of_view_deg: 58.0,
@@ -401,7 +409,12 @@ mod tests {
 
     #[test]
     fn impossible_values_are_refused() {
-        for text in ["duration_s = 0.0", "[camera]\nwidth = 0", "[[people]]\nspeed_mps = 1.0"] {
+        for text in [
+            "duration_s = 0.0",
+            "[camera]\nwidth = 0",
+            "[[people]]\nspeed_mps = 1.0",
+            "[camera]\nkind = \"stereo\"\ncolour = false",
+        ] {
             assert!(Scene::parse(text).is_err(), "{text}");
         }
         assert_eq!(Scene::parse("").unwrap(), Scene::default());

@@ -4,11 +4,14 @@
 use tagalong_core::{DepthImage, GreyImage, Image, RgbImage};
 
 use crate::material::luma;
+use crate::parallel::in_pieces;
 use crate::random::{normal_at, uniform_at};
 use crate::world::Hit;
 
 /// Mean brightness that the exposure aims at, 1 is white.
 const TARGET: f64 = 0.28;
+/// Rows that a thread works on at once.
+const STRIP_ROWS: usize = 16;
 /// Loss of light in the corners.
 const VIGNETTING: f32 = 0.22;
 /// Light at which the gain is 1, lx times reflectance; less light, more noise.
@@ -30,6 +33,7 @@ const EDGE_JITTER_PX: f64 = 0.5;
 pub struct Exposure {
     /// Light that becomes [`TARGET`], lx times reflectance.
     mean_light: Option<f64>,
+    threads: usize,
 }
 
 /// The moment of an image: what changes it besides the view.
@@ -44,10 +48,16 @@ pub struct Moment {
 }
 
 impl Exposure {
+    /// Of a camera that has not seen anything yet. `threads` develop an image.
+    pub fn new(threads: usize) -> Self {
+        Self { mean_light: None, threads }
+    }
+
     /// A colour image.
     pub fn colour(&mut self, seen: &Image<Hit>, moment: &Moment) -> RgbImage {
         let factor = self.adapt(seen);
-        let channel = |c: usize| expose(seen, moment, factor, c as u64, |hit| hit.light[c]);
+        let film = Film::new(seen, moment, factor, self.threads);
+        let channel = |c: usize| film.expose(c as u64, |hit| hit.light[c]);
         let [red, green, blue] = [channel(0), channel(1), channel(2)];
         RgbImage::from_fn(seen.width(), seen.height(), |x, y| {
             let at = y * seen.width() + x;
@@ -58,7 +68,7 @@ impl Exposure {
     /// A grey image.
     pub fn grey(&mut self, seen: &Image<Hit>, moment: &Moment) -> GreyImage {
         let factor = self.adapt(seen);
-        let pixels = expose(seen, moment, factor, 0, |hit| luma(hit.light));
+        let pixels = Film::new(seen, moment, factor, self.threads).expose(0, |hit| luma(hit.light));
         GreyImage::from_fn(seen.width(), seen.height(), |x, y| pixels[y * seen.width() + x])
     }
 
@@ -73,32 +83,51 @@ impl Exposure {
     }
 }
 
-/// One channel: lens blur, motion blur, vignetting, noise, gamma.
-fn expose(
-    seen: &Image<Hit>,
-    moment: &Moment,
+/// What the channels of an image have in common.
+struct Film<'a> {
+    seen: &'a Image<Hit>,
+    moment: &'a Moment,
+    /// What light is multiplied by, so that 1 is white.
     factor: f64,
-    channel: u64,
-    light: impl Fn(&Hit) -> f64,
-) -> Vec<u8> {
-    let (width, height) = (seen.width(), seen.height());
-    let sharp: Vec<f32> = seen.pixels().iter().map(|hit| (light(hit) * factor) as f32).collect();
-    let soft = soften(&smear(&sharp, width, moment.smear_px), width);
-    let gain = (TARGET / factor / BASE_LIGHT).recip().clamp(1.0, 16.0);
-    let curve = gamma_curve();
-    let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
-    let corner = cx * cx + cy * cy;
-    let develop = |(at, value): (usize, &f32)| {
+    /// Variance of the read noise, and that of the shot noise of a white pixel.
+    noise: [f64; 2],
+    curve: Vec<u8>,
+    threads: usize,
+}
+
+impl<'a> Film<'a> {
+    fn new(seen: &'a Image<Hit>, moment: &'a Moment, factor: f64, threads: usize) -> Self {
+        let gain = (TARGET / factor / BASE_LIGHT).recip().clamp(1.0, 16.0);
+        let noise = [(READ_NOISE * gain).powi(2), SHOT_NOISE * SHOT_NOISE * gain];
+        Self { seen, moment, factor, noise, curve: gamma_curve(), threads }
+    }
+
+    /// One channel: lens blur, motion blur, vignetting, noise, gamma.
+    fn expose(&self, channel: u64, light: impl Fn(&Hit) -> f64) -> Vec<u8> {
+        let width = self.seen.width();
+        let sharp: Vec<f32> =
+            self.seen.pixels().iter().map(|hit| (light(hit) * self.factor) as f32).collect();
+        let soft = soften(&smear(&sharp, width, self.moment.smear_px), width);
+        let mut pixels = vec![0; soft.len()];
+        in_pieces(&mut pixels, STRIP_ROWS * width, self.threads, |number, strip| {
+            let first = number * STRIP_ROWS * width;
+            for ((at, pixel), light) in (first..).zip(strip).zip(&soft[first..]) {
+                *pixel = self.develop(*light, at, channel);
+            }
+        });
+        pixels
+    }
+
+    fn develop(&self, light: f32, at: usize, channel: u64) -> u8 {
+        let (width, height) = (self.seen.width(), self.seen.height());
+        let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
         let (dx, dy) = ((at % width) as f32 - cx, (at / width) as f32 - cy);
-        let dimmed =
-            f64::from(value * (1.0 - VIGNETTING * (dx * dx + dy * dy) / corner)) * moment.gain;
-        let sigma = (READ_NOISE * READ_NOISE * gain * gain
-            + SHOT_NOISE * SHOT_NOISE * gain * dimmed)
-            .sqrt();
-        let noisy = dimmed + sigma * normal_at(moment.seed ^ (channel << 48), at as u64);
-        curve[(noisy.clamp(0.0, 1.0) * 4095.0) as usize]
-    };
-    soft.iter().enumerate().map(develop).collect()
+        let corner = VIGNETTING * (dx * dx + dy * dy) / (cx * cx + cy * cy);
+        let dimmed = f64::from(light * (1.0 - corner)) * self.moment.gain;
+        let sigma = (self.noise[0] + self.noise[1] * dimmed).sqrt();
+        let noisy = dimmed + sigma * normal_at(self.moment.seed ^ (channel << 48), at as u64);
+        self.curve[(noisy.clamp(0.0, 1.0) * 4095.0) as usize]
+    }
 }
 
 /// 12-bit linear light to 8 bit.
@@ -151,23 +180,26 @@ pub struct DepthSensor {
 impl DepthSensor {
     /// The depth image; NaN where there is no reading: out of range, too little
     /// light returned, or in the shadow of the projector, which stands to the right.
-    pub fn measure(&self, seen: &Image<Hit>, seed: u64) -> DepthImage {
-        let (width, height) = (seen.width(), seen.height());
-        let mut depth = DepthImage::filled(width, height, f32::NAN);
-        for (y, row) in depth.pixels_mut().chunks_mut(width).enumerate() {
-            let mut leftmost = f64::INFINITY;
-            for x in (0..width).rev() {
-                let key = (y * width + x) as u64;
-                let hit = jittered(seen, x, y, seed, key);
-                let lit_from = x as f64 - self.focal_px * self.baseline_m / hit.t;
-                let shadowed = lit_from > leftmost + 1.0;
-                leftmost = leftmost.min(lit_from);
-                if !shadowed && self.returns(&hit, x, y, seed) {
-                    row[x] = self.quantised(hit.t, seed, key) as f32;
-                }
+    pub fn measure(&self, seen: &Image<Hit>, seed: u64, threads: usize) -> DepthImage {
+        let mut depth = DepthImage::filled(seen.width(), seen.height(), f32::NAN);
+        in_pieces(depth.pixels_mut(), seen.width(), threads, |y, row| {
+            self.measure_row(seen, seed, y, row);
+        });
+        depth
+    }
+
+    fn measure_row(&self, seen: &Image<Hit>, seed: u64, y: usize, row: &mut [f32]) {
+        let mut leftmost = f64::INFINITY;
+        for x in (0..row.len()).rev() {
+            let key = (y * row.len() + x) as u64;
+            let hit = jittered(seen, x, y, seed, key);
+            let lit_from = x as f64 - self.focal_px * self.baseline_m / hit.t;
+            let shadowed = lit_from > leftmost + 1.0;
+            leftmost = leftmost.min(lit_from);
+            if !shadowed && self.returns(&hit, x, y, seed) {
+                row[x] = self.quantised(hit.t, seed, key) as f32;
             }
         }
-        depth
     }
 
     fn returns(&self, hit: &Hit, x: usize, y: usize, seed: u64) -> bool {
@@ -190,7 +222,7 @@ impl DepthSensor {
 fn jittered(seen: &Image<Hit>, x: usize, y: usize, seed: u64, key: u64) -> Hit {
     let off = |salt: u64| (EDGE_JITTER_PX * normal_at(seed ^ salt, key)).round() as i64;
     let near = seen.get(x as i64 + off(0x54), y as i64 + off(0x55));
-    near.unwrap_or(seen.pixels()[y * seen.width() + x])
+    near.unwrap_or_else(|| seen.pixels()[y * seen.width() + x])
 }
 
 #[cfg(test)]
@@ -206,7 +238,7 @@ mod tests {
 
     fn spread(z: f64) -> (f64, f64) {
         let seen = Image::filled(200, 50, wall(z, 0.6));
-        let depth = SENSOR.measure(&seen, 9);
+        let depth = SENSOR.measure(&seen, 9, 2);
         let read: Vec<f64> =
             depth.pixels().iter().filter(|d| !d.is_nan()).map(|d| f64::from(*d)).collect();
         let mean = read.iter().sum::<f64>() / read.len() as f64;
@@ -227,7 +259,7 @@ mod tests {
     #[test]
     fn near_far_and_black_things_are_not_seen() {
         let holes = |hit: Hit| {
-            let depth = SENSOR.measure(&Image::filled(40, 40, hit), 3);
+            let depth = SENSOR.measure(&Image::filled(40, 40, hit), 3, 2);
             depth.pixels().iter().filter(|d| d.is_nan()).count()
         };
         assert_eq!(holes(wall(2.0, 0.6)), 0);
@@ -238,7 +270,7 @@ mod tests {
     #[test]
     fn the_projector_throws_a_shadow_beside_what_is_near() {
         let seen = Image::from_fn(200, 4, |x, _| wall(if x > 100 { 1.0 } else { 3.0 }, 0.6));
-        let depth = SENSOR.measure(&seen, 3);
+        let depth = SENSOR.measure(&seen, 3, 1);
         let holes = depth.row(1).iter().filter(|d| d.is_nan()).count() as f64;
         let expected = 580.0 * 0.075 * (1.0 - 1.0 / 3.0);
         assert!((holes - expected).abs() < 4.0, "{holes} {expected}");

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 
 use crate::material::Material;
+use crate::seen::Seen;
 
 /// The geometry of a solid in its own axes, origin at its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,99 +94,71 @@ impl Shape {
         way.norm_squared() - along * along * per_length <= self.ball.1
     }
 
+    /// How far the solid reaches from its origin along a unit vector (its
+    /// support function), m.
+    pub fn extent(&self, along: &Vector3<f64>) -> f64 {
+        let own = self.world_from_own.inverse_transform_vector(along);
+        match self.form {
+            Form::Ellipsoid(half) => own.component_mul(&half).norm(),
+            Form::Block(half) => own.abs().dot(&half),
+            Form::Capsule { length, first, second } => first.max(own.z * length + second),
+        }
+    }
+
     /// A point of the world in the solid's own axes.
     pub fn own(&self, point: &Point3<f64>) -> Vector3<f64> {
         self.world_from_own.inverse_transform_vector(&(point - self.origin))
     }
 
     /// The smallest positive `t` at which `eye + t * ray` enters the solid.
+    /// Who casts many rays from one eye asks [`Shape::seen_from`] instead.
     pub fn meet(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
-        let start = self.own(eye);
-        let step = self.world_from_own.inverse_transform_vector(ray);
-        let t = match self.form {
-            Form::Ellipsoid(half) => {
-                ball(start.component_div(&half), step.component_div(&half), 1.0)
-            }
-            Form::Block(half) => block(&start, &step, &half),
-            Form::Capsule { length, first, second } => {
-                capsule(&start, &step, length, first, second)
-            }
-        };
-        t.filter(|t| *t > 1e-6)
+        self.seen_from(eye).meet(ray)
     }
 
-    /// The outward normal at a point of the surface.
+    /// What of the meeting with a ray depends on nothing but the eye.
+    pub fn seen_from(&self, eye: &Point3<f64>) -> Seen {
+        let turn = self.world_from_own.matrix().transpose();
+        let start = self.own(eye);
+        match self.form {
+            Form::Ellipsoid(half) => Seen::ellipsoid(&turn, &start, &half),
+            Form::Block(half) => Seen::block(&turn, &start, &half),
+            Form::Capsule { length, first, second } => {
+                Seen::capsule(&turn, &start, length, first, second)
+            }
+        }
+    }
+
+    /// The outward normal in the world at a point of the surface in own axes.
     pub fn normal(&self, own: &Vector3<f64>) -> Vector3<f64> {
         let normal = match self.form {
-            Form::Ellipsoid(half) => own.component_div(&half.component_mul(&half)),
+            Form::Ellipsoid(half) => unit(own.zip_map(&half, |at, half| at / (half * half))),
             Form::Block(half) => block_normal(own, &half),
             Form::Capsule { length, first, second } => {
                 let sine = (first - second) / length;
                 let cosine = (1.0 - sine * sine).sqrt();
                 let nearest = (own.z - own.xy().norm() * sine / cosine).clamp(0.0, length);
-                own - Vector3::new(0.0, 0.0, nearest)
+                unit(own - Vector3::new(0.0, 0.0, nearest))
             }
         };
-        self.world_from_own * normal.try_normalize(1e-12).unwrap_or_else(Vector3::z)
+        self.world_from_own * normal
     }
 }
 
-/// Where a ray enters a ball about the origin.
-fn ball(start: Vector3<f64>, step: Vector3<f64>, radius: f64) -> Option<f64> {
-    let a = step.norm_squared();
-    let b = start.dot(&step);
-    let c = start.norm_squared() - radius * radius;
-    let root = b * b - a * c;
-    (root >= 0.0).then(|| (-b - root.sqrt()) / a)
+fn unit(vector: Vector3<f64>) -> Vector3<f64> {
+    let length = vector.norm();
+    if length > 1e-12 { vector / length } else { Vector3::z() }
 }
 
-/// Where a ray enters a block (slabs: Kay & Kajiya 1986).
-fn block(start: &Vector3<f64>, step: &Vector3<f64>, half: &Vector3<f64>) -> Option<f64> {
-    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-    for axis in 0..3 {
-        let inverse = 1.0 / step[axis];
-        let (a, b) = ((-half[axis] - start[axis]) * inverse, (half[axis] - start[axis]) * inverse);
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
-    }
-    (enter <= leave).then_some(enter)
-}
-
+/// The normal of the side that a point lies on.
 fn block_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
-    let axis = own.component_div(half).iamax();
-    let mut normal = Vector3::zeros();
-    normal[axis] = own[axis].signum();
-    normal
-}
-
-/// Where a ray enters the hull of two balls. With `s` the sine of the mantle's
-/// slope and `c` its cosine, mantle points satisfy `r c + z s = first`; the
-/// mantle touches the balls at `first * s` and `length + second * s`.
-fn capsule(
-    start: &Vector3<f64>,
-    step: &Vector3<f64>,
-    length: f64,
-    first: f64,
-    second: f64,
-) -> Option<f64> {
-    let s = (first - second) / length;
-    let c2 = 1.0 - s * s;
-    let reach = first - s * start.z;
-    let a = c2 * step.xy().norm_squared() - s * s * step.z * step.z;
-    let b = c2 * start.xy().dot(&step.xy()) + s * step.z * reach;
-    let c = c2 * start.xy().norm_squared() - reach * reach;
-    let root = b * b - a * c;
-    if root >= 0.0 && a.abs() > 1e-12 {
-        let t = (-b - root.sqrt()) / a;
-        let z = start.z + t * step.z;
-        if (first * s..=length + second * s).contains(&z) {
-            return Some(t);
-        }
-    }
-    let far = start - Vector3::new(0.0, 0.0, length);
-    match (ball(*start, *step, first), ball(far, *step, second)) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
+    let (x, y, z) = (own.x.abs() / half.x, own.y.abs() / half.y, own.z.abs() / half.z);
+    if x >= y && x >= z {
+        Vector3::new(own.x.signum(), 0.0, 0.0)
+    } else if y >= z {
+        Vector3::new(0.0, own.y.signum(), 0.0)
+    } else {
+        Vector3::new(0.0, 0.0, own.z.signum())
     }
 }
 
@@ -246,12 +219,15 @@ mod tests {
                     prop_assert!((t - expected).abs() < 3e-3, "{t} {expected} {form:?}");
                     let turned = turn * ray;
                     prop_assert!(shape.near(&eye, &turned, 1.0 / turned.norm_squared()));
-                    let point = eye + turn * ray * t;
+                    let point = eye + turned * t;
                     let normal = shape.normal(&shape.own(&point));
-                    prop_assert!(normal.dot(&(turn * ray)) < 1e-6);
+                    prop_assert!(normal.dot(&turned) < 1e-6);
                     prop_assert!(!inside(&form, &shape.own(&(point + normal * 2e-3))));
                     let (centre, radius) = shape.bound();
                     prop_assert!((point - centre).norm() < radius + 1e-9);
+                    // The plane that touches the solid there leaves all of it behind.
+                    let reach = normal.dot(&(point - shape.origin));
+                    prop_assert!((shape.extent(&normal) - reach).abs() < 1e-6);
                 }
                 // A ray that only grazes may slip between the steps.
                 (Some(t), None) => {

@@ -12,7 +12,7 @@ use crate::behaviour::{Obstacle, Walker, hidden_by, play_tricks};
 use crate::body::Skeleton;
 use crate::person::{Look, Person};
 use crate::random::Random;
-use crate::render::{Visibility, draw, visibility};
+use crate::render::{View, Visibility, draw, visibility};
 use crate::robot::Robot;
 use crate::room;
 use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Scene};
@@ -120,7 +120,7 @@ impl Simulation {
             obstacles: pieces.iter().map(obstacle).collect(),
             walkers: walkers(scene, &mut stream(3)),
             robot: Robot::new(&scene.robot, stream(4)),
-            exposures: [Exposure::default(); 2],
+            exposures: [Exposure::new(threads); 2],
             chance: stream(5),
             now_ns: 0,
             shots: 0,
@@ -211,7 +211,8 @@ impl Simulation {
     fn shot(&mut self, recorded_ns: u64) -> Shot {
         let (world, uppers) = self.world();
         let pose = self.world_from_robot();
-        let seen = draw(&world, &self.true_camera, &pose, self.threads);
+        let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
+        let seen = View { world: &world, camera, pose: &|_| pose, lit }.draw(self.threads);
         let truth = self.truth(&world, &uppers, &seen, &pose);
         let images = match self.scene.camera.kind {
             CameraKind::Rgbd => self.rgbd(&seen),
@@ -232,9 +233,7 @@ impl Simulation {
             uppers.push(upper);
         }
         let light = &self.scene.light;
-        let world =
-            World { objects, lamps: self.lamps.clone(), ambient_lux: light.lux * light.ambient };
-        (world, uppers)
+        (World::new(objects, self.lamps.clone(), light.lux * light.ambient), uppers)
     }
 
     /// The robot's body in the world; it nods when it brakes.
@@ -260,9 +259,10 @@ impl Simulation {
             range_m: [settings.min_depth_m, settings.max_depth_m],
         };
         let moment = self.moment(0, 1.0);
-        let colour = self.exposures[0].colour(seen, &moment);
-        let depth = sensor.measure(seen, moment.seed);
-        Images { colour: Some(Arc::new(colour)), depth: Some(Arc::new(depth)), ..Images::default() }
+        let depth = Some(Arc::new(sensor.measure(seen, moment.seed, self.threads)));
+        let lit = settings.colour;
+        let colour = lit.then(|| Arc::new(self.exposures[0].colour(seen, &moment)));
+        Images { colour, depth, ..Images::default() }
     }
 
     fn stereo(&mut self, world: &World, left: &Image<Hit>, pose: &Isometry3<f64>) -> Images {
@@ -423,6 +423,20 @@ mod tests {
         }
         let other = shots(&SMALL.replace("seed = 4", "seed = 5"), 1);
         assert_ne!(one[0].images.colour, other[0].images.colour);
+    }
+
+    #[test]
+    fn depth_is_the_same_without_colour() {
+        let with = shots(SMALL, 2);
+        let without = shots(&SMALL.replace("[camera]\n", "[camera]\ncolour = false\n"), 2);
+        assert!(with.len() == without.len() && with[0].images.colour.is_some());
+        for (a, b) in with.iter().zip(&without) {
+            let bits = |shot: &Shot| -> Vec<u32> {
+                shot.images.depth.iter().flat_map(|d| d.pixels()).map(|z| z.to_bits()).collect()
+            };
+            assert!(b.images.colour.is_none() && bits(a) == bits(b));
+            assert_eq!(a.truth, b.truth);
+        }
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! What there is to see at one moment, and the casting of single rays into it.
 
+use std::sync::OnceLock;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::material::Colour;
+use crate::shadow::Shadows;
 use crate::shape::Shape;
 
-/// Solids that belong together, with a ball around them.
+/// Solids that belong together.
 #[derive(Clone, Debug)]
 pub struct Object {
     /// The solids.
@@ -14,26 +17,12 @@ pub struct Object {
     pub person: Option<u16>,
     /// Walls do not: the lamps hang inside of them.
     pub casts_shadow: bool,
-    centre: Point3<f64>,
-    radius: f64,
 }
 
 impl Object {
     /// Solids that belong together.
     pub fn new(shapes: Vec<Shape>, person: Option<u16>, casts_shadow: bool) -> Self {
-        let bounds: Vec<_> = shapes.iter().map(Shape::bound).collect();
-        let sum: Vector3<f64> = bounds.iter().map(|b| b.0.coords).sum();
-        let centre = Point3::from(sum / bounds.len().max(1) as f64);
-        let radius = bounds.iter().map(|b| (b.0 - centre).norm() + b.1).fold(0.0, f64::max);
-        Self { shapes, person, casts_shadow, centre, radius }
-    }
-
-    /// True if the segment of `length` from `eye` along the unit vector passes
-    /// through the ball around the object.
-    fn near(&self, eye: &Point3<f64>, along: &Vector3<f64>, length: f64) -> bool {
-        let to = self.centre - eye;
-        let t = to.dot(along).clamp(0.0, length);
-        (to - along * t).norm_squared() < self.radius * self.radius
+        Self { shapes, person, casts_shadow }
     }
 }
 
@@ -55,6 +44,9 @@ pub struct World {
     pub lamps: Vec<Lamp>,
     /// Light from everywhere, lx.
     pub ambient_lux: f64,
+    /// One for each lamp, made when they are first asked for: the world does not
+    /// change after that.
+    shadows: OnceLock<Vec<Shadows>>,
 }
 
 /// What a ray meets first.
@@ -73,75 +65,93 @@ pub struct Hit {
 }
 
 impl World {
+    /// A moment's world.
+    pub fn new(objects: Vec<Object>, lamps: Vec<Lamp>, ambient_lux: f64) -> Self {
+        Self { objects, lamps, ambient_lux, shadows: OnceLock::new() }
+    }
+
     /// All solids with the index of their object.
-    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, &Shape)> {
+    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, &Shape)> + Clone {
         let numbered = self.objects.iter().enumerate();
         numbered.flat_map(|(index, object)| object.shapes.iter().map(move |shape| (index, shape)))
     }
 
-    /// The first of some solids that a ray meets.
+    /// The first of some solids that a ray meets: for rays that have no eye in
+    /// common, and the reference for those that have.
     pub(crate) fn first<'a>(
         &'a self,
         solids: impl Iterator<Item = (usize, &'a Shape)>,
         eye: &Point3<f64>,
         ray: &Vector3<f64>,
     ) -> Hit {
-        let mut best: Option<(f64, usize, &Shape)> = None;
         let per_length = 1.0 / ray.norm_squared();
-        for (object, shape) in solids {
-            if shape.near(eye, ray, per_length)
-                && let Some(t) = shape.meet(eye, ray)
-                && best.is_none_or(|(nearest, ..)| t < nearest)
-            {
-                best = Some((t, object, shape));
-            }
-        }
-        best.map_or(Hit { t: f64::INFINITY, ..Hit::default() }, |(t, object, shape)| {
-            self.shade(t, &self.objects[object], shape, &(eye + ray * t), ray)
-        })
+        let meet = |(object, shape): (usize, &'a Shape)| {
+            let near = shape.near(eye, ray, per_length);
+            Some((near.then(|| shape.meet(eye, ray)).flatten()?, object, shape))
+        };
+        let first = solids.filter_map(meet).min_by(|a, b| a.0.total_cmp(&b.0));
+        first
+            .map_or(Hit::NOTHING, |(t, object, shape)| self.hit(t, object, shape, (eye, ray), true))
     }
 
-    fn shade(
+    /// What a ray from an eye meets after `t` lengths of it on a solid of an
+    /// object; without light on it unless it is to be `lit`.
+    pub(crate) fn hit(
         &self,
         t: f64,
-        object: &Object,
+        object: usize,
         of: &Shape,
-        at: &Point3<f64>,
-        ray: &Vector3<f64>,
+        (eye, ray): (&Point3<f64>, &Vector3<f64>),
+        lit: bool,
     ) -> Hit {
-        let own = of.own(at);
+        let at = eye + ray * t;
+        let own = of.own(&at);
         let normal = of.normal(&own);
-        // Floors are lit by the ceiling, undersides by the floor, which is darker.
-        let ambient = self.ambient_lux * (0.75 + 0.25 * normal.z);
-        let lamps: f64 = self.lamps.iter().map(|lamp| self.lit(lamp, at, &normal)).sum();
+        let light =
+            if lit { scaled_light(of.material.at(&own), self.lux(&at, &normal)) } else { [0.0; 3] };
         Hit {
             t,
-            light: scaled_light(of.material.at(&own), ambient + lamps),
+            light,
             infrared: of.material.infrared,
             facing: -normal.dot(ray) / ray.norm(),
-            person: object.person,
+            person: self.objects[object].person,
         }
     }
 
-    fn lit(&self, lamp: &Lamp, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+    /// Illuminance of a point with this normal.
+    fn lux(&self, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        // Floors are lit by the ceiling, undersides by the floor, which is darker.
+        let ambient = self.ambient_lux * (0.75 + 0.25 * normal.z);
+        let lamps = self.lamps.iter().zip(self.shadows());
+        lamps.fold(ambient, |sum, (lamp, shadows)| sum + lamp.on(shadows, at, normal))
+    }
+
+    fn shadows(&self) -> &[Shadows] {
+        let casters = || self.solids().filter(|(object, _)| self.objects[*object].casts_shadow);
+        self.shadows
+            .get_or_init(|| self.lamps.iter().map(|l| Shadows::new(l.at, casters())).collect())
+    }
+}
+
+impl Lamp {
+    /// Illuminance of a point with this normal, lx.
+    fn on(&self, shadows: &Shadows, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         let start = at + normal * 1e-3;
-        let way = lamp.at - start;
-        let length = way.norm();
-        let along = way / length;
-        let cosine = normal.dot(&along);
-        if cosine <= 0.0 || self.shadowed(&start, &along, length) {
+        let way = self.at - start;
+        let square = way.norm_squared();
+        let cosine = normal.dot(&way) / square.sqrt();
+        if cosine <= 0.0 || shadows.on(&start) {
             return 0.0;
         }
         // A lamp is not a point: close to it the light does not grow without end.
-        lamp.lux_at_1m * cosine / (length * length).max(0.25)
+        self.lux_at_1m * cosine / square.max(0.25)
     }
+}
 
-    fn shadowed(&self, start: &Point3<f64>, along: &Vector3<f64>, length: f64) -> bool {
-        let objects =
-            self.objects.iter().filter(|o| o.casts_shadow && o.near(start, along, length));
-        let mut near = objects.flat_map(|o| &o.shapes).filter(|s| s.near(start, along, 1.0));
-        near.any(|s| s.meet(start, along).is_some_and(|t| t < length))
-    }
+impl Hit {
+    /// What a ray meets that goes on for ever.
+    pub const NOTHING: Self =
+        Self { t: f64::INFINITY, light: [0.0; 3], infrared: 0.0, facing: 0.0, person: None };
 }
 
 fn scaled_light(colour: Colour, lux: f64) -> Colour {

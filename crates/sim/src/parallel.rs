@@ -1,0 +1,48 @@
+//! Work on parts of an image that do not depend on each other, so that any
+//! number of threads does the same.
+
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+/// Works on pieces of `length` values each, the last one perhaps shorter. The
+/// work is told the number of its piece.
+pub fn in_pieces<T: Send>(
+    values: &mut [T],
+    length: usize,
+    threads: usize,
+    work: impl Fn(usize, &mut [T]) + Sync,
+) {
+    let pieces = Mutex::new(values.chunks_mut(length.max(1)).enumerate());
+    let labour = || {
+        while let Some((number, piece)) = next(&pieces) {
+            work(number, piece);
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(labour);
+        }
+        labour();
+    });
+}
+
+/// The next piece; the lock is held no longer than that.
+fn next<T>(work: &Mutex<impl Iterator<Item = T>>) -> Option<T> {
+    work.lock().unwrap_or_else(PoisonError::into_inner).next()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_is_worked_on_once_whatever_the_number_of_threads() {
+        for (threads, length) in [(0, 7), (1, 100), (3, 7), (8, 1)] {
+            let mut values: Vec<usize> = (0..50).collect();
+            in_pieces(&mut values, length, threads, |number, piece| {
+                piece.iter_mut().for_each(|v| *v = 100 * number + *v);
+            });
+            assert!(values.iter().enumerate().all(|(i, v)| *v == 100 * (i / length) + i));
+        }
+    }
+}
