@@ -40,7 +40,7 @@ mod tests {
         for (threads, length) in [(0, 7), (1, 100), (3, 7), (8, 1)] {
             let mut values: Vec<usize> = (0..50).collect();
             in_pieces(&mut values, length, threads, |number, piece| {
-                piece.iter_mut().for_each(|v| *v = 100 * number + *v);
+                piece.iter_mut().for_each(|v| *v += 100 * number);
             });
             assert!(values.iter().enumerate().all(|(i, v)| *v == 100 * (i / length) + i));
         }
