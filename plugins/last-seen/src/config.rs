@@ -1,0 +1,38 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// Settings of the filter `last-seen`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Account for the robot's own motion: a person stays where last seen in
+    /// the room. Otherwise at the same place before the robot, wherever that
+    /// goes.
+    pub ego_motion: bool,
+    /// How fast somebody may have moved away unseen: the standard deviation
+    /// grows by this, metres per square root of a second.
+    pub wander: f64,
+    /// The velocity that is reported, and used for nothing, is the way between
+    /// the last sighting and the first one in this time before it, s.
+    pub velocity_over_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { ego_motion: true, wander: 0.5, velocity_over_s: 1.0 }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        for (key, value) in [("wander", self.wander), ("velocity_over_s", self.velocity_over_s)] {
+            if !(value > 0.0 && value <= 100.0) {
+                let message = format!("`{key}` must be positive and at most 100, not {value}");
+                return Err(Error::Settings(message));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,164 @@
+use std::collections::VecDeque;
+
+use nalgebra::{Matrix2, Matrix3, Point2, Point3, SMatrix, Vector2};
+use tagalong_core::{Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
+
+use crate::Config;
+
+/// How fast a head may rise or sink unseen, metres per square root of a second.
+const HEIGHT_WANDER: f64 = 0.1;
+/// Variance of a velocity component, m²/s²: it is hardly known.
+const VELOCITY_VARIANCE: f64 = 1.0;
+/// Sightings of one person that are remembered at most.
+const MOST_SIGHTINGS: usize = 64;
+
+/// What is believed of a person, in the robot frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Belief {
+    /// Centre of the head when last seen, m.
+    position: Point3<f64>,
+    /// Its covariance, m².
+    covariance: Matrix3<f64>,
+    /// How long ago somebody was seen, s, and where on the floor; newest last.
+    sightings: VecDeque<(f64, Point2<f64>)>,
+}
+
+/// The filter.
+pub struct LastSeen {
+    config: Config,
+}
+
+impl LastSeen {
+    /// A filter.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        Ok(Self { config })
+    }
+
+    fn remember(&self, sightings: &mut VecDeque<(f64, Point2<f64>)>, place: Point2<f64>) {
+        sightings.push_back((0.0, place));
+        while sightings.len() > MOST_SIGHTINGS
+            || sightings.front().is_some_and(|(ago, _)| *ago > self.config.velocity_over_s)
+        {
+            sightings.pop_front();
+        }
+    }
+}
+
+impl PersonFilter for LastSeen {
+    type Belief = Belief;
+
+    fn start(&self, seen: &Detection) -> Belief {
+        let mut sightings = VecDeque::new();
+        self.remember(&mut sightings, seen.position.xy());
+        Belief { position: seen.position, covariance: seen.covariance, sightings }
+    }
+
+    fn predict(&self, belief: &mut Belief, motion: &Motion) {
+        let motion = match self.config.ego_motion {
+            true => *motion,
+            false => Motion::at_rest(motion.dt),
+        };
+        let floor = motion.apply_to_point(belief.position.xy());
+        belief.position = Point3::new(floor.x, floor.y, belief.position.z);
+        for (ago, place) in &mut belief.sightings {
+            *ago += motion.dt;
+            *place = motion.apply_to_point(*place);
+        }
+        let mut turn = Matrix3::identity();
+        turn.fixed_view_mut::<2, 2>(0, 0).copy_from(&turn_back(&motion));
+        let (floor, height) = (self.config.wander.powi(2), HEIGHT_WANDER.powi(2));
+        let grown = Matrix3::from_diagonal(&[floor, floor, height].into()) * motion.dt;
+        let turned = turn * belief.covariance * turn.transpose();
+        belief.covariance = 0.5 * (turned + turned.transpose()) + grown;
+    }
+
+    fn correct(&self, belief: &mut Belief, seen: &Detection, _: &Camera) -> Support {
+        belief.position = seen.position;
+        belief.covariance = seen.covariance;
+        self.remember(&mut belief.sightings, seen.position.xy());
+        Support::default()
+    }
+
+    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+        let mut covariance = SMatrix::<f64, 5, 5>::identity() * VELOCITY_VARIANCE;
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&belief.covariance);
+        Estimate {
+            person: Person { position: belief.position, velocity: velocity(&belief.sightings) },
+            covariance,
+            region: camera.upper_body(&belief.position),
+        }
+    }
+}
+
+/// From the first to the last sighting.
+fn velocity(sightings: &VecDeque<(f64, Point2<f64>)>) -> Vector2<f64> {
+    match (sightings.front(), sightings.back()) {
+        (Some((then, from)), Some((now, to))) if then > now => (to - from) / (then - now),
+        _ => Vector2::zeros(),
+    }
+}
+
+/// Turns a vector into the robot's new axes.
+fn turn_back(motion: &Motion) -> Matrix2<f64> {
+    *motion.isometry().rotation.inverse().to_rotation_matrix().matrix()
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::{Distortion, Pinhole, Rect};
+
+    use super::*;
+
+    fn sighting(x: f64, y: f64) -> Detection {
+        Detection {
+            region: Rect::new(0.0, 0.0, 9.0, 9.0),
+            position: Point3::new(x, y, 1.6),
+            covariance: Matrix3::identity() * 0.01,
+            score: 1.0,
+            source: "test",
+        }
+    }
+
+    fn after_a_turn(ego_motion: bool) -> Belief {
+        let filter = LastSeen::new(Config { ego_motion, ..Config::default() }).unwrap();
+        let mut belief = filter.start(&sighting(3.0, 0.0));
+        let turn = std::f64::consts::FRAC_PI_2;
+        filter.predict(&mut belief, &Motion { forward: 1.0, turn, ..Motion::at_rest(0.5) });
+        belief
+    }
+
+    #[test]
+    fn who_is_unseen_stays_in_the_room_or_before_the_robot() {
+        assert!((after_a_turn(true).position - Point3::new(0.0, -2.0, 1.6)).norm() < 1e-12);
+        assert_eq!(after_a_turn(false).position, Point3::new(3.0, 0.0, 1.6));
+    }
+
+    #[test]
+    fn nothing_is_averaged() {
+        let filter = LastSeen::new(Config::default()).unwrap();
+        let mut belief = after_a_turn(true);
+        let camera = Camera::mounted(
+            Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None },
+            320,
+            240,
+            1.2,
+            0.0,
+            0.0,
+        );
+        filter.correct(&mut belief, &sighting(2.0, 0.5), &camera);
+        assert_eq!(
+            (belief.position, belief.covariance),
+            (Point3::new(2.0, 0.5, 1.6), sighting(0.0, 0.0).covariance)
+        );
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        assert!(LastSeen::new(Config { wander: 0.0, ..Config::default() }).is_err());
+        assert!(LastSeen::new(Config { velocity_over_s: f64::NAN, ..Config::default() }).is_err());
+    }
+}

@@ -1,0 +1,35 @@
+//! `last-seen`: a person stays where they were last seen.
+//!
+//! The least that can be called a filter, and therefore the measure of all
+//! others: what a tracker gains over it is what its model is worth. There is no
+//! model of walking, nothing is averaged, and, if so configured, the robot's own
+//! motion is left out of account as well.
+
+mod config;
+mod filter;
+
+pub use config::Config;
+pub use filter::{Belief, LastSeen};
+use tagalong_core::{PerPerson, Registry};
+
+/// Registers the filter `last-seen`.
+pub fn register(registry: &mut Registry) {
+    registry.filter(
+        "last-seen",
+        "a person stays where last seen: the baseline that trackers must beat",
+        |config: Config, _| Ok(PerPerson::new(LastSeen::new(config)?)),
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_conforms() {
+        let mut registry = Registry::default();
+        register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+}

@@ -1,0 +1,63 @@
+//! Pipelines of the catalog on drawn scenes.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on fails")]
+
+use std::path::Path;
+
+use tagalong_core::Registry;
+use tagalong_eval::Tally;
+use tagalong_sim::Scene;
+use tagalong_trials::{Contender, Judge, each};
+
+const CONFIGS: [&str; 2] = ["naive", "depth-ekf"];
+
+/// Two people pass before a turning robot, one behind the other; small images,
+/// so that a test can afford them.
+const SCENE: &str = "duration_s = 6.0\n[camera]\nwidth = 320\nheight = 240\n\
+    field_of_view_deg = 70.0\n[room]\nclutter = 4\n[robot]\nstart = [0.8, 2.0]\n\
+    path = [[2.2, 2.2], [2.8, 3.4]]\nspeed_mps = 0.5\n\
+    [[people]]\npath = [[3.8, 4.4], [3.8, 1.6]]\nspeed_mps = 0.8\n\
+    [[people]]\npath = [[4.8, 1.4], [4.8, 4.8]]\nspeed_mps = 0.8\n";
+
+fn registry() -> Registry {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    registry
+}
+
+fn contenders() -> Vec<Contender> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let read = |name: &&str| {
+        let config = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+        Contender { folder: folder.clone(), ..Contender::new(*name, config) }
+    };
+    CONFIGS.iter().map(read).collect()
+}
+
+fn scenes(seeds: u64) -> Vec<Scene> {
+    let scene = Scene::parse(SCENE).unwrap();
+    (1..=seeds).map(|seed| Scene { seed, ..scene.clone() }).collect()
+}
+
+/// One tally a contender and a scene.
+fn tallies(seeds: u64, threads: usize) -> Vec<Vec<Tally>> {
+    let keep = |trial: tagalong_trials::Trial| {
+        let judge = Judge::default();
+        trial.runs.iter().map(|run| Ok(judge.judge(&trial, run)?.tally)).collect()
+    };
+    each(&scenes(seeds), &contenders(), &registry(), threads, keep, |_| ()).unwrap()
+}
+
+#[test]
+fn the_naive_baseline_is_clearly_worse() {
+    let all = tallies(4, 2);
+    let scores = |at: usize| Tally::combine(all.iter().map(|trial| &trial[at])).scores();
+    let (naive, ekf) = (scores(0), scores(1));
+    assert!(ekf.idf1 > naive.idf1.map(|f| f + 0.1), "{:?} {:?}", ekf.idf1, naive.idf1);
+    assert!(naive.mota < Some(0.95) && ekf.mota > Some(0.5), "{:?} {:?}", naive.mota, ekf.mota);
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    assert_eq!(tallies(2, 1), tallies(2, 3));
+}
