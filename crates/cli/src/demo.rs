@@ -1,0 +1,134 @@
+//! `tagalong demo`: the whole way from a scene to a report, without a file.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use tagalong_core::Registry;
+use tagalong_log::write::RunDir;
+use tagalong_sim::{Scene, Simulation};
+
+use crate::args::{Format, RunArgs};
+use crate::bench::{self, BenchArgs};
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::simulate::{record, threads};
+use crate::{run, signals::Signals};
+
+const SCENE: &str = include_str!("../../../configs/scenes/demo.toml");
+
+/// The pipelines that are compared, and what is in their files.
+const PIPELINES: [(&str, &str); 2] = [
+    ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
+    ("naive", include_str!("../../../configs/naive.toml")),
+];
+
+/// The arguments of `tagalong demo`.
+#[derive(Args, Debug)]
+pub struct DemoArgs {
+    /// Where the files go.
+    #[arg(short, long, value_name = "DIR", default_value = "tagalong-demo")]
+    pub output: PathBuf,
+    /// Replace the files of an earlier demo in the same directory.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Draw another luck: looks, furniture, noise.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+}
+
+/// Draws a scene, tracks its people with two pipelines, compares them.
+///
+/// # Errors
+/// A directory that is not empty is exit code 2; a disk that fails is 1.
+pub fn demo(args: &DemoArgs, registry: &Registry) -> Outcome {
+    let folder = &args.output;
+    RunDir::check(folder, args.overwrite, Path::new("")).map_err(Failure::usage)?;
+    let signals = Signals::listen().map_err(Failure::failed)?;
+    say("1/4 drawing four people around a moving robot");
+    let log = draw(folder, args.seed)?;
+    for ((name, config), step) in PIPELINES.iter().zip(2..) {
+        say(&format!("{step}/4 tracking them with {name}"));
+        let config = put(&folder.join(format!("{name}.toml")), config)?;
+        let ended = run::run(&run_args(folder, name, config, &log), registry)?;
+        if let Some(signal) = signals.received() {
+            return Ok(Ended::BySignal(signal));
+        }
+        if ended != Ended::Well {
+            return Ok(ended);
+        }
+    }
+    say("4/4 comparing both with the truth");
+    let ended = bench::bench(&bench_args(folder, &log), registry)?;
+    print(&what_now(folder))?;
+    Ok(ended)
+}
+
+#[expect(clippy::expect_used, reason = "the scene is part of the program, and a test reads it")]
+fn draw(folder: &Path, seed: Option<u64>) -> Result<PathBuf, Failure> {
+    let mut scene = Scene::parse(SCENE).expect("the built-in scene is right");
+    scene.seed = seed.unwrap_or(scene.seed);
+    let log = folder.join("demo.mcap");
+    fs::create_dir_all(folder)
+        .map_err(|error| Failure::failed(format!("cannot make {}: {error}", folder.display())))?;
+    put(&folder.join("demo-scene.toml"), SCENE)?;
+    record(Simulation::new(&scene, threads(None)), &scene, &log).map_err(Failure::failed)?;
+    Ok(log)
+}
+
+fn put(path: &Path, text: &str) -> Result<PathBuf, Failure> {
+    fs::write(path, text)
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))?;
+    Ok(path.to_owned())
+}
+
+fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
+    RunArgs {
+        config: Some(config),
+        log: Some(log.to_owned()),
+        output: Some(folder.join(name)),
+        overlay: true,
+        overwrite: true,
+        strict: false,
+        threads: None,
+        seed: None,
+        format: Format::Text,
+        quiet: true,
+    }
+}
+
+fn bench_args(folder: &Path, log: &Path) -> BenchArgs {
+    let configs = PIPELINES.iter().map(|(name, _)| folder.join(format!("{name}.toml")));
+    BenchArgs::of(configs.collect(), vec![log.to_owned()], folder.join("report"))
+}
+
+fn what_now(folder: &Path) -> String {
+    let shown = folder.display();
+    format!(
+        "
+Look at:
+  {shown}/report/report.html: which pipeline is better, and every mistake with a picture
+  {shown}/depth-ekf/overlay/: boxes, ids, trails and a plan, one picture a frame
+  {shown}/naive/overlay/: the same, with ids that change whenever somebody is hidden
+
+Try next:
+  tagalong trials --seeds 10
+      are the differences luck? Ten draws of each hard scene
+  tagalong run {shown}/depth-ekf.toml YOUR.mcap --overlay
+      the log of your own robot
+  tagalong simulate {shown}/demo-scene.toml --gallery pictures
+      change the scene, and look at it
+  rerun {shown}/depth-ekf/tracks.mcap
+      the tracks in space, if you have Rerun
+"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_scene_can_be_read() {
+        assert_eq!(Scene::parse(SCENE).unwrap().people.len(), 4);
+    }
+}

@@ -1,0 +1,99 @@
+//! Where depth puts the edge of a person against where it is. Structured light
+//! frays it, stereo matching with windows fattens it.
+
+use tagalong_core::{DepthImage, Rect};
+use tagalong_sim::Truth;
+use tagalong_trials::{Drawn, TrialError};
+
+use super::{Check, depth, deviation, drawn, mean, scene};
+
+const GROUP: &str = "silhouettes in depth (RGB-D camera)";
+/// Depth within this of the trunk is the person, m.
+const BODY_M: f32 = 0.4;
+/// The edge is looked for up to this far outside of the true one, pixels.
+const REACH_PX: i64 = 12;
+/// Histogram of displacements: from here to its negative, pixels.
+const BINS: i64 = 3;
+
+pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
+    let mut offsets = Vec::new();
+    for seed in 1..=seeds.max(4) {
+        let standing = format!(
+            "seed = {seed}\nduration_s = 0.25\n[room]\nsize_m = [9.0, 6.0]\n\
+             [faults]\ndropped = 0.0\nlate = 0.0\n[camera]\nmount_error_deg = 0.0\n\
+             [[people]]\npath = [[{}, 3.0]]\nheading_deg = {}\n",
+            3.3 + 0.2 * (seed % 9) as f64,
+            40 * seed % 360
+        );
+        drawn(&scene(&standing)).for_each(|drawn| offsets.extend(displacements(&drawn)));
+    }
+    let share = |wanted: i64| {
+        let held = |o: &&f64| (o.round() as i64).clamp(-BINS, BINS) == wanted;
+        100.0 * offsets.iter().filter(held).count() as f64 / offsets.len().max(1) as f64
+    };
+    let mut checks: Vec<Check> = (-BINS..=BINS)
+        .map(|bin| Check::told(GROUP, format!("edges displaced by {}", name(bin)), share(bin), "%"))
+        .collect();
+    let centre = mean(&offsets);
+    checks.push(Check::between(GROUP, "mean, outwards positive", centre, "px", [-2.0, 2.0]));
+    let spread = deviation(&offsets);
+    checks.push(Check::between(GROUP, "standard deviation", spread, "px", [0.3, 4.0]));
+    Ok(checks)
+}
+
+fn name(bin: i64) -> String {
+    match bin.abs() {
+        BINS if bin < 0 => format!("{bin:+} px or further in"),
+        BINS => format!("{bin:+} px or further out"),
+        _ => format!("{bin:+} px"),
+    }
+}
+
+/// Left, right and upper edge of everybody who is wholly seen.
+fn displacements(drawn: &Drawn) -> Vec<f64> {
+    let Some(depth) = depth(&drawn.frame) else { return Vec::new() };
+    let of = |person: &Truth| {
+        let (whole, seen) = (person.upper_body?, person.visible?);
+        let trunk = drawn.frame.camera.depth_of(&person.torso_in_robot) as f32;
+        let measured = extent(depth, &seen, trunk)?;
+        // An edge of the square is no edge of the person.
+        let free = [
+            (seen.x > whole.x + 1.0).then_some(seen.x - measured.x),
+            (seen.right() < whole.right() - 1.0).then_some(measured.right() - seen.right()),
+            (seen.y > whole.y + 1.0).then_some(seen.y - measured.y),
+        ];
+        (person.visible_fraction > 0.95).then_some(free)
+    };
+    drawn.truth.iter().filter_map(of).flatten().flatten().collect()
+}
+
+/// The bounds of what is as far away as the trunk.
+fn extent(depth: &DepthImage, seen: &Rect, trunk_m: f32) -> Option<Rect> {
+    let (left, right) = (seen.x as i64 - REACH_PX, seen.right() as i64 + REACH_PX);
+    let (top, bottom) = (seen.y as i64 - REACH_PX, seen.bottom() as i64);
+    let near = |x: i64, y: i64| depth.get(x, y).is_some_and(|z| (z - trunk_m).abs() < BODY_M);
+    let body = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+    let body: Vec<(i64, i64)> = body.filter(|(x, y)| near(*x, *y)).collect();
+    let xs = || body.iter().map(|(x, _)| *x);
+    let (x, y) = (xs().min()? as f64, body.iter().map(|(_, y)| *y).min()? as f64);
+    Some(Rect::new(x, y, xs().max()? as f64 + 1.0 - x, bottom as f64 - y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extent_is_that_of_the_body() {
+        let depth =
+            DepthImage::from_fn(
+                60,
+                60,
+                |x, y| {
+                    if (20..30).contains(&x) && y >= 25 { 3.1 } else { 6.0 }
+                },
+            );
+        let extent = extent(&depth, &Rect::new(21.0, 24.0, 10.0, 20.0), 3.0).unwrap();
+        assert_eq!((extent.x, extent.right(), extent.y), (20.0, 30.0, 25.0));
+    }
+}

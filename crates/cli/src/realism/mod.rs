@@ -1,0 +1,186 @@
+//! `tagalong simulate --realism`: is the drawn world hard in the ways in which
+//! the real one is? Each check is a figure, what is wanted of it, and whether it
+//! holds; one that does not is said as loudly as one that does.
+
+mod edges;
+mod failures;
+mod gait;
+mod patches;
+mod walls;
+
+use std::fmt::Write as _;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use tagalong_core::{DepthImage, Frame, Registry};
+use tagalong_sim::Scene;
+use tagalong_trials::{Draw, Drawn, TrialError};
+
+use crate::args::Format;
+use crate::outcome::{Ended, Failure, Outcome, print};
+
+/// A figure and what is wanted of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// What it belongs to.
+    pub group: &'static str,
+    /// What was measured.
+    pub what: String,
+    /// The figure; absent where it could not be measured.
+    pub value: Option<f64>,
+    /// Its unit.
+    pub unit: &'static str,
+    /// What is wanted, in words.
+    pub wanted: String,
+    /// Whether that holds; absent where nothing is wanted, or nothing measured.
+    pub holds: Option<bool>,
+}
+
+impl Check {
+    /// A figure that should lie between two others.
+    pub fn between(
+        group: &'static str,
+        what: impl Into<String>,
+        value: f64,
+        unit: &'static str,
+        [low, high]: [f64; 2],
+    ) -> Self {
+        let wanted = match (low.is_finite(), high.is_finite()) {
+            (true, true) => format!("{low} to {high}"),
+            (true, false) => format!("at least {low}"),
+            _ => format!("at most {high}"),
+        };
+        let holds = Some((low..=high).contains(&value));
+        Self { group, what: what.into(), value: Some(value), unit, wanted, holds }
+    }
+
+    /// A figure to look at.
+    pub fn told(
+        group: &'static str,
+        what: impl Into<String>,
+        value: f64,
+        unit: &'static str,
+    ) -> Self {
+        let (what, wanted) = (what.into(), String::new());
+        Self { group, what, value: Some(value), unit, wanted, holds: None }
+    }
+
+    /// Something that could not be measured, and why.
+    pub fn skipped(group: &'static str, why: impl Into<String>) -> Self {
+        let (what, wanted) = (why.into(), String::new());
+        Self { group, what, value: None, unit: "", wanted, holds: None }
+    }
+}
+
+/// Which part of the checks, how thoroughly.
+type Part = fn(&Registry, u64) -> Result<Vec<Check>, TrialError>;
+
+/// All parts, by name.
+const PARTS: [(&str, Part); 5] = [
+    ("walls", |_, _| walls::checks()),
+    ("silhouettes", |_, seeds| edges::checks(seeds)),
+    ("gait", |_, _| gait::checks()),
+    ("failures", failures::checks),
+    ("depth patches", |_, seeds| patches::checks(seeds)),
+];
+
+/// Measures everything and prints it; `seeds` draws where a scene is random.
+///
+/// # Errors
+/// A plugin that fails on a drawn frame.
+pub fn realism(registry: &Registry, seeds: u64, format: Format) -> Outcome {
+    let bar = ProgressBar::new(PARTS.len() as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} checks {msg}") {
+        bar.set_style(style);
+    }
+    let mut checks = Vec::new();
+    for (name, part) in PARTS {
+        bar.set_message(name);
+        checks.extend(part(registry, seeds).map_err(Failure::failed)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    match format {
+        Format::Text => print(&text(&checks))?,
+        Format::Json => print(&(serde_json::to_string_pretty(&checks).unwrap_or_default() + "\n"))?,
+    }
+    Ok(Ended::Well)
+}
+
+fn text(checks: &[Check]) -> String {
+    let width = checks.iter().map(|check| check.what.chars().count()).max().unwrap_or(0);
+    let mut out = String::new();
+    let mut group = "";
+    for check in checks {
+        if check.group != group {
+            group = check.group;
+            let _ = writeln!(out, "{group}");
+        }
+        let value = check.value.map_or(String::new(), |value| format!("{value:.3}"));
+        let verdict = match check.holds {
+            None => "",
+            Some(true) => "holds",
+            Some(false) => "DOES NOT HOLD",
+        };
+        let line = format!(
+            "  {:<width$}  {value:>8} {:<6}  {:<22}  {verdict}",
+            check.what, check.unit, check.wanted
+        );
+        let _ = writeln!(out, "{}", line.trim_end());
+    }
+    let judged = checks.iter().filter_map(|check| check.holds);
+    let (held, all) = (judged.clone().filter(|holds| *holds).count(), judged.count());
+    let _ = writeln!(out, "{held} of {all} checks hold");
+    out
+}
+
+/// Scenes of checks are written by this file's own modules, and are right.
+#[expect(clippy::expect_used, reason = "the scenes are part of the program, and tests read them")]
+fn scene(text: &str) -> Scene {
+    Scene::parse(text).expect("the built-in scene is right")
+}
+
+/// All frames of a scene.
+fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn> + use<> {
+    let mut draw = Draw::new(scene, crate::simulate::threads(None));
+    std::iter::from_fn(move || draw.next_frame())
+}
+
+/// The depth that a pipeline would see. A stereo pair has none before it is
+/// matched.
+fn depth(frame: &Frame) -> Option<&DepthImage> {
+    frame.depth().ok()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let centre = mean(values);
+    let squares: Vec<f64> = values.iter().map(|v| (v - centre).powi(2)).collect();
+    mean(&squares).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_says_what_is_wanted_and_whether_it_holds() {
+        let checks = [
+            Check::between("a", "x", 1.0, "m", [0.0, 2.0]),
+            Check::between("a", "y", 3.0, "m", [f64::NEG_INFINITY, 2.0]),
+            Check::told("b", "z", 5.0, ""),
+        ];
+        let text = text(&checks);
+        assert!(text.contains("0 to 2") && text.contains("at most 2"), "{text}");
+        assert!(text.contains("DOES NOT HOLD") && text.ends_with("1 of 2 checks hold\n"), "{text}");
+    }
+
+    #[test]
+    fn mean_and_deviation() {
+        assert_eq!((mean(&[1.0, 3.0]), deviation(&[1.0, 3.0])), (2.0, 1.0));
+        assert_eq!(mean(&[]), 0.0);
+    }
+}

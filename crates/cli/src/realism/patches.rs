@@ -1,0 +1,247 @@
+//! A two-sample test: can a simple classifier tell drawn people from real ones
+//! by their depth? An area under its curve of one half is "no", one is "always".
+//!
+//! Each sample is the depth in the upper-body square of somebody who is wholly
+//! seen. Its features are the medians of a 6x6 grid against the trunk, the part
+//! of readings in a 3x3 grid, and the roughness. A linear discriminant is
+//! trained on all recordings but one, and on all drawn rooms but some, and
+//! asked about the rest.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{DMatrix, DVector};
+use tagalong_core::{DepthImage, Rect};
+use tagalong_eval::formats::people;
+use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_trials::TrialError;
+
+use super::{Check, drawn, mean, scene};
+
+const GROUP: &str = "drawn against real depth patches";
+/// Where recordings with annotated people lie, seen from the repository.
+const LOGS: &str = "../shared/data/logs";
+/// Recordings with depth and annotated people.
+const REAL: [&str; 3] = ["filinha", "lab2-camera2", "um"];
+/// Cells of the grid of depths, and of the grid of readings, along a side.
+const CELLS: usize = 6;
+const FILLS: usize = 3;
+/// Depth further from the trunk than this counts as this, m.
+const FAR_M: f32 = 1.0;
+/// Ridge of the discriminant, part of the mean variance.
+const RIDGE: f64 = 0.05;
+
+type Sample = DVector<f64>;
+
+pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
+    let real: Vec<Vec<Sample>> =
+        REAL.iter().filter_map(|name| recording(&log(name))).filter(|l| l.len() >= 5).collect();
+    if real.len() < 2 {
+        let why = format!("skipped: {LOGS} has no two recordings with annotated people");
+        return Ok(vec![Check::skipped(GROUP, why)]);
+    }
+    let sim = rooms(real.len(), seeds);
+    let count = |folds: &[Vec<Sample>]| folds.iter().map(Vec::len).sum::<usize>() as f64;
+    let within = |folds: &[Vec<Sample>]| cross_validated(&folds[..1], &folds[1..2]);
+    let what = format!("area under the curve, left out by recording ({} folds)", real.len());
+    let limit = [f64::NEG_INFINITY, 0.8];
+    Ok(vec![
+        Check::told(GROUP, "real patches", count(&real), ""),
+        Check::told(GROUP, "drawn patches", count(&sim), ""),
+        Check::between(GROUP, what, cross_validated(&real, &sim), "", limit),
+        Check::told(GROUP, "for comparison: one recording against another", within(&real), ""),
+    ])
+}
+
+fn log(name: &str) -> PathBuf {
+    Path::new(LOGS).join(format!("{name}.mcap"))
+}
+
+/// The people of a recording who are wholly seen; `None` where it is absent.
+fn recording(log: &Path) -> Option<Vec<Sample>> {
+    let text = std::fs::read_to_string(log.with_extension("people.csv")).ok()?;
+    let rows = people::parse(&text, "people.csv").ok()?;
+    let needs = Needs { depth: true, ..Needs::default() };
+    let mut source =
+        FrameSource::open(log, &InputSettings::default(), &Limits::default(), needs).ok()?;
+    let mut samples = Vec::new();
+    while let Some(item) = source.next_frame() {
+        let Ok(depth) = item.frame.depth() else { continue };
+        let here = rows.iter().filter(|row| u64::from(row.frame) == item.frame.index);
+        for row in here.filter(|row| row.visible > 0.95) {
+            let at = row.upper_body;
+            let square = Rect::new(at.x, at.y, at.width, at.height);
+            samples.extend(features(depth, &square));
+        }
+    }
+    Some(samples)
+}
+
+/// Drawn rooms, in as many folds as there are recordings.
+fn rooms(folds: usize, seeds: u64) -> Vec<Vec<Sample>> {
+    let mut all = vec![Vec::new(); folds];
+    for seed in 1..=seeds.max(2 * folds as u64) {
+        let high = seed % 2 == 0;
+        let (height, pitch) = if high { (2.3, 25.0) } else { (1.15, 2.0) };
+        let text = format!(
+            "seed = {seed}\nduration_s = 6.0\ncrowd = 4\n[room]\nclutter = 6\n[camera]\n\
+             rate_hz = 1.0\nheight_m = {height}\npitch_down_deg = {pitch:.1}\n\
+             [robot]\nstart = [0.6, 3.0]\n"
+        );
+        for drawn in drawn(&scene(&text)) {
+            let Ok(depth) = drawn.frame.depth() else { continue };
+            let seen = drawn.truth.iter().filter(|person| person.visible_fraction > 0.95);
+            let squares = seen.filter_map(|person| person.upper_body);
+            all[seed as usize % folds].extend(squares.filter_map(|at| features(depth, &at)));
+        }
+    }
+    all
+}
+
+/// What is looked at in an upper-body square; `None` if it is hardly there.
+fn features(depth: &DepthImage, square: &Rect) -> Option<Sample> {
+    let square = square.clipped(depth.width(), depth.height());
+    if square.width < 24.0 || square.height < 24.0 {
+        return None;
+    }
+    let middle = cell(depth, &square, 3, 1, 1);
+    let trunk = median(&middle)?;
+    let mut values = Vec::with_capacity(CELLS * CELLS + FILLS * FILLS + 2);
+    for (row, column) in cells(CELLS) {
+        let here = median(&cell(depth, &square, CELLS, row, column));
+        let off = here.map_or(FAR_M, |z| (z - trunk).clamp(-FAR_M, FAR_M));
+        values.push(f64::from(off));
+    }
+    for (row, column) in cells(FILLS) {
+        let here = cell(depth, &square, FILLS, row, column);
+        values
+            .push(here.iter().filter(|z| z.is_finite()).count() as f64 / here.len().max(1) as f64);
+    }
+    values.push(roughness(&middle, trunk));
+    values.push(f64::from(trunk) / 5.0);
+    Some(DVector::from_vec(values))
+}
+
+fn cells(side: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..side).flat_map(move |row| (0..side).map(move |column| (row, column)))
+}
+
+/// The pixels of one cell of a grid over the square, row by row.
+fn cell(depth: &DepthImage, square: &Rect, side: usize, row: usize, column: usize) -> Vec<f32> {
+    let edge = |from: f64, length: f64, index: usize| {
+        (from + length * index as f64 / side as f64) as usize
+    };
+    let (left, right) =
+        (edge(square.x, square.width, column), edge(square.x, square.width, column + 1));
+    let (top, bottom) =
+        (edge(square.y, square.height, row), edge(square.y, square.height, row + 1));
+    let inside = bottom.min(depth.height());
+    (top..inside)
+        .flat_map(|y| depth.row(y)[left..right.min(depth.width())].iter().copied())
+        .collect()
+}
+
+fn median(values: &[f32]) -> Option<f32> {
+    let mut finite: Vec<f32> = values.iter().copied().filter(|z| z.is_finite()).collect();
+    finite.sort_by(f32::total_cmp);
+    finite.get(finite.len() / 2).copied()
+}
+
+/// Median step between neighbours, in parts of a thousandth of the squared range.
+fn roughness(pixels: &[f32], trunk_m: f32) -> f64 {
+    let steps: Vec<f32> = pixels.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    f64::from(median(&steps).unwrap_or(0.0) / (trunk_m * trunk_m).max(0.1)) * 1e3
+}
+
+/// Mean area under the curve over folds that the discriminant did not see. With
+/// a single fold there is nothing to leave out: every other sample is.
+fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
+    if a.len() < 2 {
+        let halves = |all: &[Vec<Sample>]| -> Vec<Vec<Sample>> {
+            let half = |odd: usize| all[0].iter().skip(odd).step_by(2).cloned().collect();
+            vec![half(0), half(1)]
+        };
+        return cross_validated(&halves(a), &halves(b));
+    }
+    let others = |all: &[Vec<Sample>], fold: usize| -> Vec<Sample> {
+        let kept = all.iter().enumerate().filter(|(at, _)| *at != fold);
+        kept.flat_map(|(_, samples)| samples.iter().cloned()).collect()
+    };
+    let areas = (0..a.len()).filter_map(|fold| {
+        let weights = discriminant(&others(a, fold), &others(b, fold))?;
+        let score =
+            |samples: &[Sample]| samples.iter().map(|s| weights.dot(s)).collect::<Vec<f64>>();
+        area(&score(&a[fold]), &score(&b[fold]))
+    });
+    mean(&areas.collect::<Vec<f64>>())
+}
+
+/// Fisher's linear discriminant with a ridge, larger on `a`.
+fn discriminant(a: &[Sample], b: &[Sample]) -> Option<DVector<f64>> {
+    let size = a.first()?.len();
+    let centre = |all: &[Sample]| all.iter().sum::<DVector<f64>>() / all.len() as f64;
+    let scatter = |all: &[Sample], centre: &DVector<f64>| {
+        all.iter().map(|s| (s - centre) * (s - centre).transpose()).sum::<DMatrix<f64>>()
+            / all.len() as f64
+    };
+    if b.is_empty() {
+        return None;
+    }
+    let (of_a, of_b) = (centre(a), centre(b));
+    let mut within = scatter(a, &of_a) + scatter(b, &of_b);
+    let ridge = RIDGE * within.trace() / size as f64;
+    (0..size).for_each(|i| within[(i, i)] += ridge.max(1e-9));
+    Some(within.cholesky()?.solve(&(of_a - of_b)))
+}
+
+/// How often a score of `a` is above one of `b`; ties are half.
+fn area(a: &[f64], b: &[f64]) -> Option<f64> {
+    let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
+    let wins = pairs.map(|(x, y)| if x > y { 1.0 } else { f64::from(u8::from(x == y)) * 0.5 });
+    (!a.is_empty() && !b.is_empty()).then(|| wins.sum::<f64>() / (a.len() * b.len()) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(centre: f64, count: usize, from: u64) -> Vec<Sample> {
+        let mut state = from;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+        };
+        (0..count).map(|_| DVector::from_vec(vec![centre + noise(), noise()])).collect()
+    }
+
+    #[test]
+    fn what_is_alike_cannot_be_told_apart_and_what_differs_can() {
+        let same = cross_validated(
+            &[cloud(0.0, 200, 1), cloud(0.0, 200, 2)],
+            &[cloud(0.0, 200, 3), cloud(0.0, 200, 4)],
+        );
+        assert!((same - 0.5).abs() < 0.08, "{same}");
+        let other = cross_validated(
+            &[cloud(0.0, 50, 1), cloud(0.0, 50, 2)],
+            &[cloud(2.0, 50, 3), cloud(2.0, 50, 4)],
+        );
+        assert!(other > 0.999, "{other}");
+    }
+
+    #[test]
+    fn the_area_counts_pairs() {
+        assert_eq!(area(&[2.0, 1.0], &[1.0, 0.0]), Some(0.875));
+        assert_eq!(area(&[], &[1.0]), None);
+    }
+
+    #[test]
+    fn a_flat_patch_has_flat_features() {
+        let depth = DepthImage::filled(64, 64, 2.5);
+        let features = features(&depth, &Rect::new(4.0, 4.0, 50.0, 50.0)).unwrap();
+        assert_eq!(features.len(), CELLS * CELLS + FILLS * FILLS + 2);
+        assert!(features.rows(0, 36).iter().all(|v| *v == 0.0));
+        assert!(features.rows(36, 9).iter().all(|v| *v == 1.0));
+        assert!(super::features(&depth, &Rect::new(0.0, 0.0, 9.0, 9.0)).is_none());
+    }
+}

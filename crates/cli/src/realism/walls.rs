@@ -1,0 +1,130 @@
+//! Depth of a flat wall: how much it scatters, how much of it is there, how far
+//! it is off. Stereo and structured light both say that the scatter of depth
+//! grows with its square, `z² s / (f B)` for a scatter `s` of the disparity. The
+//! wall is looked at askew, so that it covers many steps of the disparity.
+
+use nalgebra::{Matrix3, Vector3};
+use tagalong_core::DepthImage;
+use tagalong_trials::TrialError;
+
+use super::{Check, depth, deviation, drawn, mean, scene};
+
+const GROUP: &str = "depth of a wall (RGB-D camera)";
+/// Distances of the wall, m.
+const RANGES_M: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+/// How far the camera looks aside, degrees.
+const ASKEW_DEG: f64 = 20.0;
+/// Baseline of the drawn camera, m, and its field of view.
+const CAMERA: &str = "baseline_m = 0.075\nmount_error_deg = 0.0\n";
+const BASELINE_M: f64 = 0.075;
+
+/// What is measured on a wall.
+struct Wall {
+    range_m: f64,
+    /// Standard deviation from the best plane, m.
+    residual_m: f64,
+    /// The plane at the centre against the wall, m.
+    bias_m: f64,
+    /// Fraction of pixels with a reading.
+    fill: f64,
+    /// Scatter of the disparity that explains the residual, pixels.
+    sigma_px: f64,
+}
+
+pub fn checks() -> Result<Vec<Check>, TrialError> {
+    let walls: Vec<Wall> = RANGES_M.iter().filter_map(|range| measure(*range)).collect();
+    let mut checks: Vec<Check> = walls.iter().flat_map(of_wall).collect();
+    let inner = walls.iter().filter(|wall| (2.0..=5.0).contains(&wall.range_m));
+    let sigmas: Vec<f64> = inner.map(|wall| wall.sigma_px).collect();
+    let (least, most) = sigmas.iter().fold((f64::MAX, 0.0_f64), |(a, b), s| (a.min(*s), b.max(*s)));
+    let what = "largest over smallest disparity scatter, 2 to 5 m";
+    checks.push(Check::between(GROUP, what, most / least, "", [1.0, 2.0]));
+    if let Some(wall) = walls.iter().find(|wall| wall.range_m == 3.0) {
+        let percent = 100.0 * wall.residual_m / 3.0;
+        let what = "scatter of one pixel at 3 m, part of the range";
+        checks.push(Check::between(GROUP, what, percent, "%", [0.2, 2.0]));
+        let what = "offset of the wall at 3 m, part of the range";
+        let percent = 100.0 * wall.bias_m.abs() / 3.0;
+        checks.push(Check::between(GROUP, what, percent, "%", [f64::NEG_INFINITY, 1.0]));
+    }
+    Ok(checks)
+}
+
+fn of_wall(wall: &Wall) -> [Check; 3] {
+    let at = format!("at {} m", wall.range_m);
+    // Holes are rare near by; far away the light of the projector is lost.
+    let fill = if wall.range_m <= 4.0 { [0.9, 1.0] } else { [0.2, 1.0] };
+    [
+        Check::told(GROUP, format!("plane residual {at}"), wall.residual_m, "m"),
+        Check::between(GROUP, format!("disparity scatter {at}"), wall.sigma_px, "px", [0.03, 0.25]),
+        Check::between(GROUP, format!("fill rate {at}"), wall.fill, "", fill),
+    ]
+}
+
+fn measure(range_m: f64) -> Option<Wall> {
+    let room = format!("[room]\nsize_m = [{}, 14.0]\nwallpaper = true\n", range_m + 1.0);
+    let text = format!(
+        "duration_s = 0.35\n{room}[camera]\n{CAMERA}[robot]\nstart = [1.0, 7.0]\n\
+         heading_deg = {ASKEW_DEG:.1}\n\
+         [faults]\ndropped = 0.0\nlate = 0.0\n"
+    );
+    let mut fits = Vec::new();
+    let mut focal_px = 0.0;
+    for drawn in drawn(&scene(&text)) {
+        focal_px = drawn.frame.camera.focal_px();
+        fits.extend(fit(depth(&drawn.frame)?));
+    }
+    let of = |pick: fn(&Fit) -> f64| mean(&fits.iter().map(pick).collect::<Vec<f64>>());
+    let residual_m = of(|fit| fit.residual_m);
+    let centre_m = range_m / ASKEW_DEG.to_radians().cos();
+    Some(Wall {
+        range_m,
+        residual_m,
+        bias_m: of(|fit| fit.centre_m) - centre_m,
+        fill: of(|fit| fit.fill),
+        sigma_px: residual_m * focal_px * BASELINE_M / centre_m.powi(2),
+    })
+}
+
+struct Fit {
+    residual_m: f64,
+    centre_m: f64,
+    fill: f64,
+}
+
+/// The best plane through the middle of the image: `1 / z = a + b u + c v`.
+fn fit(depth: &DepthImage) -> Option<Fit> {
+    let (w, h) = (depth.width(), depth.height());
+    let (us, vs) = (w / 4..3 * w / 4, 3 * h / 10..7 * h / 10);
+    let all = us.len() * vs.len();
+    let pixel = |u: usize, v: usize| {
+        let z = f64::from(depth.get(u as i64, v as i64)?);
+        let place = Vector3::new(1.0, u as f64 / w as f64 - 0.5, v as f64 / h as f64 - 0.5);
+        (z.is_finite() && z > 0.0).then_some((place, z))
+    };
+    let points: Vec<(Vector3<f64>, f64)> =
+        vs.flat_map(|v| us.clone().filter_map(move |u| pixel(u, v))).collect();
+    let normal: Matrix3<f64> = points.iter().map(|(p, _)| p * p.transpose()).sum();
+    let right: Vector3<f64> = points.iter().map(|(p, z)| p / *z).sum();
+    let plane = normal.cholesky()?.solve(&right);
+    let residuals: Vec<f64> = points.iter().map(|(p, z)| z - 1.0 / plane.dot(p)).collect();
+    let fill = points.len() as f64 / all as f64;
+    Some(Fit { residual_m: deviation(&residuals), centre_m: 1.0 / plane.x, fill })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tilted_plane_has_no_residual_and_holes_do_not_matter() {
+        let depth = DepthImage::from_fn(40, 40, |x, y| match (x + y) % 4 {
+            0 => f32::NAN,
+            _ => 1.0 / (0.3 + 0.001 * (x as f32 - 20.0) - 0.002 * (y as f32 - 20.0)),
+        });
+        let fit = fit(&depth).unwrap();
+        assert!(fit.residual_m < 1e-5 && (fit.centre_m - 1.0 / 0.3).abs() < 1e-5);
+        assert!((fit.fill - 0.75).abs() < 0.01);
+        assert!(super::fit(&DepthImage::filled(40, 40, f32::NAN)).is_none());
+    }
+}

@@ -1,0 +1,113 @@
+//! `tagalong trials`: pipelines on many draws of the same scenes.
+
+mod contest;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_core::Registry;
+use tagalong_sim::Scene;
+use tagalong_trials::Contender;
+
+use crate::args::Format;
+use crate::config_file::ConfigFile;
+use crate::outcome::{Ended, Failure, Outcome, print};
+use crate::simulate;
+
+/// Scenes on which nobody should be perfect.
+const HARD: [&str; 5] = ["crossing", "crossing-oblique", "full-occlusion", "following", "crowd"];
+
+/// Pipelines that are compared where none are named.
+const PIPELINES: [&str; 3] = ["depth-ekf", "depth-ekf-as-printed", "naive"];
+
+/// The arguments of `tagalong trials`.
+#[derive(Args, Debug)]
+pub struct TrialsArgs {
+    /// The scenes [default: the hard ones of configs/scenes].
+    pub scenes: Vec<PathBuf>,
+    /// The pipelines; the last one is the baseline of the others [default:
+    /// depth-ekf, depth-ekf-as-printed, naive].
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub configs: Vec<PathBuf>,
+    /// Draws each scene with this many seeds, counted from its own.
+    #[arg(long, value_name = "N", default_value_t = 10,
+          value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub seeds: u64,
+    /// Trials that run at once; the results are the same [default: as many as
+    /// there are cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub jobs: Option<u8>,
+    /// How to print.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Runs the trials and prints the table.
+///
+/// # Errors
+/// Scenes and configs that cannot be used are exit code 2; plugins that fail are 1.
+pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
+    let contenders = contenders(&args.configs, registry)?;
+    let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
+    let suites =
+        scenes.iter().map(|path| suite(path, args.seeds)).collect::<Result<Vec<_>, _>>()?;
+    let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
+    let mut table = table::Table::default();
+    for (name, scenes) in &suites {
+        bar.set_message(name.clone());
+        let jobs = simulate::threads(args.jobs);
+        let results = contest::run(scenes, &contenders, registry, jobs, || bar.inc(1))
+            .map_err(Failure::failed)?;
+        table.add(name, &contenders, &results);
+    }
+    bar.finish_and_clear();
+    match args.format {
+        Format::Text => print(&table.text())?,
+        Format::Json => print(&table.json())?,
+    }
+    Ok(Ended::Well)
+}
+
+fn or_default(named: &[PathBuf], folder: &str, names: &[&str]) -> Vec<PathBuf> {
+    if named.is_empty() {
+        return names.iter().map(|name| Path::new(folder).join(format!("{name}.toml"))).collect();
+    }
+    named.to_vec()
+}
+
+/// Reads configs for trials.
+///
+/// # Errors
+/// A config that cannot be read or built.
+pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contender>, Failure> {
+    let paths = or_default(named, "configs", &PIPELINES);
+    let read = |path: &PathBuf| {
+        let file = ConfigFile::read(path)?;
+        file.pipeline(registry, None)?;
+        Ok(file.contender())
+    };
+    paths.iter().map(read).collect()
+}
+
+/// A scene with as many seeds as wanted.
+fn suite(path: &Path, seeds: u64) -> Result<(String, Vec<Scene>), Failure> {
+    let scene = simulate::read(path, None)?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok((name, with_seeds(&scene, seeds)))
+}
+
+/// The same scene with other luck.
+pub fn with_seeds(scene: &Scene, seeds: u64) -> Vec<Scene> {
+    let seed = |offset| scene.seed.wrapping_add(offset);
+    (0..seeds).map(|offset| Scene { seed: seed(offset), ..scene.clone() }).collect()
+}
+
+fn bar(trials: usize) -> ProgressBar {
+    let bar = ProgressBar::new(trials as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} trials {msg} {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}

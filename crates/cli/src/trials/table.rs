@@ -1,0 +1,165 @@
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use tagalong_eval::{Bootstrap, Clear, Gain, Identity, Interval, PositionError, wilson};
+use tagalong_trials::Contender;
+
+use super::contest::Result;
+
+/// Confidence of all intervals.
+const CONFIDENCE: f64 = 0.95;
+/// Samples of the bootstrap: enough for two digits.
+const SAMPLES: usize = 2_000;
+
+/// Contenders on suites.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Table {
+    /// One row a suite and contender.
+    pub rows: Vec<Row>,
+    /// Each contender against the baseline, the last one.
+    pub gains: Vec<GainRow>,
+}
+
+/// One contender on one suite; intervals have 95 % confidence.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The scene.
+    pub suite: String,
+    /// The contender.
+    pub pipeline: String,
+    /// Draws.
+    pub draws: usize,
+    /// Accuracy, bootstrapped over draws.
+    pub mota: Option<Interval>,
+    /// Identity F1, bootstrapped over draws.
+    pub idf1: Option<Interval>,
+    /// Errors on the floor, robot frame.
+    pub error: Option<PositionError>,
+    /// Draws in which everybody in view was tracked in all frames within 22 cm
+    /// (Wilson).
+    pub success: Option<Interval>,
+    /// Identity switches.
+    pub switches: u64,
+}
+
+/// How much a contender gains over the baseline on the same draws.
+#[derive(Clone, Debug, Serialize)]
+pub struct GainRow {
+    /// The scene.
+    pub suite: String,
+    /// The contender.
+    pub pipeline: String,
+    /// The baseline.
+    pub baseline: String,
+    /// Gain of IDF1.
+    pub idf1: Gain,
+}
+
+impl Table {
+    /// Adds a suite: for each draw one result a contender.
+    pub fn add(&mut self, suite: &str, contenders: &[Contender], results: &[Vec<Result>]) {
+        let column = |at: usize| results.iter().map(|draw| &draw[at]).collect::<Vec<_>>();
+        for (at, contender) in contenders.iter().enumerate() {
+            self.rows.push(row(suite, &contender.name, &column(at)));
+        }
+        let Some((baseline, others)) = contenders.split_last() else { return };
+        let idf1 = |at: usize| -> Vec<f64> {
+            column(at).iter().map(|result| result.identity.idf1()).collect()
+        };
+        let base = idf1(others.len());
+        for (at, contender) in others.iter().enumerate() {
+            self.gains.extend(bootstrap().paired(&base, &idf1(at)).map(|gain| GainRow {
+                suite: suite.to_owned(),
+                pipeline: contender.name.clone(),
+                baseline: baseline.name.clone(),
+                idf1: gain,
+            }));
+        }
+    }
+
+    /// For programs.
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    /// For people.
+    pub fn text(&self) -> String {
+        let width = |name: fn(&Row) -> &str| {
+            self.rows.iter().map(|row| name(row).len()).max().unwrap_or(0).max(8)
+        };
+        let (first, second) = (width(|row| &row.suite), width(|row| &row.pipeline));
+        let mut out = format!(
+            "{:<first$}  {:<second$}  {:>5}  {:^21}  {:^21}  {:>7}  {:^21}  {:>4}\n",
+            "suite", "pipeline", "draws", "MOTA", "IDF1", "error m", "all frames right", "IDSW"
+        );
+        for row in &self.rows {
+            let error = row.error.map_or("-".to_owned(), |error| format!("{:.3}", error.mean_m));
+            let _ = writeln!(
+                out,
+                "{:<first$}  {:<second$}  {:>5}  {}  {}  {:>7}  {}  {:>4}",
+                row.suite,
+                row.pipeline,
+                row.draws,
+                interval(row.mota),
+                interval(row.idf1),
+                error,
+                interval(row.success),
+                row.switches
+            );
+        }
+        let _ = writeln!(out, "\nintervals: 95 %, over draws; {}", self.perfection());
+        for gain in &self.gains {
+            let Interval { estimate, lower, upper } = gain.idf1.difference;
+            let _ = writeln!(
+                out,
+                "{}: {} gains {estimate:+.3} [{lower:+.3}, {upper:+.3}] IDF1 over {} on the same \
+                 draws{}",
+                gain.suite,
+                gain.pipeline,
+                gain.baseline,
+                if lower > 0.0 { "" } else { ", which may be luck" }
+            );
+        }
+        out
+    }
+
+    /// A suite that somebody solves asks for a harder one.
+    fn perfection(&self) -> String {
+        let perfect = |row: &&Row| row.mota.is_some_and(|mota| mota.estimate >= 0.9995);
+        let named = self.rows.iter().filter(perfect);
+        let all: Vec<String> =
+            named.map(|row| format!("{} on {}", row.pipeline, row.suite)).collect();
+        match all.is_empty() {
+            true => "no pipeline is perfect (MOTA 1) on any suite".into(),
+            false => format!("perfect, so the suite is too easy: {}", all.join(", ")),
+        }
+    }
+}
+
+fn bootstrap() -> Bootstrap {
+    Bootstrap { samples: SAMPLES, confidence: CONFIDENCE, seed: 1 }
+}
+
+fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {
+    let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &results[i].clear)).mota();
+    let idf1 =
+        |drawn: &[usize]| Identity::combine(drawn.iter().map(|&i| &results[i].identity)).idf1();
+    let errors: Vec<f64> = results.iter().flat_map(|r| &r.errors_m).copied().collect();
+    let successes = results.iter().filter(|result| result.success).count() as u64;
+    Row {
+        suite: suite.to_owned(),
+        pipeline: pipeline.to_owned(),
+        draws: results.len(),
+        mota: bootstrap().interval(results.len(), mota),
+        idf1: bootstrap().interval(results.len(), idf1),
+        error: PositionError::of(&errors),
+        success: wilson(successes, results.len() as u64, CONFIDENCE),
+        switches: results.iter().map(|result| result.clear.id_switches).sum(),
+    }
+}
+
+fn interval(interval: Option<Interval>) -> String {
+    interval.map_or(format!("{:^21}", "-"), |Interval { estimate, lower, upper }| {
+        format!("{estimate:>6.3} [{lower:.3}, {upper:.3}]")
+    })
+}

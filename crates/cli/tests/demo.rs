@@ -1,0 +1,45 @@
+//! `tagalong demo` and `tagalong trials`: what they refuse, and what they print.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+
+use common::{code, tagalong, text};
+
+#[test]
+fn a_folder_with_other_files_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("tagalong-demo")).unwrap();
+    fs::write(folder.path().join("tagalong-demo/mine.txt"), "mine").unwrap();
+    let output = tagalong().current_dir(folder.path()).arg("demo").output().unwrap();
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("--overwrite"), "{}", text(&output.stderr));
+    assert_eq!(fs::read_dir(folder.path().join("tagalong-demo")).unwrap().count(), 1);
+}
+
+const SCENE: &str = "duration_s = 1.5\n[camera]\nwidth = 160\nheight = 120\n[[people]]\n\
+    path = [[4.0, 2.5], [4.0, 4.0]]\nspeed_mps = 0.5\n";
+
+#[test]
+fn trials_print_the_same_table_on_any_number_of_jobs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/naive.toml");
+    let trials = |jobs: &str| {
+        let mut command = tagalong();
+        command.current_dir(folder.path()).args(["trials", "s.toml", "--seeds", "3"]);
+        command.args(["--format", "json", "--jobs", jobs, "--configs", config, config]);
+        let output = command.output().unwrap();
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let table = trials("1");
+    assert_eq!(table, trials("3"));
+    let table: serde_json::Value = serde_json::from_str(&table).unwrap();
+    assert_eq!(
+        (table["rows"].as_array().unwrap().len(), &table["rows"][0]["draws"]),
+        (2, &3.into())
+    );
+    assert_eq!(table["gains"][0]["idf1"]["difference"]["estimate"], 0.0);
+}
