@@ -224,7 +224,7 @@ impl MirrorCamera {
             return (None, Visibility::default());
         }
         let mut seen = self.visibility(raw, world_from_camera, (person, shapes), &region);
-        seen.fraction *= region.area() / whole.area();
+        seen.fraction *= (region.area() / whole.area()).min(1.0);
         (Some(region), seen)
     }
 
