@@ -92,7 +92,7 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
     let mut frames: Vec<TruthFrame> = Vec::new();
     while let Some(message) = walker.next() {
         if message.channel.topic == TRUTH_TOPIC {
-            let plain = message.channel.message_encoding == "json";
+            let plain = message.channel.encoding == "json";
             let frame = parse(message.data, plain).map_err(|why| LogError::Truth {
                 path: path.to_owned(),
                 number: frames.len() + 1,
