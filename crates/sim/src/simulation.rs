@@ -356,9 +356,8 @@ impl Simulation {
     ) -> (Image<Hit>, Vec<Truth>) {
         let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
         let seen = View { world, camera, pose: &|_| *pose, lit }.draw(self.threads);
-        let truth = self.truth(world, uppers, pose, |of, skeleton| {
-            self.sight(&seen, pose, of, skeleton)
-        });
+        let truth =
+            self.truth(world, uppers, pose, |of, skeleton| self.sight(&seen, pose, of, skeleton));
         (seen, truth)
     }
 
