@@ -7,6 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use common::{code, tagalong, text};
+use tagalong_core::ConicalMirror;
+use tagalong_log::msgs::{CameraInfo, PoseStamped, TFMessage, decode};
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::Scene;
 
@@ -70,4 +72,66 @@ fn every_shipped_scene_can_be_read_and_says_what_it_is_for() {
         scenes += 1;
     }
     assert!(scenes >= 10);
+}
+
+const OMNI: &str = "duration_s = 0.6\n[camera]\nkind = \"panorama\"\nwidth = 96\nheight = 96\n\
+    rate_hz = 5.0\nheight_m = 1.55\n[faults]\ndropped = 0.0\nlate = 0.0\n\
+    [robot]\nstart = [4.0, 3.0]\n[[people]]\npath = [[2.0, 3.0]]\nextras = [\"green-hat\"]\n\
+    [[webcams]]\nat = [0.2, 0.3]\nwidth = 32\nheight = 24\n[[webcams]]\nwidth = 32\nheight = 24\n";
+
+/// The first message of a topic.
+fn first(log: &[u8], topic: &str) -> Vec<u8> {
+    let messages = mcap::MessageStream::new(log).unwrap();
+    let found = messages.map(Result::unwrap).find(|message| message.channel.topic == topic);
+    found.unwrap_or_else(|| panic!("{topic} is not in the log")).data.into_owned()
+}
+
+#[test]
+fn a_mirror_and_webcams_are_in_the_log_as_they_are_described() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), OMNI).unwrap();
+    let output = simulate(folder.path(), &["s.toml", "-o", "a.mcap"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let path = folder.path().join("a.mcap");
+    let log = fs::read(&path).unwrap();
+
+    let info: CameraInfo = decode(&first(&log, "/camera/color/camera_info")).unwrap();
+    assert_eq!(info.distortion_model, ConicalMirror::MODEL);
+    let mirror = ConicalMirror::from_coefficients(info.k[0], [info.k[2], info.k[5]], &info.d);
+    assert!(mirror.is_some_and(|m| (m.half_angle_rad - 67.5_f64.to_radians()).abs() < 1e-9));
+
+    let mounts = first(&log, "/truth/tf_static");
+    let mounts: TFMessage = decode(&mounts).unwrap();
+    let place = mounts.transforms[0].transform.translation;
+    assert_eq!((mounts.transforms.len(), place.x, place.y, place.z), (2, 0.2, 0.3, 2.2));
+    let robot = first(&log, "/truth/robot");
+    let robot: PoseStamped = decode(&robot).unwrap();
+    assert_eq!((robot.pose.position.x, robot.pose.position.y), (4.0, 3.0));
+    let webcam: CameraInfo = decode(&first(&log, "/webcam_2/camera_info")).unwrap();
+    assert_eq!((webcam.width, webcam.header.frame_id.as_str()), (32, "webcam_2_optical_frame"));
+    assert!(!first(&log, "/webcam_1/image_raw/compressed").is_empty());
+
+    let truth = read_truth(&path, &Limits::default()).unwrap().unwrap();
+    let [x, _, width, _] = truth[0].people[0].upper_body_px.unwrap();
+    assert!(x < 480.0 && x + width > 475.0, "behind the robot: {x} {width}");
+}
+
+#[test]
+fn pictures_of_a_mirror_show_the_panorama_and_the_webcams() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), OMNI).unwrap();
+    let output = simulate(folder.path(), &["s.toml", "--gallery", "pictures"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let size = |path: &Path| {
+        let reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
+        let info = reader.read_info().unwrap();
+        (info.info().width, info.info().height)
+    };
+    let mut sizes: Vec<_> = fs::read_dir(folder.path().join("pictures"))
+        .unwrap()
+        .map(|entry| size(&entry.unwrap().path()))
+        .collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    assert_eq!(sizes, [(64, 24), (480 + 96, 120)]);
 }

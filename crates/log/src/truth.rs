@@ -1,11 +1,13 @@
 //! Ground truth inside a log: who was where, as a simulator or an annotator
 //! knows it.
 //!
-//! The channel [`TRUTH_TOPIC`] carries one JSON message per image, with the
-//! image's stamp (see [`TruthFrame`]; message encoding `json`, schema encoding
-//! `jsonschema`, schema name [`TRUTH_SCHEMA`]). JSON, because no ROS message
-//! says "this one is hidden and does not count", and because it can be read in
-//! any viewer.
+//! The channel [`TRUTH_TOPIC`] carries one JSON text per image, with the image's
+//! stamp (see [`TruthFrame`]). JSON, because no ROS message says "this one is
+//! hidden and does not count", and because it can be read in any viewer. We
+//! write it as a `std_msgs/String`: some readers of ROS 2 logs refuse a file
+//! that has any other kind of schema in it. Read is a plain JSON message, too
+//! (message encoding `json`, schema encoding `jsonschema`, schema name
+//! [`TRUTH_SCHEMA`]).
 
 use std::path::Path;
 
@@ -13,13 +15,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::mcap_walk::Walker;
+use crate::msgs::{StringMsg, decode};
 use crate::scan::open_file;
 use crate::{Limits, LogError};
 
 /// The topic of the truth.
 pub const TRUTH_TOPIC: &str = "/truth/people";
 
-/// The name of its schema.
+/// The name of its schema where it is plain JSON.
 pub const TRUTH_SCHEMA: &str = "tagalong/TruthFrame";
 
 /// Everybody who was there at the moment of one image.
@@ -41,6 +44,8 @@ pub struct TruthPerson {
     /// Centre of the head in the robot frame (X forward, Y left, Z up), m.
     pub head_in_robot_m: Option<[f64; 3]>,
     /// The upper-body square clipped to the image: x, y, width, height, pixels.
+    /// Of a conical mirror it lies in the unwrapped panorama, and may continue
+    /// beyond the right edge (see `tagalong_core::Panorama`).
     pub upper_body_px: Option<[f64; 4]>,
     /// The part of it that can be seen, likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -87,10 +92,11 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
     let mut frames: Vec<TruthFrame> = Vec::new();
     while let Some(message) = walker.next() {
         if message.channel.topic == TRUTH_TOPIC {
-            let frame = serde_json::from_slice(message.data).map_err(|error| LogError::Truth {
+            let plain = message.channel.encoding == "json";
+            let frame = parse(message.data, plain).map_err(|why| LogError::Truth {
                 path: path.to_owned(),
                 number: frames.len() + 1,
-                why: error.to_string(),
+                why,
             })?;
             frames.push(frame);
         }
@@ -98,6 +104,14 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
     let present = walker.channels().any(|channel| channel.topic == TRUTH_TOPIC);
     frames.sort_by_key(|frame| frame.stamp_ns);
     Ok(present.then_some(frames))
+}
+
+fn parse(data: &[u8], plain: bool) -> Result<TruthFrame, String> {
+    if plain {
+        return serde_json::from_slice(data).map_err(|error| error.to_string());
+    }
+    let text: StringMsg = decode(data).map_err(|error| error.to_string())?;
+    serde_json::from_str(&text.data).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

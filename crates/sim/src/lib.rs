@@ -29,6 +29,7 @@ mod behaviour;
 mod body;
 mod gait;
 mod material;
+mod mirror;
 mod parallel;
 mod person;
 mod random;
@@ -42,11 +43,14 @@ mod shadow;
 mod shape;
 mod sight;
 mod simulation;
+mod webcam;
 mod world;
 
+pub use mirror::MirrorSettings;
 pub use person::Extra;
 pub use scene::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Trick,
 };
-pub use simulation::{Event, OdometryReading, Shot, Simulation, Truth};
+pub use simulation::{Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
+pub use webcam::WebcamSettings;

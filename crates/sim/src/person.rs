@@ -37,6 +37,8 @@ pub enum Extra {
     Backpack,
     /// A brimmed hat.
     Hat,
+    /// A brimmed hat of a green that nothing else has: webcams find it.
+    GreenHat,
     /// A bag in the left hand.
     Bag,
 }
@@ -216,7 +218,8 @@ impl Drawing<'_> {
             match extra {
                 Extra::Coat => self.coat(),
                 Extra::Backpack => self.backpack(),
-                Extra::Hat => self.hat(),
+                Extra::Hat => self.hat(scaled(self.look.trousers.colour, 1.3)),
+                Extra::GreenHat => self.hat([0.02, 0.45, 0.05]),
                 Extra::Bag => self.bag(),
             }
         }
@@ -241,9 +244,9 @@ impl Drawing<'_> {
         self.ellipsoid(at, turn, Vector3::new(0.062, 0.085, 0.14) * self.h, cloth);
     }
 
-    fn hat(&mut self) {
+    fn hat(&mut self, colour: Colour) {
         let (h, turn) = (self.h, self.s.world_from_head);
-        let felt = Material::plain(scaled(self.look.trousers.colour, 1.3));
+        let felt = Material::plain(colour);
         let up = |z: f64| self.s.head + Vector3::new(0.0, 0.0, z * h);
         self.ellipsoid(up(0.040), turn, Vector3::new(0.058, 0.052, 0.045) * h, felt);
         self.ellipsoid(up(0.038), turn, Vector3::new(0.088, 0.078, 0.006) * h, felt);

@@ -4,7 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::ConfigError;
 
+use crate::mirror::MirrorSettings;
 use crate::person::Extra;
+use crate::webcam::WebcamSettings;
 
 /// A scene. Lengths are in metres; the room's corner is the origin, X runs
 /// along its length, Y along its width; angles turn from X towards Y.
@@ -29,6 +31,8 @@ pub struct Scene {
     pub robot: RobotSettings,
     /// What goes wrong on the way into the log.
     pub faults: FaultSettings,
+    /// Cameras that hang in the room.
+    pub webcams: Vec<WebcamSettings>,
     /// What stands around.
     pub furniture: Vec<Furniture>,
     /// Who is there.
@@ -47,6 +51,7 @@ impl Default for Scene {
             camera: CameraSettings::default(),
             robot: RobotSettings::default(),
             faults: FaultSettings::default(),
+            webcams: Vec::new(),
             furniture: Vec::new(),
             people: Vec::new(),
         }
@@ -100,8 +105,10 @@ impl Scene {
                 "speed_mps must be in 0 to 2",
             ),
         ];
-        match rules.iter().find(|(holds, _)| !holds) {
-            Some((_, message)) => Err(ConfigError::new(*message)),
+        let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
+        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(webcams);
+        match rules.find(|(holds, _)| !holds) {
+            Some((_, message)) => Err(ConfigError::new(message)),
             None => Ok(()),
         }
     }
@@ -173,6 +180,9 @@ pub enum CameraKind {
     Rgbd,
     /// A rectified pair of grey images.
     Stereo,
+    /// The circular colour image of a camera that looks up into a conical
+    /// mirror, of which `width`, `height`, `rate_hz`, `height_m` and `mirror` hold.
+    Panorama,
 }
 
 /// The camera on the robot.
@@ -207,6 +217,8 @@ pub struct CameraSettings {
     /// The mount differs from what the log says by about this, degrees and (in
     /// hundredths) metres.
     pub mount_error_deg: f64,
+    /// The mirror of a panorama camera.
+    pub mirror: MirrorSettings,
 }
 
 impl Default for CameraSettings {
@@ -225,6 +237,7 @@ impl Default for CameraSettings {
             max_depth_m: 8.0,
             exposure_s: 0.012,
             mount_error_deg: 0.4,
+            mirror: MirrorSettings::default(),
         }
     }
 }

@@ -6,10 +6,13 @@ use std::sync::Arc;
 use nalgebra::{
     Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
 };
-use tagalong_core::{Camera, Distortion, Image, Images, Pinhole, Rect, RightImage, WheelSpeeds};
+use tagalong_core::{
+    Camera, Distortion, Image, Images, Panorama, Pinhole, Rect, RgbImage, RightImage, WheelSpeeds,
+};
 
 use crate::behaviour::{Obstacle, Walker, hidden_by, play_tricks};
 use crate::body::Skeleton;
+use crate::mirror::MirrorCamera;
 use crate::person::{Look, Person};
 use crate::random::Random;
 use crate::render::{View, Visibility, draw, visibility};
@@ -17,6 +20,8 @@ use crate::robot::Robot;
 use crate::room;
 use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Scene};
 use crate::sensor::{DepthSensor, Exposure, Moment};
+use crate::shape::Shape;
+use crate::webcam::Webcam;
 use crate::world::{Hit, Lamp, Object, World};
 
 /// People, robot and odometry move in steps of this many nanoseconds.
@@ -31,6 +36,19 @@ pub enum Event {
     Odometry(OdometryReading),
     /// An image, or a pair of them, with the truth.
     Shot(Box<Shot>),
+    /// An image of a camera in the room.
+    Webcam(WebcamShot),
+}
+
+/// What a camera in the room delivers; its images are neither lost nor late.
+#[derive(Clone, Debug)]
+pub struct WebcamShot {
+    /// Which one, from 0 in the order of the scene.
+    pub webcam: usize,
+    /// Since the start, ns.
+    pub captured_ns: u64,
+    /// The image.
+    pub image: Arc<RgbImage>,
 }
 
 /// What the odometry believes.
@@ -53,7 +71,8 @@ pub struct Shot {
     pub captured_ns: u64,
     /// When it is written to the log, ns; not before it was captured.
     pub recorded_ns: u64,
-    /// Colour and depth, or the grey images of a stereo pair.
+    /// Colour and depth, the grey images of a stereo pair, or the circular image
+    /// of a mirror.
     pub images: Images,
     /// Everybody.
     pub truth: Vec<Truth>,
@@ -70,9 +89,11 @@ pub struct Truth {
     pub head_in_robot: Point3<f64>,
     /// Middle of the trunk in the robot frame, m.
     pub torso_in_robot: Point3<f64>,
-    /// The upper-body square clipped to the image; `None` outside.
+    /// The upper-body square clipped to the image; `None` outside. A panorama
+    /// camera has it in the unwrapped image, where it may continue beyond the
+    /// right edge (see [`Panorama`]).
     pub upper_body: Option<Rect>,
-    /// The part that is seen.
+    /// The part that is seen, likewise.
     pub visible: Option<Rect>,
     /// Seen fraction of the upper body.
     pub visible_fraction: f64,
@@ -88,6 +109,9 @@ pub struct Simulation {
     camera: Camera,
     /// The camera as it is really mounted.
     true_camera: Camera,
+    /// What the camera looks into, if it is a panorama camera.
+    mirror: Option<MirrorCamera>,
+    webcams: Vec<Webcam>,
     fixed: Vec<Object>,
     lamps: Vec<Lamp>,
     obstacles: Vec<Obstacle>,
@@ -110,11 +134,17 @@ impl Simulation {
         pieces.extend(room::clutter(&scene.room, &mut stream(1)));
         let mut fixed = vec![room::room(&scene.room)];
         fixed.extend(pieces.iter().map(|piece| room::furniture(piece, scene.room.height_m)));
-        let camera = camera(scene);
+        let mirror = (scene.camera.kind == CameraKind::Panorama)
+            .then(|| MirrorCamera::new(&scene.camera, &mut stream(6)));
+        let camera = mirror
+            .as_ref()
+            .map_or_else(|| camera(scene), |mirror| mirror.camera(scene.camera.height_m));
         let true_camera = shaken(&camera, scene.camera.mount_error_deg, &mut stream(2));
         Self {
             true_camera,
             camera,
+            mirror,
+            webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
             fixed,
             lamps: room::lamps(&scene.room, &scene.light),
             obstacles: pieces.iter().map(obstacle).collect(),
@@ -131,9 +161,22 @@ impl Simulation {
         }
     }
 
-    /// The camera as the log describes it.
+    /// The camera as the log describes it; of a panorama camera the lens that
+    /// looks up into the mirror.
     pub fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// The mirror of a panorama camera as the log describes it, and the unwrapped
+    /// image in which the truth gives regions.
+    pub fn panorama(&self) -> Option<&Panorama> {
+        self.mirror.as_ref().map(|mirror| &mirror.panorama)
+    }
+
+    /// The cameras in the room; their `robot_from_camera` is their pose in the
+    /// **world**.
+    pub fn webcams(&self) -> impl Iterator<Item = &Camera> {
+        self.webcams.iter().map(Webcam::camera)
     }
 
     /// Commands the wheels from now on: the loop is closed, the scene's path
@@ -162,6 +205,7 @@ impl Simulation {
             self.shots += 1;
             self.shoot();
         }
+        self.shoot_webcams();
         let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
         self.robot.step(now_s, dt);
         self.walk(now_s, dt);
@@ -208,15 +252,32 @@ impl Simulation {
         self.record(recorded_ns, Event::Shot(Box::new(shot)));
     }
 
+    fn shoot_webcams(&mut self) {
+        let now_ns = self.now_ns;
+        let due: Vec<usize> =
+            (0..self.webcams.len()).filter(|i| self.webcams[*i].due(now_ns)).collect();
+        if due.is_empty() {
+            return;
+        }
+        let (world, _) = self.world();
+        for webcam in due {
+            let seed = self.scene.seed.rotate_left(20) ^ ((webcam as u64 + 1) << 40);
+            let image = Arc::new(self.webcams[webcam].shoot(&world, seed));
+            self.record(now_ns, Event::Webcam(WebcamShot { webcam, captured_ns: now_ns, image }));
+        }
+    }
+
     fn shot(&mut self, recorded_ns: u64) -> Shot {
         let (world, uppers) = self.world();
         let pose = self.world_from_robot();
-        let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
-        let seen = View { world: &world, camera, pose: &|_| pose, lit }.draw(self.threads);
-        let truth = self.truth(&world, &uppers, &seen, &pose);
+        let (seen, truth) = match &self.mirror {
+            Some(mirror) => self.in_mirror(mirror, &world, &uppers, &pose),
+            None => self.in_lens(&world, &uppers, &pose),
+        };
         let images = match self.scene.camera.kind {
             CameraKind::Rgbd => self.rgbd(&seen),
             CameraKind::Stereo => self.stereo(&world, &seen, &pose),
+            CameraKind::Panorama => self.circle(&seen),
         };
         let world_from_robot = self.robot.pose;
         Shot { captured_ns: self.now_ns, recorded_ns, images, truth, world_from_robot }
@@ -265,6 +326,13 @@ impl Simulation {
         Images { colour, depth, ..Images::default() }
     }
 
+    /// A turn of the robot smears the circle along itself, which is not drawn.
+    fn circle(&mut self, seen: &Image<Hit>) -> Images {
+        let moment = Moment { smear_px: 0.0, ..self.moment(0, 1.0) };
+        let colour = self.exposures[0].colour(seen, &moment);
+        Images { colour: Some(Arc::new(colour)), ..Images::default() }
+    }
+
     fn stereo(&mut self, world: &World, left: &Image<Hit>, pose: &Isometry3<f64>) -> Images {
         let mut camera = self.true_camera.clone();
         // A fifth of a pixel is what rectification leaves.
@@ -280,50 +348,79 @@ impl Simulation {
         Images { grey: Some(Arc::new(grey)), right: Some(Arc::new(right)), ..Images::default() }
     }
 
+    fn in_lens(
+        &self,
+        world: &World,
+        uppers: &[usize],
+        pose: &Isometry3<f64>,
+    ) -> (Image<Hit>, Vec<Truth>) {
+        let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
+        let seen = View { world, camera, pose: &|_| *pose, lit }.draw(self.threads);
+        let truth =
+            self.truth(world, uppers, pose, |of, skeleton| self.sight(&seen, pose, of, skeleton));
+        (seen, truth)
+    }
+
+    fn in_mirror(
+        &self,
+        mirror: &MirrorCamera,
+        world: &World,
+        uppers: &[usize],
+        pose: &Isometry3<f64>,
+    ) -> (Image<Hit>, Vec<Truth>) {
+        let world_from_camera = pose * self.true_camera.robot_from_camera;
+        let seen = mirror.draw(world, &world_from_camera, self.threads);
+        let truth = self.truth(world, uppers, pose, |of, skeleton| {
+            mirror.sight(&seen, &world_from_camera, of, &skeleton.head)
+        });
+        (seen, truth)
+    }
+
+    /// `sight` says how somebody's upper body is seen: the region where it must
+    /// be, and what there is to see of it.
     fn truth(
         &self,
         world: &World,
         uppers: &[usize],
-        seen: &Image<Hit>,
         pose: &Isometry3<f64>,
+        sight: impl Fn((u16, &[Shape]), &Skeleton) -> (Option<Rect>, Visibility),
     ) -> Vec<Truth> {
         let people = world.objects.iter().filter_map(|o| Some((o.person?, o)));
         let walkers = self.walkers.iter().zip(uppers);
         let truth = people.zip(walkers).map(|((id, object), (walker, upper))| {
             let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
-            let upper = &object.shapes[..*upper];
-            self.truth_of(id, &skeleton, pose, |area| {
-                visibility(seen, &self.true_camera, pose, (id, upper), area)
-            })
+            let torso = nalgebra::center(&skeleton.pelvis, &skeleton.chest);
+            let (upper_body, seen) = sight((id, &object.shapes[..*upper]), &skeleton);
+            Truth {
+                id,
+                head_in_robot: pose.inverse_transform_point(&skeleton.head),
+                torso_in_robot: pose.inverse_transform_point(&torso),
+                upper_body,
+                visible: seen.bounds_px.map(|[x, y, r, b]| Rect::new(x, y, r - x, b - y)),
+                visible_fraction: seen.fraction,
+                occluder: seen.occluder,
+                ignore: seen.fraction < LEAST_VISIBLE,
+            }
         });
         truth.collect()
     }
 
-    fn truth_of(
+    fn sight(
         &self,
-        id: u16,
-        skeleton: &Skeleton,
+        seen: &Image<Hit>,
         pose: &Isometry3<f64>,
-        look: impl Fn([usize; 4]) -> Visibility,
-    ) -> Truth {
+        of: (u16, &[Shape]),
+        skeleton: &Skeleton,
+    ) -> (Option<Rect>, Visibility) {
         let camera = &self.true_camera;
-        let head = pose.inverse_transform_point(&skeleton.head);
-        let torso = nalgebra::center(&skeleton.pelvis, &skeleton.chest);
-        let whole = camera.upper_body(&head);
+        let whole = camera.upper_body(&pose.inverse_transform_point(&skeleton.head));
         let clipped = whole.clipped(camera.width, camera.height);
-        let inside = clipped.width >= 2.0 && clipped.height >= 2.0;
-        let seen = if inside { look(pixels(&clipped)) } else { Visibility::default() };
-        let in_image = if whole.area() > 0.0 { clipped.area() / whole.area() } else { 0.0 };
-        Truth {
-            id,
-            head_in_robot: head,
-            torso_in_robot: pose.inverse_transform_point(&torso),
-            upper_body: inside.then_some(clipped),
-            visible: seen.bounds_px.map(|[x, y, r, b]| Rect::new(x, y, r - x, b - y)),
-            visible_fraction: seen.fraction * in_image,
-            occluder: seen.occluder,
-            ignore: seen.fraction * in_image < LEAST_VISIBLE,
+        if clipped.width < 2.0 || clipped.height < 2.0 {
+            return (None, Visibility::default());
         }
+        let mut visibility = visibility(seen, camera, pose, of, pixels(&clipped));
+        visibility.fraction *= clipped.area() / whole.area();
+        (Some(clipped), visibility)
     }
 }
 
@@ -476,11 +573,45 @@ mod tests {
         let recorded = |event: &Event| match event {
             Event::Odometry(reading) => reading.at_ns,
             Event::Shot(shot) => shot.recorded_ns,
+            Event::Webcam(shot) => shot.captured_ns,
         };
         let events = events(&text, 2);
         assert!(events.windows(2).all(|pair| recorded(&pair[0]) <= recorded(&pair[1])));
         let shots: Vec<_> = shots(&text, 2);
         assert!(shots.iter().any(|s| s.recorded_ns > s.captured_ns) && shots.len() < 10);
+    }
+
+    const OMNI: &str = "duration_s = 1.0\n[camera]\nkind = \"panorama\"\nwidth = 160\nheight = 160\n\
+        rate_hz = 3.0\nheight_m = 1.55\n[robot]\nstart = [5.0, 3.0]\n[faults]\ndropped = 0.0\n\
+        [[people]]\npath = [[3.0, 3.01]]\nheight_m = 1.7\n[[people]]\npath = [[5.0, 5.5]]\n\
+        [[webcams]]\nwidth = 64\nheight = 48\n[[webcams]]\nwidth = 64\nheight = 48\nrate_hz = 5.0\n";
+
+    #[test]
+    fn a_mirror_shows_people_all_around_and_the_seam_cuts_nobody() {
+        let (one, three) = (shots(OMNI, 1), shots(OMNI, 3));
+        assert!(one.len() == 3 && one[0].images.depth.is_none());
+        for (a, b) in one.iter().zip(&three) {
+            assert!(a.images.colour == b.images.colour && a.truth == b.truth);
+        }
+        let (behind, left) = (&one[0].truth[0], &one[0].truth[1]);
+        let seam = behind.upper_body.unwrap();
+        assert!(seam.x < 480.0 && seam.right() > 480.0 && seam.width < 50.0, "{seam:?}");
+        assert!((left.upper_body.unwrap().centre().x - 119.5).abs() < 6.0, "{left:?}");
+        for person in [behind, left] {
+            let (whole, seen) = (person.upper_body.unwrap(), person.visible.unwrap());
+            assert!(person.visible_fraction > 0.9 && !person.ignore, "{person:?}");
+            assert!(seen.intersection(&whole).area() > 0.95 * seen.area(), "{person:?}");
+            assert!(seen.area() > 0.5 * whole.area(), "{person:?}");
+        }
+    }
+
+    #[test]
+    fn webcams_deliver_at_their_own_rates() {
+        let webcam =
+            |event: &Event| if let Event::Webcam(shot) = event { Some(shot.webcam) } else { None };
+        let numbers: Vec<usize> = events(OMNI, 2).iter().filter_map(webcam).collect();
+        let of = |number| numbers.iter().filter(|n| **n == number).count();
+        assert_eq!((of(0), of(1)), (3, 5));
     }
 
     #[test]

@@ -78,10 +78,6 @@ impl World {
 
     /// The first of some solids that a ray meets: for rays that have no eye in
     /// common, and the reference for those that have.
-    #[cfg_attr(
-        not(test),
-        allow(dead_code, reason = "for rays without a common eye, as of a mirror")
-    )]
     pub(crate) fn first<'a>(
         &'a self,
         solids: impl Iterator<Item = (usize, &'a Shape)>,

@@ -77,6 +77,7 @@ impl Draw {
                     self.odometry = self.odometry.split_off(&reading.at_ns.saturating_sub(KEPT_NS));
                 }
                 Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.captured_ns, *shot)),
+                Some(Event::Webcam(_)) => {}
                 None => break,
             }
         }

@@ -3,6 +3,8 @@
 //! Each fast kernel here has a slow, obvious twin in its tests.
 
 pub mod ground;
+mod panorama;
 mod row_sums;
 
+pub use panorama::{Blend, Unwrapper};
 pub use row_sums::{RowSums, Sums};

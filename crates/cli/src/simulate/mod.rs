@@ -96,7 +96,7 @@ fn default_log(scene: &Path) -> PathBuf {
 /// # Errors
 /// [`WriteError`] if the disk says no.
 pub fn record(mut simulation: Simulation, scene: &Scene, path: &Path) -> Result<u64, WriteError> {
-    let mut recorder = Recorder::create(path, scene, simulation.camera())?;
+    let mut recorder = Recorder::create(path, scene, &simulation)?;
     let bar = ProgressBar::new((scene.duration_s * 10.0) as u64);
     let mut images = 0;
     while let Some(event) = simulation.next_event() {

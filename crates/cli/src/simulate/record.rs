@@ -2,14 +2,17 @@ use std::path::Path;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use tagalong_core::{Camera, DepthImage, GreyImage, Lens, Rect, RgbImage, Stamp};
+use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
+use tagalong_core::{
+    Camera, ConicalMirror, DepthImage, GreyImage, Lens, Panorama, Rect, RgbImage, Stamp,
+};
 use tagalong_log::msgs::{
-    CameraInfo, CompressedImage, Header, Image, Odometry, StringMsg, TFMessage, TransformStamped,
+    CameraInfo, CompressedImage, Header, Image, Odometry, PoseStamped, StringMsg, TFMessage,
+    TransformStamped,
 };
 use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{TruthFrame, TruthPerson};
-use tagalong_sim::{Event, OdometryReading, Scene, Shot, Truth};
+use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot};
 
 /// The moment at which every drawn log starts.
 const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
@@ -18,24 +21,40 @@ const CAMERA_FRAME: &str = "camera_color_optical_frame";
 const JPEG_QUALITY: u8 = 85;
 /// Where the scene itself is kept.
 const SCENE_TOPIC: &str = "/simulation/scene";
+/// Where the robot really is in the room. Nothing under `/truth` is for trackers.
+const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
+/// Where the webcams really hang in the room: to find that out is the task of
+/// whoever measures with them.
+const TRUE_WEBCAMS_TOPIC: &str = "/truth/tf_static";
+/// The coordinates of the room.
+const WORLD_FRAME: &str = "world";
 
 /// Writes what the robot records, under the topics that robots use.
 pub struct Recorder {
     log: MessageLog,
     camera: Camera,
+    mirror: Option<ConicalMirror>,
+    webcams: Vec<Camera>,
 }
 
 impl Recorder {
-    /// Starts a log with the scene and the mount of the camera.
+    /// Starts a log with the scene and the mount of its cameras.
     ///
     /// # Errors
     /// [`WriteError`] if the disk says no.
-    pub fn create(path: &Path, scene: &Scene, camera: &Camera) -> Result<Self, WriteError> {
+    pub fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, WriteError> {
         let mut log = MessageLog::create(path)?;
         let text = toml::to_string(scene).unwrap_or_default();
         log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
-        log.send("/tf_static", EPOCH, &mount(camera))?;
-        Ok(Self { log, camera: camera.clone() })
+        let camera = simulation.camera().clone();
+        log.send("/tf_static", EPOCH, &mount("base_link", [(CAMERA_FRAME.into(), &camera)]))?;
+        let webcams: Vec<Camera> = simulation.webcams().cloned().collect();
+        if !webcams.is_empty() {
+            let named = webcams.iter().enumerate().map(|(i, camera)| (webcam_frame(i), camera));
+            log.send(TRUE_WEBCAMS_TOPIC, EPOCH, &mount(WORLD_FRAME, named))?;
+        }
+        let mirror = simulation.panorama().map(|panorama: &Panorama| panorama.mirror);
+        Ok(Self { log, camera, mirror, webcams })
     }
 
     /// Writes one thing.
@@ -48,6 +67,7 @@ impl Recorder {
                 self.log.send("/odom", after(reading.at_ns), &odometry(reading))
             }
             Event::Shot(shot) => self.shot(shot),
+            Event::Webcam(shot) => self.webcam(shot),
         }
     }
 
@@ -65,7 +85,7 @@ impl Recorder {
         let images = &shot.images;
         if let Some(colour) = &images.colour {
             self.info("color", recorded, &header, 0.0)?;
-            self.colour(recorded, &header, colour)?;
+            self.colour("/camera/color", recorded, &header, colour)?;
         }
         if let Some(depth) = &images.depth {
             self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
@@ -77,14 +97,32 @@ impl Recorder {
             self.info(side, recorded, &header, aside_m)?;
             self.grey(side, recorded, &header, image)?;
         }
+        self.log.send(TRUE_ROBOT_TOPIC, recorded, &true_robot(captured, &shot.world_from_robot))?;
         self.log.send_truth(recorded, &truth(captured, &shot.truth))
     }
 
-    fn colour(&mut self, at: Stamp, header: &Header, image: &RgbImage) -> Result<(), WriteError> {
+    fn webcam(&mut self, shot: &WebcamShot) -> Result<(), WriteError> {
+        let Some(camera) = self.webcams.get(shot.webcam) else { return Ok(()) };
+        let at = after(shot.captured_ns);
+        let header = Header::new(at, webcam_frame(shot.webcam));
+        let topic = format!("/webcam_{}", shot.webcam + 1);
+        if let Some(info) = info(camera, &header, 0.0) {
+            self.log.send(&format!("{topic}/camera_info"), at, &info)?;
+        }
+        self.colour(&topic, at, &header, &shot.image)
+    }
+
+    fn colour(
+        &mut self,
+        camera: &str,
+        at: Stamp,
+        header: &Header,
+        image: &RgbImage,
+    ) -> Result<(), WriteError> {
         let data = jpeg(image);
         let format = "rgb8; jpeg compressed bgr8".into();
         let message = CompressedImage { header: header.clone(), format, data: &data };
-        self.log.send("/camera/color/image_raw/compressed", at, &message)
+        self.log.send(&format!("{camera}/image_raw/compressed"), at, &message)
     }
 
     fn depth(&mut self, at: Stamp, header: &Header, depth: &DepthImage) -> Result<(), WriteError> {
@@ -119,21 +157,33 @@ impl Recorder {
         header: &Header,
         aside_m: f64,
     ) -> Result<(), WriteError> {
-        let Lens::Pinhole(lens) = self.camera.lens else { return Ok(()) };
-        let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
-        let info = CameraInfo {
-            header: header.clone(),
-            height: self.camera.height as u32,
-            width: self.camera.width as u32,
-            distortion_model: "plumb_bob".into(),
-            d: vec![0.0; 5],
-            k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            p: [fx, 0.0, cx, -fx * aside_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-            ..CameraInfo::default()
-        };
+        let Some(mut info) = info(&self.camera, header, aside_m) else { return Ok(()) };
+        if let Some(mirror) = &self.mirror {
+            info.distortion_model = ConicalMirror::MODEL.into();
+            info.d = mirror.coefficients().to_vec();
+        }
         self.log.send(&format!("/camera/{name}/camera_info"), at, &info)
     }
+}
+
+fn info(camera: &Camera, header: &Header, aside_m: f64) -> Option<CameraInfo> {
+    let Lens::Pinhole(lens) = camera.lens else { return None };
+    let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
+    Some(CameraInfo {
+        header: header.clone(),
+        height: camera.height as u32,
+        width: camera.width as u32,
+        distortion_model: "plumb_bob".into(),
+        d: vec![0.0; 5],
+        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [fx, 0.0, cx, -fx * aside_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        ..CameraInfo::default()
+    })
+}
+
+fn webcam_frame(index: usize) -> String {
+    format!("webcam_{}_optical_frame", index + 1)
 }
 
 fn after(start_ns: u64) -> Stamp {
@@ -159,26 +209,35 @@ fn millimetres(depth_m: f32) -> [u8; 2] {
     millimetres.to_le_bytes()
 }
 
-fn mount(camera: &Camera) -> TFMessage {
-    TFMessage {
-        transforms: vec![TransformStamped {
-            header: Header::new(EPOCH, "base_link"),
-            child_frame_id: CAMERA_FRAME.into(),
-            transform: (&camera.robot_from_camera).into(),
-        }],
-    }
+/// Static transforms to cameras from the frame that their poses are given in.
+fn mount<'a>(parent: &str, cameras: impl IntoIterator<Item = (String, &'a Camera)>) -> TFMessage {
+    let transform = |(child_frame_id, camera): (String, &Camera)| TransformStamped {
+        header: Header::new(EPOCH, parent),
+        child_frame_id,
+        transform: (&camera.robot_from_camera).into(),
+    };
+    TFMessage { transforms: cameras.into_iter().map(transform).collect() }
+}
+
+/// A pose on the floor.
+fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
+    let at = Translation3::new(planar.translation.x, planar.translation.y, 0.0);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
+    Isometry3::from_parts(at, turn)
+}
+
+fn true_robot(captured: Stamp, world_from_robot: &Isometry2<f64>) -> PoseStamped {
+    let pose = (&spatial(world_from_robot)).into();
+    PoseStamped { header: Header::new(captured, WORLD_FRAME), pose }
 }
 
 fn odometry(reading: &OdometryReading) -> Odometry {
-    let planar = reading.odom_from_robot;
-    let at = Translation3::new(planar.translation.x, planar.translation.y, 0.0);
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
     let mut odometry = Odometry {
         header: Header::new(after(reading.at_ns), "odom"),
         child_frame_id: "base_link".into(),
         ..Odometry::default()
     };
-    odometry.pose.pose = (&Isometry3::from_parts(at, turn)).into();
+    odometry.pose.pose = (&spatial(&reading.odom_from_robot)).into();
     odometry.twist.twist.linear.x = reading.speed_mps;
     odometry.twist.twist.angular.z = reading.turn_rate;
     odometry

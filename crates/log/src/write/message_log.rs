@@ -9,8 +9,8 @@ use serde::Serialize;
 use tagalong_core::Stamp;
 
 use super::WriteError;
-use crate::msgs::{Message, encode};
-use crate::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame};
+use crate::msgs::{Message, StringMsg, encode};
+use crate::{TRUTH_TOPIC, TruthFrame};
 
 /// Writes any ROS 2 messages to an MCAP file, as a robot's recorder would. The
 /// file has a partial name until [`MessageLog::finish`].
@@ -54,7 +54,7 @@ impl MessageLog {
     ) -> Result<(), WriteError> {
         let channel_id = match self.channels.get(topic) {
             Some(id) => *id,
-            None => self.open(topic, (M::TYPE, "ros2msg", M::DEFINITION), "cdr")?,
+            None => self.open::<M>(topic)?,
         };
         self.put(channel_id, captured, &encode(message))
     }
@@ -65,14 +65,8 @@ impl MessageLog {
     /// # Errors
     /// [`WriteError::Mcap`].
     pub fn send_truth(&mut self, recorded: Stamp, truth: &TruthFrame) -> Result<(), WriteError> {
-        let channel_id = match self.channels.get(TRUTH_TOPIC) {
-            Some(id) => *id,
-            None => {
-                let schema = TruthFrame::schema();
-                self.open(TRUTH_TOPIC, (TRUTH_SCHEMA, "jsonschema", &schema), "json")?
-            }
-        };
-        self.put(channel_id, recorded, &truth.encode())
+        let data = String::from_utf8(truth.encode()).unwrap_or_default();
+        self.send(TRUTH_TOPIC, recorded, &StringMsg { data })
     }
 
     fn put(&mut self, channel_id: u16, at: Stamp, data: &[u8]) -> Result<(), WriteError> {
@@ -82,16 +76,10 @@ impl MessageLog {
         written.map_err(failed(&self.partial))
     }
 
-    /// Opens a channel; a schema is its name, its encoding and its text.
-    fn open(
-        &mut self,
-        topic: &str,
-        (name, encoding, text): (&str, &str, &str),
-        messages: &str,
-    ) -> Result<u16, WriteError> {
-        let schema = self.writer.add_schema(name, encoding, text.as_bytes());
+    fn open<M: Message>(&mut self, topic: &str) -> Result<u16, WriteError> {
+        let schema = self.writer.add_schema(M::TYPE, "ros2msg", M::DEFINITION.as_bytes());
         let schema = schema.map_err(failed(&self.partial))?;
-        let channel = self.writer.add_channel(schema, topic, messages, &BTreeMap::new());
+        let channel = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
         let id = channel.map_err(failed(&self.partial))?;
         self.channels.insert(topic.to_owned(), id);
         Ok(id)

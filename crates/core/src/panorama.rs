@@ -1,0 +1,307 @@
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+
+use nalgebra::{Isometry3, Point2, Point3, Rotation3, UnitQuaternion, Vector3};
+
+use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+
+/// A camera that looks up into a conical mirror.
+///
+/// The **camera frame** is that of any camera, with z along the common axis:
+/// the pinhole is its origin, the image's top is -y. The robot mounts it
+/// [`upright`](Self::upright): z up, the image's top towards the front, the
+/// image's right towards the left, since it shows the ceiling from below.
+///
+/// The cone stands above the pinhole with its apex down. In the half plane of
+/// one bearing the mirror is a straight line, so all rays leave as if from the
+/// mirror image of the pinhole; over all bearings these images form a ring
+/// beyond the axis. There is no single viewpoint. A ray at the angle `phi` from
+/// the axis leaves at the elevation `phi + 90 deg - 2 * half_angle`.
+///
+/// In a `sensor_msgs/CameraInfo`, K holds the focal length and the centre,
+/// `distortion_model` is [`MODEL`](Self::MODEL), and D the
+/// [`coefficients`](Self::coefficients).
+///
+/// ```
+/// use tagalong_core::ConicalMirror;
+/// let mirror = ConicalMirror::from_coefficients(
+///     170.0, [239.5, 239.5], &[67.5_f64.to_radians(), 0.05, 8.0, 230.0],
+/// ).unwrap();
+/// // 20 degrees from the axis, the floor is seen 3.5 m away.
+/// let elevation = mirror.elevation(170.0 * 20f64.to_radians().tan());
+/// assert!((elevation.to_degrees() + 25.0).abs() < 1e-9);
+/// assert!((mirror.floor_range_m(elevation, 1.55).unwrap() - 3.47).abs() < 0.01);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConicalMirror {
+    /// Focal length of the camera, pixels.
+    pub focal_px: f64,
+    /// Where the axis of the mirror is seen, pixels.
+    pub centre_px: Point2<f64>,
+    /// Between the axis and the mirror's surface, rad; more than 45 degrees.
+    pub half_angle_rad: f64,
+    /// Height of the apex above the pinhole, m.
+    pub apex_m: f64,
+    /// Radius of the innermost circle that is of use, pixels.
+    pub inner_px: f64,
+    /// Radius of the outermost circle that is of use, pixels.
+    pub outer_px: f64,
+}
+
+impl ConicalMirror {
+    /// The `distortion_model` of the calibration message.
+    pub const MODEL: &str = "conical_mirror";
+
+    /// D of the calibration message: half angle (rad), height of the apex (m),
+    /// inner and outer radius (pixels).
+    pub fn coefficients(&self) -> [f64; 4] {
+        [self.half_angle_rad, self.apex_m, self.inner_px, self.outer_px]
+    }
+
+    /// The mirror of a calibration message; `None` where the numbers are those
+    /// of no mirror.
+    pub fn from_coefficients(focal_px: f64, centre_px: [f64; 2], d: &[f64]) -> Option<Self> {
+        let &[half_angle_rad, apex_m, inner_px, outer_px] = d else { return None };
+        let centre_px = Point2::from(centre_px);
+        let mirror = Self { focal_px, centre_px, half_angle_rad, apex_m, inner_px, outer_px };
+        mirror.is_sane().then_some(mirror)
+    }
+
+    /// True if all numbers are finite and light gets from the mirror into the
+    /// camera everywhere between the two circles.
+    pub fn is_sane(&self) -> bool {
+        self.centre_px.iter().all(|v| v.is_finite())
+            && self.focal_px.is_finite()
+            && self.focal_px > 0.0
+            && self.apex_m.is_finite()
+            && self.apex_m > 0.0
+            && self.half_angle_rad > FRAC_PI_4
+            && self.half_angle_rad < FRAC_PI_2
+            && self.inner_px >= 0.0
+            && self.outer_px > self.inner_px
+            && (self.outer_px / self.focal_px).atan() < self.half_angle_rad
+    }
+
+    /// The pose of a camera in the middle of the robot that looks up from
+    /// `height_m` above the floor, with the image's top to the front.
+    pub fn upright(height_m: f64) -> Isometry3<f64> {
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
+        let turn = UnitQuaternion::from_rotation_matrix(&turn);
+        Isometry3::from_parts(Vector3::new(0.0, 0.0, height_m).into(), turn)
+    }
+
+    /// Radius of the ring of viewpoints, and its height above the pinhole, m.
+    pub fn ring_m(&self) -> (f64, f64) {
+        let (sine, cosine) = self.half_angle_rad.sin_cos();
+        (2.0 * self.apex_m * sine * cosine, 2.0 * self.apex_m * sine * sine)
+    }
+
+    /// Elevation of what is seen on a circle about the centre, rad; above the
+    /// horizon is positive.
+    pub fn elevation(&self, radius_px: f64) -> f64 {
+        (radius_px / self.focal_px).atan() + FRAC_PI_2 - 2.0 * self.half_angle_rad
+    }
+
+    /// The circle on which an elevation is seen, pixels: the inverse of
+    /// [`elevation`](Self::elevation).
+    pub fn radius_px(&self, elevation_rad: f64) -> f64 {
+        self.focal_px * (elevation_rad - FRAC_PI_2 + 2.0 * self.half_angle_rad).tan()
+    }
+
+    /// Bearing (left of the image's top is positive) and elevation of a point in
+    /// the camera frame, rad. All else follows from these two.
+    pub fn direction(&self, point_in_camera: &Point3<f64>) -> (f64, f64) {
+        let (ring, height) = self.ring_m();
+        let p = point_in_camera;
+        let bearing = p.x.atan2(-p.y);
+        (bearing, (p.z - height).atan2(p.xy().coords.norm() + ring))
+    }
+
+    /// The pixel of the raw image that shows a direction.
+    pub fn raw_pixel(&self, bearing_rad: f64, elevation_rad: f64) -> Point2<f64> {
+        let (sine, cosine) = bearing_rad.sin_cos();
+        let radius = self.radius_px(elevation_rad);
+        Point2::new(self.centre_px.x + radius * sine, self.centre_px.y - radius * cosine)
+    }
+
+    /// The viewpoint on the ring and the unit vector of a direction, in the
+    /// camera frame.
+    pub fn ray(&self, bearing_rad: f64, elevation_rad: f64) -> (Point3<f64>, Vector3<f64>) {
+        let (ring, height) = self.ring_m();
+        let outward = Vector3::new(bearing_rad.sin(), -bearing_rad.cos(), 0.0);
+        let (up, along) = elevation_rad.sin_cos();
+        let from = Point3::from(-ring * outward + Vector3::new(0.0, 0.0, height));
+        (from, along * outward + Vector3::new(0.0, 0.0, up))
+    }
+
+    /// How far from the axis the floor is seen at an elevation by a camera
+    /// `camera_height_m` above it; `None` at and above the horizon.
+    pub fn floor_range_m(&self, elevation_rad: f64, camera_height_m: f64) -> Option<f64> {
+        let (ring, height) = self.ring_m();
+        (elevation_rad < 0.0).then(|| (camera_height_m + height) / (-elevation_rad).tan() - ring)
+    }
+}
+
+/// The unwrapped image of a [`ConicalMirror`]: a column per bearing, a row per
+/// elevation, both evenly spaced.
+///
+/// The middle is the front, what is left of the robot is left of it, and the
+/// seam is behind. Pixel (0, 0) is the **centre** of the upper left pixel.
+///
+/// **Across the seam.** Columns are counted modulo [`columns`](Self::columns). A
+/// region starts at a column from 0 up to that and keeps its width: across the
+/// seam it continues beyond the right edge, and is never cut there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Panorama {
+    /// The mirror.
+    pub mirror: ConicalMirror,
+    /// Columns, once around.
+    pub columns: usize,
+    /// Rows, from the outer circle at the top to the inner one.
+    pub rows: usize,
+}
+
+impl Panorama {
+    /// Highest and lowest elevation at the edges of the image, rad.
+    pub fn elevations(&self) -> [f64; 2] {
+        [self.mirror.outer_px, self.mirror.inner_px].map(|radius| self.mirror.elevation(radius))
+    }
+
+    /// Bearing of a column, rad, left of the front is positive.
+    pub fn bearing(&self, column: f64) -> f64 {
+        PI - TAU * (column + 0.5) / self.columns as f64
+    }
+
+    /// Column of a bearing, from -0.5 up to `columns - 0.5`.
+    pub fn column(&self, bearing_rad: f64) -> f64 {
+        let turns = ((PI - bearing_rad) / TAU).rem_euclid(1.0);
+        turns * self.columns as f64 - 0.5
+    }
+
+    /// Elevation of a row, rad.
+    pub fn elevation(&self, row: f64) -> f64 {
+        let [top, bottom] = self.elevations();
+        top + (bottom - top) * (row + 0.5) / self.rows as f64
+    }
+
+    /// Row of an elevation; it may lie outside the image.
+    pub fn row(&self, elevation_rad: f64) -> f64 {
+        let [top, bottom] = self.elevations();
+        (elevation_rad - top) / (bottom - top) * self.rows as f64 - 0.5
+    }
+
+    /// The pixel that shows a point of the camera frame.
+    pub fn pixel(&self, point_in_camera: &Point3<f64>) -> Point2<f64> {
+        let (bearing, elevation) = self.mirror.direction(point_in_camera);
+        Point2::new(self.column(bearing), self.row(elevation))
+    }
+
+    /// Where a pixel of the unwrapped image lies in the raw one.
+    pub fn raw_pixel(&self, column: f64, row: f64) -> Point2<f64> {
+        self.mirror.raw_pixel(self.bearing(column), self.elevation(row))
+    }
+
+    /// The upper body of a person whose head centre is at `head` in the camera
+    /// frame, as [`Camera::upper_body`](crate::Camera::upper_body) has it for
+    /// other cameras: [`UPPER_BODY_SIDE_M`] wide and high at the distance of the
+    /// face. Not cut at the seam, nor at the upper and lower edge; empty where
+    /// the head touches the axis.
+    pub fn upper_body(&self, head: &Point3<f64>) -> Rect {
+        let range = head.xy().coords.norm() - HEAD_RADIUS_M;
+        if range <= 0.05 {
+            return Rect::default();
+        }
+        let (bearing, _) = self.mirror.direction(head);
+        let (ring, height) = self.mirror.ring_m();
+        let row = |z: f64| self.row((z - height).atan2(range + ring));
+        let (top, bottom) =
+            (head.z + HEAD_BELOW_TOP_M, head.z + HEAD_BELOW_TOP_M - UPPER_BODY_SIDE_M);
+        let half_angle = (0.5 * UPPER_BODY_SIDE_M / range).atan();
+        let width = 2.0 * half_angle / TAU * self.columns as f64;
+        let left = (self.column(bearing) - 0.5 * width).rem_euclid(self.columns as f64);
+        Rect::new(left, row(top), width, row(bottom) - row(top))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn mirror(half_angle_deg: f64) -> ConicalMirror {
+        let d = [half_angle_deg.to_radians(), 0.05, 8.0, 230.0];
+        ConicalMirror::from_coefficients(175.0, [241.3, 238.0], &d).unwrap()
+    }
+
+    fn panorama() -> Panorama {
+        Panorama { mirror: mirror(67.5), columns: 480, rows: 120 }
+    }
+
+    #[test]
+    fn the_floor_is_seen_as_far_away_as_the_geometry_says() {
+        // phi in degrees, range in metres: half angle 67.5 degrees, 1.55 m high.
+        for (phi, range) in [(2.0_f64, 1.7), (20.0, 3.5), (35.0, 9.2)] {
+            let mirror = mirror(67.5);
+            let elevation = mirror.elevation(175.0 * phi.to_radians().tan());
+            let seen = mirror.floor_range_m(elevation, 1.55).unwrap();
+            assert!((seen - range).abs() < 0.05, "{phi}: {seen}");
+        }
+        assert_eq!(mirror(67.5).floor_range_m(0.0, 1.55), None);
+    }
+
+    #[test]
+    fn front_is_the_middle_left_is_left_and_the_seam_is_behind() {
+        let (panorama, mount) = (panorama(), ConicalMirror::upright(1.5).inverse());
+        let column = |x: f64, y: f64| panorama.pixel(&(mount * Point3::new(x, y, 1.0))).x;
+        assert!((column(2.0, 0.0) - 239.5).abs() < 1e-9);
+        assert!((column(0.0, 2.0) - 119.5).abs() < 1e-9);
+        assert!(column(-2.0, 0.01) < 1.0 && column(-2.0, -0.01) > 478.0);
+        let raw = |x: f64, y: f64| {
+            let (bearing, elevation) = panorama.mirror.direction(&(mount * Point3::new(x, y, 1.0)));
+            panorama.mirror.raw_pixel(bearing, elevation) - panorama.mirror.centre_px
+        };
+        assert!(raw(2.0, 0.0).y < -20.0 && raw(0.0, 2.0).x > 20.0);
+    }
+
+    #[test]
+    fn a_region_across_the_seam_keeps_its_width() {
+        let head = ConicalMirror::upright(1.5).inverse() * Point3::new(-2.0, 0.05, 1.6);
+        let region = panorama().upper_body(&head);
+        assert!(region.x > 440.0 && region.right() > 480.0 && region.width < 40.0, "{region:?}");
+        assert!(region.y > -10.0 && region.bottom() < 60.0, "{region:?}");
+        assert_eq!(panorama().upper_body(&Point3::new(0.05, 0.0, 0.1)), Rect::default());
+    }
+
+    #[test]
+    fn what_is_no_mirror_is_refused() {
+        for d in [[0.5, 0.05, 8.0, 230.0], [1.2, 0.05, 230.0, 8.0], [1.2, f64::NAN, 8.0, 230.0]] {
+            assert_eq!(ConicalMirror::from_coefficients(175.0, [0.0, 0.0], &d), None, "{d:?}");
+        }
+        assert_eq!(
+            ConicalMirror::from_coefficients(0.0, [0.0, 0.0], &[1.2, 0.05, 8.0, 230.0]),
+            None
+        );
+        assert_eq!(ConicalMirror::from_coefficients(175.0, [0.0, 0.0], &[]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_point_lies_on_the_ray_of_its_direction(
+            x in -6.0..6.0f64, y in -6.0..6.0f64, z in -1.6..0.6f64, half in 50.0..80.0f64,
+        ) {
+            let point = Point3::new(x, y, z);
+            let mirror = mirror(half.max(54.0));
+            let (bearing, elevation) = mirror.direction(&point);
+            let (from, along) = mirror.ray(bearing, elevation);
+            prop_assert!((point - from).cross(&along).norm() < 1e-9);
+            prop_assert!((point - from).dot(&along) > 0.0);
+        }
+
+        #[test]
+        fn columns_and_rows_are_inverted(column in -0.5..479.4f64, row in -5.0..125.0f64) {
+            let panorama = panorama();
+            prop_assert!((panorama.column(panorama.bearing(column)) - column).abs() < 1e-9);
+            prop_assert!((panorama.row(panorama.elevation(row)) - row).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Cameras that hang in the room and do not move: an external measurement
+//! system, as a laboratory builds it from webcams.
+
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Camera, Distortion, Pinhole, RgbImage};
+
+use crate::render::draw;
+use crate::sensor::{Exposure, Moment};
+use crate::world::World;
+
+/// A camera at a fixed place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct WebcamSettings {
+    /// Where it hangs, m.
+    pub at: [f64; 2],
+    /// How high, m.
+    pub height_m: f64,
+    /// Where it looks, degrees.
+    pub heading_deg: f64,
+    /// Looks this far down, degrees.
+    pub pitch_down_deg: f64,
+    /// Horizontal field of view, degrees.
+    pub field_of_view_deg: f64,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Images per second.
+    pub rate_hz: f64,
+}
+
+impl Default for WebcamSettings {
+    fn default() -> Self {
+        Self {
+            at: [0.1, 0.1],
+            height_m: 2.2,
+            heading_deg: 45.0,
+            pitch_down_deg: 15.0,
+            field_of_view_deg: 80.0,
+            width: 320,
+            height: 240,
+            rate_hz: 3.0,
+        }
+    }
+}
+
+impl WebcamSettings {
+    /// What cannot be.
+    pub(crate) fn rules(&self) -> [(bool, &'static str); 3] {
+        [
+            (
+                (8..=4096).contains(&self.width) && (8..=4096).contains(&self.height),
+                "webcams: width and height must be in 8 to 4096",
+            ),
+            (
+                (10.0..=150.0).contains(&self.field_of_view_deg),
+                "webcams: field_of_view_deg must be in 10 to 150",
+            ),
+            ((0.1..=100.0).contains(&self.rate_hz), "webcams: rate_hz must be in 0.1 to 100"),
+        ]
+    }
+
+    /// The camera; its `robot_from_camera` is its pose in the **world**.
+    pub fn camera(&self) -> Camera {
+        let f = 0.5 * self.width as f64 / (0.5 * self.field_of_view_deg.to_radians()).tan();
+        let lens = Pinhole {
+            fx: f,
+            fy: f,
+            cx: 0.5 * (self.width as f64 - 1.0),
+            cy: 0.5 * (self.height as f64 - 1.0),
+            distortion: Distortion::None,
+        };
+        let down = self.pitch_down_deg.to_radians();
+        let camera = Camera::mounted(lens, self.width, self.height, self.height_m, down, 0.0);
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), self.heading_deg.to_radians());
+        let place = Isometry3::from_parts(
+            Translation3::new(self.at[0], self.at[1], 0.0),
+            UnitQuaternion::from_rotation_matrix(&turn),
+        );
+        Camera { robot_from_camera: place * camera.robot_from_camera, ..camera }
+    }
+}
+
+/// A camera at a fixed place, at work.
+#[derive(Clone, Debug)]
+pub(crate) struct Webcam {
+    camera: Camera,
+    rate_hz: f64,
+    exposure: Exposure,
+    shots: u64,
+    threads: usize,
+}
+
+impl Webcam {
+    /// `threads` draw its images.
+    pub(crate) fn new(settings: &WebcamSettings, threads: usize) -> Self {
+        let exposure = Exposure::new(threads);
+        Self { camera: settings.camera(), rate_hz: settings.rate_hz, exposure, shots: 0, threads }
+    }
+
+    pub(crate) fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// True once for each image.
+    pub(crate) fn due(&mut self, now_ns: u64) -> bool {
+        let due = now_ns >= (self.shots as f64 * 1e9 / self.rate_hz) as u64;
+        self.shots += u64::from(due);
+        due
+    }
+
+    /// An image; `seed` is the noise of the webcam.
+    pub(crate) fn shoot(&mut self, world: &World, seed: u64) -> RgbImage {
+        let seen = draw(world, &self.camera, &Isometry3::identity(), self.threads);
+        let seed = seed ^ (self.shots << 2);
+        self.exposure.colour(&seen, &Moment { seed, smear_px: 0.0, gain: 1.0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    #[test]
+    fn a_webcam_looks_where_it_is_told() {
+        let settings =
+            WebcamSettings { at: [1.0, 2.0], heading_deg: 90.0, ..WebcamSettings::default() };
+        let camera = settings.camera();
+        let down = 3.0 * settings.pitch_down_deg.to_radians().tan();
+        let pixel = camera.project(&Point3::new(1.0, 5.0, settings.height_m - down)).unwrap();
+        assert!((pixel.x - 159.5).abs() < 1e-6 && (pixel.y - 119.5).abs() < 1e-6, "{pixel}");
+        let left = camera.project(&Point3::new(0.5, 5.0, 1.4)).unwrap();
+        assert!(left.x < 150.0, "what is in negative X is on the left of one that looks along Y");
+    }
+
+    #[test]
+    fn images_come_at_the_rate() {
+        let mut webcam = Webcam::new(&WebcamSettings::default(), 1);
+        let due = (0..100).filter(|step| webcam.due(step * 20_000_000)).count();
+        assert_eq!(due, 6);
+    }
+}
