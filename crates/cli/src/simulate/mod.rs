@@ -11,7 +11,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 pub use record::Recorder;
 use tagalong_log::write::WriteError;
-use tagalong_sim::{Event, Scene, Simulation};
+use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
 use crate::outcome::{Ended, Failure, Outcome, say};
 
@@ -23,9 +23,15 @@ pub struct SimulateArgs {
     /// The log to write [default: runs/<scene>.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
-    /// Use this seed instead of the scene's.
+    /// Use this seed instead of the scene's: counted within --split if given.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Take seed, people and rooms from train, validation or test.
+    #[arg(long, value_name = "SPLIT")]
+    pub split: Option<Split>,
+    /// Set a value of the scene, like camera.kind=stereo or people.0.speed_mps=0.8.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub set: Vec<(String, String)>,
     /// Draw pictures with the truth into this folder instead of writing a log.
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub gallery: Option<PathBuf>,
@@ -40,7 +46,8 @@ pub struct SimulateArgs {
 /// A scene that cannot be read or is wrong is exit code 2; files that cannot be
 /// written are 1.
 pub fn simulate(args: &SimulateArgs) -> Outcome {
-    let scene = read(&args.scene, args.seed)?;
+    let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
+    let scene = read(&args.scene, &variant)?;
     let simulation = Simulation::new(&scene, threads(args.threads));
     match &args.gallery {
         Some(folder) => gallery::paint(simulation, &scene, folder)?,
@@ -53,14 +60,17 @@ pub fn simulate(args: &SimulateArgs) -> Outcome {
     Ok(Ended::Well)
 }
 
-fn read(path: &Path, seed: Option<u64>) -> Result<Scene, Failure> {
+fn key_and_value(argument: &str) -> Result<(String, String), String> {
+    let (key, value) = argument.split_once('=').ok_or("write KEY=VALUE, like crowd=5")?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
+fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
     let shown = path.display();
     let text = fs::read_to_string(path)
         .map_err(|error| Failure::usage(format!("cannot read scene {shown}: {error}")))?;
-    let mut scene = Scene::parse(&text)
-        .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))?;
-    scene.seed = seed.unwrap_or(scene.seed);
-    Ok(scene)
+    Scene::parse_with(&text, variant)
+        .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))
 }
 
 /// As many threads as asked for, else as many as there are.
