@@ -3,9 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::ConfigError;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use crate::mirror::MirrorSettings;
 use crate::person::Extra;
+use crate::split::{SUBJECTS, Split};
+use crate::variation::{Variant, one_scene};
 use crate::webcam::WebcamSettings;
 
 /// A scene. Lengths are in metres; the room's corner is the origin, X runs
@@ -15,7 +19,8 @@ use crate::webcam::WebcamSettings;
 pub struct Scene {
     /// What the scene is for.
     pub about: String,
-    /// Where all chance comes from.
+    /// Where all chance comes from; it also says for what the log may be used,
+    /// see [`Split`].
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
@@ -64,14 +69,52 @@ impl Scene {
     /// # Errors
     /// An unknown key, a wrong type or an impossible value, with its place.
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
-        let scene: Self = toml::from_str(text)?;
+        Self::parse_with(text, &Variant::default())
+    }
+
+    /// Reads one of the scenes that a text with a table `[vary]` describes. That
+    /// table has dotted keys and says for each where its value comes from:
+    ///
+    /// ```toml
+    /// [vary]
+    /// light.lux = { between = [50.0, 1000.0] }             # of whole numbers: both ends included
+    /// room.floor = { one_of = ["planks", "tiles", "carpet"] }
+    /// people.0.speed_mps = { in_turn = [0.6, 0.8, 1.0] }   # the seed's number counts
+    /// people.1.look = { same_as = "people.0.look" }
+    /// room.size_m.0 = { between = [7.0, 12.0], apart = true } # no value in two splits
+    /// ```
+    ///
+    /// Same text, same variant, same scene; each key has a chance of its own.
+    ///
+    /// # Errors
+    /// An unknown key, a wrong type or an impossible value, with its place.
+    pub fn parse_with(text: &str, variant: &Variant) -> Result<Self, ConfigError> {
+        let scene = one_scene(text, variant, |mut table, seed| {
+            complete_camera(&mut table);
+            let value = Spanned::new(0..0, DeValue::Table(table));
+            let scene = Self::deserialize(ValueDeserializer::from(value))?;
+            Ok(Self { seed, ..scene })
+        })?;
         scene.check()?;
         Ok(scene)
+    }
+
+    /// How many people there are, companions and crowd included.
+    pub fn number_of_people(&self) -> usize {
+        let with_companions = self.people.iter().map(|p| 1 + p.companions);
+        with_companions.fold(self.crowd, usize::saturating_add)
+    }
+
+    /// What the log may be used for.
+    pub fn split(&self) -> Split {
+        Split::of(self.seed)
     }
 
     fn check(&self) -> Result<(), ConfigError> {
         let camera = &self.camera;
         let rules = [
+            (self.seed < Split::SEEDS_END, "seed must be below 3000000000"),
+            (self.room.clutter <= 500, "room.clutter must be at most 500"),
             (self.duration_s > 0.0 && self.duration_s <= 3600.0, "duration_s must be in 0 to 3600"),
             (
                 self.room.size_m.iter().all(|m| (1.0..=200.0).contains(m)),
@@ -95,10 +138,15 @@ impl Scene {
                 camera.colour || camera.kind == CameraKind::Rgbd,
                 "camera.colour = false needs camera.kind = \"rgbd\": it has depth besides",
             ),
-            (self.people.len() + self.crowd <= 200, "there must be at most 200 people"),
+            (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
+            (self.number_of_people() <= 200, "there must be at most 200 people"),
             (
                 self.people.iter().all(|p| !p.path.is_empty()),
                 "every person needs a path of one point at least",
+            ),
+            (
+                self.people.iter().all(|p| p.subject.max(p.look) < Some(SUBJECTS)),
+                "subject and look must be below 500",
             ),
             (
                 self.people.iter().all(|p| (0.0..=2.0).contains(&p.speed_mps)),
@@ -110,6 +158,23 @@ impl Scene {
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
             None => Ok(()),
+        }
+    }
+}
+
+/// What a stereo pair has where a scene does not say otherwise.
+const STEREO: [(&str, &str); 4] =
+    [("width", "512"), ("height", "384"), ("field_of_view_deg", "100.0"), ("baseline_m", "0.12")];
+
+/// Gives a camera that only names its kind what that kind ordinarily has.
+fn complete_camera(root: &mut DeTable<'_>) {
+    let Some(DeValue::Table(camera)) = root.get_mut("camera").map(Spanned::get_mut) else { return };
+    if camera.get("kind").and_then(|kind| kind.get_ref().as_str()) != Some("stereo") {
+        return;
+    }
+    for (key, value) in STEREO {
+        if let (false, Ok(value)) = (camera.contains_key(key), DeValue::parse(value)) {
+            camera.insert(Spanned::new(0..0, key.into()), value);
         }
     }
 }
@@ -126,8 +191,11 @@ pub struct RoomSettings {
     pub wallpaper: bool,
     /// The floor.
     pub floor: Floor,
-    /// Pieces of furniture of any kind at random places along the walls.
+    /// Pieces of furniture of any kind at random places along the walls, off
+    /// everybody's way.
     pub clutter: usize,
+    /// The door at the far end stands open to a dark room.
+    pub open_door: bool,
 }
 
 impl Default for RoomSettings {
@@ -138,6 +206,7 @@ impl Default for RoomSettings {
             wallpaper: false,
             floor: Floor::Planks,
             clutter: 0,
+            open_door: false,
         }
     }
 }
@@ -185,7 +254,9 @@ pub enum CameraKind {
     Panorama,
 }
 
-/// The camera on the robot.
+/// The camera on the robot. Where a scene leaves them out, width, height, field
+/// of view and baseline are those of the kind: 640x480, 58 degrees and 0.075 m
+/// of `rgbd`; 512x384, 100 degrees and 0.12 m of `stereo`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSettings {
@@ -335,6 +406,14 @@ pub enum FurnitureKind {
     Desk,
     /// A shelf with books.
     Shelf,
+    /// A chair.
+    Chair,
+    /// A round bin on a small table.
+    BinOnTable,
+    /// A wall of 2.4 m across its heading with an open doorway in its middle.
+    Doorway,
+    /// A screen of 1.6 m x 1.7 m across its heading.
+    Partition,
 }
 
 /// What somebody does when the robot cannot see them for the first time.
@@ -346,7 +425,7 @@ pub enum Trick {
     None,
     /// Turns round and goes back.
     TurnBack,
-    /// Stays behind whoever hides them for three seconds.
+    /// Stays behind whoever hides them for `hide_s`.
     Stop,
     /// Takes over the way of whoever hides them, who takes over theirs.
     Swap,
@@ -365,6 +444,21 @@ pub enum AtEnd {
     Loop,
 }
 
+/// How somebody holds their body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Posture {
+    /// Stands and walks.
+    #[default]
+    Upright,
+    /// Looks down at a phone while standing and walking.
+    Phone,
+    /// Sits on a chair all the time, at the first point of the path.
+    Seated,
+    /// Bends down now and then while standing.
+    Bending,
+}
+
 /// A person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -379,13 +473,24 @@ pub struct PersonSettings {
     pub at_end: AtEnd,
     /// What they do when hidden.
     pub trick: Trick,
+    /// For how long the trick `stop` stays hidden, s.
+    pub hide_s: f64,
+    /// The whole path is shifted by this, m.
+    pub offset: [f64; 2],
+    /// How they hold their body.
+    pub posture: Posture,
+    /// Others who walk along, 0.6 to 1 m apart; they count as people of their own.
+    pub companions: usize,
     /// Direction of the face at the start, degrees; the way ahead if left out.
     pub heading_deg: Option<f64>,
     /// Turns on the spot, degrees per second.
     pub spin_deg_per_s: f64,
     /// Body height, m; by chance if left out.
     pub height_m: Option<f64>,
-    /// People with the same number look alike; by chance if left out.
+    /// Number in the pool of people that the seed's split has, 0 to 499; by
+    /// chance if left out.
+    pub subject: Option<u64>,
+    /// In the clothes of this number of the pool; in their own if left out.
     pub look: Option<u64>,
     /// Things put on or carried; by chance if left out.
     pub extras: Option<Vec<Extra>>,
@@ -399,9 +504,14 @@ impl Default for PersonSettings {
             start_s: 0.0,
             at_end: AtEnd::Stop,
             trick: Trick::None,
+            hide_s: 3.0,
+            offset: [0.0; 2],
+            posture: Posture::Upright,
+            companions: 0,
             heading_deg: None,
             spin_deg_per_s: 0.0,
             height_m: None,
+            subject: None,
             look: None,
             extras: None,
         }

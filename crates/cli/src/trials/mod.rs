@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::Registry;
-use tagalong_sim::Scene;
+use tagalong_sim::{Scene, Split, Variant};
 use tagalong_trials::Contender;
 
 use crate::args::Format;
@@ -17,7 +17,14 @@ use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::simulate;
 
 /// Scenes on which nobody should be perfect.
-const HARD: [&str; 5] = ["crossing", "crossing-oblique", "full-occlusion", "following", "crowd"];
+const HARD: [&str; 6] = [
+    "crossing-parallel",
+    "crossing-oblique",
+    "crossing-three",
+    "full-occlusion",
+    "following",
+    "crowd",
+];
 
 /// Pipelines that are compared where none are named.
 const PIPELINES: [&str; 3] = ["depth-ekf", "depth-ekf-as-printed", "naive"];
@@ -31,7 +38,13 @@ pub struct TrialsArgs {
     /// depth-ekf, depth-ekf-as-printed, naive].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
-    /// Draws each scene with this many seeds, counted from its own.
+    /// The split that the seeds belong to; settings are chosen on `validation`.
+    #[arg(long, value_name = "SPLIT", default_value = "test")]
+    pub split: Split,
+    /// Replaces a value in each scene: a dotted key, like `crowd=5`.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = simulate::key_and_value)]
+    pub set: Vec<(String, String)>,
+    /// Draws each scene with this many seeds of the split.
     #[arg(long, value_name = "N", default_value_t = 10,
           value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: u64,
@@ -52,7 +65,7 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let contenders = contenders(&args.configs, registry)?;
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
     let suites =
-        scenes.iter().map(|path| suite(path, args.seeds)).collect::<Result<Vec<_>, _>>()?;
+        scenes.iter().map(|path| suite(path, args)).collect::<Result<Vec<_>, _>>()?;
     let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
     let mut table = table::Table::default();
     for (name, scenes) in &suites {
@@ -92,10 +105,15 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
 }
 
 /// A scene with as many seeds as wanted.
-fn suite(path: &Path, seeds: u64) -> Result<(String, Vec<Scene>), Failure> {
-    let scene = simulate::read(path, None)?;
+fn suite(path: &Path, args: &TrialsArgs) -> Result<(String, Vec<Scene>), Failure> {
+    let variant = |seed| Variant {
+        seed: Some(seed),
+        split: Some(args.split),
+        set: args.set.clone(),
+    };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok((name, with_seeds(&scene, seeds)))
+    let scenes = (0..args.seeds).map(|seed| simulate::read(path, &variant(seed)));
+    Ok((name, scenes.collect::<Result<_, _>>()?))
 }
 
 /// The same scene with other luck.
