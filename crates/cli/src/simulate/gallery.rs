@@ -24,7 +24,7 @@ pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result
     fs::create_dir_all(folder)
         .map_err(|error| Failure::failed(format!("cannot make {}: {error}", folder.display())))?;
     let mut unwrapping = Unwrapping::of(&simulation)?;
-    let mut webcams = vec![Arc::new(RgbImage::default()); simulation.webcams().count()];
+    let mut webcams: Vec<Arc<RgbImage>> = simulation.webcams().map(|_| Arc::default()).collect();
     let every_ns = (scene.duration_s * 1e9) as u64 / PICTURES;
     let mut drawn = 0;
     while let Some(event) = simulation.next_event() {

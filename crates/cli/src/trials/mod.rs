@@ -64,8 +64,7 @@ pub struct TrialsArgs {
 pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let contenders = contenders(&args.configs, registry)?;
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
-    let suites =
-        scenes.iter().map(|path| suite(path, args)).collect::<Result<Vec<_>, _>>()?;
+    let suites = scenes.iter().map(|path| suite(path, args)).collect::<Result<Vec<_>, _>>()?;
     let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
     let mut table = table::Table::default();
     for (name, scenes) in &suites {
@@ -106,11 +105,8 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
 
 /// A scene with as many seeds as wanted.
 fn suite(path: &Path, args: &TrialsArgs) -> Result<(String, Vec<Scene>), Failure> {
-    let variant = |seed| Variant {
-        seed: Some(seed),
-        split: Some(args.split),
-        set: args.set.clone(),
-    };
+    let variant =
+        |seed| Variant { seed: Some(seed), split: Some(args.split), set: args.set.clone() };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let scenes = (0..args.seeds).map(|seed| simulate::read(path, &variant(seed)));
     Ok((name, scenes.collect::<Result<_, _>>()?))
