@@ -66,18 +66,25 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
     let suites = scenes.iter().map(|path| suite(path, args)).collect::<Result<Vec<_>, _>>()?;
     let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
-    let mut table = table::Table::default();
+    let names = suites.iter().map(|(name, _)| name);
+    let mut table = table::Table::new(names, contenders.iter().map(|c| &c.name));
+    let tell = |text: String| match args.format {
+        Format::Text => bar.suspend(|| print(&text)),
+        Format::Json => Ok(()),
+    };
+    tell(table.header())?;
     for (name, scenes) in &suites {
         bar.set_message(name.clone());
         let jobs = simulate::threads(args.jobs);
         let results = contest::run(scenes, &contenders, registry, jobs, || bar.inc(1))
             .map_err(Failure::failed)?;
         table.add(name, &contenders, &results);
+        tell(table.last_rows())?;
     }
     bar.finish_and_clear();
-    match args.format {
-        Format::Text => print(&table.text())?,
-        Format::Json => print(&table.json())?,
+    tell(table.summary())?;
+    if args.format == Format::Json {
+        print(&table.json())?;
     }
     Ok(Ended::Well)
 }

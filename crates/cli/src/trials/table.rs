@@ -18,6 +18,9 @@ pub struct Table {
     pub rows: Vec<Row>,
     /// Each contender against the baseline, the last one.
     pub gains: Vec<GainRow>,
+    /// Columns of the names of suites and contenders.
+    #[serde(skip)]
+    widths: [usize; 2],
 }
 
 /// One contender on one suite; intervals have 95 % confidence.
@@ -56,6 +59,17 @@ pub struct GainRow {
 }
 
 impl Table {
+    /// An empty table for these names.
+    pub fn new<'a>(
+        suites: impl Iterator<Item = &'a String>,
+        contenders: impl Iterator<Item = &'a String>,
+    ) -> Self {
+        let widest = |lengths: Option<usize>| lengths.unwrap_or(0).max(8);
+        let widths =
+            [widest(suites.map(String::len).max()), widest(contenders.map(String::len).max())];
+        Self { widths, ..Self::default() }
+    }
+
     /// Adds a suite: for each draw one result a contender.
     pub fn add(&mut self, suite: &str, contenders: &[Contender], results: &[Vec<Result>]) {
         let column = |at: usize| results.iter().map(|draw| &draw[at]).collect::<Vec<_>>();
@@ -82,32 +96,40 @@ impl Table {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 
-    /// For people.
-    pub fn text(&self) -> String {
-        let width = |name: fn(&Row) -> &str| {
-            self.rows.iter().map(|row| name(row).len()).max().unwrap_or(0).max(8)
-        };
-        let (first, second) = (width(|row| &row.suite), width(|row| &row.pipeline));
-        let mut out = format!(
+    /// The names of the columns, for people.
+    pub fn header(&self) -> String {
+        let [first, second] = self.widths;
+        format!(
             "{:<first$}  {:<second$}  {:>5}  {:^21}  {:^21}  {:>7}  {:^21}  {:>4}\n",
             "suite", "pipeline", "draws", "MOTA", "IDF1", "error m", "all frames right", "IDSW"
-        );
-        for row in &self.rows {
-            let error = row.error.map_or("-".to_owned(), |error| format!("{:.3}", error.mean_m));
-            let _ = writeln!(
-                out,
-                "{:<first$}  {:<second$}  {:>5}  {}  {}  {:>7}  {}  {:>4}",
-                row.suite,
-                row.pipeline,
-                row.draws,
-                interval(row.mota),
-                interval(row.idf1),
-                error,
-                interval(row.success),
-                row.switches
-            );
-        }
-        let _ = writeln!(out, "\nintervals: 95 %, over draws; {}", self.perfection());
+        )
+    }
+
+    /// The rows of the suite that was added last.
+    pub fn last_rows(&self) -> String {
+        let Some(suite) = self.rows.last().map(|row| &row.suite) else { return String::new() };
+        self.rows.iter().filter(|row| row.suite == *suite).map(|row| self.line(row)).collect()
+    }
+
+    fn line(&self, row: &Row) -> String {
+        let [first, second] = self.widths;
+        let error = row.error.map_or("-".to_owned(), |error| format!("{:.3}", error.mean_m));
+        format!(
+            "{:<first$}  {:<second$}  {:>5}  {}  {}  {:>7}  {}  {:>4}\n",
+            row.suite,
+            row.pipeline,
+            row.draws,
+            interval(row.mota),
+            interval(row.idf1),
+            error,
+            interval(row.success),
+            row.switches
+        )
+    }
+
+    /// What follows from the rows.
+    pub fn summary(&self) -> String {
+        let mut out = format!("\nintervals: 95 %, over draws; {}\n", self.perfection());
         for gain in &self.gains {
             let Interval { estimate, lower, upper } = gain.idf1.difference;
             let _ = writeln!(
