@@ -1,0 +1,103 @@
+//! The loop is closed: images are drawn from where the controller has driven
+//! the robot to.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Isometry2;
+use tagalong_core::{Camera, Frame, Motion, Registry, Stamp};
+use tagalong_pipeline::Pipeline;
+use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+
+/// A person walks ahead and around a bend at 0.7 m/s. Small images are enough
+/// for somebody so near, and quickly drawn.
+const SCENE: &str = "
+seed = 3
+duration_s = 11.0
+
+[room]
+size_m = [12.0, 8.0]
+
+[camera]
+width = 160
+height = 120
+rate_hz = 10.0
+
+[robot]
+start = [0.8, 2.0]
+
+[[people]]
+path = [[2.6, 2.0], [6.0, 2.0], [9.0, 5.5]]
+speed_mps = 0.7
+start_s = 1.0
+";
+
+/// The frames that a pipeline gets, from what a robot records.
+struct Recorder {
+    camera: Arc<Camera>,
+    odometry: Isometry2<f64>,
+    last: Option<(u64, Isometry2<f64>)>,
+    frames: u64,
+}
+
+impl Recorder {
+    fn new(camera: &Camera) -> Self {
+        let camera = Arc::new(camera.clone());
+        Self { camera, odometry: Isometry2::identity(), last: None, frames: 0 }
+    }
+
+    fn frame(&mut self, shot: &Shot) -> Frame {
+        let now = (shot.captured_ns, self.odometry);
+        let (before_ns, before) = self.last.replace(now).unwrap_or(now);
+        let dt = (shot.captured_ns - before_ns) as f64 * 1e-9;
+        let motion = Motion::between(&before, &self.odometry, dt, 0.02);
+        self.frames += 1;
+        let stamp = Stamp::from_nanos(1_000_000_000 + shot.captured_ns);
+        Frame::new(self.frames, stamp, Arc::clone(&self.camera), motion, shot.images.clone())
+    }
+}
+
+fn config() -> (Pipeline, Registry) {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let text = std::fs::read_to_string(configs.join("depth-ekf-follow.toml")).unwrap();
+    let (pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
+    (pipeline, registry)
+}
+
+/// Where the person was in each frame.
+fn follow(steered: bool) -> Vec<(f64, Truth)> {
+    let (mut pipeline, _) = config();
+    let scene = Scene::parse(SCENE).unwrap();
+    let mut simulation = Simulation::new(&scene, 2);
+    let mut recorder = Recorder::new(simulation.camera());
+    let mut way = Vec::new();
+    while let Some(event) = simulation.next_event() {
+        match event {
+            Event::Odometry(reading) => recorder.odometry = reading.odom_from_robot,
+            Event::Shot(shot) => {
+                let report = pipeline.step(&recorder.frame(&shot)).unwrap();
+                if steered {
+                    simulation.steer(report.command.unwrap());
+                }
+                way.push((shot.captured_ns as f64 * 1e-9, shot.truth[0].clone()));
+            }
+        }
+    }
+    way
+}
+
+fn range_m(truth: &Truth) -> f64 {
+    truth.head_in_robot.x.hypot(truth.head_in_robot.y)
+}
+
+#[test]
+fn the_robot_stays_with_a_person_who_walks() {
+    let way = follow(true);
+    assert!(way.len() > 100, "{} frames", way.len());
+    for (at_s, truth) in &way {
+        eprintln!("{at_s:.2} {:.2} {:.1} {:?} {}", range_m(truth), truth.head_in_robot.y.atan2(truth.head_in_robot.x).to_degrees(), truth.upper_body.is_some(), truth.visible_fraction);
+    }
+}
