@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, Frame, Motion, Registry, Stamp};
+use tagalong_core::{Camera, Frame, Motion, Registry, Stamp, TrackId};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 
@@ -24,11 +24,14 @@ width = 160
 height = 120
 rate_hz = 10.0
 
+[faults]
+late = 0.0
+
 [robot]
 start = [0.8, 2.0]
 
 [[people]]
-path = [[2.6, 2.0], [6.0, 2.0], [9.0, 5.5]]
+path = [[3.0, 2.0], [6.0, 2.0], [9.0, 5.5]]
 speed_mps = 0.7
 start_s = 1.0
 ";
@@ -58,46 +61,56 @@ impl Recorder {
     }
 }
 
-fn config() -> (Pipeline, Registry) {
+fn pipeline() -> Pipeline {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(configs.join("depth-ekf-follow.toml")).unwrap();
-    let (pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
-    (pipeline, registry)
+    Pipeline::from_toml(&text, &configs, &registry).unwrap().0
 }
 
-/// Where the person was in each frame.
-fn follow(steered: bool) -> Vec<(f64, Truth)> {
-    let (mut pipeline, _) = config();
-    let scene = Scene::parse(SCENE).unwrap();
-    let mut simulation = Simulation::new(&scene, 2);
+/// One frame of the run.
+struct Step {
+    at_s: f64,
+    target: Option<TrackId>,
+    person: Truth,
+    world_from_robot: Isometry2<f64>,
+}
+
+fn follow() -> Vec<Step> {
+    let mut pipeline = pipeline();
+    let mut simulation = Simulation::new(&Scene::parse(SCENE).unwrap(), 2);
     let mut recorder = Recorder::new(simulation.camera());
-    let mut way = Vec::new();
+    let mut steps = Vec::new();
     while let Some(event) = simulation.next_event() {
         match event {
             Event::Odometry(reading) => recorder.odometry = reading.odom_from_robot,
             Event::Shot(shot) => {
                 let report = pipeline.step(&recorder.frame(&shot)).unwrap();
-                if steered {
-                    simulation.steer(report.command.unwrap());
-                }
-                way.push((shot.captured_ns as f64 * 1e-9, shot.truth[0].clone()));
+                simulation.steer(report.command.unwrap());
+                steps.push(Step {
+                    at_s: shot.captured_ns as f64 * 1e-9,
+                    target: report.target,
+                    person: shot.truth[0].clone(),
+                    world_from_robot: shot.world_from_robot,
+                });
             }
         }
     }
-    way
-}
-
-fn range_m(truth: &Truth) -> f64 {
-    truth.head_in_robot.x.hypot(truth.head_in_robot.y)
+    steps
 }
 
 #[test]
 fn the_robot_stays_with_a_person_who_walks() {
-    let way = follow(true);
-    assert!(way.len() > 100, "{} frames", way.len());
-    for (at_s, truth) in &way {
-        eprintln!("{at_s:.2} {:.2} {:.1} {:?} {}", range_m(truth), truth.head_in_robot.y.atan2(truth.head_in_robot.x).to_degrees(), truth.upper_body.is_some(), truth.visible_fraction);
+    let steps = follow();
+    assert!(steps.len() > 100, "{} frames", steps.len());
+    for Step { at_s, target, person, .. } in &steps {
+        let head = person.head_in_robot;
+        let (range_m, bearing) = (head.x.hypot(head.y), head.y.atan2(head.x).to_degrees());
+        assert!((1.5..2.4).contains(&range_m), "{range_m} m away after {at_s} s");
+        assert!(bearing.abs() < 15.0, "{bearing} degrees aside after {at_s} s");
+        assert!(*at_s < 1.0 || *target == Some(TrackId(1)), "{target:?} after {at_s} s");
     }
+    let way = steps[0].world_from_robot.inverse() * steps[steps.len() - 1].world_from_robot;
+    assert!(way.translation.x > 4.0 && way.rotation.angle() > 0.5, "stands still: {way}");
 }

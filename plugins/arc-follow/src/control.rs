@@ -64,7 +64,7 @@ impl ArcFollow {
             return None;
         }
         let target = scene.target?;
-        let aim = Aim::new(&target.estimate.person, &self.sent.to_come(wheels))?;
+        let aim = Aim::new(&target.estimate.person, &self.sent.forecast(wheels))?;
         let trust = self.trust(target);
         self.turning = self.turn_in_place(&aim);
         let speed_mps = self.ramped(self.wanted_speed(&aim, max), dt).min(trust * max);

@@ -32,7 +32,7 @@ impl Sent {
 
     /// What the robot is going to do before it answers to the next command, and
     /// forgets what it has done.
-    pub(crate) fn to_come(&mut self, wheels: &Wheels) -> Motion {
+    pub(crate) fn forecast(&mut self, wheels: &Wheels) -> Motion {
         let mut to_come = Motion::at_rest(0.0);
         let mut known = 0;
         for (command, held_s) in &self.commands {
