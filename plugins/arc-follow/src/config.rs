@@ -1,0 +1,144 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// The way to the target (P1, Figure 7; P4, Figure 8).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Path {
+    /// The circle that leaves along the robot's heading and meets the target.
+    A,
+    /// Turns on the spot until it faces the target, then drives straight.
+    B,
+    /// Turns towards the target while driving: the radius of the circle is
+    /// divided by `path_gain`.
+    C,
+}
+
+/// Settings of the controller `arc-follow`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// The way to the target: "A" on a circle, "B" turn first and then
+    /// straight, "C" turn while driving.
+    pub path: Path,
+    /// By what path C divides the radius of the circle (k in P1, section 3):
+    /// 1.5 to 2.5 for usual fields of view. No unit.
+    pub path_gain: f64,
+    /// The wheel speeds exactly as the papers print them: no bound on the
+    /// curvature, no turning on the spot, no slowing down in bends. Paths A
+    /// and C only.
+    pub as_printed: bool,
+    /// Distance kept from the person, m, on the floor.
+    pub stand_off_m: f64,
+    /// Speed for each metre beyond the stand-off, 1/s.
+    pub range_gain_per_s: f64,
+    /// Speeds up by at most this much, m/s².
+    pub max_acceleration: f64,
+    /// Slows down by at most this much, m/s².
+    pub max_deceleration: f64,
+    /// Turning for each radian of bearing while the robot stands, 1/s; it
+    /// fades as the robot drives faster.
+    pub bearing_gain_per_s: f64,
+    /// Turns no faster than this, rad/s.
+    pub max_turn_rate: f64,
+    /// Largest curvature of the path, 1/m.
+    pub max_curvature: f64,
+    /// A target nearer than this steers as if it were this far away, m.
+    pub min_range_m: f64,
+    /// Paths A and C stop and turn on the spot while the bearing exceeds the
+    /// second of these angles, and until it is below the first, degrees.
+    pub turn_in_place_deg: [f64; 2],
+    /// The same for path B, which steers in no other way, degrees.
+    pub align_deg: [f64; 2],
+    /// Drives after a person who is not seen for half of this time, then slows
+    /// down, and stands still at the end of it, s.
+    pub max_unseen_s: f64,
+    /// From the capture of an image until the wheels answer to it, s: the
+    /// target is predicted by as much.
+    pub latency_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            path: Path::C,
+            path_gain: 2.0,
+            as_printed: false,
+            stand_off_m: 1.4,
+            range_gain_per_s: 0.8,
+            max_acceleration: 0.5,
+            max_deceleration: 1.0,
+            bearing_gain_per_s: 1.0,
+            max_turn_rate: 1.2,
+            max_curvature: 3.0,
+            min_range_m: 0.5,
+            turn_in_place_deg: [30.0, 60.0],
+            align_deg: [3.0, 12.0],
+            max_unseen_s: 1.0,
+            latency_s: 0.1,
+        }
+    }
+}
+
+/// Above this nothing on the floor makes sense, whatever the unit.
+pub(crate) const MOST: f64 = 1e6;
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.check_numbers()?;
+        let angles = [("turn_in_place_deg", self.turn_in_place_deg), ("align_deg", self.align_deg)];
+        for (key, [off, on]) in angles {
+            if !(0.0 < off && off <= on && on < 180.0) {
+                let message = format!("`{key}` must be two rising angles between 0 and 180");
+                return Err(Error::Settings(message));
+            }
+        }
+        if self.as_printed && self.path == Path::B {
+            let message = "`as_printed` needs path A or C: no equation is printed for path B";
+            return Err(Error::Settings(message.into()));
+        }
+        Ok(())
+    }
+
+    fn check_numbers(&self) -> Result<()> {
+        let numbers = [
+            ("path_gain", self.path_gain, false),
+            ("stand_off_m", self.stand_off_m, true),
+            ("range_gain_per_s", self.range_gain_per_s, false),
+            ("max_acceleration", self.max_acceleration, false),
+            ("max_deceleration", self.max_deceleration, false),
+            ("bearing_gain_per_s", self.bearing_gain_per_s, true),
+            ("max_turn_rate", self.max_turn_rate, false),
+            ("max_curvature", self.max_curvature, true),
+            ("min_range_m", self.min_range_m, false),
+            ("max_unseen_s", self.max_unseen_s, false),
+            ("latency_s", self.latency_s, true),
+        ];
+        for (key, value, may_be_zero) in numbers {
+            let least = if may_be_zero { 0.0 } else { 1.0 / MOST };
+            if !(least..=MOST).contains(&value) {
+                let bound = if may_be_zero { "at least 0" } else { "positive" };
+                let message = format!("`{key}` must be {bound} and below {MOST:e}, not {value}");
+                return Err(Error::Settings(message));
+            }
+        }
+        Ok(())
+    }
+
+    /// k of P1, section 3: path A is path C with a gain of one; path B drives
+    /// straight.
+    pub(crate) fn gain(&self) -> f64 {
+        match self.path {
+            Path::A => 1.0,
+            Path::B => 0.0,
+            Path::C => self.path_gain,
+        }
+    }
+
+    /// Bearings at which turning on the spot ends and begins, rad.
+    pub(crate) fn turning_bounds(&self) -> [f64; 2] {
+        let degrees = if self.path == Path::B { self.align_deg } else { self.turn_in_place_deg };
+        degrees.map(f64::to_radians)
+    }
+}

@@ -1,0 +1,165 @@
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use tagalong_core::{Controller, Motion, Scene, Track, WheelSpeeds, Wheels};
+
+use crate::aim::Aim;
+use crate::config::{Config, MOST, Path};
+use crate::sent::Sent;
+
+/// A longer pause between frames counts as this one, s.
+const LONGEST_STEP_S: f64 = 0.5;
+
+/// Follows a person along the paths of P1, section 3.
+#[derive(Clone, Debug)]
+pub struct ArcFollow {
+    config: Config,
+    /// The forward speed of the last command, m/s.
+    speed_mps: f64,
+    /// Turning on the spot: to the left (1) or to the right (-1).
+    turning: Option<f64>,
+    sent: Sent,
+}
+
+/// Forward speed, m/s, and turn rate, rad/s.
+#[derive(Clone, Copy, Debug)]
+struct Twist {
+    speed_mps: f64,
+    turn_rate: f64,
+}
+
+impl Twist {
+    fn of_wheels(self, wheels: &Wheels) -> WheelSpeeds {
+        let rim = self.turn_rate * wheels.half_separation_m;
+        WheelSpeeds { left: self.speed_mps - rim, right: self.speed_mps + rim }
+    }
+}
+
+impl Controller for ArcFollow {
+    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
+        let dt = step_s(&scene.frame.motion);
+        self.sent.grow_older(dt);
+        let command = match self.steer(scene, dt) {
+            Some(twist) => twist.of_wheels(&scene.wheels),
+            None => self.halt(),
+        };
+        self.sent.add(command);
+        command
+    }
+}
+
+impl ArcFollow {
+    /// A controller of a robot at rest.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] if a number cannot work.
+    pub fn new(config: Config) -> tagalong_core::Result<Self> {
+        config.check()?;
+        let sent = Sent::new(config.latency_s);
+        Ok(Self { config, speed_mps: 0.0, turning: None, sent })
+    }
+
+    fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
+        let (wheels, max) = (&scene.wheels, scene.max_speed_mps);
+        if !is_sensible(wheels.half_separation_m) || !is_sensible(max) {
+            return None;
+        }
+        let target = scene.target?;
+        let aim = Aim::new(&target.estimate.person, &self.sent.forecast(wheels))?;
+        let trust = self.trust(target);
+        self.turning = self.turn_in_place(&aim);
+        let speed_mps = self.ramped(self.wanted_speed(&aim, max), dt).min(trust * max);
+        let facing = trust * (1.0 - speed_mps / max) * self.facing_rate(&aim);
+        let turn_rate = speed_mps * self.curvature(&aim)? + facing;
+        let twist = self.within_limits(Twist { speed_mps, turn_rate }, scene);
+        self.speed_mps = twist.speed_mps;
+        twist.turn_rate.is_finite().then_some(twist)
+    }
+
+    /// Stands still, and will start anew.
+    fn halt(&mut self) -> WheelSpeeds {
+        self.turning = None;
+        self.speed_mps = 0.0;
+        WheelSpeeds::STOP
+    }
+
+    /// How far to believe in somebody who is coasting: 1, then less, then 0.
+    fn trust(&self, target: &Track) -> f64 {
+        let left = 2.0 * (1.0 - target.unseen_s / self.config.max_unseen_s);
+        if left > 0.0 { left.min(1.0) } else { 0.0 }
+    }
+
+    /// Whether to turn on the spot, and which way. It goes on the way it began,
+    /// so that a target right behind the robot does not make it hesitate.
+    fn turn_in_place(&self, aim: &Aim) -> Option<f64> {
+        if self.config.as_printed {
+            return None;
+        }
+        let [off, on] = self.config.turning_bounds();
+        let bound = if self.turning.is_some() { off } else { on };
+        let way = self.turning.filter(|_| aim.bearing.abs() > FRAC_PI_2);
+        (aim.bearing.abs() > bound).then(|| way.unwrap_or(aim.bearing.signum()))
+    }
+
+    /// The speed that brings the robot to the stand-off and keeps it there, m/s.
+    fn wanted_speed(&self, aim: &Aim, max_mps: f64) -> f64 {
+        let config = &self.config;
+        let excess = config.range_gain_per_s * (aim.range_m - config.stand_off_m);
+        let speed = (excess + aim.receding_mps.max(0.0)).clamp(0.0, max_mps);
+        if config.as_printed {
+            return speed;
+        }
+        let ahead = aim.bearing.cos().max(0.0);
+        if self.turning.is_some() { 0.0 } else { speed * ahead * ahead }
+    }
+
+    /// A speed on the way from the last one to the wanted one.
+    fn ramped(&self, wanted: f64, dt: f64) -> f64 {
+        let least = self.speed_mps - self.config.max_deceleration * dt;
+        wanted.clamp(least, self.speed_mps + self.config.max_acceleration * dt)
+    }
+
+    /// 1 / rho of P1, section 3, times the path's gain, 1/m. As printed there is
+    /// none at the origin.
+    fn curvature(&self, aim: &Aim) -> Option<f64> {
+        let config = &self.config;
+        if config.as_printed {
+            let curvature = 2.0 * config.gain() * aim.sine / aim.range_m;
+            return curvature.is_finite().then_some(curvature);
+        }
+        let range = aim.range_m.max(config.min_range_m);
+        let curvature = 2.0 * config.gain() * aim.sine * (aim.range_m / range) / range;
+        Some(curvature.clamp(-config.max_curvature, config.max_curvature))
+    }
+
+    /// How fast a standing robot turns to face the target, rad/s.
+    fn facing_rate(&self, aim: &Aim) -> f64 {
+        let config = &self.config;
+        let is_straight = config.path == Path::B && self.turning.is_none();
+        if config.as_printed || is_straight {
+            return 0.0;
+        }
+        let bearing = match self.turning {
+            Some(way) if way * aim.bearing < 0.0 => aim.bearing + way * TAU,
+            _ => aim.bearing,
+        };
+        config.bearing_gain_per_s * bearing * (aim.range_m / config.min_range_m).min(1.0)
+    }
+
+    /// Slower where the robot cannot do it, on the same path.
+    fn within_limits(&self, twist: Twist, scene: &Scene<'_>) -> Twist {
+        let rim = twist.turn_rate.abs() * scene.wheels.half_separation_m;
+        let by_speed = scene.max_speed_mps / (twist.speed_mps + rim);
+        let by_turn = self.config.max_turn_rate / twist.turn_rate.abs();
+        let scale = if self.config.as_printed { by_speed } else { by_speed.min(by_turn) }.min(1.0);
+        Twist { speed_mps: twist.speed_mps * scale, turn_rate: twist.turn_rate * scale }
+    }
+}
+
+/// Time since the frame before, s.
+fn step_s(motion: &Motion) -> f64 {
+    if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 }
+}
+
+fn is_sensible(number: f64) -> bool {
+    number > 0.0 && number <= MOST
+}

@@ -1,0 +1,275 @@
+//! The laws of the papers, and what is done where they have none.
+
+use super::*;
+
+/// Only what the papers print, up to the target itself.
+fn bare(path: Path, gain: f64) -> Config {
+    Config {
+        path,
+        path_gain: gain,
+        stand_off_m: 0.0,
+        max_acceleration: 1e3,
+        bearing_gain_per_s: 0.0,
+        max_turn_rate: 1e3,
+        max_curvature: 1e3,
+        min_range_m: 1e-3,
+        turn_in_place_deg: [170.0, 175.0],
+        latency_s: 0.0,
+        ..Config::default()
+    }
+}
+
+/// Drives to somebody who stands 3 m away at 34 degrees, until 0.8 m from
+/// them; ranges and bearings on the way.
+fn approach(config: Config) -> Vec<(f64, f64)> {
+    let bearing = 34_f64.to_radians();
+    let place = Point2::new(3.0 * bearing.cos(), 3.0 * bearing.sin());
+    let mut drive = Drive::new(config, 2e-4, 0);
+    let mut way = vec![drive.polar(place)];
+    while way[way.len() - 1].0 > 0.8 {
+        drive.step(place, Vector2::zeros());
+        way.push(drive.polar(place));
+        assert!(way.len() < 200_000, "stuck at {:?}", way.last());
+    }
+    way
+}
+
+#[test]
+fn a_target_at_rest_keeps_sine_of_bearing_over_a_power_of_range() {
+    for (path, gain) in [(Path::A, 1.0), (Path::C, 1.5), (Path::C, 2.0), (Path::C, 2.5)] {
+        for as_printed in [false, true] {
+            let way = approach(Config { as_printed, ..bare(path, gain) });
+            let (range, bearing) = way[0];
+            for (r, b) in &way {
+                let expected = bearing.sin() * (r / range).powf(2.0 * gain - 1.0);
+                let error = (b - expected.asin()).to_degrees().abs();
+                assert!(error < 0.01, "gain {gain}: {error} degrees off at {r} m");
+            }
+        }
+    }
+}
+
+#[test]
+fn path_c_faces_the_target_long_before_path_a() {
+    let at_the_end = |path| approach(bare(path, 2.0)).last().unwrap().1.to_degrees();
+    let (circle, turning) = (at_the_end(Path::A), at_the_end(Path::C));
+    assert!((circle - 8.6).abs() < 0.1, "{circle}");
+    assert!((turning - 0.6).abs() < 0.05, "{turning}");
+}
+
+#[test]
+fn path_a_ends_on_the_circle_through_the_target() {
+    let place = Point2::new(2.0, 1.0);
+    let mut drive = Drive::new(bare(Path::A, 1.0), 1e-3, 0);
+    let centre = Point2::new(0.0, (2.0_f64.powi(2) + 1.0) / 2.0);
+    while drive.polar(place).0 > 0.2 {
+        drive.step(place, Vector2::zeros());
+        let at = Point2::from(drive.pose.translation.vector);
+        assert!(((at - centre).norm() - centre.y).abs() < 1e-3, "{at}");
+    }
+}
+
+#[test]
+fn path_b_turns_first_and_then_drives_straight() {
+    let config = Config { path: Path::B, ..Config::default() };
+    let mut drive = Drive::new(config, 0.05, 0);
+    let place = Point2::new(3.0, 2.0);
+    let mut turned = false;
+    for _ in 0..300 {
+        let wheels = drive.step(place, Vector2::zeros());
+        let (v, w) = (speed(wheels), turn_rate(wheels));
+        assert!(v == 0.0 || w == 0.0, "drives at {v} and turns at {w}");
+        assert!(!turned || w == 0.0, "turns again");
+        turned |= v > 0.0;
+    }
+    let (range, bearing) = drive.polar(place);
+    assert!((range - 1.4).abs() < 0.05 && bearing.abs() < 12_f64.to_radians());
+}
+
+#[test]
+fn wheels_are_those_of_the_paper() {
+    let (x, y, k, d) = (2.0, -0.7, 2.0, WHEELS.half_separation_m);
+    let wheels = settled(
+        Config { as_printed: true, latency_s: 0.0, ..Config::default() },
+        &target(x, y, Vector2::zeros()),
+    );
+    let v = 0.8 * (x.hypot(y) - 1.4);
+    let bend = k * 2.0 * d * y / (x * x + y * y);
+    assert!((wheels.left - v * (1.0 - bend)).abs() < 1e-12);
+    assert!((wheels.right - v * (1.0 + bend)).abs() < 1e-12);
+}
+
+#[test]
+fn the_inner_wheel_reverses_in_bends_narrower_than_the_robot() {
+    let config = Config { stand_off_m: 0.0, ..Config::default() };
+    let config = Config { as_printed: true, latency_s: 0.0, ..config };
+    let bound = 2.0 * config.path_gain * WHEELS.half_separation_m;
+    for (range, reverses) in [(0.98 * bound, true), (1.02 * bound, false)] {
+        let wheels = settled(config.clone(), &target(0.0, range, Vector2::zeros()));
+        assert!(wheels.right > 0.0 && (wheels.left < 0.0) == reverses, "{wheels:?}");
+    }
+}
+
+#[test]
+fn the_curvature_is_bounded_where_the_printed_one_is_not() {
+    let near = target(0.25, 0.1, Vector2::new(0.5, 0.0));
+    let curvature = |as_printed| {
+        let config = Config {
+            bearing_gain_per_s: 0.0,
+            max_turn_rate: 10.0,
+            latency_s: 0.0,
+            as_printed,
+            ..Config::default()
+        };
+        let config = Config { stand_off_m: 0.2, ..config };
+        let wheels = settled(config, &near);
+        turn_rate(wheels) / speed(wheels)
+    };
+    assert!((curvature(true) - 4.0 * 0.1 / 0.0725).abs() < 1e-9);
+    assert!((curvature(false) - 4.0 * 0.1 / 0.25).abs() < 1e-9);
+}
+
+#[test]
+fn a_target_at_the_origin_stops_the_robot() {
+    for as_printed in [false, true] {
+        let config = Config { as_printed, stand_off_m: 0.0, latency_s: 0.0, ..Config::default() };
+        let here = target(0.0, 0.0, Vector2::new(0.5, 0.0));
+        let wheels = settled(config, &here);
+        assert!(wheels.left == wheels.right, "{wheels:?}");
+        assert!(!as_printed || wheels == WheelSpeeds::STOP, "{wheels:?}");
+    }
+    let wheels = settled(Config::default(), &target(0.0, 0.0, Vector2::zeros()));
+    assert_eq!(wheels, WheelSpeeds::STOP);
+}
+
+#[test]
+fn it_turns_to_whoever_is_behind_where_the_printed_law_drives_away() {
+    let place = Point2::new(-2.0, 0.01);
+    let end = |as_printed| {
+        let mut drive = Drive::new(Config { as_printed, ..Config::default() }, 0.1, 0);
+        for _ in 0..150 {
+            drive.step(place, Vector2::zeros());
+        }
+        drive.polar(place)
+    };
+    let (range, bearing) = end(false);
+    assert!((range - 1.4).abs() < 0.05 && bearing.abs() < 0.05, "{range} {bearing}");
+    assert!(end(true).0 > 3.0);
+}
+
+#[test]
+fn it_goes_on_turning_the_way_it_began() {
+    let mut controller = ArcFollow::new(Config::default()).unwrap();
+    let mut rate = |y: f64| {
+        let person = target(-2.0, y, Vector2::zeros());
+        turn_rate(command(&mut controller, Motion::at_rest(0.1), Some(&person)))
+    };
+    assert!(rate(0.3) > 0.0);
+    assert!(rate(-0.3) > 0.0 && rate(0.1) > 0.0, "hesitates");
+}
+
+#[test]
+fn turning_in_place_ends_later_than_it_begins() {
+    let mut controller = ArcFollow::new(Config { latency_s: 0.0, ..Config::default() }).unwrap();
+    let mut driven = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let person = target(3.0 * cos, 3.0 * sin, Vector2::zeros());
+        let steps =
+            (0..20).map(|_| speed(command(&mut controller, Motion::at_rest(0.1), Some(&person))));
+        steps.last().unwrap() > 0.0
+    };
+    assert_eq!([55.0, 65.0, 35.0, 25.0, 55.0].map(&mut driven), [true, false, false, true, true]);
+}
+
+#[test]
+fn at_the_stand_off_it_turns_with_a_person_who_walks_around_it() {
+    let worst = |as_printed| {
+        let mut drive = Drive::new(Config { as_printed, ..Config::default() }, 0.1, 0);
+        let bearings = (0..200).map(|i| {
+            let (sin, cos) = (0.03 * f64::from(i)).sin_cos();
+            drive.step(Point2::new(1.4 * cos, 1.4 * sin), Vector2::new(-sin, cos) * 0.42);
+            drive.polar(Point2::new(1.4 * cos, 1.4 * sin)).1.abs()
+        });
+        bearings.fold(0.0, f64::max).to_degrees()
+    };
+    assert!(worst(false) < 25.0, "{}", worst(false));
+    assert!(worst(true) > 90.0, "{}", worst(true));
+}
+
+#[test]
+fn it_keeps_the_stand_off_to_a_person_who_walks() {
+    let mut drive = Drive::new(Config::default(), 0.1, 0);
+    for i in 0..200 {
+        drive.step(Point2::new(1.6 + 0.07 * f64::from(i), 0.0), Vector2::new(0.7, 0.0));
+    }
+    let range = drive.polar(Point2::new(1.6 + 0.07 * 199.0, 0.0)).0;
+    assert!((range - 1.4).abs() < 0.15, "{range}");
+}
+
+#[test]
+fn it_never_backs_up_and_slows_down_in_bends() {
+    let towards = target(0.8, 0.0, Vector2::new(-1.0, 0.0));
+    assert_eq!(settled(Config::default(), &towards), WheelSpeeds::STOP);
+    let at = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let config = Config { latency_s: 0.0, ..Config::default() };
+        speed(settled(config, &target(2.0 * cos, 2.0 * sin, Vector2::zeros())))
+    };
+    assert!((at(45.0) / at(0.0) - 0.5).abs() < 1e-9, "{} {}", at(45.0), at(0.0));
+}
+
+#[test]
+fn saturated_wheels_keep_the_curvature() {
+    let config = Config { bearing_gain_per_s: 0.0, latency_s: 0.0, ..Config::default() };
+    let config = Config { path_gain: 6.0, ..config };
+    let far = settled(config, &target(6.0, 1.0, Vector2::new(0.9, 0.0)));
+    assert!((far.right - MAX_MPS).abs() < 1e-9, "{far:?}");
+    assert!((turn_rate(far) / speed(far) - 12.0 / 37.0).abs() < 1e-9, "{far:?}");
+}
+
+#[test]
+fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
+    let after = |unseen_s| {
+        let person = Track { seen: false, unseen_s, ..target(4.0, 1.0, Vector2::zeros()) };
+        settled(Config::default(), &person)
+    };
+    assert_eq!(after(0.45), after(0.0));
+    assert!(speed(after(0.8)) < 0.5 * speed(after(0.0)) && speed(after(0.8)) > 0.0);
+    for unseen_s in [1.0, 30.0, f64::INFINITY, f64::NAN] {
+        assert_eq!(after(unseen_s), WheelSpeeds::STOP);
+    }
+}
+
+#[test]
+fn a_robot_that_answers_late_does_the_same_later() {
+    let drive = |latency_s, delay: usize| {
+        let config = Config { latency_s, ..Config::default() };
+        let mut drive = Drive::new(config, 0.05, delay);
+        let velocity = Vector2::new(0.4, 0.3);
+        let commands = (0..120).map(|i| {
+            let when_it_answers = 0.05 * (i + 6 - delay) as f64;
+            drive.step(Point2::new(1.0, 2.0) + velocity * when_it_answers, velocity)
+        });
+        commands.collect::<Vec<_>>()
+    };
+    for (late, at_once) in drive(0.3, 6).iter().zip(drive(0.0, 0)) {
+        assert!((late.left - at_once.left).abs() < 1e-9, "{late:?} {at_once:?}");
+        assert!((late.right - at_once.right).abs() < 1e-9, "{late:?} {at_once:?}");
+    }
+}
+
+#[test]
+fn it_turns_too_far_if_it_does_not_know_of_its_latency() {
+    let overshoot = |latency_s| {
+        let config = Config { bearing_gain_per_s: 4.0, latency_s, ..Config::default() };
+        let mut drive = Drive::new(config, 0.05, 6);
+        let place = Point2::new(0.0, 1.3);
+        let bearings = (0..200).map(|_| {
+            drive.step(place, Vector2::zeros());
+            drive.polar(place).1
+        });
+        -bearings.fold(0.0, f64::min).to_degrees()
+    };
+    assert!(overshoot(0.0) > 10.0, "{}", overshoot(0.0));
+    assert!(overshoot(0.3) < 1.0, "{}", overshoot(0.3));
+}

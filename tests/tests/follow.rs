@@ -1,0 +1,116 @@
+//! The loop is closed: images are drawn from where the controller has driven
+//! the robot to.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Isometry2;
+use tagalong_core::{Camera, Frame, Motion, Registry, Stamp, TrackId};
+use tagalong_pipeline::Pipeline;
+use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+
+/// A person walks ahead and around a bend at 0.7 m/s. Small images are enough
+/// for somebody so near, and quickly drawn.
+const SCENE: &str = "
+seed = 3
+duration_s = 11.0
+
+[room]
+size_m = [12.0, 8.0]
+
+[camera]
+width = 160
+height = 120
+rate_hz = 10.0
+
+[faults]
+late = 0.0
+
+[robot]
+start = [0.8, 2.0]
+
+[[people]]
+path = [[3.0, 2.0], [6.0, 2.0], [9.0, 5.5]]
+speed_mps = 0.7
+start_s = 1.0
+";
+
+/// The frames that a pipeline gets, from what a robot records.
+struct Recorder {
+    camera: Arc<Camera>,
+    odometry: Isometry2<f64>,
+    last: Option<(u64, Isometry2<f64>)>,
+    frames: u64,
+}
+
+impl Recorder {
+    fn new(camera: &Camera) -> Self {
+        let camera = Arc::new(camera.clone());
+        Self { camera, odometry: Isometry2::identity(), last: None, frames: 0 }
+    }
+
+    fn frame(&mut self, shot: &Shot) -> Frame {
+        let now = (shot.captured_ns, self.odometry);
+        let (before_ns, before) = self.last.replace(now).unwrap_or(now);
+        let dt = (shot.captured_ns - before_ns) as f64 * 1e-9;
+        let motion = Motion::between(&before, &self.odometry, dt, 0.02);
+        self.frames += 1;
+        let stamp = Stamp::from_nanos(1_000_000_000 + shot.captured_ns);
+        Frame::new(self.frames, stamp, Arc::clone(&self.camera), motion, shot.images.clone())
+    }
+}
+
+fn pipeline() -> Pipeline {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let text = std::fs::read_to_string(configs.join("depth-ekf-follow.toml")).unwrap();
+    Pipeline::from_toml(&text, &configs, &registry).unwrap().0
+}
+
+/// One frame of the run.
+struct Step {
+    at_s: f64,
+    target: Option<TrackId>,
+    person: Truth,
+    world_from_robot: Isometry2<f64>,
+}
+
+fn follow() -> Vec<Step> {
+    let mut pipeline = pipeline();
+    let mut simulation = Simulation::new(&Scene::parse(SCENE).unwrap(), 2);
+    let mut recorder = Recorder::new(simulation.camera());
+    let mut steps = Vec::new();
+    while let Some(event) = simulation.next_event() {
+        match event {
+            Event::Odometry(reading) => recorder.odometry = reading.odom_from_robot,
+            Event::Shot(shot) => {
+                let report = pipeline.step(&recorder.frame(&shot)).unwrap();
+                simulation.steer(report.command.unwrap());
+                steps.push(Step {
+                    at_s: shot.captured_ns as f64 * 1e-9,
+                    target: report.target,
+                    person: shot.truth[0].clone(),
+                    world_from_robot: shot.world_from_robot,
+                });
+            }
+        }
+    }
+    steps
+}
+
+#[test]
+fn the_robot_stays_with_a_person_who_walks() {
+    let steps = follow();
+    assert!(steps.len() > 100, "{} frames", steps.len());
+    for Step { at_s, target, person, .. } in &steps {
+        let head = person.head_in_robot;
+        let (range_m, bearing) = (head.x.hypot(head.y), head.y.atan2(head.x).to_degrees());
+        assert!((1.5..2.4).contains(&range_m), "{range_m} m away after {at_s} s");
+        assert!(bearing.abs() < 15.0, "{bearing} degrees aside after {at_s} s");
+        assert!(*at_s < 1.0 || *target == Some(TrackId(1)), "{target:?} after {at_s} s");
+    }
+    let way = steps[0].world_from_robot.inverse() * steps[steps.len() - 1].world_from_robot;
+    assert!(way.translation.x > 4.0 && way.rotation.angle() > 0.5, "stands still: {way}");
+}
