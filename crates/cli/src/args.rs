@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::simulate::SimulateArgs;
+use crate::train::TrainArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.
@@ -60,6 +61,9 @@ pub enum Command {
     /// Draws the log of a robot among people, with the truth, from a scene
     #[command(after_help = SIMULATE_HELP)]
     Simulate(SimulateArgs),
+    /// Makes the model file of a plugin, and its card
+    #[command(after_help = TRAIN_HELP)]
+    Train(TrainArgs),
     /// Says what a log contains and what a pipeline could use of it
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -122,6 +126,15 @@ Examples:
   tagalong simulate configs/scenes/crossing.toml
   tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
+
+const TRAIN_HELP: &str = "\
+Candidates are what the template detector proposes in drawn rooms and annotated logs. Same seed and
+data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
+held-out rooms and logs.
+
+Examples:
+  tagalong train svm-patch --quick -o quick.toml
+  tagalong train svm-patch --data ../shared/data";
 
 const INSPECT_HELP: &str = "\
 Examples:

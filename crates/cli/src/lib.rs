@@ -27,6 +27,7 @@ mod scoring;
 mod signals;
 mod simulate;
 mod suggest;
+mod train;
 
 use std::process::ExitCode;
 
@@ -71,6 +72,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Bench(args) => bench::bench(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => simulate::simulate(args),
+        Command::Train(args) => train::train(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }
