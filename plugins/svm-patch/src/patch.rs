@@ -36,8 +36,7 @@ impl Sampler {
         for (row, (top, bottom)) in cells(around.y, around.height, grey.height()).iter().enumerate()
         {
             for (column, (left, right)) in columns.iter().enumerate() {
-                let sum: u64 =
-                    (*top..*bottom).map(|y| sum_of(&grey.row(y)[*left..*right])).sum();
+                let sum: u64 = (*top..*bottom).map(|y| sum_of(&grey.row(y)[*left..*right])).sum();
                 let count = (right - left) * (bottom - top);
                 patch[row * SIDE + column] = (sum as f64 / count as f64) as f32;
             }

@@ -70,6 +70,8 @@ impl Card {
         for (name, effect) in [("held-out rooms", &self.held_out_rooms)].into_iter().chain(logs) {
             let _ = writeln!(out, "{name}");
             for (what, share) in [
+                ("false proposals rejected", effect.false_proposals_rejected),
+                ("people's proposals rejected", effect.people_proposals_rejected),
                 ("false sightings removed", effect.false_sightings_removed),
                 ("people's sightings lost", effect.people_sightings_lost),
                 ("sightings of parts removed", effect.part_sightings_removed),

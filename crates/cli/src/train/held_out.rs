@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point2;
 use serde::Serialize;
-use tagalong_core::{Registry, Track, Verifier};
+use tagalong_core::{Detection, Registry, Track, Verifier};
 use tagalong_eval::wilson;
-use tagalong_pipeline::{Fate, FrameReport, Pipeline};
+use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 
 use super::seen::{Known, Label, Seen, label};
 use crate::outcome::Failure;
@@ -32,16 +32,21 @@ pub struct Share {
 impl Share {
     fn new(count: u64, of: u64) -> Self {
         let rounded = |v: f64| (v * 1e5).round() / 1e5;
-        let (lower, upper) = wilson(count, of, 0.95)
-            .map_or((0.0, 1.0), |i| (rounded(i.lower), rounded(i.upper)));
+        let (lower, upper) =
+            wilson(count, of, 0.95).map_or((0.0, 1.0), |i| (rounded(i.lower), rounded(i.upper)));
         Self { count, of, lower, upper }
     }
 }
 
-/// What the verifier did, on sightings that the pipeline without it accepted
-/// and on the confirmed tracks of both pipelines.
+/// What the verifier did: on proposals of the detector with low thresholds, by
+/// the sign of its margin alone; on sightings that the pipeline without it
+/// accepted; and on the confirmed tracks of both pipelines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Effect {
+    /// Proposals of nobody that it rejects.
+    pub false_proposals_rejected: Share,
+    /// Proposals of people that it rejects.
+    pub people_proposals_rejected: Share,
     /// Accepted sightings of nobody that it rejects.
     pub false_sightings_removed: Share,
     /// Accepted sightings of people that it rejects.
@@ -59,8 +64,9 @@ pub struct Effect {
     pub people_never_tracked: Share,
 }
 
-/// Both pipelines, side by side.
+/// The pipelines, side by side.
 pub struct Comparison {
+    proposer: Pipeline,
     plain: Pipeline,
     verified: Pipeline,
     verifier: Box<dyn Verifier>,
@@ -72,6 +78,8 @@ pub struct Comparison {
 pub struct Tally {
     /// Rejected and accepted sightings of people, nobody, and parts.
     sightings: [(u64, u64); 3],
+    /// The same of proposals.
+    proposals: [(u64, u64); 3],
     /// Of the pipeline without the verifier, and with it.
     tracks: [Tracks; 2],
     both: u64,
@@ -87,41 +95,49 @@ struct Tracks {
 }
 
 impl Comparison {
-    /// Two fresh pipelines.
+    /// Fresh pipelines: one that proposes, one without the verifier, one with
+    /// it.
     ///
     /// # Errors
     /// A config that is wrong.
     pub fn new(
-        config: &str,
-        with_verifier: &str,
+        [proposer, plain, verified]: [&str; 3],
         verifier: Box<dyn Verifier>,
         registry: &Registry,
     ) -> Result<Self, Failure> {
         Ok(Self {
-            plain: super::pipeline(config, registry)?,
-            verified: super::pipeline(with_verifier, registry)?,
+            proposer: super::pipeline(proposer, registry)?,
+            plain: super::pipeline(plain, registry)?,
+            verified: super::pipeline(verified, registry)?,
             verifier,
             start_score: 0.0,
         })
     }
 
-    /// Takes both through one frame.
+    /// Takes all of them through one frame.
     ///
     /// # Errors
     /// A plugin that fails.
     pub fn step(&mut self, seen: &Seen, tally: &mut Tally) -> Result<(), Failure> {
+        let proposed = self.proposer.step(&seen.frame).map_err(Failure::failed)?;
+        for Candidate { detection, .. } in &proposed.candidates {
+            tally.proposal(label(detection, &seen.people), self.margin(seen, detection)? < 0.0);
+        }
         let plain = self.plain.step(&seen.frame).map_err(Failure::failed)?;
         let verified = self.verified.step(&seen.frame).map_err(Failure::failed)?;
         for candidate in &plain.candidates {
             if matches!(candidate.fate, Fate::Dropped(_)) {
                 continue;
             }
-            let margin = self.verifier.margin(&seen.frame, &candidate.detection);
-            let score = candidate.detection.score + margin.map_err(Failure::failed)?;
+            let score = candidate.detection.score + self.margin(seen, &candidate.detection)?;
             tally.sighting(label(&candidate.detection, &seen.people), score < self.start_score);
         }
         tally.frame(&[&plain, &verified], &seen.people);
         Ok(())
+    }
+
+    fn margin(&mut self, seen: &Seen, candidate: &Detection) -> Result<f64, Failure> {
+        self.verifier.margin(&seen.frame, candidate).map_err(Failure::failed)
     }
 }
 
@@ -132,14 +148,11 @@ impl Tally {
     }
 
     fn sighting(&mut self, label: Label, rejected: bool) {
-        let row = match label {
-            Label::Person(_) => 0,
-            Label::Nobody => 1,
-            Label::Part => 2,
-            Label::Unclear => return,
-        };
-        self.sightings[row].0 += u64::from(rejected);
-        self.sightings[row].1 += 1;
+        count(&mut self.sightings, label, rejected);
+    }
+
+    fn proposal(&mut self, label: Label, rejected: bool) {
+        count(&mut self.proposals, label, rejected);
     }
 
     fn frame(&mut self, reports: &[&FrameReport; 2], people: &[Known]) {
@@ -166,6 +179,8 @@ impl Tally {
         let people = plain.people.len() as u64;
         let kept = plain.people.intersection(&verified.people).count() as u64;
         Effect {
+            people_proposals_rejected: share(self.proposals[0]),
+            false_proposals_rejected: share(self.proposals[1]),
             people_sightings_lost: share(self.sightings[0]),
             false_sightings_removed: share(self.sightings[1]),
             part_sightings_removed: share(self.sightings[2]),
@@ -178,6 +193,17 @@ impl Tally {
             people_never_tracked: fewer(people, kept),
         }
     }
+}
+
+fn count(rows: &mut [(u64, u64); 3], label: Label, rejected: bool) {
+    let row = match label {
+        Label::Person(_) => &mut rows[0],
+        Label::Nobody => &mut rows[1],
+        Label::Part => &mut rows[2],
+        Label::Unclear => return,
+    };
+    row.0 += u64::from(rejected);
+    row.1 += 1;
 }
 
 /// The people who count and have a track on them.

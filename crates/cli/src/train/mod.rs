@@ -80,9 +80,9 @@ struct Plan {
 impl Plan {
     fn new(quick: bool) -> Self {
         if quick {
-            Self { rooms: [4, 2], rounds: 1, test_rooms: 3, duration_s: 3.0 }
+            Self { rooms: [4, 2], rounds: 1, test_rooms: 3, duration_s: 2.0 }
         } else {
-            Self { rooms: [80, 60], rounds: 2, test_rooms: 48, duration_s: 5.0 }
+            Self { rooms: [45, 30], rounds: 2, test_rooms: 36, duration_s: 4.0 }
         }
     }
 
@@ -160,7 +160,9 @@ impl<'a> Session<'a> {
         let mut names = vec!["drawn rooms".to_owned()];
         if self.args.data.is_some() {
             names.extend(TRAIN_LOGS.map(|log| format!("logs/{log}.mcap")));
-            names.extend(["people/inria-64x128", "people/head-shoulder-50", "negatives"].map(String::from));
+            names.extend(
+                ["people/inria-64x128", "people/head-shoulder-50", "negatives"].map(String::from),
+            );
         }
         names
     }
@@ -234,16 +236,14 @@ impl<'a> Session<'a> {
             for log in TRAIN_LOGS {
                 let mut pipeline = pipeline(HARVEST, self.registry)?;
                 let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
-                self.in_log(data, log, &mut |seen| {
-                    propose(&mut pipeline, seen, group, &mut show)
-                })?;
+                self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
             }
         }
         let share = if self.args.quick { 8 } else { 1 };
         let photos = photos(data, false);
         self.bar.set_length(photos.len() as u64);
         for photo in photos.iter().filter(|p| p.group / 5 % share == 0) {
-            photo.visit(&mut show)?;
+            photo.visit(round as u64, &mut show)?;
             self.bar.inc(1);
         }
         Ok(harvest)
@@ -262,7 +262,7 @@ impl<'a> Session<'a> {
         let mut table = toml::Table::new();
         table.insert("verifiers".into(), vec![toml::Value::Table(section)].into());
         let with_verifier = format!("{IN_USE}\n{table}");
-        Comparison::new(IN_USE, &with_verifier, self.verifier()?, self.registry)
+        Comparison::new([HARVEST, IN_USE, &with_verifier], self.verifier()?, self.registry)
     }
 
     fn try_rooms(&self) -> Result<Effect, Failure> {

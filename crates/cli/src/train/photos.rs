@@ -13,7 +13,7 @@ use super::rooms::Chance;
 use crate::outcome::Failure;
 
 /// Squares cut from a photograph without anybody.
-const SQUARES: usize = 4;
+const SQUARES: usize = 2;
 
 /// A person in a crop of INRIA is 96 of 128 rows tall and begins at row 16.
 const INRIA_BODY: Rect = Rect::new(0.0, 16.0, 64.0, 96.0);
@@ -127,10 +127,7 @@ fn looks(image: &GreyImage) -> [u64; 2] {
     if image.width() < 9 || image.height() < 8 {
         return [0, 0];
     }
-    [
-        bits(&|x, y| cell(x, y) > cell(x + 1, y)),
-        bits(&|x, y| cell(8 - x, y) > cell(7 - x, y)),
-    ]
+    [bits(&|x, y| cell(x, y) > cell(x + 1, y)), bits(&|x, y| cell(8 - x, y) > cell(7 - x, y))]
 }
 
 fn alike(a: &[u64; 2], b: &[u64; 2]) -> bool {
@@ -152,19 +149,20 @@ impl Photo {
         self.kind != Kind::Nobody
     }
 
-    /// Hands out its candidates.
+    /// Hands out its candidates; those of pictures without anybody are other
+    /// ones in each round.
     ///
     /// # Errors
     /// A picture that cannot be read, and those of `take`.
-    pub fn visit(&self, take: Take<'_>) -> Result<(), Failure> {
+    pub fn visit(&self, round: u64, take: Take<'_>) -> Result<(), Failure> {
         let grey = read(&self.path)?;
         let example = Example { is_person: self.is_person(), group: self.group };
-        let squares = self.squares(&grey);
+        let squares = self.squares(&grey, round);
         let frame = frame(grey);
         squares.into_iter().try_for_each(|region| take(&frame, &candidate(region), example))
     }
 
-    fn squares(&self, grey: &GreyImage) -> Vec<Rect> {
+    fn squares(&self, grey: &GreyImage, round: u64) -> Vec<Rect> {
         let (width, height) = (grey.width() as f64, grey.height() as f64);
         match self.kind {
             Kind::Body => {
@@ -176,7 +174,7 @@ impl Photo {
             }
             Kind::Bust => vec![Rect::new(0.0, 0.0, width, height).inflated(-0.08)],
             Kind::Nobody => {
-                let mut chance = Chance(self.group);
+                let mut chance = Chance(self.group ^ round);
                 let least = width.min(height).min(40.0);
                 let most = (0.6 * width.min(height)).max(least);
                 let count = if width < 200.0 { 1 } else { SQUARES };

@@ -1,8 +1,8 @@
 //! Rooms for training and for testing, drawn at random from a seed.
 
 use tagalong_sim::{
-    CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind, LightSettings, RobotSettings,
-    RoomSettings, Scene,
+    AtEnd, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind, LightSettings,
+    PersonSettings, RobotSettings, RoomSettings, Scene,
 };
 
 /// Rooms for training have seeds from here on ...
@@ -20,17 +20,18 @@ const LOOK_ALIKES: [FurnitureKind; 5] = [
     FurnitureKind::Pillar,
 ];
 
-/// A room with so many people. Size, light, camera, furniture and the way of
-/// the robot depend on the seed.
+/// A room with so many people, all of it in view. Size, light, camera, furniture
+/// and everybody's way and looks depend on the seed.
 pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
     let mut chance = Chance(seed);
     let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
     let start = [0.8, width * chance.between(0.3, 0.7)];
+    let view = View { start, room: [length, width] };
     Scene {
         about: "candidates for a verifier".into(),
         seed,
         duration_s,
-        crowd: people,
+        crowd: 0,
         room: RoomSettings {
             size_m: [length, width],
             height_m: chance.between(2.5, 3.2),
@@ -54,21 +55,48 @@ pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
         },
         robot: RobotSettings {
             start,
-            path: vec![[chance.between(2.0, 4.0), width * chance.between(0.3, 0.7)]],
+            path: vec![[chance.between(1.3, 2.0), start[1] + chance.between(-0.3, 0.3)]],
             speed_mps: chance.between(0.2, 0.5),
             ..RobotSettings::default()
         },
         faults: FaultSettings { dropped: 0.0, late: 0.0 },
-        furniture: (0..6).map(|_| piece(&mut chance, length, width)).collect(),
-        people: Vec::new(),
+        furniture: (0..6).map(|_| piece(&mut chance, &view)).collect(),
+        people: (0..people).map(|_| walker(&mut chance, &view)).collect(),
     }
 }
 
-fn piece(chance: &mut Chance, length: f64, width: f64) -> Furniture {
+/// What the robot looks at from its start.
+struct View {
+    start: [f64; 2],
+    room: [f64; 2],
+}
+
+impl View {
+    /// A place in view, within the detector's range and inside the room.
+    fn place(&self, chance: &mut Chance) -> [f64; 2] {
+        let (distance, angle) = (chance.between(1.8, 5.5), chance.between(-0.5, 0.5));
+        let inside = |at: f64, size: f64| at.clamp(0.5, size - 0.5);
+        [
+            inside(self.start[0] + distance * angle.cos(), self.room[0]),
+            inside(self.start[1] + distance * angle.sin(), self.room[1]),
+        ]
+    }
+}
+
+fn piece(chance: &mut Chance, view: &View) -> Furniture {
     Furniture {
         kind: chance.pick(&LOOK_ALIKES),
-        at: [chance.between(2.6, length - 0.5), chance.between(0.5, width - 0.5)],
+        at: view.place(chance),
         heading_deg: chance.between(90.0, 270.0),
+    }
+}
+
+fn walker(chance: &mut Chance, view: &View) -> PersonSettings {
+    PersonSettings {
+        path: (0..3).map(|_| view.place(chance)).collect(),
+        speed_mps: chance.between(0.3, 1.2),
+        at_end: AtEnd::Loop,
+        ..PersonSettings::default()
     }
 }
 

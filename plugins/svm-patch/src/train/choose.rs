@@ -146,9 +146,8 @@ mod tests {
         let parts = parts(&all, 4, 3);
         for part in 0..4 {
             for people in [true, false] {
-                let here = |s: &&Sample| {
-                    parts[&s.example.group] == part && s.example.is_person == people
-                };
+                let here =
+                    |s: &&Sample| parts[&s.example.group] == part && s.example.is_person == people;
                 assert!(samples.iter().any(|s| here(&s)), "part {part}, people {people}");
             }
         }

@@ -127,9 +127,8 @@ fn rounded(value: f64) -> toml::Value {
 }
 
 fn check(training: &Training) -> Result<()> {
-    let positive = |values: &[f64]| {
-        !values.is_empty() && values.iter().all(|v| v.is_finite() && *v > 0.0)
-    };
+    let positive =
+        |values: &[f64]| !values.is_empty() && values.iter().all(|v| v.is_finite() && *v > 0.0);
     let rules = [
         (positive(&training.gammas), "`gammas` must be positive numbers"),
         (positive(&training.penalties), "`penalties` must be positive numbers"),
