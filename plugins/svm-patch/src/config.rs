@@ -66,8 +66,8 @@ impl Default for Training {
             gammas: vec![0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0],
             penalties: vec![0.1, 1.0, 10.0, 100.0],
             folds: 4,
-            max_tried: 800,
-            max_samples: 3000,
+            max_tried: 600,
+            max_samples: 2000,
             max_vectors: 600,
         }
     }

@@ -82,7 +82,7 @@ impl Plan {
         if quick {
             Self { rooms: [4, 2], rounds: 1, test_rooms: 3, duration_s: 2.0 }
         } else {
-            Self { rooms: [45, 30], rounds: 2, test_rooms: 36, duration_s: 4.0 }
+            Self { rooms: [18, 12], rounds: 2, test_rooms: 18, duration_s: 3.0 }
         }
     }
 

@@ -1,13 +1,13 @@
 //! Frames with the truth beside them, from drawn rooms and from annotated logs.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use nalgebra::{Isometry2, Point2};
-use tagalong_core::{Detection, Frame, Motion, Rect, Stamp};
+use nalgebra::Point2;
+use tagalong_core::{Detection, Frame, Rect};
 use tagalong_eval::{Role, Truth};
 use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
-use tagalong_sim::{Event, Scene, Shot, Simulation};
+use tagalong_sim::Scene;
+use tagalong_trials::Draw;
 
 use crate::outcome::Failure;
 use crate::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
@@ -79,46 +79,21 @@ pub type See<'a> = &'a mut dyn FnMut(&Seen) -> Result<(), Failure>;
 /// # Errors
 /// Those of `see`.
 pub fn in_room(scene: &Scene, threads: usize, see: See<'_>) -> Result<(), Failure> {
-    let mut simulation = Simulation::new(scene, threads);
-    let camera = Arc::new(simulation.camera().clone());
-    let (mut odometry, mut before) = (Isometry2::identity(), None);
-    let mut index = 0;
-    while let Some(event) = simulation.next_event() {
-        match event {
-            Event::Odometry(reading) => odometry = reading.odom_from_robot,
-            Event::Shot(shot) => {
-                let motion = since(before.replace((shot.captured_ns, odometry)), &shot, odometry);
-                index += 1;
-                let stamp = Stamp::from_nanos(1_700_000_000_000_000_000 + shot.captured_ns);
-                let people = drawn(&shot);
-                let images = shot.images;
-                let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, images);
-                see(&Seen { frame, people })?;
-            }
-        }
+    let mut draw = Draw::new(scene, threads);
+    while let Some(drawn) = draw.next_frame() {
+        let people = drawn.truth.iter().map(known).collect();
+        see(&Seen { frame: drawn.frame, people })?;
     }
     Ok(())
 }
 
-fn since(before: Option<(u64, Isometry2<f64>)>, shot: &Shot, now: Isometry2<f64>) -> Motion {
-    const ODOMETRY_SIGMA: f64 = 0.02;
-    match before {
-        None => Motion::at_rest(0.0),
-        Some((then_ns, then)) => {
-            let dt = (shot.captured_ns - then_ns) as f64 * 1e-9;
-            Motion::between(&then, &now, dt, ODOMETRY_SIGMA)
-        }
-    }
-}
-
-fn drawn(shot: &Shot) -> Vec<Known> {
-    let known = |truth: &tagalong_sim::Truth| Known {
+fn known(truth: &tagalong_sim::Truth) -> Known {
+    Known {
         id: i64::from(truth.id),
         floor: truth.head_in_robot.xy(),
         region: truth.upper_body,
         ignore: truth.ignore || truth.upper_body.is_none(),
-    };
-    shot.truth.iter().map(known).collect()
+    }
 }
 
 /// Goes through an annotated log.

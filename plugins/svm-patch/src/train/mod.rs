@@ -32,9 +32,9 @@ pub struct PatchTrainer {
 /// The last fit takes so much of the progress.
 const LAST_FIT: f64 = 0.2;
 
-/// A fit with too many support vectors is repeated with this part of the
-/// samples.
-const FEWER: f64 = 0.8;
+/// A fit with too many support vectors is repeated with fewer samples: so many
+/// that there would be this part of what is allowed, were they in proportion.
+const ALLOWED: f64 = 0.95;
 
 impl PatchTrainer {
     /// A trainer without samples.
@@ -65,7 +65,8 @@ impl PatchTrainer {
             if model.len() <= self.training.max_vectors {
                 return Ok((model, samples.len()));
             }
-            most = (FEWER * samples.len() as f64) as usize;
+            let part = ALLOWED * self.training.max_vectors as f64 / model.len() as f64;
+            most = (part * samples.len() as f64) as usize;
         }
     }
 
