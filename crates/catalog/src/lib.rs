@@ -14,4 +14,5 @@ pub fn register(registry: &mut Registry) {
     tagalong_ekf::register(registry);
     tagalong_last_seen::register(registry);
     tagalong_recorded_detections::register(registry);
+    tagalong_svm_patch::register(registry);
 }

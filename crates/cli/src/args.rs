@@ -7,6 +7,7 @@ use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
 use crate::simulate::SimulateArgs;
 use crate::trials::TrialsArgs;
+use crate::train::TrainArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.
@@ -68,6 +69,9 @@ pub enum Command {
     /// Compares pipelines on many draws of the same scenes, in memory
     #[command(after_help = TRIALS_HELP)]
     Trials(TrialsArgs),
+    /// Makes the model file of a plugin, and its card
+    #[command(after_help = TRAIN_HELP)]
+    Train(TrainArgs),
     /// Says what a log contains and what a pipeline could use of it
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -148,6 +152,15 @@ Examples:
   tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7 --split test
   tagalong simulate configs/scenes/crowd.toml --set crowd=3 --set camera.kind=stereo
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
+
+const TRAIN_HELP: &str = "\
+Candidates are what the template detector proposes in drawn rooms and annotated logs. Same seed and
+data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
+held-out rooms and logs.
+
+Examples:
+  tagalong train svm-patch --quick -o quick.toml
+  tagalong train svm-patch --data ../shared/data";
 
 const INSPECT_HELP: &str = "\
 Examples:

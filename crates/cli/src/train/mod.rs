@@ -1,0 +1,353 @@
+//! `tagalong train`: from drawn rooms, annotated logs and photographs to the
+//! model file of a plugin, and a card that says where it comes from and what it
+//! is worth.
+//!
+//! A verifier is trained on what the detector proposes, since that is what it
+//! will be asked about. The first model is then shown new rooms, and what it
+//! gets wrong there, or is unsure of, is added before the next fit.
+
+mod card;
+mod held_out;
+mod photos;
+mod rooms;
+mod seen;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_core::{
+    ConfigError, Context, Detection, Example, Frame, Registry, Trainer, Verifier, Wheels,
+};
+use tagalong_pipeline::Pipeline;
+use toml::Spanned;
+use toml::de::DeTable;
+
+use self::card::{Card, Harvest};
+use self::held_out::{Comparison, Effect, Tally};
+use self::photos::{fingerprint, photos};
+use self::seen::{Label, Seen, in_log, in_room, label};
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::simulate::threads;
+
+/// Proposes candidates.
+const HARVEST: &str = include_str!("harvest.toml");
+/// What the verifier is tried in.
+const IN_USE: &str = include_str!("../../../../configs/depth-ekf.toml");
+
+/// A margin below this is unsure: log-odds.
+const UNSURE: f64 = 1.0;
+
+/// Annotated logs for training ...
+const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
+/// ... and one of another room, which is held out.
+const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
+
+/// The arguments of `tagalong train`.
+#[derive(Args, Debug)]
+pub struct TrainArgs {
+    /// The plugin to train, for example `svm-patch`.
+    pub plugin: String,
+    /// Where the model goes; its card is written beside it
+    /// [default: configs/models/<plugin>.toml].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// A folder of real data (logs, people, negatives); without it, only drawn
+    /// rooms are used.
+    #[arg(long, value_name = "DIR")]
+    pub data: Option<PathBuf>,
+    /// Settings of the plugin, a TOML file.
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
+    /// A minute's version, to see that it works; the model is poor.
+    #[arg(long)]
+    pub quick: bool,
+    /// Everything random depends on it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// How much is drawn.
+struct Plan {
+    /// Rooms of the first round and of each further one.
+    rooms: [u64; 2],
+    rounds: usize,
+    test_rooms: u64,
+    duration_s: f64,
+}
+
+impl Plan {
+    fn new(quick: bool) -> Self {
+        if quick {
+            Self { rooms: [4, 2], rounds: 1, test_rooms: 3, duration_s: 2.0 }
+        } else {
+            Self { rooms: [18, 12], rounds: 2, test_rooms: 18, duration_s: 3.0 }
+        }
+    }
+
+    /// The seeds of the rooms of a round; no room comes twice.
+    fn seeds(&self, round: usize, seed: u64) -> Vec<u64> {
+        let [first, further] = self.rooms;
+        let before = if round == 0 { 0 } else { first + (round as u64 - 1) * further };
+        let count = if round == 0 { first } else { further };
+        let start = rooms::TRAIN + seed.wrapping_mul(1000) % (rooms::TEST - 1000) + before;
+        (start..start + count).collect()
+    }
+}
+
+/// What a session of training has at hand.
+struct Session<'a> {
+    args: &'a TrainArgs,
+    registry: &'a Registry,
+    plan: Plan,
+    settings: toml::Table,
+    model: PathBuf,
+    bar: ProgressBar,
+}
+
+/// `tagalong train`.
+///
+/// # Errors
+/// A plugin that cannot be trained and wrong settings are exit code 2; files
+/// that cannot be read or written are 1.
+pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
+    let session = Session::new(args, registry)?;
+    let mut trainer = session.trainer()?;
+    let mut card = Card::new(args, session.sources());
+    let mut doubter: Option<Box<dyn Verifier>> = None;
+    for round in 0..=session.plan.rounds {
+        let harvest = session.harvest(round, trainer.as_mut(), doubter)?;
+        session.tell(round, "fitting");
+        session.bar.set_length(1000);
+        let fitted = trainer
+            .fit(&mut |part| session.bar.set_position((1000.0 * part) as u64))
+            .map_err(Failure::failed)?;
+        write(&session.model, &fitted.model)?;
+        doubter = Some(session.verifier()?);
+        card.rounds.push(harvest);
+        card.fit = fitted.figures;
+    }
+    card.held_out_rooms = session.try_rooms()?;
+    card.held_out_logs = session.try_logs()?;
+    session.bar.finish_and_clear();
+    let path = session.model.with_extension("card.toml");
+    write(&path, &card.to_text())?;
+    print(&card.summary())?;
+    say(&format!("{} and {}", session.model.display(), path.display()));
+    Ok(Ended::Well)
+}
+
+impl<'a> Session<'a> {
+    fn new(args: &'a TrainArgs, registry: &'a Registry) -> Result<Self, Failure> {
+        let model = args.output.clone().unwrap_or_else(|| {
+            Path::new("configs/models").join(&args.plugin).with_extension("toml")
+        });
+        let bar = ProgressBar::new(1);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3}% {msg} {eta}") {
+            bar.set_style(style);
+        }
+        let settings = settings(args.settings.as_deref())?;
+        Ok(Self { args, registry, plan: Plan::new(args.quick), settings, model, bar })
+    }
+
+    fn tell(&self, round: usize, what: &str) {
+        self.bar.set_position(0);
+        self.bar.set_message(format!("round {} of {}: {what}", round + 1, self.plan.rounds + 1));
+    }
+
+    fn sources(&self) -> Vec<String> {
+        let mut names = vec!["drawn rooms".to_owned()];
+        if self.args.data.is_some() {
+            names.extend(TRAIN_LOGS.map(|log| format!("logs/{log}.mcap")));
+            names.extend(
+                ["people/inria-64x128", "people/head-shoulder-50", "negatives"].map(String::from),
+            );
+        }
+        names
+    }
+
+    fn context(&self) -> Context {
+        let wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+        Context { seed: self.args.seed, base_dir: PathBuf::from("."), wheels }
+    }
+
+    fn trainer(&self) -> Result<Box<dyn Trainer>, Failure> {
+        let mut settings = self.settings.clone();
+        if self.args.quick {
+            settings.extend(quick_settings(&self.args.plugin));
+        }
+        with_value(&settings, |value| {
+            self.registry.build_trainer(&self.args.plugin, value, &self.context())
+        })
+    }
+
+    /// The verifier with the model of the last round.
+    fn verifier(&self) -> Result<Box<dyn Verifier>, Failure> {
+        with_value(&self.with_model()?, |value| {
+            self.registry.build_verifier(&self.args.plugin, value, &self.context())
+        })
+    }
+
+    fn with_model(&self) -> Result<toml::Table, Failure> {
+        let absolute = std::path::absolute(&self.model).map_err(Failure::failed)?;
+        let mut settings = self.settings.clone();
+        settings.insert("model".into(), absolute.display().to_string().into());
+        Ok(settings)
+    }
+
+    /// Shows the trainer candidates: all of them in the first round, after
+    /// that what the verifier gets wrong or is unsure of.
+    fn harvest(
+        &self,
+        round: usize,
+        trainer: &mut dyn Trainer,
+        mut doubter: Option<Box<dyn Verifier>>,
+    ) -> Result<Harvest, Failure> {
+        let mut harvest = Harvest::default();
+        let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
+            harvest.seen += 1;
+            if let Some(verifier) = &mut doubter {
+                let margin = verifier.margin(frame, candidate).map_err(Failure::failed)?;
+                let right = if example.is_person { margin } else { -margin };
+                harvest.mistakes += u64::from(right < 0.0);
+                if right >= UNSURE {
+                    return Ok(());
+                }
+            }
+            let count = if example.is_person { &mut harvest.people } else { &mut harvest.others };
+            *count += 1;
+            trainer.add(frame, candidate, example).map_err(Failure::failed)
+        };
+        let seeds = self.plan.seeds(round, self.args.seed);
+        self.tell(round, "drawing rooms");
+        self.bar.set_length(seeds.len() as u64);
+        for seed in &seeds {
+            let scene = rooms::room(*seed, (seed % 4) as usize, self.plan.duration_s);
+            let mut pipeline = pipeline(HARVEST, self.registry)?;
+            in_room(&scene, threads(None), &mut |seen| {
+                propose(&mut pipeline, seen, |_| *seed, &mut show)
+            })?;
+            self.bar.inc(1);
+        }
+        let Some(data) = &self.args.data else { return Ok(harvest) };
+        self.tell(round, "reading logs and photographs");
+        if round == 0 {
+            for log in TRAIN_LOGS {
+                let mut pipeline = pipeline(HARVEST, self.registry)?;
+                let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
+                self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
+            }
+        }
+        let share = if self.args.quick { 8 } else { 1 };
+        let photos = photos(data, false);
+        self.bar.set_length(photos.len() as u64);
+        for photo in photos.iter().filter(|p| p.group / 5 % share == 0) {
+            photo.visit(round as u64, &mut show)?;
+            self.bar.inc(1);
+        }
+        Ok(harvest)
+    }
+
+    fn in_log(&self, data: &Path, log: &str, see: seen::See<'_>) -> Result<(), Failure> {
+        let path = data.join("logs").join(log);
+        in_log(&path.with_extension("mcap"), &path.with_extension("people.csv"), see)
+    }
+
+    /// The pipeline in use, without and with the verifier.
+    fn comparison(&self) -> Result<Comparison, Failure> {
+        let mut section = toml::Table::new();
+        section.insert("plugin".into(), self.args.plugin.clone().into());
+        section.insert("config".into(), self.with_model()?.into());
+        let mut table = toml::Table::new();
+        table.insert("verifiers".into(), vec![toml::Value::Table(section)].into());
+        let with_verifier = format!("{IN_USE}\n{table}");
+        Comparison::new([HARVEST, IN_USE, &with_verifier], self.verifier()?, self.registry)
+    }
+
+    fn try_rooms(&self) -> Result<Effect, Failure> {
+        self.bar.set_message("trying held-out rooms");
+        self.bar.set_position(0);
+        self.bar.set_length(self.plan.test_rooms);
+        let mut tally = Tally::default();
+        for seed in rooms::TEST..rooms::TEST + self.plan.test_rooms {
+            let scene = rooms::room(seed, (seed % 3) as usize, self.plan.duration_s);
+            let mut comparison = self.comparison()?;
+            tally.next_scene();
+            in_room(&scene, threads(None), &mut |seen| comparison.step(seen, &mut tally))?;
+            self.bar.inc(1);
+        }
+        Ok(tally.effect())
+    }
+
+    fn try_logs(&self) -> Result<Option<Effect>, Failure> {
+        let Some(data) = &self.args.data else { return Ok(None) };
+        let mut tally = Tally::default();
+        for log in TEST_LOGS {
+            let mut comparison = self.comparison()?;
+            tally.next_scene();
+            self.in_log(data, log, &mut |seen| comparison.step(seen, &mut tally))?;
+        }
+        Ok(Some(tally.effect()))
+    }
+}
+
+/// Hands on what the detector proposes and the truth can label.
+fn propose(
+    pipeline: &mut Pipeline,
+    seen: &Seen,
+    group: impl Fn(Option<i64>) -> u64,
+    show: photos::Take<'_>,
+) -> Result<(), Failure> {
+    let report = pipeline.step(&seen.frame).map_err(Failure::failed)?;
+    for candidate in &report.candidates {
+        let (is_person, who) = match label(&candidate.detection, &seen.people) {
+            Label::Person(id) => (true, Some(id)),
+            Label::Nobody => (false, None),
+            Label::Part | Label::Unclear => continue,
+        };
+        show(&seen.frame, &candidate.detection, Example { is_person, group: group(who) })?;
+    }
+    Ok(())
+}
+
+fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
+    let built = Pipeline::from_toml(text, Path::new("."), registry);
+    built.map(|(pipeline, _)| pipeline).map_err(Failure::usage)
+}
+
+/// Fewer combinations, for those who only want to see that it works.
+fn quick_settings(plugin: &str) -> toml::Table {
+    let text = match plugin {
+        "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
+        _ => "",
+    };
+    text.parse().unwrap_or_default()
+}
+
+fn settings(path: Option<&Path>) -> Result<toml::Table, Failure> {
+    let Some(path) = path else { return Ok(toml::Table::new()) };
+    let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
+    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))
+}
+
+/// Builds something from a table of settings.
+fn with_value<T>(
+    settings: &toml::Table,
+    build: impl FnOnce(Option<tagalong_core::Value<'_>>) -> Result<T, ConfigError>,
+) -> Result<T, Failure> {
+    let text = settings.to_string();
+    let table = DeTable::parse(&text).map_err(Failure::usage)?;
+    let span = table.span();
+    let value = Spanned::new(span, toml::de::DeValue::Table(table.into_inner()));
+    build(Some(value)).map_err(|error| Failure::usage(error.message))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(failed)?;
+    }
+    fs::write(path, text).map_err(failed)
+}

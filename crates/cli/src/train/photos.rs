@@ -1,0 +1,229 @@
+//! Photographs without depth: crops of people, and pictures without anybody.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{
+    Camera, Detection, Distortion, Example, Frame, GreyImage, Images, Motion, Pinhole, Rect, Stamp,
+};
+
+use super::rooms::Chance;
+use crate::outcome::Failure;
+
+/// Squares cut from a photograph without anybody.
+const SQUARES: usize = 2;
+
+/// A person in a crop of INRIA is 96 of 128 rows tall and begins at row 16.
+const INRIA_BODY: Rect = Rect::new(0.0, 16.0, 64.0, 96.0);
+/// The height that makes a body 1.7 m.
+const STANDING_M: f64 = 1.7;
+
+/// How a candidate of a photograph is taken in.
+pub type Take<'a> = &'a mut dyn FnMut(&Frame, &Detection, Example) -> Result<(), Failure>;
+
+/// A photograph, and whether it shows a person.
+pub struct Photo {
+    path: PathBuf,
+    kind: Kind,
+    /// Photographs that resemble each other share it.
+    pub group: u64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Body,
+    Bust,
+    Nobody,
+}
+
+/// All photographs of a folder of data, in order; those that are held out, or
+/// the others.
+pub fn photos(data: &Path, held_out: bool) -> Vec<Photo> {
+    let mut all = Vec::new();
+    let folders = [
+        ("people/inria-64x128/pos", Kind::Body),
+        ("people/inria-64x128/neg", Kind::Nobody),
+        ("negatives", Kind::Nobody),
+    ];
+    for (folder, kind) in folders {
+        let files = pictures(&data.join(folder));
+        all.extend(files.into_iter().map(|path| Photo { group: stem_group(&path), path, kind }));
+    }
+    all.extend(busts(&data.join("people/head-shoulder-50")));
+    all.retain(|photo| (photo.group % 5 == 0) == held_out);
+    all
+}
+
+fn pictures(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_picture = |path: &PathBuf| {
+        path.extension().and_then(|e| e.to_str()).is_some_and(|e| ["jpg", "png"].contains(&e))
+    };
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_picture).collect();
+    files.sort();
+    files
+}
+
+/// Crops of one photograph have its name and a letter or a number behind it.
+fn stem_group(path: &Path) -> u64 {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let base = match stem.rsplit_once('_') {
+        Some((base, number)) if number.parse::<u32>().is_ok() => base,
+        _ => stem.trim_end_matches(|c: char| c.is_ascii_lowercase()),
+    };
+    fingerprint(base)
+}
+
+/// FNV-1a: a number for a name.
+pub fn fingerprint(name: &str) -> u64 {
+    name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
+    })
+}
+
+/// Crops of heads and shoulders; near-duplicates and mirror images share a
+/// group.
+fn busts(folder: &Path) -> Vec<Photo> {
+    let files: Vec<(PathBuf, GreyImage)> = pictures(folder)
+        .into_iter()
+        .filter_map(|path| Some((path.clone(), read(&path).ok()?)))
+        .collect();
+    let looks: Vec<[u64; 2]> = files.iter().map(|(_, image)| looks(image)).collect();
+    let mut group_of: Vec<usize> = (0..files.len()).collect();
+    for i in 0..files.len() {
+        for j in 0..i {
+            if alike(&looks[i], &looks[j]) {
+                let (from, to) = (group_of[i], group_of[j]);
+                group_of.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+            }
+        }
+    }
+    let each = files.into_iter().zip(group_of);
+    each.map(|((path, _), group)| Photo {
+        path,
+        kind: Kind::Bust,
+        group: fingerprint(&format!("bust {group}")),
+    })
+    .collect()
+}
+
+/// 64 bits, one for each of 8x8 cells that is brighter than its right
+/// neighbour, of the image and of its mirror image.
+fn looks(image: &GreyImage) -> [u64; 2] {
+    let cell = |x: usize, y: usize| {
+        let (w, h) = (image.width(), image.height());
+        let rows = y * h / 8..((y + 1) * h / 8).max(y * h / 8 + 1);
+        let columns = x * w / 9..((x + 1) * w / 9).max(x * w / 9 + 1);
+        let sum: u64 = rows
+            .map(|row| image.row(row)[columns.clone()].iter().map(|v| u64::from(*v)).sum::<u64>())
+            .sum();
+        sum
+    };
+    let bits = |brighter: &dyn Fn(usize, usize) -> bool| {
+        (0..64).fold(0u64, |bits, k| bits << 1 | u64::from(brighter(k % 8, k / 8)))
+    };
+    if image.width() < 9 || image.height() < 8 {
+        return [0, 0];
+    }
+    [bits(&|x, y| cell(x, y) > cell(x + 1, y)), bits(&|x, y| cell(8 - x, y) > cell(7 - x, y))]
+}
+
+fn alike(a: &[u64; 2], b: &[u64; 2]) -> bool {
+    const DIFFERENT_BITS: u32 = 10;
+    [b[0], b[1]].iter().any(|other| (a[0] ^ other).count_ones() <= DIFFERENT_BITS)
+}
+
+fn read(path: &Path) -> Result<GreyImage, Failure> {
+    let image = image::open(path)
+        .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?
+        .into_luma8();
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    Ok(GreyImage::from_pixels(width, height, image.into_raw()).unwrap_or_default())
+}
+
+impl Photo {
+    /// True if it shows a person.
+    pub fn is_person(&self) -> bool {
+        self.kind != Kind::Nobody
+    }
+
+    /// Hands out its candidates; those of pictures without anybody are other
+    /// ones in each round.
+    ///
+    /// # Errors
+    /// A picture that cannot be read, and those of `take`.
+    pub fn visit(&self, round: u64, take: Take<'_>) -> Result<(), Failure> {
+        let grey = read(&self.path)?;
+        let example = Example { is_person: self.is_person(), group: self.group };
+        let squares = self.squares(&grey, round);
+        let frame = frame(grey);
+        squares.into_iter().try_for_each(|region| take(&frame, &candidate(region), example))
+    }
+
+    fn squares(&self, grey: &GreyImage, round: u64) -> Vec<Rect> {
+        let (width, height) = (grey.width() as f64, grey.height() as f64);
+        match self.kind {
+            Kind::Body => {
+                let scale = height / 128.0;
+                let aside = 0.5 * (width - 64.0 * scale);
+                let r = INRIA_BODY;
+                let body = Rect::new(aside, scale * r.y, scale * r.width, scale * r.height);
+                vec![body.upper_body_of_standing(STANDING_M)]
+            }
+            Kind::Bust => vec![Rect::new(0.0, 0.0, width, height).inflated(-0.08)],
+            Kind::Nobody => {
+                let mut chance = Chance(self.group ^ round);
+                let least = width.min(height).min(40.0);
+                let most = (0.6 * width.min(height)).max(least);
+                let count = if width < 200.0 { 1 } else { SQUARES };
+                let square = |_| {
+                    let side = chance.between(least, most);
+                    let (x, y) =
+                        (chance.between(0.0, width - side), chance.between(0.0, height - side));
+                    Rect::new(x, y, side, side)
+                };
+                (0..count).map(square).collect()
+            }
+        }
+    }
+}
+
+fn frame(grey: GreyImage) -> Frame {
+    let (width, height) = (grey.width(), grey.height());
+    let (cx, cy) = (0.5 * width as f64, 0.5 * height as f64);
+    let lens = Pinhole { fx: 500.0, fy: 500.0, cx, cy, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, width, height, 1.2, 0.0, 0.0));
+    let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
+    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
+}
+
+/// A candidate of which only the region is known.
+fn candidate(region: Rect) -> Detection {
+    let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), Matrix3::identity());
+    Detection { region, position, covariance, score: 0.0, source: "photograph" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crops_of_one_photograph_are_one_group() {
+        let group = |name: &str| stem_group(Path::new(name));
+        assert_eq!(group("crop001248a.png"), group("crop001248c.png"));
+        assert_eq!(group("125_8.jpg"), group("125_11.jpg"));
+        assert_ne!(group("125_8.jpg"), group("126_8.jpg"));
+        assert_ne!(group("crop001248a.png"), group("crop001249a.png"));
+    }
+
+    #[test]
+    fn mirror_images_look_alike() {
+        let image = GreyImage::from_fn(50, 50, |x, y| ((x * x + 7 * y * x) % 251) as u8);
+        let mirrored = GreyImage::from_fn(50, 50, |x, y| image.row(y)[49 - x]);
+        let other = GreyImage::from_fn(50, 50, |x, y| ((x * 31 + y * y * 3) % 253) as u8);
+        assert!(alike(&looks(&image), &looks(&mirrored)));
+        assert!(!alike(&looks(&image), &looks(&other)));
+    }
+}

@@ -1,0 +1,138 @@
+//! Rooms for training and for testing, drawn at random from a seed.
+
+use tagalong_sim::{
+    AtEnd, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind, LightSettings,
+    PersonSettings, RobotSettings, RoomSettings, Scene,
+};
+
+/// Rooms for training have seeds from here on ...
+pub const TRAIN: u64 = 1;
+/// ... and rooms for testing from here on. No room is in both.
+pub const TEST: u64 = 100_000;
+
+/// Furniture with the silhouette of a person, but without a picture of one:
+/// posters and cardboard figures show what grey values alone cannot doubt.
+const LOOK_ALIKES: [FurnitureKind; 5] = [
+    FurnitureKind::CoatStand,
+    FurnitureKind::DrapedChair,
+    FurnitureKind::FloorLamp,
+    FurnitureKind::Plant,
+    FurnitureKind::Pillar,
+];
+
+/// A room with so many people, all of it in view. Size, light, camera, furniture
+/// and everybody's way and looks depend on the seed.
+pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
+    let mut chance = Chance(seed);
+    let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
+    let start = [0.8, width * chance.between(0.3, 0.7)];
+    let view = View { start, room: [length, width] };
+    Scene {
+        about: "candidates for a verifier".into(),
+        seed,
+        duration_s,
+        crowd: 0,
+        room: RoomSettings {
+            size_m: [length, width],
+            height_m: chance.between(2.5, 3.2),
+            wallpaper: chance.between(0.0, 1.0) < 0.5,
+            floor: chance.pick(&[Floor::Planks, Floor::Tiles, Floor::Carpet]),
+            clutter: 0,
+        },
+        light: LightSettings {
+            lux: chance.between(80.0, 700.0),
+            lamps: chance.between(1.0, 4.0) as usize,
+            ambient: chance.between(0.2, 0.5),
+        },
+        camera: CameraSettings {
+            width: 512,
+            height: 384,
+            field_of_view_deg: chance.between(56.0, 75.0),
+            rate_hz: 4.0,
+            height_m: chance.between(0.9, 1.5),
+            pitch_down_deg: chance.between(-3.0, 6.0),
+            ..CameraSettings::default()
+        },
+        robot: RobotSettings {
+            start,
+            path: vec![[chance.between(1.3, 2.0), start[1] + chance.between(-0.3, 0.3)]],
+            speed_mps: chance.between(0.2, 0.5),
+            ..RobotSettings::default()
+        },
+        faults: FaultSettings { dropped: 0.0, late: 0.0 },
+        furniture: (0..6).map(|_| piece(&mut chance, &view)).collect(),
+        people: (0..people).map(|_| walker(&mut chance, &view)).collect(),
+    }
+}
+
+/// What the robot looks at from its start.
+struct View {
+    start: [f64; 2],
+    room: [f64; 2],
+}
+
+impl View {
+    /// A place in view, within the detector's range and inside the room.
+    fn place(&self, chance: &mut Chance) -> [f64; 2] {
+        let (distance, angle) = (chance.between(1.8, 5.5), chance.between(-0.5, 0.5));
+        let inside = |at: f64, size: f64| at.clamp(0.5, size - 0.5);
+        [
+            inside(self.start[0] + distance * angle.cos(), self.room[0]),
+            inside(self.start[1] + distance * angle.sin(), self.room[1]),
+        ]
+    }
+}
+
+fn piece(chance: &mut Chance, view: &View) -> Furniture {
+    Furniture {
+        kind: chance.pick(&LOOK_ALIKES),
+        at: view.place(chance),
+        heading_deg: chance.between(90.0, 270.0),
+    }
+}
+
+fn walker(chance: &mut Chance, view: &View) -> PersonSettings {
+    PersonSettings {
+        path: (0..3).map(|_| view.place(chance)).collect(),
+        speed_mps: chance.between(0.3, 1.2),
+        at_end: AtEnd::Loop,
+        ..PersonSettings::default()
+    }
+}
+
+/// Chance that depends on a seed only (SplitMix64: Steele, Lea and Flood,
+/// OOPSLA 2014).
+pub struct Chance(pub u64);
+
+impl Chance {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// A number between two others.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn pick<T: Copy>(&mut self, all: &[T]) -> T {
+        all[(self.next() % all.len() as u64) as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_room_depends_on_its_seed_only_and_is_a_scene() {
+        assert_eq!(room(5, 2, 4.0), room(5, 2, 4.0));
+        assert_ne!(room(5, 2, 4.0).furniture, room(6, 2, 4.0).furniture);
+        for seed in [TRAIN, TEST, TEST + 7] {
+            let text = toml::to_string(&room(seed, 1, 4.0)).unwrap();
+            assert_eq!(Scene::parse(&text).unwrap().seed, seed);
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Frames with the truth beside them, from drawn rooms and from annotated logs.
+
+use std::path::Path;
+
+use nalgebra::Point2;
+use tagalong_core::{Detection, Frame, Rect};
+use tagalong_eval::{Role, Truth};
+use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_sim::Scene;
+use tagalong_trials::Draw;
+
+use crate::outcome::Failure;
+use crate::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
+
+/// A frame and who is in it.
+pub struct Seen {
+    /// The frame.
+    pub frame: Frame,
+    /// Everybody, also those who do not count.
+    pub people: Vec<Known>,
+}
+
+/// Where somebody really is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// Who.
+    pub id: i64,
+    /// Below the head, on the floor of the robot frame, m.
+    pub floor: Point2<f64>,
+    /// The upper body in the image.
+    pub region: Option<Rect>,
+    /// Neither a miss nor a false alarm.
+    pub ignore: bool,
+}
+
+/// What a candidate is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Label {
+    /// The head and shoulders of this person.
+    Person(i64),
+    /// Something else of a person: a backpack, an arm.
+    Part,
+    /// Too near to somebody to be called one or the other.
+    Unclear,
+    /// Nobody is there.
+    Nobody,
+}
+
+/// A person's head is this near on the floor, m ...
+const SAME_M: f64 = 0.4;
+/// ... and the square overlaps this much.
+const SAME_OVERLAP: f64 = 0.4;
+/// Nobody is nearer than this to something that is nobody, m.
+const NOBODY_M: f64 = 0.9;
+
+/// What the candidate is, by the truth.
+pub fn label(candidate: &Detection, people: &[Known]) -> Label {
+    let at = candidate.position.xy();
+    let off = |known: &&Known| (known.floor - at).norm();
+    let Some(nearest) = people.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
+        return Label::Nobody;
+    };
+    let overlap = |known: &Known| known.region.map_or(0.0, |r| r.iou(&candidate.region));
+    let covers_nobody = people.iter().all(|known| overlap(known) < 0.2);
+    match off(&nearest) {
+        _ if nearest.ignore && off(&nearest) <= NOBODY_M => Label::Unclear,
+        m if m <= SAME_M && overlap(nearest) >= SAME_OVERLAP => Label::Person(nearest.id),
+        m if m <= SAME_M => Label::Part,
+        m if m > NOBODY_M && covers_nobody => Label::Nobody,
+        _ => Label::Unclear,
+    }
+}
+
+/// What is done with each frame.
+pub type See<'a> = &'a mut dyn FnMut(&Seen) -> Result<(), Failure>;
+
+/// Goes through a drawn room.
+///
+/// # Errors
+/// Those of `see`.
+pub fn in_room(scene: &Scene, threads: usize, see: See<'_>) -> Result<(), Failure> {
+    let mut draw = Draw::new(scene, threads);
+    while let Some(drawn) = draw.next_frame() {
+        let people = drawn.truth.iter().map(known).collect();
+        see(&Seen { frame: drawn.frame, people })?;
+    }
+    Ok(())
+}
+
+fn known(truth: &tagalong_sim::Truth) -> Known {
+    Known {
+        id: i64::from(truth.id),
+        floor: truth.head_in_robot.xy(),
+        region: truth.upper_body,
+        ignore: truth.ignore || truth.upper_body.is_none(),
+    }
+}
+
+/// Goes through an annotated log.
+///
+/// # Errors
+/// A log or a truth that cannot be used, and those of `see`.
+pub fn in_log(log: &Path, truth: &Path, see: See<'_>) -> Result<(), Failure> {
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let needs = Needs { colour: true, depth: true, right: false };
+    let truth = TruthFile::read(truth, TruthOptions::default())?;
+    let shots = Shots::read(log, &input, &limits)?;
+    let mut people = truth.frames(&shots);
+    let mut source = FrameSource::open(log, &input, &limits, needs)?;
+    while let Some(item) = source.next_frame() {
+        let (truths, _) = people.remove(&LogShot::of(&item).number).unwrap_or_default();
+        let people = truths.iter().filter_map(annotated).collect();
+        see(&Seen { frame: item.frame, people })?;
+    }
+    Ok(())
+}
+
+fn annotated(truth: &Truth) -> Option<Known> {
+    Some(Known {
+        id: truth.id,
+        floor: truth.floor_m?.into(),
+        region: truth.region.map(|r| Rect::new(r.x, r.y, r.width, r.height)),
+        ignore: truth.role != Role::Counts,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3};
+
+    use super::*;
+
+    fn known(x: f64, ignore: bool) -> Known {
+        let region = Some(Rect::new(100.0, 50.0, 60.0, 60.0));
+        Known { id: 7, floor: Point2::new(x, 0.0), region, ignore }
+    }
+
+    fn at(x: f64, left: f64) -> Detection {
+        Detection {
+            region: Rect::new(left, 50.0, 60.0, 60.0),
+            position: Point3::new(x, 0.0, 1.6),
+            covariance: Matrix3::identity(),
+            score: 0.0,
+            source: "test",
+        }
+    }
+
+    #[test]
+    fn candidates_are_labelled_by_place_and_overlap() {
+        let people = [known(3.0, false)];
+        assert_eq!(label(&at(3.1, 105.0), &people), Label::Person(7));
+        assert_eq!(label(&at(3.1, 145.0), &people), Label::Part);
+        assert_eq!(label(&at(3.7, 300.0), &people), Label::Unclear);
+        assert_eq!(label(&at(5.0, 300.0), &people), Label::Nobody);
+        assert_eq!(label(&at(5.0, 110.0), &people), Label::Unclear);
+        assert_eq!(label(&at(5.0, 110.0), &[]), Label::Nobody);
+        assert_eq!(label(&at(3.1, 105.0), &[known(3.0, true)]), Label::Unclear);
+    }
+}

@@ -1,0 +1,56 @@
+//! `tagalong train`: the same bytes for the same seed, a model that its plugin
+//! reads, and answers to wrong usage.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{code, tagalong, text};
+
+fn train(folder: &Path, arguments: &[&str]) -> std::process::Output {
+    tagalong().current_dir(folder).arg("train").args(arguments).output().unwrap()
+}
+
+#[test]
+#[cfg(feature = "train")]
+fn the_same_seed_makes_the_same_model_and_card_and_the_model_works() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |name: &str| {
+        let output = train(folder.path(), &["svm-patch", "--quick", "-o", name]);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let read = |extension: &str| {
+            fs::read_to_string(folder.path().join(name).with_extension(extension)).unwrap()
+        };
+        (read("toml"), read("card.toml"))
+    };
+    let first = make("a.toml");
+    assert_eq!(first, make("b.toml"));
+    let card: toml::Table = first.1.parse().unwrap();
+    assert!(card["fit"]["people"].as_integer().unwrap() > 0, "{card}");
+    assert!(card["fit"]["others"].as_integer().unwrap() > 0, "{card}");
+    let config = "[[detectors]]\nplugin = \"depth-template\"\n[filter]\nplugin = \"ekf\"\n\
+                  [[verifiers]]\nplugin = \"svm-patch\"\nconfig = { model = \"a.toml\" }\n";
+    fs::write(folder.path().join("with.toml"), config).unwrap();
+    let check = tagalong().current_dir(folder.path()).args(["check", "with.toml"]).output();
+    assert_eq!(code(&check.unwrap()), 0);
+}
+
+#[test]
+fn who_cannot_be_trained_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = train(folder.path(), &["ekf", "--quick"]);
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("`ekf` cannot be trained"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn wrong_settings_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), "[training]\nfold = 3\n").unwrap();
+    let output = train(folder.path(), &["svm-patch", "--quick", "--settings", "s.toml"]);
+    assert_eq!(code(&output), 2);
+    #[cfg(feature = "train")]
+    assert!(text(&output.stderr).contains("did you mean `folds`?"), "{}", text(&output.stderr));
+}

@@ -1,0 +1,41 @@
+//! Doubts candidates by their intensity patch, with a support vector machine
+//! (P4, section II-C).
+//!
+//! Silhouettes in depth cannot tell a person from a coat on a stand; the grey
+//! values inside often can. A candidate's square is reduced to 20x20 grey
+//! values ([`Sampler`]), freed of brightness and contrast, and compared with
+//! the support vectors of a [`Model`] by a radial basis function. The decision
+//! value becomes log-odds by a calibration on held-out groups.
+//!
+//! The margin is evidence alone: the prior, one person in so many candidates,
+//! is the business of the detector, whose score the pipeline adds.
+//!
+//! With the feature `train` the plugin also offers a trainer (`train`).
+//! Without it there is no solver in the program.
+
+mod config;
+mod model;
+mod patch;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+mod verify;
+
+pub use config::{Config, Scaling, Training};
+pub use model::Model;
+pub use patch::{PIXELS, Patch, SIDE, Sampler};
+use tagalong_core::Registry;
+pub use verify::SvmPatch;
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "svm-patch";
+
+/// Registers the plugin, and its trainer if that is compiled in.
+pub fn register(registry: &mut Registry) {
+    registry.verifier(NAME, "a support vector machine on 20x20 grey patches (P4)", SvmPatch::new);
+    #[cfg(feature = "train")]
+    registry.trainer(NAME, |config: Config, context| {
+        train::PatchTrainer::new(config.training, context.seed)
+    });
+}

@@ -1,0 +1,55 @@
+use linfa::Dataset;
+use linfa::traits::Fit;
+use linfa_svm::Svm;
+use ndarray::{Array1, Array2};
+use tagalong_core::{Error, Result};
+
+use super::Sample;
+use crate::{Model, PIXELS, Sampler};
+
+/// Change of the objective at which the solver stops (that of libsvm).
+const TOLERANCE: f64 = 1e-3;
+
+/// Weights below this are zero.
+const LEAST_WEIGHT: f64 = 1e-9;
+
+/// Fits a machine with the kernel `exp(-gamma |a - b|^2)`. Each class weighs
+/// the same, whatever its share.
+///
+/// # Errors
+/// Samples that are not finite (the solver would return nonsense), one class.
+pub fn fit(samples: &[&Sample], sampler: Sampler, gamma: f64, penalty: f64) -> Result<Model> {
+    let (for_people, for_others) = penalties(samples, penalty)?;
+    if !samples.iter().all(|s| s.patch.iter().all(|v| v.is_finite())) {
+        return Err(Error::Other("a training patch is not finite".into()));
+    }
+    let rows = Array2::from_shape_fn((samples.len(), PIXELS), |(row, column)| {
+        f64::from(samples[row].patch[column])
+    });
+    let targets: Array1<bool> = samples.iter().map(|s| s.example.is_person).collect();
+    // The kernel of this library divides by its parameter. Shrinking stays off,
+    // the default: with it, weights are given back to the wrong samples.
+    let fitted = Svm::<f64, bool>::params()
+        .pos_neg_weights(for_people, for_others)
+        .gaussian_kernel(1.0 / gamma)
+        .eps(TOLERANCE)
+        .fit(&Dataset::new(rows, targets))
+        .map_err(|error| Error::Other(format!("the solver failed: {error}")))?;
+    let weights = samples.iter().zip(&fitted.alpha);
+    let support = weights
+        .filter(|(_, alpha)| alpha.abs() > LEAST_WEIGHT)
+        .map(|(sample, alpha)| (&*sample.patch, *alpha));
+    Ok(Model::new(sampler, gamma, -fitted.rho, support))
+}
+
+/// The penalty of an error in each class: inverse to its share.
+fn penalties(samples: &[&Sample], penalty: f64) -> Result<(f64, f64)> {
+    let people = samples.iter().filter(|s| s.example.is_person).count();
+    let others = samples.len() - people;
+    if people == 0 || others == 0 {
+        let message = format!("{people} people and {others} others: both are needed");
+        return Err(Error::Other(message));
+    }
+    let half = 0.5 * samples.len() as f64;
+    Ok((penalty * half / people as f64, penalty * half / others as f64))
+}
