@@ -11,6 +11,7 @@ use tagalong_core::Registry;
 pub fn register(registry: &mut Registry) {
     tagalong_depth_template::register(registry);
     tagalong_ekf::register(registry);
+    tagalong_joint_particle::register(registry);
     tagalong_last_seen::register(registry);
     tagalong_recorded_detections::register(registry);
 }
