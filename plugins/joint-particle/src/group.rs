@@ -229,7 +229,6 @@ impl Group {
             ids,
         }
     }
-
 }
 
 /// Side of the cells by which the spread of particles is measured, m.

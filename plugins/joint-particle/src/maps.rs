@@ -25,8 +25,7 @@ impl Kernel {
     }
 
     fn at(&self, a: &Place, b: &Place) -> f64 {
-        let square: f64 =
-            (0..2).map(|i| ((a[i] - b[i]) / self.0[i]).powi(2)).sum();
+        let square: f64 = (0..2).map(|i| ((a[i] - b[i]) / self.0[i]).powi(2)).sum();
         (-0.5 * square).exp()
     }
 }
@@ -48,7 +47,12 @@ pub struct Gp {
 
 impl Gp {
     /// Fits the process; `None` if the places have no such process.
-    pub fn fit(places: Vec<Place>, likelihoods: &[f64], kernel: Kernel, nugget: f64) -> Option<Self> {
+    pub fn fit(
+        places: Vec<Place>,
+        likelihoods: &[f64],
+        kernel: Kernel,
+        nugget: f64,
+    ) -> Option<Self> {
         let count = places.len().min(likelihoods.len());
         let gram = DMatrix::from_fn(count, count, |i, j| {
             kernel.at(&places[i], &places[j]) + if i == j { nugget } else { 0.0 }
@@ -77,7 +81,11 @@ impl Grid {
     pub fn new(config: &Config) -> Self {
         let reach = [config.reach_near_m, config.reach_far_m];
         let half = reach.map(|reach| ((reach / config.step_m).round() as usize).min(MAX_HALF));
-        Self { reach: half.map(|h| h as f64 * config.step_m), step: config.step_m, sides: half.map(|h| 2 * h + 1) }
+        Self {
+            reach: half.map(|h| h as f64 * config.step_m),
+            step: config.step_m,
+            sides: half.map(|h| 2 * h + 1),
+        }
     }
 
     /// All places, near by near.

@@ -22,7 +22,9 @@ impl Overlaps {
     ) -> Vec<BTreeSet<TrackId>> {
         let mut links = BTreeMap::new();
         for (a, one) in people {
-            for (b, other) in people.range((std::ops::Bound::Excluded(*a), std::ops::Bound::Unbounded)) {
+            for (b, other) in
+                people.range((std::ops::Bound::Excluded(*a), std::ops::Bound::Unbounded))
+            {
                 let before = self.links.get(&(*a, *b)).copied();
                 if let Some(apart) = link(one, other, before, config) {
                     links.insert((*a, *b), apart);

@@ -79,7 +79,11 @@ impl<'a> Look<'a> {
     ) -> Result<Vec<f64>> {
         for variant in changed {
             for (i, part) in group.row(row).iter().enumerate() {
-                self.scenes.push(if i == person { variant } else { self.person(group.ids[i], part) });
+                self.scenes.push(if i == person {
+                    variant
+                } else {
+                    self.person(group.ids[i], part)
+                });
             }
         }
         self.ask(group.people())
@@ -252,7 +256,8 @@ fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
         return heaviest(before, config.points).into_iter().map(|row| all[row]).collect();
     }
     let coarse = [-1.0, 0.0, 1.0].map(|near| {
-        [-1.0, 0.0, 1.0].map(|far| [0.5 * near * config.reach_near_m, 0.5 * far * config.reach_far_m])
+        [-1.0, 0.0, 1.0]
+            .map(|far| [0.5 * near * config.reach_near_m, 0.5 * far * config.reach_far_m])
     });
     let coarse: Vec<Place> = coarse.into_iter().flatten().take(config.points).collect();
     let rest = (config.points - coarse.len()).min(all.len());
