@@ -118,8 +118,8 @@ mod tests {
 
     #[test]
     fn the_quantile_is_of_the_normal_distribution() {
-        assert_eq!(kld_size(20, 0.05, 2.33), 362);
-        assert_eq!(kld_size(20, 0.05, 0.99), 249);
+        assert_eq!(kld_size(20, 0.05, 2.33), 363);
+        assert_eq!(kld_size(20, 0.05, 0.99), 250);
         assert_eq!(kld_size(1, 0.05, 2.33), 1);
     }
 
