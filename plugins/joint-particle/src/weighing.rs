@@ -274,7 +274,7 @@ fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
         let best = group.row(row)[person].clone();
         let h = line.direction(&best, &look.eye);
         let variance = (best.covariance * h).dot(&h);
-        if !(variance > 1e-8) {
+        if variance.is_nan() || variance <= 1e-8 {
             continue;
         }
         let (sigma, id) = (variance.sqrt(), group.ids[person]);
@@ -344,7 +344,7 @@ fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
     let mean: f64 = weights.iter().enumerate().map(|(i, w)| w * offset(i, sigma)).sum();
     let square = |i: usize| (offset(i, sigma) - mean).powi(2);
     let variance: f64 = weights.iter().enumerate().map(|(i, w)| w * square(i)).sum();
-    if !(variance < 0.95 * sigma * sigma) {
+    if variance.is_nan() || variance >= 0.95 * sigma * sigma {
         return None;
     }
     let spread = 1.0 / (1.0 / variance.max(1e-9) - 1.0 / (sigma * sigma));
