@@ -11,6 +11,7 @@ use crate::{Check, Verdict, demand};
 pub(crate) const CHECKS: &[Check] = &[
     ("likelihood: the true scene outweighs a shifted one", truth_outweighs),
     ("likelihood: the order of people does not matter", order_does_not_matter),
+    ("likelihood: many scenes weigh what each weighs alone", batches_agree),
     ("likelihood: is finite on odd scenes", finite),
     ("likelihood: a missing image is named", missing_image_is_named),
 ];
@@ -55,6 +56,25 @@ fn order_does_not_matter(subject: &Subject<'_>) -> Verdict {
         let one = weigh(likelihood, &frame, &[standing(near.head), standing(far.head)])?;
         let other = weigh(likelihood, &frame, &[standing(far.head), standing(near.head)])?;
         demand((one - other).abs() <= 1e-9 * one.abs().max(1.0), || format!("{one} and {other}"))
+    })
+}
+
+fn batches_agree(subject: &Subject<'_>) -> Verdict {
+    with(subject, |likelihood| {
+        let (near, far) = (Figure::at(2.0, 0.1), Figure::at(3.0, -0.1));
+        let frame = drawn(1, &level(), &[near, far]);
+        let aside = |m: f64| standing(far.head + nalgebra::Vector3::new(0.0, m, 0.0));
+        let people: Vec<Person> =
+            [-0.4, 0.0, 0.4].iter().flat_map(|m| [standing(near.head), aside(*m)]).collect();
+        let mut many = Vec::new();
+        let asked = likelihood.log_likelihoods(&frame, &people, 2, &mut many);
+        asked.map_err(|error| format!("it fails: {error}"))?;
+        let one_by_one: Result<Vec<f64>, String> =
+            people.chunks(2).map(|scene| weigh(likelihood, &frame, scene)).collect();
+        let one_by_one = one_by_one?;
+        let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * b.abs().max(1.0);
+        let agree = many.len() == 3 && many.iter().zip(&one_by_one).all(alike);
+        demand(agree, || format!("together {many:?}, one by one {one_by_one:?}"))
     })
 }
 

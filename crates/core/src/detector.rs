@@ -51,11 +51,34 @@ pub trait Detector: Send {
 /// Weighs imagined scenes against an image (P3: overlapping silhouettes).
 pub trait Likelihood: Send + Sync {
     /// Log-likelihood ratio of the scene against the empty background. Nearer
-    /// people hide farther ones; the order of `scene` does not matter.
+    /// people hide farther ones; the order of `scene` does not matter. A
+    /// person's velocity says where the body faces; at rest it faces along the
+    /// viewing ray.
     ///
     /// # Errors
     /// [`crate::Error::MissingImage`] if the frame lacks what is needed.
     fn log_likelihood(&self, frame: &Frame, scene: &[Person]) -> Result<f64>;
+
+    /// Log-likelihood ratios of many scenes with `people_per_scene` people
+    /// each: `people` holds one scene after the other, and `out` one number a
+    /// scene afterwards. Whoever weighs hundreds of scenes asks here, so that
+    /// what depends on the frame alone is prepared once.
+    ///
+    /// # Errors
+    /// As [`Likelihood::log_likelihood`].
+    fn log_likelihoods(
+        &self,
+        frame: &Frame,
+        people: &[Person],
+        people_per_scene: usize,
+        out: &mut Vec<f64>,
+    ) -> Result<()> {
+        out.clear();
+        for scene in people.chunks(people_per_scene.max(1)) {
+            out.push(self.log_likelihood(frame, scene)?);
+        }
+        Ok(())
+    }
 }
 
 /// Doubts detections (P4, II-C: an SVM on the intensity patch).

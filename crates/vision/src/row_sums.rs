@@ -94,6 +94,14 @@ impl RowSums {
         (x < self.width && y < self.height).then(|| self.values[y * self.width + x])
     }
 
+    /// The values of row `y`; 0 is no reading.
+    ///
+    /// # Panics
+    /// If `y` is not below the height.
+    pub fn values(&self, y: usize) -> &[u16] {
+        &self.values[y * self.width..(y + 1) * self.width]
+    }
+
     /// Depth in metres at a reduced pixel; `None` outside and where there is
     /// no reading.
     pub fn depth_m(&self, x: i64, y: i64) -> Option<f64> {

@@ -74,6 +74,10 @@ pub struct DepthTemplateConfig {
     /// Background of the frame as a percentile of its depths, for the costs
     /// `squared` and `printed` (P3, P4: 90).
     pub background_percentile: f64,
+    /// Log-likelihood of a person in an imagined scene who fits perfectly and
+    /// is wholly visible (role `weigh`), nats. Neighbouring pixels err alike, so
+    /// that this is far below the number of pixels.
+    pub likelihood_nats: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
     /// Standard deviation of the head's place across the viewing ray, m.
@@ -111,6 +115,7 @@ impl Default for DepthTemplateConfig {
             min_cells: 2,
             follow_radius_m: 0.6,
             background_percentile: 90.0,
+            likelihood_nats: 12.0,
             max_rows: 28,
             sigma_across_m: 0.03,
             sigma_depth_m: 0.03,

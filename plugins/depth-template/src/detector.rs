@@ -2,8 +2,8 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use tagalong_core::{
-    DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
-    Track,
+    DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Likelihood, Rect, Result,
+    Search, Track,
 };
 use tagalong_vision::RowSums;
 
@@ -14,6 +14,7 @@ use crate::config::{Cost, DepthTemplateConfig};
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
 use crate::view::{Local, View, Working};
+use crate::weigher::Weigher;
 
 /// The detector: discovers people, and follows them near a prediction.
 pub struct DepthTemplate {
@@ -21,6 +22,7 @@ pub struct DepthTemplate {
     bank: Bank,
     cells: Vec<Cell>,
     view: Option<Arc<View>>,
+    weigher: Weigher,
 }
 
 /// Where a silhouette fits best.
@@ -63,7 +65,13 @@ impl DepthTemplate {
                 return Err(Error::Settings(format!("`{low}` = {a} must be below `{high}` = {b}")));
             }
         }
-        Ok(Self { bank: Bank::new(config.max_rows), config, cells: Vec::new(), view: None })
+        Ok(Self {
+            bank: Bank::new(config.max_rows),
+            weigher: Weigher::new(&config),
+            config,
+            cells: Vec::new(),
+            view: None,
+        })
     }
 
     /// Looks at the cells of a window and keeps those that `admit` lets through
@@ -289,6 +297,10 @@ impl Detector for DepthTemplate {
             Search::Everywhere { .. } => self.discover(frame, &scene, search, funnel),
             Search::Near(track) => self.follow(frame, &scene, track, funnel),
         }
+    }
+
+    fn likelihood(&self) -> Option<&dyn Likelihood> {
+        Some(&self.weigher)
     }
 }
 

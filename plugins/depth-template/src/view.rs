@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{Camera, Derived, Frame, HEAD_RADIUS_M, Rect, Result};
+use tagalong_core::{Camera, DepthImage, Derived, Frame, HEAD_RADIUS_M, Rect, Result};
 use tagalong_vision::RowSums;
 
 /// The reduced inverse-depth image of a frame, shared by whoever matches
@@ -11,6 +11,13 @@ pub struct Working(pub RowSums);
 /// Depth images are reduced by the whole factor that brings their focal length
 /// nearest to this: finer ones cost time, coarser ones lose people far away.
 const WORKING_FOCAL_PX: f64 = 267.0;
+
+impl Working {
+    /// An image without pixels.
+    pub fn empty() -> Self {
+        Self(RowSums::new(&DepthImage::filled(0, 0, 0.0), 1))
+    }
+}
 
 impl Derived for Working {
     fn derive(frame: &Frame) -> Result<Self> {
@@ -117,6 +124,13 @@ impl View {
     pub fn full_pixel(&self, x: f64, y: f64) -> Point2<f64> {
         let middle = 0.5 * (self.scale - 1.0);
         Point2::new(self.scale * x + middle, self.scale * y + middle)
+    }
+
+    /// The pixel of the image that is nearest to a reduced one.
+    pub fn nearest_inside(&self, x: i64, y: i64) -> (i64, i64) {
+        let last = |cells: usize| (cells as i64 * Self::GRID - 1).max(0);
+        let lines = self.geometry.len() / self.columns.max(1);
+        (x.clamp(0, last(self.columns)), y.clamp(0, last(lines)))
     }
 
     /// The reduced pixel of a point in the robot frame.

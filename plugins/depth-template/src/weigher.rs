@@ -1,0 +1,443 @@
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Result};
+
+use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
+use crate::config::DepthTemplateConfig;
+use crate::scores::{Levels, ONE, Scores};
+use crate::view::{View, Working};
+
+/// Weighs imagined scenes by their overlapping silhouettes (P3, section II-C):
+/// each person is painted over those behind.
+///
+/// The weight is a log-likelihood ratio against a scene without people, so that
+/// pixels outside of all windows cancel and hypotheses of any size compare. A
+/// person who fits perfectly and is wholly visible weighs `likelihood_nats`, at
+/// any range; who is hidden weighs nothing.
+pub struct Weigher {
+    nats: f64,
+    tools: Mutex<Tools>,
+}
+
+/// What is reused from scene to scene and from frame to frame.
+struct Tools {
+    silhouettes: Silhouettes,
+    view: Option<Arc<View>>,
+    scores: Scores,
+    cast: Vec<Placed>,
+    masks: Vec<Span>,
+}
+
+/// A run of pixels of a row: from, to.
+type Span = (i64, i64);
+
+/// Every second row is looked at, the same ones in every scene.
+const ROW_STEP: i64 = 2;
+
+/// Templates with all their rows, by number.
+struct Silhouettes {
+    bank: Bank,
+    kept: Vec<(Pose, Arc<Silhouette>)>,
+}
+
+/// A template with all its rows.
+struct Silhouette {
+    rows: Vec<TemplateRow>,
+    half_width: i64,
+    /// Pixels of the person in the rows that are looked at.
+    area: f64,
+}
+
+/// Somebody in a scene.
+#[derive(Clone)]
+struct Placed {
+    silhouette: Arc<Silhouette>,
+    x: i64,
+    y: i64,
+    depth_m: f64,
+    levels: Levels,
+}
+
+impl Weigher {
+    /// A weigher.
+    pub fn new(config: &DepthTemplateConfig) -> Self {
+        let tools = Tools {
+            silhouettes: Silhouettes { bank: Bank::new(usize::MAX), kept: Vec::new() },
+            view: None,
+            scores: Scores::new(config),
+            cast: Vec::new(),
+            masks: Vec::new(),
+        };
+        Self { nats: config.likelihood_nats, tools: Mutex::new(tools) }
+    }
+
+    fn tools(&self) -> MutexGuard<'_, Tools> {
+        self.tools.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Likelihood for Weigher {
+    fn log_likelihood(&self, frame: &Frame, scene: &[Person]) -> Result<f64> {
+        let mut out = Vec::new();
+        self.log_likelihoods(frame, scene, scene.len(), &mut out)?;
+        Ok(out.first().copied().unwrap_or_default())
+    }
+
+    fn log_likelihoods(
+        &self,
+        frame: &Frame,
+        people: &[Person],
+        people_per_scene: usize,
+        out: &mut Vec<f64>,
+    ) -> Result<()> {
+        out.clear();
+        let image = frame.derived::<Working>()?;
+        let mut tools = self.tools();
+        let tools = &mut *tools;
+        let view = tools.view_of(frame, &image);
+        let mut cast = std::mem::take(&mut tools.cast);
+        let mut counts = Vec::with_capacity(people.len() / people_per_scene.max(1) + 1);
+        cast.clear();
+        for scene in people.chunks(people_per_scene.max(1)) {
+            let before = cast.len();
+            cast.extend(scene.iter().filter_map(|p| tools.place(p, &frame.camera, &view)));
+            cast[before..].sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
+            counts.push(cast.len() - before);
+        }
+        let (from, to) = cast.iter().fold((i64::MAX, 0), |(from, to), p| {
+            let half = p.silhouette.half_width;
+            (from.min(p.x - half), to.max(p.x + half + 1))
+        });
+        tools.scores.prepare(&image, from, to);
+        let mut rest = &cast[..];
+        for count in counts {
+            let (scene, others) = rest.split_at(count);
+            out.push(self.nats * tools.weigh(scene));
+            rest = others;
+        }
+        tools.cast = cast;
+        Ok(())
+    }
+}
+
+impl Tools {
+    /// The view of this frame's camera; it seldom changes.
+    fn view_of(&mut self, frame: &Frame, image: &Working) -> Arc<View> {
+        match &self.view {
+            Some(view) if view.is_of(&frame.camera, &image.0) => Arc::clone(view),
+            _ => Arc::clone(self.view.insert(Arc::new(View::new(&frame.camera, &image.0)))),
+        }
+    }
+
+    /// Where a person's silhouette is in the image; `None` for who is behind
+    /// the camera, or so far aside that nothing can be seen.
+    fn place(&mut self, person: &Person, camera: &Camera, view: &View) -> Option<Placed> {
+        let depth_m = camera.depth_of(&person.position) - HEAD_RADIUS_M;
+        if !(MIN_DEPTH_M..MAX_DEPTH_M).contains(&depth_m) {
+            return None;
+        }
+        let pixel = view.reduced_pixel(&person.position)?;
+        if !(pixel.x.abs() < MAX_PIXEL && pixel.y.abs() < MAX_PIXEL) {
+            return None;
+        }
+        let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+        let (inside_x, inside_y) = view.nearest_inside(x, y);
+        let local = view.local(inside_x, inside_y, depth_m);
+        let direction = direction(person, camera);
+        let pose = Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
+        let silhouette = self.silhouettes.of(pose);
+        Some(Placed { silhouette, x, y, depth_m, levels: Levels::of_face(depth_m) })
+    }
+
+    /// The weight of a scene, near to far, in units of one person.
+    fn weigh(&mut self, scene: &[Placed]) -> f64 {
+        (0..scene.len()).map(|k| self.weigh_one(scene, k)).sum()
+    }
+
+    /// What person `k` of the scene explains, as a part of the whole person.
+    fn weigh_one(&mut self, scene: &[Placed], k: usize) -> f64 {
+        let Self { scores, masks, .. } = self;
+        let person = &scene[k];
+        let mut sum = 0_i64;
+        for (line, row) in person.rows(scores.height()) {
+            let levels = person.levels.behind(row.relief_m);
+            let pixels = scores.row(line as usize, levels);
+            union_of(masks, scene[..k].iter().filter_map(|p| p.body(line)));
+            let body = (person.x + row.from, person.x + row.to);
+            sum += without(masks, body, |(from, to)| pixels.run(from, to).covered);
+            union_of(masks, others(scene, k).filter_map(|p| p.body(line)));
+            for side in person.beside(row) {
+                sum -= without(masks, side, |(from, to)| pixels.run(from, to).beside);
+            }
+        }
+        sum as f64 / (f64::from(ONE) * person.silhouette.area)
+    }
+}
+
+/// A face that is nearer than this has no silhouette, m.
+const MIN_DEPTH_M: f64 = 0.3;
+/// A person who is farther away than this is a dot, m.
+const MAX_DEPTH_M: f64 = 20.0;
+/// Nobody is looked for farther outside of the image than this.
+const MAX_PIXEL: f64 = 4000.0;
+
+/// Everybody in the scene but `k`.
+fn others(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
+    scene[..k].iter().chain(&scene[k + 1..])
+}
+
+impl Placed {
+    /// The rows of the silhouette that are looked at, with their lines.
+    fn rows(&self, height: i64) -> impl Iterator<Item = (i64, &TemplateRow)> {
+        let first = self.y + self.silhouette.rows.first().map_or(0, |row| row.dy);
+        let skip = first.rem_euclid(ROW_STEP);
+        let rows = self.silhouette.rows.iter().skip(skip as usize).step_by(ROW_STEP as usize);
+        let rows = rows.map(|row| (self.y + row.dy, row));
+        rows.filter(move |(line, _)| (0..height).contains(line))
+    }
+
+    /// Where the body, edges included, hides what is behind. Below the window
+    /// the trunk goes on.
+    fn body(&self, line: i64) -> Option<Span> {
+        let rows = &self.silhouette.rows;
+        let index = line - self.y - rows.first()?.dy;
+        let row = &rows[usize::try_from(index).ok()?.min(rows.len() - 1)];
+        let span = (self.x + row.guard_from, self.x + row.guard_to);
+        (span.0 < span.1).then_some(span)
+    }
+
+    /// What lies beside the body within the window.
+    fn beside(&self, row: &TemplateRow) -> [Span; 2] {
+        let half = self.silhouette.half_width;
+        [(self.x - half, self.x + row.guard_from), (self.x + row.guard_to, self.x + half + 1)]
+    }
+}
+
+impl Silhouettes {
+    fn of(&mut self, pose: Pose) -> Arc<Silhouette> {
+        let found = self.kept.binary_search_by(|(kept, _)| kept.cmp(&pose));
+        let at = found.unwrap_or_else(|at| {
+            let silhouette = Arc::new(Silhouette::new(self.bank.template(pose)));
+            self.kept.insert(at, (pose, silhouette));
+            at
+        });
+        Arc::clone(&self.kept[at].1)
+    }
+}
+
+impl Silhouette {
+    fn new(template: &Template) -> Self {
+        let pixels: i64 = template.rows.iter().map(|row| (row.to - row.from).max(0)).sum();
+        let area = (pixels as f64 / ROW_STEP as f64).max(1.0);
+        Self { rows: template.rows.clone(), half_width: template.half_width, area }
+    }
+}
+
+/// Replaces `masks` by the union of `spans`, sorted and disjoint.
+fn union_of(masks: &mut Vec<Span>, spans: impl Iterator<Item = Span>) {
+    masks.clear();
+    masks.extend(spans);
+    if masks.len() < 2 {
+        return;
+    }
+    masks.sort_unstable();
+    masks.dedup_by(|next, kept| {
+        let touches = next.0 <= kept.1;
+        if touches {
+            kept.1 = kept.1.max(next.1);
+        }
+        touches
+    });
+}
+
+/// Sum over a span without its masked parts.
+fn without(masks: &[Span], span: Span, sum: impl Fn(Span) -> i32) -> i64 {
+    if span.0 >= span.1 {
+        return 0;
+    }
+    let hidden = masks.iter().map(|mask| (mask.0.max(span.0), mask.1.min(span.1)));
+    let hidden: i64 = hidden.filter(|(from, to)| from < to).map(|part| i64::from(sum(part))).sum();
+    i64::from(sum(span)) - hidden
+}
+
+/// The template that a person shows: P3 chooses it by the direction of motion,
+/// which counts relative to the viewing ray.
+fn direction(person: &Person, camera: &Camera) -> Direction {
+    let ray = (person.position - camera.robot_from_camera.translation.vector).coords.xy();
+    let (speed, range) = (person.velocity.norm(), ray.norm());
+    if !(speed >= SLOW_MPS && range > 0.0) {
+        return Direction::Along;
+    }
+    let along = person.velocity.dot(&ray) / (speed * range);
+    match along.abs() > TURNED_COSINE {
+        true => Direction::Along,
+        false if ray.x * person.velocity.y > ray.y * person.velocity.x => Direction::Left,
+        false => Direction::Right,
+    }
+}
+
+/// Who is slower than this may face anywhere, m/s.
+const SLOW_MPS: f64 = 0.3;
+/// Cosine of the angle to the viewing ray from which on a body is seen from the side.
+const TURNED_COSINE: f64 = 0.7;
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector2};
+    use proptest::prelude::*;
+    use tagalong_core::{DepthImage, Distortion, Images, Motion, Pinhole, Stamp};
+
+    use super::*;
+
+    fn frame(pixels: Vec<f32>) -> Frame {
+        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 80, 60, 1.4, 0.1, 0.1));
+        let depth = DepthImage::from_pixels(80, 60, pixels).map(Arc::new);
+        let images = Images { depth, ..Images::default() };
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+    }
+
+    /// The weight of a scene pixel by pixel: who is in front at each one?
+    fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
+        let image = frame.derived::<Working>().unwrap();
+        let mut tools = weigher.tools();
+        let view = tools.view_of(frame, &image);
+        let mut cast: Vec<Placed> =
+            scene.iter().filter_map(|p| tools.place(p, &frame.camera, &view)).collect();
+        cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
+        let inside = |span: Option<Span>, x: i64| span.is_some_and(|(a, b)| a <= x && x < b);
+        let mut weight = 0.0;
+        for (k, person) in cast.iter().enumerate() {
+            let mut sum = 0;
+            for (index, row) in person.silhouette.rows.iter().enumerate() {
+                let line = person.y + person.silhouette.rows[0].dy + index as i64;
+                if line % ROW_STEP != 0 || !(0..60).contains(&line) {
+                    continue;
+                }
+                let level = person.levels.behind(row.relief_m);
+                let half = person.silhouette.half_width;
+                for x in (person.x - half..=person.x + half).filter(|x| (0..80).contains(x)) {
+                    let pixel = tools.scores.pixel(x, line, level);
+                    let (from, to) = (person.x + row.from, person.x + row.to);
+                    let (edge, end) = (person.x + row.guard_from, person.x + row.guard_to);
+                    if from <= x && x < to {
+                        let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
+                        sum += if hidden { 0 } else { pixel.covered };
+                    } else if x < edge || end <= x {
+                        let taken = others(&cast, k).any(|p| inside(p.body(line), x));
+                        sum -= if taken { 0 } else { pixel.beside };
+                    }
+                }
+            }
+            weight += f64::from(sum) / (f64::from(ONE) * person.silhouette.area);
+        }
+        weigher.nats * weight
+    }
+
+    fn person() -> impl Strategy<Value = Person> {
+        let place = (1.2..5.0f64, -0.6..0.6f64, 1.2..1.9f64);
+        (place, -1.0..1.0f64, -1.0..1.0f64).prop_map(|((x, slope, z), vx, vy)| Person {
+            position: Point3::new(x, slope * x, z),
+            velocity: Vector2::new(vx, vy),
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+
+        #[test]
+        fn runs_of_a_scene_equal_its_pixels(
+            pixels in prop::collection::vec(
+                prop_oneof![Just(f32::NAN), 1.0f32..2.5, 2.0f32..6.0], 80 * 60),
+            scenes in prop::collection::vec(prop::collection::vec(person(), 3), 1..5),
+        ) {
+            let (weigher, frame) = (Weigher::new(&DepthTemplateConfig::default()), frame(pixels));
+            let mut fast = Vec::new();
+            weigher.log_likelihoods(&frame, &scenes.concat(), 3, &mut fast).unwrap();
+            prop_assert_eq!(fast.len(), scenes.len());
+            for (scene, fast) in scenes.iter().zip(fast) {
+                let slow = slow(&weigher, &frame, scene);
+                prop_assert!((fast - slow).abs() < 1e-9, "{} {}", fast, slow);
+                let alone = weigher.log_likelihood(&frame, scene).unwrap();
+                prop_assert!((fast - alone).abs() < 1e-9, "in a batch {}, alone {}", fast, alone);
+            }
+        }
+    }
+
+    /// A wall at 5 m and people painted as their silhouettes.
+    fn painted(people: &[Person]) -> Frame {
+        let weigher = Weigher::new(&DepthTemplateConfig::default());
+        let empty = frame(vec![5.0; 80 * 60]);
+        let image = empty.derived::<Working>().unwrap();
+        let mut tools = weigher.tools();
+        let view = tools.view_of(&empty, &image);
+        let cast: Vec<Placed> =
+            people.iter().filter_map(|p| tools.place(p, &empty.camera, &view)).collect();
+        let depth = DepthImage::from_fn(80, 60, |x, y| {
+            let (x, y) = (x as i64, y as i64);
+            let here = |p: &&Placed| p.body(y).is_some_and(|(a, b)| a <= x && x < b);
+            let relief = |p: &Placed| {
+                let row = p.silhouette.rows.iter().find(|row| p.y + row.dy == y);
+                row.map_or(0.0, |row| row.relief_m)
+            };
+            let nearest = cast.iter().filter(here).map(|p| (p.depth_m + relief(p)) as f32);
+            nearest.fold(5.0, f32::min)
+        });
+        frame(depth.pixels().to_vec())
+    }
+
+    fn standing(x: f64, y: f64) -> Person {
+        Person { position: Point3::new(x, y, 1.5), velocity: Vector2::zeros() }
+    }
+
+    fn weight(frame: &Frame, scene: &[Person]) -> f64 {
+        let weigher = Weigher::new(&DepthTemplateConfig::default());
+        weigher.log_likelihood(frame, scene).unwrap()
+    }
+
+    #[test]
+    fn a_visible_person_weighs_all_and_a_hidden_one_nothing() {
+        let (near, hidden) = (standing(1.8, 0.0), standing(3.6, 0.0));
+        let frame = painted(&[near]);
+        let alone = weight(&frame, &[near]);
+        assert!((alone - 12.0).abs() < 1.5, "{alone}");
+        assert!((weight(&frame, &[near, hidden]) - alone).abs() < 0.5);
+        assert!(weight(&frame, &[near, standing(3.6, 1.4)]) < alone - 6.0);
+    }
+
+    #[test]
+    fn a_person_weighs_as_much_at_any_range() {
+        let of = |x| weight(&painted(&[standing(x, 0.0)]), &[standing(x, 0.0)]);
+        assert!((of(1.6) - of(3.2)).abs() < 1.5, "{} {}", of(1.6), of(3.2));
+    }
+
+    #[test]
+    fn who_stands_half_behind_another_is_weighed_by_what_is_seen() {
+        let (near, far) = (standing(1.8, 0.0), standing(3.0, 0.35));
+        let frame = painted(&[near, far]);
+        let gain = |y| weight(&frame, &[near, standing(3.0, y)]) - weight(&frame, &[near]);
+        assert!(gain(0.35) > 2.0 && gain(0.35) > gain(0.15).max(gain(0.6)), "{}", gain(0.35));
+    }
+
+    #[test]
+    fn the_body_faces_where_it_moves_as_seen_from_the_camera() {
+        let camera = frame(vec![1.0; 80 * 60]).camera.clone();
+        let of = |x, y, vx, vy| {
+            let velocity = Vector2::new(vx, vy);
+            direction(&Person { velocity, ..standing(x, y) }, &camera)
+        };
+        assert_eq!(of(2.0, 0.0, 0.0, 1.0), Direction::Left);
+        assert_eq!(of(2.0, 0.0, 0.0, -1.0), Direction::Right);
+        assert_eq!(of(2.0, 0.0, -1.0, 0.2), Direction::Along);
+        assert_eq!(of(2.0, 2.0, 1.0, 1.0), Direction::Along, "along the ray, not the axis");
+        assert_eq!(of(2.0, 0.0, 0.0, 0.1), Direction::Along, "too slow to tell");
+    }
+
+    #[test]
+    fn pixels_that_are_hidden_twice_are_hidden_once() {
+        let mut masks = Vec::new();
+        union_of(&mut masks, [(5, 9), (1, 3), (2, 6)].into_iter());
+        assert_eq!(masks, [(1, 9)]);
+        assert_eq!(without(&masks, (0, 12), |(a, b)| (b - a) as i32), 4);
+    }
+}

@@ -1,0 +1,188 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// How the particles of people whose silhouettes overlap are weighed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Person after person, from front to back, each with the nearer ones held
+    /// (MacCormick and Blake 1999). For any number of people.
+    Partitioned,
+    /// The scene of every particle is compared with the image (P3, II-C).
+    All,
+    /// A full table over the lateral places of two people, looked up by every
+    /// particle (P3, III: 21 x 61).
+    Table,
+    /// Some particles are compared; the likelihood of all is their sum of
+    /// kernels (P3, III).
+    Kde,
+    /// Some particles are compared; the likelihood of all is interpolated by a
+    /// Gaussian process with the same kernels.
+    Gp,
+}
+
+/// Which particles `kde` and `gp` compare with the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Chosen {
+    /// Those that were most likely in the frame before (P3).
+    PreviousBest,
+    /// Evenly many of the predicted ones, and a coarse grid of 3 x 3 places.
+    Spread,
+}
+
+/// Settings of the filter `joint-particle`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// How people whose silhouettes overlap are weighed.
+    pub method: Method,
+    /// Particles of a person alone (P3: 100).
+    pub particles: usize,
+    /// `all`, `table`, `kde`, `gp`: this many particles of each of two people
+    /// are combined with each other (P3: 25, which makes 625).
+    pub joint_side: usize,
+    /// `partitioned`: most particles of a group; how many there are follows
+    /// from their spread (KLD sampling) ...
+    pub max_particles: usize,
+    /// ... so that the error of their distribution stays below this, nats, ...
+    pub kld_error: f64,
+    /// ... with this normal quantile of certainty (2.33 is 99 %).
+    pub kld_quantile: f64,
+    /// Only the place across the viewing ray is drawn; depth, height and
+    /// velocity are small Kalman filters in each particle. Otherwise
+    /// everything is drawn, as P3 does.
+    pub marginalise: bool,
+    /// Spectral density of a person's white acceleration, m²/s³.
+    pub acceleration_noise: f64,
+    /// Standard deviation of the place on the floor beside what velocity
+    /// explains, m per square root of a second.
+    pub position_noise: f64,
+    /// Standard deviation of the height, m per square root of a second.
+    pub height_noise: f64,
+    /// Standard deviation of the velocity beside what acceleration explains,
+    /// m/s per square root of a second.
+    pub velocity_noise: f64,
+    /// Variance of each velocity component of a newcomer, m²/s².
+    pub initial_velocity_variance: f64,
+    /// This part of the particles is moved to what a detector found, 0 to 1.
+    pub from_detection: f64,
+    /// A person is seen if the scene is more likely by this with than without
+    /// the person, nats.
+    pub min_support: f64,
+    /// Upper-body squares are enlarged by this part of their size before they
+    /// are asked whether they overlap.
+    pub inflate: f64,
+    /// People part when they are farther from each other than this on the
+    /// floor, m, ...
+    pub split_m: f64,
+    /// ... and their squares do not overlap in this many frames in a row.
+    pub split_frames: u32,
+    /// `kde`, `gp`: particles that are compared with the image (P3: 30 or 50).
+    pub points: usize,
+    /// `kde`, `gp`: which ones.
+    pub chosen: Chosen,
+    /// Width of the kernel along the place of the near person, m (P3: 0.04).
+    pub kernel_near_m: f64,
+    /// Width of the kernel along the place of the far person, m (P3: 0.1).
+    pub kernel_far_m: f64,
+    /// `gp`: variance of the likelihood that the kernels do not explain.
+    pub nugget: f64,
+    /// `table`: reach of the near person's place, m (P3: 0.3).
+    pub reach_near_m: f64,
+    /// `table`: reach of the far person's place, m (P3: 0.9).
+    pub reach_far_m: f64,
+    /// `table`: distance of its places, m (P3: 0.03).
+    pub step_m: f64,
+    /// After people part, their colours are compared with those before; they
+    /// change names if that is more likely by this, in Bhattacharyya
+    /// coefficients. 2 is never.
+    pub swap_margin: f64,
+    /// As printed: kernels with 2 sigma in place of 2 sigma² (millimetres).
+    pub compat_printed_kernel: bool,
+    /// As printed: places along the robot's Y axis instead of across the
+    /// viewing ray.
+    pub compat_printed_axes: bool,
+    /// As printed: people in a group are moved by the same noise.
+    pub compat_shared_noise: bool,
+    /// As printed: the most likely particles are kept when groups form and
+    /// part, instead of drawing from all.
+    pub compat_top: bool,
+    /// As OpenCV's ConDensation, which P3 used: resampling in every frame
+    /// without a random offset, uniform noise from generators that are seeded
+    /// alike for everybody, and the prediction reported as the estimate.
+    pub compat_condensation: bool,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            method: Method::Partitioned,
+            particles: 100,
+            joint_side: 25,
+            max_particles: 400,
+            kld_error: 0.05,
+            kld_quantile: 2.33,
+            marginalise: true,
+            acceleration_noise: 0.8,
+            position_noise: 0.08,
+            height_noise: 0.04,
+            velocity_noise: 0.0,
+            initial_velocity_variance: 1.0,
+            from_detection: 0.1,
+            min_support: 2.0,
+            inflate: 0.1,
+            split_m: 0.6,
+            split_frames: 3,
+            points: 50,
+            chosen: Chosen::Spread,
+            kernel_near_m: 0.04,
+            kernel_far_m: 0.1,
+            nugget: 0.03,
+            reach_near_m: 0.3,
+            reach_far_m: 0.9,
+            step_m: 0.03,
+            swap_margin: 0.15,
+            compat_printed_kernel: false,
+            compat_printed_axes: false,
+            compat_shared_noise: false,
+            compat_top: false,
+            compat_condensation: false,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let ranges = [
+            ("particles", self.particles as f64, 1.0, 100_000.0),
+            ("joint_side", self.joint_side as f64, 1.0, 300.0),
+            ("max_particles", self.max_particles as f64, 1.0, 100_000.0),
+            ("points", self.points as f64, 1.0, 1000.0),
+            ("kld_error", self.kld_error, 1e-6, 10.0),
+            ("kld_quantile", self.kld_quantile, -10.0, 10.0),
+            ("acceleration_noise", self.acceleration_noise, 0.0, 1e3),
+            ("position_noise", self.position_noise, 0.0, 1e3),
+            ("height_noise", self.height_noise, 0.0, 1e3),
+            ("velocity_noise", self.velocity_noise, 0.0, 1e3),
+            ("initial_velocity_variance", self.initial_velocity_variance, 0.0, 1e3),
+            ("from_detection", self.from_detection, 0.0, 1.0),
+            ("min_support", self.min_support, -1e6, 1e6),
+            ("inflate", self.inflate, 0.0, 10.0),
+            ("split_m", self.split_m, 0.0, 100.0),
+            ("kernel_near_m", self.kernel_near_m, 1e-4, 10.0),
+            ("kernel_far_m", self.kernel_far_m, 1e-4, 10.0),
+            ("nugget", self.nugget, 1e-9, 10.0),
+            ("reach_near_m", self.reach_near_m, 0.0, 10.0),
+            ("reach_far_m", self.reach_far_m, 0.0, 10.0),
+            ("step_m", self.step_m, 5e-3, 10.0),
+            ("swap_margin", self.swap_margin, 0.0, 10.0),
+        ];
+        let bad = ranges.iter().find(|(_, value, low, high)| !(*low..=*high).contains(value));
+        bad.map_or(Ok(()), |(key, value, low, high)| {
+            Err(Error::Settings(format!("`{key}` must be in {low} to {high}, not {value}")))
+        })
+    }
+}

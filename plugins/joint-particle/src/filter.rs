@@ -1,0 +1,246 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Point3, Vector2};
+use tagalong_core::{
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
+};
+
+use crate::config::{Config, Method};
+use crate::group::Group;
+use crate::identity::Wardrobe;
+use crate::overlap::Overlaps;
+use crate::particle::{Particle, Transition};
+use crate::resampling::{effective_size, kld_size};
+use crate::weighing::{Look, facing, support, weigh};
+
+/// The filter: particles of people, alone or together.
+pub struct JointParticle {
+    config: Config,
+    seed: u64,
+    groups: Vec<Group>,
+    overlaps: Overlaps,
+    /// Where bodies face, m/s; kept while somebody stands.
+    headings: BTreeMap<TrackId, Vector2<f64>>,
+    wardrobe: Wardrobe,
+    /// ConDensation reports the state this much later, s.
+    ahead_s: f64,
+    dt_s: f64,
+}
+
+impl JointParticle {
+    /// A filter whose random numbers start from `seed`.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config, seed: u64) -> Result<Self> {
+        config.check()?;
+        Ok(Self {
+            config,
+            seed,
+            groups: Vec::new(),
+            overlaps: Overlaps::default(),
+            headings: BTreeMap::new(),
+            wardrobe: Wardrobe::default(),
+            ahead_s: 0.0,
+            dt_s: 0.0,
+        })
+    }
+
+    /// Resamples groups in which few particles carry the weight.
+    fn renew(&mut self) {
+        let config = &self.config;
+        for group in &mut self.groups {
+            let few = effective_size(&group.weights) < 0.5 * group.rows() as f64;
+            if few || config.compat_condensation {
+                let count = match config.method {
+                    Method::Partitioned => {
+                        let wanted =
+                            kld_size(group.occupied(), config.kld_error, config.kld_quantile);
+                        wanted.min(config.max_particles).max(config.particles)
+                    }
+                    _ => group.rows(),
+                };
+                group.resample(count, config);
+            }
+        }
+    }
+
+    /// People whose silhouettes overlap come together, others part.
+    fn regroup(&mut self, camera: &Camera) {
+        let wanted = self.overlaps.groups(&self.estimates(camera), &self.config);
+        if self.groups.iter().map(ids).collect::<BTreeSet<_>>() == wanted.iter().cloned().collect()
+        {
+            return;
+        }
+        for group in std::mem::take(&mut self.groups) {
+            self.split(group, &wanted);
+        }
+        for people in &wanted {
+            self.join(people);
+        }
+        self.groups.sort_by(|a, b| a.ids.cmp(&b.ids));
+    }
+
+    /// Cuts a group along the borders of the wanted ones.
+    fn split(&mut self, mut group: Group, wanted: &[BTreeSet<TrackId>]) {
+        let columns = |people: &BTreeSet<TrackId>| -> Vec<usize> {
+            (0..group.people()).filter(|i| people.contains(&group.ids[*i])).collect()
+        };
+        let parts: Vec<Vec<usize>> =
+            wanted.iter().map(columns).filter(|part| !part.is_empty()).collect();
+        if parts.len() < 2 {
+            self.groups.push(group);
+            return;
+        }
+        self.wardrobe.part(&group.ids);
+        let parts = parts.iter().map(|part| group.part(part, self.seed, &self.config));
+        self.groups.extend(parts.collect::<Vec<_>>());
+    }
+
+    /// Brings the groups together that make up a wanted one.
+    fn join(&mut self, people: &BTreeSet<TrackId>) {
+        let is_part = |group: &mut Group| group.ids.iter().any(|id| people.contains(id));
+        let parts: Vec<Group> = self.groups.extract_if(.., is_part).collect();
+        let joined = parts.into_iter().reduce(|a, b| a.merge(b, &self.config));
+        self.groups.extend(joined);
+    }
+
+    /// Bodies face where people walk; who hardly moves and is alone faces
+    /// where the image says.
+    fn turn(&mut self, look: &mut Look<'_>) -> Result<BTreeMap<TrackId, Vector2<f64>>> {
+        let mut headings = self.headings.clone();
+        for group in &self.groups {
+            for (person, id) in group.ids.iter().enumerate() {
+                let mean = group.moments(person).mean;
+                let velocity = Vector2::new(mean[3], mean[4]);
+                if velocity.norm() > WALKING_MPS {
+                    headings.insert(*id, velocity);
+                } else if group.people() == 1 {
+                    headings.insert(*id, facing(group, look)?);
+                }
+            }
+        }
+        Ok(headings)
+    }
+
+    /// Gives people whose colours say so each other's particles.
+    fn swap(&mut self, (a, b): (TrackId, TrackId)) {
+        let other = |id: TrackId| if id == a { b } else { a };
+        for id in self.groups.iter_mut().flat_map(|group| &mut group.ids) {
+            if *id == a || *id == b {
+                *id = other(*id);
+            }
+        }
+        let (of_a, of_b) = (self.headings.remove(&a), self.headings.remove(&b));
+        self.headings.extend(of_a.map(|h| (b, h)).into_iter().chain(of_b.map(|h| (a, h))));
+    }
+
+    /// Those who are alone and seen, with their heads.
+    fn alone(&self, seen: &BTreeMap<TrackId, Support>) -> BTreeMap<TrackId, Point3<f64>> {
+        let single = self.groups.iter().filter(|g| g.people() == 1 && seen.contains_key(&g.ids[0]));
+        single
+            .map(|group| {
+                let m = group.moments(0).mean;
+                (group.ids[0], Point3::new(m[0], m[1], m[2]))
+            })
+            .collect()
+    }
+
+    fn estimate(&self, group: &Group, person: usize, camera: &Camera) -> Estimate {
+        let moments = group.moments(person);
+        let m = moments.mean;
+        let velocity = Vector2::new(m[3], m[4]);
+        let floor = m.fixed_rows::<2>(0) + velocity * self.ahead_s;
+        let position = Point3::new(floor.x, floor.y, m[2]);
+        Estimate {
+            person: Person { position, velocity },
+            covariance: moments.covariance,
+            region: camera.upper_body(&position),
+        }
+    }
+}
+
+/// Who is faster than this faces where they walk, m/s.
+const WALKING_MPS: f64 = 0.35;
+
+fn ids(group: &Group) -> BTreeSet<TrackId> {
+    group.ids.iter().copied().collect()
+}
+
+impl Filter for JointParticle {
+    fn start(&mut self, id: TrackId, detection: &Detection) {
+        let first = Particle::of(detection, &self.config);
+        self.groups.push(Group::single(id, &first, self.seed, &self.config));
+    }
+
+    fn predict(&mut self, motion: &Motion) {
+        let transition = Transition::new(motion, &self.config);
+        self.groups.iter_mut().for_each(|group| group.predict(&transition));
+        for heading in self.headings.values_mut() {
+            *heading = motion.apply_to_velocity(*heading);
+        }
+        self.ahead_s = 0.0;
+        self.dt_s = motion.dt;
+    }
+
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+        let Some(likelihood) = evidence.likelihood else { return Ok(BTreeMap::new()) };
+        self.renew();
+        self.regroup(&evidence.frame.camera);
+        let sightings: BTreeMap<TrackId, Particle> = evidence
+            .matched
+            .iter()
+            .map(|m| (m.id, Particle::of(m.detection, &self.config)))
+            .collect();
+        let headings = self.headings.clone();
+        let config = self.config.clone();
+        let mut look = Look::new(evidence.frame, likelihood, &config, &headings, &sightings);
+        let mut seen = BTreeMap::new();
+        for group in &mut self.groups {
+            weigh(group, &mut look)?;
+            let supports = support(group, &mut look)?;
+            let supported = group.ids.iter().zip(supports).filter(|(_, s)| *s > config.min_support);
+            seen.extend(supported.map(|(id, _)| (*id, Support::default())));
+        }
+        self.headings = self.turn(&mut look)?;
+        let alone = self.alone(&seen);
+        for pair in self.wardrobe.look(evidence.frame, &alone, config.swap_margin) {
+            self.swap(pair);
+        }
+        self.ahead_s = if config.compat_condensation { self.dt_s } else { 0.0 };
+        Ok(seen)
+    }
+
+    fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
+        let people = self.groups.iter().flat_map(|g| g.ids.iter().enumerate().map(move |p| (g, p)));
+        people.map(|(group, (i, id))| (*id, self.estimate(group, i, camera))).collect()
+    }
+
+    fn stop(&mut self, id: TrackId) {
+        for group in std::mem::take(&mut self.groups) {
+            let rest: BTreeSet<TrackId> = ids(&group).into_iter().filter(|i| *i != id).collect();
+            if rest.len() == group.people() {
+                self.groups.push(group);
+            } else if !rest.is_empty() {
+                self.keep_columns(group, &rest);
+            }
+        }
+        self.headings.remove(&id);
+        self.wardrobe.forget(id);
+    }
+
+    fn weighs_scenes(&self) -> bool {
+        true
+    }
+}
+
+impl JointParticle {
+    /// What is left of a group when somebody is forgotten.
+    fn keep_columns(&mut self, mut group: Group, people: &BTreeSet<TrackId>) {
+        let columns: Vec<usize> =
+            (0..group.people()).filter(|i| people.contains(&group.ids[*i])).collect();
+        let rest = group.part(&columns, self.seed, &self.config);
+        self.groups.push(rest);
+        self.groups.sort_by(|a, b| a.ids.cmp(&b.ids));
+    }
+}

@@ -1,0 +1,160 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Point3;
+use tagalong_core::{Frame, RgbImage, TrackId};
+
+/// Colours per channel.
+const SHADES: usize = 6;
+/// Weight of a frame in the colours of a person.
+const RATE: f64 = 0.2;
+/// The chest: from and to below the centre of the head, and half its width, m.
+const CHEST_M: [f64; 3] = [0.22, 0.5, 0.13];
+
+/// How often each colour occurs on a chest; sums to 1.
+type Histogram = Vec<f64>;
+
+/// What people wear, learned while they are alone, and asked again after they
+/// were too close to be told apart by their silhouettes.
+#[derive(Default)]
+pub(crate) struct Wardrobe {
+    known: BTreeMap<TrackId, Histogram>,
+    /// Pairs that parted and were not told apart since.
+    parted: BTreeSet<(TrackId, TrackId)>,
+}
+
+impl Wardrobe {
+    pub(crate) fn forget(&mut self, id: TrackId) {
+        self.known.remove(&id);
+        self.parted.retain(|(a, b)| *a != id && *b != id);
+    }
+
+    /// People who were in one group are in two.
+    pub(crate) fn part(&mut self, ids: &[TrackId]) {
+        for a in ids {
+            self.parted.extend(ids.iter().filter(|b| *b > a).map(|b| (*a, *b)));
+        }
+    }
+
+    /// Learns the colours of the people who are alone and seen; returns the
+    /// pairs that have each other's colours.
+    pub(crate) fn look(
+        &mut self,
+        frame: &Frame,
+        alone: &BTreeMap<TrackId, Point3<f64>>,
+        margin: f64,
+    ) -> Vec<(TrackId, TrackId)> {
+        let Ok(image) = frame.colour() else { return Vec::new() };
+        let seen: BTreeMap<TrackId, Histogram> = alone
+            .iter()
+            .filter_map(|(id, head)| Some((*id, colours(frame, image, head)?)))
+            .collect();
+        let asked: Vec<(TrackId, TrackId)> = self
+            .parted
+            .iter()
+            .copied()
+            .filter(|(a, b)| seen.contains_key(a) && seen.contains_key(b))
+            .collect();
+        let swapped: Vec<_> =
+            asked.iter().copied().filter(|pair| self.is_swapped(pair, &seen, margin)).collect();
+        self.parted.retain(|pair| !asked.contains(pair));
+        if swapped.is_empty() {
+            seen.into_iter().for_each(|(id, colours)| self.learn(id, colours));
+        }
+        swapped
+    }
+
+    fn learn(&mut self, id: TrackId, seen: Histogram) {
+        if self.parted.iter().any(|(a, b)| *a == id || *b == id) {
+            return;
+        }
+        let known = self.known.entry(id).or_insert_with(|| seen.clone());
+        known.iter_mut().zip(&seen).for_each(|(k, s)| *k += RATE * (s - *k));
+    }
+
+    fn is_swapped(
+        &self,
+        (a, b): &(TrackId, TrackId),
+        seen: &BTreeMap<TrackId, Histogram>,
+        margin: f64,
+    ) -> bool {
+        let like = |known, now| match (self.known.get(known), seen.get(now)) {
+            (Some(known), Some(now)) => Some(coefficient(known, now)),
+            _ => None,
+        };
+        let gain = || Some(like(a, b)? + like(b, a)? - like(a, a)? - like(b, b)?);
+        gain().is_some_and(|gain| gain > margin)
+    }
+}
+
+/// Bhattacharyya coefficient: 1 for the same colours, 0 for none in common.
+fn coefficient(a: &Histogram, b: &Histogram) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum()
+}
+
+/// The colours of the chest below a head; `None` outside of the image.
+fn colours(frame: &Frame, image: &RgbImage, head: &Point3<f64>) -> Option<Histogram> {
+    let [from, to, half] = CHEST_M;
+    let centre = frame.camera.project(head)?;
+    let scale = frame.camera.focal_px() / frame.camera.depth_of(head).max(0.1);
+    let mut histogram = vec![0.0; SHADES * SHADES * SHADES];
+    let mut sum = 0.0;
+    let rows = ((centre.y + from * scale) as i64..(centre.y + to * scale) as i64).step_by(2);
+    for y in rows.take(MAX_PIXELS) {
+        let columns = (centre.x - half * scale) as i64..(centre.x + half * scale) as i64;
+        for pixel in columns.step_by(2).take(MAX_PIXELS).filter_map(|x| image.get(x, y)) {
+            let index = pixel.iter().fold(0, |i, v| i * SHADES + usize::from(*v) * SHADES / 256);
+            histogram[index] += 1.0;
+            sum += 1.0;
+        }
+    }
+    (sum >= MIN_PIXELS).then(|| histogram.into_iter().map(|count| count / sum).collect())
+}
+
+/// Fewer pixels have no colour.
+const MIN_PIXELS: f64 = 12.0;
+/// Nobody is larger, pixels.
+const MAX_PIXELS: usize = 2000;
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tagalong_core::{Camera, Distortion, Images, Motion, Pinhole, Stamp};
+
+    use super::*;
+
+    const IDS: [TrackId; 2] = [TrackId(1), TrackId(2)];
+
+    /// Red on the left half of the image and blue on the right one, or mirrored.
+    fn frame(mirrored: bool, with_colour: bool) -> Frame {
+        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
+        let pixel = |x: usize, _| if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] };
+        let colour = with_colour.then(|| Arc::new(RgbImage::from_fn(100, 80, pixel)));
+        let images = Images { colour, ..Images::default() };
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+    }
+
+    fn people() -> BTreeMap<TrackId, Point3<f64>> {
+        let heads = [Point3::new(2.0, 0.6, 1.6), Point3::new(2.0, -0.6, 1.6)];
+        IDS.into_iter().zip(heads).collect()
+    }
+
+    fn learned() -> Wardrobe {
+        let mut wardrobe = Wardrobe::default();
+        assert!(wardrobe.look(&frame(false, true), &people(), 0.15).is_empty());
+        wardrobe.part(&IDS);
+        wardrobe
+    }
+
+    #[test]
+    fn people_who_come_out_with_each_others_colours_are_swapped() {
+        assert_eq!(learned().look(&frame(true, true), &people(), 0.15), [(IDS[0], IDS[1])]);
+        assert!(learned().look(&frame(false, true), &people(), 0.15).is_empty());
+    }
+
+    #[test]
+    fn without_colour_nobody_is_swapped() {
+        assert!(learned().look(&frame(true, false), &people(), 0.15).is_empty());
+    }
+}

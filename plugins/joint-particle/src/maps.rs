@@ -1,0 +1,199 @@
+//! Likelihood maps over the lateral places of two people (P3, section III).
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use crate::config::Config;
+
+/// Where two people are across the viewing ray of the near one's mean: near,
+/// far, m.
+pub type Place = [f64; 2];
+
+/// Widths of the kernel along the two places, m.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel([f64; 2]);
+
+impl Kernel {
+    /// P3's kernels: standard deviations of 40 and 100 mm. As printed, with
+    /// `2 sigma` under the square, they are those of which 40 and 100 are the
+    /// variances in mm².
+    pub fn new(config: &Config) -> Self {
+        let width = |sigma_m: f64| match config.compat_printed_kernel {
+            true => (1000.0 * sigma_m).sqrt() / 1000.0,
+            false => sigma_m,
+        };
+        Self([width(config.kernel_near_m), width(config.kernel_far_m)])
+    }
+
+    fn at(&self, a: &Place, b: &Place) -> f64 {
+        let square: f64 = (0..2).map(|i| ((a[i] - b[i]) / self.0[i]).powi(2)).sum();
+        (-0.5 * square).exp()
+    }
+}
+
+/// P3's estimate: the sum of kernels at the compared places, each as high as
+/// its likelihood.
+pub fn parzen(places: &[Place], likelihoods: &[f64], kernel: Kernel, at: &Place) -> f64 {
+    places.iter().zip(likelihoods).map(|(place, l)| l * kernel.at(place, at)).sum()
+}
+
+/// Interpolation by a Gaussian process with the same kernels. A sum of kernels
+/// is higher where more places were compared; this is not.
+#[derive(Clone, Debug)]
+pub struct Gp {
+    places: Vec<Place>,
+    coefficients: DVector<f64>,
+    kernel: Kernel,
+}
+
+impl Gp {
+    /// Fits the process; `None` if the places have no such process.
+    pub fn fit(
+        places: Vec<Place>,
+        likelihoods: &[f64],
+        kernel: Kernel,
+        nugget: f64,
+    ) -> Option<Self> {
+        let count = places.len().min(likelihoods.len());
+        let gram = DMatrix::from_fn(count, count, |i, j| {
+            kernel.at(&places[i], &places[j]) + if i == j { nugget } else { 0.0 }
+        });
+        let known = DVector::from_column_slice(&likelihoods[..count]);
+        let coefficients = Cholesky::new(gram)?.solve(&known);
+        Some(Self { places, coefficients, kernel })
+    }
+
+    /// The likelihood at a place; never negative.
+    pub fn at(&self, at: &Place) -> f64 {
+        parzen(&self.places, self.coefficients.as_slice(), self.kernel, at).max(0.0)
+    }
+}
+
+/// The places of P3's full table.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    reach: [f64; 2],
+    step: f64,
+    sides: [usize; 2],
+}
+
+impl Grid {
+    /// The table of the settings.
+    pub fn new(config: &Config) -> Self {
+        let reach = [config.reach_near_m, config.reach_far_m];
+        let half = reach.map(|reach| ((reach / config.step_m).round() as usize).min(MAX_HALF));
+        Self {
+            reach: half.map(|h| h as f64 * config.step_m),
+            step: config.step_m,
+            sides: half.map(|h| 2 * h + 1),
+        }
+    }
+
+    /// All places, near by near.
+    pub fn places(&self) -> Vec<Place> {
+        let value = |axis: usize, i: usize| i as f64 * self.step - self.reach[axis];
+        let rows = 0..self.sides[0];
+        rows.flat_map(|i| (0..self.sides[1]).map(move |j| [value(0, i), value(1, j)])).collect()
+    }
+
+    /// The value of the nearest place; outside of the table that of its edge.
+    pub fn look_up(&self, table: &[f64], at: &Place) -> f64 {
+        let index = |axis: usize| {
+            let steps = ((at[axis] + self.reach[axis]) / self.step).round();
+            steps.clamp(0.0, (self.sides[axis] - 1) as f64) as usize
+        };
+        table.get(index(0) * self.sides[1] + index(1)).copied().unwrap_or_default()
+    }
+}
+
+/// A table has at most this many places on each side of its middle.
+const MAX_HALF: usize = 100;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// A ridge as two people make it: sharp where the near one is, wide and
+    /// leaning where the far one is.
+    fn ridge(at: &Place) -> f64 {
+        let (near, far) = (at[0] - 0.03, at[1] - 0.2 - 0.5 * at[0]);
+        (-0.5 * (near / 0.06).powi(2) - 0.5 * (far / 0.18).powi(2)).exp()
+    }
+
+    /// Places near the ridge, as the best particles of the frame before are.
+    fn sampled(count: usize, seed: u64) -> Vec<Place> {
+        let mut random = Random::new(seed, 0);
+        let mut draw = |centre: f64, spread: f64| centre + spread * random.normal();
+        (0..count).map(|_| [draw(0.03, 0.08), draw(0.2, 0.25)]).collect()
+    }
+
+    fn correlation(a: &[f64], b: &[f64]) -> f64 {
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let (ma, mb) = (mean(a), mean(b));
+        let dot = |x: &[f64], mx: f64, y: &[f64], my: f64| -> f64 {
+            x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum()
+        };
+        dot(a, ma, b, mb) / (dot(a, ma, a, ma) * dot(b, mb, b, mb)).sqrt()
+    }
+
+    /// Mean correlation with the full table over some draws of 50 places:
+    /// printed kernel, corrected kernel, Gaussian process.
+    fn correlations() -> [f64; 3] {
+        let grid = Grid::new(&Config::default()).places();
+        let truth: Vec<f64> = grid.iter().map(ridge).collect();
+        let printed = Kernel::new(&Config { compat_printed_kernel: true, ..Config::default() });
+        let right = Kernel::new(&Config::default());
+        let mut sums = [0.0; 3];
+        for seed in 0..10 {
+            let places = sampled(50, seed);
+            let known: Vec<f64> = places.iter().map(ridge).collect();
+            let gp = Gp::fit(places.clone(), &known, right, 0.03).unwrap();
+            let of = |map: &dyn Fn(&Place) -> f64| {
+                correlation(&grid.iter().map(map).collect::<Vec<_>>(), &truth)
+            };
+            sums[0] += of(&|at| parzen(&places, &known, printed, at)) / 10.0;
+            sums[1] += of(&|at| parzen(&places, &known, right, at)) / 10.0;
+            sums[2] += of(&|at| gp.at(at)) / 10.0;
+        }
+        sums
+    }
+
+    #[test]
+    fn the_printed_kernel_makes_spikes_and_interpolation_follows_the_ridge() {
+        let [printed, right, gp] = correlations();
+        assert!((0.25..0.65).contains(&printed), "printed {printed}");
+        assert!(right > 0.85 && right > printed + 0.2, "corrected {right}");
+        assert!(gp > right, "interpolated {gp}, corrected {right}");
+    }
+
+    #[test]
+    fn interpolation_finds_the_mean_that_a_sum_of_kernels_misses() {
+        let grid = Grid::new(&Config::default()).places();
+        let kernel = Kernel::new(&Config::default());
+        let mean = |map: &dyn Fn(&Place) -> f64| {
+            let sum: f64 = grid.iter().map(map).sum();
+            grid.iter().map(|at| at[1] * map(at)).sum::<f64>() / sum
+        };
+        let truth = mean(&ridge);
+        let (mut by_sum, mut by_gp) = (0.0, 0.0);
+        for seed in 0..10 {
+            let places = sampled(50, seed);
+            let known: Vec<f64> = places.iter().map(ridge).collect();
+            let gp = Gp::fit(places.clone(), &known, kernel, 0.03).unwrap();
+            by_sum += (mean(&|at| parzen(&places, &known, kernel, at)) - truth).abs() / 10.0;
+            by_gp += (mean(&|at| gp.at(at)) - truth).abs() / 10.0;
+        }
+        assert!(by_gp < 0.010 && by_sum > 1.5 * by_gp, "gp {by_gp} m, sum {by_sum} m");
+    }
+
+    #[test]
+    fn the_printed_table_has_1281_places_and_finds_each_again() {
+        let grid = Grid::new(&Config::default());
+        let places = grid.places();
+        assert_eq!(places.len(), 1281);
+        let numbers: Vec<f64> = (0..1281).map(f64::from).collect();
+        assert!(places.iter().zip(&numbers).all(|(at, n)| grid.look_up(&numbers, at) == *n));
+        assert_eq!(grid.look_up(&numbers, &[-9.0, -9.0]), 0.0);
+        assert_eq!(grid.look_up(&numbers, &[9.0, 9.0]), 1280.0);
+    }
+}

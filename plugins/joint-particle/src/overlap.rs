@@ -1,0 +1,108 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use tagalong_core::{Estimate, Rect, TrackId};
+
+use crate::config::Config;
+
+/// Which people are weighed together: their silhouettes overlap, or did so
+/// lately.
+#[derive(Default)]
+pub(crate) struct Overlaps {
+    /// For each linked pair, for how many frames their squares were apart.
+    links: BTreeMap<(TrackId, TrackId), u32>,
+}
+
+impl Overlaps {
+    /// Takes in where everybody is expected, and returns the groups: the
+    /// connected components of the pairs that are linked.
+    pub(crate) fn groups(
+        &mut self,
+        people: &BTreeMap<TrackId, Estimate>,
+        config: &Config,
+    ) -> Vec<BTreeSet<TrackId>> {
+        let mut links = BTreeMap::new();
+        for (a, one) in people {
+            for (b, other) in
+                people.range((std::ops::Bound::Excluded(*a), std::ops::Bound::Unbounded))
+            {
+                let before = self.links.get(&(*a, *b)).copied();
+                if let Some(apart) = link(one, other, before, config) {
+                    links.insert((*a, *b), apart);
+                }
+            }
+        }
+        self.links = links;
+        components(people.keys().copied(), self.links.keys())
+    }
+}
+
+/// For how many frames a pair that is linked has been apart; `None` if it is
+/// not linked (any more).
+fn link(a: &Estimate, b: &Estimate, before: Option<u32>, config: &Config) -> Option<u32> {
+    let [one, other] = [a, b].map(|e| inflated(&e.region, config.inflate));
+    if one.intersection(&other).area() > 0.0 {
+        return Some(0);
+    }
+    let frames = before? + 1;
+    let away = (a.person.position.xy() - b.person.position.xy()).norm();
+    (frames < config.split_frames || away <= config.split_m).then_some(frames)
+}
+
+fn inflated(region: &Rect, part: f64) -> Rect {
+    let (dx, dy) = (0.5 * part * region.width, 0.5 * part * region.height);
+    Rect::new(region.x - dx, region.y - dy, region.width + 2.0 * dx, region.height + 2.0 * dy)
+}
+
+fn components<'a>(
+    people: impl Iterator<Item = TrackId>,
+    links: impl Iterator<Item = &'a (TrackId, TrackId)>,
+) -> Vec<BTreeSet<TrackId>> {
+    let mut groups: Vec<BTreeSet<TrackId>> = people.map(|id| BTreeSet::from([id])).collect();
+    for (a, b) in links {
+        let find = |groups: &[BTreeSet<TrackId>], id| groups.iter().position(|g| g.contains(id));
+        if let (Some(one), Some(other)) = (find(&groups, a), find(&groups, b))
+            && one != other
+        {
+            let moved = groups.swap_remove(one.max(other));
+            groups[one.min(other)].extend(moved);
+        }
+    }
+    groups.sort();
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix5, Point3, Vector2};
+    use tagalong_core::Person;
+
+    use super::*;
+
+    fn people(places: &[(f64, f64)]) -> BTreeMap<TrackId, Estimate> {
+        let estimate = |(x, y): &(f64, f64)| Estimate {
+            person: Person { position: Point3::new(*x, *y, 1.6), velocity: Vector2::zeros() },
+            covariance: Matrix5::identity(),
+            region: Rect::new(300.0 - 250.0 * y / x, 100.0, 150.0 / x, 150.0 / x),
+        };
+        (1..).map(TrackId).zip(places.iter().map(estimate)).collect()
+    }
+
+    #[test]
+    fn people_whose_silhouettes_overlap_are_one_group_and_part_with_hysteresis() {
+        let (config, mut overlaps) = (Config::default(), Overlaps::default());
+        let count = |overlaps: &mut Overlaps, y| {
+            overlaps.groups(&people(&[(2.0, 0.0), (3.0, y)]), &config).len()
+        };
+        assert_eq!(count(&mut overlaps, 1.5), 2);
+        assert_eq!(count(&mut overlaps, 0.2), 1);
+        assert_eq!([1.5; 4].map(|y| count(&mut overlaps, y)), [1, 1, 2, 2]);
+    }
+
+    #[test]
+    fn a_chain_is_one_group() {
+        let mut overlaps = Overlaps::default();
+        let line = people(&[(2.0, 0.0), (3.0, 0.6), (2.0, 0.8), (3.0, -2.0)]);
+        let groups = overlaps.groups(&line, &Config::default());
+        assert_eq!(groups.iter().map(BTreeSet::len).collect::<Vec<_>>(), [3, 1]);
+    }
+}

@@ -1,0 +1,204 @@
+use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, Point3, Vector2, Vector5};
+use tagalong_core::{Detection, Motion, Person};
+
+use crate::config::Config;
+use crate::random::Random;
+
+/// One person in one particle: a Gaussian over (x, y, z, vx, vy) in the robot
+/// frame, m and m/s over ground. What was drawn in this frame has no variance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Particle {
+    pub(crate) mean: Vector5<f64>,
+    pub(crate) covariance: Matrix5<f64>,
+}
+
+/// From one frame to the next: x' = F (x + shift), P' = F P F' + Q.
+pub(crate) struct Transition {
+    f: Matrix5<f64>,
+    shift: Vector5<f64>,
+    noise: Matrix5<f64>,
+    motion: Motion,
+}
+
+impl Transition {
+    /// For the robot's motion.
+    pub(crate) fn new(motion: &Motion, config: &Config) -> Self {
+        let (sin, cos) = motion.turn.sin_cos();
+        let back = Matrix2::new(cos, sin, -sin, cos);
+        let mut f = Matrix5::identity();
+        f.fixed_view_mut::<2, 2>(0, 0).copy_from(&back);
+        f.fixed_view_mut::<2, 2>(0, 3).copy_from(&(back * motion.dt));
+        f.fixed_view_mut::<2, 2>(3, 3).copy_from(&back);
+        let shift = Vector5::new(-motion.forward, -motion.left, 0.0, 0.0, 0.0);
+        Self { f, shift, noise: process_noise(motion.dt, config), motion: *motion }
+    }
+
+    /// Moves a particle; what it does not know of the motion becomes variance.
+    pub(crate) fn apply(&self, particle: &mut Particle) {
+        particle.mean = self.f * (particle.mean + self.shift);
+        particle.covariance = self.f * particle.covariance * self.f.transpose()
+            + self.noise
+            + ego_noise(&particle.mean, &self.motion);
+    }
+}
+
+/// Process noise. It is isotropic on the floor, so that the robot's turn does
+/// not matter.
+fn process_noise(dt: f64, config: &Config) -> Matrix5<f64> {
+    let q = config.acceleration_noise;
+    let position = q * dt.powi(3) / 3.0 + config.position_noise.powi(2) * dt;
+    let velocity = q * dt + config.velocity_noise.powi(2) * dt;
+    let height = config.height_noise.powi(2) * dt;
+    let mut noise =
+        Matrix5::from_diagonal(&Vector5::new(position, position, height, velocity, velocity));
+    for axis in 0..2 {
+        noise[(axis, axis + 3)] = q * dt.powi(2) / 2.0;
+        noise[(axis + 3, axis)] = q * dt.powi(2) / 2.0;
+    }
+    noise
+}
+
+/// What the uncertainty of the robot's own motion adds to the place.
+fn ego_noise(predicted: &Vector5<f64>, motion: &Motion) -> Matrix5<f64> {
+    let (sin, cos) = motion.turn.sin_cos();
+    let (x, y) = (predicted[0], predicted[1]);
+    let by_motion = nalgebra::Matrix2x3::new(-cos, -sin, y, sin, -cos, -x);
+    let mut noise = Matrix5::zeros();
+    let place = by_motion * motion.covariance * by_motion.transpose();
+    noise.fixed_view_mut::<2, 2>(0, 0).copy_from(&place);
+    noise
+}
+
+impl Particle {
+    /// The belief after the first sighting.
+    pub(crate) fn of(detection: &Detection, config: &Config) -> Self {
+        let p = detection.position;
+        let mut covariance = Matrix5::zeros();
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&detection.covariance);
+        covariance[(3, 3)] = config.initial_velocity_variance;
+        covariance[(4, 4)] = config.initial_velocity_variance;
+        Self { mean: Vector5::new(p.x, p.y, p.z, 0.0, 0.0), covariance }
+    }
+
+    /// Puts the person where a detection is; the velocity stays.
+    pub(crate) fn move_to(&mut self, position: &Point3<f64>, covariance: &Matrix3<f64>) {
+        self.mean.fixed_rows_mut::<3>(0).copy_from(&position.coords);
+        self.covariance.fixed_view_mut::<3, 2>(0, 3).fill(0.0);
+        self.covariance.fixed_view_mut::<2, 3>(3, 0).fill(0.0);
+        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(covariance);
+    }
+
+    /// Draws all five numbers from the Gaussian with independent `noise`.
+    pub(crate) fn draw_all(&mut self, noise: &Vector5<f64>) {
+        if let Some(root) = root(&self.covariance) {
+            self.mean += root * noise;
+            self.covariance = Matrix5::zeros();
+        }
+    }
+
+    /// Draws the place across the viewing ray of a camera at `eye` and keeps
+    /// the rest as a Gaussian that knows it (Rao and Blackwell).
+    pub(crate) fn draw_across(&mut self, eye: &Point2<f64>, random: &mut Random) {
+        let across = across(&(self.floor() - eye));
+        let h = Vector5::new(across.x, across.y, 0.0, 0.0, 0.0);
+        let variance = (self.covariance * h).dot(&h).max(0.0);
+        let drawn = h.dot(&self.mean) + variance.sqrt() * random.normal();
+        self.correct(&h, drawn, 0.0);
+    }
+
+    /// Kalman update by a measurement of `h . x` with the given variance.
+    pub(crate) fn correct(&mut self, h: &Vector5<f64>, measured: f64, variance: f64) {
+        let ph = self.covariance * h;
+        let total = h.dot(&ph) + variance;
+        if total > 1e-12 {
+            let gain = ph / total;
+            self.mean += gain * (measured - h.dot(&self.mean));
+            self.covariance -= gain * ph.transpose();
+            self.covariance = 0.5 * (self.covariance + self.covariance.transpose());
+        }
+    }
+
+    pub(crate) fn floor(&self) -> Point2<f64> {
+        Point2::new(self.mean[0], self.mean[1])
+    }
+
+    pub(crate) fn person(&self) -> Person {
+        let m = &self.mean;
+        let position = Point3::new(m[0], m[1], m[2]);
+        Person { position, velocity: Vector2::new(m[3], m[4]) }
+    }
+}
+
+/// The horizontal unit vector to the left of a viewing ray; robot's Y at none.
+pub(crate) fn across(ray: &Vector2<f64>) -> Vector2<f64> {
+    let length = ray.norm();
+    if length > 1e-9 { Vector2::new(-ray.y, ray.x) / length } else { Vector2::y() }
+}
+
+/// A square root of a covariance that may be singular; `None` if it is zero or
+/// no covariance.
+fn root(covariance: &Matrix5<f64>) -> Option<Matrix5<f64>> {
+    let size = covariance.trace();
+    if !(size.is_finite() && size > 0.0) {
+        return None;
+    }
+    let ridge = Matrix5::identity() * (1e-12 * size);
+    (covariance + ridge).cholesky().map(|c| c.unpack())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn gaussian(entries: [f64; 25]) -> Particle {
+        let root = Matrix5::from_iterator(entries);
+        let mean = Vector5::new(3.0, 0.5, 1.6, 0.4, -0.2);
+        Particle { mean, covariance: root * root.transpose() + Matrix5::identity() * 1e-3 }
+    }
+
+    proptest! {
+        /// Drawing a part and keeping the rest as a Gaussian is drawing from
+        /// the whole: mean and covariance of many draws are those before.
+        #[test]
+        fn what_is_drawn_and_what_is_kept_make_up_the_whole(
+            entries in prop::array::uniform25(-0.2..0.2f64), seed in 0u64..100,
+        ) {
+            let whole = gaussian(entries);
+            let mut random = Random::new(seed, 0);
+            let draws: Vec<Particle> = (0..4000).map(|_| {
+                let mut particle = whole.clone();
+                particle.draw_across(&Point2::origin(), &mut random);
+                particle
+            }).collect();
+            let count = draws.len() as f64;
+            let mean = draws.iter().map(|p| p.mean).sum::<Vector5<f64>>() / count;
+            let spread: Matrix5<f64> = draws.iter().map(|p| {
+                let off = p.mean - whole.mean;
+                p.covariance + off * off.transpose()
+            }).sum::<Matrix5<f64>>() / count;
+            let scale = whole.covariance.trace();
+            prop_assert!((mean - whole.mean).norm() < 0.1 * scale.sqrt());
+            prop_assert!((spread - whole.covariance).norm() < 0.12 * scale);
+        }
+
+        #[test]
+        fn drawing_everything_leaves_no_variance(entries in prop::array::uniform25(-0.2..0.2f64)) {
+            let mut particle = gaussian(entries);
+            particle.draw_all(&Vector5::repeat(0.5));
+            prop_assert_eq!(particle.covariance, Matrix5::zeros());
+        }
+    }
+
+    #[test]
+    fn a_place_fixed_in_the_world_moves_as_the_robot_sees_it() {
+        let motion = Motion { forward: 0.3, left: 0.1, turn: 0.2, ..Motion::at_rest(0.1) };
+        let mut particle = gaussian([0.0; 25]);
+        particle.mean[3] = 0.0;
+        particle.mean[4] = 0.0;
+        let expected = motion.apply_to_point(particle.floor());
+        Transition::new(&motion, &Config::default()).apply(&mut particle);
+        assert!((particle.floor() - expected).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,77 @@
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Seeded random numbers that are the same on every machine. The distributions
+/// are our own, because those of general libraries change between versions.
+#[derive(Clone, Debug)]
+pub struct Random(ChaCha8Rng);
+
+impl Random {
+    /// Numbers of one purpose: each stream of a seed is independent of the
+    /// others.
+    pub fn new(seed: u64, stream: u64) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(stream);
+        Self(generator)
+    }
+
+    /// Uniform in (0, 1].
+    pub fn uniform(&mut self) -> f64 {
+        ((self.0.next_u64() >> 11) + 1) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Standard normal (Box & Muller 1958).
+    pub fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * self.uniform().ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+
+    /// Uniform with mean zero and variance one.
+    pub fn flat(&mut self) -> f64 {
+        (2.0 * self.uniform() - 1.0) * 3f64.sqrt()
+    }
+
+    /// A whole number below `end`, which must not be 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        ((self.uniform() * end as f64) as usize).min(end.saturating_sub(1))
+    }
+
+    /// Brings `items` into random order (Fisher & Yates).
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for last in (1..items.len()).rev() {
+            items.swap(last, self.below(last + 1));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_mean_zero_and_variance_one() {
+        let mut random = Random::new(1, 2);
+        let mut check = |draw: fn(&mut Random) -> f64| {
+            let drawn: Vec<f64> = (0..20_000).map(|_| draw(&mut random)).collect();
+            let mean = drawn.iter().sum::<f64>() / 20_000.0;
+            let variance = drawn.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 20_000.0;
+            assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.05, "{mean} {variance}");
+        };
+        check(Random::normal);
+        check(Random::flat);
+    }
+
+    #[test]
+    fn shuffling_keeps_all_and_repeats() {
+        let shuffled = |seed| {
+            let mut items: Vec<u32> = (0..50).collect();
+            Random::new(seed, 0).shuffle(&mut items);
+            items
+        };
+        let mut sorted = shuffled(3);
+        assert_eq!(sorted, shuffled(3));
+        assert_ne!(sorted, shuffled(4));
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..50).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,412 @@
+//! How well the particles of a group explain the image.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point2, Vector2, Vector5};
+use tagalong_core::{Frame, Likelihood, Person, Result, TrackId};
+
+use crate::config::{Chosen, Config, Method};
+use crate::group::Group;
+use crate::maps::{Gp, Grid, Kernel, Place, parzen};
+use crate::particle::{Particle, across};
+use crate::resampling::{effective_size, from_logs, heaviest, normalise};
+
+/// What is needed to look at a frame.
+pub(crate) struct Look<'a> {
+    pub(crate) frame: &'a Frame,
+    pub(crate) likelihood: &'a dyn Likelihood,
+    pub(crate) config: &'a Config,
+    /// Where people's bodies face, m/s.
+    pub(crate) headings: &'a BTreeMap<TrackId, Vector2<f64>>,
+    /// What a detector found, by track.
+    pub(crate) sightings: &'a BTreeMap<TrackId, Particle>,
+    /// The camera on the floor.
+    pub(crate) eye: Point2<f64>,
+    scenes: Vec<Person>,
+}
+
+impl<'a> Look<'a> {
+    pub(crate) fn new(
+        frame: &'a Frame,
+        likelihood: &'a dyn Likelihood,
+        config: &'a Config,
+        headings: &'a BTreeMap<TrackId, Vector2<f64>>,
+        sightings: &'a BTreeMap<TrackId, Particle>,
+    ) -> Self {
+        let eye = Point2::from(frame.camera.robot_from_camera.translation.vector.xy());
+        Self { frame, likelihood, config, headings, sightings, eye, scenes: Vec::new() }
+    }
+
+    /// A person as the likelihood wants it: facing where the track faces, not
+    /// where one particle believes to walk.
+    fn person(&self, id: TrackId, particle: &Particle) -> Person {
+        let velocity = self.headings.get(&id).copied().unwrap_or_default();
+        Person { velocity, ..particle.person() }
+    }
+
+    /// Puts a person into the scene that is being collected.
+    fn add(&mut self, id: TrackId, particle: &Particle) {
+        let person = self.person(id, particle);
+        self.scenes.push(person);
+    }
+
+    /// Log-likelihoods of the scenes that were collected.
+    fn ask(&mut self, people_per_scene: usize) -> Result<Vec<f64>> {
+        let mut out = Vec::new();
+        let scenes = std::mem::take(&mut self.scenes);
+        self.likelihood.log_likelihoods(self.frame, &scenes, people_per_scene, &mut out)?;
+        self.scenes = scenes;
+        self.scenes.clear();
+        Ok(out)
+    }
+
+    /// Log-likelihoods of all particles, as far as they speak of some people.
+    fn rows(&mut self, group: &Group, people: &[usize]) -> Result<Vec<f64>> {
+        for row in 0..group.rows() {
+            let parts = group.row(row);
+            people.iter().for_each(|p| self.add(group.ids[*p], &parts[*p]));
+        }
+        self.ask(people.len())
+    }
+
+    /// Log-likelihoods of one particle with one person changed.
+    fn variants(
+        &mut self,
+        group: &Group,
+        row: usize,
+        person: usize,
+        changed: impl Iterator<Item = Person>,
+    ) -> Result<Vec<f64>> {
+        for variant in changed {
+            for (i, part) in group.row(row).iter().enumerate() {
+                self.scenes.push(if i == person {
+                    variant
+                } else {
+                    self.person(group.ids[i], part)
+                });
+            }
+        }
+        self.ask(group.people())
+    }
+
+    /// The people of a group from near to far.
+    fn order(&self, group: &Group) -> Vec<usize> {
+        let depth = |person: usize| {
+            let m = group.moments(person).mean;
+            self.frame.camera.depth_of(&nalgebra::Point3::new(m[0], m[1], m[2]))
+        };
+        let mut order: Vec<(f64, usize)> = (0..group.people()).map(|p| (depth(p), p)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        order.into_iter().map(|(_, person)| person).collect()
+    }
+
+    fn draw(&self, group: &mut Group, person: usize) {
+        if let Some(sighting) = self.sightings.get(&group.ids[person]) {
+            group.restart(person, sighting, self.config.from_detection);
+        }
+        group.draw(person, &self.eye, self.config);
+    }
+
+    fn draw_everybody(&self, group: &mut Group) {
+        if self.config.compat_shared_noise {
+            group.draw_shared();
+            return;
+        }
+        (0..group.people()).for_each(|person| self.draw(group, person));
+    }
+}
+
+/// Draws what is to be drawn and weighs the particles.
+pub(crate) fn weigh(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+    match look.config.method {
+        Method::Partitioned => partitioned(group, look)?,
+        Method::Table | Method::Kde | Method::Gp if group.people() == 2 => mapped(group, look)?,
+        _ => all(group, look)?,
+    }
+    if look.config.marginalise {
+        (look.order(group).into_iter()).try_for_each(|person| refine(group, look, person))?;
+    }
+    Ok(())
+}
+
+/// Every particle's whole scene is compared with the image.
+fn all(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+    look.draw_everybody(group);
+    let everybody: Vec<usize> = (0..group.people()).collect();
+    let logs = look.rows(group, &everybody)?;
+    take_in(group, &logs);
+    Ok(())
+}
+
+/// Front to back: who is nearest is weighed without the others; each farther
+/// person is drawn for, and hidden by, the nearer ones that survived.
+fn partitioned(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+    let order = look.order(group);
+    let mut before = vec![0.0; group.rows()];
+    for (k, person) in order.iter().enumerate() {
+        look.draw(group, *person);
+        let now = look.rows(group, &order[..=k])?;
+        let gained: Vec<f64> = now.iter().zip(&before).map(|(n, b)| n - b).collect();
+        take_in(group, &gained);
+        before = now;
+        let few = effective_size(&group.weights) < 0.5 * group.rows() as f64;
+        if few && k + 1 < order.len() {
+            let rows = group.resample(group.rows(), look.config);
+            before = rows.into_iter().map(|row| before[row]).collect();
+        }
+    }
+    Ok(())
+}
+
+/// Multiplies the weights by likelihoods that are given as logarithms.
+fn take_in(group: &mut Group, logs: &[f64]) {
+    let mut posterior: Vec<f64> =
+        group.weights.iter().zip(logs).map(|(w, log)| w.ln() + log).collect();
+    from_logs(&mut posterior);
+    group.weights = posterior;
+    group.likelihoods = relative(logs);
+}
+
+/// Likelihoods relative to the largest one.
+fn relative(logs: &[f64]) -> Vec<f64> {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    logs.iter().map(|log| (log - most).exp()).collect()
+}
+
+/// Lateral places of two people: P3 holds depth and height.
+struct Lateral {
+    near: usize,
+    far: usize,
+    /// Where the near person's mean is: both places count from there.
+    origin: Point2<f64>,
+    across: Vector2<f64>,
+    means: [Vector5<f64>; 2],
+}
+
+impl Lateral {
+    fn new(group: &Group, look: &Look<'_>) -> Self {
+        let order = look.order(group);
+        let (near, far) = (order[0], order[1]);
+        let means = [near, far].map(|person| group.moments(person).mean);
+        let origin = Point2::new(means[0][0], means[0][1]);
+        let across = match look.config.compat_printed_axes {
+            true => Vector2::y(),
+            false => across(&(origin - look.eye)),
+        };
+        Self { near, far, origin, across, means }
+    }
+
+    fn place(&self, row: &[Particle]) -> Place {
+        [self.near, self.far].map(|p| self.across.dot(&(row[p].floor() - self.origin)))
+    }
+
+    /// The scene with the two people at a place, in the order of the columns.
+    fn scene(&self, place: &Place) -> [Particle; 2] {
+        let moved = |i: usize| {
+            let mut mean = self.means[i];
+            let now = self.across.dot(&(Point2::new(mean[0], mean[1]) - self.origin));
+            let shift = self.across * (place[i] - now);
+            mean[0] += shift.x;
+            mean[1] += shift.y;
+            Particle { mean, covariance: nalgebra::Matrix5::zeros() }
+        };
+        let (near, far) = (moved(0), moved(1));
+        if self.near == 0 { [near, far] } else { [far, near] }
+    }
+}
+
+/// P3, section III: a map of the likelihood over the lateral places is made
+/// from a table, or from a few particles, and looked up by all.
+fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+    let config = look.config;
+    let before = group.likelihoods.clone();
+    look.draw_everybody(group);
+    let lateral = Lateral::new(group, look);
+    let all: Vec<Place> = (0..group.rows()).map(|row| lateral.place(group.row(row))).collect();
+    let grid = Grid::new(config);
+    let places = match config.method {
+        Method::Table => grid.places(),
+        _ => chosen(&all, &before, config),
+    };
+    for place in &places {
+        let scene = lateral.scene(place);
+        [0, 1].into_iter().for_each(|i| look.add(group.ids[i], &scene[i]));
+    }
+    let known = relative(&look.ask(2)?);
+    let kernel = Kernel::new(config);
+    let gp = match config.method {
+        Method::Gp => Gp::fit(places.clone(), &known, kernel, config.nugget),
+        _ => None,
+    };
+    let value = |at: &Place| match (config.method, &gp) {
+        (Method::Table, _) => grid.look_up(&known, at),
+        (Method::Gp, Some(gp)) => gp.at(at),
+        _ => parzen(&places, &known, kernel, at),
+    };
+    group.likelihoods = all.iter().map(value).collect();
+    let weights = group.weights.iter().zip(&group.likelihoods);
+    group.weights = weights.map(|(weight, likelihood)| weight * likelihood).collect();
+    normalise(&mut group.weights);
+    Ok(())
+}
+
+/// The places that are compared with the image.
+fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
+    if config.chosen == Chosen::PreviousBest {
+        return heaviest(before, config.points).into_iter().map(|row| all[row]).collect();
+    }
+    let coarse = [-1.0, 0.0, 1.0].map(|near| {
+        [-1.0, 0.0, 1.0]
+            .map(|far| [0.5 * near * config.reach_near_m, 0.5 * far * config.reach_far_m])
+    });
+    let coarse: Vec<Place> = coarse.into_iter().flatten().take(config.points).collect();
+    let rest = (config.points - coarse.len()).min(all.len());
+    let spread = (0..rest).map(|i| all[i * all.len() / rest.max(1)]);
+    coarse.iter().copied().chain(spread).collect()
+}
+
+/// Corrects the depth and then the height of one person in all particles: the
+/// likelihood along a line through the best particle, times what was believed,
+/// has a mean and a variance, which are those of a measurement.
+fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
+    for line in [Line::Range, Line::Height] {
+        let row = group.best();
+        let best = group.row(row)[person].clone();
+        let h = line.direction(&best, &look.eye);
+        let variance = (best.covariance * h).dot(&h);
+        if variance.is_nan() || variance <= 1e-8 {
+            continue;
+        }
+        let (sigma, id) = (variance.sqrt(), group.ids[person]);
+        let moved = |i: usize| {
+            let mut moved = best.clone();
+            moved.mean += h * offset(i, sigma);
+            look.person(id, &moved)
+        };
+        let variants: Vec<Person> = (0..SAMPLES).map(moved).collect();
+        let logs = look.variants(group, row, person, variants.into_iter())?;
+        let Some((shift, spread)) = measurement(&logs, sigma) else { continue };
+        let measured = line.value(&best, &look.eye) + shift;
+        for particle in group.column_mut(person) {
+            let h = line.direction(particle, &look.eye);
+            let now = line.value(particle, &look.eye);
+            particle.correct(&h, h.dot(&particle.mean) + measured - now, spread);
+        }
+    }
+    Ok(())
+}
+
+/// Lines along which a person is looked for.
+#[derive(Clone, Copy)]
+enum Line {
+    /// Along the viewing ray, on the floor.
+    Range,
+    /// Up and down.
+    Height,
+}
+
+impl Line {
+    fn direction(self, particle: &Particle, eye: &Point2<f64>) -> Vector5<f64> {
+        match self {
+            Self::Height => Vector5::new(0.0, 0.0, 1.0, 0.0, 0.0),
+            Self::Range => {
+                let left = across(&(particle.floor() - eye));
+                Vector5::new(left.y, -left.x, 0.0, 0.0, 0.0)
+            }
+        }
+    }
+
+    fn value(self, particle: &Particle, eye: &Point2<f64>) -> f64 {
+        match self {
+            Self::Height => particle.mean[2],
+            Self::Range => (particle.floor() - eye).norm(),
+        }
+    }
+}
+
+/// Places along a line at which the likelihood is asked for.
+const SAMPLES: usize = 15;
+/// They reach this many standard deviations to both sides.
+const REACH: f64 = 3.5;
+/// No line tells more than this, m².
+const FINEST_M2: f64 = 0.02 * 0.02;
+
+fn offset(i: usize, sigma: f64) -> f64 {
+    REACH * sigma * (2.0 * i as f64 / (SAMPLES - 1) as f64 - 1.0)
+}
+
+/// The measurement that turns the prior N(0, sigma²) into the posterior: its
+/// value and variance; `None` if the likelihood says nothing.
+fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
+    let prior = |i: usize| -0.5 * (offset(i, sigma) / sigma).powi(2);
+    let mut weights: Vec<f64> = logs.iter().enumerate().map(|(i, log)| log + prior(i)).collect();
+    from_logs(&mut weights);
+    let mean: f64 = weights.iter().enumerate().map(|(i, w)| w * offset(i, sigma)).sum();
+    let square = |i: usize| (offset(i, sigma) - mean).powi(2);
+    let variance: f64 = weights.iter().enumerate().map(|(i, w)| w * square(i)).sum();
+    if variance.is_nan() || variance >= 0.95 * sigma * sigma {
+        return None;
+    }
+    let spread = 1.0 / (1.0 / variance.max(1e-9) - 1.0 / (sigma * sigma));
+    Some((mean * (1.0 + spread / (sigma * sigma)), spread.max(FINEST_M2)))
+}
+
+/// By how much each person makes the best particle's scene more likely, nats.
+pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
+    let row = group.best();
+    let everybody: Vec<usize> = (0..group.people()).collect();
+    let scene = |look: &mut Look<'_>, people: &[usize]| -> Result<f64> {
+        let parts = group.row(row);
+        people.iter().for_each(|p| look.add(group.ids[*p], &parts[*p]));
+        if people.is_empty() {
+            return Ok(0.0);
+        }
+        Ok(look.ask(people.len())?.first().copied().unwrap_or_default())
+    };
+    let whole = scene(look, &everybody)?;
+    let without = |person: usize| everybody.iter().copied().filter(move |p| *p != person);
+    everybody
+        .iter()
+        .map(|person| Ok(whole - scene(look, &without(*person).collect::<Vec<_>>())?))
+        .collect()
+}
+
+/// Which way somebody who hardly moves faces: the template that fits best of
+/// those seen along the viewing ray, facing left and facing right.
+pub(crate) fn facing(group: &Group, look: &mut Look<'_>) -> Result<Vector2<f64>> {
+    let row = group.best();
+    let particle = &group.row(row)[0];
+    let left = across(&(particle.floor() - look.eye));
+    let ways = [Vector2::zeros(), left, -left];
+    let variants = ways.map(|velocity| Person { velocity, ..particle.person() });
+    let logs = look.variants(group, row, 0, variants.into_iter())?;
+    let best = heaviest(&logs, 1).first().copied().unwrap_or_default();
+    Ok(ways[best])
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// A Gaussian likelihood along the line is the measurement itself.
+        #[test]
+        fn a_gaussian_likelihood_is_measured_as_it_is(
+            value in -0.1..0.1f64, sigma in 0.1..0.3f64, part in 0.6..1.5f64,
+        ) {
+            let spread = (part * sigma).powi(2);
+            let log = |i| -0.5 * (offset(i, sigma) - value).powi(2) / spread;
+            let logs: Vec<f64> = (0..SAMPLES).map(log).collect();
+            let (found, variance) = measurement(&logs, sigma).unwrap();
+            prop_assert!((found - value).abs() < 0.03 * sigma + 0.1 * value.abs());
+            prop_assert!((variance / spread - 1.0).abs() < 0.15, "{} {}", variance, spread);
+        }
+    }
+
+    #[test]
+    fn a_flat_likelihood_measures_nothing() {
+        assert_eq!(measurement(&[-3.0; SAMPLES], 0.2), None);
+    }
+}
