@@ -10,9 +10,6 @@ use tagalong_core::GreyImage;
 /// Bytes in the string of a pixel.
 pub const BYTES: usize = 3;
 
-/// Bits in the string of a pixel, which is the largest matching cost.
-pub const BITS: u8 = 8 * BYTES as u8;
-
 /// The neighbours that a pixel is compared with, as (column, row) offsets: all
 /// of a 5x5 window but its centre.
 pub const NEIGHBOURS: [(i32, i32); 8 * BYTES] = neighbours();
@@ -44,10 +41,11 @@ pub struct CensusRow {
 }
 
 impl CensusRow {
-    /// Computes row `y` of an image. Outside of the image its border goes on.
-    /// With `mirrored`, the row is written from right to left, and the value
-    /// of the first column is repeated `after` times behind it.
-    pub fn compute(&mut self, image: &GreyImage, y: usize, mirrored: bool, after: usize) {
+    /// Computes row `y` of an image. Outside of the image its border goes on. A
+    /// neighbour counts as darker only if it is so by more than `noise`. A
+    /// mirrored row is written from right to left, and the value of the first
+    /// column is repeated so many times behind it.
+    pub fn compute(&mut self, image: &GreyImage, y: usize, noise: u8, mirrored: Option<usize>) {
         let width = image.width();
         self.padded.resize_with(2 * REACH + 1, Vec::new);
         for (row, padded) in self.padded.iter_mut().enumerate() {
@@ -61,13 +59,13 @@ impl CensusRow {
                 let centre = &self.padded[REACH][REACH..];
                 let neighbour =
                     &self.padded[(REACH as i32 + dy) as usize][(REACH as i32 + dx) as usize..];
-                set_bits(plane, neighbour, centre, bit);
+                set_bits(plane, neighbour, centre, noise, bit);
             }
-            if mirrored {
+            if mirrored.is_some() {
                 plane.reverse();
             }
             let last = plane.last().copied().unwrap_or(0);
-            plane.resize(width + after, last);
+            plane.resize(width + mirrored.unwrap_or(0), last);
         }
     }
 }
@@ -81,8 +79,8 @@ fn pad(row: &[u8], padded: &mut Vec<u8>) {
 
 /// Sets a bit where a neighbour is darker than the centre.
 #[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
-fn set_bits(plane: &mut [u8], neighbour: &[u8], centre: &[u8], bit: usize) {
+fn set_bits(plane: &mut [u8], neighbour: &[u8], centre: &[u8], noise: u8, bit: usize) {
     for ((cell, n), c) in plane.iter_mut().zip(neighbour).zip(centre) {
-        *cell |= u8::from(n < c) << bit;
+        *cell |= u8::from(*n < c.saturating_sub(noise)) << bit;
     }
 }

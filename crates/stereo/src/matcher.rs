@@ -80,6 +80,8 @@ impl Matcher {
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
         let (pixels, step) = (self.settings.speckle_pixels, self.settings.speckle_step as f32);
         dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
+        let gone = self.disparities.iter().zip(&mut self.confidences);
+        gone.filter(|(d, _)| d.is_nan()).for_each(|(_, confidence)| *confidence = 0);
         let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());
         Ok(Disparities { width, values, confidences, dropped })
     }

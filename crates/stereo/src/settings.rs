@@ -28,6 +28,8 @@ pub struct StereoSettings {
     /// Largest disparity that is looked for, px at the reduced width; 0 takes
     /// what `min_depth_m` asks for.
     pub max_disparity: usize,
+    /// Differences in brightness up to this are taken for noise, of 255.
+    pub noise: u8,
     /// Least distance of the second best match from the best, as a fraction of
     /// its cost, 0 to 1.
     pub uniqueness: f64,
@@ -60,14 +62,15 @@ impl Default for StereoSettings {
             min_depth_m: 0.5,
             max_depth_m: 20.0,
             max_disparity: 0,
+            noise: 3,
             uniqueness: 0.1,
             left_right: 1,
             speckle_pixels: 100,
             speckle_step: 2.0,
             window: 9,
-            small_penalty: 4,
-            large_penalty: 24,
-            edge_penalty: 10,
+            small_penalty: 8,
+            large_penalty: 100,
+            edge_penalty: 30,
             max_vertical_px: 1.0,
             threads: 0,
         }

@@ -105,8 +105,9 @@ impl Strip {
     }
 
     fn cost_row<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {
-        self.left.compute(pair.left, y, false, 0);
-        self.right.compute(pair.right, y, true, D);
+        let noise = pair.settings.noise;
+        self.left.compute(pair.left, y, noise, None);
+        self.right.compute(pair.right, y, noise, Some(D));
         cost::row(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
     }
 

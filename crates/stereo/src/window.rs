@@ -1,10 +1,6 @@
 //! Block matching: the cost of a disparity is summed up over a square window,
-//! by running sums, so that the work does not depend on the window's size.
-
-use crate::census::BITS;
-
-/// Largest window: the sum of a column of it still fits in a byte.
-pub const MAX_ROWS: usize = (u8::MAX / BITS) as usize;
+//! by running sums, so that the work does not depend on the window's size. The sum
+//! of a column must fit in a byte: at most ten rows of 24 bits.
 
 /// Replaces a row in the sums of columns.
 #[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use tagalong_core::GreyImage;
 
 use super::reference::{self, Volume};
-use crate::census::{BITS, CensusRow};
+use crate::census::{BYTES, CensusRow};
 use crate::paths::{Excess, Penalties};
 use crate::speckle::SpeckleFilter;
 use crate::winner::Winner;
@@ -22,17 +22,17 @@ fn images(count: usize) -> impl Strategy<Value = Vec<GreyImage>> {
     })
 }
 
-fn cost_row(left: &GreyImage, right: &GreyImage, y: usize) -> Vec<[u8; D]> {
+fn cost_row(pair: &[GreyImage], noise: u8, y: usize) -> Vec<[u8; D]> {
     let (mut l, mut r) = (CensusRow::default(), CensusRow::default());
-    l.compute(left, y, false, 0);
-    r.compute(right, y, true, D);
-    let mut costs = vec![[0; D]; left.width()];
+    l.compute(&pair[0], y, noise, None);
+    r.compute(&pair[1], y, noise, Some(D));
+    let mut costs = vec![[0; D]; pair[0].width()];
     cost::row(&l, &r, &mut costs);
     costs
 }
 
-fn cost_rows(pair: &[GreyImage]) -> Vec<Vec<[u8; D]>> {
-    (0..pair[0].height()).map(|y| cost_row(&pair[0], &pair[1], y)).collect()
+fn cost_rows(pair: &[GreyImage], noise: u8) -> Vec<Vec<[u8; D]>> {
+    (0..pair[0].height()).map(|y| cost_row(pair, noise, y)).collect()
 }
 
 fn wide(cells: &[u8]) -> Vec<i64> {
@@ -41,12 +41,12 @@ fn wide(cells: &[u8]) -> Vec<i64> {
 
 proptest! {
     #[test]
-    fn costs_equal_counted_bits(pair in images(2)) {
+    fn costs_equal_counted_bits(pair in images(2), noise in 0..20u8) {
         let (width, height) = (pair[0].width() as i64, pair[0].height() as i64);
         let slow = Volume::from_fn((width, height, D as i64), |x, y, d| {
-            reference::cost(&pair[0], &pair[1], x, y, d)
+            reference::cost(&pair, noise, x, y, d)
         });
-        let fast: Vec<u8> = cost_rows(&pair).concat().into_flattened();
+        let fast: Vec<u8> = cost_rows(&pair, noise).concat().into_flattened();
         prop_assert_eq!(wide(&fast), slow.cells);
     }
 
@@ -56,7 +56,7 @@ proptest! {
     ) {
         let large = |difference: u8| if difference < 9 { small + more + most } else { small + more };
         let penalties = Penalties { small, large: std::array::from_fn(|i| large(i as u8)) };
-        let rows = cost_rows(&pair);
+        let rows = cost_rows(&pair, 0);
         let grey = &pair[0];
         let cells = wide(&rows.concat().into_flattened());
         let (width, height) = (grey.width() as i64, grey.height() as i64);
@@ -83,7 +83,7 @@ proptest! {
 
     #[test]
     fn window_sums_equal_added_costs(
-        cells in prop::collection::vec(0..=BITS, 12 * 7 * D), radius in 1..5usize, shift in 0..4u32,
+        cells in prop::collection::vec(0..=8 * BYTES as u8, 12 * 7 * D), radius in 1..5usize, shift in 0..4u32,
     ) {
         const WIDTH: usize = 7;
         let rows: Vec<&[[u8; D]]> = cells.as_chunks::<D>().0.chunks(WIDTH).collect();

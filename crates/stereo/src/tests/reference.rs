@@ -9,17 +9,19 @@ fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
     image.get(x.clamp(0, right), y.clamp(0, bottom)).unwrap()
 }
 
-pub fn census(image: &GreyImage, x: i64, y: i64) -> Vec<bool> {
+pub fn census(image: &GreyImage, noise: u8, x: i64, y: i64) -> Vec<bool> {
     let darker = |(dx, dy): &(i32, i32)| {
-        clamped(image, x + i64::from(*dx), y + i64::from(*dy)) < clamped(image, x, y)
+        let neighbour = clamped(image, x + i64::from(*dx), y + i64::from(*dy));
+        i16::from(neighbour) < i16::from(clamped(image, x, y)) - i16::from(noise)
     };
     NEIGHBOURS.iter().map(darker).collect()
 }
 
 /// The cost of disparity `d` at the left image's pixel; outside of the right
 /// image the strings of its border go on.
-pub fn cost(left: &GreyImage, right: &GreyImage, x: i64, y: i64, d: i64) -> i64 {
-    let (left, right) = (census(left, x, y), census(right, (x - d).max(0), y));
+pub fn cost(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
+    let left = census(&pair[0], noise, x, y);
+    let right = census(&pair[1], noise, (x - d).max(0), y);
     left.iter().zip(right).filter(|(l, r)| **l != *r).count() as i64
 }
 
