@@ -96,7 +96,6 @@ impl Pipeline {
     }
 
     fn process(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
-        let with_depth;
         let mut now = Now::new(frame);
         let motion = match self.clock.tick(frame, &mut now.report.funnel) {
             Tick::Skip(outcome) => return Ok(FrameReport { outcome, ..now.report }),
@@ -105,7 +104,7 @@ impl Pipeline {
                 motion
             }
         };
-        with_depth = self.see_depth(&mut now)?;
+        let with_depth = self.see_depth(&mut now)?;
         now.frame = with_depth.as_ref().unwrap_or(frame);
         now.lap(STAGES[0]);
         self.break_off(&mut now)?;
