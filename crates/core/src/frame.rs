@@ -93,8 +93,9 @@ impl Frame {
     /// The same moment with a depth image.
     pub fn with_depth(&self, depth: Arc<DepthImage>) -> Self {
         let images = Images { depth: Some(depth), ..self.images.clone() };
-        Self::new(self.index, self.stamp, Arc::clone(&self.camera), self.motion, images)
-            .with_recorded(self.recorded.clone())
+        let camera = Arc::clone(&self.camera);
+        let frame = Self::new(self.index, self.stamp, camera, self.motion, images);
+        Self { recorded: self.recorded.clone(), grey: self.grey.clone(), ..frame }
     }
 
     /// The images as they came.

@@ -118,19 +118,45 @@ fn write_table(
         comment(out, property(key).0);
         let _ = writeln!(out, "{key} = {}", table[key]);
     }
-    for key in absent(schema, table) {
+    let (absent_tables, absent): (Vec<_>, Vec<_>) = absent(schema, table)
+        .into_iter()
+        .partition(|key| property(key).1["properties"].is_object());
+    for key in absent {
         comment(out, property(key).0);
         let _ = writeln!(out, "# {key} =");
     }
     for key in tables {
         let (text, inner) = property(key);
-        let name = if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+        let name = join(path, key);
         out.push('\n');
         comment(out, text);
         let _ = writeln!(out, "[{name}]");
         if let toml::Value::Table(table) = &table[key] {
             write_table(out, &name, table, inner, root);
         }
+    }
+    for key in absent_tables {
+        write_absent_table(out, &join(path, key), property(key), root);
+    }
+}
+
+fn join(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
+/// A table that may be left out, as a comment, with the defaults of its keys.
+fn write_absent_table(
+    out: &mut String,
+    name: &str,
+    (text, table): (Option<&str>, &serde_json::Value),
+    root: &serde_json::Value,
+) {
+    out.push('\n');
+    comment(out, text);
+    let _ = writeln!(out, "# [{name}]");
+    for (key, property) in table["properties"].as_object().into_iter().flatten() {
+        comment(out, resolve(property, root).0);
+        let _ = writeln!(out, "# {key} = {}", property["default"]);
     }
 }
 
@@ -145,8 +171,10 @@ fn resolve<'a>(
     property: &'a serde_json::Value,
     root: &'a serde_json::Value,
 ) -> (Option<&'a str>, &'a serde_json::Value) {
-    let target = property["$ref"]
-        .as_str()
+    let any = property["anyOf"].as_array().into_iter().flatten();
+    let mut references = std::iter::once(property).chain(any).map(|p| &p["$ref"]);
+    let target = references
+        .find_map(|reference| reference.as_str())
         .and_then(|path| root.pointer(path.trim_start_matches('#')))
         .unwrap_or(property);
     let text = property["description"].as_str().or_else(|| target["description"].as_str());
@@ -176,6 +204,8 @@ mod tests {
         topic: Option<String>,
         /// More of it.
         inner: Inner,
+        /// More, if wanted.
+        wanted: Option<Inner>,
     }
 
     #[derive(Serialize, Deserialize, JsonSchema, Default)]
@@ -187,7 +217,13 @@ mod tests {
 
     impl Default for Example {
         fn default() -> Self {
-            Self { min_depth_m: 0.5, names: vec!["a".into()], topic: None, inner: Inner::default() }
+            Self {
+                min_depth_m: 0.5,
+                names: vec!["a".into()],
+                topic: None,
+                inner: Inner::default(),
+                wanted: None,
+            }
         }
     }
 
@@ -211,6 +247,8 @@ mod tests {
         assert!(text.contains("# Nearest depth, m.\nmin_depth_m = 0.5\n"), "{text}");
         assert!(text.contains("# More of it.\n[inner]\n# A count.\ncount = 0\n"), "{text}");
         assert!(text.contains("# A topic, else the only one.\n# topic =\n"), "{text}");
+        let optional = "# More, if wanted.\n# [wanted]\n# A count.\n# count = 0\n";
+        assert!(text.contains(optional), "{text}");
         assert_eq!(toml::from_str::<Example>(&text).unwrap().min_depth_m, 0.5);
     }
 }

@@ -8,6 +8,7 @@ use std::path::Path;
 use tagalong_core::{
     ConfigError, Context, Filter, Registry, Settings, Value, Verifier, nearest, parse_settings,
 };
+use tagalong_stereo::StereoDepth;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -30,7 +31,8 @@ const MAX_BYTES: usize = 1 << 20;
 /// Deepest nesting of a config.
 const MAX_DEPTH: usize = 32;
 
-const OWN: [&str; 6] = ["seed", "robot", "clock", "association", "occlusion", "lifecycle"];
+const OWN: [&str; 7] =
+    ["seed", "robot", "stereo", "clock", "association", "occlusion", "lifecycle"];
 const PLUGINS: [&str; 4] = ["detectors", "verifiers", "filter", "controller"];
 
 /// How a config is read.
@@ -106,11 +108,14 @@ impl Pipeline {
         check_weighing(&filter, &detectors, filter_span)?;
         let steering = builder.steering(root.remove("controller"))?;
         let resolved = resolve(text, &settings, registry)?;
+        let stereo = settings.stereo.clone().map(StereoDepth::new).transpose();
+        let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let run =
             RunSettings { seed: settings.seed, robot: settings.robot.clone(), text: text.into() };
         let pipeline = Self {
             clock: Clock::new(settings.clock.clone()),
             lifecycle: Lifecycle::new(settings.lifecycle.clone()),
+            stereo,
             settings,
             detectors,
             verifiers,

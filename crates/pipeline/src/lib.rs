@@ -27,6 +27,7 @@
 //! | entry | what was dropped |
 //! |---|---|
 //! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
+//! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |
 //! | `motion not finite` | a frame's odometry; the robot counts as standing |
 //! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
 //! | `gate`, `not the best sighting` | what a follower found for a track |
@@ -63,3 +64,4 @@ pub use settings::{
     AssociationSettings, ClockSettings, Cost, DetectorSettings, LifecycleSettings,
     OcclusionSettings, Overlap, PipelineSettings, PluginSettings, RobotSettings, Role,
 };
+pub use tagalong_stereo::StereoSettings;

@@ -4,6 +4,7 @@ use tagalong_core::{
     Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched, Motion,
     Scene, Search, Track, TrackId, Verifier, WheelSpeeds,
 };
+use tagalong_stereo::StereoDepth;
 
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
@@ -17,6 +18,7 @@ use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role
 /// Plugins and the rules by which they work together.
 pub struct Pipeline {
     pub(crate) settings: PipelineSettings,
+    pub(crate) stereo: Option<StereoDepth>,
     pub(crate) detectors: Vec<DetectorSlot>,
     pub(crate) verifiers: Vec<Slot<dyn Verifier>>,
     pub(crate) filter: Slot<dyn Filter>,
@@ -54,8 +56,17 @@ impl DetectorSlot {
 /// Log-odds that stand for certainty. Larger ones would drown all others.
 const CERTAIN: f64 = 100.0;
 
-const STAGES: [&str; 8] =
-    ["predict", "follow", "discover", "associate", "update", "life cycle", "learn", "control"];
+const STAGES: [&str; 9] = [
+    "stereo",
+    "predict",
+    "follow",
+    "discover",
+    "associate",
+    "update",
+    "life cycle",
+    "learn",
+    "control",
+];
 
 impl Pipeline {
     /// Takes one frame through the pipeline.
@@ -93,25 +104,39 @@ impl Pipeline {
                 motion
             }
         };
+        let with_depth = self.see_depth(&mut now)?;
+        now.frame = with_depth.as_ref().unwrap_or(frame);
+        now.lap(STAGES[0]);
         self.break_off(&mut now)?;
         self.predict(&mut now, motion)?;
-        now.lap(STAGES[0]);
-        self.follow(&mut now)?;
         now.lap(STAGES[1]);
-        self.discover(&mut now)?;
+        self.follow(&mut now)?;
         now.lap(STAGES[2]);
-        self.associate(&mut now);
+        self.discover(&mut now)?;
         now.lap(STAGES[3]);
-        self.update(&mut now)?;
+        self.associate(&mut now);
         now.lap(STAGES[4]);
-        self.live(&mut now)?;
+        self.update(&mut now)?;
         now.lap(STAGES[5]);
-        self.learn(&mut now)?;
+        self.live(&mut now)?;
         now.lap(STAGES[6]);
-        self.steer(&mut now)?;
+        self.learn(&mut now)?;
         now.lap(STAGES[7]);
+        self.steer(&mut now)?;
+        now.lap(STAGES[8]);
         self.frames += 1;
         Ok(now.finish())
+    }
+
+    /// The frame with depth from its stereo pair, where it has none and the
+    /// config wants it.
+    fn see_depth(&mut self, now: &mut Now<'_>) -> Result<Option<Frame>, StepError> {
+        let Some(stereo) = self.stereo.as_mut().filter(|_| now.frame.depth().is_err()) else {
+            return Ok(None);
+        };
+        let (frame, funnel) = (now.frame, &mut now.report.funnel);
+        let depth = guard(STAGES[0], frame.index, || stereo.depth(frame, funnel))?;
+        Ok(Some(frame.with_depth(depth)))
     }
 
     /// Ends the tracks that a jump of the clock cuts off.

@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::Wheels;
+use tagalong_stereo::StereoSettings;
 
 /// The pipeline's own keys. Beside them a config has the plugin sections
 /// `[[detectors]]`, `[[verifiers]]`, `[filter]` and `[controller]`, each with
@@ -13,6 +14,10 @@ pub struct PipelineSettings {
     pub seed: u64,
     /// The robot.
     pub robot: RobotSettings,
+    /// Depth from a stereo pair, for frames that have none. Left out: the log
+    /// carries depth, or nobody needs it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stereo: Option<StereoSettings>,
     /// What to do about stamps that jump.
     pub clock: ClockSettings,
     /// Which detection belongs to which track.

@@ -1,4 +1,5 @@
 mod clock;
 pub(crate) mod doubles;
 mod faults;
+mod stereo;
 mod tracking;

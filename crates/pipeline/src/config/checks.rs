@@ -1,4 +1,7 @@
+use std::ops::Range;
+
 use tagalong_core::ConfigError;
+use tagalong_stereo::StereoSettings;
 use toml::Spanned;
 use toml::de::DeTable;
 
@@ -47,14 +50,22 @@ pub(super) fn check(settings: &PipelineSettings, root: &DeTable<'_>) -> Result<(
     for (section, key, value, must) in rules(settings) {
         if !must.accepts(value) {
             let message = format!("`{section}.{key}` must be {}, not {value}", must.words());
-            let entry = root.get(section).and_then(|t| t.get_ref().as_table()?.get(key));
-            return Err(ConfigError { message, span: entry.map(Spanned::span) });
+            return Err(ConfigError { message, span: place(root, section, key) });
         }
+    }
+    if let Some((key, must)) = settings.stereo.as_ref().and_then(StereoSettings::mistake) {
+        let message = format!("`stereo.{key}` must be {must}");
+        return Err(ConfigError { message, span: place(root, "stereo", key) });
     }
     if i64::try_from(settings.seed).is_err() {
         return Err(ConfigError::new(format!("`seed` must be at most {}", i64::MAX)));
     }
     Ok(())
+}
+
+/// Where a key of a section stands.
+fn place(root: &DeTable<'_>, section: &str, key: &str) -> Option<Range<usize>> {
+    root.get(section).and_then(|t| t.get_ref().as_table()?.get(key)).map(Spanned::span)
 }
 
 type Rule = (&'static str, &'static str, f64, Must);

@@ -32,6 +32,9 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         (own("lifecycle.confirm_hits = 9"), &["`lifecycle.confirm_within` must be at least 9"]),
         (own("lifecycle.confirm_within = 40"), &["a.toml:1:28", "at most 32"]),
         (own("robot.max_speed_mps = inf"), &["a.toml:1:23", "must be positive, not inf"]),
+        (own("stereo.window = 4"), &["a.toml:1:17", "`stereo.window` must be 3, 5, 7 or 9"]),
+        (own("stereo.metod = 'block'"), &["a.toml:1:8", "did you mean `method`?"]),
+        (own("stereo.method = 'blok'"), &["a.toml:1:17", "did you mean `block`?"]),
         (own("seed = 'x'"), &["a.toml:1:8", "invalid type"]),
         (own("seed = -4"), &["a.toml:1:8"]),
         (own("seed = "), &["a.toml:1:8"]),
@@ -129,6 +132,9 @@ fn the_seed_can_be_replaced() {
 fn the_defaults_are_printed_under_their_documentation_and_parse() {
     let text = commented_defaults::<PipelineSettings>();
     for key in ["[association]", "# Mahalanobis: largest squared distance.", "gate = 11.34"] {
+        assert!(text.contains(key), "{key} in\n{text}");
+    }
+    for key in ["# [stereo]", "# method = \"semi-global\"", "# min_depth_m = 0.5"] {
         assert!(text.contains(key), "{key} in\n{text}");
     }
     assert_eq!(toml::from_str::<PipelineSettings>(&text).unwrap(), PipelineSettings::default());

@@ -11,7 +11,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("core", &[]),
     ("vision", &["core"]),
     ("stereo", &["core", "vision"]),
-    ("pipeline", &["core"]),
+    ("pipeline", &["core", "stereo"]),
     ("log", &["core", "vision"]),
     ("sim", &["core"]),
     ("eval", &["core"]),

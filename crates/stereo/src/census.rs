@@ -1,0 +1,86 @@
+//! The census transform: each pixel becomes a string of bits that say which of
+//! its neighbours are darker than it is. Two views of one thing get nearly the
+//! same string, whatever their exposure and gain.
+//!
+//! R. Zabih and J. Woodfill, *Non-parametric local transforms for computing
+//! visual correspondence*, ECCV 1994, section 3.
+
+use tagalong_core::GreyImage;
+
+/// Bytes in the string of a pixel.
+pub const BYTES: usize = 3;
+
+/// The neighbours that a pixel is compared with, as (column, row) offsets: all
+/// of a 5x5 window but its centre.
+pub const NEIGHBOURS: [(i32, i32); 8 * BYTES] = neighbours();
+
+/// Largest offset in [`NEIGHBOURS`].
+const REACH: usize = 2;
+
+const fn neighbours() -> [(i32, i32); 8 * BYTES] {
+    let mut all = [(0, 0); 8 * BYTES];
+    let (mut cell, mut n) = (0, 0);
+    while cell < 25 {
+        let offset = (cell % 5 - 2, cell / 5 - 2);
+        if offset.0 != 0 || offset.1 != 0 {
+            all[n] = offset;
+            n += 1;
+        }
+        cell += 1;
+    }
+    all
+}
+
+/// The strings of one row, one plane a byte, with room on both sides so that
+/// any disparity may be looked up.
+#[derive(Clone, Debug, Default)]
+pub struct CensusRow {
+    /// Per byte of the string, `before + width + after` values.
+    pub planes: [Vec<u8>; BYTES],
+    padded: Vec<Vec<u8>>,
+}
+
+impl CensusRow {
+    /// Computes row `y` of an image. Outside of the image its border goes on. A
+    /// neighbour counts as darker only if it is so by more than `noise`. A
+    /// mirrored row is written from right to left, and the value of the first
+    /// column is repeated so many times behind it.
+    pub fn compute(&mut self, image: &GreyImage, y: usize, noise: u8, mirrored: Option<usize>) {
+        let width = image.width();
+        self.padded.resize_with(2 * REACH + 1, Vec::new);
+        for (row, padded) in self.padded.iter_mut().enumerate() {
+            let y = (y + row).saturating_sub(REACH).min(image.height() - 1);
+            pad(image.row(y), padded);
+        }
+        for (byte, plane) in self.planes.iter_mut().enumerate() {
+            plane.clear();
+            plane.resize(width, 0);
+            for (bit, (dx, dy)) in NEIGHBOURS[8 * byte..8 * byte + 8].iter().enumerate() {
+                let centre = &self.padded[REACH][REACH..];
+                let neighbour =
+                    &self.padded[(REACH as i32 + dy) as usize][(REACH as i32 + dx) as usize..];
+                set_bits(plane, neighbour, centre, noise, bit);
+            }
+            if mirrored.is_some() {
+                plane.reverse();
+            }
+            let last = plane.last().copied().unwrap_or(0);
+            plane.resize(width + mirrored.unwrap_or(0), last);
+        }
+    }
+}
+
+fn pad(row: &[u8], padded: &mut Vec<u8>) {
+    padded.clear();
+    padded.resize(REACH, row[0]);
+    padded.extend_from_slice(row);
+    padded.resize(row.len() + 2 * REACH, row[row.len() - 1]);
+}
+
+/// Sets a bit where a neighbour is darker than the centre.
+#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+fn set_bits(plane: &mut [u8], neighbour: &[u8], centre: &[u8], noise: u8, bit: usize) {
+    for ((cell, n), c) in plane.iter_mut().zip(neighbour).zip(centre) {
+        *cell |= u8::from(*n < c.saturating_sub(noise)) << bit;
+    }
+}

@@ -1,0 +1,204 @@
+use std::sync::Arc;
+
+use tagalong_core::{DepthImage, Error, Frame, Funnel, GreyImage, Lens, Result};
+
+use crate::matcher::size_error;
+use crate::rectification::Rectification;
+use crate::reduce::Reducer;
+use crate::{Disparities, Dropped, Matcher, StereoSettings};
+
+/// Frames between two looks at whether the pair is rectified.
+const CHECK_EVERY: u64 = 30;
+
+/// Brightness up to which an image is black.
+const BLACK: u8 = 8;
+/// Brightness from which on a pixel is saturated.
+const SATURATED: u8 = 250;
+/// Part of an image that may be saturated.
+const MAX_SATURATED: f64 = 0.9;
+/// Least difference between the brightest and the darkest pixel.
+const MIN_CONTRAST: u8 = 8;
+
+/// Gives frames with a right image their depth.
+#[derive(Debug)]
+pub struct StereoDepth {
+    settings: StereoSettings,
+    matcher: Matcher,
+    left: Reducer,
+    right: Reducer,
+    rectification: Rectification,
+    frames: u64,
+    depth: Arc<DepthImage>,
+}
+
+impl StereoDepth {
+    /// Depth by these settings.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] if [`StereoSettings::mistake`] finds one.
+    pub fn new(settings: StereoSettings) -> Result<Self> {
+        Ok(Self {
+            matcher: Matcher::new(settings.clone())?,
+            settings,
+            left: Reducer::default(),
+            right: Reducer::default(),
+            rectification: Rectification::default(),
+            frames: 0,
+            depth: Arc::default(),
+        })
+    }
+
+    /// The depth of a frame's left image, of the same size: metres along the
+    /// optical axis, NaN = unknown. Why pixels, or all of the image, have none
+    /// is counted in the funnel.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] without a right or a left image;
+    /// [`Error::Other`] if they differ in size, the camera is no pinhole, or
+    /// the baseline is none.
+    pub fn depth(&mut self, frame: &Frame, funnel: &mut Funnel) -> Result<Arc<DepthImage>> {
+        let right = frame.right()?;
+        let left = frame.grey()?;
+        if let Some(error) = size_error(left, &right.image) {
+            return Err(error);
+        }
+        let fx = focal_px(frame)?;
+        if !(right.baseline_m.is_finite() && right.baseline_m > 0.0) {
+            let message = format!("the baseline of a stereo pair is not {} m", right.baseline_m);
+            return Err(Error::Other(message));
+        }
+        let size = reduced_size(left, self.settings.width);
+        let scale = size.0 as f64 / left.width() as f64;
+        let (fine, left, right_image) = (
+            left,
+            at_size(&mut self.left, left, size),
+            at_size(&mut self.right, &right.image, size),
+        );
+        let focal_baseline = fx * scale * right.baseline_m;
+        let max_disparity = max_disparity(&self.settings, focal_baseline);
+        if self.frames.is_multiple_of(CHECK_EVERY) {
+            self.rectification = Rectification::measure(left, right_image, max_disparity.min(255));
+        }
+        self.frames += 1;
+        let depth = unshared(&mut self.depth, fine.width(), fine.height());
+        depth.pixels_mut().fill(f32::NAN);
+        if let Some(reason) = unusable(left, right_image, &self.rectification) {
+            funnel.drop_many(reason, 1);
+            return Ok(Arc::clone(&self.depth));
+        }
+        let off = self.rectification.vertical_px.abs() > self.settings.max_vertical_px;
+        funnel.drop_many("stereo: images vertically off", u64::from(off));
+        let disparities = self.matcher.disparities(left, right_image, max_disparity)?;
+        count(&disparities.dropped, funnel);
+        let range = self.settings.min_depth_m as f32..=self.settings.max_depth_m as f32;
+        let out = write(&disparities, focal_baseline as f32, &range, depth);
+        funnel.drop_many("stereo pixels: outside of the depth range", out);
+        Ok(Arc::clone(&self.depth))
+    }
+
+    /// How the images of a recent pair lay to each other.
+    pub fn rectification(&self) -> Rectification {
+        self.rectification
+    }
+}
+
+fn focal_px(frame: &Frame) -> Result<f64> {
+    match &frame.camera.lens {
+        Lens::Pinhole(lens) => Ok(lens.fx),
+        _ => Err(Error::Other("a stereo pair needs pinhole cameras".into())),
+    }
+}
+
+fn reduced_size(image: &GreyImage, width: usize) -> (usize, usize) {
+    let (from, height) = (image.width(), image.height());
+    if from <= width {
+        return (from, height);
+    }
+    (width, (height * width).div_ceil(from))
+}
+
+fn at_size<'a>(
+    reducer: &'a mut Reducer,
+    image: &'a GreyImage,
+    (width, height): (usize, usize),
+) -> &'a GreyImage {
+    if width == image.width() { image } else { reducer.reduce(image, width, height) }
+}
+
+fn max_disparity(settings: &StereoSettings, focal_baseline: f64) -> usize {
+    match settings.max_disparity {
+        0 => (focal_baseline / settings.min_depth_m).ceil() as usize,
+        wanted => wanted,
+    }
+}
+
+/// The image to write depth to: the one of an earlier frame if nobody holds it
+/// any more.
+fn unshared(depth: &mut Arc<DepthImage>, width: usize, height: usize) -> &mut DepthImage {
+    let fits = (depth.width(), depth.height()) == (width, height);
+    if !fits || Arc::get_mut(depth).is_none() {
+        *depth = Arc::new(DepthImage::filled(width, height, f32::NAN));
+    }
+    Arc::make_mut(depth)
+}
+
+/// Why nothing can be seen in a pair.
+fn unusable(
+    left: &GreyImage,
+    right: &GreyImage,
+    rectification: &Rectification,
+) -> Option<&'static str> {
+    let range = |image: &GreyImage| {
+        let pixels = image.pixels().iter();
+        pixels.fold((u8::MAX, 0), |(low, high), p| (low.min(*p), high.max(*p)))
+    };
+    let bright = |image: &GreyImage| {
+        let bright = image.pixels().iter().filter(|p| **p >= SATURATED).count();
+        bright as f64 > MAX_SATURATED * image.pixels().len() as f64
+    };
+    let ((low, high), (low_right, high_right)) = (range(left), range(right));
+    if high.min(high_right) <= BLACK {
+        Some("stereo: image is black")
+    } else if bright(left) || bright(right) {
+        Some("stereo: image is saturated")
+    } else if (high - low).min(high_right - low_right) < MIN_CONTRAST {
+        Some("stereo: image without texture")
+    } else if rectification.is_swapped() {
+        Some("stereo: left and right are swapped")
+    } else {
+        None
+    }
+}
+
+fn count(dropped: &Dropped, funnel: &mut Funnel) {
+    funnel.drop_many("stereo pixels: outside of the right image", dropped.outside);
+    funnel.drop_many("stereo pixels: not unique", dropped.not_unique);
+    funnel.drop_many("stereo pixels: left and right disagree", dropped.left_right);
+    funnel.drop_many("stereo pixels: speckle", dropped.speckle);
+}
+
+/// Writes the depths, each to the pixels that its own was made of; returns how
+/// many were out of range.
+fn write(
+    disparities: &Disparities<'_>,
+    focal_baseline: f32,
+    range: &std::ops::RangeInclusive<f32>,
+    depth: &mut DepthImage,
+) -> u64 {
+    let (width, fine) = (disparities.width, (depth.width(), depth.height()));
+    let height = disparities.values.len() / width.max(1);
+    let mut out = 0;
+    for (y, row) in depth.pixels_mut().chunks_exact_mut(fine.0.max(1)).enumerate() {
+        let from = y * height / fine.1 * width;
+        let values = &disparities.values[from..from + width];
+        for (x, depth) in row.iter_mut().enumerate() {
+            let metres = focal_baseline / values[x * width / fine.0];
+            if range.contains(&metres) {
+                *depth = metres;
+            } else {
+                out += u64::from(!metres.is_nan());
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,166 @@
+use tagalong_core::{Error, GreyImage, Result};
+
+use crate::paths::Penalties;
+use crate::settings::MAX_DISPARITIES;
+use crate::speckle::SpeckleFilter;
+use crate::strip::{Output, Pair, Strip};
+use crate::{Dropped, StereoSettings};
+
+/// Rows of a strip. Strips do not depend on the number of threads, so that the
+/// disparities do not, either.
+const STRIP_ROWS: usize = 192;
+
+/// Finds the disparities of rectified pairs; keeps its buffers between them.
+#[derive(Debug)]
+pub struct Matcher {
+    settings: StereoSettings,
+    penalties: Penalties,
+    strips: Vec<Strip>,
+    speckles: SpeckleFilter,
+    disparities: Vec<f32>,
+    confidences: Vec<u8>,
+}
+
+/// Disparities of the left image of a pair, row by row.
+#[derive(Clone, Copy, Debug)]
+pub struct Disparities<'a> {
+    /// Columns.
+    pub width: usize,
+    /// How far each pixel is shifted to the left in the right image, px; NaN =
+    /// unknown.
+    pub values: &'a [f32],
+    /// How sure that is, 0 to 255: by how much the best match is better than
+    /// the second best.
+    pub confidences: &'a [u8],
+    /// Pixels without a disparity, by the reason.
+    pub dropped: Dropped,
+}
+
+impl Matcher {
+    /// A matcher. Of the settings, those that speak of metres and of the width
+    /// are not its concern: see [`crate::StereoDepth`].
+    ///
+    /// # Errors
+    /// [`Error::Settings`] if [`StereoSettings::mistake`] finds one.
+    pub fn new(settings: StereoSettings) -> Result<Self> {
+        if let Some((key, must)) = settings.mistake() {
+            return Err(Error::Settings(format!("`{key}` must be {must}")));
+        }
+        Ok(Self {
+            penalties: penalties(&settings),
+            settings,
+            strips: Vec::new(),
+            speckles: SpeckleFilter::default(),
+            disparities: Vec::new(),
+            confidences: Vec::new(),
+        })
+    }
+
+    /// The disparities from 0 to at least `max_disparity` px. More are looked
+    /// for, up to the next power of two, since it costs nothing.
+    ///
+    /// # Errors
+    /// If the images differ in size, or `max_disparity` is above 255.
+    pub fn disparities(
+        &mut self,
+        left: &GreyImage,
+        right: &GreyImage,
+        max_disparity: usize,
+    ) -> Result<Disparities<'_>> {
+        let (width, height) = (left.width(), left.height());
+        if let Some(error) = size_error(left, right) {
+            return Err(error);
+        }
+        self.disparities.resize(width * height, f32::NAN);
+        self.confidences.resize(width * height, 0);
+        if width * height > 0 {
+            self.fill(left, right, max_disparity)?;
+        }
+        let mut dropped = Dropped::default();
+        self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
+        let (pixels, step) = (self.settings.speckle_pixels, self.settings.speckle_step as f32);
+        dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
+        let gone = self.disparities.iter().zip(&mut self.confidences);
+        gone.filter(|(d, _)| d.is_nan()).for_each(|(_, confidence)| *confidence = 0);
+        let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());
+        Ok(Disparities { width, values, confidences, dropped })
+    }
+
+    fn fill(&mut self, left: &GreyImage, right: &GreyImage, max_disparity: usize) -> Result<()> {
+        let run = match max_disparity {
+            0..16 => Self::run::<16>,
+            16..32 => Self::run::<32>,
+            32..64 => Self::run::<64>,
+            64..128 => Self::run::<128>,
+            128..MAX_DISPARITIES => Self::run::<MAX_DISPARITIES>,
+            _ => {
+                let message = format!(
+                    "disparities up to {max_disparity} px are more than the {} that are looked \
+                     for: reduce the width or raise the least depth",
+                    MAX_DISPARITIES - 1
+                );
+                return Err(Error::Settings(message));
+            }
+        };
+        run(self, left, right);
+        Ok(())
+    }
+
+    fn run<const D: usize>(&mut self, left: &GreyImage, right: &GreyImage) {
+        let cells = STRIP_ROWS * left.width();
+        let count = left.pixels().len().div_ceil(cells);
+        self.strips.resize_with(count, Strip::default);
+        let pair = Pair { left, right, settings: &self.settings, penalties: &self.penalties };
+        let outputs = self.disparities.chunks_mut(cells).zip(self.confidences.chunks_mut(cells));
+        let mut jobs: Vec<(&mut Strip, Output<'_>)> = self
+            .strips
+            .iter_mut()
+            .zip(outputs.enumerate())
+            .map(|(strip, (i, (disparities, confidences)))| {
+                (strip, Output { first_row: i * STRIP_ROWS, disparities, confidences })
+            })
+            .collect();
+        let each = count.div_ceil(threads(self.settings.threads).min(count));
+        let work = |jobs: &mut [(&mut Strip, Output<'_>)]| {
+            jobs.iter_mut().for_each(|(strip, output)| strip.fill::<D>(&pair, output));
+        };
+        std::thread::scope(|scope| {
+            let mut shares = jobs.chunks_mut(each);
+            let own = shares.next();
+            for share in shares {
+                scope.spawn(|| work(share));
+            }
+            own.map(work);
+        });
+    }
+}
+
+/// What is wrong if the images differ in size.
+pub(crate) fn size_error(left: &GreyImage, right: &GreyImage) -> Option<Error> {
+    let [l, r] = [left, right].map(|image| (image.width(), image.height()));
+    (l != r).then(|| {
+        let message = format!(
+            "the left image has {}x{} pixels, the right one {}x{}: a rectified stereo pair has one size",
+            l.0, l.1, r.0, r.1
+        );
+        Error::Other(message)
+    })
+}
+
+fn threads(wanted: usize) -> usize {
+    match wanted {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    }
+}
+
+/// The large penalty falls with the difference in brightness: a jump of the
+/// disparity is likely where the image has an edge (equation 14 of the paper).
+fn penalties(settings: &StereoSettings) -> Penalties {
+    let StereoSettings { small_penalty, large_penalty, edge_penalty, .. } = *settings;
+    let at = |difference: usize| {
+        let lower = f64::from(large_penalty) * 8.0 / (difference.max(8) as f64);
+        (lower as u8).max(edge_penalty)
+    };
+    Penalties { small: small_penalty, large: std::array::from_fn(at) }
+}

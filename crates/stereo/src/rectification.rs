@@ -1,0 +1,134 @@
+//! Is a pair rectified, and is the left image the left one?
+//!
+//! A matcher looks along rows and to one side only, so that it cannot tell. Some
+//! distinct points of the left image are therefore looked for in all directions.
+
+use tagalong_core::GreyImage;
+
+/// Half the side of the patch around a point, px.
+const RADIUS: usize = 5;
+/// How far up and down points are looked for, px.
+const UP_DOWN: i32 = 4;
+/// Columns and rows of cells, from each of which one point is taken.
+const CELLS: (usize, usize) = (8, 6);
+/// So many points must be found again before anything is said.
+const MIN_POINTS: usize = 8;
+/// Least mean change of brightness across a patch, in both directions.
+const MIN_TEXTURE: u32 = 4;
+/// The best place must be better than any other by this factor.
+const DISTINCT: f32 = 0.7;
+
+/// How the images of a pair lie to each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rectification {
+    /// Points of the left image that were found in the right one.
+    pub points: usize,
+    /// How much lower they are there, px (median); 0 if there are too few.
+    pub vertical_px: f64,
+    /// The part of them that is further right there, which cannot be unless
+    /// the images are swapped.
+    pub reversed: f64,
+}
+
+impl Rectification {
+    /// Measures a pair of images of the same size.
+    pub fn measure(left: &GreyImage, right: &GreyImage, max_disparity: usize) -> Self {
+        let found: Vec<Shift> =
+            points(left).filter_map(|p| find(left, right, p, max_disparity as i32)).collect();
+        if found.len() < MIN_POINTS {
+            return Self { points: found.len(), ..Self::default() };
+        }
+        let mut down: Vec<f64> = found.iter().map(|s| s.down).collect();
+        down.sort_by(f64::total_cmp);
+        let reversed = found.iter().filter(|s| s.left < -1).count();
+        Self {
+            points: found.len(),
+            vertical_px: down[down.len() / 2],
+            reversed: reversed as f64 / found.len() as f64,
+        }
+    }
+
+    /// True if the left image is from the right camera.
+    pub fn is_swapped(&self) -> bool {
+        self.points >= MIN_POINTS && self.reversed > 0.5
+    }
+}
+
+/// Where a point is in the right image, compared with the left one, px.
+struct Shift {
+    left: i32,
+    down: f64,
+}
+
+/// The point with the most texture in both directions, of each cell.
+fn points(image: &GreyImage) -> impl Iterator<Item = (usize, usize)> {
+    let border = RADIUS + UP_DOWN as usize;
+    let (width, height) =
+        (image.width().saturating_sub(2 * border), image.height().saturating_sub(2 * border));
+    let (columns, rows) = (CELLS.0.min(width), CELLS.1.min(height));
+    (0..columns * rows).filter_map(move |cell| {
+        let (column, row) = (cell % columns, cell / columns);
+        let xs = (column * width / columns..(column + 1) * width / columns).step_by(4);
+        let ys = (row * height / rows..(row + 1) * height / rows).step_by(4);
+        let all = ys.flat_map(|y| xs.clone().map(move |x| (x + border, y + border)));
+        let best = all.map(|p| (texture(image, p), p)).max_by_key(|(texture, _)| *texture)?;
+        (best.0 >= MIN_TEXTURE).then_some(best.1)
+    })
+}
+
+/// Mean change from pixel to pixel, in the direction with the smaller one.
+fn texture(image: &GreyImage, (x, y): (usize, usize)) -> u32 {
+    let (mut across, mut down) = (0, 0);
+    for row in y - RADIUS..=y + RADIUS {
+        let (this, next) = (image.row(row), image.row(row + 1));
+        for column in x - RADIUS..=x + RADIUS {
+            across += u32::from(this[column].abs_diff(this[column + 1]));
+            down += u32::from(this[column].abs_diff(next[column]));
+        }
+    }
+    across.min(down) / (2 * RADIUS as u32 + 1).pow(2)
+}
+
+/// Looks for a point of the left image; `None` unless one place is clearly the
+/// best.
+fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32) -> Option<Shift> {
+    let radius = RADIUS as i32;
+    let shifts: Vec<i32> = (-reach..=reach)
+        .filter(|s| (radius..right.width() as i32 - radius).contains(&(x as i32 - s)))
+        .collect();
+    let rows = -UP_DOWN..=UP_DOWN;
+    let cost = |shift: i32, down: i32| {
+        difference(left, right, (x, y), ((x as i32 - shift) as usize, (y as i32 + down) as usize))
+    };
+    let all: Vec<(f32, i32, i32)> = rows
+        .flat_map(|down| shifts.iter().map(move |shift| (*shift, down)))
+        .map(|(shift, down)| (cost(shift, down), shift, down))
+        .collect();
+    let best = *all.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let far = |c: &&(f32, i32, i32)| (c.1 - best.1).abs() > 2 || (c.2 - best.2).abs() > 2;
+    let rival = all.iter().filter(far).map(|c| c.0).fold(f32::INFINITY, f32::min);
+    let inside = best.2.abs() < UP_DOWN;
+    (inside && best.0 < DISTINCT * rival).then(|| {
+        let (above, below) = (cost(best.1, best.2 - 1), cost(best.1, best.2 + 1));
+        let rise = above.max(below) - best.0;
+        let offset = if rise > 0.0 { 0.5 * (above - below) / rise } else { 0.0 };
+        Shift { left: best.1, down: f64::from(best.2) + f64::from(offset) }
+    })
+}
+
+/// Mean difference of two patches, apart from their mean brightness.
+fn difference(a: &GreyImage, b: &GreyImage, at_a: (usize, usize), at_b: (usize, usize)) -> f32 {
+    const SIDE: usize = 2 * RADIUS + 1;
+    let rows = |image: &GreyImage, (x, y): (usize, usize), row: usize| -> [i32; SIDE] {
+        let row = &image.row(y + row - RADIUS)[x - RADIUS..];
+        std::array::from_fn(|i| i32::from(row[i]))
+    };
+    let mut differences = [[0_i32; SIDE]; SIDE];
+    for (row, line) in differences.iter_mut().enumerate() {
+        let (a, b) = (rows(a, at_a, row), rows(b, at_b, row));
+        *line = std::array::from_fn(|i| a[i].wrapping_sub(b[i]));
+    }
+    let count = (SIDE * SIDE) as f32;
+    let mean = differences.as_flattened().iter().sum::<i32>() as f32 / count;
+    differences.as_flattened().iter().map(|d| (*d as f32 - mean).abs()).sum::<f32>() / count
+}

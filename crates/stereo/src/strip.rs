@@ -1,0 +1,157 @@
+//! The work on a strip of rows, which is all that a thread does at a time.
+
+use tagalong_core::GreyImage;
+
+use crate::census::CensusRow;
+use crate::paths::{Excess, Penalties};
+use crate::winner::Winner;
+use crate::{Dropped, Method, StereoSettings, cost, paths, window, winner};
+
+/// Rows above a strip from which the paths into it come.
+const RUN_UP: usize = 16;
+
+/// Buffers for the rows of a strip.
+#[derive(Debug, Default)]
+pub struct Strip {
+    left: CensusRow,
+    right: CensusRow,
+    costs: Vec<u8>,
+    sums: Vec<u8>,
+    winners: Vec<Winner>,
+    /// Best disparity and its cost by column of the right image.
+    from_right: Vec<(u8, u8)>,
+    /// Excess costs of the paths from above left, above and above right.
+    excess: [Excess; 3],
+    /// Costs of the rows in the window, and their sums.
+    ring: Vec<Vec<u8>>,
+    columns: Vec<u8>,
+    /// What was dropped.
+    pub dropped: Dropped,
+}
+
+/// What is the same for all strips of a pair.
+pub struct Pair<'a> {
+    pub left: &'a GreyImage,
+    pub right: &'a GreyImage,
+    pub settings: &'a StereoSettings,
+    pub penalties: &'a Penalties,
+}
+
+/// Where a strip leaves its disparities and confidences.
+pub struct Output<'a> {
+    pub first_row: usize,
+    pub disparities: &'a mut [f32],
+    pub confidences: &'a mut [u8],
+}
+
+impl Strip {
+    /// Fills the rows of a strip.
+    pub fn fill<const D: usize>(&mut self, pair: &Pair<'_>, output: &mut Output<'_>) {
+        let width = pair.left.width();
+        self.costs.resize(width * D, 0);
+        self.sums.resize(width * D, 0);
+        self.winners.resize(width, Winner::default());
+        self.dropped = Dropped::default();
+        match pair.settings.method {
+            Method::Block => self.block::<D>(pair, output),
+            Method::SemiGlobal => self.semi_global::<D>(pair, output),
+        }
+    }
+
+    fn semi_global<const D: usize>(&mut self, pair: &Pair<'_>, output: &mut Output<'_>) {
+        let width = pair.left.width();
+        self.excess.iter_mut().for_each(|e| e.reset::<D>(width));
+        let rows = output.disparities.len() / width;
+        for y in output.first_row.saturating_sub(RUN_UP)..output.first_row + rows {
+            self.cost_row::<D>(pair, y);
+            let grey = (pair.left.row(y), pair.left.row(y.saturating_sub(1)));
+            let costs = self.costs.as_chunks::<D>().0;
+            let sums = self.sums.as_chunks_mut::<D>().0;
+            let [left, above, right] = &mut self.excess;
+            paths::forward(costs, grey, pair.penalties, above, right, sums);
+            paths::backward(costs, grey, pair.penalties, left, sums);
+            if y >= output.first_row {
+                self.decide::<D>(pair, y - output.first_row, output);
+            }
+        }
+    }
+
+    fn block<const D: usize>(&mut self, pair: &Pair<'_>, output: &mut Output<'_>) {
+        let (width, height) = (pair.left.width(), pair.left.height());
+        let side = pair.settings.window;
+        let radius = side / 2;
+        let shift = u32::from(side > 3) + 2 * u32::from(side > 7) + u32::from(side > 5);
+        self.columns.clear();
+        self.columns.resize(width * D, 0);
+        self.ring.resize_with(side, Vec::new);
+        for row in &mut self.ring {
+            row.clear();
+            row.resize(width * D, 0);
+        }
+        let rows = output.disparities.len() / width;
+        for step in 0..rows + 2 * radius {
+            let y = (output.first_row + step).saturating_sub(radius).min(height - 1);
+            self.cost_row::<D>(pair, y);
+            let leaves = &mut self.ring[step % side];
+            let columns = self.columns.as_chunks_mut::<D>().0;
+            window::slide_down(columns, self.costs.as_chunks::<D>().0, leaves.as_chunks::<D>().0);
+            std::mem::swap(leaves, &mut self.costs);
+            if step >= 2 * radius {
+                let sums = self.sums.as_chunks_mut::<D>().0;
+                window::slide_along(columns, radius, shift, sums);
+                self.decide::<D>(pair, step - 2 * radius, output);
+            }
+        }
+    }
+
+    fn cost_row<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {
+        let noise = pair.settings.noise;
+        self.left.compute(pair.left, y, noise, None);
+        self.right.compute(pair.right, y, noise, Some(D));
+        cost::row(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
+    }
+
+    /// Writes the disparities of a row, where they stand the tests.
+    fn decide<const D: usize>(&mut self, pair: &Pair<'_>, row: usize, output: &mut Output<'_>) {
+        let width = pair.left.width();
+        winner::row(self.sums.as_chunks_mut::<D>().0, &mut self.winners);
+        self.look_from_right(width);
+        let place = row * width..(row + 1) * width;
+        let disparities = output.disparities[place.clone()].iter_mut();
+        let confidences = output.confidences[place].iter_mut();
+        let uniqueness = pair.settings.uniqueness as f32;
+        for (x, (disparity, confidence)) in disparities.zip(confidences).enumerate() {
+            let winner = &self.winners[x];
+            let margin = winner.margin();
+            (*disparity, *confidence) = (f32::NAN, 0);
+            if usize::from(winner.disparity) > x {
+                self.dropped.outside += 1;
+            } else if margin < uniqueness {
+                self.dropped.not_unique += 1;
+            } else if !self.agrees(x, pair.settings.left_right) {
+                self.dropped.left_right += 1;
+            } else {
+                (*disparity, *confidence) = (winner.refined(), (margin * 255.0) as u8);
+            }
+        }
+    }
+
+    /// The best disparity of each column of the right image, among those that
+    /// won in the left one.
+    fn look_from_right(&mut self, width: usize) {
+        self.from_right.clear();
+        self.from_right.resize(width, (0, u8::MAX));
+        for (x, winner) in self.winners.iter().enumerate() {
+            let Some(seen) = x.checked_sub(usize::from(winner.disparity)) else { continue };
+            if winner.cost < self.from_right[seen].1 {
+                self.from_right[seen] = (winner.disparity, winner.cost);
+            }
+        }
+    }
+
+    fn agrees(&self, x: usize, tolerance: u8) -> bool {
+        let disparity = self.winners[x].disparity;
+        let (back, _) = self.from_right[x - usize::from(disparity)];
+        disparity.abs_diff(back) <= tolerance
+    }
+}

@@ -1,0 +1,117 @@
+//! Depth of frames, and what is said of bad ones.
+
+use std::sync::Arc;
+
+use tagalong_core::{
+    Camera, DepthImage, Distortion, Frame, Funnel, GreyImage, Images, Motion, Pinhole, RightImage,
+    Stamp,
+};
+
+use super::kernels::noise_pair;
+use crate::{Method, StereoDepth, StereoSettings};
+
+const BASELINE_M: f64 = 0.1;
+const FX: f64 = 200.0;
+
+fn frame(left: GreyImage, right: GreyImage) -> Frame {
+    let (width, height) = (left.width(), left.height());
+    let lens = Pinhole { fx: FX, fy: FX, cx: 0.0, cy: 0.0, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, width, height, 1.0, 0.0, 0.0));
+    let images = Images {
+        grey: Some(Arc::new(left)),
+        right: Some(Arc::new(RightImage { image: right, baseline_m: BASELINE_M })),
+        ..Images::default()
+    };
+    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
+}
+
+fn depth(settings: StereoSettings, frame: &Frame) -> (Arc<DepthImage>, Funnel) {
+    let mut funnel = Funnel::default();
+    let mut stereo = StereoDepth::new(settings).unwrap();
+    (stereo.depth(frame, &mut funnel).unwrap(), funnel)
+}
+
+fn known(depth: &DepthImage) -> usize {
+    depth.pixels().iter().filter(|d| !d.is_nan()).count()
+}
+
+#[test]
+fn a_plane_has_its_depth() {
+    let (left, right) = noise_pair(160, 120, 10);
+    for method in [Method::Block, Method::SemiGlobal] {
+        let settings = StereoSettings { method, ..StereoSettings::default() };
+        let (depth, _) = depth(settings, &frame(left.clone(), right.clone()));
+        let wanted = (FX * BASELINE_M / 10.0) as f32;
+        let close = depth.pixels().iter().filter(|d| (**d - wanted).abs() < 0.05).count();
+        assert!(close > 140 * 120, "{method:?}: {close}");
+    }
+}
+
+#[test]
+fn a_reduced_pair_keeps_its_depth() {
+    let (small_left, small_right) = noise_pair(100, 80, 5);
+    let twice = |image: &GreyImage| GreyImage::from_fn(200, 160, |x, y| image.row(y / 2)[x / 2]);
+    let settings = StereoSettings { width: 100, ..StereoSettings::default() };
+    let (depth, _) = depth(settings, &frame(twice(&small_left), twice(&small_right)));
+    assert_eq!((depth.width(), depth.height()), (200, 160));
+    let close = depth.pixels().iter().filter(|d| (**d - 2.0).abs() < 0.1).count();
+    assert!(close > 170 * 160, "{close}");
+}
+
+#[test]
+fn depth_out_of_range_is_none_and_counted() {
+    let (left, right) = noise_pair(160, 120, 10);
+    let settings = StereoSettings { max_depth_m: 1.5, ..StereoSettings::default() };
+    let (depth, funnel) = depth(settings, &frame(left, right));
+    assert_eq!(known(&depth), 0);
+    assert!(funnel.count("stereo pixels: outside of the depth range") > 140 * 120);
+}
+
+#[test]
+fn bad_pairs_have_no_depth_and_the_reason_is_counted() {
+    let (left, right) = noise_pair(320, 240, 10);
+    let plain = |value| GreyImage::filled(320, 240, value);
+    let cases = [
+        (plain(0), right.clone(), "stereo: image is black"),
+        (left.clone(), plain(255), "stereo: image is saturated"),
+        (plain(90), plain(90), "stereo: image without texture"),
+        (right.clone(), left.clone(), "stereo: left and right are swapped"),
+    ];
+    for (left, right, reason) in cases {
+        let (depth, funnel) = depth(StereoSettings::default(), &frame(left, right));
+        assert_eq!((known(&depth), funnel.count(reason)), (0, 1), "{reason}: {funnel:?}");
+    }
+    let (_, funnel) = depth(StereoSettings::default(), &frame(left, right));
+    assert!(funnel.entries().iter().all(|e| !e.test.starts_with("stereo:")), "{funnel:?}");
+}
+
+#[test]
+fn a_vertical_offset_is_measured_and_told() {
+    let (left, right) = noise_pair(320, 240, 10);
+    let lower = GreyImage::from_fn(320, 240, |x, y| right.row(y.saturating_sub(2))[x]);
+    let mut stereo = StereoDepth::new(StereoSettings::default()).unwrap();
+    let mut funnel = Funnel::default();
+    stereo.depth(&frame(left, lower), &mut funnel).unwrap();
+    assert!((stereo.rectification().vertical_px - 2.0).abs() < 0.2);
+    assert_eq!(funnel.count("stereo: images vertically off"), 1);
+}
+
+#[test]
+fn what_is_missing_or_does_not_fit_is_an_error() {
+    let (left, right) = noise_pair(64, 48, 3);
+    let mut stereo = StereoDepth::new(StereoSettings::default()).unwrap();
+    let mut error =
+        |frame: &Frame| stereo.depth(frame, &mut Funnel::default()).unwrap_err().to_string();
+    let whole = frame(left.clone(), right.clone());
+    let bare = |images| Frame::new(1, whole.stamp, Arc::clone(&whole.camera), whole.motion, images);
+    let only_left = Images { right: None, ..whole.images().clone() };
+    assert!(error(&bare(only_left)).contains("needs a right stereo image"));
+    let only_right = Images { grey: None, ..whole.images().clone() };
+    assert!(error(&bare(only_right)).contains("needs a grey or colour image"));
+    assert!(error(&frame(left.clone(), GreyImage::filled(64, 47, 0))).contains("64x47"));
+    for baseline_m in [0.0, -0.1, f64::NAN] {
+        let right = Some(Arc::new(RightImage { image: right.clone(), baseline_m }));
+        let frame = bare(Images { right, ..whole.images().clone() });
+        assert!(error(&frame).contains("baseline"));
+    }
+}

@@ -1,0 +1,211 @@
+//! Each fast kernel against its reference.
+
+use proptest::prelude::*;
+use tagalong_core::GreyImage;
+
+use super::reference::{self, Volume};
+use crate::census::{BYTES, CensusRow};
+use crate::paths::{Excess, Penalties};
+use crate::speckle::SpeckleFilter;
+use crate::winner::Winner;
+use crate::{Matcher, Method, StereoSettings, cost, paths, window, winner};
+
+const D: usize = 16;
+
+/// Images with many equal neighbours, or few.
+fn images(count: usize) -> impl Strategy<Value = Vec<GreyImage>> {
+    (1..40usize, 1..12usize, 1..=255u8).prop_flat_map(move |(width, height, most)| {
+        let pixels = prop::collection::vec(0..=most, width * height);
+        let image =
+            pixels.prop_map(move |p| GreyImage::from_pixels(width, height, p).expect("all pixels"));
+        prop::collection::vec(image, count)
+    })
+}
+
+fn cost_row(pair: &[GreyImage], noise: u8, y: usize) -> Vec<[u8; D]> {
+    let (mut l, mut r) = (CensusRow::default(), CensusRow::default());
+    l.compute(&pair[0], y, noise, None);
+    r.compute(&pair[1], y, noise, Some(D));
+    let mut costs = vec![[0; D]; pair[0].width()];
+    cost::row(&l, &r, &mut costs);
+    costs
+}
+
+fn cost_rows(pair: &[GreyImage], noise: u8) -> Vec<Vec<[u8; D]>> {
+    (0..pair[0].height()).map(|y| cost_row(pair, noise, y)).collect()
+}
+
+fn wide(cells: &[u8]) -> Vec<i64> {
+    cells.iter().copied().map(i64::from).collect()
+}
+
+proptest! {
+    #[test]
+    fn costs_equal_counted_bits(pair in images(2), noise in 0..20u8) {
+        let (width, height) = (pair[0].width() as i64, pair[0].height() as i64);
+        let slow = Volume::from_fn((width, height, D as i64), |x, y, d| {
+            reference::cost(&pair, noise, x, y, d)
+        });
+        let fast: Vec<u8> = cost_rows(&pair, noise).concat().into_flattened();
+        prop_assert_eq!(wide(&fast), slow.cells);
+    }
+
+    #[test]
+    fn path_sums_equal_equation_13(
+        pair in images(2), small in 0..9u8, more in 0..20u8, most in 0..40u8,
+    ) {
+        let large = |difference: u8| if difference < 9 { small + more + most } else { small + more };
+        let penalties = Penalties { small, large: std::array::from_fn(|i| large(i as u8)) };
+        let rows = cost_rows(&pair, 0);
+        let grey = &pair[0];
+        let cells = wide(&rows.concat().into_flattened());
+        let (width, height) = (grey.width() as i64, grey.height() as i64);
+        let costs = Volume { width, height, disparities: D as i64, cells };
+        let mut slow = vec![0_i64; costs.cells.len()];
+        for from in [(-1, 0), (1, 0), (-1, -1), (0, -1), (1, -1)] {
+            let path =
+                reference::path(&costs, grey, from, small.into(), |i| large(i).into());
+            slow.iter_mut().zip(path.cells).for_each(|(s, p)| *s = (*s + p).min(255));
+        }
+        let mut excess: [Excess; 3] = Default::default();
+        excess.iter_mut().for_each(|e| e.reset::<D>(grey.width()));
+        let [left, above, right] = &mut excess;
+        let mut fast = Vec::new();
+        for (y, costs) in rows.iter().enumerate() {
+            let pixels = (grey.row(y), grey.row(y.saturating_sub(1)));
+            let mut sums = vec![[0; D]; grey.width()];
+            paths::forward(costs, pixels, &penalties, above, right, &mut sums);
+            paths::backward(costs, pixels, &penalties, left, &mut sums);
+            fast.extend(wide(sums.as_flattened()));
+        }
+        prop_assert_eq!(fast, slow);
+    }
+
+    #[test]
+    fn window_sums_equal_added_costs(
+        cells in prop::collection::vec(0..=8 * BYTES as u8, 12 * 7 * D), radius in 1..5usize, shift in 0..4u32,
+    ) {
+        const WIDTH: usize = 7;
+        let rows: Vec<&[[u8; D]]> = cells.as_chunks::<D>().0.chunks(WIDTH).collect();
+        let side = 2 * radius + 1;
+        let mut columns = vec![[0; D]; WIDTH];
+        let nothing = vec![[0; D]; WIDTH];
+        for y in 0..rows.len() {
+            let leaves = if y < side { &nothing } else { rows[y - side] };
+            window::slide_down(&mut columns, rows[y], leaves);
+            let first = (y + 1).saturating_sub(side);
+            let mut sums = vec![[0; D]; WIDTH];
+            window::slide_along(&columns, radius, shift, &mut sums);
+            let around = |row: &[[u8; D]], x: usize, d: usize| -> u32 {
+                let clamp = |i: usize| (x + i).saturating_sub(radius).min(WIDTH - 1);
+                (0..side).map(|i| u32::from(row[clamp(i)][d])).sum()
+            };
+            for (at, fast) in sums.as_flattened().iter().enumerate() {
+                let slow: u32 =
+                    rows[first..=y].iter().map(|row| around(row, at / D, at % D)).sum();
+                prop_assert_eq!(*fast, (slow >> shift) as u8);
+            }
+        }
+    }
+
+    #[test]
+    fn winners_are_the_least(cells in prop::collection::vec(any::<u8>(), D)) {
+        let mut sums: [u8; D] = cells.clone().try_into().expect("D of them");
+        let mut fast = [Winner::default()];
+        winner::row(std::slice::from_mut(&mut sums), &mut fast);
+        let cost = *cells.iter().min().expect("some");
+        let best = cells.iter().position(|c| *c == cost).expect("the least is there");
+        let others = cells.iter().enumerate().filter(|(d, _)| d.abs_diff(best) > 1);
+        prop_assert_eq!((usize::from(fast[0].disparity), fast[0].cost), (best, cost));
+        prop_assert_eq!(Some(fast[0].second), others.map(|(_, c)| *c).min());
+        let beside = [cells[best.saturating_sub(1)], cells[(best + 1).min(D - 1)]];
+        prop_assert_eq!(fast[0].beside, beside);
+        prop_assert!((fast[0].refined() - best as f32).abs() <= 0.5);
+        prop_assert!((0.0..=1.0).contains(&fast[0].margin()));
+    }
+
+    #[test]
+    fn speckles_equal_flooded_patches(
+        values in prop::collection::vec(prop_oneof![Just(f32::NAN), 0.0..4.0_f32], 12 * 9),
+        min_pixels in 0..30usize,
+        step in 0.0..1.5_f32,
+    ) {
+        let slow = reference::without_speckles(&values, 12, min_pixels, step);
+        let mut fast = values.clone();
+        let erased = SpeckleFilter::default().apply(&mut fast, 12, min_pixels, step);
+        let bits = |image: &[f32]| image.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+        prop_assert_eq!(bits(&fast), bits(&slow));
+        let holes = |image: &[f32]| image.iter().filter(|v| v.is_nan()).count();
+        prop_assert_eq!(erased as usize, holes(&fast) - holes(&values));
+    }
+
+    #[test]
+    fn any_pair_gives_what_can_be(
+        pair in images(2), block: bool, max_disparity in 0..256usize, uniqueness in 0.0..0.5,
+    ) {
+        let method = if block { Method::Block } else { Method::SemiGlobal };
+        let settings =
+            StereoSettings { method, uniqueness, speckle_pixels: 3, ..StereoSettings::default() };
+        let mut matcher = Matcher::new(settings).expect("valid settings");
+        let found = matcher.disparities(&pair[0], &pair[1], max_disparity).expect("one size");
+        prop_assert_eq!(found.values.len(), pair[0].pixels().len());
+        for (at, value) in found.values.iter().enumerate() {
+            let column = (at % found.width) as f32;
+            prop_assert!(value.is_nan() || (-0.5..=column + 0.5).contains(value));
+            prop_assert_eq!(value.is_nan() && found.confidences[at] > 0, false);
+        }
+    }
+}
+
+/// A left image of noise, and the right one that shows it shifted.
+pub fn noise_pair(width: usize, height: usize, disparity: usize) -> (GreyImage, GreyImage) {
+    let noise = |x: usize, y: usize| {
+        let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+        (h >> 13) as u8
+    };
+    let left = GreyImage::from_fn(width, height, noise);
+    let right = GreyImage::from_fn(width, height, |x, y| noise(x + disparity, y));
+    (left, right)
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let (left, right) = noise_pair(90, 500, 7);
+    for method in [Method::Block, Method::SemiGlobal] {
+        let bits = |threads| {
+            let settings = StereoSettings { method, threads, ..StereoSettings::default() };
+            let mut matcher = Matcher::new(settings).unwrap();
+            let found = matcher.disparities(&left, &right, 20).unwrap();
+            (found.values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>(), found.dropped)
+        };
+        let one = bits(1);
+        assert!((2..=5).all(|threads| bits(threads) == one));
+    }
+}
+
+#[test]
+fn a_shift_is_found() {
+    let (left, right) = noise_pair(120, 60, 9);
+    for method in [Method::Block, Method::SemiGlobal] {
+        let settings = StereoSettings { method, ..StereoSettings::default() };
+        let mut matcher = Matcher::new(settings).unwrap();
+        let found = matcher.disparities(&left, &right, 31).unwrap();
+        let right = found.values.iter().filter(|d| (**d - 9.0).abs() < 0.3).count();
+        assert!(right > 100 * 60, "{method:?}: {right}");
+        let wrong = found.values.iter().filter(|d| (**d - 9.0).abs() > 1.0).count();
+        assert_eq!(wrong, 0, "{method:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_matched_is_an_error() {
+    let mut matcher = Matcher::new(StereoSettings::default()).unwrap();
+    let (a, b) = (GreyImage::filled(8, 6, 0), GreyImage::filled(8, 5, 0));
+    let error = matcher.disparities(&a, &b, 15).unwrap_err().to_string();
+    assert!(error.contains("8x6") && error.contains("8x5"), "{error}");
+    let error = matcher.disparities(&a, &a, 256).unwrap_err().to_string();
+    assert!(error.contains("256 px"), "{error}");
+    let bad = StereoSettings { window: 4, ..StereoSettings::default() };
+    assert!(Matcher::new(bad).unwrap_err().to_string().contains("`window` must be"));
+}

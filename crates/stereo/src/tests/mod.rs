@@ -1,0 +1,3 @@
+mod depth;
+mod kernels;
+mod reference;

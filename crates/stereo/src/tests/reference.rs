@@ -1,0 +1,127 @@
+//! What the kernels compute, pixel by pixel and in wide numbers.
+
+use tagalong_core::GreyImage;
+
+use crate::census::NEIGHBOURS;
+
+fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
+    let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
+    image.get(x.clamp(0, right), y.clamp(0, bottom)).unwrap()
+}
+
+pub fn census(image: &GreyImage, noise: u8, x: i64, y: i64) -> Vec<bool> {
+    let darker = |(dx, dy): &(i32, i32)| {
+        let neighbour = clamped(image, x + i64::from(*dx), y + i64::from(*dy));
+        i16::from(neighbour) < i16::from(clamped(image, x, y)) - i16::from(noise)
+    };
+    NEIGHBOURS.iter().map(darker).collect()
+}
+
+/// The cost of disparity `d` at the left image's pixel; outside of the right
+/// image the strings of its border go on.
+pub fn cost(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
+    let left = census(&pair[0], noise, x, y);
+    let right = census(&pair[1], noise, (x - d).max(0), y);
+    left.iter().zip(right).filter(|(l, r)| **l != *r).count() as i64
+}
+
+/// Costs of all disparities of all pixels, in row order.
+pub struct Volume {
+    pub width: i64,
+    pub height: i64,
+    pub disparities: i64,
+    pub cells: Vec<i64>,
+}
+
+impl Volume {
+    pub fn from_fn(size: (i64, i64, i64), mut cell: impl FnMut(i64, i64, i64) -> i64) -> Self {
+        let (width, height, disparities) = size;
+        let mut cells = Vec::new();
+        for y in 0..height {
+            for x in 0..width {
+                cells.extend((0..disparities).map(|d| cell(x, y, d)));
+            }
+        }
+        Self { width, height, disparities, cells }
+    }
+
+    pub fn size(&self) -> (i64, i64, i64) {
+        (self.width, self.height, self.disparities)
+    }
+
+    pub fn get(&self, x: i64, y: i64, d: i64) -> Option<i64> {
+        let inside = (0..self.width).contains(&x)
+            && (0..self.height).contains(&y)
+            && (0..self.disparities).contains(&d);
+        inside.then(|| self.cells[((y * self.width + x) * self.disparities + d) as usize])
+    }
+}
+
+/// Equation 13 of Hirschmueller for the paths that come from `(dx, dy)` away.
+pub fn path(
+    costs: &Volume,
+    grey: &GreyImage,
+    (dx, dy): (i64, i64),
+    small: i64,
+    large: impl Fn(u8) -> i64,
+) -> Volume {
+    let mut path = Volume::from_fn(costs.size(), |_, _, _| 0);
+    let mut order: Vec<(i64, i64)> =
+        (0..costs.height).flat_map(|y| (0..costs.width).map(move |x| (x, y))).collect();
+    order.sort_by_key(|(x, y)| (*y, -dx.signum() * x));
+    for (x, y) in order {
+        let before = |d| path.get(x + dx, y + dy, d);
+        let least = (0..costs.disparities).filter_map(before).min();
+        let own = clamped(grey, x, y);
+        let jump = large(own.abs_diff(clamped(grey, x + dx, y + dy)));
+        let row: Vec<i64> = (0..costs.disparities)
+            .map(|d| {
+                let cost = costs.get(x, y, d).unwrap();
+                let Some(least) = least else { return cost };
+                let ways = [
+                    before(d),
+                    before(d - 1).map(|c| c + small),
+                    before(d + 1).map(|c| c + small),
+                    Some(least + jump),
+                ];
+                cost + ways.into_iter().flatten().min().unwrap() - least
+            })
+            .collect();
+        let at = ((y * costs.width + x) * costs.disparities) as usize;
+        path.cells[at..at + row.len()].copy_from_slice(&row);
+    }
+    path
+}
+
+/// Sets patches of fewer than `min_pixels` pixels to NaN, by flooding.
+pub fn without_speckles(image: &[f32], width: usize, min_pixels: usize, step: f32) -> Vec<f32> {
+    let mut cleaned = image.to_vec();
+    let mut visited = vec![false; image.len()];
+    for start in 0..image.len() {
+        if visited[start] || image[start].is_nan() {
+            continue;
+        }
+        let (mut patch, mut next) = (vec![start], 0);
+        visited[start] = true;
+        while next < patch.len() {
+            let at = patch[next];
+            next += 1;
+            let beside = [
+                (at % width > 0).then(|| at - 1),
+                (at % width + 1 < width).then_some(at + 1),
+                at.checked_sub(width),
+                Some(at + width).filter(|n| *n < image.len()),
+            ];
+            for other in beside.into_iter().flatten() {
+                if !visited[other] && (image[at] - image[other]).abs() <= step {
+                    visited[other] = true;
+                    patch.push(other);
+                }
+            }
+        }
+        if patch.len() < min_pixels {
+            patch.iter().for_each(|at| cleaned[*at] = f32::NAN);
+        }
+    }
+    cleaned
+}

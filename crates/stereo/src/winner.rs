@@ -1,0 +1,66 @@
+//! From the costs of all disparities of a row to the best ones.
+
+/// The best disparity of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Winner {
+    /// The disparity with the lowest cost, px.
+    pub disparity: u8,
+    /// Its cost ...
+    pub cost: u8,
+    /// ... and those of the disparities below and above; its own where there
+    /// is none.
+    pub beside: [u8; 2],
+    /// The lowest cost of a disparity that is not beside the best one.
+    pub second: u8,
+}
+
+impl Winner {
+    /// How far the second best cost is above the best one, as a fraction of
+    /// the second, 0 to 1.
+    pub fn margin(&self) -> f32 {
+        f32::from(self.second.saturating_sub(self.cost)) / f32::from(self.second.max(1))
+    }
+
+    /// The disparity to a fraction of a pixel, by two lines of equal slope
+    /// through the three costs. M. Shimizu and M. Okutomi, *Precise sub-pixel
+    /// estimation on area-based matching*, ICCV 2001, equation 5.
+    pub fn refined(&self) -> f32 {
+        let [below, above] = self.beside.map(f32::from);
+        let rise = below.max(above) - f32::from(self.cost);
+        let offset = if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 };
+        f32::from(self.disparity) + offset
+    }
+}
+
+/// Finds the best disparity of each pixel. The sums are used up.
+#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+pub fn row<const D: usize>(sums: &mut [[u8; D]], winners: &mut [Winner]) {
+    for (sums, winner) in sums.iter_mut().zip(winners) {
+        *winner = best(sums);
+    }
+}
+
+#[inline(always)]
+fn best<const D: usize>(sums: &mut [u8; D]) -> Winner {
+    let cost = least(sums);
+    let mut at = u8::MAX;
+    for (d, sum) in sums.iter().enumerate() {
+        at = at.min(if *sum == cost { d as u8 } else { u8::MAX });
+    }
+    let d = usize::from(at);
+    let beside = [sums[d.saturating_sub(1)], sums[(d + 1).min(D - 1)]];
+    let (from, to) = (d.saturating_sub(1), (d + 1).min(D - 1));
+    sums[from] = u8::MAX;
+    sums[d] = u8::MAX;
+    sums[to] = u8::MAX;
+    Winner { disparity: at, cost, beside, second: least(sums) }
+}
+
+#[inline(always)]
+fn least<const D: usize>(cells: &[u8; D]) -> u8 {
+    let mut least = u8::MAX;
+    for cell in cells {
+        least = least.min(*cell);
+    }
+    least
+}
