@@ -6,8 +6,8 @@ use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
 use crate::simulate::SimulateArgs;
-use crate::trials::TrialsArgs;
 use crate::train::TrainArgs;
+use crate::trials::TrialsArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.

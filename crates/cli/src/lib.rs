@@ -29,8 +29,8 @@ mod scoring;
 mod signals;
 mod simulate;
 mod suggest;
-mod trials;
 mod train;
+mod trials;
 
 use std::process::ExitCode;
 
@@ -77,7 +77,6 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => simulate::simulate(args, registry),
         Command::Trials(args) => trials::trials(args, registry),
-        Command::Simulate(args) => simulate::simulate(args),
         Command::Train(args) => train::train(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)

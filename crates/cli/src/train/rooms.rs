@@ -31,13 +31,12 @@ pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
         about: "candidates for a verifier".into(),
         seed,
         duration_s,
-        crowd: 0,
         room: RoomSettings {
             size_m: [length, width],
             height_m: chance.between(2.5, 3.2),
             wallpaper: chance.between(0.0, 1.0) < 0.5,
             floor: chance.pick(&[Floor::Planks, Floor::Tiles, Floor::Carpet]),
-            clutter: 0,
+            ..RoomSettings::default()
         },
         light: LightSettings {
             lux: chance.between(80.0, 700.0),
@@ -62,6 +61,7 @@ pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
         faults: FaultSettings { dropped: 0.0, late: 0.0 },
         furniture: (0..6).map(|_| piece(&mut chance, &view)).collect(),
         people: (0..people).map(|_| walker(&mut chance, &view)).collect(),
+        ..Scene::default()
     }
 }
 

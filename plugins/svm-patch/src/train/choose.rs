@@ -91,7 +91,7 @@ fn hold_out(
     let mut values = Vec::with_capacity(samples.len());
     for fold in 0..folds {
         let is_out = |s: &&&Sample| parts.get(&s.example.group) == Some(&fold);
-        let (out, rest): (Vec<&Sample>, Vec<&Sample>) = samples.iter().partition(|s| is_out(&s));
+        let (out, rest): (Vec<&Sample>, Vec<&Sample>) = samples.iter().partition(|s| is_out(s));
         let model = fit(&rest)?;
         values.extend(out.iter().map(|s| (model.decision(&s.patch), s.example.is_person)));
     }
