@@ -148,9 +148,9 @@ pub(crate) fn in_image(truth: &Truth, camera: &Camera) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::trial;
+    use crate::testing::{Path, trial};
 
-    fn judged(tracks: &[(u32, &[Option<(f64, f64)>])]) -> Result<Span, Failing> {
+    fn judged(tracks: &[Path<'_>]) -> Result<Span, Failing> {
         let people: [&[_]; 2] = [&[(3.0, 0.5, 1.0); 20], &[(4.0, -0.5, 1.0); 20]];
         let trial = trial(&people, tracks);
         crossing(&trial, &trial.runs[0], &Crossing::default())

@@ -13,13 +13,19 @@ pub const RATE_HZ: f64 = 10.0;
 /// Where somebody is, and how much is seen of them.
 pub type Place = (f64, f64, f64);
 
+/// Where a track is on the floor in a frame, if it is there, m.
+pub type Seen = Option<(f64, f64)>;
+
+/// A track's number, and where it is in every frame.
+pub type Path<'a> = (u32, &'a [Seen]);
+
 fn camera() -> Camera {
     let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
     Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0)
 }
 
 /// A robot at rest, and for each person and each track a place in every frame.
-pub fn trial(people: &[&[Place]], tracks: &[(u32, &[Option<(f64, f64)>])]) -> Trial {
+pub fn trial(people: &[&[Place]], tracks: &[Path<'_>]) -> Trial {
     let frames = people[0].len();
     let camera = camera();
     let moments = (0..frames).map(|at| moment(at, people, &camera)).collect();
@@ -55,8 +61,8 @@ fn moment(at: usize, people: &[&[Place]], camera: &Camera) -> Moment {
     }
 }
 
-fn report(at: usize, tracks: &[(u32, &[Option<(f64, f64)>])], camera: &Camera) -> FrameReport {
-    let track = |(id, places): &(u32, &[Option<(f64, f64)>])| {
+fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
+    let track = |(id, places): &Path<'_>| {
         let (x, y) = places[at]?;
         let position = Point3::new(x, y, 1.6);
         let person = Person { position, velocity: Vector2::zeros() };
