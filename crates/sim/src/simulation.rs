@@ -140,10 +140,10 @@ impl Simulation {
         pieces.extend(chairs(scene));
         let obstacles: Vec<Obstacle> = pieces.iter().flat_map(room::obstacles).collect();
         let mut fixed = vec![room::room(&scene.room)];
-        let (ceiling_m, mut chance) = (scene.room.height_m, stream(6));
+        let (ceiling_m, mut chance) = (scene.room.height_m, stream(8));
         fixed.extend(pieces.iter().map(|piece| room::furniture(piece, ceiling_m, &mut chance)));
         let mirror = (scene.camera.kind == CameraKind::Panorama)
-            .then(|| MirrorCamera::new(&scene.camera, &mut stream(7)));
+            .then(|| MirrorCamera::new(&scene.camera, &mut stream(6)));
         let camera = mirror
             .as_ref()
             .map_or_else(|| camera(scene), |mirror| mirror.camera(scene.camera.height_m));
@@ -662,7 +662,7 @@ mod tests {
 
     const OMNI: &str = "duration_s = 1.0\n[camera]\nkind = \"panorama\"\nwidth = 160\nheight = 160\n\
         rate_hz = 3.0\nheight_m = 1.55\n[robot]\nstart = [5.0, 3.0]\n[faults]\ndropped = 0.0\n\
-        [[people]]\npath = [[3.0, 3.01]]\nheight_m = 1.7\n[[people]]\npath = [[5.0, 5.5]]\n\
+        [[people]]\npath = [[3.0, 3.01]]\nheight_m = 1.7\n[[people]]\npath = [[5.0, 5.5]]\nheading_deg = 270.0\n\
         [[webcams]]\nwidth = 64\nheight = 48\n[[webcams]]\nwidth = 64\nheight = 48\nrate_hz = 5.0\n";
 
     #[test]
