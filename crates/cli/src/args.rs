@@ -145,7 +145,8 @@ Same scene and seed, same bytes.
 Examples:
   tagalong simulate --realism
   tagalong simulate configs/scenes/crossing.toml
-  tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7
+  tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7 --split test
+  tagalong simulate configs/scenes/crowd.toml --set crowd=3 --set camera.kind=stereo
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
 
 const INSPECT_HELP: &str = "\

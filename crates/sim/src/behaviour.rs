@@ -223,11 +223,10 @@ fn angle_between(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
 
     fn walker(path: &[[f64; 2]], trick: Trick) -> Walker {
         let settings = PersonSettings { path: path.to_vec(), trick, ..PersonSettings::default() };
-        Walker::new(Person::random(&mut Random::new(1, 0)), settings)
+        Walker::new(Person::subject(1), settings)
     }
 
     /// Walks for some time; calls `see` after every step.

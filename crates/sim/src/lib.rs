@@ -23,6 +23,19 @@
 //! assert_eq!(images, 2);
 //! ```
 //!
+//! One file describes any number of scenes: its table `[vary]` says what
+//! differs from seed to seed, a [`Variant`] picks one, and a [`Split`] keeps
+//! seeds, people and rooms for training, validation and test apart.
+//!
+//! ```
+//! use tagalong_sim::{Scene, Split, Variant};
+//! let text = "crowd = 1\n[vary]\nlight.lux = { between = [50.0, 1000.0] }\n";
+//! let variant = Variant::of_split(Split::Test, 7).with("crowd", 3);
+//! let scene = Scene::parse_with(text, &variant).unwrap();
+//! assert_eq!((scene.crowd, scene.seed), (3, 2_000_000_007));
+//! assert!((50.0..=1000.0).contains(&scene.light.lux));
+//! ```
+//!
 //! World coordinates have X along the room, Y across it and Z up, in metres.
 
 mod behaviour;
@@ -44,6 +57,8 @@ mod shape;
 mod sight;
 mod simulation;
 mod webcam;
+mod split;
+mod variation;
 mod world;
 
 pub use mirror::MirrorSettings;
@@ -54,3 +69,5 @@ pub use scene::{
 };
 pub use simulation::{Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
 pub use webcam::WebcamSettings;
+pub use split::Split;
+pub use variation::Variant;

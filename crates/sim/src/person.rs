@@ -43,6 +43,8 @@ pub enum Extra {
     Bag,
 }
 
+/// Random numbers that only subjects are drawn from.
+const SUBJECT_STREAM: u64 = 7;
 const SKINS: &[Colour] = &[
     [0.62, 0.42, 0.33],
     [0.52, 0.33, 0.25],
@@ -105,9 +107,10 @@ pub struct Person {
 }
 
 impl Person {
-    /// Somebody of the population.
-    pub fn random(random: &mut Random) -> Self {
-        Self { build: Build::random(random), look: Look::random(random) }
+    /// Somebody of the population: the same number is the same person.
+    pub fn subject(number: u64) -> Self {
+        let mut random = Random::new(number, SUBJECT_STREAM);
+        Self { build: Build::random(&mut random), look: Look::random(&mut random) }
     }
 
     /// The solids of the person, those of the upper body (head, trunk above the
@@ -285,9 +288,8 @@ mod tests {
 
     #[test]
     fn the_top_of_the_head_is_at_the_height_of_the_body() {
-        let mut random = Random::new(8, 0);
-        for _ in 0..20 {
-            let mut person = Person::random(&mut random);
+        for number in 0..20 {
+            let mut person = Person::subject(number);
             person.look.extras.clear();
             let stance =
                 Stance { place: Point2::origin(), heading_rad: 1.0, speed_mps: 0.0, phase: 0.0 };

@@ -38,7 +38,12 @@ impl Random {
 
     /// One of a list that is not empty.
     pub fn pick<T: Copy>(&mut self, of: &[T]) -> T {
-        of[(self.0.next_u64() % of.len() as u64) as usize]
+        of[self.below(of.len() as u64) as usize]
+    }
+
+    /// A whole number from 0 to below `end`, which must not be 0.
+    pub fn below(&mut self, end: u64) -> u64 {
+        self.0.next_u64() % end
     }
 }
 

@@ -3,10 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::ConfigError;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use crate::mirror::MirrorSettings;
 use crate::person::Extra;
 use crate::webcam::WebcamSettings;
+use crate::split::{SUBJECTS, Split};
+use crate::variation::{Variant, one_scene};
 
 /// A scene. Lengths are in metres; the room's corner is the origin, X runs
 /// along its length, Y along its width; angles turn from X towards Y.
@@ -15,7 +19,8 @@ use crate::webcam::WebcamSettings;
 pub struct Scene {
     /// What the scene is for.
     pub about: String,
-    /// Where all chance comes from.
+    /// Where all chance comes from; it also says for what the log may be used,
+    /// see [`Split`].
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
@@ -64,14 +69,46 @@ impl Scene {
     /// # Errors
     /// An unknown key, a wrong type or an impossible value, with its place.
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
-        let scene: Self = toml::from_str(text)?;
+        Self::parse_with(text, &Variant::default())
+    }
+
+    /// Reads one of the scenes that a text with a table `[vary]` describes. That
+    /// table has dotted keys and says for each where its value comes from:
+    ///
+    /// ```toml
+    /// [vary]
+    /// light.lux = { between = [50.0, 1000.0] }             # of whole numbers: both ends included
+    /// room.floor = { one_of = ["planks", "tiles", "carpet"] }
+    /// people.0.speed_mps = { in_turn = [0.6, 0.8, 1.0] }   # the seed's number counts
+    /// people.1.look = { same_as = "people.0.look" }
+    /// room.size_m.0 = { between = [7.0, 12.0], apart = true } # no value in two splits
+    /// ```
+    ///
+    /// Same text, same variant, same scene; each key has a chance of its own.
+    ///
+    /// # Errors
+    /// An unknown key, a wrong type or an impossible value, with its place.
+    pub fn parse_with(text: &str, variant: &Variant) -> Result<Self, ConfigError> {
+        let scene = one_scene(text, variant, |mut table, seed| {
+            complete_camera(&mut table);
+            let value = Spanned::new(0..0, DeValue::Table(table));
+            let scene = Self::deserialize(ValueDeserializer::from(value))?;
+            Ok(Self { seed, ..scene })
+        })?;
         scene.check()?;
         Ok(scene)
+    }
+
+    /// What the log may be used for.
+    pub fn split(&self) -> Split {
+        Split::of(self.seed)
     }
 
     fn check(&self) -> Result<(), ConfigError> {
         let camera = &self.camera;
         let rules = [
+            (self.seed < Split::SEEDS_END, "seed must be below 3000000000"),
+            (self.room.clutter <= 500, "room.clutter must be at most 500"),
             (self.duration_s > 0.0 && self.duration_s <= 3600.0, "duration_s must be in 0 to 3600"),
             (
                 self.room.size_m.iter().all(|m| (1.0..=200.0).contains(m)),
@@ -101,6 +138,10 @@ impl Scene {
                 "every person needs a path of one point at least",
             ),
             (
+                self.people.iter().all(|p| p.subject.max(p.look) < Some(SUBJECTS)),
+                "subject and look must be below 500",
+            ),
+            (
                 self.people.iter().all(|p| (0.0..=2.0).contains(&p.speed_mps)),
                 "speed_mps must be in 0 to 2",
             ),
@@ -110,6 +151,23 @@ impl Scene {
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
             None => Ok(()),
+        }
+    }
+}
+
+/// What a stereo pair has where a scene does not say otherwise.
+const STEREO: [(&str, &str); 4] =
+    [("width", "512"), ("height", "384"), ("field_of_view_deg", "100.0"), ("baseline_m", "0.12")];
+
+/// Gives a camera that only names its kind what that kind ordinarily has.
+fn complete_camera(root: &mut DeTable<'_>) {
+    let Some(DeValue::Table(camera)) = root.get_mut("camera").map(Spanned::get_mut) else { return };
+    if camera.get("kind").and_then(|kind| kind.get_ref().as_str()) != Some("stereo") {
+        return;
+    }
+    for (key, value) in STEREO {
+        if let (false, Ok(value)) = (camera.contains_key(key), DeValue::parse(value)) {
+            camera.insert(Spanned::new(0..0, key.into()), value);
         }
     }
 }
@@ -185,7 +243,9 @@ pub enum CameraKind {
     Panorama,
 }
 
-/// The camera on the robot.
+/// The camera on the robot. Where a scene leaves them out, width, height, field
+/// of view and baseline are those of the kind: 640x480, 58 degrees and 0.075 m
+/// of `rgbd`; 512x384, 100 degrees and 0.12 m of `stereo`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSettings {
@@ -385,7 +445,10 @@ pub struct PersonSettings {
     pub spin_deg_per_s: f64,
     /// Body height, m; by chance if left out.
     pub height_m: Option<f64>,
-    /// People with the same number look alike; by chance if left out.
+    /// Number in the pool of people that the seed's split has, 0 to 499; by
+    /// chance if left out.
+    pub subject: Option<u64>,
+    /// In the clothes of this number of the pool; in their own if left out.
     pub look: Option<u64>,
     /// Things put on or carried; by chance if left out.
     pub extras: Option<Vec<Extra>>,
@@ -402,6 +465,7 @@ impl Default for PersonSettings {
             heading_deg: None,
             spin_deg_per_s: 0.0,
             height_m: None,
+            subject: None,
             look: None,
             extras: None,
         }

@@ -13,7 +13,7 @@ use tagalong_core::{
 use crate::behaviour::{Obstacle, Walker, hidden_by, play_tricks};
 use crate::body::Skeleton;
 use crate::mirror::MirrorCamera;
-use crate::person::{Look, Person};
+use crate::person::Person;
 use crate::random::Random;
 use crate::render::{View, Visibility, draw, visibility};
 use crate::robot::Robot;
@@ -22,6 +22,7 @@ use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, 
 use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
 use crate::webcam::Webcam;
+use crate::split::{SUBJECTS, Split};
 use crate::world::{Hit, Lamp, Object, World};
 
 /// People, robot and odometry move in steps of this many nanoseconds.
@@ -466,13 +467,21 @@ fn obstacle(piece: &Furniture) -> Obstacle {
 fn walkers(scene: &Scene, random: &mut Random) -> Vec<Walker> {
     let wanderers: Vec<PersonSettings> =
         (0..scene.crowd).map(|_| wanderer(scene, random)).collect();
-    scene.people.iter().cloned().chain(wanderers).map(|p| somebody(p, random)).collect()
+    scene
+        .people
+        .iter()
+        .cloned()
+        .chain(wanderers)
+        .map(|p| somebody(p, scene.split(), random))
+        .collect()
 }
 
-fn somebody(settings: PersonSettings, random: &mut Random) -> Walker {
-    let mut person = Person::random(random);
+/// One of the people of a split.
+fn somebody(settings: PersonSettings, split: Split, random: &mut Random) -> Walker {
+    let any = random.below(SUBJECTS);
+    let mut person = Person::subject(split.subject(settings.subject.unwrap_or(any)));
     if let Some(look) = settings.look {
-        person.look = Look::random(&mut Random::new(look, 7));
+        person.look = Person::subject(split.subject(look)).look;
     }
     if let Some(extras) = &settings.extras {
         person.look.extras.clone_from(extras);
@@ -550,7 +559,8 @@ mod tests {
 
     #[test]
     fn a_stereo_pair_is_shifted_by_the_disparity() {
-        let text = SMALL.replace("[camera]\n", "[camera]\nkind = \"stereo\"\nbaseline_m = 0.12\n");
+        let text =
+            SMALL.replace("[camera]\n", "[camera]\nkind = \"stereo\"\nfield_of_view_deg = 58.0\n");
         let images = &shots(&text, 2)[0].images;
         let (left, right) = (images.grey.as_ref().unwrap(), &images.right.as_ref().unwrap().image);
         let difference = |shift: i64| -> i64 {

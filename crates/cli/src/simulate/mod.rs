@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 pub use record::Recorder;
 use tagalong_core::Registry;
 use tagalong_log::write::WriteError;
-use tagalong_sim::{Event, Scene, Simulation};
+use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
 use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, say};
@@ -27,9 +27,15 @@ pub struct SimulateArgs {
     /// The log to write [default: runs/<scene>.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
-    /// Use this seed instead of the scene's.
+    /// Use this seed instead of the scene's: counted within --split if given.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Take seed, people and rooms from train, validation or test.
+    #[arg(long, value_name = "SPLIT")]
+    pub split: Option<Split>,
+    /// Set a value of the scene, like camera.kind=stereo or people.0.speed_mps=0.8.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub set: Vec<(String, String)>,
     /// Draw pictures with the truth into this folder instead of writing a log.
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub gallery: Option<PathBuf>,
@@ -37,7 +43,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
     /// Draw no scene, but check how real drawn worlds are, and print it.
-    #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "threads"])]
+    #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "split", "set", "threads"])]
     pub realism: bool,
     /// Draws of each random scene of the checks.
     #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
@@ -55,7 +61,8 @@ pub struct SimulateArgs {
 /// written are 1.
 pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
     let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
-    let scene = read(path, args.seed)?;
+    let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
+    let scene = read(path, &variant)?;
     let simulation = Simulation::new(&scene, threads(args.threads));
     match &args.gallery {
         Some(folder) => gallery::paint(simulation, &scene, folder)?,
@@ -68,18 +75,21 @@ pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Reads a scene.
+fn key_and_value(argument: &str) -> Result<(String, String), String> {
+    let (key, value) = argument.split_once('=').ok_or("write KEY=VALUE, like crowd=5")?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
+/// Reads one of the scenes that a file describes.
 ///
 /// # Errors
 /// A file that cannot be read, or a mistake in it with its place: exit code 2.
-pub fn read(path: &Path, seed: Option<u64>) -> Result<Scene, Failure> {
+pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
     let shown = path.display();
     let text = fs::read_to_string(path)
         .map_err(|error| Failure::usage(format!("cannot read scene {shown}: {error}")))?;
-    let mut scene = Scene::parse(&text)
-        .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))?;
-    scene.seed = seed.unwrap_or(scene.seed);
-    Ok(scene)
+    Scene::parse_with(&text, variant)
+        .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))
 }
 
 /// As many threads as asked for, else as many as there are.

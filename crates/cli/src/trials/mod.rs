@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::Registry;
-use tagalong_sim::Scene;
+use tagalong_sim::{Scene, Variant};
 use tagalong_trials::Contender;
 
 use crate::args::Format;
@@ -98,11 +98,12 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
     paths.iter().map(read).collect()
 }
 
-/// A scene with as many seeds as wanted.
+/// The scenes of as many seeds as wanted, from the file's own on.
 fn suite(path: &Path, seeds: u64) -> Result<(String, Vec<Scene>), Failure> {
-    let scene = simulate::read(path, None)?;
+    let first = simulate::read(path, &Variant::default())?.seed;
+    let scene = |number| simulate::read(path, &Variant::of_seed(first.saturating_add(number)));
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok((name, with_seeds(&scene, seeds)))
+    Ok((name, (0..seeds).map(scene).collect::<Result<_, _>>()?))
 }
 
 /// The same scene with other luck.
