@@ -1,12 +1,12 @@
 //! What people do: they walk along their ways, keep off each other and off
 //! furniture, and some of them play tricks when the robot cannot see them.
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Rotation2, Vector2};
 
 use crate::body::Stance;
 use crate::gait::Gait;
 use crate::person::Person;
-use crate::scene::{AtEnd, PersonSettings, Trick};
+use crate::scene::{AtEnd, PersonSettings, Posture, Trick};
 
 /// How fast a walker's velocity can change, m/s².
 const MAX_ACCELERATION: f64 = 1.2;
@@ -18,8 +18,15 @@ const REACHED_M: f64 = 0.25;
 /// 1995, with the reach of indoor crowds).
 const PUSH: f64 = 2.2;
 const PUSH_REACH_M: f64 = 0.45;
-/// For how long somebody who plays [`Trick::Stop`] stays hidden, s.
-const HIDE_S: f64 = 3.0;
+/// Somebody with the posture [`Posture::Bending`] bends down for the second half
+/// of every so many seconds, by this angle, rad, which takes them some time, s.
+const BEND_EVERY_S: f64 = 6.0;
+const BEND_RAD: f64 = 1.1;
+const BEND_TAKES_S: f64 = 0.4;
+/// Companions come no nearer to each other than about this, m.
+const TOO_NEAR_M: f64 = 0.6;
+/// Whoever walks along closes a gap to their place within about this time, s.
+const CATCH_UP_S: f64 = 0.8;
 
 /// A round thing that people walk around.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +37,17 @@ pub struct Obstacle {
     pub radius_m: f64,
 }
 
+/// Where somebody who walks along should be now, and how they move there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lead {
+    /// The place beside the one who leads, m.
+    pub place: Point2<f64>,
+    /// The velocity of the one who leads, m/s.
+    pub velocity: Vector2<f64>,
+    /// Where the one who leads looks, rad.
+    pub heading_rad: f64,
+}
+
 /// A person on the way.
 #[derive(Clone, Debug)]
 pub struct Walker {
@@ -37,6 +55,8 @@ pub struct Walker {
     pub person: Person,
     /// Where they are and how they stand.
     pub stance: Stance,
+    /// Whom they walk along with, and where in the axes of that person, m.
+    pub beside: Option<(usize, Vector2<f64>)>,
     settings: PersonSettings,
     velocity: Vector2<f64>,
     /// Index into the path of the point ahead; past its end on arrival.
@@ -48,14 +68,20 @@ pub struct Walker {
 impl Walker {
     /// Somebody at the first point of the path, which must exist.
     pub fn new(person: Person, settings: PersonSettings) -> Self {
+        let mut settings = settings;
+        for point in &mut settings.path {
+            *point = [point[0] + settings.offset[0], point[1] + settings.offset[1]];
+        }
         let points: Vec<Point2<f64>> = settings.path.iter().map(|p| Point2::from(*p)).collect();
         let way = points.get(1).map_or(Vector2::x(), |next| next - points[0]);
         let heading_rad = settings.heading_deg.map_or(way.y.atan2(way.x), f64::to_radians);
-        let stance = Stance { place: points[0], heading_rad, speed_mps: 0.0, phase: 0.0 };
+        let stance =
+            Stance { posture: settings.posture, ..Stance::standing(points[0], heading_rad) };
         let waits_until_s = settings.start_s;
         Self {
             person,
             stance,
+            beside: None,
             settings,
             velocity: Vector2::zeros(),
             ahead: 1,
@@ -64,11 +90,42 @@ impl Walker {
         }
     }
 
-    /// Moves by a short time. `keep_off` are the places of everybody else, the
-    /// robot included.
-    pub fn step(&mut self, now_s: f64, dt: f64, keep_off: &[Point2<f64>], obstacles: &[Obstacle]) {
+    /// Somebody who walks along with walker `leader`, at `offset` in the axes of
+    /// that person, m.
+    pub fn along(mut self, leader: (usize, &Self), offset: Vector2<f64>) -> Self {
+        let (index, leader) = leader;
+        self.stance.place = leader.place_beside(offset);
+        self.stance.heading_rad = leader.stance.heading_rad;
+        self.beside = Some((index, offset));
+        self
+    }
+
+    /// Where somebody who walks along should be.
+    pub fn lead(&self, offset: Vector2<f64>) -> Lead {
+        let heading_rad = self.stance.heading_rad;
+        Lead { place: self.place_beside(offset), velocity: self.velocity, heading_rad }
+    }
+
+    fn place_beside(&self, offset: Vector2<f64>) -> Point2<f64> {
+        self.stance.place + Rotation2::new(self.stance.heading_rad) * offset
+    }
+
+    /// Moves by a short time. `keep_off` are the places of all who are no
+    /// companions; `lead` is the place of somebody who walks along.
+    pub fn step(
+        &mut self,
+        now_s: f64,
+        dt: f64,
+        lead: Option<&Lead>,
+        keep_off: &[Point2<f64>],
+        obstacles: &[Obstacle],
+    ) {
         self.look_ahead();
-        let wanted = if now_s < self.waits_until_s { Vector2::zeros() } else { self.wanted() };
+        let wanted = match lead {
+            Some(lead) => self.follow(lead),
+            None if now_s < self.waits_until_s => Vector2::zeros(),
+            None => self.wanted(),
+        };
         let mut change = (wanted - self.velocity) / 0.5;
         // Who stands lets the others do the avoiding.
         if wanted != Vector2::zeros() {
@@ -81,8 +138,40 @@ impl Walker {
         self.velocity = self.velocity.cap_magnitude(1.3 * self.settings.speed_mps.max(0.1));
         self.stance.place += self.velocity * dt;
         self.stance.speed_mps = self.velocity.norm();
-        self.turn(dt);
+        if wanted != Vector2::zeros() {
+            self.stay_outside(obstacles);
+        }
+        self.turn(dt, lead);
         self.stride(dt);
+        self.bend(now_s, dt);
+    }
+
+    /// Nobody walks through things, however hard they are pushed.
+    fn stay_outside(&mut self, obstacles: &[Obstacle]) {
+        for obstacle in obstacles {
+            let away = self.stance.place - obstacle.at;
+            if let Some(out) = away.try_normalize(1e-6).filter(|_| away.norm() < obstacle.radius_m)
+            {
+                self.stance.place = obstacle.at + out * obstacle.radius_m;
+            }
+        }
+    }
+
+    /// The velocity that closes the gap to the place beside the leader.
+    fn follow(&self, lead: &Lead) -> Vector2<f64> {
+        let gap = lead.place - self.stance.place;
+        if lead.velocity.norm() < 0.1 && gap.norm() < 0.15 {
+            return Vector2::zeros();
+        }
+        (lead.velocity + gap / CATCH_UP_S).cap_magnitude(1.3 * self.settings.speed_mps)
+    }
+
+    fn bend(&mut self, now_s: f64, dt: f64) {
+        let down = self.settings.posture == Posture::Bending
+            && self.stance.speed_mps < 0.1
+            && now_s.rem_euclid(BEND_EVERY_S) > 0.5 * BEND_EVERY_S;
+        let goal = if down { BEND_RAD } else { 0.0 };
+        self.stance.bend_rad += (goal - self.stance.bend_rad) * (dt / BEND_TAKES_S).min(1.0);
     }
 
     /// Goes on to the next point of the path where one is reached.
@@ -144,18 +233,23 @@ impl Walker {
         (away + right * (0.9 * ahead)) * strength * (0.25 + 0.75 * ahead)
     }
 
-    fn turn(&mut self, dt: f64) {
+    fn turn(&mut self, dt: f64, lead: Option<&Lead>) {
         let v = self.velocity;
-        if self.stance.speed_mps > 0.08 {
-            let off = angle_between(v.y.atan2(v.x), self.stance.heading_rad);
-            self.stance.heading_rad += off.clamp(-MAX_TURN * dt, MAX_TURN * dt);
+        if let Some(lead) = lead.filter(|_| self.stance.speed_mps < 0.4) {
+            self.turn_to(lead.heading_rad, dt);
+        } else if self.stance.speed_mps > 0.08 {
+            self.turn_to(v.y.atan2(v.x), dt);
         } else if self.settings.spin_deg_per_s != 0.0 {
             self.stance.heading_rad += self.settings.spin_deg_per_s.to_radians() * dt;
         } else if let Some(goal) = self.settings.path.get(self.ahead) {
             let way = Point2::from(*goal) - self.stance.place;
-            let off = angle_between(way.y.atan2(way.x), self.stance.heading_rad);
-            self.stance.heading_rad += off.clamp(-MAX_TURN * dt, MAX_TURN * dt);
+            self.turn_to(way.y.atan2(way.x), dt);
         }
+    }
+
+    fn turn_to(&mut self, heading_rad: f64, dt: f64) {
+        let off = angle_between(heading_rad, self.stance.heading_rad);
+        self.stance.heading_rad += off.clamp(-MAX_TURN * dt, MAX_TURN * dt);
     }
 
     fn stride(&mut self, dt: f64) {
@@ -178,7 +272,7 @@ pub fn play_tricks(walkers: &mut [Walker], hidden_by: &[Option<usize>], now_s: f
         if walkers[i].plays(Trick::TurnBack) {
             walkers[i].reverse();
         } else if walkers[i].plays(Trick::Stop) {
-            walkers[i].waits_until_s = now_s + HIDE_S;
+            walkers[i].waits_until_s = now_s + walkers[i].settings.hide_s;
         } else if walkers[i].plays(Trick::Swap) {
             let (mine, theirs) = (walkers[i].way(), walkers[hider].way());
             walkers[i].take(theirs);
@@ -198,6 +292,22 @@ impl Walker {
         self.ahead = ahead;
         self.settings.at_end = at_end;
     }
+}
+
+/// Where a walker should be who walks along with somebody.
+pub fn lead_of(walkers: &[Walker], i: usize) -> Option<Lead> {
+    walkers[i].beside.map(|(leader, offset)| walkers[leader].lead(offset))
+}
+
+/// The places of all whom a walker keeps off: everybody but their own group,
+/// and of that whoever comes too near.
+pub fn others(walkers: &[Walker], i: usize) -> Vec<Point2<f64>> {
+    let group = |j: usize| walkers[j].beside.map_or(j, |(leader, _)| leader);
+    let place = |j: usize| walkers[j].stance.place;
+    let counts = |j: &usize| {
+        *j != i && (group(*j) != group(i) || (place(*j) - place(i)).norm() < TOO_NEAR_M)
+    };
+    (0..walkers.len()).filter(counts).map(place).collect()
 }
 
 /// Behind whom each walker is, seen from a place: the middle of their body lies
@@ -236,11 +346,8 @@ mod tests {
             let hidden = hidden_by(walkers, &Point2::origin());
             play_tricks(walkers, &hidden, now_s);
             for i in 0..walkers.len() {
-                let others: Vec<_> = (0..walkers.len())
-                    .filter(|j| *j != i)
-                    .map(|j| walkers[j].stance.place)
-                    .collect();
-                walkers[i].step(now_s, 0.02, &others, &[]);
+                let (lead, others) = (lead_of(walkers, i), others(walkers, i));
+                walkers[i].step(now_s, 0.02, lead.as_ref(), &others, &[]);
             }
             see(walkers);
         }
@@ -267,6 +374,31 @@ mod tests {
         });
         assert!(nearest > 0.4, "{nearest}");
         assert!(walkers[0].stance.place.x > 6.0 && walkers[1].stance.place.x < 2.0);
+    }
+
+    #[test]
+    fn companions_stay_beside_the_one_who_leads() {
+        let leads = walker(&[[1.0, 1.0], [6.0, 1.0], [6.0, 4.0]], Trick::None);
+        let along = walker(&[[0.0, 0.0]], Trick::None).along((0, &leads), Vector2::new(0.0, 0.8));
+        let mut walkers = [leads, along];
+        let mut apart = Vec::new();
+        walk(&mut walkers, 12.0, |w| {
+            apart.push((w[0].stance.place - w[1].stance.place).norm());
+        });
+        let (least, most) = apart.iter().fold((9f64, 0f64), |(l, m), d| (l.min(*d), m.max(*d)));
+        assert!(least > 0.35 && most < 1.3, "{least} {most}");
+        assert!(walkers[1].stance.place.y > 2.5 && walkers[1].stance.speed_mps < 0.1);
+    }
+
+    #[test]
+    fn nobody_walks_through_things() {
+        let mut walkers = [walker(&[[1.0, 1.0], [5.0, 1.0]], Trick::None)];
+        let pillar = Obstacle { at: Point2::new(3.0, 1.01), radius_m: 0.4 };
+        for step in 0..500 {
+            walkers[0].step(f64::from(step) * 0.02, 0.02, None, &[], &[pillar]);
+            assert!((walkers[0].stance.place - pillar.at).norm() > 0.399);
+        }
+        assert!(walkers[0].stance.place.x > 4.5, "{}", walkers[0].stance.place);
     }
 
     #[test]

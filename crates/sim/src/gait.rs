@@ -7,6 +7,11 @@ use std::f64::consts::TAU;
 /// Leg length as a fraction of the body height (thigh and shank).
 const LEG: f64 = 0.491;
 
+/// Phases in which a foot lies flat on the floor, and one between them at which
+/// the joint angles are left alone.
+const FLAT: [f64; 2] = [0.06, 0.44];
+const MID_STANCE: f64 = 0.25;
+
 /// The gait of a body of some height at some speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gait {
@@ -82,6 +87,34 @@ impl Gait {
             torsion_rad: (4.0 * rv).to_radians().min(0.14) * -(TAU * phase).cos(),
             lean_rad: lean * (1.0 - (TAU * (2.0 * phase - 0.1)).sin()),
         }
+    }
+
+    /// How far the left ankle has to be moved forward from where the joint angles
+    /// put it so that the flat foot stays where it is on the floor, m: the angles
+    /// alone let it slide. In between the correction goes over smoothly.
+    pub fn plant_m(&self, phase: f64) -> f64 {
+        let phase = phase.rem_euclid(1.0);
+        let [start, end] = FLAT;
+        if (start..=end).contains(&phase) {
+            return self.slide_m(phase);
+        }
+        let part = (phase - end).rem_euclid(1.0) / (1.0 - (end - start));
+        let (from, to) = (self.slide_m(end), self.slide_m(start));
+        from + (to - from) * 0.5 * (1.0 - (0.5 * TAU * part).cos())
+    }
+
+    /// A planted foot goes back under the body at the body's speed.
+    fn slide_m(&self, phase: f64) -> f64 {
+        let cycle_m = 1.346 * self.relative_speed.sqrt() * self.leg_m;
+        let planted = self.ankle_ahead_m(MID_STANCE) + cycle_m * (MID_STANCE - phase);
+        planted - self.ankle_ahead_m(phase)
+    }
+
+    /// The left ankle ahead of the smooth motion of the body.
+    fn ankle_ahead_m(&self, phase: f64) -> f64 {
+        let limb = self.limb(phase);
+        let leg = 0.5 * (limb.hip.sin() + (limb.hip - limb.knee).sin());
+        self.pelvis(phase).forward_m + self.leg_m * leg
     }
 
     /// The joints of the left side at a phase; the right side is half a cycle later.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::body::{Build, Skeleton};
 use crate::material::{Colour, Material, Pattern, scaled};
 use crate::random::Random;
+use crate::scene::Posture;
 use crate::shape::{Form, Shape};
 
 /// What somebody wears and carries.
@@ -41,6 +42,8 @@ pub enum Extra {
     GreenHat,
     /// A bag in the left hand.
     Bag,
+    /// A suitcase on wheels, drawn along by the right hand.
+    Trolley,
 }
 
 /// Random numbers that only subjects are drawn from.
@@ -80,8 +83,13 @@ impl Look {
             Pattern::Checks(0.06),
             Pattern::Mottled(0.05),
         ]);
-        let chances =
-            [(Extra::Coat, 0.15), (Extra::Backpack, 0.2), (Extra::Hat, 0.12), (Extra::Bag, 0.15)];
+        let chances = [
+            (Extra::Coat, 0.18),
+            (Extra::Backpack, 0.2),
+            (Extra::Hat, 0.15),
+            (Extra::Bag, 0.15),
+            (Extra::Trolley, 0.07),
+        ];
         // Dyes that look black reflect infrared, carbon black does not.
         let infrared = if random.chance(0.12) { 0.06 } else { random.between(0.3, 0.8) };
         Self {
@@ -129,6 +137,9 @@ impl Person {
         drawing.extras();
         let upper = drawing.shapes.len();
         drawing.legs();
+        if drawing.look.extras.contains(&Extra::Trolley) {
+            drawing.trolley();
+        }
         (drawing.shapes, upper)
     }
 }
@@ -224,7 +235,11 @@ impl Drawing<'_> {
                 Extra::Hat => self.hat(scaled(self.look.trousers.colour, 1.3)),
                 Extra::GreenHat => self.hat([0.02, 0.45, 0.05]),
                 Extra::Bag => self.bag(),
+                Extra::Trolley => {}
             }
+        }
+        if self.s.posture == Posture::Phone {
+            self.phone();
         }
     }
 
@@ -233,6 +248,9 @@ impl Drawing<'_> {
         let upper = self.s.pelvis + Vector3::new(0.0, 0.0, 0.06 * h);
         let hem = self.s.pelvis - Vector3::new(0.0, 0.0, 0.13 * h);
         self.ellipsoid(upper, turn, Vector3::new(0.078 * h, 0.108 * w, 0.16 * h), self.look.top);
+        if self.s.posture == Posture::Seated {
+            return;
+        }
         for sign in [1.0, -1.0] {
             let out = turn * Vector3::new(0.0, sign * 0.035 * w, 0.0);
             self.limb(upper + out, hem + out, 0.07 * h, 0.078 * h, self.look.top);
@@ -263,6 +281,26 @@ impl Drawing<'_> {
         self.shapes.push(block);
     }
 
+    fn phone(&mut self) {
+        let (wrist, elbow) = (self.s.wrists[1], self.s.elbows[1]);
+        let at = wrist + (wrist - elbow).normalize() * (0.06 * self.h);
+        let form = Form::Block(Vector3::new(0.008, 0.037, 0.075));
+        let glass = Material::plain([0.02; 3]).with_infrared(0.05);
+        self.shapes.push(Shape::new(form, at, self.s.world_from_head, glass));
+    }
+
+    /// Leans behind the right hand, to which its handle reaches.
+    fn trolley(&mut self) {
+        let turn = self.s.world_from_pelvis * Rotation3::from_axis_angle(&Vector3::y_axis(), 0.55);
+        let hand = self.s.wrists[1];
+        let behind = self.s.world_from_pelvis * Vector3::new(-0.5, -0.08, 0.0);
+        let at = Point3::new(hand.x + behind.x, hand.y + behind.y, 0.34);
+        let shell = Material::plain(scaled(self.look.top.second, 0.8));
+        self.shapes.push(Shape::new(Form::Block(Vector3::new(0.11, 0.18, 0.27)), at, turn, shell));
+        let rim = at + turn * Vector3::new(0.0, 0.0, 0.27);
+        self.limb(rim, hand, 0.012, 0.012, Material::plain([0.1; 3]));
+    }
+
     fn ellipsoid(
         &mut self,
         at: Point3<f64>,
@@ -287,12 +325,24 @@ mod tests {
     use crate::body::Stance;
 
     #[test]
+    fn the_same_subject_is_the_same_person_and_splits_share_nobody() {
+        use crate::split::{SUBJECTS, Split};
+        assert_eq!(Person::subject(3), Person::subject(3));
+        let of = |split: Split| (0..SUBJECTS).map(move |n| Person::subject(split.subject(n)));
+        let sizes: std::collections::BTreeSet<[u64; 2]> = Split::ALL
+            .into_iter()
+            .flat_map(of)
+            .map(|p| [p.build.height_m.to_bits(), p.build.breadth.to_bits()])
+            .collect();
+        assert_eq!(sizes.len() as u64, 3 * SUBJECTS);
+    }
+
+    #[test]
     fn the_top_of_the_head_is_at_the_height_of_the_body() {
         for number in 0..20 {
             let mut person = Person::subject(number);
             person.look.extras.clear();
-            let stance =
-                Stance { place: Point2::origin(), heading_rad: 1.0, speed_mps: 0.0, phase: 0.0 };
+            let stance = Stance::standing(Point2::origin(), 1.0);
             let (shapes, upper) = person.shapes(&Skeleton::new(&person.build, &stance));
             let (down, from) = (-Vector3::z(), Point3::new(0.0, 0.0, 3.0));
             let from = from

@@ -1,10 +1,11 @@
 //! Rooms and what stands in them.
 
-use nalgebra::{Point3, Rotation3, Vector3};
+use nalgebra::{Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 
+use crate::behaviour::Obstacle;
 use crate::material::{Colour, Material, Pattern, scaled};
 use crate::random::Random;
-use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, RoomSettings};
+use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, RoomSettings, Scene};
 use crate::shape::{Form, Shape};
 use crate::world::{Lamp, Object};
 
@@ -12,6 +13,23 @@ const WOOD: Colour = [0.30, 0.17, 0.08];
 const METAL: Colour = [0.10, 0.10, 0.11];
 /// Thickness of walls and panels, m.
 const WALL_M: f64 = 0.1;
+/// Half the width and the height of a door, m.
+const DOOR_M: [f64; 2] = [0.45, 2.02];
+/// Depth of the room behind an open door, m.
+const BEHIND_M: f64 = 1.8;
+/// Furniture is at least this far from everybody's way, m.
+const OFF_THE_WAY_M: f64 = 0.75;
+/// So often a free place is looked for.
+const TRIES: usize = 40;
+/// Coats, jackets, shades.
+const CLOTHS: &[Colour] = &[
+    [0.09, 0.10, 0.16],
+    [0.28, 0.09, 0.07],
+    [0.05; 3],
+    [0.30, 0.25, 0.18],
+    [0.10, 0.18, 0.12],
+    [0.42, 0.40, 0.36],
+];
 
 /// Floor, ceiling, walls and a door.
 pub fn room(settings: &RoomSettings) -> Object {
@@ -29,15 +47,40 @@ pub fn room(settings: &RoomSettings) -> Object {
         Shape::new(Form::Block(sides), Point3::from(centre), Rotation3::identity(), of)
     };
     let (cx, cy, cz) = (0.5 * x, 0.5 * y, 0.5 * z);
+    let door_y = 0.3 * y;
     let mut shapes = vec![
         slab([cx, cy, -half], [x, y, 0.0], floor(settings.floor)),
         slab([cx, cy, z + half], [x, y, 0.0], Material::plain([0.75; 3])),
         slab([-half, cy, cz], [0.0, y, z], wall),
-        slab([x + half, cy, cz], [0.0, y, z], wall),
         slab([cx, -half, cz], [x, 0.0, z], wall),
         slab([cx, y + half, cz], [x, 0.0, z], wall),
     ];
-    shapes.extend(door(x, 0.3 * y));
+    if settings.open_door {
+        let [side, top] = DOOR_M;
+        let (low, high) = (door_y - side, door_y + side);
+        let piece = |from: [f64; 2], to: [f64; 2]| {
+            let at = Point3::new(x + half, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]));
+            let sides = Vector3::new(WALL_M, to[0] - from[0], to[1] - from[1]) * 0.5;
+            Shape::new(Form::Block(sides), at, Rotation3::identity(), wall)
+        };
+        let behind = Material::plain([0.2, 0.19, 0.18]);
+        let end = x + WALL_M + BEHIND_M;
+        shapes.extend([
+            piece([-WALL_M, -WALL_M], [low, z + WALL_M]),
+            piece([high, -WALL_M], [y + WALL_M, z + WALL_M]),
+            piece([low, top], [high, z + WALL_M]),
+            slab([end + half, door_y, cz], [0.0, 3.0, z], behind),
+            slab([0.5 * (x + end), door_y, -half], [end - x, 3.0, 0.0], behind),
+        ]);
+        shapes.extend(
+            [-1.5, 1.5]
+                .map(|side| slab([0.5 * (x + end), door_y + side, cz], [end - x, 0.0, z], behind)),
+        );
+        shapes.extend(door_frame([x, door_y], &Rotation3::identity()));
+    } else {
+        shapes.push(slab([x + half, cy, cz], [0.0, y, z], wall));
+        shapes.extend(door(x, door_y));
+    }
     Object::new(shapes, None, false)
 }
 
@@ -53,23 +96,30 @@ fn floor(kind: Floor) -> Material {
     }
 }
 
-/// A door with its frame on the wall at the far end.
+/// A closed door with its frame on the wall at the far end.
 fn door(x: f64, y: f64) -> Vec<Shape> {
+    let still = Rotation3::identity();
     let block = |dy: f64, z: f64, half: [f64; 3], colour| {
         let at = Point3::new(x, y + dy, z);
-        Shape::new(
-            Form::Block(Vector3::from(half)),
-            at,
-            Rotation3::identity(),
-            Material::plain(colour),
-        )
+        Shape::new(Form::Block(half.into()), at, still, Material::plain(colour))
+    };
+    let mut shapes = door_frame([x, y], &still);
+    shapes.push(block(0.0, 1.0, [0.03, 0.45, 1.0], [0.36, 0.30, 0.22]));
+    shapes.push(block(0.35, 1.05, [0.07, 0.05, 0.012], [0.5; 3]));
+    shapes
+}
+
+/// Jambs and lintel of a doorway across X.
+fn door_frame(at: [f64; 2], turn: &Rotation3<f64>) -> Vec<Shape> {
+    let [side, top] = DOOR_M;
+    let block = |y: f64, z: f64, half: [f64; 3]| {
+        let at = Point3::new(at[0], at[1], 0.0) + turn * Vector3::new(0.0, y, z);
+        Shape::new(Form::Block(half.into()), at, *turn, Material::plain(WOOD))
     };
     vec![
-        block(0.0, 1.0, [0.03, 0.45, 1.0], [0.36, 0.30, 0.22]),
-        block(0.49, 1.02, [0.06, 0.04, 1.02], WOOD),
-        block(-0.49, 1.02, [0.06, 0.04, 1.02], WOOD),
-        block(0.0, 2.06, [0.06, 0.53, 0.04], WOOD),
-        block(0.35, 1.05, [0.07, 0.05, 0.012], [0.5; 3]),
+        block(side + 0.04, 0.5 * top, [0.06, 0.04, 0.5 * top]),
+        block(-side - 0.04, 0.5 * top, [0.06, 0.04, 0.5 * top]),
+        block(0.0, top + 0.04, [0.06, side + 0.08, 0.04]),
     ]
 }
 
@@ -83,8 +133,30 @@ pub fn lamps(room: &RoomSettings, light: &LightSettings) -> Vec<Lamp> {
     (0..light.lamps).map(|i| Lamp { at: hang(i), lux_at_1m: direct * z * z }).collect()
 }
 
-/// Random pieces along the walls.
-pub fn clutter(room: &RoomSettings, random: &mut Random) -> Vec<Furniture> {
+/// Random pieces along the walls, off the ways of robot and people and off each
+/// other; a piece for which there is no place is left out.
+pub fn clutter(scene: &Scene, random: &mut Random) -> Vec<Furniture> {
+    let mut ways: Vec<Vec<Point2<f64>>> = vec![
+        [scene.robot.start].iter().chain(&scene.robot.path).map(|p| Point2::from(*p)).collect(),
+    ];
+    for person in &scene.people {
+        let offset = Vector2::from(person.offset);
+        ways.push(person.path.iter().map(|p| Point2::from(*p) + offset).collect());
+    }
+    ways.extend(scene.furniture.iter().map(|piece| vec![Point2::from(piece.at)]));
+    let mut pieces = Vec::new();
+    for _ in 0..scene.room.clutter {
+        let mut tries = (0..TRIES).map(|_| random_piece(&scene.room, random));
+        let free = |at: Point2<f64>| ways.iter().all(|way| distance(way, &at) > OFF_THE_WAY_M);
+        if let Some(piece) = tries.find(|piece| free(Point2::from(piece.at))) {
+            ways.push(vec![Point2::from(piece.at)]);
+            pieces.push(piece);
+        }
+    }
+    pieces
+}
+
+fn random_piece(room: &RoomSettings, random: &mut Random) -> Furniture {
     use FurnitureKind as K;
     let kinds = [
         K::CoatStand,
@@ -96,43 +168,67 @@ pub fn clutter(room: &RoomSettings, random: &mut Random) -> Vec<Furniture> {
         K::CardboardFigure,
         K::Desk,
         K::Shelf,
+        K::BinOnTable,
     ];
     let [x, y] = room.size_m;
-    let piece = |random: &mut Random| {
-        let (along, side) = (random.between(0.35, 0.97), random.chance(0.5));
-        let off = random.between(0.45, 0.8);
-        let at = if random.chance(0.25) {
-            [x - off, y * random.between(0.1, 0.9)]
-        } else {
-            [x * along, if side { off } else { y - off }]
-        };
-        let heading_deg = random.between(150.0, 210.0);
-        Furniture { kind: random.pick(&kinds), at, heading_deg }
+    let (along, side) = (random.between(0.2, 0.97), random.chance(0.5));
+    let off = random.between(0.45, 0.8);
+    let at = if random.chance(0.25) {
+        [x - off, y * random.between(0.1, 0.9)]
+    } else {
+        [x * along, if side { off } else { y - off }]
     };
-    (0..room.clutter).map(|_| piece(random)).collect()
+    Furniture { kind: random.pick(&kinds), at, heading_deg: random.between(150.0, 210.0) }
 }
 
-/// The solids of a piece of furniture.
-pub fn furniture(piece: &Furniture, ceiling_m: f64) -> Object {
+/// Distance of a place from a polyline of one point at least.
+pub fn distance(way: &[Point2<f64>], place: &Point2<f64>) -> f64 {
+    let to_segment = |pair: &[Point2<f64>]| {
+        let along = pair[1] - pair[0];
+        let part = (place - pair[0]).dot(&along) / along.norm_squared().max(1e-12);
+        (place - (pair[0] + along * part.clamp(0.0, 1.0))).norm()
+    };
+    let to_points = way.iter().map(|point| (place - point).norm());
+    way.windows(2).map(to_segment).chain(to_points).fold(f64::INFINITY, f64::min)
+}
+
+/// What people walk around.
+pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
+    let turn = Rotation2::new(piece.heading_deg.to_radians());
+    let round = |aside: f64, radius_m: f64| {
+        let at = Point2::from(piece.at) + turn * Vector2::new(0.0, aside);
+        Obstacle { at, radius_m }
+    };
+    match piece.kind {
+        FurnitureKind::Desk => vec![round(0.0, 0.75)],
+        FurnitureKind::Shelf => vec![round(0.0, 0.45)],
+        FurnitureKind::Doorway => [-1.05, -0.75, 0.75, 1.05].map(|y| round(y, 0.25)).into(),
+        FurnitureKind::Partition => [-0.65, 0.0, 0.65].map(|y| round(y, 0.35)).into(),
+        _ => vec![round(0.0, 0.3)],
+    }
+}
+
+/// The solids of a piece of furniture. Its cloth, tone and size are by chance.
+pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Object {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), piece.heading_deg.to_radians());
-    let mut maker = Maker { at: piece.at, turn, shapes: Vec::new() };
+    let cloth = random.pick(CLOTHS);
+    let wood = scaled(WOOD, random.between(0.5, 1.6));
+    let size = random.between(0.93, 1.07);
+    let mut maker = Maker { at: piece.at, turn, cloth, wood, size, shapes: Vec::new() };
     match piece.kind {
         FurnitureKind::CoatStand => maker.coat_stand(),
         FurnitureKind::DrapedChair => maker.draped_chair(),
         FurnitureKind::FloorLamp => maker.floor_lamp(),
         FurnitureKind::Plant => maker.plant(),
-        FurnitureKind::Pillar => {
-            maker.limb(
-                [0.0, 0.0, -0.1],
-                [0.0, 0.0, ceiling_m],
-                [0.21, 0.21],
-                Material::plain([0.55; 3]),
-            );
-        }
+        FurnitureKind::Pillar => maker.pillar(ceiling_m),
         FurnitureKind::Poster => maker.poster(),
         FurnitureKind::CardboardFigure => maker.cardboard_figure(),
         FurnitureKind::Desk => maker.desk(),
         FurnitureKind::Shelf => maker.shelf(),
+        FurnitureKind::Chair => maker.chair(),
+        FurnitureKind::BinOnTable => maker.bin_on_table(),
+        FurnitureKind::Doorway => maker.doorway(ceiling_m),
+        FurnitureKind::Partition => maker.partition(),
     }
     Object::new(maker.shapes, None, true)
 }
@@ -141,6 +237,10 @@ pub fn furniture(piece: &Furniture, ceiling_m: f64) -> Object {
 struct Maker {
     at: [f64; 2],
     turn: Rotation3<f64>,
+    cloth: Colour,
+    wood: Colour,
+    /// Height as a multiple of the ordinary one.
+    size: f64,
     shapes: Vec<Shape>,
 }
 
@@ -166,38 +266,82 @@ impl Maker {
     }
 
     fn coat_stand(&mut self) {
-        let (wood, cloth) = (Material::plain(WOOD), Material::plain([0.09, 0.10, 0.16]));
-        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, 1.72], [0.025, 0.02], wood);
+        let (wood, cloth) = (Material::plain(self.wood), Material::plain(self.cloth));
+        let z = self.size;
+        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, 1.72 * z], [0.025, 0.02], wood);
         self.ellipsoid([0.0, 0.0, 0.02], [0.22, 0.22, 0.03], wood);
-        self.limb([0.02, -0.17, 1.42], [0.02, 0.17, 1.42], [0.07, 0.07], cloth);
-        self.ellipsoid([0.03, 0.0, 1.08], [0.12, 0.22, 0.42], cloth);
-        for side in [-1.0, 1.0] {
-            self.limb([0.03, side * 0.21, 1.38], [0.04, side * 0.25, 0.85], [0.06, 0.05], cloth);
+        self.limb([0.02, -0.17, 1.42 * z], [0.02, 0.17, 1.42 * z], [0.07, 0.07], cloth);
+        self.ellipsoid([0.03, 0.0, 1.08 * z], [0.12, 0.22, 0.42 * z], cloth);
+        for y in [-1.0, 1.0] {
+            let (top, hem) = ([0.03, y * 0.21, 1.38 * z], [0.04, y * 0.25, 0.85 * z]);
+            self.limb(top, hem, [0.06, 0.05], cloth);
         }
         let felt = Material::plain([0.07, 0.05, 0.04]);
-        self.ellipsoid([0.0, 0.0, 1.70], [0.10, 0.09, 0.10], felt);
-        self.ellipsoid([0.0, 0.0, 1.65], [0.16, 0.15, 0.012], felt);
+        self.ellipsoid([0.0, 0.0, 1.70 * z], [0.10, 0.09, 0.10], felt);
+        self.ellipsoid([0.0, 0.0, 1.65 * z], [0.16, 0.15, 0.012], felt);
+    }
+
+    fn pillar(&mut self, ceiling_m: f64) {
+        let stone = Material::plain([0.55; 3]);
+        self.limb([0.0, 0.0, -0.1], [0.0, 0.0, ceiling_m], [0.21 * self.size; 2], stone);
+    }
+
+    fn chair(&mut self) {
+        let wood = Material::plain(self.wood);
+        self.block([0.0, 0.0, 0.43], [0.21, 0.21, 0.02], wood);
+        for (x, y) in [(-0.19, -0.19), (-0.19, 0.19), (0.19, -0.19), (0.19, 0.19)] {
+            self.limb([x, y, 0.0], [x, y, 0.43], [0.02, 0.02], wood);
+        }
+        self.block([-0.2, 0.0, 0.68], [0.02, 0.2, 0.24], wood);
     }
 
     fn draped_chair(&mut self) {
-        let wood = Material::plain(WOOD);
         let jacket =
-            Material::patterned([0.28, 0.09, 0.07], [0.2, 0.06, 0.05], Pattern::Mottled(0.05));
-        self.block([0.0, 0.0, 0.46], [0.22, 0.22, 0.025], wood);
-        for (x, y) in [(-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2)] {
-            self.limb([x, y, 0.0], [x, y, 0.46], [0.02, 0.02], wood);
-        }
-        self.block([-0.21, 0.0, 0.75], [0.02, 0.2, 0.28], wood);
+            Material::patterned(self.cloth, scaled(self.cloth, 0.7), Pattern::Mottled(0.05));
+        self.chair();
+        self.block([-0.21, 0.0, 0.75], [0.02, 0.2, 0.28], Material::plain(self.wood));
         self.limb([-0.21, -0.2, 1.02], [-0.21, 0.2, 1.02], [0.06, 0.06], jacket);
         self.ellipsoid([-0.23, 0.0, 0.78], [0.08, 0.25, 0.32], jacket);
     }
 
+    fn bin_on_table(&mut self) {
+        let (wood, tin) = (Material::plain(self.wood), Material::plain(self.cloth));
+        self.block([0.0, 0.0, 0.74], [0.3, 0.3, 0.015], wood);
+        for (x, y) in [(-0.27, -0.27), (-0.27, 0.27), (0.27, -0.27), (0.27, 0.27)] {
+            self.limb([x, y, 0.0], [x, y, 0.74], [0.02, 0.02], wood);
+        }
+        self.limb([0.0, 0.0, 0.92], [0.0, 0.0, 1.2 * self.size], [0.15, 0.18], tin);
+        self.ellipsoid([0.0, 0.0, 1.42 * self.size], [0.1, 0.1, 0.13], Material::plain([0.35; 3]));
+    }
+
+    fn doorway(&mut self, ceiling_m: f64) {
+        let (paint, [side, top]) = (Material::plain([0.60, 0.58, 0.54]), DOOR_M);
+        let above = 0.5 * (ceiling_m - top);
+        for y in [-1.0, 1.0] {
+            let half = 0.5 * (1.2 - side);
+            let at = [0.0, y * (side + half), 0.5 * ceiling_m];
+            self.block(at, [0.05, half, 0.5 * ceiling_m], paint);
+        }
+        self.block([0.0, 0.0, top + above], [0.05, side, above], paint);
+        self.shapes.extend(door_frame(self.at, &self.turn));
+    }
+
+    fn partition(&mut self) {
+        let felt = Material::patterned(self.cloth, scaled(self.cloth, 0.8), Pattern::Mottled(0.02));
+        self.block([0.0, 0.0, 0.9], [0.02, 0.8, 0.8], felt);
+        for y in [-0.8, 0.8] {
+            self.limb([0.0, y, 0.0], [0.0, y, 1.7], [0.025, 0.025], Material::plain(METAL));
+            self.block([0.0, y, 0.015], [0.22, 0.03, 0.015], Material::plain(METAL));
+        }
+    }
+
     fn floor_lamp(&mut self) {
-        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, 1.5], [0.014, 0.014], Material::plain(METAL));
+        let top = 1.66 * self.size;
+        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, top - 0.1], [0.014, 0.014], Material::plain(METAL));
         self.ellipsoid([0.0, 0.0, 0.015], [0.15, 0.15, 0.02], Material::plain(METAL));
         self.limb(
-            [0.0, 0.0, 1.48],
-            [0.0, 0.0, 1.66],
+            [0.0, 0.0, top - 0.18],
+            [0.0, 0.0, top],
             [0.15, 0.09],
             Material::plain([0.75, 0.66, 0.45]),
         );
@@ -224,21 +368,29 @@ impl Maker {
         self.limb([-0.03, 0.0, 0.0], [-0.03, 0.0, 1.2], [0.02, 0.02], Material::plain(METAL));
     }
 
+    /// The outline of a person, a centimetre thick, as tall as one.
     fn cardboard_figure(&mut self) {
-        let (shirt, legs) =
-            (Material::plain([0.12, 0.25, 0.4]), Material::plain([0.05, 0.05, 0.07]));
-        let skin = Material::plain([0.52, 0.33, 0.25]);
-        let half = Vector3::new(0.012, 0.085, 0.115);
+        let (shirt, legs) = (Material::plain(self.cloth), Material::plain([0.05, 0.05, 0.07]));
+        let (skin, z) = (Material::plain([0.52, 0.33, 0.25]), self.size);
+        let half = Vector3::new(0.012, 0.080, 0.112);
         let pattern = Pattern::Head { half, hairline: 0.62 };
         let face = Material { second: [0.04, 0.03, 0.02], pattern, ..skin };
-        self.ellipsoid([0.0, 0.0, 1.58], half.into(), face);
-        self.block([0.0, 0.0, 1.45], [0.006, 0.05, 0.06], skin);
-        self.ellipsoid([0.0, 0.0, 1.15], [0.010, 0.235, 0.29], shirt);
-        self.block([0.0, 0.0, 0.45], [0.006, 0.17, 0.45], legs);
+        self.ellipsoid([0.0, 0.0, 1.60 * z], half.into(), face);
+        self.block([0.0, 0.0, 1.46 * z], [0.006, 0.052, 0.05], skin);
+        self.ellipsoid([0.0, 0.0, 1.36 * z], [0.007, 0.235, 0.075], shirt);
+        self.block([0.0, 0.0, 1.16 * z], [0.006, 0.165, 0.22], shirt);
+        self.ellipsoid([0.0, 0.0, 0.97 * z], [0.006, 0.170, 0.13], legs);
+        for y in [-1.0, 1.0] {
+            self.ellipsoid([0.001, y * 0.215, 1.13 * z], [0.006, 0.048, 0.27], shirt);
+            self.ellipsoid([0.002, y * 0.225, 0.86 * z], [0.006, 0.035, 0.07], skin);
+            self.block([0.0, y * 0.088, 0.48 * z], [0.006, 0.075, 0.46 * z], legs);
+        }
+        // It leans on a strut.
+        self.limb([-0.3, 0.0, 0.0], [-0.01, 0.0, 0.8], [0.01, 0.01], Material::plain(METAL));
     }
 
     fn desk(&mut self) {
-        let (top, screen) = (Material::plain(scaled(WOOD, 1.5)), Material::plain([0.02; 3]));
+        let (top, screen) = (Material::plain(scaled(self.wood, 1.5)), Material::plain([0.02; 3]));
         self.block([0.0, 0.0, 0.72], [0.4, 0.75, 0.02], top);
         for (x, y) in [(-0.37, -0.7), (-0.37, 0.7), (0.37, -0.7), (0.37, 0.7)] {
             self.limb([x, y, 0.0], [x, y, 0.72], [0.025, 0.025], Material::plain(METAL));
@@ -250,10 +402,63 @@ impl Maker {
 
     fn shelf(&mut self) {
         let books = Material::patterned([0.35, 0.10, 0.08], [0.1, 0.2, 0.3], Pattern::Checks(0.16));
-        self.block([0.0, 0.0, 0.95], [0.15, 0.45, 0.95], Material::plain(WOOD));
+        self.block([0.0, 0.0, 0.95], [0.15, 0.45, 0.95], Material::plain(self.wood));
         for level in 0..5 {
             let z = 0.2 + 0.36 * f64::from(level);
             self.block([0.03, 0.0, z], [0.13, 0.41, 0.13], books);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::PersonSettings;
+    use crate::split::Split;
+
+    fn scene(seed: u64) -> Scene {
+        let mut scene = Scene { seed, ..Scene::default() };
+        scene.room.clutter = 8;
+        scene.robot.path = vec![[6.0, 2.0]];
+        let path = vec![[5.0, 0.5], [5.0, 5.5]];
+        scene.people.push(PersonSettings { path, ..PersonSettings::default() });
+        scene
+    }
+
+    #[test]
+    fn clutter_stands_in_nobodys_way_and_differs_between_splits() {
+        let mut layouts = Vec::new();
+        for split in Split::ALL {
+            for number in 0..30 {
+                let scene = scene(split.seed(number).unwrap());
+                let pieces = clutter(&scene, &mut Random::new(scene.seed, 1));
+                assert!(pieces.len() >= 5, "{}", pieces.len());
+                let ways = [[[1.0, 3.0], [6.0, 2.0]], [[5.0, 0.5], [5.0, 5.5]]];
+                for piece in &pieces {
+                    let off = |way: &[[f64; 2]; 2]| {
+                        distance(&way.map(Point2::from), &Point2::from(piece.at))
+                    };
+                    assert!(ways.iter().all(|way| off(way) > 0.7), "{piece:?}");
+                }
+                assert!(!layouts.contains(&pieces));
+                layouts.push(pieces);
+            }
+        }
+    }
+
+    #[test]
+    fn an_open_door_can_be_looked_through() {
+        let ray = |open_door| {
+            let settings = RoomSettings { open_door, ..RoomSettings::default() };
+            let eye = Point3::new(4.0, 0.3 * settings.size_m[1], 1.0);
+            let hits = room(&settings);
+            let hits = hits.shapes.iter().filter_map(|s| s.meet(&eye, &Vector3::x()));
+            hits.fold(f64::INFINITY, f64::min)
+        };
+        assert!(
+            (ray(false) - 4.97).abs() < 0.01 && (ray(true) - 6.9).abs() < 0.02,
+            "{}",
+            ray(true)
+        );
     }
 }

@@ -99,6 +99,12 @@ impl Scene {
         Ok(scene)
     }
 
+    /// How many people there are, companions and crowd included.
+    pub fn number_of_people(&self) -> usize {
+        let with_companions = self.people.iter().map(|p| 1 + p.companions);
+        with_companions.fold(self.crowd, usize::saturating_add)
+    }
+
     /// What the log may be used for.
     pub fn split(&self) -> Split {
         Split::of(self.seed)
@@ -132,7 +138,8 @@ impl Scene {
                 camera.colour || camera.kind == CameraKind::Rgbd,
                 "camera.colour = false needs camera.kind = \"rgbd\": it has depth besides",
             ),
-            (self.people.len() + self.crowd <= 200, "there must be at most 200 people"),
+            (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
+            (self.number_of_people() <= 200, "there must be at most 200 people"),
             (
                 self.people.iter().all(|p| !p.path.is_empty()),
                 "every person needs a path of one point at least",
@@ -184,8 +191,11 @@ pub struct RoomSettings {
     pub wallpaper: bool,
     /// The floor.
     pub floor: Floor,
-    /// Pieces of furniture of any kind at random places along the walls.
+    /// Pieces of furniture of any kind at random places along the walls, off
+    /// everybody's way.
     pub clutter: usize,
+    /// The door at the far end stands open to a dark room.
+    pub open_door: bool,
 }
 
 impl Default for RoomSettings {
@@ -196,6 +206,7 @@ impl Default for RoomSettings {
             wallpaper: false,
             floor: Floor::Planks,
             clutter: 0,
+            open_door: false,
         }
     }
 }
@@ -395,6 +406,14 @@ pub enum FurnitureKind {
     Desk,
     /// A shelf with books.
     Shelf,
+    /// A chair.
+    Chair,
+    /// A round bin on a small table.
+    BinOnTable,
+    /// A wall of 2.4 m across its heading with an open doorway in its middle.
+    Doorway,
+    /// A screen of 1.6 m x 1.7 m across its heading.
+    Partition,
 }
 
 /// What somebody does when the robot cannot see them for the first time.
@@ -406,7 +425,7 @@ pub enum Trick {
     None,
     /// Turns round and goes back.
     TurnBack,
-    /// Stays behind whoever hides them for three seconds.
+    /// Stays behind whoever hides them for `hide_s`.
     Stop,
     /// Takes over the way of whoever hides them, who takes over theirs.
     Swap,
@@ -425,6 +444,21 @@ pub enum AtEnd {
     Loop,
 }
 
+/// How somebody holds their body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Posture {
+    /// Stands and walks.
+    #[default]
+    Upright,
+    /// Looks down at a phone while standing and walking.
+    Phone,
+    /// Sits on a chair all the time, at the first point of the path.
+    Seated,
+    /// Bends down now and then while standing.
+    Bending,
+}
+
 /// A person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -439,6 +473,14 @@ pub struct PersonSettings {
     pub at_end: AtEnd,
     /// What they do when hidden.
     pub trick: Trick,
+    /// For how long the trick `stop` stays hidden, s.
+    pub hide_s: f64,
+    /// The whole path is shifted by this, m.
+    pub offset: [f64; 2],
+    /// How they hold their body.
+    pub posture: Posture,
+    /// Others who walk along, 0.6 to 1 m apart; they count as people of their own.
+    pub companions: usize,
     /// Direction of the face at the start, degrees; the way ahead if left out.
     pub heading_deg: Option<f64>,
     /// Turns on the spot, degrees per second.
@@ -462,6 +504,10 @@ impl Default for PersonSettings {
             start_s: 0.0,
             at_end: AtEnd::Stop,
             trick: Trick::None,
+            hide_s: 3.0,
+            offset: [0.0; 2],
+            posture: Posture::Upright,
+            companions: 0,
             heading_deg: None,
             spin_deg_per_s: 0.0,
             height_m: None,

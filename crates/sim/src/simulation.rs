@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{
-    Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
+    Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
 };
 use tagalong_core::{
     Camera, Distortion, Image, Images, Panorama, Pinhole, Rect, RgbImage, RightImage, WheelSpeeds,
 };
 
-use crate::behaviour::{Obstacle, Walker, hidden_by, play_tricks};
+use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
 use crate::mirror::MirrorCamera;
 use crate::person::Person;
@@ -18,15 +18,19 @@ use crate::random::Random;
 use crate::render::{View, Visibility, draw, visibility};
 use crate::robot::Robot;
 use crate::room;
-use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Scene};
+use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Posture, Scene};
 use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
 use crate::webcam::Webcam;
 use crate::split::{SUBJECTS, Split};
 use crate::world::{Hit, Lamp, Object, World};
 
+/// So many of a crowd come as two.
+const CROWD_PAIRS: f64 = 0.3;
 /// People, robot and odometry move in steps of this many nanoseconds.
 const STEP_NS: u64 = 20_000_000;
+/// People keep this far away from the middle of the robot, m.
+const ROBOT_M: f64 = 0.5;
 /// Below this visible fraction nobody can be expected to find somebody.
 const LEAST_VISIBLE: f64 = 0.2;
 
@@ -132,9 +136,12 @@ impl Simulation {
     pub fn new(scene: &Scene, threads: usize) -> Self {
         let stream = |number| Random::new(scene.seed, number);
         let mut pieces = scene.furniture.clone();
-        pieces.extend(room::clutter(&scene.room, &mut stream(1)));
+        pieces.extend(room::clutter(scene, &mut stream(1)));
+        pieces.extend(chairs(scene));
+        let obstacles: Vec<Obstacle> = pieces.iter().flat_map(room::obstacles).collect();
         let mut fixed = vec![room::room(&scene.room)];
-        fixed.extend(pieces.iter().map(|piece| room::furniture(piece, scene.room.height_m)));
+        let (ceiling_m, mut chance) = (scene.room.height_m, stream(8));
+        fixed.extend(pieces.iter().map(|piece| room::furniture(piece, ceiling_m, &mut chance)));
         let mirror = (scene.camera.kind == CameraKind::Panorama)
             .then(|| MirrorCamera::new(&scene.camera, &mut stream(6)));
         let camera = mirror
@@ -148,8 +155,8 @@ impl Simulation {
             webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
             fixed,
             lamps: room::lamps(&scene.room, &scene.light),
-            obstacles: pieces.iter().map(obstacle).collect(),
-            walkers: walkers(scene, &mut stream(3)),
+            walkers: walkers(scene, &obstacles, &mut stream(3)),
+            obstacles,
             robot: Robot::new(&scene.robot, stream(4)),
             exposures: [Exposure::new(threads); 2],
             chance: stream(5),
@@ -217,12 +224,14 @@ impl Simulation {
         let robot = Point2::from(self.robot.pose.translation.vector);
         let hidden = hidden_by(&self.walkers, &robot);
         play_tricks(&mut self.walkers, &hidden, now_s);
-        let places: Vec<_> = self.walkers.iter().map(|w| w.stance.place).collect();
-        for (i, walker) in self.walkers.iter_mut().enumerate() {
-            let others = places.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, p)| *p);
-            let keep_off: Vec<_> = others.chain([robot]).collect();
-            walker.step(now_s, dt, &keep_off, &self.obstacles);
+        let ways: Vec<_> = (0..self.walkers.len())
+            .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i)))
+            .collect();
+        self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M });
+        for (walker, (lead, others)) in self.walkers.iter_mut().zip(&ways) {
+            walker.step(now_s, dt, lead.as_ref(), others, &self.obstacles);
         }
+        self.obstacles.pop();
     }
 
     fn record(&mut self, at_ns: u64, event: Event) {
@@ -455,25 +464,52 @@ fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
     Camera { robot_from_camera: camera.robot_from_camera * off, ..camera.clone() }
 }
 
-fn obstacle(piece: &Furniture) -> Obstacle {
-    let radius_m = match piece.kind {
-        FurnitureKind::Desk => 0.75,
-        FurnitureKind::Shelf => 0.45,
-        _ => 0.3,
-    };
-    Obstacle { at: Point2::from(piece.at), radius_m }
+/// Everybody who sits needs something to sit on.
+fn chairs(scene: &Scene) -> impl Iterator<Item = Furniture> {
+    let seated = scene.people.iter().filter(|p| p.posture == Posture::Seated);
+    seated.map(|person| Furniture {
+        kind: FurnitureKind::Chair,
+        at: [0, 1].map(|axis| person.path[0][axis] + person.offset[axis]),
+        heading_deg: person.heading_deg.unwrap_or(0.0),
+    })
 }
 
-fn walkers(scene: &Scene, random: &mut Random) -> Vec<Walker> {
-    let wanderers: Vec<PersonSettings> =
-        (0..scene.crowd).map(|_| wanderer(scene, random)).collect();
-    scene
-        .people
-        .iter()
-        .cloned()
-        .chain(wanderers)
-        .map(|p| somebody(p, scene.split(), random))
-        .collect()
+fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random) -> Vec<Walker> {
+    let mut walkers = Vec::new();
+    for person in &scene.people {
+        add_group(&mut walkers, person.clone(), person.companions, scene, random);
+    }
+    let mut left = scene.crowd;
+    while left > 0 {
+        let companions = usize::from(left > 1 && random.chance(CROWD_PAIRS));
+        let person = wanderer(scene, &walkers, obstacles, random);
+        add_group(&mut walkers, person, companions, scene, random);
+        left -= 1 + companions;
+    }
+    walkers
+}
+
+/// Somebody and those who walk along, to the left and to the right of them.
+fn add_group(
+    walkers: &mut Vec<Walker>,
+    person: PersonSettings,
+    companions: usize,
+    scene: &Scene,
+    random: &mut Random,
+) {
+    let leader = walkers.len();
+    let own = PersonSettings { subject: None, look: None, height_m: None, ..person.clone() };
+    walkers.push(somebody(person, scene.split(), random));
+    let mut aside = [0.0; 2];
+    for number in 0..companions {
+        let side = number % 2;
+        aside[side] += random.between(0.6, 1.0);
+        let left = if side == 0 { aside[side] } else { -aside[side] };
+        let offset = Vector2::new(random.between(-0.25, 0.15), left);
+        let along = somebody(own.clone(), scene.split(), random);
+        let along = along.along((leader, &walkers[leader]), offset);
+        walkers.push(along);
+    }
 }
 
 /// One of the people of a split.
@@ -493,12 +529,45 @@ fn somebody(settings: PersonSettings, split: Split, random: &mut Random) -> Walk
 }
 
 /// Somebody who walks between random points of the room.
-fn wanderer(scene: &Scene, random: &mut Random) -> PersonSettings {
-    let [x, y] = scene.room.size_m;
-    let mut point = || [random.between(0.2, 0.92) * x, random.between(0.15, 0.85) * y];
-    let path = vec![point(), point(), point(), point()];
+fn wanderer(
+    scene: &Scene,
+    walkers: &[Walker],
+    obstacles: &[Obstacle],
+    random: &mut Random,
+) -> PersonSettings {
+    let mut path = vec![free_point(scene, walkers, obstacles, random)];
+    path.extend((0..3).map(|_| free_point(scene, &[], obstacles, random)));
     let (speed_mps, start_s) = (random.between(0.6, 1.3), random.between(0.0, 2.0));
-    PersonSettings { path, speed_mps, start_s, at_end: AtEnd::Loop, ..PersonSettings::default() }
+    let posture = if random.chance(0.15) { Posture::Phone } else { Posture::Upright };
+    let at_end = AtEnd::Loop;
+    PersonSettings {
+        path: path.iter().map(|p| [p.x, p.y]).collect(),
+        speed_mps,
+        start_s,
+        at_end,
+        posture,
+        ..PersonSettings::default()
+    }
+}
+
+/// A random point of the room off the robot's start, furniture and people; after
+/// some tries any.
+fn free_point(
+    scene: &Scene,
+    walkers: &[Walker],
+    obstacles: &[Obstacle],
+    random: &mut Random,
+) -> Point2<f64> {
+    let [x, y] = scene.room.size_m;
+    let robot = Point2::from(scene.robot.start);
+    let mut point = || Point2::new(random.between(0.2, 0.92) * x, random.between(0.15, 0.85) * y);
+    let free = |at: &Point2<f64>| {
+        (at - robot).norm() > 1.5
+            && obstacles.iter().all(|o| (at - o.at).norm() > o.radius_m + 0.35)
+            && walkers.iter().all(|w| (at - w.stance.place).norm() > 1.0)
+    };
+    let tries: Vec<_> = (0..30).map(|_| point()).collect();
+    tries.iter().copied().find(free).unwrap_or(tries[0])
 }
 
 #[cfg(test)]
@@ -622,6 +691,23 @@ mod tests {
         let numbers: Vec<usize> = events(OMNI, 2).iter().filter_map(webcam).collect();
         let of = |number| numbers.iter().filter(|n| **n == number).count();
         assert_eq!((of(0), of(1)), (3, 5));
+    }
+
+    #[test]
+    fn people_walk_round_a_robot_at_rest() {
+        let text = "duration_s = 14.0\n[camera]\nwidth = 8\nheight = 8\n[robot]\nstart = [4.0, 3.0]\n\
+            [[people]]\npath = [[2.0, 3.0], [7.0, 3.0]]\ncompanions = 1\n";
+        let mut nearest = f64::MAX;
+        let shots = shots(text, 1);
+        for shot in &shots {
+            let away = shot.truth.iter().map(|t| t.torso_in_robot.coords.xy().norm());
+            nearest = away.fold(nearest, f64::min);
+        }
+        assert!(nearest > 0.4, "{nearest}");
+        let last: Vec<_> = shots[shots.len() - 1].truth.iter().map(|t| t.torso_in_robot).collect();
+        assert!(last.len() == 2 && last.iter().all(|at| at.x > 2.0), "{last:?}");
+        let apart = (last[0] - last[1]).norm();
+        assert!((0.5..1.3).contains(&apart), "{apart}");
     }
 
     #[test]

@@ -1,0 +1,109 @@
+//! The scenes under `configs/scenes/`: all of them can be drawn, for every split.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+use std::fs;
+use std::path::PathBuf;
+
+use tagalong_sim::{CameraKind, Event, Scene, Shot, Simulation, Split, Variant};
+
+fn suites() -> Vec<(String, String)> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    paths.sort();
+    let name = |path: &PathBuf| path.file_stem().unwrap().to_string_lossy().into_owned();
+    paths.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
+}
+
+fn suite(name: &str) -> String {
+    suites().into_iter().find(|s| s.0 == name).unwrap().1
+}
+
+/// The first image of a small version of a scene.
+fn first_shot(mut scene: Scene) -> Shot {
+    (scene.camera.width, scene.camera.height) = (40, 30);
+    scene.faults.dropped = 0.0;
+    let mut simulation = Simulation::new(&scene, 1);
+    loop {
+        if let Event::Shot(shot) = simulation.next_event().unwrap() {
+            return *shot;
+        }
+    }
+}
+
+#[test]
+fn every_scene_can_be_drawn_for_every_split_and_camera() {
+    for (name, text) in suites() {
+        for (split, number) in Split::ALL.into_iter().zip([3, 8, 13]) {
+            let parse = |variant: &Variant| {
+                let scene = Scene::parse_with(&text, variant);
+                scene.map_err(|e| e.render(&name, &text)).unwrap_or_else(|told| panic!("{told}"))
+            };
+            let variant = Variant::of_split(split, number);
+            let scene = parse(&variant);
+            assert_eq!((scene.split(), &scene), (split, &parse(&variant)), "{name}");
+            let shot = first_shot(scene.clone());
+            assert_eq!(shot.truth.len(), scene.number_of_people(), "{name}");
+            for kind in ["rgbd", "stereo"] {
+                let other = parse(&variant.clone().with("camera.kind", kind));
+                assert_eq!(other.camera.kind == CameraKind::Stereo, kind == "stereo", "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rooms_that_vary_are_shared_by_no_two_splits() {
+    for (name, text) in suites().iter().filter(|(_, text)| text.contains("[vary]")) {
+        let sizes = |split| -> Vec<[f64; 2]> {
+            let scene = |n| Scene::parse_with(text, &Variant::of_split(split, n)).unwrap();
+            (0..20).map(|n| scene(n).room.size_m).collect()
+        };
+        let [train, validation, test] = Split::ALL.map(sizes);
+        if name == "turntable" {
+            continue;
+        }
+        assert!(!train.iter().any(|s| validation.contains(s) || test.contains(s)), "{name}");
+        assert!(!validation.iter().any(|s| test.contains(s)), "{name}");
+    }
+}
+
+#[test]
+fn fourteen_crossings_differ_and_come_again_with_other_people() {
+    let text = suite("crossing-parallel");
+    let scene = |n| Scene::parse_with(&text, &Variant::of_seed(n)).unwrap();
+    let shape = |n| {
+        let people = scene(n).people;
+        (people[0].path[0][0], people[0].speed_mps, people[1].path[0][0], people[1].speed_mps)
+    };
+    let shapes: Vec<_> = (0..14).map(shape).collect();
+    for (i, one) in shapes.iter().enumerate() {
+        assert!(!shapes[..i].contains(one), "{i}");
+        assert_eq!(*one, shape(14 + i as u64));
+        let (near, far) = (one.0, one.2);
+        assert!(far - near >= 0.7, "{near} {far}");
+    }
+    assert_ne!(scene(0), Scene { seed: 0, ..scene(14) });
+}
+
+#[test]
+fn the_sequences_contain_what_they_are_for() {
+    let hidden = |name: &str, seed| {
+        let scene = Variant::of_seed(seed).with("camera.width", 48).with("camera.height", 36);
+        let scene = Scene::parse_with(&suite(name), &scene).unwrap();
+        let mut simulation = Simulation::new(&scene, 1);
+        let mut hidden = 0;
+        while let Some(event) = simulation.next_event() {
+            if let Event::Shot(shot) = event {
+                hidden += usize::from(
+                    shot.truth.iter().any(|t| t.occluder.is_some() && t.visible_fraction < 0.3),
+                );
+            }
+        }
+        hidden
+    };
+    for seed in [0, 5] {
+        assert!(hidden("crossing-parallel", seed) >= 1, "{seed}");
+        assert!(hidden("crossing-oblique", seed) >= 1, "{seed}");
+        assert!(hidden("full-occlusion", seed) >= 3, "{seed}");
+    }
+}
