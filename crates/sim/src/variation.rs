@@ -145,6 +145,9 @@ impl Change {
         let mut slot = self.entry(root, first);
         for part in rest.split('.').filter(|part| !part.is_empty()) {
             slot = match slot.get_mut() {
+                DeValue::Table(table) if table.is_empty() && is_index(part) => {
+                    return Err(self.fails("there is no such list in the file: give it whole"));
+                }
                 DeValue::Table(table) => self.entry(table, part),
                 DeValue::Array(list) => self.item(list, part)?,
                 _ => return Err(self.fails(&format!("there is no `{part}` in a plain value"))),
@@ -177,6 +180,10 @@ impl Change {
         let message = format!("cannot vary `{}`: {why}", self.key);
         ConfigError { message, span: Some(self.span.clone()) }
     }
+}
+
+fn is_index(part: &str) -> bool {
+    part.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// The value with all its places replaced by one.
@@ -434,6 +441,8 @@ people.1.speed_mps = { in_turn = [0.5, 0.75, 1.0] }
         let told =
             error("[vary]\npeople.2.look = { one_of = [1] }\n[[people]]\npath=[[1,1]]", &plain);
         assert!(told.contains("the list has 1"), "{told}");
+        let told = error("[vary]\nroom.size_m.0 = { one_of = [9.0] }\n", &plain);
+        assert!(told.starts_with("s.toml:2:") && told.contains("give it whole"), "{told}");
         let told = error("[vary]\ncrowd = { one_of = ['a'] }\n", &plain);
         assert!(told.starts_with("s.toml:2:") && told.contains("expected usize"), "{told}");
         let told = error(TEXT, &Variant::default().with("room.hight_m", 3.0));
