@@ -61,6 +61,33 @@ fn a_wrong_scene_is_told_with_its_line() {
 }
 
 #[test]
+fn a_split_and_settings_choose_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let varied = format!("{SMALL}[vary]\nlight.lux = {{ between = [50.0, 900.0] }}\n");
+    fs::write(folder.path().join("s.toml"), varied).unwrap();
+    let log = |name: &str, more: &[&str]| {
+        let output = simulate(folder.path(), &[&["s.toml", "-o", name], more].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        fs::read(folder.path().join(name)).unwrap()
+    };
+    let test = log("a.mcap", &["--split", "test", "--seed", "1"]);
+    assert_eq!(test, log("b.mcap", &["--seed", "2000000001"]));
+    assert_ne!(test, log("c.mcap", &["--split", "train", "--seed", "1"]));
+    log("d.mcap", &["--set", "camera.kind=stereo", "--set", "people.0.speed_mps=0.5"]);
+    let inspected = tagalong().arg("inspect").arg(folder.path().join("d.mcap")).output().unwrap();
+    assert!(text(&inspected.stdout).contains("/camera/right/image_rect"));
+    for (wrong, told) in [
+        (["--set", "camera.knd=stereo"], "camera.knd=stereo: unknown field `knd`"),
+        (["--set", "crowd"], "write KEY=VALUE"),
+        (["--split", "tests"], "did you mean `test`?"),
+    ] {
+        let output = simulate(folder.path(), &[&["s.toml"][..], &wrong].concat());
+        assert_eq!(code(&output), 2);
+        assert!(text(&output.stderr).contains(told), "{}", text(&output.stderr));
+    }
+}
+
+#[test]
 fn every_shipped_scene_can_be_read_and_says_what_it_is_for() {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
     let mut scenes = 0;
