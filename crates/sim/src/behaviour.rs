@@ -18,6 +18,8 @@ const REACHED_M: f64 = 0.25;
 /// 1995, with the reach of indoor crowds).
 const PUSH: f64 = 2.2;
 const PUSH_REACH_M: f64 = 0.45;
+/// Reach of the push away from things, m: people pass close to door jambs.
+const THING_REACH_M: f64 = 0.18;
 /// Somebody with the posture [`Posture::Bending`] bends down for the second half
 /// of every so many seconds, by this angle, rad, which takes them some time, s.
 const BEND_EVERY_S: f64 = 6.0;
@@ -129,9 +131,12 @@ impl Walker {
         let mut change = (wanted - self.velocity) / 0.5;
         // Who stands lets the others do the avoiding.
         if wanted != Vector2::zeros() {
-            change += keep_off.iter().map(|p| self.push(p, 0.6)).sum::<Vector2<f64>>();
             change +=
-                obstacles.iter().map(|o| self.push(&o.at, 0.25 + o.radius_m)).sum::<Vector2<f64>>();
+                keep_off.iter().map(|p| self.push(p, 0.6, PUSH_REACH_M)).sum::<Vector2<f64>>();
+            change += obstacles
+                .iter()
+                .map(|o| self.push(&o.at, 0.25 + o.radius_m, THING_REACH_M))
+                .sum::<Vector2<f64>>();
         }
         let limit = MAX_ACCELERATION.max(2.0 * self.velocity.norm());
         self.velocity += change.cap_magnitude(limit) * dt;
@@ -219,7 +224,7 @@ impl Walker {
 
     /// The push away from a place, stronger from ahead than from behind, with a
     /// part to the right so that people who meet head-on pass each other.
-    fn push(&self, from: &Point2<f64>, radius_m: f64) -> Vector2<f64> {
+    fn push(&self, from: &Point2<f64>, radius_m: f64, reach_m: f64) -> Vector2<f64> {
         let away = self.stance.place - from;
         let distance = away.norm();
         if !(1e-6..2.5 + radius_m).contains(&distance) {
@@ -229,7 +234,7 @@ impl Walker {
         let heading = Vector2::new(self.stance.heading_rad.cos(), self.stance.heading_rad.sin());
         let ahead = 0.5 * (1.0 - heading.dot(&away));
         let right = Vector2::new(heading.y, -heading.x);
-        let strength = PUSH * ((radius_m - distance) / PUSH_REACH_M).exp().min(3.0);
+        let strength = PUSH * ((radius_m - distance) / reach_m).exp().min(3.0);
         (away + right * (0.9 * ahead)) * strength * (0.25 + 0.75 * ahead)
     }
 

@@ -694,6 +694,19 @@ mod tests {
     }
 
     #[test]
+    fn people_walk_through_a_doorway() {
+        let text = "duration_s = 9.0\n[camera]\nwidth = 8\nheight = 8\n[[furniture]]\n\
+            kind = \"doorway\"\nat = [5.0, 3.0]\n\
+            [[people]]\npath = [[3.0, 3.4], [5.0, 3.0], [8.0, 2.6]]\n";
+        let shots = shots(text, 1);
+        let last = &shots[shots.len() - 1].truth[0].torso_in_robot;
+        assert!(last.x > 5.5, "{last}");
+        let at_wall = shots.iter().map(|s| s.truth[0].torso_in_robot);
+        let aside = at_wall.filter(|at| (at.x - 4.0).abs() < 0.1).map(|at| at.y.abs());
+        assert!(aside.fold(0.0, f64::max) < 0.35);
+    }
+
+    #[test]
     fn people_walk_round_a_robot_at_rest() {
         let text = "duration_s = 14.0\n[camera]\nwidth = 8\nheight = 8\n[robot]\nstart = [4.0, 3.0]\n\
             [[people]]\npath = [[2.0, 3.0], [7.0, 3.0]]\ncompanions = 1\n";
