@@ -56,9 +56,9 @@ mod shadow;
 mod shape;
 mod sight;
 mod simulation;
-mod webcam;
 mod split;
 mod variation;
+mod webcam;
 mod world;
 
 pub use mirror::MirrorSettings;
@@ -68,6 +68,6 @@ pub use scene::{
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Trick,
 };
 pub use simulation::{Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
-pub use webcam::WebcamSettings;
 pub use split::Split;
 pub use variation::Variant;
+pub use webcam::WebcamSettings;

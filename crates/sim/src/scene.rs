@@ -8,9 +8,9 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use crate::mirror::MirrorSettings;
 use crate::person::Extra;
-use crate::webcam::WebcamSettings;
 use crate::split::{SUBJECTS, Split};
 use crate::variation::{Variant, one_scene};
+use crate::webcam::WebcamSettings;
 
 /// A scene. Lengths are in metres; the room's corner is the origin, X runs
 /// along its length, Y along its width; angles turn from X towards Y.

@@ -21,8 +21,8 @@ use crate::room;
 use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Posture, Scene};
 use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
-use crate::webcam::Webcam;
 use crate::split::{SUBJECTS, Split};
+use crate::webcam::Webcam;
 use crate::world::{Hit, Lamp, Object, World};
 
 /// So many of a crowd come as two.
@@ -662,7 +662,7 @@ mod tests {
 
     const OMNI: &str = "duration_s = 1.0\n[camera]\nkind = \"panorama\"\nwidth = 160\nheight = 160\n\
         rate_hz = 3.0\nheight_m = 1.55\n[robot]\nstart = [5.0, 3.0]\n[faults]\ndropped = 0.0\n\
-        [[people]]\npath = [[3.0, 3.01]]\nheight_m = 1.7\n[[people]]\npath = [[5.0, 5.5]]\n\
+        [[people]]\npath = [[3.0, 3.01]]\nheight_m = 1.7\n[[people]]\npath = [[5.0, 5.5]]\nheading_deg = 270.0\n\
         [[webcams]]\nwidth = 64\nheight = 48\n[[webcams]]\nwidth = 64\nheight = 48\nrate_hz = 5.0\n";
 
     #[test]
