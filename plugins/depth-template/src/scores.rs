@@ -12,6 +12,7 @@ pub const ONE: i32 = 256;
 /// Depths are told apart in steps of 3 %: finer ones cost time and change
 /// nothing, since a body is deeper than that.
 const LEVEL_STEP: f64 = 0.03;
+const PER_STEP: f64 = 1.0 / LEVEL_STEP;
 const LEVELS: usize = 160;
 const NEAREST_M: f64 = 0.2;
 const NONE: u32 = u32::MAX;
@@ -37,8 +38,9 @@ impl Levels {
     /// The level `behind_m` behind the face (the logarithm to second order).
     pub fn behind(&self, behind_m: f64) -> Level {
         let part = behind_m * self.per_metre;
-        let level = self.face + (part - 0.5 * part * part) / LEVEL_STEP;
-        Level((level.max(0.0).round() as usize).min(LEVELS - 1))
+        let level = self.face + (part - 0.5 * part * part) * PER_STEP;
+        // A cast rounds down, and what is negative up to zero.
+        Level(((level + 0.5) as usize).min(LEVELS - 1))
     }
 }
 
@@ -143,7 +145,7 @@ pub struct Row<'a> {
 
 impl Row<'_> {
     /// Sum over the pixels `from..to`.
-    pub fn run(&self, from: i64, to: i64) -> Sum {
+    pub fn of(&self, (from, to): (i64, i64)) -> Sum {
         let last = self.sums.len() as i64 - 1;
         let a = (from - self.first).clamp(0, last);
         let b = (to - self.first).clamp(a, last);
@@ -196,7 +198,7 @@ mod tests {
         let image = Arc::new(Working(RowSums::new(&image, 1)));
         let mut scores = Scores::new(&DepthTemplateConfig::default());
         scores.prepare(&image, 0, 1);
-        scores.row(0, Levels::of_face(person_m).behind(0.0)).run(0, 1)
+        scores.row(0, Levels::of_face(person_m).behind(0.0)).of((0, 1))
     }
 
     #[test]
