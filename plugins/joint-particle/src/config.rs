@@ -69,8 +69,10 @@ pub struct Config {
     /// This part of the particles is moved to what a detector found, 0 to 1.
     pub from_detection: f64,
     /// A person is seen if the scene is more likely by this with than without
-    /// the person, nats.
+    /// the person, nats, ...
     pub min_support: f64,
+    /// ... and a detector found the person not longer ago than this, s.
+    pub trust_s: f64,
     /// Upper-body squares are enlarged by this part of their size before they
     /// are asked whether they overlap.
     pub inflate: f64,
@@ -132,6 +134,7 @@ impl Default for Config {
             initial_velocity_variance: 1.0,
             from_detection: 0.1,
             min_support: 2.0,
+            trust_s: 1.0,
             inflate: 0.1,
             split_m: 0.6,
             split_frames: 3,
@@ -170,6 +173,7 @@ impl Config {
             ("initial_velocity_variance", self.initial_velocity_variance, 0.0, 1e3),
             ("from_detection", self.from_detection, 0.0, 1.0),
             ("min_support", self.min_support, -1e6, 1e6),
+            ("trust_s", self.trust_s, 0.0, 1e9),
             ("inflate", self.inflate, 0.0, 10.0),
             ("split_m", self.split_m, 0.0, 100.0),
             ("kernel_near_m", self.kernel_near_m, 1e-4, 10.0),

@@ -22,6 +22,8 @@ pub struct JointParticle {
     /// Where bodies face, m/s; kept while somebody stands.
     headings: BTreeMap<TrackId, Vector2<f64>>,
     wardrobe: Wardrobe,
+    /// Since when no detector found somebody, s.
+    unfound_s: BTreeMap<TrackId, f64>,
     /// ConDensation reports the state this much later, s.
     ahead_s: f64,
     dt_s: f64,
@@ -41,6 +43,7 @@ impl JointParticle {
             overlaps: Overlaps::default(),
             headings: BTreeMap::new(),
             wardrobe: Wardrobe::default(),
+            unfound_s: BTreeMap::new(),
             ahead_s: 0.0,
             dt_s: 0.0,
         })
@@ -146,6 +149,14 @@ impl JointParticle {
             .collect()
     }
 
+    /// Whether a silhouette that explains so many nats is the person: a
+    /// likelihood only compares, and without a person the best place is some
+    /// furniture or the edge of the image.
+    fn is_seen(&self, id: TrackId, nats: f64) -> bool {
+        let unfound_s = self.unfound_s.get(&id).copied().unwrap_or_default();
+        nats > self.config.min_support && unfound_s <= self.config.trust_s
+    }
+
     fn estimate(&self, group: &Group, person: usize, camera: &Camera) -> Estimate {
         let moments = group.moments(person);
         let m = moments.mean;
@@ -171,6 +182,7 @@ impl Filter for JointParticle {
     fn start(&mut self, id: TrackId, detection: &Detection) {
         let first = Particle::of(detection, &self.config);
         self.groups.push(Group::single(id, &first, self.seed, &self.config));
+        self.unfound_s.insert(id, 0.0);
     }
 
     fn predict(&mut self, motion: &Motion) {
@@ -179,6 +191,7 @@ impl Filter for JointParticle {
         for heading in self.headings.values_mut() {
             *heading = motion.apply_to_velocity(*heading);
         }
+        self.unfound_s.values_mut().for_each(|s| *s += motion.dt);
         self.ahead_s = 0.0;
         self.dt_s = motion.dt;
     }
@@ -192,16 +205,17 @@ impl Filter for JointParticle {
             .iter()
             .map(|m| (m.id, Particle::of(m.detection, &self.config)))
             .collect();
+        self.unfound_s.extend(sightings.keys().map(|id| (*id, 0.0)));
         let headings = self.headings.clone();
         let config = self.config.clone();
         let mut look = Look::new(evidence.frame, likelihood, &config, &headings, &sightings);
-        let mut seen = BTreeMap::new();
+        let mut nats = BTreeMap::new();
         for group in &mut self.groups {
             weigh(group, &mut look)?;
-            let supports = support(group, &mut look)?;
-            let supported = group.ids.iter().zip(supports).filter(|(_, s)| *s > config.min_support);
-            seen.extend(supported.map(|(id, _)| (*id, Support::default())));
+            nats.extend(group.ids.iter().copied().zip(support(group, &mut look)?));
         }
+        let seen = nats.into_iter().filter(|(id, nats)| self.is_seen(*id, *nats));
+        let seen: BTreeMap<_, _> = seen.map(|(id, _)| (id, Support::default())).collect();
         self.headings = self.turn(&mut look)?;
         let alone = self.alone(&seen);
         for pair in self.wardrobe.look(evidence.frame, &alone, config.swap_margin) {
@@ -226,6 +240,7 @@ impl Filter for JointParticle {
             }
         }
         self.headings.remove(&id);
+        self.unfound_s.remove(&id);
         self.wardrobe.forget(id);
     }
 
@@ -242,5 +257,53 @@ impl JointParticle {
         let rest = group.part(&columns, self.seed, &self.config);
         self.groups.push(rest);
         self.groups.sort_by(|a, b| a.ids.cmp(&b.ids));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Matrix3;
+    use tagalong_core::{Distortion, Frame, Images, Likelihood, Matched, Pinhole, Rect, Stamp};
+
+    use super::*;
+
+    /// Everybody fits everywhere, as a person-shaped cupboard may.
+    struct Flattering;
+
+    impl Likelihood for Flattering {
+        fn log_likelihood(&self, _frame: &Frame, scene: &[Person]) -> Result<f64> {
+            Ok(5.0 * scene.len() as f64)
+        }
+    }
+
+    fn frame() -> Frame {
+        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+    }
+
+    fn detection() -> Detection {
+        let position = Point3::new(2.0, 0.0, 1.6);
+        let region = Rect::new(40.0, 30.0, 20.0, 20.0);
+        let covariance = Matrix3::identity() * 0.01;
+        Detection { region, position, covariance, score: 3.0, source: "drawn" }
+    }
+
+    #[test]
+    fn a_silhouette_that_no_detector_finds_is_not_believed_for_long() {
+        let (mut filter, id) = (JointParticle::new(Config::default(), 1).unwrap(), TrackId(1));
+        let (frame, detection) = (frame(), detection());
+        filter.start(id, &detection);
+        let mut is_seen = |matched: &[Matched<'_>]| {
+            filter.predict(&frame.motion);
+            let likelihood: Option<&dyn Likelihood> = Some(&Flattering);
+            let evidence = Evidence { frame: &frame, matched, unmatched: &[], likelihood };
+            filter.update(&evidence).unwrap().contains_key(&id)
+        };
+        let seen: Vec<bool> = (0..12).map(|_| is_seen(&[])).collect();
+        assert!(seen[..9].iter().all(|seen| *seen) && !seen[10] && !seen[11], "{seen:?}");
+        assert!(is_seen(&[Matched { id, detection: &detection }]), "found again");
     }
 }
