@@ -232,8 +232,16 @@ fn a_shift_is_found() {
         let found = matcher.disparities(&left, &right, 31).unwrap();
         let right = found.values.iter().filter(|d| (**d - 9.0).abs() < 0.3).count();
         assert!(right > 100 * 60, "{method:?}: {right}");
-        let wrong = found.values.iter().filter(|d| (**d - 9.0).abs() > 1.0).count();
-        assert_eq!(wrong, 0, "{method:?}");
+        // What is further left is not in the right image, and of the last two columns
+        // the census sees neighbours that are none.
+        let wrong: Vec<(usize, f32)> = found
+            .values
+            .iter()
+            .enumerate()
+            .map(|(at, d)| (at % 120, *d))
+            .filter(|(x, d)| (9..118).contains(x) && (d - 9.0).abs() > 1.0)
+            .collect();
+        assert!(wrong.is_empty(), "{method:?}: {wrong:?}");
     }
 }
 
