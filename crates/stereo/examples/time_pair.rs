@@ -3,6 +3,8 @@
 //!
 //! `cargo run --release -p tagalong-stereo --example time_pair LEFT RIGHT DISPARITIES RUNS THREADS`
 
+#![allow(clippy::print_stdout, reason = "its output is what it is for")]
+
 use std::error::Error;
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,6 @@
 //! Disparities of the Middlebury pairs, judged as OpenCV's were.
 #![allow(clippy::unwrap_used, reason = "a broken test may stop loudly")]
+#![allow(clippy::print_stdout, reason = "the figures are what one wants to see")]
 
 use std::path::{Path, PathBuf};
 
