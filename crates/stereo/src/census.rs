@@ -5,7 +5,7 @@
 //! R. Zabih and J. Woodfill, *Non-parametric local transforms for computing
 //! visual correspondence*, ECCV 1994, section 3.
 
-use tagalong_core::GreyImage;
+use crate::rows::{Rows, mirror};
 
 /// Bytes in the string of a pixel.
 pub const BYTES: usize = 3;
@@ -13,9 +13,6 @@ pub const BYTES: usize = 3;
 /// The neighbours that a pixel is compared with, as (column, row) offsets: all
 /// of a 5x5 window but its centre.
 pub const NEIGHBOURS: [(i32, i32); 8 * BYTES] = neighbours();
-
-/// Largest offset in [`NEIGHBOURS`].
-const REACH: usize = 2;
 
 const fn neighbours() -> [(i32, i32); 8 * BYTES] {
     let mut all = [(0, 0); 8 * BYTES];
@@ -31,50 +28,28 @@ const fn neighbours() -> [(i32, i32); 8 * BYTES] {
     all
 }
 
-/// The strings of one row, one plane a byte, with room on both sides so that
-/// any disparity may be looked up.
+/// The strings of one row, one plane a byte.
 #[derive(Clone, Debug, Default)]
 pub struct CensusRow {
-    /// Per byte of the string, `before + width + after` values.
+    /// Per byte of the string, the columns, and behind them the room asked for.
     pub planes: [Vec<u8>; BYTES],
-    padded: Vec<Vec<u8>>,
 }
 
 impl CensusRow {
-    /// Computes row `y` of an image. Outside of the image its border goes on. A
-    /// neighbour counts as darker only if it is so by more than `noise`. A
-    /// mirrored row is written from right to left, and the value of the first
-    /// column is repeated so many times behind it.
-    pub fn compute(&mut self, image: &GreyImage, y: usize, noise: u8, mirrored: Option<usize>) {
-        let width = image.width();
-        self.padded.resize_with(2 * REACH + 1, Vec::new);
-        for (row, padded) in self.padded.iter_mut().enumerate() {
-            let y = (y + row).saturating_sub(REACH).min(image.height() - 1);
-            pad(image.row(y), padded);
-        }
+    /// Computes a row. A neighbour counts as darker only if it is so by more
+    /// than `noise`. A mirrored row is written from right to left, and the value
+    /// of the first column is repeated so many times behind it.
+    pub fn compute(&mut self, rows: &Rows, noise: u8, mirrored: Option<usize>) {
+        let width = rows.width();
         for (byte, plane) in self.planes.iter_mut().enumerate() {
             plane.clear();
             plane.resize(width, 0);
             for (bit, (dx, dy)) in NEIGHBOURS[8 * byte..8 * byte + 8].iter().enumerate() {
-                let centre = &self.padded[REACH][REACH..];
-                let neighbour =
-                    &self.padded[(REACH as i32 + dy) as usize][(REACH as i32 + dx) as usize..];
-                set_bits(plane, neighbour, centre, noise, bit);
+                set_bits(plane, rows.from(*dx, *dy), rows.from(0, 0), noise, bit);
             }
-            if mirrored.is_some() {
-                plane.reverse();
-            }
-            let last = plane.last().copied().unwrap_or(0);
-            plane.resize(width + mirrored.unwrap_or(0), last);
+            mirror(plane, mirrored);
         }
     }
-}
-
-fn pad(row: &[u8], padded: &mut Vec<u8>) {
-    padded.clear();
-    padded.resize(REACH, row[0]);
-    padded.extend_from_slice(row);
-    padded.resize(row.len() + 2 * REACH, row[row.len() - 1]);
 }
 
 /// Sets a bit where a neighbour is darker than the centre.

@@ -6,7 +6,8 @@
 //! # One pass, a row at a time
 //!
 //! Both methods compare census strings, which do not mind that two cameras
-//! differ in exposure, and sum up the costs of all disparities of one row before
+//! differ in exposure; the semi-global one adds how brightness and its slope
+//! differ. Both sum up the costs of all disparities of one row before
 //! they go on to the next. A volume of costs, 12 million of them for a small
 //! image, would not fit in a cache; a row does. That is why semi-global matching
 //! has no paths from below. All costs are bytes, many of which fit in a vector
@@ -23,10 +24,13 @@
 mod census;
 mod cost;
 mod depth;
+mod fill;
+mod level;
 mod matcher;
 mod paths;
 mod rectification;
 mod reduce;
+mod rows;
 mod settings;
 mod speckle;
 mod strip;
@@ -52,6 +56,8 @@ pub struct Dropped {
     pub left_right: u64,
     /// It belongs to a patch that is too small.
     pub speckle: u64,
+    /// It was dropped, and then filled from both sides.
+    pub filled: u64,
 }
 
 impl Dropped {
@@ -60,5 +66,6 @@ impl Dropped {
         self.not_unique += other.not_unique;
         self.left_right += other.left_right;
         self.speckle += other.speckle;
+        self.filled += other.filled;
     }
 }

@@ -4,7 +4,7 @@ use crate::paths::Penalties;
 use crate::settings::MAX_DISPARITIES;
 use crate::speckle::SpeckleFilter;
 use crate::strip::{Output, Pair, Strip};
-use crate::{Dropped, StereoSettings};
+use crate::{Dropped, StereoSettings, fill};
 
 /// Rows of a strip. Strips do not depend on the number of threads, so that the
 /// disparities do not, either.
@@ -80,6 +80,7 @@ impl Matcher {
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
         let (pixels, step) = (self.settings.speckle_pixels, self.settings.speckle_step as f32);
         dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
+        dropped.filled = fill::holes(&mut self.disparities, width, self.settings.fill_px, step);
         let gone = self.disparities.iter().zip(&mut self.confidences);
         gone.filter(|(d, _)| d.is_nan()).for_each(|(_, confidence)| *confidence = 0);
         let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());

@@ -40,6 +40,9 @@ pub struct StereoSettings {
     pub speckle_pixels: usize,
     /// Neighbours whose disparities differ by at most this are of one patch, px.
     pub speckle_step: f64,
+    /// Holes of at most so many pixels along a row are filled, px at the reduced
+    /// width, if their ends are of one patch; 0 leaves them.
+    pub fill_px: usize,
     /// Block: side of the window, px; odd, at most 9.
     pub window: usize,
     /// Semi-global: penalty of a disparity that changes by one.
@@ -63,14 +66,15 @@ impl Default for StereoSettings {
             max_depth_m: 20.0,
             max_disparity: 0,
             noise: 3,
-            uniqueness: 0.1,
+            uniqueness: 0.05,
             left_right: 1,
             speckle_pixels: 100,
             speckle_step: 2.0,
+            fill_px: 8,
             window: 9,
-            small_penalty: 8,
-            large_penalty: 100,
-            edge_penalty: 30,
+            small_penalty: 6,
+            large_penalty: 40,
+            edge_penalty: 15,
             max_vertical_px: 1.0,
             threads: 0,
         }

@@ -2,7 +2,7 @@
 
 use tagalong_core::GreyImage;
 
-use crate::census::CensusRow;
+use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
 use crate::winner::Winner;
 use crate::{Dropped, Method, StereoSettings, cost, paths, window, winner};
@@ -13,8 +13,8 @@ const RUN_UP: usize = 16;
 /// Buffers for the rows of a strip.
 #[derive(Debug, Default)]
 pub struct Strip {
-    left: CensusRow,
-    right: CensusRow,
+    left: Features,
+    right: Features,
     costs: Vec<u8>,
     sums: Vec<u8>,
     winners: Vec<Winner>,
@@ -63,7 +63,7 @@ impl Strip {
         self.excess.iter_mut().for_each(|e| e.reset::<D>(width));
         let rows = output.disparities.len() / width;
         for y in output.first_row.saturating_sub(RUN_UP)..output.first_row + rows {
-            self.cost_row::<D>(pair, y);
+            self.blended_costs::<D>(pair, y);
             let grey = (pair.left.row(y), pair.left.row(y.saturating_sub(1)));
             let costs = self.costs.as_chunks::<D>().0;
             let sums = self.sums.as_chunks_mut::<D>().0;
@@ -91,7 +91,7 @@ impl Strip {
         let rows = output.disparities.len() / width;
         for step in 0..rows + 2 * radius {
             let y = (output.first_row + step).saturating_sub(radius).min(height - 1);
-            self.cost_row::<D>(pair, y);
+            self.census_costs::<D>(pair, y);
             let leaves = &mut self.ring[step % side];
             let columns = self.columns.as_chunks_mut::<D>().0;
             window::slide_down(columns, self.costs.as_chunks::<D>().0, leaves.as_chunks::<D>().0);
@@ -104,11 +104,18 @@ impl Strip {
         }
     }
 
-    fn cost_row<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {
+    fn census_costs<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {
         let noise = pair.settings.noise;
-        self.left.compute(pair.left, y, noise, None);
-        self.right.compute(pair.right, y, noise, Some(D));
-        cost::row(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
+        self.left.census(pair.left, y, noise, None);
+        self.right.census(pair.right, y, noise, Some(D));
+        cost::bits(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
+    }
+
+    fn blended_costs<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {
+        let noise = pair.settings.noise;
+        self.left.all(pair.left, y, noise, None);
+        self.right.all(pair.right, y, noise, Some(D));
+        cost::blend(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
     }
 
     /// Writes the disparities of a row, where they stand the tests.

@@ -21,12 +21,12 @@ impl Winner {
         f32::from(self.second.saturating_sub(self.cost)) / f32::from(self.second.max(1))
     }
 
-    /// The disparity to a fraction of a pixel, by two lines of equal slope
-    /// through the three costs. M. Shimizu and M. Okutomi, *Precise sub-pixel
-    /// estimation on area-based matching*, ICCV 2001, equation 5.
+    /// The disparity to a fraction of a pixel, by a parabola through the three
+    /// costs. It leans to whole pixels; two lines of equal slope, which do not,
+    /// follow the noise of the sums more, and were further off in all.
     pub fn refined(&self) -> f32 {
         let [below, above] = self.beside.map(f32::from);
-        let rise = below.max(above) - f32::from(self.cost);
+        let rise = below + above - 2.0 * f32::from(self.cost);
         let offset = if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 };
         f32::from(self.disparity) + offset
     }

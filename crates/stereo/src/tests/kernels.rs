@@ -4,11 +4,12 @@ use proptest::prelude::*;
 use tagalong_core::GreyImage;
 
 use super::reference::{self, Volume};
-use crate::census::{BYTES, CensusRow};
+use crate::census::BYTES;
+use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
 use crate::speckle::SpeckleFilter;
 use crate::winner::Winner;
-use crate::{Matcher, Method, StereoSettings, cost, paths, window, winner};
+use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window, winner};
 
 const D: usize = 16;
 
@@ -22,12 +23,17 @@ fn images(count: usize) -> impl Strategy<Value = Vec<GreyImage>> {
     })
 }
 
+fn features(pair: &[GreyImage], noise: u8, y: usize) -> (Features, Features) {
+    let (mut left, mut right) = (Features::default(), Features::default());
+    left.all(&pair[0], y, noise, None);
+    right.all(&pair[1], y, noise, Some(D));
+    (left, right)
+}
+
 fn cost_row(pair: &[GreyImage], noise: u8, y: usize) -> Vec<[u8; D]> {
-    let (mut l, mut r) = (CensusRow::default(), CensusRow::default());
-    l.compute(&pair[0], y, noise, None);
-    r.compute(&pair[1], y, noise, Some(D));
+    let (left, right) = features(pair, noise, y);
     let mut costs = vec![[0; D]; pair[0].width()];
-    cost::row(&l, &r, &mut costs);
+    cost::bits(&left, &right, &mut costs);
     costs
 }
 
@@ -44,10 +50,43 @@ proptest! {
     fn costs_equal_counted_bits(pair in images(2), noise in 0..20u8) {
         let (width, height) = (pair[0].width() as i64, pair[0].height() as i64);
         let slow = Volume::from_fn((width, height, D as i64), |x, y, d| {
-            reference::cost(&pair, noise, x, y, d)
+            reference::bits(&pair, noise, x, y, d)
         });
         let fast: Vec<u8> = cost_rows(&pair, noise).concat().into_flattened();
         prop_assert_eq!(wide(&fast), slow.cells);
+    }
+
+    #[test]
+    fn blended_costs_equal_added_ones(pair in images(2), noise in 0..20u8) {
+        let (width, height) = (pair[0].width(), pair[0].height());
+        let size = (width as i64, height as i64, D as i64);
+        let slow =
+            Volume::from_fn(size, |x, y, d| reference::blend(&pair, noise, x, y, d));
+        let mut fast = Vec::new();
+        for y in 0..height {
+            let (left, right) = features(&pair, noise, y);
+            let mut costs = vec![[0; D]; width];
+            cost::blend(&left, &right, &mut costs);
+            fast.extend(wide(costs.as_flattened()));
+        }
+        prop_assert_eq!(fast, slow.cells);
+    }
+
+    #[test]
+    fn holes_are_bridged_pixel_by_pixel(
+        values in prop::collection::vec(prop_oneof![Just(f32::NAN), 0.0..4.0_f32], 12 * 9),
+        most in 0..6usize,
+        step in 0.0..3.0_f32,
+    ) {
+        let slow = reference::without_holes(&values, 12, most, step);
+        let mut fast = values.clone();
+        let filled = fill::holes(&mut fast, 12, most, step);
+        let holes = |image: &[f32]| image.iter().filter(|v| v.is_nan()).count();
+        prop_assert_eq!(filled as usize, holes(&values) - holes(&fast));
+        for (fast, slow) in fast.iter().zip(&slow) {
+            let close = (fast - slow).abs() < 1e-5 || (fast.is_nan() && slow.is_nan());
+            prop_assert!(close, "{} {}", fast, slow);
+        }
     }
 
     #[test]
@@ -157,15 +196,15 @@ proptest! {
     }
 }
 
-/// A left image of noise, and the right one that shows it shifted.
+/// A left image of smooth noise, and the right one that shows it shifted.
 pub fn noise_pair(width: usize, height: usize, disparity: usize) -> (GreyImage, GreyImage) {
-    let noise = |x: usize, y: usize| {
-        let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
-        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-        (h >> 13) as u8
+    let hash = |x: usize, y: usize| {
+        let h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+        ((h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D) >> 24) as usize
     };
-    let left = GreyImage::from_fn(width, height, noise);
-    let right = GreyImage::from_fn(width, height, |x, y| noise(x + disparity, y));
+    let mean = |x: usize, y: usize| (0..9).map(|i| hash(x + i % 3, y + i / 3)).sum::<usize>() / 9;
+    let left = GreyImage::from_fn(width, height, |x, y| mean(x, y) as u8);
+    let right = GreyImage::from_fn(width, height, |x, y| mean(x + disparity, y) as u8);
     (left, right)
 }
 
@@ -193,8 +232,16 @@ fn a_shift_is_found() {
         let found = matcher.disparities(&left, &right, 31).unwrap();
         let right = found.values.iter().filter(|d| (**d - 9.0).abs() < 0.3).count();
         assert!(right > 100 * 60, "{method:?}: {right}");
-        let wrong = found.values.iter().filter(|d| (**d - 9.0).abs() > 1.0).count();
-        assert_eq!(wrong, 0, "{method:?}");
+        // What is further left is not in the right image, and of the last two columns
+        // the census sees neighbours that are none.
+        let wrong: Vec<(usize, f32)> = found
+            .values
+            .iter()
+            .enumerate()
+            .map(|(at, d)| (at % 120, *d))
+            .filter(|(x, d)| (9..118).contains(x) && (d - 9.0).abs() > 1.0)
+            .collect();
+        assert!(wrong.is_empty(), "{method:?}: {wrong:?}");
     }
 }
 

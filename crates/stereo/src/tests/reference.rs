@@ -3,6 +3,7 @@
 use tagalong_core::GreyImage;
 
 use crate::census::NEIGHBOURS;
+use crate::cost::{MOST_BRIGHTNESS, MOST_SLOPE, SLOPE_WEIGHT};
 
 fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
     let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
@@ -17,12 +18,63 @@ pub fn census(image: &GreyImage, noise: u8, x: i64, y: i64) -> Vec<bool> {
     NEIGHBOURS.iter().map(darker).collect()
 }
 
-/// The cost of disparity `d` at the left image's pixel; outside of the right
-/// image the strings of its border go on.
-pub fn cost(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
+/// In how many bits disparity `d` differs at the left image's pixel; outside of
+/// the right image its border goes on.
+pub fn bits(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
     let left = census(&pair[0], noise, x, y);
     let right = census(&pair[1], noise, (x - d).max(0), y);
     left.iter().zip(right).filter(|(l, r)| **l != *r).count() as i64
+}
+
+pub fn blend(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
+    let right = (x - d).max(0);
+    let brightness = dissimilarity(pair, x, right, |image, x| clamped(image, x, y).into());
+    let slope = dissimilarity(pair, x, right, |image, x| slope(image, x, y));
+    let cost = bits(pair, noise, x, y, d)
+        + brightness.min(MOST_BRIGHTNESS.into())
+        + i64::from(SLOPE_WEIGHT) * slope.min(MOST_SLOPE.into());
+    cost / 2
+}
+
+fn slope(image: &GreyImage, x: i64, y: i64) -> i64 {
+    let x = x.clamp(0, image.width() as i64 - 1);
+    let at = |dx, dy| i64::from(clamped(image, x + dx, y + dy));
+    let sum: i64 =
+        [(-1, 1), (0, 2), (1, 1)].map(|(dy, w)| w * (at(1, dy) - at(-1, dy))).iter().sum();
+    (128 + sum.div_euclid(2)).clamp(0, 255)
+}
+
+/// Equations 1 to 3 of Birchfield and Tomasi, in whole numbers.
+fn dissimilarity(
+    pair: &[GreyImage],
+    left: i64,
+    right: i64,
+    level: impl Fn(&GreyImage, i64) -> i64,
+) -> i64 {
+    let one_way = |image: &GreyImage, x: i64, own: i64| {
+        let centre = level(image, x);
+        let all = [centre, (centre + level(image, x - 1)) / 2, (centre + level(image, x + 1)) / 2];
+        let (least, most) = (*all.iter().min().unwrap(), *all.iter().max().unwrap());
+        (own - most).max(least - own).max(0)
+    };
+    let (l, r) = (level(&pair[0], left), level(&pair[1], right));
+    one_way(&pair[1], right, l).min(one_way(&pair[0], left, r))
+}
+
+/// Fills holes along a row pixel by pixel.
+pub fn without_holes(image: &[f32], width: usize, most: usize, step: f32) -> Vec<f32> {
+    let mut filled = image.to_vec();
+    for at in (0..image.len()).filter(|at| image[*at].is_nan()) {
+        let (x, row) = (at % width, at / width * width);
+        let before = (0..x).rev().find(|x| !image[row + x].is_nan());
+        let behind = (x..width).find(|x| !image[row + x].is_nan());
+        let (Some(a), Some(b)) = (before, behind) else { continue };
+        let (from, to) = (image[row + a], image[row + b]);
+        if b - a - 1 <= most && (to - from).abs() <= step {
+            filled[at] = from + (to - from) * (x - a) as f32 / (b - a) as f32;
+        }
+    }
+    filled
 }
 
 /// Costs of all disparities of all pixels, in row order.
