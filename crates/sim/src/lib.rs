@@ -63,6 +63,7 @@ mod world;
 
 pub use mirror::MirrorSettings;
 pub use person::Extra;
+pub use robot::Encoder;
 pub use scene::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Trick,

@@ -52,8 +52,7 @@ impl View<'_> {
     fn strip(&self, top: usize, pixels: &mut [Hit]) {
         let width = self.camera.width;
         let rows = pixels.len() / width;
-        let middle = (top as f64 + 0.5 * rows as f64) / self.camera.height as f64;
-        let eye = Eye::new(self.camera, &(self.pose)(middle));
+        let eye = self.eye(top);
         let sights = before(self.world.solids(), &eye.at, &eye.forward());
         let edge = |y: usize| [eye.corner(0, y), eye.corner(width, y)];
         let strip = between(&sights, edge(top), edge(top + rows));
@@ -68,6 +67,53 @@ impl View<'_> {
                 }
             }
         }
+    }
+
+    /// The eye while the strip with a row is taken.
+    fn eye(&self, row: usize) -> Eye<'_> {
+        let (top, height) = (row - row % TILE, self.camera.height);
+        let middle = 0.5 * (top + height.min(top + TILE)) as f64;
+        Eye::new(self.camera, &(self.pose)(middle / height as f64))
+    }
+
+    /// Compares what is seen of some solids of `person` within an area (left, top,
+    /// right, bottom, pixels, clipped to the image by the caller) with what would
+    /// be seen of them alone. At most some 40 x 40 rays are cast.
+    pub fn visibility(
+        &self,
+        image: &Image<Hit>,
+        (person, shapes): (u16, &[Shape]),
+        area: [usize; 4],
+    ) -> Visibility {
+        let [left, top, right, bottom] = area;
+        let step = ((right - left).max(bottom - top) / 40).max(1);
+        let (mut whole, mut seen) = (0u32, 0u32);
+        let mut bounds: Option<[f64; 4]> = None;
+        let mut hiders = std::collections::BTreeMap::<u16, u32>::new();
+        for row in (top..bottom).step_by(step) {
+            let eye = self.eye(row);
+            let alone: Vec<_> = shapes.iter().map(|shape| shape.seen_from(&eye.at)).collect();
+            for column in (left..right).step_by(step) {
+                let ray = eye.ray(column as f64, row as f64);
+                if !alone.iter().any(|seen| seen.meet(&ray).is_some()) {
+                    continue;
+                }
+                whole += 1;
+                let there = image.pixels()[row * image.width() + column].person;
+                if there == Some(person) {
+                    seen += 1;
+                    let (x, y, s) = (column as f64, row as f64, step as f64);
+                    bounds = Some(bounds.map_or([x, y, x + s, y + s], |b| {
+                        [b[0].min(x), b[1].min(y), b[2].max(x + s), b[3].max(y + s)]
+                    }));
+                } else if let Some(other) = there {
+                    *hiders.entry(other).or_default() += 1;
+                }
+            }
+        }
+        let occluder = hiders.into_iter().max_by_key(|(_, count)| *count).map(|(id, _)| id);
+        let fraction = if whole == 0 { 0.0 } else { f64::from(seen) / f64::from(whole) };
+        Visibility { fraction, bounds_px: bounds, occluder }
     }
 
     fn look(&self, tile: &[&Sight], eye: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
@@ -135,47 +181,6 @@ pub struct Visibility {
     pub occluder: Option<u16>,
 }
 
-/// Compares what is seen of some solids of `person` within an area (left, top,
-/// right, bottom, pixels, clipped to the image by the caller) with what would be
-/// seen of them alone. At most some 40 x 40 rays are cast.
-pub fn visibility(
-    image: &Image<Hit>,
-    camera: &Camera,
-    world_from_robot: &Isometry3<f64>,
-    (person, shapes): (u16, &[Shape]),
-    area: [usize; 4],
-) -> Visibility {
-    let eye = Eye::new(camera, world_from_robot);
-    let alone: Vec<_> = shapes.iter().map(|shape| shape.seen_from(&eye.at)).collect();
-    let [left, top, right, bottom] = area;
-    let step = ((right - left).max(bottom - top) / 40).max(1);
-    let (mut whole, mut seen) = (0u32, 0u32);
-    let mut bounds: Option<[f64; 4]> = None;
-    let mut hiders = std::collections::BTreeMap::<u16, u32>::new();
-    for row in (top..bottom).step_by(step) {
-        for column in (left..right).step_by(step) {
-            let ray = eye.ray(column as f64, row as f64);
-            if !alone.iter().any(|seen| seen.meet(&ray).is_some()) {
-                continue;
-            }
-            whole += 1;
-            let there = image.pixels()[row * image.width() + column].person;
-            if there == Some(person) {
-                seen += 1;
-                let (x, y, s) = (column as f64, row as f64, step as f64);
-                bounds = Some(bounds.map_or([x, y, x + s, y + s], |b| {
-                    [b[0].min(x), b[1].min(y), b[2].max(x + s), b[3].max(y + s)]
-                }));
-            } else if let Some(other) = there {
-                *hiders.entry(other).or_default() += 1;
-            }
-        }
-    }
-    let occluder = hiders.into_iter().max_by_key(|(_, count)| *count).map(|(id, _)| id);
-    let fraction = if whole == 0 { 0.0 } else { f64::from(seen) / f64::from(whole) };
-    Visibility { fraction, bounds_px: bounds, occluder }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Rotation3;
@@ -195,6 +200,21 @@ mod tests {
         };
         let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
         Shape::new(form, Point3::from(at), turn, Material::plain([0.1 * turn.angle(); 3]))
+    }
+
+    #[test]
+    fn every_strip_is_seen_from_where_the_robot_is_then() {
+        let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 23.5, cy: 17.0, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 50, 40, 0.2, 0.0, 0.0);
+        let posts = [-0.4, 0.5].map(|y| shape(1, [3.0, y, 0.0], 0.3));
+        let world = World::new(vec![Object::new(posts.to_vec(), None, true)], vec![], 100.0);
+        let pose = |part: f64| Isometry3::rotation(Vector3::z() * 0.2 * part);
+        let rolling = View { world: &world, camera: &camera, pose: &pose, lit: true }.draw(2);
+        for (rows, part) in [(0..16, 0.2), (16..32, 0.6), (32..40, 0.9)] {
+            let at_once = draw(&world, &camera, &pose(part), 1);
+            rows.for_each(|row| assert_eq!(rolling.row(row), at_once.row(row), "{row}"));
+        }
+        assert_ne!(rolling.row(10), draw(&world, &camera, &pose(0.9), 1).row(10));
     }
 
     proptest! {

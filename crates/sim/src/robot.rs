@@ -2,6 +2,7 @@
 //! from outside, and the odometry that believes its encoders.
 
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_core::{Motion, WheelSpeeds, Wheels};
@@ -16,6 +17,15 @@ const NOD_RAD: f64 = 0.008;
 /// Time constant of the nod, s.
 const NOD_S: f64 = 0.15;
 
+/// What the encoder of a wheel says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Encoder {
+    /// Turned since the start, in whole ticks, rad.
+    pub angle_rad: f64,
+    /// Speed, rad/s.
+    pub rate_rad_s: f64,
+}
+
 /// The robot on its way.
 #[derive(Clone, Debug)]
 pub struct Robot {
@@ -28,10 +38,14 @@ pub struct Robot {
     wheels: [f64; 2],
     /// What the encoders say, m/s.
     measured: [f64; 2],
+    /// The same since the start, m.
+    travelled: [f64; 2],
     /// Wheels that are larger than believed, as factors.
     radius: [f64; 2],
     half_separation_m: f64,
     commands: VecDeque<(f64, WheelSpeeds)>,
+    /// The last command, which may not work yet.
+    given: WheelSpeeds,
     command: WheelSpeeds,
     steered: bool,
     ahead: usize,
@@ -51,9 +65,11 @@ impl Robot {
             odometry: Isometry2::identity(),
             wheels: [0.0; 2],
             measured: [0.0; 2],
+            travelled: [0.0; 2],
             radius,
             half_separation_m: settings.half_separation_m * separation,
             commands: VecDeque::new(),
+            given: WheelSpeeds::STOP,
             command: WheelSpeeds::STOP,
             steered: false,
             ahead: 0,
@@ -66,15 +82,24 @@ impl Robot {
     /// Commands wheel speeds from outside; from then on the path is left alone.
     pub fn steer(&mut self, now_s: f64, command: WheelSpeeds) {
         self.steered = true;
+        self.give(now_s, command);
+    }
+
+    /// Commands what leads along the path, unless somebody steers.
+    pub fn decide(&mut self, now_s: f64) {
+        if !self.steered {
+            let command = self.along_path();
+            self.give(now_s, command);
+        }
+    }
+
+    fn give(&mut self, now_s: f64, command: WheelSpeeds) {
+        self.given = command;
         self.commands.push_back((now_s + self.settings.latency_s, command));
     }
 
     /// Moves by a short time.
     pub fn step(&mut self, now_s: f64, dt: f64) {
-        if !self.steered {
-            let command = self.along_path();
-            self.commands.push_back((now_s + self.settings.latency_s, command));
-        }
         while let Some(command) = self.commands.front().filter(|c| c.0 <= now_s).map(|c| c.1) {
             self.command = command;
             self.commands.pop_front();
@@ -92,13 +117,18 @@ impl Robot {
             // The wheel slips; the encoder sees the wheel and not the ground.
             *measured = *wheel / radius * (1.0 + self.settings.slip * self.random.normal());
         }
+        for (travelled, measured) in self.travelled.iter_mut().zip(self.measured) {
+            *travelled += measured * dt;
+        }
         let acceleration = (self.speed_mps() - before) / dt;
         self.nod_rad += (-NOD_RAD * acceleration - self.nod_rad) * (dt / NOD_S).min(1.0);
-        let separation = |half_separation_m| Wheels { half_separation_m, slip: 0.0 };
-        let moved =
-            |[left, right]: [f64; 2], d: f64| Motion::from_wheels(left, right, &separation(d), dt);
-        self.pose *= moved(self.wheels, self.half_separation_m).isometry();
-        self.odometry *= moved(self.measured, self.settings.half_separation_m).isometry();
+        self.pose = self.pose_after(dt);
+        self.odometry *= moved(self.measured, self.settings.half_separation_m, dt);
+    }
+
+    /// Where it is after a short time, or was before it, at the speed of now.
+    pub fn pose_after(&self, dt: f64) -> Isometry2<f64> {
+        self.pose * moved(self.wheels, self.half_separation_m, dt)
     }
 
     /// Speeds that lead to the point ahead.
@@ -128,14 +158,37 @@ impl Robot {
 
     /// Forward speed, m/s, and turn rate, rad/s, as the encoders see them.
     pub fn measured(&self) -> (f64, f64) {
-        let [left, right] = self.measured;
+        self.planar(self.measured)
+    }
+
+    /// Forward speed, m/s, and turn rate, rad/s, of the last command.
+    pub fn commanded(&self) -> (f64, f64) {
+        self.planar([self.given.left, self.given.right])
+    }
+
+    fn planar(&self, [left, right]: [f64; 2]) -> (f64, f64) {
         (0.5 * (left + right), (right - left) / (2.0 * self.settings.half_separation_m))
+    }
+
+    /// What the encoders of the left and the right wheel say.
+    pub fn encoders(&self) -> [Encoder; 2] {
+        let radius_m = self.settings.wheel_radius_m;
+        let tick_rad = TAU / f64::from(self.settings.ticks_per_turn);
+        [0, 1].map(|side| Encoder {
+            angle_rad: (self.travelled[side] / radius_m / tick_rad).floor() * tick_rad,
+            rate_rad_s: self.measured[side] / radius_m,
+        })
     }
 
     /// Nose down, rad.
     pub fn nod_rad(&self) -> f64 {
         self.nod_rad
     }
+}
+
+/// The motion of wheels at these speeds.
+fn moved([left, right]: [f64; 2], half_separation_m: f64, dt: f64) -> Isometry2<f64> {
+    Motion::from_wheels(left, right, &Wheels { half_separation_m, slip: 0.0 }, dt).isometry()
 }
 
 #[cfg(test)]
@@ -148,6 +201,7 @@ mod tests {
 
     fn run(robot: &mut Robot, seconds: f64) {
         for step in 0..(seconds / 0.02) as usize {
+            robot.decide(step as f64 * 0.02);
             robot.step(step as f64 * 0.02, 0.02);
         }
     }
@@ -162,6 +216,21 @@ mod tests {
         let believed = start * robot.odometry;
         let error = (believed.translation.vector - robot.pose.translation.vector).norm();
         assert!(error > 1e-3 && error < 0.5, "{error}");
+    }
+
+    #[test]
+    fn ticks_say_how_far_the_odometry_believes_to_be() {
+        let settings = RobotSettings { path: vec![[4.0, 3.0]], ..RobotSettings::default() };
+        let tick_m = TAU * settings.wheel_radius_m / f64::from(settings.ticks_per_turn);
+        let mut robot = robot(settings.clone());
+        run(&mut robot, 10.0);
+        let [left, right] = robot.encoders().map(|e| e.angle_rad * settings.wheel_radius_m);
+        let turn = (right - left) / (2.0 * settings.half_separation_m);
+        let off = turn - robot.odometry.rotation.angle();
+        assert!(off.abs() <= tick_m / settings.half_separation_m, "{off}");
+        assert!((0.5 * (left + right) - robot.odometry.translation.vector.norm()).abs() < 0.02);
+        let ticks = left / tick_m;
+        assert!((ticks - ticks.round()).abs() < 1e-6 && ticks > 1000.0, "{ticks}");
     }
 
     #[test]

@@ -138,6 +138,27 @@ impl Scene {
                 camera.colour || camera.kind == CameraKind::Rgbd,
                 "camera.colour = false needs camera.kind = \"rgbd\": it has depth besides",
             ),
+            (
+                (0.0..=0.05).contains(&camera.rolling_shutter_s),
+                "camera.rolling_shutter_s must be in 0 to 0.05",
+            ),
+            (
+                camera.rolling_shutter_s == 0.0 || camera.kind != CameraKind::Panorama,
+                "camera.rolling_shutter_s is not for camera.kind = \"panorama\"",
+            ),
+            (
+                (0.0..=0.02).contains(&camera.depth_offset_s),
+                "camera.depth_offset_s must be in 0 to 0.02",
+            ),
+            (
+                camera.depth_offset_s == 0.0 || camera.kind == CameraKind::Rgbd && camera.colour,
+                "camera.depth_offset_s needs camera.kind = \"rgbd\" with colour",
+            ),
+            (
+                (0.005..=1.0).contains(&self.robot.wheel_radius_m),
+                "robot.wheel_radius_m must be in 0.005 to 1",
+            ),
+            (self.robot.ticks_per_turn > 0, "robot.ticks_per_turn must be at least 1"),
             (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
             (self.number_of_people() <= 200, "there must be at most 200 people"),
             (
@@ -285,6 +306,12 @@ pub struct CameraSettings {
     pub max_depth_m: f64,
     /// Exposure time, s.
     pub exposure_s: f64,
+    /// From the first row to the last, s; 0 takes all rows at once. The stamp is
+    /// that of the middle row, and people stand still meanwhile. Not for mirrors.
+    pub rolling_shutter_s: f64,
+    /// The depth of an `rgbd` camera with colour is taken this much later than
+    /// the colour, s; its stamp says so.
+    pub depth_offset_s: f64,
     /// The mount differs from what the log says by about this, degrees and (in
     /// hundredths) metres.
     pub mount_error_deg: f64,
@@ -307,6 +334,8 @@ impl Default for CameraSettings {
             min_depth_m: 0.5,
             max_depth_m: 8.0,
             exposure_s: 0.012,
+            rolling_shutter_s: 0.0,
+            depth_offset_s: 0.0,
             mount_error_deg: 0.4,
             mirror: MirrorSettings::default(),
         }
@@ -327,6 +356,10 @@ pub struct RobotSettings {
     pub speed_mps: f64,
     /// Half the distance between the wheels, m.
     pub half_separation_m: f64,
+    /// Radius of the wheels, as the odometry believes, m.
+    pub wheel_radius_m: f64,
+    /// Ticks of an encoder in one turn of its wheel.
+    pub ticks_per_turn: u32,
     /// Time constant of the wheel speeds, s.
     pub response_s: f64,
     /// From a command to its effect, s.
@@ -347,6 +380,8 @@ impl Default for RobotSettings {
             path: Vec::new(),
             speed_mps: 0.5,
             half_separation_m: 0.167,
+            wheel_radius_m: 0.0975,
+            ticks_per_turn: 4096,
             response_s: 0.2,
             latency_s: 0.1,
             wheel_bias: 0.005,

@@ -15,8 +15,8 @@ use crate::body::Skeleton;
 use crate::mirror::MirrorCamera;
 use crate::person::Person;
 use crate::random::Random;
-use crate::render::{View, Visibility, draw, visibility};
-use crate::robot::Robot;
+use crate::render::{View, Visibility};
+use crate::robot::{Encoder, Robot};
 use crate::room;
 use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Posture, Scene};
 use crate::sensor::{DepthSensor, Exposure, Moment};
@@ -67,6 +67,12 @@ pub struct OdometryReading {
     pub speed_mps: f64,
     /// About the vertical, rad/s.
     pub turn_rate: f64,
+    /// The left and the right wheel.
+    pub encoders: [Encoder; 2],
+    /// Forward speed of the last command, m/s.
+    pub commanded_mps: f64,
+    /// Turn rate of the last command, rad/s.
+    pub commanded_turn_rate: f64,
 }
 
 /// What the camera delivers, and what is true at that moment.
@@ -76,6 +82,8 @@ pub struct Shot {
     pub captured_ns: u64,
     /// When it is written to the log, ns; not before it was captured.
     pub recorded_ns: u64,
+    /// When the depth was taken: the offset of the camera later.
+    pub depth_ns: u64,
     /// Colour and depth, the grey images of a stereo pair, or the circular image
     /// of a mirror.
     pub images: Images,
@@ -207,6 +215,8 @@ impl Simulation {
 
     fn step(&mut self) {
         let due_ns = (self.shots as f64 * 1e9 / self.scene.camera.rate_hz) as u64;
+        let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
+        self.robot.decide(now_s);
         let odometry = self.read_odometry();
         self.record(self.now_ns, odometry);
         if self.now_ns >= due_ns {
@@ -214,7 +224,6 @@ impl Simulation {
             self.shoot();
         }
         self.shoot_webcams();
-        let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
         self.robot.step(now_s, dt);
         self.walk(now_s, dt);
         self.now_ns += STEP_NS;
@@ -241,12 +250,15 @@ impl Simulation {
 
     fn read_odometry(&self) -> Event {
         let (speed_mps, turn_rate) = self.robot.measured();
-        let odom_from_robot = self.robot.odometry;
+        let (commanded_mps, commanded_turn_rate) = self.robot.commanded();
         Event::Odometry(OdometryReading {
             at_ns: self.now_ns,
-            odom_from_robot,
+            odom_from_robot: self.robot.odometry,
             speed_mps,
             turn_rate,
+            encoders: self.robot.encoders(),
+            commanded_mps,
+            commanded_turn_rate,
         })
     }
 
@@ -279,18 +291,19 @@ impl Simulation {
 
     fn shot(&mut self, recorded_ns: u64) -> Shot {
         let (world, uppers) = self.world();
-        let pose = self.world_from_robot();
+        let pose = self.world_from_robot(0.5);
         let (seen, truth) = match &self.mirror {
             Some(mirror) => self.in_mirror(mirror, &world, &uppers, &pose),
             None => self.in_lens(&world, &uppers, &pose),
         };
         let images = match self.scene.camera.kind {
             CameraKind::Rgbd => self.rgbd(&seen),
-            CameraKind::Stereo => self.stereo(&world, &seen, &pose),
+            CameraKind::Stereo => self.stereo(&world, &seen),
             CameraKind::Panorama => self.circle(&seen),
         };
-        let world_from_robot = self.robot.pose;
-        Shot { captured_ns: self.now_ns, recorded_ns, images, truth, world_from_robot }
+        let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
+        let depth_ns = captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64;
+        Shot { captured_ns, recorded_ns, depth_ns, images, truth, world_from_robot }
     }
 
     /// Everything there is now, and how many solids of each person are upper body.
@@ -307,9 +320,11 @@ impl Simulation {
         (World::new(objects, self.lamps.clone(), light.lux * light.ambient), uppers)
     }
 
-    /// The robot's body in the world; it nods when it brakes.
-    fn world_from_robot(&self) -> Isometry3<f64> {
-        let planar = self.robot.pose;
+    /// The robot's body in the world while a part of the image is taken, from the
+    /// upper edge, 0, to the lower, 1; it nods when it brakes.
+    fn world_from_robot(&self, part: f64) -> Isometry3<f64> {
+        let since_middle = (part - 0.5) * self.scene.camera.rolling_shutter_s;
+        let planar = self.robot.pose_after(since_middle);
         let nod = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.robot.nod_rad());
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
         let at = planar.translation.vector;
@@ -322,7 +337,26 @@ impl Simulation {
         Moment { seed, smear_px: turned * self.camera.focal_px(), gain }
     }
 
+    /// What the depth camera sees, if it looks later than the colour camera.
+    fn seen_later(&mut self) -> Option<Image<Hit>> {
+        let offset_s = self.scene.camera.depth_offset_s;
+        if offset_s == 0.0 {
+            return None;
+        }
+        let (robot, walkers) = (self.robot.clone(), self.walkers.clone());
+        let now_s = self.now_ns as f64 * 1e-9;
+        self.robot.step(now_s, offset_s);
+        self.walk(now_s, offset_s);
+        let (world, _) = self.world();
+        let pose = |part| self.world_from_robot(part);
+        let camera = &self.true_camera;
+        let seen = View { world: &world, camera, pose: &pose, lit: false }.draw(self.threads);
+        (self.robot, self.walkers) = (robot, walkers);
+        Some(seen)
+    }
+
     fn rgbd(&mut self, seen: &Image<Hit>) -> Images {
+        let later = self.seen_later();
         let settings = &self.scene.camera;
         let sensor = DepthSensor {
             focal_px: self.camera.focal_px(),
@@ -330,7 +364,11 @@ impl Simulation {
             range_m: [settings.min_depth_m, settings.max_depth_m],
         };
         let moment = self.moment(0, 1.0);
-        let depth = Some(Arc::new(sensor.measure(seen, moment.seed, self.threads)));
+        let depth = Some(Arc::new(sensor.measure(
+            later.as_ref().unwrap_or(seen),
+            moment.seed,
+            self.threads,
+        )));
         let lit = settings.colour;
         let colour = lit.then(|| Arc::new(self.exposures[0].colour(seen, &moment)));
         Images { colour, depth, ..Images::default() }
@@ -343,14 +381,15 @@ impl Simulation {
         Images { colour: Some(Arc::new(colour)), ..Images::default() }
     }
 
-    fn stereo(&mut self, world: &World, left: &Image<Hit>, pose: &Isometry3<f64>) -> Images {
+    fn stereo(&mut self, world: &World, left: &Image<Hit>) -> Images {
         let mut camera = self.true_camera.clone();
         // A fifth of a pixel is what rectification leaves.
         let tilt = 0.2 / camera.focal_px();
         let aside = Translation3::new(self.scene.camera.baseline_m, 0.0, 0.0);
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
         camera.robot_from_camera *= Isometry3::from_parts(aside, tilt);
-        let right = draw(world, &camera, pose, self.threads);
+        let pose = |part| self.world_from_robot(part);
+        let right = View { world, camera: &camera, pose: &pose, lit: true }.draw(self.threads);
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
         let image = self.exposures[1].grey(&right, &moments[1]);
@@ -365,9 +404,10 @@ impl Simulation {
         pose: &Isometry3<f64>,
     ) -> (Image<Hit>, Vec<Truth>) {
         let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
-        let seen = View { world, camera, pose: &|_| *pose, lit }.draw(self.threads);
+        let view = View { world, camera, pose: &|part| self.world_from_robot(part), lit };
+        let seen = view.draw(self.threads);
         let truth =
-            self.truth(world, uppers, pose, |of, skeleton| self.sight(&seen, pose, of, skeleton));
+            self.truth(world, uppers, pose, |of, skeleton| sight(&view, &seen, of, skeleton));
         (seen, truth)
     }
 
@@ -414,24 +454,28 @@ impl Simulation {
         });
         truth.collect()
     }
+}
 
-    fn sight(
-        &self,
-        seen: &Image<Hit>,
-        pose: &Isometry3<f64>,
-        of: (u16, &[Shape]),
-        skeleton: &Skeleton,
-    ) -> (Option<Rect>, Visibility) {
-        let camera = &self.true_camera;
-        let whole = camera.upper_body(&pose.inverse_transform_point(&skeleton.head));
-        let clipped = whole.clipped(camera.width, camera.height);
-        if clipped.width < 2.0 || clipped.height < 2.0 {
-            return (None, Visibility::default());
-        }
-        let mut visibility = visibility(seen, camera, pose, of, pixels(&clipped));
-        visibility.fraction *= clipped.area() / whole.area();
-        (Some(clipped), visibility)
+/// How somebody's upper body is seen: the region where it must be, and what there
+/// is to see of it.
+fn sight(
+    view: &View<'_>,
+    seen: &Image<Hit>,
+    of: (u16, &[Shape]),
+    skeleton: &Skeleton,
+) -> (Option<Rect>, Visibility) {
+    let camera = view.camera;
+    let from = |part| (view.pose)(part).inverse_transform_point(&skeleton.head);
+    // Where the head is depends on when its row is taken, and the other way round.
+    let row = camera.upper_body(&from(0.5)).centre().y;
+    let whole = camera.upper_body(&from((row / camera.height as f64).clamp(0.0, 1.0)));
+    let clipped = whole.clipped(camera.width, camera.height);
+    if clipped.width < 2.0 || clipped.height < 2.0 {
+        return (None, Visibility::default());
     }
+    let mut visibility = view.visibility(seen, of, pixels(&clipped));
+    visibility.fraction *= clipped.area() / whole.area();
+    (Some(clipped), visibility)
 }
 
 /// Left, top, right, bottom.
@@ -612,6 +656,58 @@ mod tests {
             assert!(b.images.colour.is_none() && bits(a) == bits(b));
             assert_eq!(a.truth, b.truth);
         }
+    }
+
+    const TURNING: &str = "seed = 4\nduration_s = 2.0\n[camera]\nwidth = 160\nheight = 120\n\
+        [robot]\nstart = [1.0, 3.0]\nheading_deg = -60.0\npath = [[1.0, 5.5]]\n\
+        [faults]\ndropped = 0.0\nlate = 0.0\n\
+        [[people]]\npath = [[3.5, 3.0]]\nheight_m = 1.7\n";
+
+    #[test]
+    fn a_rolling_shutter_slants_the_image_and_the_truth_with_it() {
+        let at_once = shots(TURNING, 2);
+        let rolling =
+            shots(&TURNING.replace("[camera]\n", "[camera]\nrolling_shutter_s = 0.05\n"), 2);
+        let mut moved = 0.0_f64;
+        for (a, b) in at_once.iter().zip(&rolling) {
+            assert_eq!(a.truth[0].head_in_robot, b.truth[0].head_in_robot);
+            let (Some(x), Some(y)) = (a.truth[0].upper_body, b.truth[0].upper_body) else {
+                continue;
+            };
+            moved = moved.max((x.centre().x - y.centre().x).abs());
+            let off = (a.truth[0].visible_fraction - b.truth[0].visible_fraction).abs();
+            assert!(off < 0.12, "{:?} {:?}", a.truth, b.truth);
+        }
+        // 0.8 rad/s for a third of the shutter time are some 2 of 144 px / rad.
+        assert!((0.5..6.0).contains(&moved), "{moved}");
+    }
+
+    #[test]
+    fn depth_may_be_taken_later_than_colour_and_changes_nothing_else() {
+        let text = "duration_s = 2.0\n[camera]\nwidth = 96\nheight = 72\nmount_error_deg = 0.0\nbaseline_m = 0.8\n\
+            [robot]\nstart = [5.0, 3.0]\npath = [[8.0, 3.0]]\n\
+            [[people]]\npath = [[7.0, 4.0], [7.0, 5.0]]\n";
+        let together = shots(text, 2);
+        let later = shots(&text.replace("[camera]\n", "[camera]\ndepth_offset_s = 0.02\n"), 2);
+        let ahead = |shot: &Shot| {
+            let depth = shot.images.depth.as_ref().unwrap();
+            let middle = (20..50).flat_map(|y| (60..90).map(move |x| (x, y)));
+            let seen: Vec<f64> = middle
+                .filter_map(|(x, y)| depth.get(x, y))
+                .filter(|z| z.is_finite())
+                .map(f64::from)
+                .collect();
+            seen.iter().sum::<f64>() / seen.len() as f64
+        };
+        for (a, b) in together.iter().zip(&later) {
+            assert_eq!((&a.images.colour, &a.truth), (&b.images.colour, &b.truth));
+            assert_eq!(b.depth_ns, b.captured_ns + 20_000_000);
+        }
+        let nearer: f64 =
+            together.iter().zip(&later).skip(10).map(|(a, b)| ahead(a) - ahead(b)).sum();
+        // 0.5 m/s for 0.02 s, in about ten images.
+        let nearer = nearer / (together.len() - 10) as f64;
+        assert!((0.004..0.016).contains(&nearer), "{nearer}");
     }
 
     #[test]

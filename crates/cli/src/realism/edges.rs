@@ -7,7 +7,29 @@ use tagalong_trials::{Drawn, TrialError};
 
 use super::{Check, depth, deviation, drawn, mean, scene};
 
-const GROUP: &str = "silhouettes in depth (RGB-D camera)";
+/// A camera, and what is wanted of it.
+pub struct Rig {
+    group: &'static str,
+    /// `[camera]` of the scene.
+    camera: &'static str,
+    /// Least and greatest mean displacement, outwards positive, pixels.
+    mean_px: [f64; 2],
+}
+
+/// Structured light.
+pub const RGBD: Rig = Rig {
+    group: "silhouettes in depth (RGB-D camera)",
+    camera: "kind = \"rgbd\"",
+    mean_px: [-2.0, 2.0],
+};
+
+/// A matched pair: what is near grows by half of the matcher's window.
+pub const STEREO: Rig = Rig {
+    group: "silhouettes in depth (stereo pair)",
+    camera: "kind = \"stereo\"",
+    mean_px: [0.0, 5.0],
+};
+
 /// Depth within this of the trunk is the person, m.
 const BODY_M: f32 = 0.4;
 /// The edge is looked for up to this far outside of the true one, pixels.
@@ -15,12 +37,13 @@ const REACH_PX: i64 = 12;
 /// Histogram of displacements: from here to its negative, pixels.
 const BINS: i64 = 3;
 
-pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
+pub fn checks(rig: &Rig, seeds: u64) -> Result<Vec<Check>, TrialError> {
+    let Rig { group, camera, mean_px } = *rig;
     let mut offsets = Vec::new();
     for seed in 1..=seeds.max(4) {
         let standing = format!(
             "seed = {seed}\nduration_s = 0.25\n[room]\nsize_m = [9.0, 6.0]\n\
-             [faults]\ndropped = 0.0\nlate = 0.0\n[camera]\nmount_error_deg = 0.0\n\
+             [faults]\ndropped = 0.0\nlate = 0.0\n[camera]\n{camera}\nmount_error_deg = 0.0\n\
              [[people]]\npath = [[{}, 3.0]]\nheading_deg = {}\n",
             3.3 + 0.2 * (seed % 9) as f64,
             40 * seed % 360
@@ -32,12 +55,12 @@ pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
         100.0 * offsets.iter().filter(held).count() as f64 / offsets.len().max(1) as f64
     };
     let mut checks: Vec<Check> = (-BINS..=BINS)
-        .map(|bin| Check::told(GROUP, format!("edges displaced by {}", name(bin)), share(bin), "%"))
+        .map(|bin| Check::told(group, format!("edges displaced by {}", name(bin)), share(bin), "%"))
         .collect();
     let centre = mean(&offsets);
-    checks.push(Check::between(GROUP, "mean, outwards positive", centre, "px", [-2.0, 2.0]));
+    checks.push(Check::between(group, "mean, outwards positive", centre, "px", mean_px));
     let spread = deviation(&offsets);
-    checks.push(Check::between(GROUP, "standard deviation", spread, "px", [0.3, 4.0]));
+    checks.push(Check::between(group, "standard deviation", spread, "px", [0.3, 4.0]));
     Ok(checks)
 }
 

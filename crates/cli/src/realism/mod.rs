@@ -12,8 +12,9 @@ use std::fmt::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use tagalong_core::{DepthImage, Frame, Registry};
-use tagalong_sim::Scene;
+use tagalong_core::{DepthImage, Frame, Funnel, Registry};
+use tagalong_sim::{CameraKind, Scene};
+use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::{Draw, Drawn, TrialError};
 
 use crate::args::Format;
@@ -76,9 +77,11 @@ impl Check {
 type Part = fn(&Registry, u64) -> Result<Vec<Check>, TrialError>;
 
 /// All parts, by name.
-const PARTS: [(&str, Part); 5] = [
-    ("walls", |_, _| walls::checks()),
-    ("silhouettes", |_, seeds| edges::checks(seeds)),
+const PARTS: [(&str, Part); 7] = [
+    ("walls", |_, _| walls::checks(&walls::RGBD)),
+    ("walls in stereo", |_, _| walls::checks(&walls::STEREO)),
+    ("silhouettes", |_, seeds| edges::checks(&edges::RGBD, seeds)),
+    ("silhouettes in stereo", |_, seeds| edges::checks(&edges::STEREO, seeds)),
     ("gait", |_, _| gait::checks()),
     ("failures", failures::checks),
     ("depth patches", |_, seeds| patches::checks(seeds)),
@@ -140,14 +143,21 @@ fn scene(text: &str) -> Scene {
     Scene::parse(text).expect("the built-in scene is right")
 }
 
-/// All frames of a scene.
+/// All frames of a scene; those of a stereo pair with the depth that the stage
+/// of the pipelines finds.
 fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn> + use<> {
     let mut draw = Draw::new(scene, crate::simulate::threads(None));
-    std::iter::from_fn(move || draw.next_frame())
+    let is_pair = scene.camera.kind == CameraKind::Stereo;
+    let mut stereo = StereoDepth::new(StereoSettings::default()).ok().filter(|_| is_pair);
+    std::iter::from_fn(move || {
+        let drawn = draw.next_frame()?;
+        let depth = stereo.as_mut().map(|s| s.depth(&drawn.frame, &mut Funnel::default()));
+        let Some(Ok(depth)) = depth else { return Some(drawn) };
+        Some(Drawn { frame: drawn.frame.with_depth(depth), ..drawn })
+    })
 }
 
-/// The depth that a pipeline would see. A stereo pair has none before it is
-/// matched.
+/// The depth that a pipeline would see.
 fn depth(frame: &Frame) -> Option<&DepthImage> {
     frame.depth().ok()
 }

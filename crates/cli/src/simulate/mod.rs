@@ -127,14 +127,32 @@ pub fn record(mut simulation: Simulation, scene: &Scene, path: &Path) -> Result<
 
 #[cfg(test)]
 mod tests {
-    use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+    use tagalong_log::{FrameSource, InputSettings, Limits, Needs, inspect};
     use tagalong_trials::Draw;
 
     use super::*;
 
     const SCENE: &str = "seed = 3\nduration_s = 3.0\n[camera]\nwidth = 64\nheight = 48\n\
-        rate_hz = 20.0\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.1\n\
+        rate_hz = 20.0\ndepth_offset_s = 0.015\nrolling_shutter_s = 0.015\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.1\n\
         [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+
+    #[test]
+    fn a_log_has_encoders_commands_and_the_time_of_its_depth() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.mcap");
+        let scene = Scene::parse(SCENE).unwrap();
+        record(Simulation::new(&scene, 1), &scene, &path).unwrap();
+        let seen = inspect(&path, &InputSettings::default(), &Limits::default()).unwrap();
+        for (topic, schema) in [
+            ("/joint_states", "sensor_msgs/msg/JointState"),
+            ("/cmd_vel", "geometry_msgs/msg/TwistStamped"),
+            ("/odom", "nav_msgs/msg/Odometry"),
+        ] {
+            let found = seen.topics.iter().find(|t| t.topic == topic).unwrap();
+            assert_eq!((found.schema.as_str(), found.count, found.undecodable), (schema, 150, 0));
+        }
+        assert!((seen.skew_s.unwrap() - 0.015).abs() < 1e-6, "{:?}", seen.skew_s);
+    }
 
     /// Trials skip the log; they must see what a pipeline sees that reads it.
     #[test]

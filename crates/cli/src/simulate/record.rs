@@ -7,8 +7,8 @@ use tagalong_core::{
     Camera, ConicalMirror, DepthImage, GreyImage, Lens, Panorama, Rect, RgbImage, Stamp,
 };
 use tagalong_log::msgs::{
-    CameraInfo, CompressedImage, Header, Image, Odometry, PoseStamped, StringMsg, TFMessage,
-    TransformStamped,
+    CameraInfo, CompressedImage, Header, Image, JointState, Odometry, PoseStamped, StringMsg,
+    TFMessage, TransformStamped, TwistStamped,
 };
 use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{TruthFrame, TruthPerson};
@@ -17,6 +17,8 @@ use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Truth, Webca
 /// The moment at which every drawn log starts.
 const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
 const CAMERA_FRAME: &str = "camera_color_optical_frame";
+/// The wheels of the encoders, left and right.
+const WHEEL_JOINTS: [&str; 2] = ["left_wheel_joint", "right_wheel_joint"];
 /// As cameras of robots send it.
 const JPEG_QUALITY: u8 = 85;
 /// Where the scene itself is kept.
@@ -63,9 +65,7 @@ impl Recorder {
     /// [`WriteError`] if the disk says no.
     pub fn write(&mut self, event: &Event) -> Result<(), WriteError> {
         match event {
-            Event::Odometry(reading) => {
-                self.log.send("/odom", after(reading.at_ns), &odometry(reading))
-            }
+            Event::Odometry(reading) => self.odometry(reading),
             Event::Shot(shot) => self.shot(shot),
             Event::Webcam(shot) => self.webcam(shot),
         }
@@ -79,6 +79,13 @@ impl Recorder {
         self.log.finish()
     }
 
+    fn odometry(&mut self, reading: &OdometryReading) -> Result<(), WriteError> {
+        let at = after(reading.at_ns);
+        self.log.send("/cmd_vel", at, &command(reading))?;
+        self.log.send("/joint_states", at, &wheels(reading))?;
+        self.log.send("/odom", at, &odometry(reading))
+    }
+
     fn shot(&mut self, shot: &Shot) -> Result<(), WriteError> {
         let (captured, recorded) = (after(shot.captured_ns), after(shot.recorded_ns));
         let header = Header::new(captured, CAMERA_FRAME);
@@ -88,6 +95,10 @@ impl Recorder {
             self.colour("/camera/color", recorded, &header, colour)?;
         }
         if let Some(depth) = &images.depth {
+            let (header, recorded) = (
+                Header::new(after(shot.depth_ns), CAMERA_FRAME),
+                recorded.max(after(shot.depth_ns)),
+            );
             self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
             self.depth(recorded, &header, depth)?;
         }
@@ -241,6 +252,26 @@ fn odometry(reading: &OdometryReading) -> Odometry {
     odometry.twist.twist.linear.x = reading.speed_mps;
     odometry.twist.twist.angular.z = reading.turn_rate;
     odometry
+}
+
+fn wheels(reading: &OdometryReading) -> JointState {
+    JointState {
+        header: Header::new(after(reading.at_ns), "base_link"),
+        name: WHEEL_JOINTS.map(String::from).to_vec(),
+        position: reading.encoders.map(|encoder| encoder.angle_rad).to_vec(),
+        velocity: reading.encoders.map(|encoder| encoder.rate_rad_s).to_vec(),
+        effort: Vec::new(),
+    }
+}
+
+fn command(reading: &OdometryReading) -> TwistStamped {
+    let mut command = TwistStamped {
+        header: Header::new(after(reading.at_ns), "base_link"),
+        ..TwistStamped::default()
+    };
+    command.twist.linear.x = reading.commanded_mps;
+    command.twist.angular.z = reading.commanded_turn_rate;
+    command
 }
 
 fn truth(captured: Stamp, people: &[Truth]) -> TruthFrame {

@@ -81,3 +81,20 @@ pub struct CameraInfo {
 }
 
 message!(CameraInfo, "sensor_msgs/msg/CameraInfo", "CameraInfo.msg");
+
+/// `sensor_msgs/JointState`: lists of one length, or empty where nothing is known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct JointState {
+    /// When.
+    pub header: Header,
+    /// The joints.
+    pub name: Vec<String>,
+    /// Angles of joints that turn, rad; else m.
+    pub position: Vec<f64>,
+    /// Speeds, rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// Efforts, N m or N.
+    pub effort: Vec<f64>,
+}
+
+message!(JointState, "sensor_msgs/msg/JointState", "JointState.msg");
