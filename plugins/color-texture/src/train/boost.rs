@@ -151,7 +151,8 @@ mod tests {
 
     /// Few candidates with numbers from a hash; feature 5 tells people apart.
     fn examples(seed: u64, count: usize) -> (Vec<f32>, Examples) {
-        let is_person: Vec<bool> = (0..count).map(|k| mix(seed ^ k as u64) % 2 == 0).collect();
+        let is_person: Vec<bool> =
+            (0..count).map(|k| mix(seed ^ k as u64).is_multiple_of(2)).collect();
         let number = |k: usize| match (k % COUNT, mix(seed ^ (k as u64) << 8) % 100) {
             (_, 0..5) => f32::NAN,
             (5, n) => n as f32 / 400.0 + if is_person[k / COUNT] { 1.0 } else { 0.0 },
