@@ -320,6 +320,7 @@ fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
 fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
+        "color-texture" => "[training]\nstumps = [25, 50]",
         _ => "",
     };
     text.parse().unwrap_or_default()

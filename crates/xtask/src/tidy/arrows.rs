@@ -10,6 +10,7 @@ use crate::workspace::Workspace;
 const ARROWS: &[(&str, &[&str])] = &[
     ("core", &[]),
     ("vision", &["core"]),
+    ("learn", &["core"]),
     ("stereo", &["core", "vision"]),
     ("pipeline", &["core", "stereo"]),
     ("log", &["core", "vision"]),
@@ -30,10 +31,10 @@ const ARROWS: &[(&str, &[&str])] = &[
 ];
 
 /// What a plugin may lean on.
-const OF_PLUGINS: &[&str] = &["core", "vision"];
+const OF_PLUGINS: &[&str] = &["core", "vision", "learn"];
 
 /// What the tests of any crate may lean on in addition.
-const FOR_TESTS: &[&str] = &["core", "vision", "sim", "conformance"];
+const FOR_TESTS: &[&str] = &["core", "vision", "learn", "sim", "conformance"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {

@@ -1,7 +1,8 @@
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::thread::available_parallelism;
 
 use tagalong_core::{Error, Result};
+use tagalong_learn::{accepted, area, mix, parts};
 
 use super::{Sample, solver};
 use crate::{Sampler, Training};
@@ -21,23 +22,12 @@ impl Trial {
     /// Chance that a person has a larger decision value than another candidate
     /// (area under the ROC curve).
     pub fn area(&self) -> f64 {
-        let mut sorted = self.held_out.clone();
-        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (mut below, mut others, mut people) = (0.0, 0.0, 0.0);
-        for ties in sorted.chunk_by(|a, b| a.0 == b.0) {
-            let here = ties.iter().filter(|(_, is_person)| *is_person).count() as f64;
-            let not = ties.len() as f64 - here;
-            below += here * (others + 0.5 * not);
-            people += here;
-            others += not;
-        }
-        if people * others > 0.0 { below / (people * others) } else { 0.5 }
+        area(&self.held_out)
     }
 
     /// Fraction of a class whose decision value is positive.
     pub fn accepted(&self, people: bool) -> f64 {
-        let of_class = || self.held_out.iter().filter(|(_, is_person)| *is_person == people);
-        of_class().filter(|(f, _)| *f > 0.0).count() as f64 / of_class().count().max(1) as f64
+        accepted(&self.held_out, people)
     }
 }
 
@@ -53,7 +43,7 @@ pub fn trials(
     seed: u64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Trial>> {
-    let parts = parts(samples, training.folds, seed);
+    let parts = parts(samples.iter().map(|s| s.example), training.folds, seed);
     let each = training.gammas.iter().flat_map(|g| training.penalties.iter().map(|c| (*g, *c)));
     let grid: Vec<(f64, f64)> = each.collect();
     let attempt = |gamma, penalty| {
@@ -98,21 +88,6 @@ fn hold_out(
     Ok(values)
 }
 
-/// Deals the groups out to the parts, those with people and those without in
-/// turn, so that each part has both.
-fn parts(samples: &[&Sample], folds: usize, seed: u64) -> BTreeMap<u64, usize> {
-    let groups = |wanted: &dyn Fn(&Sample) -> bool| -> BTreeSet<(u64, u64)> {
-        let of = samples.iter().filter(|s| wanted(s)).map(|s| s.example.group);
-        of.map(|group| (mix(group ^ seed), group)).collect()
-    };
-    let with_people = groups(&|s| s.example.is_person);
-    let without = &groups(&|_| true) - &with_people;
-    let deal = |set: &BTreeSet<(u64, u64)>| -> Vec<(u64, usize)> {
-        set.iter().enumerate().map(|(k, (_, group))| (*group, k % folds)).collect()
-    };
-    deal(&with_people).into_iter().chain(deal(&without)).collect()
-}
-
 /// At most `most` samples, as many of each class as there are up to half, in
 /// the order of a hash.
 pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
@@ -136,14 +111,6 @@ pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
     people
 }
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
-fn mix(seed: u64) -> u64 {
-    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
-}
-
 #[cfg(test)]
 mod tests {
     use tagalong_core::Example;
@@ -156,32 +123,10 @@ mod tests {
     }
 
     #[test]
-    fn every_part_has_groups_with_and_without_people() {
-        let samples: Vec<Sample> = (0..80).map(|k| sample(k / 4, k / 4 % 5 == 0)).collect();
-        let all: Vec<&Sample> = samples.iter().collect();
-        let parts = parts(&all, 4, 3);
-        for part in 0..4 {
-            for people in [true, false] {
-                let here =
-                    |s: &&Sample| parts[&s.example.group] == part && s.example.is_person == people;
-                assert!(samples.iter().any(|s| here(&s)), "part {part}, people {people}");
-            }
-        }
-    }
-
-    #[test]
     fn a_subset_has_both_classes_and_no_more_than_asked_for() {
         let samples: Vec<Sample> = (0..100).map(|k| sample(k, k < 10)).collect();
         let chosen = subset(&samples, 40, 1);
         assert_eq!(chosen.len(), 40);
         assert_eq!(chosen.iter().filter(|s| s.example.is_person).count(), 10);
-    }
-
-    #[test]
-    fn the_area_counts_ordered_pairs() {
-        let held_out = vec![(0.1, false), (0.2, true), (0.2, false), (0.9, true)];
-        let trial = Trial { gamma: 1.0, penalty: 1.0, held_out };
-        assert_eq!(trial.area(), (1.5 + 2.0) / 4.0);
-        assert_eq!((trial.accepted(true), trial.accepted(false)), (1.0, 1.0));
     }
 }

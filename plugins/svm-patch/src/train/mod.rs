@@ -2,13 +2,12 @@
 //! cross-validation over groups, the decision values of the held-out samples
 //! calibrate the log-odds, and a last fit to more samples makes the model.
 
-mod calibrate;
 mod choose;
 mod solver;
 
-pub use calibrate::{Line, platt};
 pub use choose::Trial;
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
+use tagalong_learn::{Line, platt};
 
 use crate::{Model, Patch, Sampler, Training};
 

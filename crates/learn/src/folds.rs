@@ -1,0 +1,53 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use tagalong_core::Example;
+
+/// Deals the groups out to `folds` parts, those with people and those without
+/// in turn, so that each part has both. The deal depends on the seed, not on
+/// the order of the examples.
+pub fn parts(
+    examples: impl Iterator<Item = Example>,
+    folds: usize,
+    seed: u64,
+) -> BTreeMap<u64, usize> {
+    let (mut all, mut with_people) = (BTreeSet::new(), BTreeSet::new());
+    for example in examples {
+        let key = (mix(example.group ^ seed), example.group);
+        all.insert(key);
+        if example.is_person {
+            with_people.insert(key);
+        }
+    }
+    let without = &all - &with_people;
+    let deal = |set: &BTreeSet<(u64, u64)>| -> Vec<(u64, usize)> {
+        set.iter().enumerate().map(|(k, (_, group))| (*group, k % folds.max(1))).collect()
+    };
+    deal(&with_people).into_iter().chain(deal(&without)).collect()
+}
+
+/// A number that looks random and depends on `seed` only (SplitMix64: Steele,
+/// Lea and Flood, OOPSLA 2014).
+pub fn mix(seed: u64) -> u64 {
+    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_has_groups_with_and_without_people() {
+        let examples: Vec<Example> =
+            (0..80).map(|k| Example { group: k / 4, is_person: k / 4 % 5 == 0 }).collect();
+        let parts = parts(examples.iter().copied(), 4, 3);
+        for part in 0..4 {
+            for people in [true, false] {
+                let here = |e: &&Example| parts[&e.group] == part && e.is_person == people;
+                assert!(examples.iter().any(|e| here(&e)), "part {part}, people {people}");
+            }
+        }
+    }
+}

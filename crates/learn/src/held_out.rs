@@ -1,0 +1,33 @@
+/// Chance that a person has a larger value than another candidate (area under
+/// the ROC curve); 0.5 where one of them is missing.
+pub fn area(values: &[(f64, bool)]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut below, mut others, mut people) = (0.0, 0.0, 0.0);
+    for ties in sorted.chunk_by(|a, b| a.0 == b.0) {
+        let here = ties.iter().filter(|(_, is_person)| *is_person).count() as f64;
+        let not = ties.len() as f64 - here;
+        below += here * (others + 0.5 * not);
+        people += here;
+        others += not;
+    }
+    if people * others > 0.0 { below / (people * others) } else { 0.5 }
+}
+
+/// Fraction of a class whose value is positive.
+pub fn accepted(values: &[(f64, bool)], people: bool) -> f64 {
+    let of_class = || values.iter().filter(|(_, is_person)| *is_person == people);
+    of_class().filter(|(f, _)| *f > 0.0).count() as f64 / of_class().count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_area_counts_ordered_pairs() {
+        let held_out = [(0.1, false), (0.2, true), (0.2, false), (0.9, true)];
+        assert_eq!(area(&held_out), (1.5 + 2.0) / 4.0);
+        assert_eq!((accepted(&held_out, true), accepted(&held_out, false)), (1.0, 1.0));
+    }
+}

@@ -1,0 +1,13 @@
+//! What trainers of plugins share, so that their cards can be compared: groups
+//! are dealt out to folds and never split ([`parts`]), held-out values become
+//! figures ([`area`], [`accepted`]), and log-odds ([`platt`]).
+//!
+//! The machines themselves are the business of the plugins.
+
+mod calibrate;
+mod folds;
+mod held_out;
+
+pub use calibrate::{Line, platt};
+pub use folds::{mix, parts};
+pub use held_out::{accepted, area};

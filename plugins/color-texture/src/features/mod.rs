@@ -1,0 +1,123 @@
+//! What is looked at.
+
+mod colour;
+mod gradients;
+mod shape;
+mod texture;
+mod window;
+
+use std::ops::Range;
+
+use tagalong_core::{Frame, Rect, Result};
+
+use self::window::{Surface, Window};
+
+/// Numbers of a candidate.
+pub const COUNT: usize = gradients::COUNT + texture::COUNT + colour::COUNT + shape::COUNT;
+
+/// What a number is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Directions of intensity edges.
+    Gradients,
+    /// Local binary patterns and contrast.
+    Texture,
+    /// Colours of head and torso.
+    Colour,
+    /// The surface in depth.
+    Shape,
+}
+
+impl Family {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::Gradients, Self::Texture, Self::Colour, Self::Shape];
+
+    /// Its place among the numbers.
+    pub fn range(self) -> Range<usize> {
+        const TEXTURE: usize = gradients::COUNT;
+        const COLOUR: usize = TEXTURE + texture::COUNT;
+        const SHAPE: usize = COLOUR + colour::COUNT;
+        match self {
+            Self::Gradients => 0..TEXTURE,
+            Self::Texture => TEXTURE..COLOUR,
+            Self::Colour => COLOUR..SHAPE,
+            Self::Shape => SHAPE..COUNT,
+        }
+    }
+
+    /// Its name on cards.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gradients => "gradients",
+            Self::Texture => "texture",
+            Self::Colour => "colour",
+            Self::Shape => "shape",
+        }
+    }
+}
+
+/// The numbers of a candidate; NaN is "not known".
+#[derive(Clone, Debug, Default)]
+pub struct Features(Vec<f32>);
+
+impl Features {
+    /// Looks at a region; the numbers of the last one are forgotten.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
+    /// Colour and depth may be missing.
+    pub fn look(&mut self, frame: &Frame, region: &Rect) -> Result<()> {
+        let grey = frame.grey()?;
+        let out = &mut self.0;
+        out.clear();
+        let Some(window) = Window::new(grey, region) else {
+            out.resize(COUNT, f32::NAN);
+            return Ok(());
+        };
+        let surface = frame.depth().ok().and_then(|depth| Surface::new(depth, region));
+        let intensity = window.grey(grey);
+        gradients::push(&intensity, out);
+        texture::push(&intensity, out);
+        match frame.colour().ok() {
+            Some(image) if same_size(image, grey) => {
+                colour::push(&window.colour(image), surface.as_ref(), out);
+            }
+            _ => unknown(colour::COUNT, out),
+        }
+        match &surface {
+            Some(surface) => shape::push(surface, out),
+            None => unknown(shape::COUNT, out),
+        }
+        Ok(())
+    }
+
+    /// All numbers, [`COUNT`] of them.
+    pub fn values(&self) -> &[f32] {
+        &self.0
+    }
+
+    /// Whether any depth was seen.
+    pub fn has_depth(&self) -> bool {
+        self.0.get(Family::Shape.range()).is_some_and(|shape| shape.iter().any(|v| v.is_finite()))
+    }
+}
+
+fn unknown(count: usize, out: &mut Vec<f32>) {
+    out.extend(std::iter::repeat_n(f32::NAN, count));
+}
+
+fn same_size(colour: &tagalong_core::RgbImage, grey: &tagalong_core::GreyImage) -> bool {
+    (colour.width(), colour.height()) == (grey.width(), grey.height())
+}
+
+/// Mean and standard deviation; NaN for nothing.
+fn spread(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    let (mut count, mut sum, mut squares) = (0.0f32, 0.0f32, 0.0f32);
+    for value in values {
+        count += 1.0;
+        sum += value;
+        squares += value * value;
+    }
+    let mean = sum / count;
+    [mean, (squares / count - mean * mean).max(0.0).sqrt()]
+}

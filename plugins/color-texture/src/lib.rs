@@ -1,0 +1,39 @@
+//! Doubts candidates by colour and texture, as P1 asks of whatever follows its
+//! silhouettes, and by the shape of their surface in depth.
+//!
+//! A candidate's square is reduced to a few hundred numbers
+//! ([`Features`]): gradients, local binary patterns, colours of head and torso,
+//! and what the depth says beyond the silhouette that the detector has
+//! already matched: a coat stand is thin below, a poster is flat, a plant is
+//! rough. A sum of one-feature decisions ([`Model`]) turns them into log-odds.
+//! What a frame does not show, colour in a grey log or depth in a photograph,
+//! says neither yes nor no.
+//!
+//! With the feature `train` the plugin also offers a trainer (`train`).
+
+mod config;
+mod features;
+mod model;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+mod verify;
+
+pub use config::{Config, Training};
+pub use features::{COUNT, Family, Features};
+pub use model::{Model, Stump};
+use tagalong_core::Registry;
+pub use verify::ColorTexture;
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "color-texture";
+
+/// Registers the plugin, and its trainer if that is compiled in.
+pub fn register(registry: &mut Registry) {
+    registry.verifier(NAME, "colour, texture and surface of a candidate (P1)", ColorTexture::new);
+    #[cfg(feature = "train")]
+    registry.trainer(NAME, |config: Config, context| {
+        train::StumpTrainer::new(config.training, context.seed)
+    });
+}

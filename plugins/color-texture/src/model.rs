@@ -1,0 +1,152 @@
+use serde::{Deserialize, Serialize};
+
+use crate::features::{COUNT, Features};
+
+/// A decision by one number: what it adds to the sum where the number is below
+/// a threshold and where it is not. A number that is not known adds nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "(usize, f32, f32, f32)", into = "(usize, f32, f32, f32)")]
+pub struct Stump {
+    /// Index of the number.
+    pub feature: usize,
+    /// Where it is divided.
+    pub threshold: f32,
+    /// Added below the threshold ...
+    pub below: f32,
+    /// ... and from it on.
+    pub above: f32,
+}
+
+impl From<(usize, f32, f32, f32)> for Stump {
+    fn from((feature, threshold, below, above): (usize, f32, f32, f32)) -> Self {
+        Self { feature, threshold, below, above }
+    }
+}
+
+impl From<Stump> for (usize, f32, f32, f32) {
+    fn from(stump: Stump) -> Self {
+        (stump.feature, stump.threshold, stump.below, stump.above)
+    }
+}
+
+impl Stump {
+    /// What it adds for a value of its number.
+    pub fn vote(&self, value: f32) -> f32 {
+        if value.is_nan() {
+            0.0
+        } else if value < self.threshold {
+            self.below
+        } else {
+            self.above
+        }
+    }
+}
+
+/// A sum of stumps, and the straight line that turns it into log-odds. Its
+/// default is undecided about everything.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// The stumps, as they were found.
+    pub stumps: Vec<Stump>,
+    /// Log-odds per unit of the sum ...
+    pub slope: f64,
+    /// ... and those of the sum 0.
+    pub offset: f64,
+}
+
+/// A model as TOML.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: String,
+    /// How many numbers its stumps choose from.
+    features: usize,
+    slope: f64,
+    offset: f64,
+    stumps: Vec<Stump>,
+}
+
+const FORMAT: &str = "color-texture 1";
+
+impl Model {
+    /// Log-odds that the candidate is a person, with even priors.
+    pub fn log_odds(&self, features: &Features) -> f64 {
+        self.slope * self.sum(features.values()) + self.offset
+    }
+
+    /// The sum of the stumps.
+    pub fn sum(&self, values: &[f32]) -> f64 {
+        let value = |stump: &Stump| values.get(stump.feature).copied().unwrap_or(f32::NAN);
+        self.stumps.iter().map(|stump| f64::from(stump.vote(value(stump)))).sum()
+    }
+
+    /// The model file.
+    pub fn to_text(&self) -> String {
+        let file = File {
+            format: FORMAT.into(),
+            features: COUNT,
+            slope: self.slope,
+            offset: self.offset,
+            stumps: self.stumps.clone(),
+        };
+        toml::to_string(&file).unwrap_or_default().replace("], [", "],\n  [")
+    }
+
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// Text that is no model, in a sentence.
+    pub fn from_text(text: &str) -> Result<Self, String> {
+        let file: File = toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
+        if file.format != FORMAT {
+            return Err(format!("the format is `{}`, not `{FORMAT}`", file.format));
+        }
+        if file.features != COUNT || file.stumps.iter().any(|s| s.feature >= COUNT) {
+            return Err(format!("it is not made of the {COUNT} numbers of this program"));
+        }
+        let numbers = file.stumps.iter().flat_map(|s| [s.threshold, s.below, s.above]);
+        let is_finite = numbers.map(f64::from).chain([file.slope, file.offset]).all(f64::is_finite);
+        if !is_finite {
+            return Err("it has numbers that are not finite".into());
+        }
+        Ok(Self { stumps: file.stumps, slope: file.slope, offset: file.offset })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> Model {
+        let stumps = [(3, 0.5, -1.0, 2.0), (7, -0.25, 0.5, 0.0)].map(Stump::from).to_vec();
+        Model { stumps, slope: 1.5, offset: -0.25 }
+    }
+
+    #[test]
+    fn what_is_not_known_says_nothing() {
+        let mut values = vec![0.0; COUNT];
+        assert_eq!(model().sum(&values), -1.0);
+        values[3] = f32::NAN;
+        assert_eq!(model().sum(&values), 0.0);
+        values[7] = -0.3;
+        assert_eq!(model().sum(&values), 0.5);
+    }
+
+    #[test]
+    fn a_model_survives_its_file() {
+        assert_eq!(Model::from_text(&model().to_text()).unwrap(), model());
+    }
+
+    #[test]
+    fn broken_files_are_refused_in_a_sentence() {
+        let good = model().to_text();
+        let refusal = |from: &str, to: &str| {
+            assert!(good.contains(from), "{good}");
+            Model::from_text(&good.replace(from, to)).unwrap_err()
+        };
+        assert!(refusal("texture 1", "texture 9").contains("texture 9"));
+        assert!(refusal("slope = 1.5", "slope = inf").contains("not finite"));
+        assert!(refusal("[3,", "[99999,").contains("numbers of this program"));
+        assert!(Model::from_text("nonsense").is_err());
+    }
+}

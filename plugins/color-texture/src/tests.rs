@@ -1,0 +1,145 @@
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{
+    Camera, Context, Detection, Distortion, Frame, GreyImage, Images, Motion, Pinhole, Rect,
+    Registry, Stamp, Verifier, Wheels,
+};
+
+use crate::{ColorTexture, Config};
+
+fn context() -> Context {
+    let wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+    Context { seed: 1, base_dir: PathBuf::from("."), wheels }
+}
+
+fn frame(grey: GreyImage) -> Frame {
+    let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, grey.width(), grey.height(), 1.0, 0.0, 0.0));
+    let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
+    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+}
+
+fn candidate() -> Detection {
+    Detection {
+        region: Rect::new(8.0, 8.0, 48.0, 48.0),
+        position: Point3::new(2.0, 0.0, 1.6),
+        covariance: Matrix3::identity(),
+        score: 1.0,
+        source: "test",
+    }
+}
+
+/// A dark head above dark shoulders before a bright wall, or bars; noise from
+/// a seed.
+fn picture(is_person: bool, seed: u32) -> GreyImage {
+    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+    GreyImage::from_fn(64, 64, |x, y| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let (dx, dy) = (x as f64 - 32.0, y as f64 - 22.0);
+        let dark = if is_person {
+            dx.hypot(dy) < 9.0 || (dy > 10.0 && dx.abs() < 20.0)
+        } else {
+            (x / 8 + seed as usize).is_multiple_of(2)
+        };
+        (if dark { 60 } else { 150 }) + (state >> 27) as u8
+    })
+}
+
+fn refusal(config: Config) -> String {
+    ColorTexture::new(config, &context()).err().map_or(String::new(), |error| error.to_string())
+}
+
+#[test]
+fn it_keeps_the_promises_of_its_kind() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn a_model_that_is_not_there_is_named() {
+    let refusal = refusal(Config { model: "nowhere.toml".into(), ..Config::default() });
+    assert!(refusal.contains("nowhere.toml"), "{refusal}");
+}
+
+#[test]
+fn a_weight_that_is_none_is_refused() {
+    assert!(refusal(Config { weight: f64::NAN, ..Config::default() }).contains("weight"));
+}
+
+#[test]
+fn the_limit_holds() {
+    let config = Config { limit: 0.01, weight: 2.0, ..Config::default() };
+    let mut verifier = ColorTexture::new(config, &context()).unwrap();
+    for seed in 0..4 {
+        let margin = verifier.margin(&frame(picture(seed % 2 == 0, seed)), &candidate()).unwrap();
+        assert!(margin.abs() <= 0.02, "{margin}");
+    }
+}
+
+#[cfg(feature = "train")]
+mod training {
+    use tagalong_core::{Example, Trainer};
+
+    use super::*;
+    use crate::train::StumpTrainer;
+    use crate::{Features, Model, Training};
+
+    fn small() -> Training {
+        Training { stumps: vec![10, 40], ..Training::default() }
+    }
+
+    fn trainer(training: Training, count: u32) -> StumpTrainer {
+        let mut trainer = StumpTrainer::new(training, 5).unwrap();
+        for seed in 0..count {
+            let is_person = seed % 2 == 0;
+            let example = Example { is_person, group: u64::from(seed / 3) };
+            trainer.add(&frame(picture(is_person, seed)), &candidate(), example).unwrap();
+        }
+        trainer
+    }
+
+    #[test]
+    fn it_learns_to_tell_heads_from_bars() {
+        let fitted = trainer(small(), 60).fit(&mut |_| {}).unwrap();
+        let model = Model::from_text(&fitted.model).unwrap();
+        let mut features = Features::default();
+        for seed in 500..520 {
+            features.look(&frame(picture(seed % 2 == 0, seed)), &candidate().region).unwrap();
+            let log_odds = model.log_odds(&features);
+            assert!((log_odds > 1.0) == (seed % 2 == 0), "{seed}: {log_odds}");
+        }
+        assert_eq!(fitted.figures["people"].as_integer(), Some(30));
+        assert_eq!(fitted.figures["cross_validation"].as_array().unwrap().len(), 2);
+    }
+
+    #[test]
+    fn the_same_samples_give_the_same_bytes() {
+        let [first, second] = [(); 2].map(|()| trainer(small(), 40).fit(&mut |_| {}).unwrap());
+        assert_eq!(first, second);
+    }
+
+    #[test]
+    fn one_class_is_no_training_set() {
+        let mut trainer = StumpTrainer::new(small(), 1).unwrap();
+        for group in 0..8 {
+            let example = Example { is_person: true, group };
+            trainer.add(&frame(picture(true, group as u32)), &candidate(), example).unwrap();
+        }
+        assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("both are needed"));
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        for training in [
+            Training { stumps: vec![], ..small() },
+            Training { rate: f64::NAN, ..small() },
+            Training { folds: 1, ..small() },
+        ] {
+            assert!(StumpTrainer::new(training, 1).is_err());
+        }
+    }
+}

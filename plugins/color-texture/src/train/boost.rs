@@ -1,0 +1,205 @@
+use tagalong_learn::mix;
+
+use crate::{COUNT, Stump, Training};
+
+/// Thresholds of a feature.
+const THRESHOLDS: usize = 31;
+/// The bin of a number that is not known.
+const UNKNOWN: u8 = 255;
+
+/// Candidates, with every number sorted into bins.
+pub struct Examples {
+    /// Thresholds of each feature, rising.
+    thresholds: Vec<Vec<f32>>,
+    /// The bin of each candidate, feature by feature.
+    bins: Vec<Vec<u8>>,
+    /// The truth.
+    is_person: Vec<bool>,
+    /// How much each candidate counts.
+    pub weights: Vec<f64>,
+}
+
+impl Examples {
+    /// From [`COUNT`] numbers of each candidate.
+    pub fn new(values: &[f32], is_person: Vec<bool>, weights: Vec<f64>) -> Self {
+        let column = |feature: usize| values.iter().skip(feature).step_by(COUNT).copied();
+        let thresholds: Vec<Vec<f32>> = (0..COUNT).map(|f| thresholds(column(f))).collect();
+        let bin = |value: f32, thresholds: &[f32]| {
+            let below = || thresholds.partition_point(|t| *t <= value) as u8;
+            if value.is_nan() { UNKNOWN } else { below() }
+        };
+        let bins = (0..COUNT).map(|f| column(f).map(|v| bin(v, &thresholds[f])).collect());
+        Self { bins: bins.collect(), thresholds, is_person, weights }
+    }
+}
+
+/// Quantiles, rounded so that a model file is short.
+fn thresholds(column: impl Iterator<Item = f32>) -> Vec<f32> {
+    let mut sorted: Vec<f32> = column.filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f32::total_cmp);
+    let quantile = |k: usize| sorted.get(sorted.len() * k / (THRESHOLDS + 1)).copied();
+    let mut thresholds: Vec<f32> =
+        (1..=THRESHOLDS).filter_map(quantile).map(|v| (v * 1e4).round() / 1e4).collect();
+    thresholds.dedup();
+    thresholds
+}
+
+/// Slopes and curvatures of the loss, summed up.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    slope: f64,
+    curvature: f64,
+}
+
+impl Sums {
+    fn add(&mut self, other: Self) {
+        self.slope += other.slope;
+        self.curvature += other.curvature;
+    }
+
+    fn minus(self, other: Self) -> Self {
+        Self { slope: self.slope - other.slope, curvature: self.curvature - other.curvature }
+    }
+
+    /// The best step, and twice what it gains.
+    fn step(self, caution: f64) -> (f64, f64) {
+        let step = self.slope / (self.curvature + caution);
+        (step, step * self.slope)
+    }
+}
+
+/// Finds `count` stumps, each by a Newton step of the weighted logistic loss
+/// (gradient boosting: Friedman, Annals of Statistics 29, 2001), among a random
+/// part of the features.
+pub fn boost(
+    examples: &Examples,
+    chosen: &[usize],
+    training: &Training,
+    count: usize,
+    seed: u64,
+) -> Vec<Stump> {
+    let mut sums = vec![0.0; chosen.len()];
+    let mut stumps = Vec::with_capacity(count);
+    for round in 0..count {
+        let losses: Vec<Sums> =
+            chosen.iter().zip(&sums).map(|(&k, &sum)| loss(examples, k, sum)).collect();
+        let order = mix(seed ^ (round as u64) << 32);
+        let is_tried = |feature: &usize| {
+            (mix(order ^ *feature as u64) >> 11) as f64 / (1u64 << 53) as f64 <= training.features
+        };
+        let tried = (0..COUNT).filter(is_tried);
+        let found =
+            tried.filter_map(|feature| best_split(examples, chosen, &losses, feature, training));
+        let Some((_, bin, stump)) = found.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
+            continue;
+        };
+        let bins = &examples.bins[stump.feature];
+        for (sum, &k) in sums.iter_mut().zip(chosen) {
+            *sum += f64::from(match bins[k] {
+                UNKNOWN => 0.0,
+                at if at <= bin => stump.below,
+                _ => stump.above,
+            });
+        }
+        stumps.push(stump);
+    }
+    stumps
+}
+
+fn loss(examples: &Examples, index: usize, sum: f64) -> Sums {
+    let (weight, target) =
+        (examples.weights[index], f64::from(u8::from(examples.is_person[index])));
+    let p = 1.0 / (1.0 + (-sum).exp());
+    Sums { slope: weight * (target - p), curvature: weight * p * (1.0 - p) }
+}
+
+/// The best threshold of a feature: its gain, the last bin below, the stump.
+fn best_split(
+    examples: &Examples,
+    chosen: &[usize],
+    losses: &[Sums],
+    feature: usize,
+    training: &Training,
+) -> Option<(f64, u8, Stump)> {
+    let mut histogram = [Sums::default(); THRESHOLDS + 1];
+    let bins = &examples.bins[feature];
+    for (&k, loss) in chosen.iter().zip(losses) {
+        if let Some(bin) = histogram.get_mut(usize::from(bins[k])) {
+            bin.add(*loss);
+        }
+    }
+    let mut total = Sums::default();
+    histogram.iter().for_each(|bin| total.add(*bin));
+    let mut below = Sums::default();
+    let splits = examples.thresholds[feature].iter().zip(&histogram).enumerate();
+    let each = splits.map(|(bin, (threshold, here))| {
+        below.add(*here);
+        let ((low, gain), (high, other)) =
+            (below.step(training.caution), total.minus(below).step(training.caution));
+        let value = |step: f64| ((training.rate * step * 1e4).round() / 1e4) as f32;
+        let stump = Stump { feature, threshold: *threshold, below: value(low), above: value(high) };
+        (gain + other, bin as u8, stump)
+    });
+    each.reduce(|a, b| if b.0 > a.0 { b } else { a })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Few candidates with numbers from a hash; feature 5 tells people apart.
+    fn examples(seed: u64, count: usize) -> (Vec<f32>, Examples) {
+        let is_person: Vec<bool> =
+            (0..count).map(|k| mix(seed ^ k as u64).is_multiple_of(2)).collect();
+        let number = |k: usize| match (k % COUNT, mix(seed ^ (k as u64) << 8) % 100) {
+            (_, 0..5) => f32::NAN,
+            (5, n) => n as f32 / 400.0 + if is_person[k / COUNT] { 1.0 } else { 0.0 },
+            (_, n) => n as f32 / 100.0,
+        };
+        let values: Vec<f32> = (0..count * COUNT).map(number).collect();
+        let weights = vec![1.0; count];
+        (values.clone(), Examples::new(&values, is_person, weights))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        /// Every threshold of a feature, tried one by one on the numbers
+        /// themselves, gains no more than the split that was found.
+        #[test]
+        fn the_split_is_the_best_one(seed: u64, feature in 0..COUNT) {
+            let (values, examples) = examples(seed, 40);
+            let training = Training::default();
+            let chosen: Vec<usize> = (0..40).collect();
+            let losses: Vec<Sums> = chosen.iter().map(|k| loss(&examples, *k, 0.3)).collect();
+            let (gain, _, stump) =
+                best_split(&examples, &chosen, &losses, feature, &training).unwrap();
+            let slow = |threshold: f32| {
+                let (mut below, mut above) = (Sums::default(), Sums::default());
+                for k in 0..40 {
+                    let value = values[k * COUNT + feature];
+                    if value < threshold { below.add(losses[k]) } else if value >= threshold { above.add(losses[k]) }
+                }
+                below.step(training.caution).1 + above.step(training.caution).1
+            };
+            let best = examples.thresholds[feature].iter().map(|t| slow(*t)).fold(0.0, f64::max);
+            prop_assert!((slow(stump.threshold) - best).abs() < 1e-9);
+            prop_assert!((gain - best).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn it_finds_the_number_that_tells_people_apart() {
+        let (values, examples) = examples(3, 60);
+        let chosen: Vec<usize> = (0..60).collect();
+        let training = Training { features: 1.0, ..Training::default() };
+        let stumps = boost(&examples, &chosen, &training, 20, 1);
+        assert_eq!(stumps[0].feature, 5);
+        let sum =
+            |k: usize| stumps.iter().map(|s| s.vote(values[k * COUNT + s.feature])).sum::<f32>();
+        let right = (0..60).filter(|k| (sum(*k) > 0.0) == examples.is_person[*k]).count();
+        assert!(right >= 57, "{right}");
+    }
+}

@@ -1,0 +1,229 @@
+//! Fits a [`Model`] to labelled candidates: stumps are found one after the
+//! other, how many is chosen by cross-validation over groups, and the sums of
+//! the held-out candidates calibrate the log-odds.
+
+mod boost;
+
+pub use boost::Examples;
+use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
+use tagalong_learn::{Line, accepted, area, parts, platt};
+
+use crate::{COUNT, Family, Features, Model, Stump, Training};
+
+/// Collects the numbers of candidates and fits models to them.
+pub struct StumpTrainer {
+    training: Training,
+    seed: u64,
+    features: Features,
+    /// [`COUNT`] numbers of each candidate, one after the other.
+    values: Vec<f32>,
+    examples: Vec<Labelled>,
+}
+
+#[derive(Clone, Copy)]
+struct Labelled {
+    example: Example,
+    has_depth: bool,
+}
+
+/// A number of stumps, judged by candidates that they were not fitted to.
+struct Trial {
+    stumps: usize,
+    /// Sums of held-out candidates, with the truth and the weight.
+    held_out: Vec<Judged>,
+}
+
+struct Judged {
+    sum: f64,
+    is_person: bool,
+    has_depth: bool,
+    weight: f64,
+}
+
+impl StumpTrainer {
+    /// A trainer without examples.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for numbers that cannot work.
+    pub fn new(training: Training, seed: u64) -> Result<Self> {
+        check(&training)?;
+        let features = Features::default();
+        Ok(Self { training, seed, features, values: Vec::new(), examples: Vec::new() })
+    }
+
+    /// People and others weigh the same, with depth and without; together they
+    /// weigh as much as there are candidates.
+    fn weights(&self) -> Vec<f64> {
+        let cell = |l: &Labelled| usize::from(l.example.is_person) * 2 + usize::from(l.has_depth);
+        let mut counts = [0.0; 4];
+        self.examples.iter().for_each(|l| counts[cell(l)] += 1.0);
+        let without = if counts[1] * counts[3] > 0.0 { self.training.without_depth } else { 1.0 };
+        let share = [without, 1.0 - without];
+        let total = self.examples.len() as f64;
+        let weight = |l: &Labelled| 0.5 * total * share[usize::from(l.has_depth)] / counts[cell(l)];
+        self.examples.iter().map(weight).collect()
+    }
+
+    fn trials(&self, examples: &Examples, progress: &mut dyn FnMut(f64)) -> Result<Vec<Trial>> {
+        let Training { folds, stumps: counts, .. } = &self.training;
+        let parts = parts(self.examples.iter().map(|l| l.example), *folds, self.seed);
+        let mut trials: Vec<Trial> =
+            counts.iter().map(|&stumps| Trial { stumps, held_out: Vec::new() }).collect();
+        for fold in 0..*folds {
+            let is_out = |k: &usize| parts.get(&self.examples[*k].example.group) == Some(&fold);
+            let (out, rest): (Vec<usize>, Vec<usize>) = (0..self.examples.len()).partition(is_out);
+            let stumps = self.boost(examples, &rest)?;
+            for trial in &mut trials {
+                let found = &stumps[..trial.stumps.min(stumps.len())];
+                trial.held_out.extend(out.iter().map(|&k| self.judge(found, examples, k)));
+            }
+            progress((fold + 1) as f64 / (folds + 1) as f64);
+        }
+        Ok(trials)
+    }
+
+    fn judge(&self, stumps: &[Stump], examples: &Examples, index: usize) -> Judged {
+        let Labelled { example, has_depth } = self.examples[index];
+        let values = &self.values[index * COUNT..(index + 1) * COUNT];
+        let sum = stumps.iter().map(|s| f64::from(s.vote(values[s.feature]))).sum();
+        Judged { sum, is_person: example.is_person, has_depth, weight: examples.weights[index] }
+    }
+
+    fn boost(&self, examples: &Examples, chosen: &[usize]) -> Result<Vec<Stump>> {
+        let is_person = |k: &usize| self.examples[*k].example.is_person;
+        if chosen.iter().all(is_person) || !chosen.iter().any(is_person) {
+            return Err(Error::Other(
+                "people and others: both are needed, in several groups".into(),
+            ));
+        }
+        let most = self.training.stumps.iter().copied().max().unwrap_or(0);
+        Ok(boost::boost(examples, chosen, &self.training, most, self.seed))
+    }
+
+    fn figures(&self, trials: &[Trial], model: &Model) -> toml::Table {
+        let count = |wanted: &dyn Fn(&Labelled) -> bool| {
+            toml::Value::Integer(self.examples.iter().filter(|l| wanted(l)).count() as i64)
+        };
+        let groups: std::collections::BTreeSet<u64> =
+            self.examples.iter().map(|l| l.example.group).collect();
+        let rows = trials.iter().map(|trial| toml::Value::Table(trial.row()));
+        toml::Table::from_iter([
+            ("people".to_owned(), count(&|l| l.example.is_person)),
+            ("others".to_owned(), count(&|l| !l.example.is_person)),
+            ("people_with_depth".to_owned(), count(&|l| l.example.is_person && l.has_depth)),
+            ("others_with_depth".to_owned(), count(&|l| !l.example.is_person && l.has_depth)),
+            ("groups".to_owned(), toml::Value::Integer(groups.len() as i64)),
+            ("stumps".to_owned(), toml::Value::Integer(model.stumps.len() as i64)),
+            ("slope".to_owned(), rounded(model.slope)),
+            ("offset".to_owned(), rounded(model.offset)),
+            ("influence".to_owned(), influence(model).into()),
+            ("cross_validation".to_owned(), toml::Value::Array(rows.collect())),
+        ])
+    }
+}
+
+impl Trainer for StumpTrainer {
+    fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
+        self.features.look(frame, &candidate.region)?;
+        self.values.extend(self.features.values());
+        self.examples.push(Labelled { example, has_depth: self.features.has_depth() });
+        Ok(())
+    }
+
+    fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        let people = self.examples.iter().map(|l| l.example.is_person);
+        let examples = Examples::new(&self.values, people.collect(), self.weights());
+        let trials = self.trials(&examples, progress)?;
+        let best = trials
+            .iter()
+            .min_by(|a, b| a.loss().total_cmp(&b.loss()))
+            .ok_or_else(|| Error::Settings("nothing to try".into()))?;
+        let everything: Vec<usize> = (0..self.examples.len()).collect();
+        let mut stumps = self.boost(&examples, &everything)?;
+        stumps.truncate(best.stumps);
+        let Line { slope, offset } = platt(&best.in_use());
+        let model = Model { stumps, slope: thousandths(slope), offset: thousandths(offset) };
+        progress(1.0);
+        let figures = self.figures(&trials, &model);
+        Ok(Fitted { model: model.to_text(), figures })
+    }
+}
+
+impl Trial {
+    /// Weighted cross-entropy of the sums as log-odds.
+    fn loss(&self) -> f64 {
+        let sign = |judged: &Judged| if judged.is_person { 1.0 } else { -1.0 };
+        let loss = |judged: &Judged| {
+            let f = -sign(judged) * judged.sum;
+            judged.weight * (f.max(0.0) + (-f.abs()).exp().ln_1p())
+        };
+        let weight: f64 = self.held_out.iter().map(|judged| judged.weight).sum();
+        self.held_out.iter().map(loss).sum::<f64>() / weight
+    }
+
+    /// What the model will be asked about: candidates with depth, if there are
+    /// both kinds of them.
+    fn in_use(&self) -> Vec<(f64, bool)> {
+        let pairs = |depth_only: bool| -> Vec<(f64, bool)> {
+            let asked = self.held_out.iter().filter(|j| j.has_depth || !depth_only);
+            asked.map(|j| (j.sum, j.is_person)).collect()
+        };
+        let with_depth = pairs(true);
+        let has = |people: bool| with_depth.iter().any(|(_, is_person)| *is_person == people);
+        if has(true) && has(false) { with_depth } else { pairs(false) }
+    }
+
+    fn row(&self) -> toml::Table {
+        let with_depth = self.in_use();
+        let all: Vec<(f64, bool)> = self.held_out.iter().map(|j| (j.sum, j.is_person)).collect();
+        toml::Table::from_iter([
+            ("stumps".to_owned(), toml::Value::Integer(self.stumps as i64)),
+            ("loss".to_owned(), rounded(self.loss())),
+            ("area_under_roc".to_owned(), rounded(area(&all))),
+            ("area_under_roc_with_depth".to_owned(), rounded(area(&with_depth))),
+            ("people_accepted_with_depth".to_owned(), rounded(accepted(&with_depth, true))),
+            ("others_accepted_with_depth".to_owned(), rounded(accepted(&with_depth, false))),
+        ])
+    }
+}
+
+/// Share of each family in what the stumps can decide.
+fn influence(model: &Model) -> toml::Table {
+    let reach = |stump: &Stump| f64::from((stump.above - stump.below).abs());
+    let total: f64 = model.stumps.iter().map(reach).sum();
+    let share = |family: Family| {
+        let of = model.stumps.iter().filter(|s| family.range().contains(&s.feature));
+        rounded(of.map(reach).sum::<f64>() / total.max(f64::MIN_POSITIVE))
+    };
+    Family::ALL.iter().map(|family| (family.name().to_owned(), share(*family))).collect()
+}
+
+fn thousandths(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+fn rounded(value: f64) -> toml::Value {
+    ((value * 1e4).round() / 1e4).into()
+}
+
+fn check(training: &Training) -> Result<()> {
+    let stumps = &training.stumps;
+    let rules = [
+        (
+            !stumps.is_empty() && stumps.iter().all(|n| (1..=5000).contains(n)),
+            "`stumps` must be numbers from 1 to 5000",
+        ),
+        (training.rate > 0.0 && training.rate <= 1.0, "`rate` must be above 0 and at most 1"),
+        (
+            training.features > 0.0 && training.features <= 1.0,
+            "`features` must be above 0 and at most 1",
+        ),
+        (training.caution.is_finite() && training.caution > 0.0, "`caution` must be positive"),
+        ((0.0..1.0).contains(&training.without_depth), "`without_depth` must be from 0 to below 1"),
+        (training.folds >= 2, "`folds` must be at least 2"),
+    ];
+    match rules.iter().find(|(holds, _)| !holds) {
+        Some((_, message)) => Err(Error::Settings((*message).into())),
+        None => Ok(()),
+    }
+}

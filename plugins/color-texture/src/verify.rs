@@ -1,0 +1,51 @@
+use tagalong_core::{Context, Detection, Error, Frame, Result, Verifier};
+
+use crate::{Config, Features, Model};
+
+/// The model that is part of the program.
+const BUILT_IN: &str = include_str!("../../../configs/models/color-texture.toml");
+
+/// The verifier.
+pub struct ColorTexture {
+    model: Model,
+    features: Features,
+    weight: f64,
+    limit: f64,
+}
+
+impl ColorTexture {
+    /// A verifier; reads its model.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a file that cannot be read or is no model,
+    /// [`Error::Settings`] for weights that are no weights.
+    pub fn new(config: Config, context: &Context) -> Result<Self> {
+        for (name, value) in [("weight", config.weight), ("limit", config.limit)] {
+            if !(value.is_finite() && value >= 0.0) {
+                let message = format!("`{name}` = {value} must be a number from 0 on");
+                return Err(Error::Settings(message));
+            }
+        }
+        let model = read(&config.model, context)?;
+        let features = Features::default();
+        Ok(Self { model, features, weight: config.weight, limit: config.limit })
+    }
+}
+
+impl Verifier for ColorTexture {
+    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+        self.features.look(frame, &candidate.region)?;
+        let log_odds = self.model.log_odds(&self.features).clamp(-self.limit, self.limit);
+        Ok(self.weight * log_odds)
+    }
+}
+
+fn read(file: &str, context: &Context) -> Result<Model> {
+    let broken = |why: String| Error::Model { path: file.into(), why };
+    if file.is_empty() {
+        return Model::from_text(BUILT_IN).map_err(broken);
+    }
+    let text = std::fs::read_to_string(context.base_dir.join(file))
+        .map_err(|error| broken(error.to_string()))?;
+    Model::from_text(&text).map_err(broken)
+}
