@@ -206,8 +206,8 @@ mod tests {
     fn every_strip_is_seen_from_where_the_robot_is_then() {
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 23.5, cy: 17.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 50, 40, 0.2, 0.0, 0.0);
-        let posts = [-0.4, 0.5].map(|y| shape(1, [3.0, y, 0.0], 0.3));
-        let world = World::new(vec![Object::new(posts.to_vec(), None, true)], vec![], 100.0);
+        let balls = [-0.4, 0.5].map(|y| shape(0, [1.2, y, 0.2], 0.3));
+        let world = World::new(vec![Object::new(balls.to_vec(), None, true)], vec![], 100.0);
         let pose = |part: f64| Isometry3::rotation(Vector3::z() * 0.2 * part);
         let rolling = View { world: &world, camera: &camera, pose: &pose, lit: true }.draw(2);
         for (rows, part) in [(0..16, 0.2), (16..32, 0.6), (32..40, 0.9)] {
