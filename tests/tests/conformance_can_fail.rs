@@ -66,6 +66,7 @@ fn every_check_of_detectors_can_fail() {
         ("likes-left", "likelihood: the true scene outweighs a shifted one"),
         ("first-only", "likelihood: the order of people does not matter"),
         ("infinite", "likelihood: is finite on odd scenes"),
+        ("hurries", "likelihood: many scenes weigh what each weighs alone"),
         ("imagines", "likelihood: a missing image is named"),
     ]);
     proves(Kind::Detector, broken::detector::register, &faults);

@@ -41,7 +41,7 @@ fn picture(is_person: bool, seed: u32) -> GreyImage {
         let dark = if is_person {
             dx.hypot(dy) < 9.0 || (dy > 10.0 && dx.abs() < 20.0)
         } else {
-            (x / 8 + seed as usize) % 2 == 0
+            (x / 8 + seed as usize).is_multiple_of(2)
         };
         (if dark { 60 } else { 150 }) + (state >> 27) as u8
     })

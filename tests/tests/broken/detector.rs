@@ -126,4 +126,19 @@ impl Likelihood for Heads {
         let counted = if self.fault == "first-only" { scene.len().min(1) } else { scene.len() };
         Ok(scene[..counted].iter().map(weight).sum())
     }
+
+    fn log_likelihoods(
+        &self,
+        frame: &Frame,
+        people: &[Person],
+        people_per_scene: usize,
+        out: &mut Vec<f64>,
+    ) -> Result<()> {
+        out.clear();
+        for scene in people.chunks(people_per_scene.max(1)) {
+            let weighed = if self.fault == "hurries" { &people[..scene.len()] } else { scene };
+            out.push(self.log_likelihood(frame, weighed)?);
+        }
+        Ok(())
+    }
 }
