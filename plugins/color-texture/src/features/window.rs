@@ -136,7 +136,7 @@ mod tests {
         #[test]
         fn cells_are_means_of_their_pixels(seed: u32, x in 2usize..9, y in 2usize..9, block in 1usize..4) {
             let image = GreyImage::from_fn(160, 160, |x, y| {
-                ((x as u32 * 73_856_093) ^ (y as u32 * 19_349_663) ^ seed).wrapping_mul(2_654_435_761).to_be_bytes()[0]
+                ((x as u32).wrapping_mul(73_856_093) ^ (y as u32).wrapping_mul(19_349_663) ^ seed).wrapping_mul(2_654_435_761).to_be_bytes()[0]
             });
             // A square of which the window has whole pixels in each cell.
             let side = (SIDE * block) as f64;
