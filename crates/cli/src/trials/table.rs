@@ -139,7 +139,7 @@ impl Table {
                 gain.suite,
                 gain.pipeline,
                 gain.baseline,
-                if lower > 0.0 { "" } else { ", which may be luck" }
+                if lower > 0.0 || upper < 0.0 { "" } else { ", which may be luck" }
             );
         }
         out

@@ -1,0 +1,210 @@
+use super::*;
+
+const SMALL: &str = "seed = 4\nduration_s = 1.0\n[camera]\nwidth = 96\nheight = 72\n\
+    [room]\nclutter = 3\n[[people]]\npath = [[4.0, 3.0]]\nheight_m = 1.7\n\
+    [[people]]\npath = [[6.0, 3.0]]\nheight_m = 1.6\n";
+
+fn events(text: &str, threads: usize) -> Vec<Event> {
+    let mut simulation = Simulation::new(&Scene::parse(text).unwrap(), threads);
+    std::iter::from_fn(|| simulation.next_event()).collect()
+}
+
+fn shots(text: &str, threads: usize) -> Vec<Shot> {
+    let of = |event| if let Event::Shot(shot) = event { Some(*shot) } else { None };
+    events(text, threads).into_iter().filter_map(of).collect()
+}
+
+#[test]
+fn the_same_scene_is_the_same_whatever_the_number_of_threads() {
+    let (one, three) = (shots(SMALL, 1), shots(SMALL, 3));
+    assert!(one.len() >= 9 && one.len() == three.len());
+    for (a, b) in one.iter().zip(&three) {
+        assert_eq!(a.images.colour, b.images.colour);
+        assert_eq!(a.truth, b.truth);
+    }
+    let other = shots(&SMALL.replace("seed = 4", "seed = 5"), 1);
+    assert_ne!(one[0].images.colour, other[0].images.colour);
+}
+
+#[test]
+fn depth_is_the_same_without_colour() {
+    let with = shots(SMALL, 2);
+    let without = shots(&SMALL.replace("[camera]\n", "[camera]\ncolour = false\n"), 2);
+    assert!(with.len() == without.len() && with[0].images.colour.is_some());
+    for (a, b) in with.iter().zip(&without) {
+        let bits = |shot: &Shot| -> Vec<u32> {
+            shot.images.depth.iter().flat_map(|d| d.pixels()).map(|z| z.to_bits()).collect()
+        };
+        assert!(b.images.colour.is_none() && bits(a) == bits(b));
+        assert_eq!(a.truth, b.truth);
+    }
+}
+
+const TURNING: &str = "seed = 4\nduration_s = 2.0\n[camera]\nwidth = 160\nheight = 120\n\
+    [robot]\nstart = [1.0, 3.0]\nheading_deg = -60.0\npath = [[1.0, 5.5]]\n\
+    [faults]\ndropped = 0.0\nlate = 0.0\n\
+    [[people]]\npath = [[3.5, 3.0]]\nheight_m = 1.7\n";
+
+#[test]
+fn a_rolling_shutter_slants_the_image_and_the_truth_with_it() {
+    let at_once = shots(TURNING, 2);
+    let rolling = shots(&TURNING.replace("[camera]\n", "[camera]\nrolling_shutter_s = 0.05\n"), 2);
+    let mut moved = 0.0_f64;
+    for (a, b) in at_once.iter().zip(&rolling) {
+        assert_eq!(a.truth[0].head_in_robot, b.truth[0].head_in_robot);
+        let (Some(x), Some(y)) = (a.truth[0].upper_body, b.truth[0].upper_body) else {
+            continue;
+        };
+        moved = moved.max((x.centre().x - y.centre().x).abs());
+        let off = (a.truth[0].visible_fraction - b.truth[0].visible_fraction).abs();
+        assert!(off < 0.12, "{:?} {:?}", a.truth, b.truth);
+    }
+    // 0.8 rad/s for a third of the shutter time are some 2 of 144 px / rad.
+    assert!((0.5..6.0).contains(&moved), "{moved}");
+}
+
+#[test]
+fn depth_may_be_taken_later_than_colour_and_changes_nothing_else() {
+    let text = "duration_s = 2.0\n[camera]\nwidth = 96\nheight = 72\nmount_error_deg = 0.0\nbaseline_m = 0.8\n\
+        [robot]\nstart = [5.0, 3.0]\npath = [[8.0, 3.0]]\n\
+        [[people]]\npath = [[7.0, 4.0], [7.0, 5.0]]\n";
+    let together = shots(text, 2);
+    let later = shots(&text.replace("[camera]\n", "[camera]\ndepth_offset_s = 0.02\n"), 2);
+    let ahead = |shot: &Shot| {
+        let depth = shot.images.depth.as_ref().unwrap();
+        let middle = (20..50).flat_map(|y| (60..90).map(move |x| (x, y)));
+        let seen: Vec<f64> = middle
+            .filter_map(|(x, y)| depth.get(x, y))
+            .filter(|z| z.is_finite())
+            .map(f64::from)
+            .collect();
+        seen.iter().sum::<f64>() / seen.len() as f64
+    };
+    for (a, b) in together.iter().zip(&later) {
+        assert_eq!((&a.images.colour, &a.truth), (&b.images.colour, &b.truth));
+        assert_eq!(b.depth_ns, b.captured_ns + 20_000_000);
+    }
+    let nearer: f64 = together.iter().zip(&later).skip(10).map(|(a, b)| ahead(a) - ahead(b)).sum();
+    // 0.5 m/s for 0.02 s, in about ten images.
+    let nearer = nearer / (together.len() - 10) as f64;
+    assert!((0.004..0.016).contains(&nearer), "{nearer}");
+}
+
+#[test]
+fn truth_agrees_with_depth_and_knows_who_hides_whom() {
+    let shot = &shots(SMALL, 2)[0];
+    let (near, far) = (&shot.truth[0], &shot.truth[1]);
+    assert!((near.head_in_robot.x - 3.0).abs() < 0.05 && near.visible_fraction > 0.95);
+    assert!(far.visible_fraction < 0.5 && far.occluder == Some(1), "{far:?}");
+    let area = near.upper_body.unwrap();
+    let (x, y) = (area.centre().x as i64, (area.y + 0.45 * area.height) as i64);
+    let depth = f64::from(shot.images.depth.as_ref().unwrap().get(x, y).unwrap());
+    assert!((depth - 2.9).abs() < 0.15, "{depth}");
+}
+
+#[test]
+fn a_stereo_pair_is_shifted_by_the_disparity() {
+    let text =
+        SMALL.replace("[camera]\n", "[camera]\nkind = \"stereo\"\nfield_of_view_deg = 58.0\n");
+    let images = &shots(&text, 2)[0].images;
+    let (left, right) = (images.grey.as_ref().unwrap(), &images.right.as_ref().unwrap().image);
+    let difference = |shift: i64| -> i64 {
+        let pairs = (44..52).flat_map(|x| (24..40).map(move |y| (x, y)));
+        pairs
+            .map(|(x, y)| {
+                let a = i64::from(left.get(x, y).unwrap());
+                (a - i64::from(right.get(x - shift, y).unwrap())).abs()
+            })
+            .sum()
+    };
+    let best = (0..8).min_by_key(|shift| difference(*shift)).unwrap();
+    // f = 86.6 px, depth 2.9 m.
+    assert_eq!(best, 4, "{:?}", (0..8).map(difference).collect::<Vec<_>>());
+}
+
+#[test]
+fn events_come_in_the_order_of_recording_and_late_images_after_their_time() {
+    let text = format!("{SMALL}[faults]\nlate = 0.5\ndropped = 0.2\n");
+    let recorded = |event: &Event| match event {
+        Event::Odometry(reading) => reading.at_ns,
+        Event::Shot(shot) => shot.recorded_ns,
+        Event::Webcam(shot) => shot.captured_ns,
+    };
+    let events = events(&text, 2);
+    assert!(events.windows(2).all(|pair| recorded(&pair[0]) <= recorded(&pair[1])));
+    let shots: Vec<_> = shots(&text, 2);
+    assert!(shots.iter().any(|s| s.recorded_ns > s.captured_ns) && shots.len() < 10);
+}
+
+const OMNI: &str = "duration_s = 1.0\n[camera]\nkind = \"panorama\"\nwidth = 160\nheight = 160\n\
+    rate_hz = 3.0\nheight_m = 1.55\n[robot]\nstart = [5.0, 3.0]\n[faults]\ndropped = 0.0\n\
+    [[people]]\npath = [[3.0, 3.01]]\nheight_m = 1.7\n[[people]]\npath = [[5.0, 5.5]]\nheading_deg = 270.0\n\
+    [[webcams]]\nwidth = 64\nheight = 48\n[[webcams]]\nwidth = 64\nheight = 48\nrate_hz = 5.0\n";
+
+#[test]
+fn a_mirror_shows_people_all_around_and_the_seam_cuts_nobody() {
+    let (one, three) = (shots(OMNI, 1), shots(OMNI, 3));
+    assert!(one.len() == 3 && one[0].images.depth.is_none());
+    for (a, b) in one.iter().zip(&three) {
+        assert!(a.images.colour == b.images.colour && a.truth == b.truth);
+    }
+    let (behind, left) = (&one[0].truth[0], &one[0].truth[1]);
+    let seam = behind.upper_body.unwrap();
+    assert!(seam.x < 480.0 && seam.right() > 480.0 && seam.width < 50.0, "{seam:?}");
+    assert!((left.upper_body.unwrap().centre().x - 119.5).abs() < 6.0, "{left:?}");
+    for person in [behind, left] {
+        let (whole, seen) = (person.upper_body.unwrap(), person.visible.unwrap());
+        assert!(person.visible_fraction > 0.9 && !person.ignore, "{person:?}");
+        assert!(seen.intersection(&whole).area() > 0.95 * seen.area(), "{person:?}");
+        assert!(seen.area() > 0.5 * whole.area(), "{person:?}");
+    }
+}
+
+#[test]
+fn webcams_deliver_at_their_own_rates() {
+    let webcam =
+        |event: &Event| if let Event::Webcam(shot) = event { Some(shot.webcam) } else { None };
+    let numbers: Vec<usize> = events(OMNI, 2).iter().filter_map(webcam).collect();
+    let of = |number| numbers.iter().filter(|n| **n == number).count();
+    assert_eq!((of(0), of(1)), (3, 5));
+}
+
+#[test]
+fn people_walk_through_a_doorway() {
+    let text = "duration_s = 9.0\n[camera]\nwidth = 8\nheight = 8\n[[furniture]]\n\
+        kind = \"doorway\"\nat = [5.0, 3.0]\n\
+        [[people]]\npath = [[3.0, 3.4], [5.0, 3.0], [8.0, 2.6]]\n";
+    let shots = shots(text, 1);
+    let last = &shots[shots.len() - 1].truth[0].torso_in_robot;
+    assert!(last.x > 5.5, "{last}");
+    let at_wall = shots.iter().map(|s| s.truth[0].torso_in_robot);
+    let aside = at_wall.filter(|at| (at.x - 4.0).abs() < 0.1).map(|at| at.y.abs());
+    assert!(aside.fold(0.0, f64::max) < 0.35);
+}
+
+#[test]
+fn people_walk_round_a_robot_at_rest() {
+    let text = "duration_s = 14.0\n[camera]\nwidth = 8\nheight = 8\n[robot]\nstart = [4.0, 3.0]\n\
+        [[people]]\npath = [[2.0, 3.0], [7.0, 3.0]]\ncompanions = 1\n";
+    let mut nearest = f64::MAX;
+    let shots = shots(text, 1);
+    for shot in &shots {
+        let away = shot.truth.iter().map(|t| t.torso_in_robot.coords.xy().norm());
+        nearest = away.fold(nearest, f64::min);
+    }
+    assert!(nearest > 0.4, "{nearest}");
+    let last: Vec<_> = shots[shots.len() - 1].truth.iter().map(|t| t.torso_in_robot).collect();
+    assert!(last.len() == 2 && last.iter().all(|at| at.x > 2.0), "{last:?}");
+    let apart = (last[0] - last[1]).norm();
+    assert!((0.5..1.3).contains(&apart), "{apart}");
+}
+
+#[test]
+fn a_steered_robot_leaves_its_path() {
+    let scene = Scene::parse("duration_s = 3.0\n[camera]\nwidth = 16\nheight = 16\n").unwrap();
+    let mut simulation = Simulation::new(&scene, 1);
+    while simulation.next_event().is_some() {
+        simulation.steer(WheelSpeeds { left: 0.3, right: 0.3 });
+    }
+    assert!(simulation.robot.pose.translation.vector.x > 1.5);
+}
