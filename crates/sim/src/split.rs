@@ -13,7 +13,7 @@ const SLICES: u64 = 15;
 
 /// What a drawn log is for. A seed belongs to exactly one split, and all chance
 /// comes from the seed: noise, ways, clutter. People come from a pool of
-/// [`SUBJECTS`] for each split, and what a scene file varies `apart` takes
+/// 500 for each split, and what a scene file varies `apart` takes
 /// different values in each.
 ///
 /// ```
