@@ -6,5 +6,5 @@ pub mod ground;
 mod panorama;
 mod row_sums;
 
-pub use panorama::{Blend, Unwrapper};
+pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};

@@ -17,7 +17,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sim", &["core"]),
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
-    ("trials", &["core", "pipeline", "stereo", "sim", "eval"]),
+    ("trials", &["core", "vision", "pipeline", "stereo", "sim", "eval"]),
     ("conformance", &["core"]),
     ("catalog", &["core", "plugins"]),
     (
