@@ -175,12 +175,14 @@ mod tests {
 
     #[test]
     fn text_has_aligned_columns() {
-        let expected = "Crossings (P3, Table I)\n\
-            \x20                          success %   ms\n\
-            \x20 published: 625               97.8  247\n\
-            \x20 all             97.1 [93.0, 98.8]    -\n\
-            \x20 * drawn\n";
-        assert_eq!(table().text(), expected);
+        let expected = [
+            "Crossings (P3, Table I)",
+            "                          success %   ms",
+            "  published: 625               97.8  247",
+            "  all             97.1 [93.0, 98.8]    -",
+            "  * drawn\n",
+        ];
+        assert_eq!(table().text(), expected.join("\n"));
     }
 
     #[test]
