@@ -18,12 +18,29 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
     ("trials", &["core", "vision", "pipeline", "stereo", "sim", "eval"]),
+    // What is reproduced may be the learning of a plugin.
+    (
+        "reproduce",
+        &[
+            "core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "trials",
+            "plugins",
+        ],
+    ),
     ("conformance", &["core"]),
     ("catalog", &["core", "plugins"]),
     (
         "cli",
         &[
-            "core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "trials",
+            "core",
+            "vision",
+            "stereo",
+            "pipeline",
+            "log",
+            "sim",
+            "eval",
+            "report",
+            "trials",
+            "reproduce",
             "catalog",
         ],
     ),
