@@ -19,6 +19,7 @@ mod blob;
 pub mod circular;
 mod config;
 mod detector;
+mod eyes;
 mod model;
 mod network;
 mod segment;
@@ -32,6 +33,7 @@ pub use background::Background;
 pub use blob::{Blob, FEATURES, Features};
 pub use config::{Config, Distance};
 pub use detector::OmniAppearance;
+pub use eyes::Eyes;
 pub use model::{Geometry, Head, Line, Model, Person, Ridge, Signature, View};
 pub use network::Network;
 pub use segment::{Counts, Segmenter};
@@ -50,4 +52,8 @@ pub fn register(registry: &mut Registry) {
         "people in the panorama of a conical mirror, distance by a small network (P5)",
         OmniAppearance::new,
     );
+    #[cfg(feature = "train")]
+    registry.trainer(TRAINER, |config: Config, context| {
+        train::DistanceTrainer::new(config, context.seed)
+    });
 }

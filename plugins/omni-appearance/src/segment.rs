@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn columns_of_the_empty_room_raise_the_bar() {
         let config = Config::default();
-        let mut segmenter = seen(4, &[&[0, 200, 200, 200]; 9]);
+        let mut segmenter = seen(4, &[&[0, 200, 200, 200][..]; 9]);
         segmenter.learn_empty(&config);
         assert_eq!(segmenter.least, 10);
     }
