@@ -146,7 +146,7 @@ mod tests {
         (15..20).for_each(|row| solid[row * 12 + 2] = 1);
         let columns =
             (0..12).map(|c| (0..40).map(|row| u16::from(solid[row * 12 + c])).sum()).collect();
-        Counts { solid, columns }
+        Counts { taken: solid.clone(), solid, columns }
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub struct Config {
     pub threshold_floor: u8,
     /// Time in which the background follows a change, s; 0 keeps it as it is.
     pub adapt_s: f64,
-    /// The same where somebody is seen, s; 0 never.
+    /// What differs for so long without a break becomes background, s; 0: nothing.
     pub absorb_s: f64,
     /// A pixel whose colours are all darker, but not below this part of the
     /// background, may be shadow; 1 finds none.
@@ -82,7 +82,7 @@ impl Default for Config {
             threshold_sigmas: 4.0,
             threshold_floor: 6,
             adapt_s: 20.0,
-            absorb_s: 0.0,
+            absorb_s: 60.0,
             shadow_min: 0.6,
             shadow_max: 0.97,
             shadow_tint: 0.05,

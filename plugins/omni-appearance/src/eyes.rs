@@ -1,5 +1,6 @@
 use tagalong_core::{Frame, Funnel, Result, Stamp};
 
+use crate::background::Pace;
 use crate::warp::{Bounds, Warp, is_moving};
 use crate::{Background, Blob, Config, Segmenter};
 
@@ -23,6 +24,8 @@ struct Scene {
     uncertain: bool,
     /// Grey images as colours.
     grey: Vec<u8>,
+    /// Images since the background was made.
+    phase: usize,
 }
 
 impl Eyes {
@@ -61,8 +64,12 @@ impl Eyes {
             funnel.drop_many("image of another size", 1);
             return Ok(Vec::new());
         }
+        // A clock that was set back is another recording.
+        let same = |scene: &Scene| {
+            scene.size == size && scene.seen.is_none_or(|(_, stamp)| stamp <= frame.stamp)
+        };
         let scene = match &mut self.scene {
-            Some(scene) if scene.size == size => scene,
+            Some(scene) if same(scene) => scene,
             scene => scene.insert(Scene::new(size, &self.config)),
         };
         if scene.seen != Some((frame.index, frame.stamp)) {
@@ -98,6 +105,7 @@ impl Scene {
             blobs: Vec::new(),
             uncertain: false,
             grey: Vec::new(),
+            phase: 0,
         }
     }
 
@@ -114,11 +122,15 @@ impl Scene {
         let learning = background.frames() < config.background_frames;
         if learning {
             // The spread of a few images is no measure for anything.
-            if background.frames() > 4 {
+            if background.frames() > 4 && !self.uncertain {
                 segmenter.compare(colours, background, !grey, config);
                 segmenter.learn_empty(config);
             }
-            background.add(colours, config);
+            if self.uncertain {
+                background.add_moving(colours, config);
+            } else {
+                background.add(colours, config);
+            }
             funnel.drop_many("background is being learned", 1);
             return Ok(());
         }
@@ -150,16 +162,15 @@ impl Scene {
         }
         // What is carried along by the odometry must be renewed soon.
         let after = if self.uncertain { config.adapt_s.min(MOVING_ADAPT_S) } else { config.adapt_s };
-        let part = |time_s: f64| {
-            if time_s > 0.0 { (frame.motion.dt / time_s).min(1.0) as f32 } else { 0.0 }
-        };
-        let (free, taken) = (part(after), part(config.absorb_s));
-        if free == 0.0 && taken == 0.0 {
-            return Ok(());
-        }
+        let dt_s = frame.motion.dt as f32;
+        let absorb_s = if config.absorb_s > 0.0 { config.absorb_s as f32 } else { f32::INFINITY };
+        let part = if after > 0.0 { dt_s / after as f32 } else { 0.0 };
+        let pace = Pace { part, absorb_s, dt_s };
         let colour = frame.images().colour.as_deref();
         let colours = colour.map_or(&self.grey[..], |c| c.pixels().as_flattened());
-        self.background.follow(colours, &self.segmenter.counts().solid, free, taken);
+        let taken = &self.segmenter.counts().taken;
+        self.background.follow(colours, taken, &pace, self.phase);
+        self.phase = self.phase.wrapping_add(1);
         Ok(())
     }
 }

@@ -6,6 +6,8 @@ use crate::{Background, Config};
 pub struct Counts {
     /// 1 where somebody may be, else 0; row by row.
     pub solid: Vec<u8>,
+    /// The same with shadows.
+    pub taken: Vec<u8>,
     /// Sums of `solid` over each column.
     pub columns: Vec<u16>,
 }
@@ -70,20 +72,19 @@ impl Segmenter {
             *differs = u8::from(off > *limit);
         }
         let shadow = Shadow::new(config, tinted);
-        self.counts.solid.resize(colours.len() / 3, 0);
+        let Counts { solid, taken, .. } = &mut self.counts;
+        taken.clear();
+        taken.extend(self.differs.chunks_exact(3).map(|d| d[0] | d[1] | d[2]));
+        solid.clone_from(taken);
         let pixels = colours.chunks_exact(3).zip(background.level.chunks_exact(3));
-        let differs = self.differs.chunks_exact(3);
-        for ((solid, differs), (colour, level)) in
-            self.counts.solid.iter_mut().zip(differs).zip(pixels)
-        {
-            let any = differs[0] | differs[1] | differs[2];
-            *solid = u8::from(any != 0 && !shadow.is_at(colour, level));
+        for (solid, (colour, level)) in solid.iter_mut().zip(pixels).filter(|(s, _)| **s != 0) {
+            *solid = u8::from(!shadow.is_at(colour, level));
         }
         self.count();
     }
 
     fn count(&mut self) {
-        let Counts { solid, columns } = &mut self.counts;
+        let Counts { solid, columns, .. } = &mut self.counts;
         columns.clear();
         columns.resize(self.width, 0);
         for row in solid.chunks_exact(self.width.max(1)) {

@@ -28,8 +28,10 @@ pub struct Training {
     pub rich_rate: f64,
     /// Part of the last step that is taken again.
     pub momentum: f64,
-    /// Most steps.
+    /// Most steps of the paper's network ...
     pub epochs: usize,
+    /// ... and of the rich one.
+    pub rich_epochs: usize,
     /// A fit ends after so many steps without progress on what is held out.
     pub patience: usize,
     /// Fits from other random weights.
@@ -46,11 +48,12 @@ impl Default for Training {
     fn default() -> Self {
         Self {
             hidden: 4,
-            rich_hidden: 6,
+            rich_hidden: 8,
             rate: 0.3,
-            rich_rate: 0.1,
+            rich_rate: 0.03,
             momentum: 0.9,
             epochs: 2000,
+            rich_epochs: 4000,
             patience: 300,
             restarts: 5,
             held_out: 5,
@@ -203,8 +206,9 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         samples.iter().map(|s| s.features.values()[..3].to_vec()).collect();
     let all: Vec<Vec<f64>> = samples.iter().map(|s| s.inputs().to_vec()).collect();
     let data = |inputs| Data { inputs, targets: &targets, held: &held };
+    let long = Training { epochs: training.rich_epochs, ..*training };
     let network = data(&printed).network(training.hidden, training.rate, training, seed);
-    let rich = data(&all).network(training.rich_hidden, training.rich_rate, training, seed);
+    let rich = data(&all).network(training.rich_hidden, training.rich_rate, &long, seed);
     let flat = Line { start: 0.0, slope: 0.0 };
     let mut head = Head {
         floor_offset_m: samples.iter().map(|s| s.distance_m - s.floor_m).sum::<f64>()
@@ -418,7 +422,10 @@ fn signature(samples: &[Sample]) -> Signature {
     Signature { mean: all.map(|(mean, _)| mean), sigma: all.map(|(_, sigma)| sigma) }
 }
 
-/// Fits everybody's head and one for each person, in the order of their numbers.
+/// People with this number and higher ones get no head of their own.
+pub const STRANGERS: u64 = 100;
+
+/// Fits everybody's head, and one for each person below [`STRANGERS`].
 ///
 /// # Errors
 /// As [`head`].
@@ -429,7 +436,9 @@ pub fn model(
     seed: u64,
 ) -> Result<Model> {
     let mut people: BTreeMap<u64, Vec<Sample>> = BTreeMap::new();
-    samples.iter().for_each(|s| people.entry(s.person).or_default().push(*s));
+    for sample in samples.iter().filter(|sample| sample.person < STRANGERS) {
+        people.entry(sample.person).or_default().push(*sample);
+    }
     let person = |(id, own): (&u64, &Vec<Sample>)| {
         Ok(Person {
             name: format!("person-{id}"),

@@ -124,16 +124,16 @@ impl Bounds {
         let rows = level.chunks_exact(stride);
         let out = low.chunks_exact_mut(stride).zip(high.chunks_exact_mut(stride));
         for (row, (low, high)) in rows.zip(out) {
-            along(row, low, slack[0], u8::min);
-            along(row, high, slack[0], u8::max);
+            along(row, low, slack[0], |a, b| a.min(b));
+            along(row, high, slack[0], |a, b| a.max(b));
         }
-        down(low, &mut self.low, stride, slack[1], u8::min);
-        down(high, &mut self.high, stride, slack[1], u8::max);
+        down(low, &mut self.low, stride, slack[1], |a, b| a.min(b));
+        down(high, &mut self.high, stride, slack[1], |a, b| a.max(b));
     }
 }
 
 /// Around the row: pixels are counted modulo its length.
-fn along(row: &[u8], out: &mut [u8], slack: usize, pick: fn(u8, u8) -> u8) {
+fn along(row: &[u8], out: &mut [u8], slack: usize, pick: impl Fn(u8, u8) -> u8 + Copy) {
     out.copy_from_slice(row);
     let width = row.len();
     for shift in (1..=slack).map(|columns| 3 * columns % width.max(1)) {
@@ -146,7 +146,7 @@ fn along(row: &[u8], out: &mut [u8], slack: usize, pick: fn(u8, u8) -> u8) {
     }
 }
 
-fn down(from: &[u8], out: &mut Vec<u8>, stride: usize, slack: usize, pick: fn(u8, u8) -> u8) {
+fn down(from: &[u8], out: &mut Vec<u8>, stride: usize, slack: usize, pick: impl Fn(u8, u8) -> u8 + Copy) {
     out.clear();
     out.extend_from_slice(from);
     for shift in (1..=slack).map(|rows| rows * stride).filter(|shift| *shift < from.len()) {
@@ -156,8 +156,87 @@ fn down(from: &[u8], out: &mut Vec<u8>, stride: usize, slack: usize, pick: fn(u8
     }
 }
 
-fn fold(out: &mut [u8], with: &[u8], pick: fn(u8, u8) -> u8) {
+fn fold(out: &mut [u8], with: &[u8], pick: impl Fn(u8, u8) -> u8 + Copy) {
     for (out, value) in out.iter_mut().zip(with) {
         *out = pick(*out, *value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use proptest::prelude::*;
+    use tagalong_core::{ConicalMirror, Lens};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
+        let mirror = ConicalMirror::from_coefficients(175.0, [240.0; 2], &d).unwrap();
+        Camera {
+            lens: Lens::Panorama(Panorama { mirror, columns: 96, rows: 40 }),
+            width: 96,
+            height: 40,
+            robot_from_camera: ConicalMirror::upright(1.5),
+        }
+    }
+
+    /// A pattern on the floor and on a round wall about the place of the first image.
+    fn room(camera: &Camera, pose: &nalgebra::Isometry2<f64>, wall_m: f64) -> Vec<f32> {
+        let panorama = camera.panorama().unwrap();
+        let pixels = (0..40).flat_map(|row| (0..96).map(move |column| (column, row)));
+        let colour = |(column, row): (usize, usize)| {
+            let at = Point2::new(column as f64, row as f64);
+            let elevation = panorama.elevation(at.y);
+            let floor = panorama.mirror.floor_range_m(elevation, 1.5);
+            let range = floor.filter(|r| *r > 0.0).map_or(wall_m, |r| r.min(wall_m));
+            let point = pose * camera.back_project(at, range).xy();
+            let value = 100.0 + 60.0 * (1.3 * point.x).sin() + 40.0 * (1.1 * point.y).cos();
+            [value as f32; 3]
+        };
+        pixels.flat_map(colour).collect()
+    }
+
+    #[test]
+    fn the_floor_is_where_the_odometry_says() {
+        let camera = camera();
+        let motion = Motion {
+            dt: 0.3,
+            forward: 0.15,
+            left: -0.05,
+            turn: 0.2,
+            covariance: Matrix3::zeros(),
+        };
+        assert!(is_moving(&motion) && !is_moving(&Motion::at_rest(0.3)));
+        let before = room(&camera, &nalgebra::Isometry2::identity(), 3.5);
+        let after = room(&camera, &motion.isometry(), 3.5);
+        let mut moved = vec![0.0; before.len()];
+        let panorama = camera.panorama().unwrap();
+        Warp::new(&camera, panorama, &motion, 3.5).apply(&before, &mut moved);
+        let off = |a: &[f32], b: &[f32]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / a.len() as f32
+        };
+        assert!(off(&moved, &after) < 2.0, "{}", off(&moved, &after));
+        assert!(off(&before, &after) > 10.0, "{}", off(&before, &after));
+    }
+
+    proptest! {
+        #[test]
+        fn bounds_are_those_of_the_neighbourhood(
+            level in prop::collection::vec(any::<u8>(), 3 * 9 * 5),
+            across in 0..4usize, rows in 0..3usize,
+        ) {
+            let mut bounds = Bounds::default();
+            bounds.of(&level, 9, [across, rows]);
+            for at in 0..level.len() {
+                let (row, column, colour) = (at / 27, at % 27 / 3, at % 3);
+                let near = (row.saturating_sub(rows)..(row + rows + 1).min(5)).flat_map(|r| {
+                    (0..=2 * across).map(move |c| (r, (column + 9 + c - across) % 9))
+                });
+                let values: Vec<u8> = near.map(|(r, c)| level[27 * r + 3 * c + colour]).collect();
+                prop_assert_eq!(Some(&bounds.low[at]), values.iter().min());
+                prop_assert_eq!(Some(&bounds.high[at]), values.iter().max());
+            }
+        }
     }
 }
