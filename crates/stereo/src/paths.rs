@@ -83,7 +83,7 @@ fn jump(penalties: &Penalties, a: u8, b: u8) -> u8 {
 
 /// Adds the costs of the paths from the left and from the right to the sums of a
 /// row. A path waits for its own last step; two of them wait together.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 pub fn along<const D: usize>(
     costs: &[[u8; D]],
     row: &[u8],
@@ -109,7 +109,7 @@ pub fn along<const D: usize>(
 
 /// Adds the costs of the paths from above, on the left and on the right too, to
 /// the sums of a row.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 pub fn down<const D: usize>(
     costs: &[[u8; D]],
     (row, row_above): (&[u8], &[u8]),

@@ -26,7 +26,24 @@ pub struct Refiner {
     /// disparity.
     slopes: Vec<f32>,
     products: Vec<f32>,
+    window: Window,
     refined: Vec<f32>,
+}
+
+/// Sums over the rows of the windows around the pixels of a row.
+#[derive(Debug, Default)]
+struct Window {
+    squares: Vec<f32>,
+    sums: Vec<f32>,
+}
+
+impl Window {
+    fn clear(&mut self, width: usize) {
+        for row in [&mut self.squares, &mut self.sums] {
+            row.clear();
+            row.resize(width, 0.0);
+        }
+    }
 }
 
 /// Sums over the pixels of a row up to some place: slope `g`, and `q`, the slope
@@ -40,11 +57,13 @@ struct Sums {
 }
 
 impl Sums {
+    #[inline(always)]
     fn with(self, g: f32, q: f32) -> Self {
         Self { g: self.g + g, q: self.q + q, gg: self.gg + g * g, gq: self.gq + g * q }
     }
 
     /// Squares and products around the means, from `first` to here.
+    #[inline(always)]
     fn since(self, first: Self, count: f32) -> (f32, f32) {
         let (g, q) = (self.g - first.g, self.q - first.q);
         let (gg, gq) = (self.gg - first.gg, self.gq - first.gq);
@@ -81,16 +100,15 @@ impl Refiner {
         }
         self.refined.clear();
         self.refined.extend_from_slice(disparities);
-        for y in 0..height {
-            let near = y.saturating_sub(radius)..(y + radius + 1).min(height);
-            let row = y * width..(y + 1) * width;
-            let place = near.start * width..near.end * width;
-            let from = (
-                &disparities[place.clone()],
-                &self.slopes[place.clone()],
-                &self.products[place],
-            );
-            across(&disparities[row.clone()], from, &mut self.refined[row]);
+        for (y, refined) in self.refined.chunks_exact_mut(width).enumerate() {
+            self.window.clear(width);
+            let own = &disparities[y * width..(y + 1) * width];
+            for near in y.saturating_sub(radius)..(y + radius + 1).min(height) {
+                let from = near * width;
+                let (slopes, products) = (&self.slopes[from..], &self.products[from..]);
+                add(own, &disparities[from..], slopes, products, &mut self.window);
+            }
+            solve(&self.window, refined);
         }
         disparities.copy_from_slice(&self.refined);
     }
@@ -122,14 +140,15 @@ impl Line {
     fn between(&self, at: f32) -> (f32, f32) {
         let last = self.level.len() - 1;
         let at = at.max(0.0);
-        let (i, part) = ((at as usize).min(last), at.fract());
+        let i = (at as usize).min(last);
+        let part = (at - i as f32).min(1.0);
         let next = (i + 1).min(last);
         let mix = |row: &[f32]| row[i] + part * (row[next] - row[i]);
         (mix(&self.level), mix(&self.slope))
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn levels(padded: &[u8], level: &mut [f32], slope: &mut [f32]) {
     let width = level.len();
     let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|from| &padded[from..from + width]);
@@ -141,6 +160,7 @@ fn levels(padded: &[u8], level: &mut [f32], slope: &mut [f32]) {
 }
 
 /// Sums up along a row, within the surface of each pixel.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn along(
     (left, right): (&Line, &Line),
     disparities: &[f32],
@@ -182,39 +202,25 @@ fn equation(left: &Line, right: &Line, x: usize, disparity: f32) -> (f32, f32) {
     (g, g * disparity + 0.25 * (level - left.level[x]))
 }
 
-/// Columns that are worked on at once.
-const LANES: usize = 16;
-
-/// Adds up the rows of the window that are of the same surface, and solves.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
-fn across(row: &[f32], (near, slopes, products): (&[f32], &[f32], &[f32]), refined: &mut [f32]) {
-    let width = row.len();
-    let (own, rest) = row.as_chunks::<LANES>();
-    for (i, was) in own.iter().enumerate() {
-        let from = i * LANES;
-        let (mut squares, mut sums) = ([PRIOR; LANES], was.map(|d| PRIOR * d));
-        for first in (from..near.len()).step_by(width) {
-            let window = [near, slopes, products].map(|plane| &plane[first..first + LANES]);
-            for lane in 0..LANES {
-                let same = is_same(was[lane], window[0][lane]);
-                squares[lane] += if same { window[1][lane] } else { 0.0 };
-                sums[lane] += if same { window[2][lane] } else { 0.0 };
-            }
-        }
-        for lane in 0..LANES {
-            refined[from + lane] = changed(was[lane], sums[lane] / squares[lane]);
-        }
-    }
-    for (x, was) in (own.len() * LANES..width).zip(rest) {
-        let same = || (x..near.len()).step_by(width).filter(|at| is_same(*was, near[*at]));
-        let squares = same().fold(PRIOR, |sum, at| sum + slopes[at]);
-        let sum = same().fold(PRIOR * was, |sum, at| sum + products[at]);
-        refined[x] = changed(*was, sum / squares);
+/// Adds the values of a row where it is of the same surface.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn add(own: &[f32], near: &[f32], slopes: &[f32], products: &[f32], window: &mut Window) {
+    let width = own.len();
+    let (near, slopes, products) = (&near[..width], &slopes[..width], &products[..width]);
+    let (squares, sums) = (&mut window.squares[..width], &mut window.sums[..width]);
+    for x in 0..width {
+        let same = is_same(own[x], near[x]);
+        squares[x] += if same { slopes[x] } else { 0.0 };
+        sums[x] += if same { products[x] } else { 0.0 };
     }
 }
 
-#[inline(always)]
-fn changed(was: f32, wanted: f32) -> f32 {
-    let new = was + (wanted - was).clamp(-MOST_PX, MOST_PX);
-    if new < 0.0 { 0.0 } else { new }
+/// Solves for the disparities, with what they were as a weak prior.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn solve(window: &Window, disparities: &mut [f32]) {
+    for ((d, squares), sum) in disparities.iter_mut().zip(&window.squares).zip(&window.sums) {
+        let change = (PRIOR * *d + sum) / (PRIOR + squares) - *d;
+        let new = *d + change.clamp(-MOST_PX, MOST_PX);
+        *d = if new < 0.0 { 0.0 } else { new };
+    }
 }

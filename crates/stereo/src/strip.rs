@@ -123,7 +123,7 @@ impl Strip {
     /// Writes the disparities of a row, where they stand the tests.
     fn decide<const D: usize>(&mut self, pair: &Pair<'_>, row: usize, output: &mut Output<'_>) {
         let width = pair.left.width();
-        winner::row(self.sums.as_chunks_mut::<D>().0, &mut self.winners);
+        winner::row(self.sums.as_chunks::<D>().0, &mut self.winners);
         self.look_from_right(width);
         let place = row * width..(row + 1) * width;
         let disparities = output.disparities[place.clone()].iter_mut();
@@ -146,7 +146,7 @@ impl Strip {
         let y = output.first_row + row;
         let near = [y.saturating_sub(1), y, (y + 1).min(pair.left.height() - 1)];
         let values = &mut output.disparities[row * width..(row + 1) * width];
-        let (least, rows) = (pair.settings.texture.into(), near.map(|y| pair.left.row(y)));
+        let (least, rows) = (pair.settings.texture, near.map(|y| pair.left.row(y)));
         self.dropped.unsupported += self.texture.apply(values, rows, least);
     }
 

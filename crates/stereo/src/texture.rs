@@ -11,44 +11,64 @@
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
 
-/// Judges the pixels of a row; keeps its buffer.
+/// Judges the pixels of a row; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct TextureTest {
+    /// Which pixels are textured.
+    textured: Vec<bool>,
     /// The disparity of the next textured pixel on the right; NaN = there is none.
     right: Vec<f32>,
-}
-
-/// Change of brightness across each pixel of the middle one of three rows, of
-/// columns side by side: half of Sobel's.
-fn slope(rows: [&[u8]; 3], x: usize) -> u32 {
-    let (before, after) = (x.saturating_sub(1), (x + 1).min(rows[1].len() - 1));
-    let rise = |row: &[u8]| i32::from(row[after]).wrapping_sub(i32::from(row[before]));
-    (rise(rows[0]) + 2 * rise(rows[1]) + rise(rows[2])).unsigned_abs() / 2
 }
 
 impl TextureTest {
     /// Sets the disparities of a row that nothing supports to NaN, and returns how
     /// many. `rows` are the row of the image and its neighbours, `least` is the
     /// least slope of a textured pixel.
-    pub fn apply(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u32) -> u64 {
-        let is_anchor = |x: usize, value: f32| !value.is_nan() && slope(rows, x) >= least;
-        self.right.clear();
+    pub fn apply(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u8) -> u64 {
+        if least == 0 {
+            return 0;
+        }
+        self.textured.clear();
+        self.textured.resize(row.len(), false);
+        find_textured(rows, least, &mut self.textured);
         self.right.resize(row.len(), f32::NAN);
         let mut next = f32::NAN;
-        for x in (0..row.len()).rev() {
-            self.right[x] = next;
-            next = if is_anchor(x, row[x]) { row[x] } else { next };
+        for (x, right) in self.right.iter_mut().enumerate().rev() {
+            *right = next;
+            next = if self.textured[x] && !row[x].is_nan() { row[x] } else { next };
         }
         let (mut dropped, mut last) = (0, f32::NAN);
-        for (x, value) in row.iter_mut().enumerate() {
-            if is_anchor(x, *value) {
+        for ((value, textured), right) in row.iter_mut().zip(&self.textured).zip(&self.right) {
+            if value.is_nan() {
+                continue;
+            }
+            if *textured {
                 last = *value;
-            } else if !value.is_nan() && !is_between(*value, last, self.right[x]) {
+            } else if !is_between(*value, last, *right) {
                 *value = f32::NAN;
                 dropped += 1;
             }
         }
         dropped
+    }
+}
+
+/// Finds the pixels across which brightness changes by at least so much: half of
+/// Sobel's sum. The first and the last column have a neighbour on one side only.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [bool]) {
+    let rise = |a: u8, b: u8| i16::from(b).wrapping_sub(i16::from(a));
+    let slope = |[a, b, c]: [i16; 3]| a.wrapping_add(b.wrapping_mul(2)).wrapping_add(c).abs() / 2;
+    let last = textured.len() - 1;
+    for (x, from, to) in [(0, 0, 1.min(last)), (last, last.saturating_sub(1), last)] {
+        textured[x] = slope(rows.map(|row| rise(row[from], row[to]))) >= i16::from(least);
+    }
+    let Some(middle) = textured.get_mut(1..last) else { return };
+    let width = middle.len();
+    let [a, b, c] = rows.map(|row| (&row[..width], &row[2..width + 2]));
+    for (x, textured) in middle.iter_mut().enumerate() {
+        let rises = [a, b, c].map(|(left, right)| rise(left[x], right[x]));
+        *textured = slope(rises) >= i16::from(least);
     }
 }
 
