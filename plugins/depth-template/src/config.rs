@@ -51,6 +51,9 @@ pub struct DepthTemplateConfig {
     pub relief_free_m: f64,
     /// Depth error of the person at which the cost is full, m.
     pub relief_full_m: f64,
+    /// What is added to both per square metre of depth, 1/m: the noise of stereo,
+    /// `sigma_px / (f B)` for a scatter of its disparity, grows with the square.
+    pub relief_per_m2: f64,
     /// Part of the person's pixels that must have a reading, 0 to 1.
     pub min_foreground_valid: f64,
     /// Largest cost of a newcomer, and of a track that is not confirmed yet.
@@ -105,6 +108,7 @@ impl Default for DepthTemplateConfig {
             foreground_weight: 0.3,
             relief_free_m: 0.15,
             relief_full_m: 0.30,
+            relief_per_m2: 0.0,
             min_foreground_valid: 0.5,
             discover_cost: 0.16,
             follow_cost: 0.30,
