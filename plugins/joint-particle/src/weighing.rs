@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point2, Vector2, Vector5};
+use nalgebra::{Point2, Vector2, Vector3, Vector5};
 use tagalong_core::{Frame, Likelihood, Person, Result, TrackId};
 
 use crate::config::{Chosen, Config, Method};
@@ -105,6 +105,15 @@ impl<'a> Look<'a> {
             group.restart(person, sighting, self.config.from_detection);
         }
         group.draw(person, &self.eye, self.config);
+    }
+
+    /// P3: during a short occlusion people move parallel to the image.
+    fn hold_depth(&self, group: &mut Group) {
+        let view = self.frame.camera.robot_from_camera * Vector3::z();
+        let along = view.xy().try_normalize(1e-6).unwrap_or_else(Vector2::x);
+        let dt_s = self.frame.motion.dt;
+        let people = 0..group.people();
+        people.for_each(|p| group.column_mut(p).for_each(|particle| particle.hold(&along, dt_s)));
     }
 
     fn draw_everybody(&self, group: &mut Group) {
@@ -220,6 +229,9 @@ impl Lateral {
 fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     let config = look.config;
     let before = group.likelihoods.clone();
+    if config.hold_depth {
+        look.hold_depth(group);
+    }
     look.draw_everybody(group);
     let lateral = Lateral::new(group, look);
     let all: Vec<Place> = (0..group.rows()).map(|row| lateral.place(group.row(row))).collect();
