@@ -14,6 +14,7 @@ use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
 use crate::sightings::{Rules, Sighting};
+use crate::weighing::Metered;
 use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role, StepError};
 
 /// Plugins and the rules by which they work together.
@@ -243,11 +244,13 @@ impl Pipeline {
             .map(|(id, s)| Matched { id, detection: &s.detection })
             .collect();
         let unmatched = now.sightings.undecided_detections();
-        let likelihood = likelihood(&self.detectors);
+        let metered = likelihood(&self.detectors).map(Metered::new);
+        let likelihood = metered.as_ref().map(|metered| metered as &dyn Likelihood);
         let evidence =
             Evidence { frame: now.frame, matched: &matched, unmatched: &unmatched, likelihood };
         let Slot { name, plugin: filter } = &mut self.filter;
         now.supports = guard(name, now.frame.index, || filter.update(&evidence))?;
+        now.report.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
         self.check_supports(now);
         Ok(())
     }

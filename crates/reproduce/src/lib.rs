@@ -13,8 +13,10 @@
 //! in the file of its system and name it in the system's list.
 
 mod findings;
+mod joint_particle;
 mod lab;
 mod stereo_svm_ekf;
+mod scatter;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};
