@@ -15,8 +15,8 @@
 mod findings;
 mod joint_particle;
 mod lab;
-mod stereo_svm_ekf;
 mod scatter;
+mod stereo_svm_ekf;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};

@@ -80,7 +80,10 @@ pub struct Config {
     pub min_support: f64,
     /// by this where a detector found the person in this very frame, ...
     pub min_support_found: f64,
-    /// ... and a detector found the person not longer ago than this, s.
+    /// ... and by this where no detector found the person for longer than
+    /// `trust_s`: furniture explains a little of the image, a person most of it.
+    pub min_support_unfound: f64,
+    /// Time for which a silhouette is trusted that no detector finds, s.
     pub trust_s: f64,
     /// Upper-body squares are enlarged by this part of their size before they
     /// are asked whether they overlap.
@@ -136,8 +139,8 @@ impl Default for Config {
             kld_error: 0.05,
             kld_quantile: 2.33,
             marginalise: true,
-            acceleration_noise: 0.8,
-            position_noise: 0.08,
+            acceleration_noise: 0.25,
+            position_noise: 0.05,
             height_noise: 0.04,
             velocity_noise: 0.0,
             initial_velocity_variance: 1.0,
@@ -146,6 +149,7 @@ impl Default for Config {
             from_detection: 0.1,
             min_support: 2.0,
             min_support_found: 0.0,
+            min_support_unfound: 6.0,
             trust_s: 1.0,
             inflate: 0.1,
             split_m: 0.6,
@@ -186,6 +190,7 @@ impl Config {
             ("from_detection", self.from_detection, 0.0, 1.0),
             ("min_support", self.min_support, -1e6, 1e6),
             ("min_support_found", self.min_support_found, -1e6, 1e6),
+            ("min_support_unfound", self.min_support_unfound, -1e6, 1e6),
             ("trust_s", self.trust_s, 0.0, 1e9),
             ("inflate", self.inflate, 0.0, 10.0),
             ("split_m", self.split_m, 0.0, 100.0),

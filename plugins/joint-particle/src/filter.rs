@@ -155,11 +155,12 @@ impl JointParticle {
     /// furniture or the edge of the image.
     fn is_seen(&self, id: TrackId, nats: f64) -> bool {
         let unfound_s = self.unfound_s.get(&id).copied().unwrap_or_default();
-        let enough = match unfound_s {
-            0.0 => self.config.min_support_found,
-            _ => self.config.min_support,
-        };
-        nats > enough && unfound_s <= self.config.trust_s
+        let config = &self.config;
+        nats > match unfound_s {
+            0.0 => config.min_support_found,
+            s if s <= config.trust_s => config.min_support,
+            _ => config.min_support_unfound,
+        }
     }
 
     fn estimate(&self, group: &Group, person: usize, camera: &Camera) -> Estimate {
