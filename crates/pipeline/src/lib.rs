@@ -55,6 +55,7 @@ mod settings;
 mod sightings;
 #[cfg(test)]
 mod tests;
+mod weighing;
 
 pub use assignment::assign;
 pub use boundary::StepError;
@@ -67,3 +68,4 @@ pub use settings::{
     OcclusionSettings, Overlap, PipelineSettings, PluginSettings, RobotSettings, Role,
 };
 pub use tagalong_stereo::StereoSettings;
+pub use weighing::Weighing;

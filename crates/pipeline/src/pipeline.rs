@@ -1,5 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use nalgebra::Point3;
 use tagalong_core::{
     Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched,
     Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
@@ -13,6 +14,7 @@ use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
 use crate::sightings::{Rules, Sighting};
+use crate::weighing::Metered;
 use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role, StepError};
 
 /// Plugins and the rules by which they work together.
@@ -266,11 +268,13 @@ impl Pipeline {
             .map(|(id, s)| Matched { id, detection: &s.detection })
             .collect();
         let unmatched = now.sightings.undecided_detections();
-        let likelihood = likelihood(&self.detectors);
+        let metered = likelihood(&self.detectors).map(Metered::new);
+        let likelihood = metered.as_ref().map(|metered| metered as &dyn Likelihood);
         let evidence =
             Evidence { frame: now.frame, matched: &matched, unmatched: &unmatched, likelihood };
         let Slot { name, plugin: filter } = &mut self.filter;
         now.supports = guard(name, now.frame.index, || filter.update(&evidence))?;
+        now.report.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
         self.check_supports(now);
         Ok(())
     }
@@ -320,8 +324,13 @@ impl Pipeline {
     fn start_newcomers(&mut self, now: &mut Now<'_>) -> Result<BTreeSet<TrackId>, StepError> {
         let mut started = BTreeSet::new();
         let start_score = self.settings.lifecycle.start_score;
+        let known = self.supported_places(now)?;
         for index in now.sightings.undecided() {
             let sighting = now.sightings.get(index).clone();
+            if self.is_known(&known, &sighting.detection) {
+                now.sightings.settle(index, Fate::Dropped("tracked already"));
+                continue;
+            }
             if sighting.detection.score < start_score {
                 now.sightings.settle(index, Fate::Dropped(sighting.score_test(start_score)));
                 continue;
@@ -340,6 +349,20 @@ impl Pipeline {
             started.insert(id);
         }
         Ok(started)
+    }
+
+    /// Where the people are whom this frame supports.
+    fn supported_places(&mut self, now: &mut Now<'_>) -> Result<Vec<Point3<f64>>, StepError> {
+        let mut estimates = self.estimates(now)?;
+        estimates.retain(|id, _| now.supports.contains_key(id));
+        Ok(estimates.values().map(|estimate| estimate.person.position).collect())
+    }
+
+    /// True for a sighting at the place of somebody who is seen there: what it
+    /// started would be a duplicate.
+    fn is_known(&self, known: &[Point3<f64>], detection: &Detection) -> bool {
+        let away = |place: &Point3<f64>| (place - detection.position).xy().norm();
+        known.iter().any(|place| away(place) < self.settings.lifecycle.duplicate_m)
     }
 
     /// What this frame says of a track.

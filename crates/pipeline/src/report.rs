@@ -1,5 +1,7 @@
 use tagalong_core::{Command, Detection, Funnel, Stamp, Track, TrackId};
 
+use crate::Weighing;
+
 /// What became of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
@@ -76,7 +78,10 @@ pub struct FrameReport {
     pub command: Option<Command>,
     /// Normalised innovation squared and its degrees of freedom.
     pub nis: Vec<(TrackId, f64, u32)>,
-    /// Milliseconds per stage. The only part that differs between two runs.
+    /// What was asked of the likelihood.
+    pub weighing: Weighing,
+    /// Milliseconds per stage. With those of `weighing` the only part that
+    /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
     /// Tracks that ended in this frame.
     pub ended: Vec<TrackId>,
@@ -94,6 +99,7 @@ impl FrameReport {
             target: None,
             command: None,
             nis: Vec::new(),
+            weighing: Weighing::default(),
             timings: Vec::new(),
             ended: Vec::new(),
         }

@@ -13,7 +13,9 @@
 //! in the file of its system and name it in the system's list.
 
 mod findings;
+mod joint_particle;
 mod lab;
+mod scatter;
 mod stereo_svm_ekf;
 mod table;
 

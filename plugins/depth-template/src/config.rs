@@ -81,6 +81,10 @@ pub struct DepthTemplateConfig {
     /// is wholly visible (role `weigh`), nats. Neighbouring pixels err alike, so
     /// that this is far below the number of pixels.
     pub likelihood_nats: f64,
+    /// Depth error of a person in an imagined scene at which a pixel no longer
+    /// speaks for the person, m; never less than three standard deviations of
+    /// the depth.
+    pub likelihood_tolerance_m: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
     /// Standard deviation of the head's place across the viewing ray, m.
@@ -120,6 +124,7 @@ impl Default for DepthTemplateConfig {
             follow_radius_m: 0.6,
             background_percentile: 90.0,
             likelihood_nats: 12.0,
+            likelihood_tolerance_m: 0.3,
             max_rows: 28,
             sigma_across_m: 0.03,
             sigma_depth_m: 0.03,
