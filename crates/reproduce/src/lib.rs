@@ -14,7 +14,7 @@
 
 mod findings;
 mod lab;
-mod stereo_svm_ekf;
+mod stereo;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};
