@@ -16,7 +16,7 @@ mod findings;
 mod joint_particle;
 mod lab;
 mod scatter;
-mod stereo_svm_ekf;
+mod stereo;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};

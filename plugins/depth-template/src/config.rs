@@ -1,6 +1,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::bank::Direction;
+
 /// How a silhouette is compared with the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -43,6 +45,9 @@ pub struct DepthTemplateConfig {
     pub max_head_width_m: f64,
     /// Part of the probes below the head that must show a body, 0 to 1.
     pub min_body: f64,
+    /// Body directions that have a template: `along` (from the front or the
+    /// back), `left`, `right`. P4 has three and does not say which.
+    pub directions: Vec<Direction>,
     /// How silhouettes are compared.
     pub cost: Cost,
     /// Weight of the person's pixels against those beside the person, 0 to 1.
@@ -108,6 +113,7 @@ impl Default for DepthTemplateConfig {
             min_head_width_m: 0.09,
             max_head_width_m: 0.36,
             min_body: 0.7,
+            directions: Direction::ALL.to_vec(),
             cost: Cost::Robust,
             foreground_weight: 0.3,
             relief_free_m: 0.15,
