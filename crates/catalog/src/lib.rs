@@ -13,6 +13,7 @@ pub fn register(registry: &mut Registry) {
     tagalong_color_texture::register(registry);
     tagalong_depth_template::register(registry);
     tagalong_ekf::register(registry);
+    tagalong_image_kalman::register(registry);
     tagalong_joint_particle::register(registry);
     tagalong_last_seen::register(registry);
     tagalong_recorded_detections::register(registry);
