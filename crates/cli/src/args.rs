@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
+use crate::reproduce::ReproduceArgs;
 use crate::simulate::SimulateArgs;
 use crate::train::TrainArgs;
 use crate::trials::TrialsArgs;
@@ -69,6 +70,9 @@ pub enum Command {
     /// Compares pipelines on many draws of the same scenes, in memory
     #[command(after_help = TRIALS_HELP)]
     Trials(TrialsArgs),
+    /// Prints the tables of a published system beside ours
+    #[command(after_help = REPRODUCE_HELP)]
+    Reproduce(ReproduceArgs),
     /// Makes the model file of a plugin, and its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
@@ -92,6 +96,15 @@ Needs no file, and half a minute.
 Examples:
   tagalong demo
   tagalong demo -o another-demo --seed 3";
+
+const REPRODUCE_HELP: &str = "\
+Everything is drawn with seeds of the test split. The whole of a system takes minutes to an hour.
+
+Examples:
+  tagalong reproduce
+  tagalong reproduce stereo-svm-ekf --quick
+  tagalong reproduce stereo-svm-ekf --only occlusion --format json
+  tagalong reproduce stereo-svm-ekf -o tables";
 
 const TRIALS_HELP: &str = "\
 Prints MOTA, IDF1, position errors, and how often everybody is tracked in all frames, with intervals

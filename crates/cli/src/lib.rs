@@ -23,6 +23,7 @@ mod needs;
 mod outcome;
 mod overlay;
 mod realism;
+mod reproduce;
 mod run;
 mod sample;
 mod scoring;
@@ -76,6 +77,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Demo(args) => demo::demo(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => simulate::simulate(args, registry),
+        Command::Reproduce(args) => reproduce::reproduce(args, registry),
         Command::Trials(args) => trials::trials(args, registry),
         Command::Train(args) => train::train(args, registry),
         Command::Inspect { log, config, format } => {

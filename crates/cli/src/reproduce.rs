@@ -1,0 +1,236 @@
+//! `tagalong reproduce`: the tables of a published system beside ours.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use tagalong_core::Registry;
+use tagalong_reproduce::{Experiment, Findings, Lab, Progress, SYSTEMS, System, Table, system};
+
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::simulate;
+
+/// The arguments of `tagalong reproduce`.
+#[derive(Args, Debug)]
+pub struct ReproduceArgs {
+    /// The published system; without one, lists the systems and their tables.
+    pub system: Option<String>,
+    /// Only these of its tables and figures.
+    #[arg(long, num_args = 1.., value_name = "NAME")]
+    pub only: Vec<String>,
+    /// A minute's version: fewer draws, wider intervals.
+    #[arg(long)]
+    pub quick: bool,
+    /// Draws each scene with this many seeds of the test split.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub seeds: Option<u64>,
+    /// Trials that run at once; apart from times, the results are the same
+    /// [default: as many as there are cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub jobs: Option<u8>,
+    /// The folder with the configs and scenes.
+    #[arg(long, value_name = "DIR", default_value = "configs")]
+    pub configs: PathBuf,
+    /// The folder with real logs and labelled images; what needs them is left
+    /// out where there is none.
+    #[arg(long, value_name = "DIR", default_value = "../shared/data")]
+    pub data: PathBuf,
+    /// Writes the tables (JSON, Markdown) and pictures (SVG) to this folder.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// How to print.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: TableFormat,
+}
+
+/// How tables are printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum TableFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// For pages.
+    Markdown,
+    /// For programs.
+    Json,
+}
+
+/// An experiment with what it found.
+#[derive(Serialize)]
+struct Found {
+    experiment: &'static str,
+    #[serde(flatten)]
+    findings: Findings,
+}
+
+/// Does the experiments and prints their tables.
+///
+/// # Errors
+/// Unknown names and unreadable configs are exit code 2; plugins that fail are 1.
+pub fn reproduce(args: &ReproduceArgs, registry: &Registry) -> Outcome {
+    let Some(name) = &args.system else { return list(args.format) };
+    let system = system(name).ok_or_else(|| unknown(name, SYSTEMS.iter().map(|s| s.name)))?;
+    let experiments = chosen(system, &args.only)?;
+    let bar = Bar::new();
+    let lab = lab(args, registry, &bar);
+    let mut all = Vec::new();
+    for experiment in experiments {
+        let findings = (experiment.run)(&lab).map_err(Failure::failed)?;
+        bar.clear();
+        show(&findings.tables, args.format)?;
+        all.push(Found { experiment: experiment.name, findings });
+    }
+    if let Some(folder) = &args.output {
+        write(folder, &all)?;
+    }
+    if args.format == TableFormat::Json {
+        print(&json(&all))?;
+    }
+    Ok(Ended::Well)
+}
+
+fn lab<'a>(args: &ReproduceArgs, registry: &'a Registry, progress: &'a Bar) -> Lab<'a> {
+    Lab {
+        registry,
+        configs: args.configs.clone(),
+        data: args.data.is_dir().then(|| args.data.clone()),
+        quick: args.quick,
+        seeds: args.seeds,
+        jobs: simulate::threads(args.jobs),
+        progress,
+    }
+}
+
+fn list(format: TableFormat) -> Outcome {
+    if format == TableFormat::Json {
+        let names = |system: &System| -> Vec<&str> {
+            system.experiments.iter().map(|experiment| experiment.name).collect()
+        };
+        let all: Vec<_> = SYSTEMS.iter().map(|system| (system.name, names(system))).collect();
+        print(&(serde_json::to_string_pretty(&all).unwrap_or_default() + "\n"))?;
+        return Ok(Ended::Well);
+    }
+    for system in SYSTEMS {
+        print(&format!("{}  {}\n", system.name, system.about))?;
+        for Experiment { name, about, .. } in system.experiments {
+            print(&format!("  {name:<12} {about}\n"))?;
+        }
+    }
+    Ok(Ended::Well)
+}
+
+/// The experiments that are asked for, in the order of the system.
+fn chosen(system: &System, only: &[String]) -> Result<Vec<&'static Experiment>, Failure> {
+    let all = system.experiments;
+    let is_there = |name: &&String| all.iter().any(|experiment| experiment.name == **name);
+    if let Some(name) = only.iter().find(|name| !is_there(name)) {
+        return Err(unknown(name, all.iter().map(|experiment| experiment.name)));
+    }
+    let asked = |e: &&Experiment| only.is_empty() || only.iter().any(|name| name == e.name);
+    Ok(all.iter().filter(asked).collect())
+}
+
+fn unknown(name: &str, known: impl Iterator<Item = &'static str>) -> Failure {
+    let known: Vec<&str> = known.collect();
+    Failure::usage(format!("nothing is called `{name}`; there are: {}", known.join(", ")))
+}
+
+fn show(tables: &[Table], format: TableFormat) -> Result<(), Failure> {
+    tables.iter().try_for_each(|table| match format {
+        TableFormat::Text => print(&format!("{}\n", table.text())),
+        TableFormat::Markdown => print(&format!("{}\n", table.markdown())),
+        TableFormat::Json => Ok(()),
+    })
+}
+
+fn json(all: &[Found]) -> String {
+    serde_json::to_string_pretty(all).unwrap_or_default() + "\n"
+}
+
+fn write(folder: &Path, all: &[Found]) -> Result<(), Failure> {
+    let save = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text)
+            .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
+    };
+    fs::create_dir_all(folder)
+        .map_err(|error| Failure::failed(format!("cannot make {}: {error}", folder.display())))?;
+    let tables = all.iter().flat_map(|found| &found.findings.tables);
+    let pages: Vec<String> = tables.map(Table::markdown).collect();
+    save("tables.json", &json(all))?;
+    save("tables.md", &pages.join("\n"))?;
+    for picture in all.iter().flat_map(|found| &found.findings.pictures) {
+        save(&format!("{}.svg", picture.name), &picture.svg)?;
+    }
+    say(&format!("the tables and pictures are in {}", folder.display()));
+    Ok(())
+}
+
+/// A progress bar that starts anew with each experiment; hidden where there is no
+/// terminal.
+struct Bar(ProgressBar);
+
+impl Bar {
+    fn new() -> Self {
+        let bar = ProgressBar::new(0);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {eta}") {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    fn clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+impl Progress for Bar {
+    fn begin(&self, steps: usize, what: &str) {
+        self.0.reset();
+        self.0.set_length(steps as u64);
+        self.0.set_message(what.to_owned());
+    }
+
+    fn step(&self) {
+        self.0.inc(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn system() -> &'static System {
+        &SYSTEMS[0]
+    }
+
+    #[test]
+    fn all_experiments_unless_some_are_named() {
+        let all = chosen(system(), &[]).unwrap();
+        assert_eq!(all.len(), system().experiments.len());
+        let first = all[0].name.to_owned();
+        assert_eq!(chosen(system(), std::slice::from_ref(&first)).unwrap()[0].name, first);
+    }
+
+    #[test]
+    fn an_unknown_name_is_answered_with_those_there_are() {
+        let failure = chosen(system(), &["alchemy".to_owned()]).unwrap_err();
+        assert_eq!(failure.code, 2);
+        assert!(failure.message.contains(system().experiments[0].name), "{}", failure.message);
+    }
+
+    #[test]
+    fn files_hold_tables_and_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = Table { title: "A table".into(), ..Table::default() };
+        let picture = tagalong_reproduce::Picture { name: "plot".into(), svg: "<svg/>".into() };
+        let findings = Findings { tables: vec![table], pictures: vec![picture] };
+        write(folder.path(), &[Found { experiment: "one", findings }]).unwrap();
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+        assert!(read("tables.md").contains("**A table**"));
+        assert!(read("tables.json").contains("\"experiment\": \"one\""));
+        assert_eq!(read("plot.svg"), "<svg/>");
+    }
+}

@@ -1,0 +1,185 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tagalong_core::Registry;
+use tagalong_sim::{Scene, Split, Variant};
+use tagalong_trials::{Contender, Trial, TrialError, each};
+
+/// Fewest seeds of a quick experiment.
+const FEWEST: u64 = 3;
+/// A quick experiment has one seed where a whole one has this many.
+const QUICK: u64 = 12;
+
+/// Why an experiment has no findings.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReproduceError {
+    /// A config, scene or log that cannot be read.
+    #[error("cannot read {path}: {why}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// What the system said.
+        why: String,
+    },
+    /// A scene with a mistake, shown with its place.
+    #[error("{0}")]
+    Scene(String),
+    /// A pipeline that failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+    /// Anything else.
+    #[error("{0}")]
+    Other(String),
+}
+
+/// Hears how far an experiment is.
+pub trait Progress: Sync {
+    /// So many steps begin.
+    fn begin(&self, steps: usize, what: &str);
+    /// One is done.
+    fn step(&self);
+}
+
+/// What experiments work with.
+pub struct Lab<'a> {
+    /// All plugins.
+    pub registry: &'a Registry,
+    /// The folder with the configs, and with the folder of `scenes`.
+    pub configs: PathBuf,
+    /// The folder with real logs and labelled images, if there is one.
+    pub data: Option<PathBuf>,
+    /// A minute's version.
+    pub quick: bool,
+    /// As many seeds a scene, where the user says so.
+    pub seeds: Option<u64>,
+    /// Trials that run at once.
+    pub jobs: usize,
+    /// Who hears how far it is.
+    pub progress: &'a dyn Progress,
+}
+
+impl Lab<'_> {
+    /// Seeds for an experiment that takes `whole` where nobody asks for fewer.
+    pub fn seeds(&self, whole: u64) -> u64 {
+        match self.seeds {
+            Some(asked) => asked,
+            None if self.quick => (whole / QUICK).max(FEWEST).min(whole),
+            None => whole,
+        }
+    }
+
+    /// A scene of the split `test` with the seeds `0..seeds`; `set` replaces
+    /// values by dotted keys, like `camera.kind=stereo`.
+    ///
+    /// # Errors
+    /// A scene that cannot be read, or a mistake in it or in `set`.
+    pub fn scenes(
+        &self,
+        name: &str,
+        set: &[(&str, &str)],
+        seeds: u64,
+    ) -> Result<Vec<Scene>, ReproduceError> {
+        let path = self.configs.join("scenes").join(format!("{name}.toml"));
+        let text = read(&path)?;
+        let set: Vec<(String, String)> =
+            set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let scene = |seed| {
+            let variant = Variant { seed: Some(seed), split: Some(Split::Test), set: set.clone() };
+            Scene::parse_with(&text, &variant).map_err(|error| {
+                ReproduceError::Scene(error.render(&path.display().to_string(), &text))
+            })
+        };
+        (0..seeds).map(scene).collect()
+    }
+
+    /// The shipped configs of these names.
+    ///
+    /// # Errors
+    /// A config that cannot be read.
+    pub fn contenders(&self, names: &[&str]) -> Result<Vec<Contender>, ReproduceError> {
+        names.iter().map(|name| self.contender(name)).collect()
+    }
+
+    /// The shipped config of this name.
+    ///
+    /// # Errors
+    /// A config that cannot be read.
+    pub fn contender(&self, name: &str) -> Result<Contender, ReproduceError> {
+        let text = read(&self.configs.join(format!("{name}.toml")))?;
+        Ok(Contender { folder: self.configs.clone(), ..Contender::new(name, text) })
+    }
+
+    /// Takes all contenders over all scenes and keeps what `keep` makes of each
+    /// trial, in the order of the scenes.
+    ///
+    /// # Errors
+    /// As [`each`].
+    pub fn trials<T: Send>(
+        &self,
+        what: &str,
+        scenes: &[Scene],
+        contenders: &[Contender],
+        keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
+    ) -> Result<Vec<T>, ReproduceError> {
+        self.progress.begin(scenes.len(), what);
+        let done = |_| self.progress.step();
+        Ok(each(scenes, contenders, self.registry, self.jobs, keep, done)?)
+    }
+}
+
+fn read(path: &Path) -> Result<String, ReproduceError> {
+    let unreadable = |error: std::io::Error| ReproduceError::Unreadable {
+        path: path.display().to_string(),
+        why: error.to_string(),
+    };
+    fs::read_to_string(path).map_err(unreadable)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Silent;
+
+    impl Progress for Silent {
+        fn begin(&self, _: usize, _: &str) {}
+        fn step(&self) {}
+    }
+
+    fn lab<'a>(registry: &'a Registry, quick: bool, seeds: Option<u64>) -> Lab<'a> {
+        let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+        Lab { registry, configs, data: None, quick, seeds, jobs: 1, progress: &Silent }
+    }
+
+    #[test]
+    fn seeds_are_as_asked_or_few_when_quick() {
+        let registry = Registry::default();
+        assert_eq!(lab(&registry, false, None).seeds(100), 100);
+        assert_eq!(lab(&registry, true, None).seeds(100), 8);
+        assert_eq!(lab(&registry, true, None).seeds(20), FEWEST);
+        assert_eq!(lab(&registry, true, None).seeds(1), 1);
+        assert_eq!(lab(&registry, true, Some(7)).seeds(100), 7);
+    }
+
+    #[test]
+    fn scenes_are_of_the_test_split_and_take_replacements() {
+        let registry = Registry::default();
+        let lab = lab(&registry, false, None);
+        let scenes = lab.scenes("full-occlusion", &[("people.1.hide_s", "0.5")], 2).unwrap();
+        assert!(scenes.iter().all(|scene| scene.split() == Split::Test));
+        assert_ne!(scenes[0].seed, scenes[1].seed);
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let registry = Registry::default();
+        let lab = lab(&registry, false, None);
+        let error = lab.scenes("nowhere", &[], 1).unwrap_err().to_string();
+        assert!(error.contains("nowhere.toml"), "{error}");
+        let error = lab.contender("nothing").unwrap_err().to_string();
+        assert!(error.contains("nothing.toml"), "{error}");
+        let error = lab.scenes("crowd", &[("camera.colours", "1")], 1).unwrap_err().to_string();
+        assert!(error.contains("colours"), "{error}");
+    }
+}

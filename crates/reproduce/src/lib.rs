@@ -1,0 +1,22 @@
+//! The tables of the published systems, beside what Tagalong finds.
+//!
+//! A [`System`] is a published tracker; each of its [`Experiment`]s stands for one
+//! table or figure of its paper and makes [`Findings`]: tables with rows of
+//! published numbers and rows of ours, and pictures. What the experiments need,
+//! drawn scenes, configs, pipelines over many seeds, they get from the [`Lab`].
+//!
+//! Scenes are drawn from the split `test`: settings and models are chosen on
+//! others. The same seeds give the same tables on any number of threads, apart
+//! from times.
+//!
+//! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>`
+//! in the file of its system and name it in the system's list.
+
+mod findings;
+mod lab;
+mod stereo_svm_ekf;
+mod table;
+
+pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};
+pub use lab::{Lab, Progress, ReproduceError};
+pub use table::{Cell, Row, Table};

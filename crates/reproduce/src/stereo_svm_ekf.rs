@@ -1,0 +1,89 @@
+//! P4: template detection in stereo depth, verified by an SVM, tracked by an EKF.
+
+use tagalong_eval::wilson;
+use tagalong_trials::{Occlusion, Outcome, Trial, TrialError, occlusions, outcome};
+
+use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
+
+/// The system.
+pub const SYSTEM: System = System {
+    name: "stereo-svm-ekf",
+    about: "P4: templates in stereo depth, an SVM that verifies, an extended Kalman filter",
+    experiments: &[Experiment {
+        name: "occlusion",
+        about: "Fig. 7: who is fully hidden is known again, by gap and duration",
+        run: occlusion,
+    }],
+};
+
+/// Confidence of intervals.
+const CONFIDENCE: f64 = 0.95;
+/// Ends of the bins of time hidden, s.
+const HIDDEN_S: [f64; 4] = [0.0, 1.0, 2.0, 4.0];
+/// Ends of the bins of the gap between the two people, m.
+const GAP_M: [f64; 3] = [0.0, 1.1, 2.0];
+/// Pipelines, the published one first.
+const PIPELINES: [&str; 3] = ["stereo-ekf", "depth-ekf-as-printed", "naive"];
+
+/// One occlusion, and how each contender came through.
+struct Case {
+    hidden_s: f64,
+    gap_m: f64,
+    outcomes: Vec<Outcome>,
+}
+
+fn occlusion(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let scenes = lab.scenes("full-occlusion", &[("camera.kind", "stereo")], lab.seeds(100))?;
+    let contenders = lab.contenders(&PIPELINES)?;
+    let cases = lab.trials("full occlusions", &scenes, &contenders, cases)?;
+    Ok(table(&cases.into_iter().flatten().collect::<Vec<_>>(), scenes.len()).into())
+}
+
+fn cases(trial: Trial) -> Result<Vec<Case>, TrialError> {
+    let case = |occlusion: Occlusion| Case {
+        hidden_s: occlusion.duration_s,
+        gap_m: occlusion.gap_m,
+        outcomes: trial.runs.iter().map(|run| outcome(&trial, run, &occlusion)).collect(),
+    };
+    Ok(occlusions(&trial).into_iter().map(case).collect())
+}
+
+fn table(cases: &[Case], draws: usize) -> Table {
+    let mut rows = Vec::new();
+    for gap in GAP_M.windows(2) {
+        for hidden in HIDDEN_S.windows(2) {
+            let within = |case: &&Case| {
+                (gap[0]..gap[1]).contains(&case.gap_m)
+                    && (hidden[0]..hidden[1]).contains(&case.hidden_s)
+            };
+            let some: Vec<&Case> = cases.iter().filter(within).collect();
+            let name = format!("gap {}-{} m, hidden {}-{} s", gap[0], gap[1], hidden[0], hidden[1]);
+            rows.push(Row::ours(name, row(&some)));
+        }
+    }
+    rows.push(Row::ours("all", row(&cases.iter().collect::<Vec<_>>())));
+    Table {
+        title: "Full occlusions after which the person keeps the number, % (P4, Fig. 7)".into(),
+        columns: PIPELINES.iter().map(|name| (*name).to_owned()).collect(),
+        rows,
+        notes: vec![
+            format!("{draws} drawn stereo scenes; {} occlusions; Wilson intervals", cases.len()),
+            "The paper shows one occlusion in pictures and counts none.".into(),
+            "Who had no track before the occlusion is not counted.".into(),
+        ],
+    }
+}
+
+/// Share of kept identities, for each pipeline.
+fn row(cases: &[&Case]) -> Vec<Cell> {
+    let share = |at: usize| {
+        let tracked = || cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);
+        let kept = tracked().filter(|outcome| *outcome == Outcome::Kept).count() as u64;
+        Cell::estimate(wilson(kept, tracked().count() as u64, CONFIDENCE), 2).percent()
+    };
+    (0..PIPELINES.len()).map(share).collect()
+}
+
+fn tracked_before(outcome: &Outcome) -> bool {
+    *outcome != Outcome::Untracked
+}

@@ -1,0 +1,210 @@
+use serde::Serialize;
+use tagalong_eval::Interval;
+
+/// A table: published numbers and ours.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Table {
+    /// What it shows, with the table or figure of the paper.
+    pub title: String,
+    /// The columns after the names of the rows, with units.
+    pub columns: Vec<String>,
+    /// The rows.
+    pub rows: Vec<Row>,
+    /// What has to be known to believe the numbers: what was drawn, how often,
+    /// what an interval is, what is not comparable.
+    pub notes: Vec<String>,
+}
+
+/// One row.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Row {
+    /// What the numbers belong to.
+    pub name: String,
+    /// They are the paper's, not ours.
+    pub published: bool,
+    /// One a column.
+    pub cells: Vec<Cell>,
+}
+
+/// One number, perhaps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Cell {
+    /// The number; none where there is nothing to say.
+    pub value: Option<f64>,
+    /// Standard deviation of what the number is the mean of.
+    pub deviation: Option<f64>,
+    /// Its confidence interval, of 95 %.
+    pub interval: Option<[f64; 2]>,
+    /// Digits behind the point.
+    #[serde(skip)]
+    pub digits: usize,
+}
+
+impl Cell {
+    /// A number, shown with so many digits behind the point.
+    pub fn number(value: f64, digits: usize) -> Self {
+        Self { value: value.is_finite().then_some(value), digits, ..Self::default() }
+    }
+
+    /// Mean and standard deviation; nothing of nothing.
+    pub fn mean(values: &[f64], digits: usize) -> Self {
+        if values.is_empty() {
+            return Self::default();
+        }
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+        Self { deviation: Some(variance.sqrt()), ..Self::number(mean, digits) }
+    }
+
+    /// An estimate with its interval, if there is one.
+    pub fn estimate(interval: Option<Interval>, digits: usize) -> Self {
+        interval.map_or_else(Self::default, |Interval { estimate, lower, upper }| Self {
+            interval: Some([lower, upper]),
+            ..Self::number(estimate, digits)
+        })
+    }
+
+    /// The same times a hundred: a fraction as per cent.
+    #[must_use]
+    pub fn percent(self) -> Self {
+        let times = |value: f64| 100.0 * value;
+        Self {
+            value: self.value.map(times),
+            deviation: self.deviation.map(times),
+            interval: self.interval.map(|ends| ends.map(times)),
+            digits: self.digits.saturating_sub(2),
+        }
+    }
+
+    fn text(&self) -> String {
+        let Some(value) = self.value else { return "-".to_owned() };
+        let digits = self.digits;
+        let mut text = format!("{value:.digits$}");
+        if let Some(deviation) = self.deviation {
+            text += &format!(" \u{b1} {deviation:.digits$}");
+        }
+        if let Some([lower, upper]) = self.interval {
+            text += &format!(" [{lower:.digits$}, {upper:.digits$}]");
+        }
+        text
+    }
+}
+
+impl Row {
+    /// Numbers that were measured.
+    pub fn ours(name: impl Into<String>, cells: Vec<Cell>) -> Self {
+        Self { name: name.into(), published: false, cells }
+    }
+
+    /// Numbers of a paper.
+    pub fn published(name: impl Into<String>, cells: Vec<Cell>) -> Self {
+        Self { name: name.into(), published: true, cells }
+    }
+
+    fn title(&self) -> String {
+        if self.published { format!("published: {}", self.name) } else { self.name.clone() }
+    }
+}
+
+impl Table {
+    /// For a terminal.
+    pub fn text(&self) -> String {
+        let lines = self.lines();
+        let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
+        let widest = |at: usize| {
+            lines.iter().filter_map(|line| line.get(at)).map(|cell| cell.chars().count()).max()
+        };
+        let widths: Vec<usize> = (0..columns).map(|at| widest(at).unwrap_or(0)).collect();
+        let mut out = format!("{}\n", self.title);
+        for line in &lines {
+            let cells = line.iter().zip(&widths).enumerate().map(|(at, (cell, width))| match at {
+                0 => format!("{cell:<width$}"),
+                _ => format!("{cell:>width$}"),
+            });
+            out += format!("  {}", cells.collect::<Vec<_>>().join("  ")).trim_end();
+            out.push('\n');
+        }
+        self.notes.iter().for_each(|note| out += &format!("  * {note}\n"));
+        out
+    }
+
+    /// For a page of the documentation.
+    pub fn markdown(&self) -> String {
+        let mut lines = self.lines().into_iter();
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let mut out = format!("**{}**\n\n", self.title);
+        if let Some(header) = lines.next() {
+            let rule = vec!["---".to_owned(); header.len()];
+            out += &(line(header) + &line(rule));
+        }
+        lines.for_each(|cells| out += &line(cells));
+        self.notes.iter().for_each(|note| out += &format!("\n* {note}"));
+        out + if self.notes.is_empty() { "" } else { "\n" }
+    }
+
+    /// Header and rows, as texts.
+    fn lines(&self) -> Vec<Vec<String>> {
+        let header = std::iter::once(String::new()).chain(self.columns.iter().cloned());
+        let line = |row: &Row| {
+            std::iter::once(row.title()).chain(row.cells.iter().map(Cell::text)).collect()
+        };
+        std::iter::once(header.collect()).chain(self.rows.iter().map(line)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let interval = Interval { estimate: 0.971, lower: 0.93, upper: 0.988 };
+        Table {
+            title: "Crossings (P3, Table I)".into(),
+            columns: vec!["success %".into(), "ms".into()],
+            rows: vec![
+                Row::published("625", vec![Cell::number(97.8, 1), Cell::number(247.0, 0)]),
+                Row::ours(
+                    "all",
+                    vec![Cell::estimate(Some(interval), 3).percent(), Cell::default()],
+                ),
+            ],
+            notes: vec!["drawn".into()],
+        }
+    }
+
+    #[test]
+    fn text_has_aligned_columns() {
+        let expected = [
+            "Crossings (P3, Table I)",
+            "                          success %   ms",
+            "  published: 625               97.8  247",
+            "  all             97.1 [93.0, 98.8]    -",
+            "  * drawn\n",
+        ];
+        assert_eq!(table().text(), expected.join("\n"));
+    }
+
+    #[test]
+    fn markdown_is_a_table() {
+        let markdown = table().markdown();
+        assert!(markdown.contains("|  | success % | ms |\n| --- | --- | --- |\n"), "{markdown}");
+        assert!(markdown.contains("| all | 97.1 [93.0, 98.8] | - |\n"), "{markdown}");
+        assert!(markdown.ends_with("\n* drawn\n"));
+    }
+
+    #[test]
+    fn means_have_deviations_and_nothing_has_none() {
+        let cell = Cell::mean(&[1.0, 3.0], 1);
+        assert_eq!(cell.text(), "2.0 \u{b1} 1.0");
+        assert_eq!(Cell::mean(&[], 1), Cell::default());
+        assert_eq!(Cell::number(f64::NAN, 1).text(), "-");
+    }
+
+    #[test]
+    fn json_says_who_measured() {
+        let json = serde_json::to_value(table()).unwrap();
+        assert_eq!(json["rows"][0]["published"], true);
+        assert_eq!(json["rows"][1]["cells"][0]["interval"][1], 98.8);
+    }
+}
