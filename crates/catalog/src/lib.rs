@@ -11,6 +11,7 @@ use tagalong_core::Registry;
 pub fn register(registry: &mut Registry) {
     tagalong_arc_follow::register(registry);
     tagalong_color_texture::register(registry);
+    tagalong_compressive::register(registry);
     tagalong_depth_template::register(registry);
     tagalong_ekf::register(registry);
     tagalong_image_kalman::register(registry);
