@@ -1,9 +1,9 @@
 use serde::Serialize;
 
-use crate::{Lab, ReproduceError, Table, stereo_svm_ekf};
+use crate::{Lab, ReproduceError, Table, rgbd_compressive, stereo_svm_ekf};
 
 /// All systems, in the order of the papers.
-pub const SYSTEMS: &[System] = &[stereo_svm_ekf::SYSTEM];
+pub const SYSTEMS: &[System] = &[rgbd_compressive::SYSTEM, stereo_svm_ekf::SYSTEM];
 
 /// A published system.
 #[derive(Clone, Copy, Debug)]

@@ -14,6 +14,7 @@
 
 mod findings;
 mod lab;
+mod rgbd_compressive;
 mod stereo_svm_ekf;
 mod table;
 

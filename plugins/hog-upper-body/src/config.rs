@@ -101,7 +101,7 @@ impl Default for Training {
             other_penalty: 0.01,
             epochs: 40,
             random_windows: 10,
-            mining_rounds: 3,
+            mining_rounds: 2,
             mined_per_picture: 40,
             mined_per_round: 8000,
         }
