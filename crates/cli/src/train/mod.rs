@@ -11,6 +11,7 @@ mod held_out;
 mod photos;
 mod rooms;
 mod seen;
+mod windows;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::{
-    ConfigError, Context, Detection, Example, Frame, Registry, Trainer, Verifier, Wheels,
+    ConfigError, Context, Detection, Example, Frame, Kind, Registry, Trainer, Verifier, Wheels,
 };
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::Split;
@@ -122,6 +123,9 @@ struct Session<'a> {
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let session = Session::new(args, registry)?;
     let mut trainer = session.trainer()?;
+    if registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector) {
+        return windows::train(&session, trainer.as_mut());
+    }
     let mut card = Card::new(args, session.sources());
     let mut doubter: Option<Box<dyn Verifier>> = None;
     for round in 0..=session.plan.rounds {
@@ -331,6 +335,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
         "color-texture" => "[training]\ntrees = [25, 50]",
+        "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
         _ => "",
     };
     text.parse().unwrap_or_default()
