@@ -8,6 +8,7 @@
 
 mod card;
 mod held_out;
+mod panorama;
 mod photos;
 mod rooms;
 mod seen;
@@ -50,7 +51,8 @@ const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 /// The arguments of `tagalong train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
-    /// The plugin to train, for example `svm-patch`.
+    /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
+    /// of the detector `omni-appearance`.
     pub plugin: String,
     /// Where the model goes; its card is written beside it
     /// [default: configs/models/<plugin>.toml].
@@ -122,6 +124,9 @@ struct Session<'a> {
 /// that cannot be read or written are 1.
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let session = Session::new(args, registry)?;
+    if args.plugin == panorama::NAME {
+        return panorama::train(&session, args);
+    }
     let mut trainer = session.trainer()?;
     if registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector) {
         return windows::train(&session, trainer.as_mut());
