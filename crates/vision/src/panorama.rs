@@ -194,7 +194,8 @@ impl Unwrapping {
     /// # Errors
     /// As [`Unwrapper::new`] and [`Unwrapper::apply`].
     pub fn apply(&mut self, panorama: &Panorama, raw: &Images) -> Result<Images> {
-        let colour = raw.colour.as_deref().map(|image| unwrapped(&mut self.colour, panorama, image));
+        let colour =
+            raw.colour.as_deref().map(|image| unwrapped(&mut self.colour, panorama, image));
         let grey = raw.grey.as_deref().map(|image| unwrapped(&mut self.grey, panorama, image));
         Ok(Images { colour: colour.transpose()?, grey: grey.transpose()?, ..Images::default() })
     }

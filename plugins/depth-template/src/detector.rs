@@ -8,7 +8,7 @@ use tagalong_core::{
 use tagalong_vision::RowSums;
 
 use crate::NAME;
-use crate::bank::{Bank, Direction, Pose};
+use crate::bank::{Bank, Pose};
 use crate::candidates::{body_below, boundary, head_width_m, is_below_something, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
 use crate::matching::{Match, Matcher};

@@ -104,7 +104,12 @@ impl Belief {
 
     /// Equations 7 to 9, in Joseph form; returns the normalised innovation
     /// squared. Where rounding has spoilt the covariance, nothing changes.
-    pub(crate) fn correct(&mut self, z: &Vector2<f64>, r: &Matrix2<f64>, form: Form) -> Option<f64> {
+    pub(crate) fn correct(
+        &mut self,
+        z: &Vector2<f64>,
+        r: &Matrix2<f64>,
+        form: Form,
+    ) -> Option<f64> {
         let innovation = z - self.position();
         let s = (self.position_covariance() + r).cholesky()?;
         let nis = innovation.dot(&s.solve(&innovation));

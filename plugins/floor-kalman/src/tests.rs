@@ -35,8 +35,7 @@ fn sighting(x: f64, y: f64) -> Detection {
 fn see(filter: &mut FloorKalman, detection: &Detection) -> (f64, u32) {
     let matched = [Matched { id: ID, detection }];
     let frame = frame();
-    let evidence =
-        Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
     filter.update(&evidence).unwrap()[&ID].nis.unwrap()
 }
 
@@ -61,11 +60,7 @@ fn after_a_walk(config: Config) -> FloorKalman {
 
 #[test]
 fn the_printed_filter_is_the_printed_filter() {
-    let config = Config {
-        form: Form::Still,
-        measurement: Measurement::Fixed,
-        ..Config::default()
-    };
+    let config = Config { form: Form::Still, measurement: Measurement::Fixed, ..Config::default() };
     let mut filter = FloorKalman::new(config).unwrap();
     filter.start(ID, &sighting(1.0, 2.0));
     let r = Matrix2::new(0.011, -0.004, -0.004, 0.020);

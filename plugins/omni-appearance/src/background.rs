@@ -128,7 +128,8 @@ impl Background {
             let seen = colours.chunks_exact(3).zip(taken.iter().zip(taken_s));
             for ((mean, level), (colour, (taken, taken_s))) in pixels.zip(seen) {
                 *taken_s = if *taken == 0 { 0.0 } else { *taken_s + passed_s };
-                let part = if *taken == 0 { part } else { f32::from(u8::from(*taken_s > pace.absorb_s)) };
+                let part =
+                    if *taken == 0 { part } else { f32::from(u8::from(*taken_s > pace.absorb_s)) };
                 for i in 0..3 {
                     mean[i] += part * (f32::from(colour[i]) - mean[i]);
                     level[i] = (mean[i] + 0.5) as u8;

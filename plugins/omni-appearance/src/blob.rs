@@ -76,7 +76,8 @@ impl Blob {
         let width = columns.len();
         let height = |column: usize| f64::from(columns[column]);
         let fullest = run.columns(width).map(height).fold(0.0, f64::max);
-        let core: Vec<usize> = run.columns(width).filter(|c| height(*c) >= CORE * fullest).collect();
+        let core: Vec<usize> =
+            run.columns(width).filter(|c| height(*c) >= CORE * fullest).collect();
         let rows: Vec<u32> = counts
             .solid
             .chunks_exact(width)

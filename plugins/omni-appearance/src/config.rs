@@ -3,7 +3,9 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result};
 
 /// How the distance follows from what is seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Distance {
     /// The network of the paper: three features, four hidden units.
@@ -106,7 +108,10 @@ impl Config {
     pub(crate) fn check(&self) -> Result<()> {
         let [low, high] = self.head_height_m;
         let rules = [
-            ((1..=10_000).contains(&self.background_frames), "background_frames must be 1 to 10000"),
+            (
+                (1..=10_000).contains(&self.background_frames),
+                "background_frames must be 1 to 10000",
+            ),
             ((0.0..=100.0).contains(&self.threshold_sigmas), "threshold_sigmas must be 0 to 100"),
             ((0.0..=1e6).contains(&self.adapt_s), "adapt_s must be 0 to 1000000"),
             ((0.0..=1e6).contains(&self.absorb_s), "absorb_s must be 0 to 1000000"),
@@ -118,7 +123,10 @@ impl Config {
             ((0.0..1.0).contains(&self.valley), "valley must be 0 to less than 1"),
             ((1..=100).contains(&self.max_people), "max_people must be 1 to 100"),
             (-1.0 < low && low < high && high < 4.0, "head_height_m must grow, from -1 to 4"),
-            ((0.01..=90.0).contains(&self.sigma_bearing_deg), "sigma_bearing_deg must be 0.01 to 90"),
+            (
+                (0.01..=90.0).contains(&self.sigma_bearing_deg),
+                "sigma_bearing_deg must be 0.01 to 90",
+            ),
             ((0.001..=10.0).contains(&self.sigma_height_m), "sigma_height_m must be 0.001 to 10"),
             ((0.5..=1000.0).contains(&self.wall_m), "wall_m must be 0.5 to 1000"),
             (self.slack_px.iter().all(|px| *px <= 20), "slack_px must be at most 20"),

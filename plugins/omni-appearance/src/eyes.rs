@@ -110,7 +110,13 @@ impl Scene {
     }
 
     /// Looks at an image: part of the background at first, then who differs.
-    fn see(&mut self, frame: &Frame, grey: bool, config: &Config, funnel: &mut Funnel) -> Result<()> {
+    fn see(
+        &mut self,
+        frame: &Frame,
+        grey: bool,
+        config: &Config,
+        funnel: &mut Funnel,
+    ) -> Result<()> {
         self.blobs.clear();
         if grey {
             self.grey.clear();
@@ -161,7 +167,8 @@ impl Scene {
             return Ok(());
         }
         // What is carried along by the odometry must be renewed soon.
-        let after = if self.uncertain { config.adapt_s.min(MOVING_ADAPT_S) } else { config.adapt_s };
+        let after =
+            if self.uncertain { config.adapt_s.min(MOVING_ADAPT_S) } else { config.adapt_s };
         let dt_s = frame.motion.dt as f32;
         let absorb_s = if config.absorb_s > 0.0 { config.absorb_s as f32 } else { f32::INFINITY };
         let part = if after > 0.0 { dt_s / after as f32 } else { 0.0 };

@@ -126,9 +126,7 @@ impl Head {
     /// Distance from the axis of the mirror, and its standard deviation, m.
     pub fn distance(&self, features: &Features, camera: &View<'_>, how: Distance) -> (f64, f64) {
         let (distance, sigma) = match how {
-            Distance::Network => {
-                (self.network.answer(&features.values()), self.network_sigma)
-            }
+            Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
             Distance::Rich => (self.rich.answer(&camera.inputs(features)), self.rich_sigma),
             Distance::Ridge => (self.ridge.answer(features), self.ridge_sigma),
             Distance::Analytic => {

@@ -36,7 +36,11 @@ impl Network {
             let (weights, bias) = split(weights);
             weights.iter().enumerate().map(|(i, w)| w * input(i)).sum::<f64>() + bias
         };
-        self.hidden.iter().zip(weights).map(|(unit_weights, w)| w * unit(unit_weights).tanh()).sum::<f64>()
+        self.hidden
+            .iter()
+            .zip(weights)
+            .map(|(unit_weights, w)| w * unit(unit_weights).tanh())
+            .sum::<f64>()
             + bias
     }
 

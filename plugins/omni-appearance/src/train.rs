@@ -299,7 +299,8 @@ impl Data<'_> {
             reach * (state as f64 / u64::MAX as f64 * 2.0 - 1.0)
         };
         let reach = 1.0 / (count as f64 + 1.0).sqrt();
-        let unit = |weight: &mut dyn FnMut(f64) -> f64| (0..=count).map(|_| weight(reach)).collect();
+        let unit =
+            |weight: &mut dyn FnMut(f64) -> f64| (0..=count).map(|_| weight(reach)).collect();
         let hidden_weights = (0..hidden).map(|_| unit(&mut weight)).collect();
         let output = (0..=hidden).map(|_| weight(0.5)).collect();
         Network { mean, scale, target: [target, deviation], hidden: hidden_weights, output }
@@ -486,7 +487,10 @@ impl Trainer for DistanceTrainer {
         };
         let model = model(&self.collector.samples, geometry, &self.training, self.seed)?;
         progress(1.0);
-        Ok(Fitted { model: model.to_text(), figures: figures(&self.collector, &self.training, self.seed)? })
+        Ok(Fitted {
+            model: model.to_text(),
+            figures: figures(&self.collector, &self.training, self.seed)?,
+        })
     }
 }
 
@@ -512,7 +516,8 @@ fn figures(collector: &Collector, training: &Training, seed: u64) -> Result<toml
         let rest: Vec<Sample> = rest.into_iter().copied().collect();
         let fitted = head(&rest, training, seed)?;
         for (sum, (_, how)) in sums.iter_mut().zip(WAYS) {
-            *sum += test.iter().map(|s| (s.distance(&fitted, how) - s.distance_m).abs()).sum::<f64>();
+            *sum +=
+                test.iter().map(|s| (s.distance(&fitted, how) - s.distance_m).abs()).sum::<f64>();
         }
     }
     for (sum, (key, _)) in sums.iter().zip(WAYS) {

@@ -146,7 +146,13 @@ fn along(row: &[u8], out: &mut [u8], slack: usize, pick: impl Fn(u8, u8) -> u8 +
     }
 }
 
-fn down(from: &[u8], out: &mut Vec<u8>, stride: usize, slack: usize, pick: impl Fn(u8, u8) -> u8 + Copy) {
+fn down(
+    from: &[u8],
+    out: &mut Vec<u8>,
+    stride: usize,
+    slack: usize,
+    pick: impl Fn(u8, u8) -> u8 + Copy,
+) {
     out.clear();
     out.extend_from_slice(from);
     for shift in (1..=slack).map(|rows| rows * stride).filter(|shift| *shift < from.len()) {
@@ -200,13 +206,8 @@ mod tests {
     #[test]
     fn the_floor_is_where_the_odometry_says() {
         let camera = camera();
-        let motion = Motion {
-            dt: 0.3,
-            forward: 0.15,
-            left: -0.05,
-            turn: 0.2,
-            covariance: Matrix3::zeros(),
-        };
+        let motion =
+            Motion { dt: 0.3, forward: 0.15, left: -0.05, turn: 0.2, covariance: Matrix3::zeros() };
         assert!(is_moving(&motion) && !is_moving(&Motion::at_rest(0.3)));
         let before = room(&camera, &nalgebra::Isometry2::identity(), 3.5);
         let after = room(&camera, &motion.isometry(), 3.5);

@@ -34,7 +34,14 @@ pub(super) struct Assembler {
 
 impl Assembler {
     pub(super) fn new() -> Self {
-        Self { index: 0, camera: None, registration: None, unwrapping: Unwrapping::default(), previous: None, misfit: None }
+        Self {
+            index: 0,
+            camera: None,
+            registration: None,
+            unwrapping: Unwrapping::default(),
+            previous: None,
+            misfit: None,
+        }
     }
 
     /// The camera of the last frame.
@@ -120,9 +127,7 @@ impl Assembler {
         let [columns, rows] = plan.input.panorama;
         let panorama = Panorama { mirror, columns, rows };
         let unwrapped = self.unwrapping.apply(&panorama, raw);
-        unwrapped
-            .map_err(|error| tally.lose("images_not_unwrapped", || error.to_string()))
-            .ok()
+        unwrapped.map_err(|error| tally.lose("images_not_unwrapped", || error.to_string())).ok()
     }
 
     /// The camera at the moment of an image; the last one while it stays.
