@@ -13,8 +13,11 @@
 //! in the file of its system and name it in the system's list.
 
 mod findings;
+mod joint_particle;
 mod lab;
-mod stereo_svm_ekf;
+mod rgbd_compressive;
+mod scatter;
+mod stereo;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};

@@ -42,6 +42,9 @@ use tagalong_core::Registry;
 /// The name of this plugin in configs.
 pub const NAME: &str = "omni-appearance";
 
+/// The name under which `tagalong train` knows the model of the distance.
+pub const TRAINER: &str = "omni-distance";
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
     registry.detector(
@@ -50,7 +53,7 @@ pub fn register(registry: &mut Registry) {
         OmniAppearance::new,
     );
     #[cfg(feature = "train")]
-    registry.trainer(NAME, |config: Config, context| {
+    registry.trainer(TRAINER, |config: Config, context| {
         train::DistanceTrainer::new(config, context.seed)
     });
 }
