@@ -2,11 +2,13 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a broken bench may stop loudly")]
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use tagalong_core::{GreyImage, RgbImage};
+use tagalong_core::{Camera, Frame, Funnel, GreyImage, Images, Lens, Motion, RgbImage, Stamp};
+use tagalong_omni_appearance::{Config, Eyes};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
-use tagalong_vision::Unwrapper;
+use tagalong_vision::{Unwrapper, Unwrapping};
 
 const SCENE: &str = include_str!("../../configs/scenes/omni-people.toml");
 
@@ -53,9 +55,46 @@ fn unwrapping(c: &mut Criterion) {
     });
 }
 
+/// What a frame costs a tracker: unwrapping it and finding three people in it.
+fn detecting(c: &mut Criterion) {
+    let mut world = simulation();
+    let panorama = *world.panorama().expect("the scene has a mirror");
+    let camera = Arc::new(Camera {
+        lens: Lens::Panorama(panorama),
+        width: panorama.columns,
+        height: panorama.rows,
+        robot_from_camera: world.camera().robot_from_camera,
+    });
+    let mut unwrapping = Unwrapping::default();
+    let mut frame = |index: u64, raw: &Images| {
+        let images = unwrapping.apply(&panorama, raw).expect("the mirror is right");
+        let stamp = Stamp::from_nanos(index * 333_000_000);
+        Frame::new(index, stamp, Arc::clone(&camera), Motion::at_rest(0.333), images)
+    };
+    let config = Config { background_frames: 12, ..Config::default() };
+    let mut eyes = Eyes::new(config).expect("the settings are right");
+    let mut see = |frame: &Frame| {
+        let blobs = eyes.look(frame, &mut Funnel::default());
+        eyes.adapt(frame).and(blobs).expect("the frame is in colour").len()
+    };
+    let shots: Vec<Shot> = std::iter::from_fn(|| next(&mut world)).take(40).collect();
+    let mut index = 0;
+    for shot in &shots {
+        index += 1;
+        see(&frame(index, &shot.images));
+    }
+    let last = &shots.last().expect("the scene is long enough").images;
+    c.bench_function("unwrap colour and find people, 480x120", |b| {
+        b.iter(|| {
+            index += 1;
+            see(&frame(index, black_box(last)))
+        });
+    });
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = drawing, unwrapping
+    targets = drawing, unwrapping, detecting
 }
 criterion_main!(benches);

@@ -8,6 +8,7 @@ use crate::demo::DemoArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::simulate::SimulateArgs;
 use crate::train::TrainArgs;
+use crate::triangulate::TriangulateArgs;
 use crate::trials::TrialsArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
@@ -76,6 +77,9 @@ pub enum Command {
     /// Makes the model file of a plugin, and its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
+    /// Measures where a coloured hat is, by fixed cameras in a log
+    #[command(after_help = TRIANGULATE_HELP)]
+    Triangulate(TriangulateArgs),
     /// Says what a log contains and what a pipeline could use of it
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -114,6 +118,15 @@ Examples:
   tagalong trials
   tagalong trials configs/scenes/crossing.toml --seeds 50 --configs configs/depth-ekf.toml
   tagalong trials --format json | jq .gains";
+
+const TRIANGULATE_HELP: &str = "\
+Calibrates the cameras by places that are known, and says how far measured places are from known
+ones that it was not told.
+
+Examples:
+  tagalong simulate configs/scenes/omni-hat.toml -o runs/hat.mcap
+  tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml -o runs/hat.csv
+  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --hue 240";
 
 const RUN_HELP: &str = "\
 Files: tracks.mcap (open it in Rerun or Foxglove), tracks.csv (MOTChallenge columns, pixels),

@@ -32,6 +32,7 @@ mod simulate;
 mod suggest;
 mod train;
 mod trials;
+mod triangulate;
 
 use std::process::ExitCode;
 
@@ -77,6 +78,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Demo(args) => demo::demo(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => simulate::simulate(args, registry),
+        Command::Triangulate(args) => triangulate::triangulate(args),
         Command::Reproduce(args) => reproduce::reproduce(args, registry),
         Command::Trials(args) => trials::trials(args, registry),
         Command::Train(args) => train::train(args, registry),

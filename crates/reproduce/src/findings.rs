@@ -1,10 +1,17 @@
 use serde::Serialize;
 
-use crate::{Lab, ReproduceError, Table, joint_particle, rgbd_compressive, stereo};
+use crate::{
+    Lab, ReproduceError, Table, joint_particle, omni_appearance, rgbd_compressive, stereo,
+};
 
 /// All systems, in the order of the papers.
-pub const SYSTEMS: &[System] =
-    &[stereo::STEREO_EKF, rgbd_compressive::SYSTEM, joint_particle::SYSTEM, stereo::STEREO_SVM_EKF];
+pub const SYSTEMS: &[System] = &[
+    stereo::STEREO_EKF,
+    rgbd_compressive::SYSTEM,
+    joint_particle::SYSTEM,
+    stereo::STEREO_SVM_EKF,
+    omni_appearance::SYSTEM,
+];
 
 /// A published system.
 #[derive(Clone, Copy, Debug)]

@@ -15,6 +15,7 @@
 mod findings;
 mod joint_particle;
 mod lab;
+mod omni_appearance;
 mod rgbd_compressive;
 mod scatter;
 mod stereo;
