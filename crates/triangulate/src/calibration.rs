@@ -1,4 +1,4 @@
-use nalgebra::{Matrix5, Point2, Vector5};
+use nalgebra::{Matrix4, Point2, Vector4};
 
 use crate::station::wrapped;
 use crate::{Sight, Station};
@@ -25,12 +25,12 @@ pub struct Calibrated {
 
 /// Misfits far beyond this hardly count (Cauchy's loss), rad.
 const FORGIVEN_RAD: f64 = 0.01;
-/// A camera with fewer known places is left as it was guessed: it has five unknowns.
+/// A camera with fewer known places is left as it was guessed: it has four unknowns.
 const FEWEST: usize = 6;
 /// Most steps of Levenberg and Marquardt.
 const STEPS: usize = 200;
 
-/// Place, heading, pitch and focal length of each camera, by least squares over
+/// Place, heading and focal length of each camera, by least squares over
 /// its bearings to known places, with Cauchy's loss. The places are known, so
 /// each camera stands for itself.
 pub fn calibrate(guess: &[Station], known: &[Known]) -> Calibrated {
@@ -68,7 +68,7 @@ fn fit(guess: &Station, seen: &[(Point2<f64>, Point2<f64>)]) -> Station {
     for _ in 0..STEPS {
         let (normal, gradient) = equations(&best, seen, unit);
         let damped =
-            normal + Matrix5::from_diagonal(&(normal.diagonal() * damping).add_scalar(1e-12));
+            normal + Matrix4::from_diagonal(&(normal.diagonal() * damping).add_scalar(1e-12));
         let Some(step) = damped.cholesky().map(|c| c.solve(&gradient)) else { break };
         let next = best.with(&(best.parameters(unit) - step), unit);
         let cost = loss(&next, seen);
@@ -93,8 +93,8 @@ fn equations(
     station: &Station,
     seen: &[(Point2<f64>, Point2<f64>)],
     unit: f64,
-) -> (Matrix5<f64>, Vector5<f64>) {
-    let (mut normal, mut gradient) = (Matrix5::zeros(), Vector5::zeros());
+) -> (Matrix4<f64>, Vector4<f64>) {
+    let (mut normal, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
     for s in seen {
         let off = misfit(station, s);
         let slope = derivative(station, s, unit);
@@ -106,7 +106,7 @@ fn equations(
 }
 
 /// Of a misfit by the parameters, by central differences.
-fn derivative(station: &Station, s: &(Point2<f64>, Point2<f64>), unit: f64) -> Vector5<f64> {
+fn derivative(station: &Station, s: &(Point2<f64>, Point2<f64>), unit: f64) -> Vector4<f64> {
     const STEP: f64 = 1e-6;
     let parameters = station.parameters(unit);
     let at = |i: usize, step: f64| {
@@ -114,7 +114,7 @@ fn derivative(station: &Station, s: &(Point2<f64>, Point2<f64>), unit: f64) -> V
         moved[i] += step;
         misfit(&station.with(&moved, unit), s)
     };
-    Vector5::from_fn(|i, _| wrapped(at(i, STEP) - at(i, -STEP)) / (2.0 * STEP))
+    Vector4::from_fn(|i, _| wrapped(at(i, STEP) - at(i, -STEP)) / (2.0 * STEP))
 }
 
 #[cfg(test)]
@@ -149,7 +149,7 @@ mod tests {
 
     fn guess() -> Station {
         let (at, heading_rad) = (Point2::new(0.5, -0.2), 0.65);
-        Station { at, heading_rad, pitch_down_rad: 0.2, focal_px: 210.0, ..station() }
+        Station { at, heading_rad, focal_px: 210.0, ..station() }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Point2, Vector5};
+use nalgebra::{Point2, Vector4};
 
 /// A fixed camera, as far as it matters for bearings: its height does not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,20 +34,19 @@ impl Station {
         way.y.atan2(way.x)
     }
 
-    /// What is calibrated: place (m), heading, pitch (rad), and focal length in
-    /// units of `unit_px`, so that all numbers are of like size.
-    pub(crate) fn parameters(&self, unit_px: f64) -> Vector5<f64> {
-        let focal = self.focal_px / unit_px;
-        Vector5::new(self.at.x, self.at.y, self.heading_rad, self.pitch_down_rad, focal)
+    /// What is calibrated: place (m), heading (rad), and focal length in units of
+    /// `unit_px`, so that all numbers are of like size. The pitch is not: bearings
+    /// to a hat that is always equally high fit any pitch, with another place.
+    pub(crate) fn parameters(&self, unit_px: f64) -> Vector4<f64> {
+        Vector4::new(self.at.x, self.at.y, self.heading_rad, self.focal_px / unit_px)
     }
 
     /// The same camera with other parameters.
-    pub(crate) fn with(&self, parameters: &Vector5<f64>, unit_px: f64) -> Self {
+    pub(crate) fn with(&self, parameters: &Vector4<f64>, unit_px: f64) -> Self {
         Self {
             at: Point2::new(parameters[0], parameters[1]),
             heading_rad: parameters[2],
-            pitch_down_rad: parameters[3],
-            focal_px: (parameters[4] * unit_px).max(1.0),
+            focal_px: (parameters[3] * unit_px).max(1.0),
             ..*self
         }
     }
