@@ -9,7 +9,7 @@ use tagalong_eval::Tally;
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Judge, each};
 
-const CONFIGS: [&str; 2] = ["naive", "depth-ekf"];
+const CONFIGS: [&str; 3] = ["naive", "depth-ekf", "particle-best"];
 
 /// Two people pass before a turning robot, one behind the other; small images,
 /// so that a test can afford them.
