@@ -46,6 +46,7 @@ mod boundary;
 mod clock;
 mod config;
 mod control;
+mod governor;
 mod lifecycle;
 mod now;
 mod occlusion;
@@ -60,6 +61,7 @@ mod weighing;
 pub use assignment::assign;
 pub use boundary::StepError;
 pub use config::{Options, RunSettings};
+pub use governor::{CorridorSettings, GovernorSettings};
 pub use pipeline::Pipeline;
 pub use report::{Candidate, Fate, FrameReport, Outcome};
 pub use settings::{

@@ -2,14 +2,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
 use tagalong_core::{
-    Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched, Motion,
-    Scene, Search, Track, TrackId, Verifier, WheelSpeeds,
+    Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched,
+    Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
 };
 use tagalong_stereo::StereoDepth;
 
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
-use crate::control::{Steering, limited};
+use crate::control::Steering;
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
@@ -83,8 +83,32 @@ impl Pipeline {
         let report = self.process(frame);
         if report.is_err() {
             self.failed = Some(frame.index);
+            if let Some(steering) = &mut self.steering {
+                steering.governor_mut().latch("a plugin failed");
+            }
         }
         report
+    }
+
+    /// What the wheels may do at a time, by the clock of the frames' stamps: the
+    /// last command until it expires, zero after that, after a fault and before
+    /// the first frame. A control loop asks at its own rate. `None` without a
+    /// controller.
+    pub fn command_at(&self, now: Stamp) -> Option<Command> {
+        self.steering.as_ref().map(|steering| steering.governor().at(now))
+    }
+
+    /// Why nothing moves until [`Pipeline::arm`], if so.
+    pub fn fault(&self) -> Option<&'static str> {
+        self.steering.as_ref()?.governor().fault()
+    }
+
+    /// Lets the robot move again after a fault, once a person has looked. A
+    /// plugin that failed stays stopped, and with it the pipeline.
+    pub fn arm(&mut self) {
+        if let Some(steering) = self.steering.as_mut().filter(|_| self.failed.is_none()) {
+            steering.governor_mut().arm();
+        }
     }
 
     /// The stages that [`FrameReport::timings`] names, in their order.
@@ -391,24 +415,11 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        let max_speed_mps = self.settings.robot.max_speed_mps;
-        let ready = steering.is_ready();
-        let target = if ready { steering.choose(&now.report.tracks) } else { None };
-        let confirmed: Vec<Track> =
-            now.report.tracks.iter().filter(|t| t.confirmed).cloned().collect();
-        let scene = Scene {
-            frame: now.frame,
-            target,
-            tracks: &confirmed,
-            wheels: self.settings.robot.wheels(),
-            max_speed_mps,
-        };
-        let name = steering.name.clone();
-        let wanted = contain(&name, now.frame.index, || steering.command(&scene))?;
-        let command = limited(wanted, max_speed_mps);
-        now.report.funnel.drop_many("command not finite", u64::from(command.is_none()));
-        let command = command.filter(|_| target.is_some()).unwrap_or(WheelSpeeds::STOP);
-        now.report.target = target.map(|t| t.id);
+        let (command, target) = steering.steer(now.frame, &now.report.tracks)?;
+        now.report
+            .funnel
+            .drop_many("command not finite", u64::from(command.reason == Reason::NotFinite));
+        now.report.target = target;
         now.report.command = Some(command);
         Ok(())
     }

@@ -1,4 +1,4 @@
-use tagalong_core::{Detection, Funnel, Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{Command, Detection, Funnel, Stamp, Track, TrackId};
 
 use crate::Weighing;
 
@@ -73,9 +73,9 @@ pub struct FrameReport {
     pub tracks: Vec<Track>,
     /// The person to follow, where the pipeline has a controller.
     pub target: Option<TrackId>,
-    /// The controller's command: finite, within the robot's limits, zero
-    /// without a target.
-    pub command: Option<WheelSpeeds>,
+    /// What the wheels may do, where the pipeline has a controller: its wish
+    /// within all limits, zero without a target, and why.
+    pub command: Option<Command>,
     /// Normalised innovation squared and its degrees of freedom.
     pub nis: Vec<(TrackId, f64, u32)>,
     /// What was asked of the likelihood.

@@ -15,8 +15,9 @@
 mod findings;
 mod joint_particle;
 mod lab;
+mod rgbd_compressive;
 mod scatter;
-mod stereo_svm_ekf;
+mod stereo;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};
