@@ -9,7 +9,6 @@ use tagalong_eval::Tally;
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Judge, each};
 
-
 /// Two people pass before a turning robot, one behind the other; small images,
 /// so that a test can afford them.
 const SCENE: &str = "duration_s = 6.0\n[camera]\nwidth = 320\nheight = 240\n\
