@@ -30,11 +30,8 @@ fn frame(camera: &Arc<Camera>, of: Rect, index: u64) -> Frame {
         ((x * x / 64 + y * 7) % 120 + kind) as u8
     });
     let depth = DepthImage::from_fn(640, 480, |x, y| if inside(x, y) { 2.92 } else { 6.0 });
-    let images = Images {
-        grey: Some(Arc::new(grey)),
-        depth: Some(Arc::new(depth)),
-        ..Images::default()
-    };
+    let images =
+        Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
     let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
     Frame::new(index, stamp, Arc::clone(camera), Motion::at_rest(0.04), images)
 }

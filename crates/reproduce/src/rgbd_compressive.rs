@@ -86,7 +86,10 @@ fn table(
     let columns =
         ["LAMR", "recall", "IDF1", "frames/s", "windows a frame", "with depth"].map(String::from);
     let notes = vec![
-        format!("{} drawn scenes; boxes, IoU 0.5; people within 6 m; predicted boxes count", scenes.len()),
+        format!(
+            "{} drawn scenes; boxes, IoU 0.5; people within 6 m; predicted boxes count",
+            scenes.len()
+        ),
         "The paper's curves are pictures; it says that it is better than RJ-MCMC by 8.0 (static) \
          and 8.55 (robot) points."
             .into(),
