@@ -13,9 +13,11 @@
 //! in the file of its system and name it in the system's list.
 
 mod findings;
+mod joint_particle;
 mod lab;
 mod rgbd_compressive;
-mod stereo_svm_ekf;
+mod scatter;
+mod stereo;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};

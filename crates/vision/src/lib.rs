@@ -8,5 +8,5 @@ mod panorama;
 mod row_sums;
 
 pub use integral::Integral;
-pub use panorama::{Blend, Unwrapper};
+pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};

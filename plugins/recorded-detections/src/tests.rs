@@ -75,8 +75,10 @@ fn a_whole_body_can_be_tracked_as_the_box_that_it_is() {
     let config = |body| Config { body, ..Config::default() };
     let mut square = of_file(&text, config(Body::Full)).unwrap();
     let mut whole = of_file(&text, config(Body::FullBox)).unwrap();
-    let (square, whole) =
-        (detect(&mut square, &frame(2, None)).remove(0), detect(&mut whole, &frame(2, None)).remove(0));
+    let (square, whole) = (
+        detect(&mut square, &frame(2, None)).remove(0),
+        detect(&mut whole, &frame(2, None)).remove(0),
+    );
     assert!((whole.region.height / whole.region.width - 3.4).abs() < 1e-6, "{:?}", whole.region);
     assert_eq!((square.position, square.covariance), (whole.position, whole.covariance));
 }
