@@ -1,12 +1,13 @@
-"""Times OpenCV's stereo matchers and ours on one pair, in turns, on one machine.
+"""Times OpenCV's stereo matchers and ours on one pair, in turns, on one thread.
 
-Usage: python benches/peers/stereo_opencv.py LEFT.png RIGHT.png [THREADS]
+Usage: python benches/peers/stereo_opencv.py LEFT.png RIGHT.png
 Needs `pip install opencv-python-headless`. The pair is brought to 512x384; 64
-disparities. Each matcher is judged by its fastest run of several rounds, since
-other programs only ever make it slower.
+disparities. Times are of the processor, not of the clock on the wall, and each is
+the least of several rounds: other programs only ever make it longer.
 """
 
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -14,7 +15,7 @@ import time
 
 import cv2
 
-ROUNDS, RUNS, DISPARITIES, SIZE = 5, 10, 64, (512, 384)
+ROUNDS, RUNS, DISPARITIES, SIZE = 5, 20, 64, (512, 384)
 
 
 def opencv():
@@ -26,24 +27,36 @@ def opencv():
     }
 
 
-def milliseconds(matcher, left, right):
-    best = float("inf")
+def opencv_ms(matcher, left, right):
+    start = time.process_time()
     for _ in range(RUNS):
-        start = time.perf_counter()
         matcher.compute(left, right)
-        best = min(best, 1e3 * (time.perf_counter() - start))
-    return best
+    return 1e3 * (time.process_time() - start) / RUNS
 
 
-def ours(paths, threads):
-    command = ["cargo", "run", "-q", "--release", "-p", "tagalong-stereo", "--example",
-               "time_pair", *paths, str(DISPARITIES), str(RUNS), str(threads)]
-    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    return {name: float(ms) for name, ms in map(str.split, lines.splitlines())}
+def ours_ms(program, method, paths):
+    """What RUNS more pairs cost, so that starting and reading does not count."""
+
+    def seconds(runs):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = [program, method, *paths, str(DISPARITIES), str(runs)]
+        subprocess.run(command, check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    return 1e3 * (seconds(RUNS + 1) - seconds(1)) / RUNS
 
 
-def main(left, right, threads=1):
-    cv2.setNumThreads(int(threads))
+def built():
+    example = ["-q", "--release", "-p", "tagalong-stereo", "--example", "time_pair"]
+    subprocess.run(["cargo", "build", *example], check=True)
+    folder = os.environ.get("CARGO_TARGET_DIR", "target")
+    return os.path.join(folder, "release", "examples", "time_pair")
+
+
+def main(left, right):
+    cv2.setNumThreads(1)
+    program = built()
     pair = [cv2.resize(cv2.imread(path, 0), SIZE, interpolation=cv2.INTER_AREA)
             for path in (left, right)]
     best = {}
@@ -52,8 +65,8 @@ def main(left, right, threads=1):
         for path, image in zip(paths, pair):
             cv2.imwrite(path, image)
         for _ in range(ROUNDS):
-            times = {name: milliseconds(m, *pair) for name, m in opencv().items()}
-            times.update(ours(paths, threads))
+            times = {name: opencv_ms(m, *pair) for name, m in opencv().items()}
+            times |= {name: ours_ms(program, name, paths) for name in ("block", "semi-global")}
             best = {name: min(ms, best.get(name, ms)) for name, ms in times.items()}
     for name, ms in best.items():
         print(f"{name:12} {ms:7.2f} ms")

@@ -13,7 +13,10 @@
 //! in the file of its system and name it in the system's list.
 
 mod findings;
+mod joint_particle;
 mod lab;
+mod rgbd_compressive;
+mod scatter;
 mod stereo;
 mod table;
 

@@ -1,7 +1,7 @@
-//! Times both matchers on a pair of image files: milliseconds of the fastest of
-//! so many runs, one line a method. Used by `benches/peers/stereo_opencv.py`.
+//! Matches a pair of image files so many times, on one thread, and says how long
+//! the fastest took, ms. Used by `benches/peers/stereo_opencv.py`.
 //!
-//! `cargo run --release -p tagalong-stereo --example time_pair LEFT RIGHT DISPARITIES RUNS THREADS`
+//! `cargo run --release -p tagalong-stereo --example time_pair METHOD LEFT RIGHT DISPARITIES RUNS`
 
 #![allow(clippy::print_stdout, reason = "its output is what it is for")]
 
@@ -19,22 +19,24 @@ fn grey(path: &str) -> Result<GreyImage, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [left, right, disparities, runs, threads] = arguments.as_slice() else {
-        return Err("expected: LEFT RIGHT DISPARITIES RUNS THREADS".into());
+    let [method, left, right, disparities, runs] = arguments.as_slice() else {
+        return Err("expected: METHOD LEFT RIGHT DISPARITIES RUNS".into());
+    };
+    let method = match method.as_str() {
+        "block" => Method::Block,
+        "semi-global" => Method::SemiGlobal,
+        other => return Err(format!("no method `{other}`: block or semi-global").into()),
     };
     let (left, right) = (grey(left)?, grey(right)?);
     let (disparities, runs): (usize, usize) = (disparities.parse()?, runs.parse()?);
-    for (name, method) in [("block", Method::Block), ("semi-global", Method::SemiGlobal)] {
-        let settings =
-            StereoSettings { method, threads: threads.parse()?, ..StereoSettings::default() };
-        let mut matcher = Matcher::new(settings)?;
-        let mut best = Duration::MAX;
-        for _ in 0..runs {
-            let start = Instant::now();
-            matcher.disparities(&left, &right, disparities.saturating_sub(1))?;
-            best = best.min(start.elapsed());
-        }
-        println!("{name} {:.3}", best.as_secs_f64() * 1e3);
+    let settings = StereoSettings { method, threads: 1, ..StereoSettings::default() };
+    let mut matcher = Matcher::new(settings)?;
+    let mut best = Duration::MAX;
+    for _ in 0..runs {
+        let start = Instant::now();
+        matcher.disparities(&left, &right, disparities.saturating_sub(1))?;
+        best = best.min(start.elapsed());
     }
+    println!("{:.3}", best.as_secs_f64() * 1e3);
     Ok(())
 }

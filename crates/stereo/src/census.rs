@@ -53,7 +53,7 @@ impl CensusRow {
 }
 
 /// Sets a bit where a neighbour is darker than the centre.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn set_bits(plane: &mut [u8], neighbour: &[u8], centre: &[u8], noise: u8, bit: usize) {
     for ((cell, n), c) in plane.iter_mut().zip(neighbour).zip(centre) {
         *cell |= u8::from(*n < c.saturating_sub(noise)) << bit;

@@ -34,8 +34,8 @@ impl Features {
 /// pixel `x` and the right pixel `x - d` differ. `right` is mirrored. Left of
 /// the image's first column its border goes on.
 #[multiversion::multiversion(targets(
-    "x86_64+avx2",
-    "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg"
+    "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg",
+    "x86_64+avx2"
 ))]
 pub fn bits<const D: usize>(left: &Features, right: &Features, costs: &mut [[u8; D]]) {
     let width = costs.len();
@@ -55,8 +55,8 @@ pub const SLOPE_WEIGHT: u8 = 3;
 /// bits alone make up small patterns where there are none, the differences alone
 /// mind unequal cameras. Weights are such that the Middlebury pairs come out best.
 #[multiversion::multiversion(targets(
-    "x86_64+avx2",
-    "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg"
+    "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg",
+    "x86_64+avx2"
 ))]
 pub fn blend<const D: usize>(left: &Features, right: &Features, costs: &mut [[u8; D]]) {
     let width = costs.len();

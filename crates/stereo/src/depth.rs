@@ -174,6 +174,7 @@ fn count(dropped: &Dropped, funnel: &mut Funnel) {
     funnel.drop_many("stereo pixels: outside of the right image", dropped.outside);
     funnel.drop_many("stereo pixels: not unique", dropped.not_unique);
     funnel.drop_many("stereo pixels: left and right disagree", dropped.left_right);
+    funnel.drop_many("stereo pixels: smooth", dropped.unsupported);
     funnel.drop_many("stereo pixels: speckle", dropped.speckle);
 }
 

@@ -1,15 +1,33 @@
 //! Closes small holes of a surface.
 
-/// Fills holes of at most `most` pixels along a row whose both ends differ by at
-/// most `step`, by a straight line between them; returns how many pixels that
-/// were. What only one camera sees lies between a near and a far surface, and so
-/// stays open.
-pub fn holes(image: &mut [f32], width: usize, most: usize, step: f32) -> u64 {
-    let rows = image.chunks_exact_mut(width.max(1));
-    rows.map(|row| fill_row(row, most, step)).sum()
+/// The greatest holes that are filled.
+#[derive(Clone, Copy, Debug)]
+pub struct Most {
+    /// Pixels along a row ...
+    pub px: usize,
+    /// ... or distances of the cameras, whichever is more: a thing at disparity
+    /// `d` has `d` pixels for each.
+    pub baselines: f32,
+    /// Difference of the ends, px.
+    pub step: f32,
 }
 
-fn fill_row(row: &mut [f32], most: usize, step: f32) -> u64 {
+impl Most {
+    fn spans(&self, hole: usize, from: f32, to: f32) -> bool {
+        let most = (self.px as f32).max(self.baselines * from.min(to));
+        hole as f32 <= most && (to - from).abs() <= self.step
+    }
+}
+
+/// Fills holes along a row that are small enough, by a straight line between them; returns how many pixels that
+/// were. What only one camera sees lies between a near and a far surface, and so
+/// stays open.
+pub fn holes(image: &mut [f32], width: usize, most: &Most) -> u64 {
+    let rows = image.chunks_exact_mut(width.max(1));
+    rows.map(|row| fill_row(row, most)).sum()
+}
+
+fn fill_row(row: &mut [f32], most: &Most) -> u64 {
     let (mut filled, mut last) = (0, None::<usize>);
     for x in 0..row.len() {
         if row[x].is_nan() {
@@ -17,7 +35,7 @@ fn fill_row(row: &mut [f32], most: usize, step: f32) -> u64 {
         }
         if let Some(from) = last {
             let hole = x - from - 1;
-            if (1..=most).contains(&hole) && (row[x] - row[from]).abs() <= step {
+            if hole > 0 && most.spans(hole, row[from], row[x]) {
                 bridge(&mut row[from..=x]);
                 filled += hole as u64;
             }

@@ -52,7 +52,7 @@ impl Level {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn slopes(sides: [(&[u8], &[u8]); 3], slopes: &mut [u8]) {
     let width = slopes.len();
     let [(a, b), (c, d), (e, f)] = sides.map(|(left, right)| (&left[..width], &right[..width]));
@@ -66,7 +66,7 @@ fn slopes(sides: [(&[u8], &[u8]); 3], slopes: &mut [u8]) {
 
 /// The least and the greatest of each value and its means with both neighbours;
 /// `padded` has one more value on both sides.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn extremes(padded: &[u8], least: &mut [u8], most: &mut [u8]) {
     let width = least.len();
     let (left, own, right) = (&padded[..width], &padded[1..=width], &padded[2..width + 2]);

@@ -30,10 +30,12 @@ mod matcher;
 mod paths;
 mod rectification;
 mod reduce;
+mod refine;
 mod rows;
 mod settings;
 mod speckle;
 mod strip;
+mod texture;
 mod window;
 mod winner;
 
@@ -54,6 +56,8 @@ pub struct Dropped {
     pub not_unique: u64,
     /// The right image disagrees: mostly what only one camera sees.
     pub left_right: u64,
+    /// It is smooth, and nothing beside it has its disparity.
+    pub unsupported: u64,
     /// It belongs to a patch that is too small.
     pub speckle: u64,
     /// It was dropped, and then filled from both sides.
@@ -65,6 +69,7 @@ impl Dropped {
         self.outside += other.outside;
         self.not_unique += other.not_unique;
         self.left_right += other.left_right;
+        self.unsupported += other.unsupported;
         self.speckle += other.speckle;
         self.filled += other.filled;
     }

@@ -1,6 +1,7 @@
 use tagalong_core::{Error, GreyImage, Result};
 
 use crate::paths::Penalties;
+use crate::refine::Refiner;
 use crate::settings::MAX_DISPARITIES;
 use crate::speckle::SpeckleFilter;
 use crate::strip::{Output, Pair, Strip};
@@ -17,6 +18,7 @@ pub struct Matcher {
     penalties: Penalties,
     strips: Vec<Strip>,
     speckles: SpeckleFilter,
+    refiner: Refiner,
     disparities: Vec<f32>,
     confidences: Vec<u8>,
 }
@@ -51,6 +53,7 @@ impl Matcher {
             settings,
             strips: Vec::new(),
             speckles: SpeckleFilter::default(),
+            refiner: Refiner::default(),
             disparities: Vec::new(),
             confidences: Vec::new(),
         })
@@ -80,11 +83,20 @@ impl Matcher {
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
         let (pixels, step) = (self.settings.speckle_pixels, self.settings.speckle_step as f32);
         dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
-        dropped.filled = fill::holes(&mut self.disparities, width, self.settings.fill_px, step);
+        let holes = self.holes();
+        dropped.filled = fill::holes(&mut self.disparities, width, &holes);
+        if self.settings.refine_px > 0 {
+            self.refiner.apply([left, right], self.settings.refine_px, &mut self.disparities);
+        }
         let gone = self.disparities.iter().zip(&mut self.confidences);
         gone.filter(|(d, _)| d.is_nan()).for_each(|(_, confidence)| *confidence = 0);
         let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());
         Ok(Disparities { width, values, confidences, dropped })
+    }
+
+    fn holes(&self) -> fill::Most {
+        let StereoSettings { fill_px, fill_baselines, speckle_step, .. } = self.settings;
+        fill::Most { px: fill_px, baselines: fill_baselines as f32, step: speckle_step as f32 }
     }
 
     fn fill(&mut self, left: &GreyImage, right: &GreyImage, max_disparity: usize) -> Result<()> {

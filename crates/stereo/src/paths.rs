@@ -75,65 +75,63 @@ const fn place<const D: usize>(x: usize) -> usize {
     GAP - 1 + x * (D + GAP)
 }
 
-/// Takes the paths from the left, from above and from above on the right to a
-/// row, and writes the sum of their costs.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
-pub fn forward<const D: usize>(
+/// What it costs to jump between pixels of these brightnesses.
+#[inline(always)]
+fn jump(penalties: &Penalties, a: u8, b: u8) -> u8 {
+    penalties.large[usize::from(a.abs_diff(b))]
+}
+
+/// Adds the costs of the paths from the left and from the right to the sums of a
+/// row. A path waits for its own last step; two of them wait together.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+pub fn along<const D: usize>(
     costs: &[[u8; D]],
-    rows: (&[u8], &[u8]),
+    row: &[u8],
     penalties: &Penalties,
-    above: &mut Excess,
-    right: &mut Excess,
     sums: &mut [[u8; D]],
 ) {
-    let (row, row_above) = rows;
-    let mut line = [u8::MAX; 512];
-    line[1..=D].fill(0);
-    for x in 0..costs.len() {
-        let grey = row[x];
-        let large = |other: u8| penalties.large[usize::from(grey.abs_diff(other))];
-        let mut sum = [0; D];
-        let after =
-            step(&costs[x], &line, penalties.small, large(row[x.saturating_sub(1)]), &mut sum);
-        line[1..=D].copy_from_slice(&after);
-        let here = place::<D>(x + 1);
-        let after =
-            step(&costs[x], &above.cells[here..], penalties.small, large(row_above[x]), &mut sum);
-        above.cells[here + 1..=here + D].copy_from_slice(&after);
-        let next = place::<D>(x + 2);
-        let beside = row_above[(x + 1).min(costs.len() - 1)];
-        let after = step(&costs[x], &right.cells[next..], penalties.small, large(beside), &mut sum);
-        right.cells[here + 1..=here + D].copy_from_slice(&after);
-        sums[x] = sum;
+    let last = costs.len() - 1;
+    let mut lines = [[u8::MAX; 512]; 2];
+    for line in &mut lines {
+        line[1..=D].fill(0);
+    }
+    let [from_left, from_right] = &mut lines;
+    for x in 0..=last {
+        let large = jump(penalties, row[x], row[x.saturating_sub(1)]);
+        let after = step(&costs[x], from_left, penalties.small, large, &mut sums[x]);
+        from_left[1..=D].copy_from_slice(&after);
+        let x = last - x;
+        let large = jump(penalties, row[x], row[(x + 1).min(last)]);
+        let after = step(&costs[x], from_right, penalties.small, large, &mut sums[x]);
+        from_right[1..=D].copy_from_slice(&after);
     }
 }
 
-/// Takes the paths from the right and from above on the left to a row, and adds
-/// their costs to the sums.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
-pub fn backward<const D: usize>(
+/// Adds the costs of the paths from above, on the left and on the right too, to
+/// the sums of a row.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+pub fn down<const D: usize>(
     costs: &[[u8; D]],
-    rows: (&[u8], &[u8]),
+    (row, row_above): (&[u8], &[u8]),
     penalties: &Penalties,
-    left: &mut Excess,
+    [left, above, right]: &mut [Excess; 3],
     sums: &mut [[u8; D]],
 ) {
-    let (row, row_above) = rows;
-    let mut line = [u8::MAX; 512];
-    line[1..=D].fill(0);
-    for x in (0..costs.len()).rev() {
-        let grey = row[x];
-        let large = |other: u8| penalties.large[usize::from(grey.abs_diff(other))];
-        let mut sum = sums[x];
-        let beside = row[(x + 1).min(costs.len() - 1)];
-        let after = step(&costs[x], &line, penalties.small, large(beside), &mut sum);
-        line[1..=D].copy_from_slice(&after);
-        let before = place::<D>(x);
-        let beside = row_above[x.saturating_sub(1)];
-        let after =
-            step(&costs[x], &left.cells[before..], penalties.small, large(beside), &mut sum);
-        let here = place::<D>(x + 1);
+    let (last, small) = (costs.len() - 1, penalties.small);
+    // The path from the left writes where it reads next.
+    let mut beside = [u8::MAX; 512];
+    beside[1..=D].fill(0);
+    for x in 0..=last {
+        let (cost, mut sum, here) = (&costs[x], sums[x], place::<D>(x + 1));
+        let large = |from: usize| jump(penalties, row[x], row_above[from]);
+        let after = step(cost, &beside, small, large(x.saturating_sub(1)), &mut sum);
+        beside[1..=D].copy_from_slice(&left.cells[here + 1..=here + D]);
         left.cells[here + 1..=here + D].copy_from_slice(&after);
+        let after = step(cost, &above.cells[here..], small, large(x), &mut sum);
+        above.cells[here + 1..=here + D].copy_from_slice(&after);
+        let next = place::<D>(x + 2);
+        let after = step(cost, &right.cells[next..], small, large((x + 1).min(last)), &mut sum);
+        right.cells[here + 1..=here + D].copy_from_slice(&after);
         sums[x] = sum;
     }
 }

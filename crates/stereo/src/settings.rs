@@ -36,6 +36,10 @@ pub struct StereoSettings {
     /// Largest difference between the disparities of a point in the left and
     /// in the right image, px at the reduced width.
     pub left_right: u8,
+    /// Least change of brightness across a textured pixel (half of Sobel's sum: twice
+    /// the height of a step). Others keep their disparity only between textured
+    /// ones that are as near; 0 keeps them all.
+    pub texture: u8,
     /// Patches of fewer pixels than this are taken for errors.
     pub speckle_pixels: usize,
     /// Neighbours whose disparities differ by at most this are of one patch, px.
@@ -43,6 +47,11 @@ pub struct StereoSettings {
     /// Holes of at most so many pixels along a row are filled, px at the reduced
     /// width, if their ends are of one patch; 0 leaves them.
     pub fill_px: usize,
+    /// So are holes up to this wide, in distances of the two cameras.
+    pub fill_baselines: f64,
+    /// Half the side of the window over which disparities are refined from the
+    /// brightness itself, px at the reduced width; 0 leaves them.
+    pub refine_px: usize,
     /// Block: side of the window, px; odd, at most 9.
     pub window: usize,
     /// Semi-global: penalty of a disparity that changes by one.
@@ -68,12 +77,15 @@ impl Default for StereoSettings {
             noise: 3,
             uniqueness: 0.05,
             left_right: 1,
+            texture: 12,
             speckle_pixels: 100,
             speckle_step: 2.0,
             fill_px: 8,
+            fill_baselines: 1.0,
+            refine_px: 4,
             window: 9,
-            small_penalty: 6,
-            large_penalty: 40,
+            small_penalty: 8,
+            large_penalty: 60,
             edge_penalty: 15,
             max_vertical_px: 1.0,
             threads: 0,
@@ -97,6 +109,8 @@ impl StereoSettings {
                 must((0.0..1.0).contains(&self.uniqueness), "uniqueness", "from 0 to below 1")
             })
             .or_else(|| must(self.speckle_step >= 0.0, "speckle_step", "at least 0"))
+            .or_else(|| must(self.fill_baselines >= 0.0, "fill_baselines", "at least 0"))
+            .or_else(|| must(self.refine_px <= 16, "refine_px", "at most 16"))
             .or_else(|| {
                 let odd = self.window % 2 == 1 && (3..=9).contains(&self.window);
                 must(odd, "window", "3, 5, 7 or 9")

@@ -4,6 +4,7 @@ use tagalong_core::GreyImage;
 
 use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
+use crate::texture::TextureTest;
 use crate::winner::Winner;
 use crate::{Dropped, Method, StereoSettings, cost, paths, window, winner};
 
@@ -25,6 +26,7 @@ pub struct Strip {
     /// Costs of the rows in the window, and their sums.
     ring: Vec<Vec<u8>>,
     columns: Vec<u8>,
+    texture: TextureTest,
     /// What was dropped.
     pub dropped: Dropped,
 }
@@ -67,9 +69,9 @@ impl Strip {
             let grey = (pair.left.row(y), pair.left.row(y.saturating_sub(1)));
             let costs = self.costs.as_chunks::<D>().0;
             let sums = self.sums.as_chunks_mut::<D>().0;
-            let [left, above, right] = &mut self.excess;
-            paths::forward(costs, grey, pair.penalties, above, right, sums);
-            paths::backward(costs, grey, pair.penalties, left, sums);
+            sums.fill([0; D]);
+            paths::along(costs, grey.0, pair.penalties, sums);
+            paths::down(costs, grey, pair.penalties, &mut self.excess, sums);
             if y >= output.first_row {
                 self.decide::<D>(pair, y - output.first_row, output);
             }
@@ -121,7 +123,7 @@ impl Strip {
     /// Writes the disparities of a row, where they stand the tests.
     fn decide<const D: usize>(&mut self, pair: &Pair<'_>, row: usize, output: &mut Output<'_>) {
         let width = pair.left.width();
-        winner::row(self.sums.as_chunks_mut::<D>().0, &mut self.winners);
+        winner::row(self.sums.as_chunks::<D>().0, &mut self.winners);
         self.look_from_right(width);
         let place = row * width..(row + 1) * width;
         let disparities = output.disparities[place.clone()].iter_mut();
@@ -141,6 +143,11 @@ impl Strip {
                 (*disparity, *confidence) = (winner.refined(), (margin * 255.0) as u8);
             }
         }
+        let y = output.first_row + row;
+        let near = [y.saturating_sub(1), y, (y + 1).min(pair.left.height() - 1)];
+        let values = &mut output.disparities[row * width..(row + 1) * width];
+        let (least, rows) = (pair.settings.texture, near.map(|y| pair.left.row(y)));
+        self.dropped.unsupported += self.texture.apply(values, rows, least);
     }
 
     /// The best disparity of each column of the right image, among those that

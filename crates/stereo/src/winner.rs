@@ -32,35 +32,35 @@ impl Winner {
     }
 }
 
-/// Finds the best disparity of each pixel. The sums are used up.
-#[multiversion::multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
-pub fn row<const D: usize>(sums: &mut [[u8; D]], winners: &mut [Winner]) {
-    for (sums, winner) in sums.iter_mut().zip(winners) {
+/// Finds the best disparity of each pixel.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+pub fn row<const D: usize>(sums: &[[u8; D]], winners: &mut [Winner]) {
+    for (sums, winner) in sums.iter().zip(winners) {
         *winner = best(sums);
     }
 }
 
 #[inline(always)]
-fn best<const D: usize>(sums: &mut [u8; D]) -> Winner {
-    let cost = least(sums);
+fn best<const D: usize>(sums: &[u8; D]) -> Winner {
+    let cost = least(sums, |_| true);
     let mut at = u8::MAX;
     for (d, sum) in sums.iter().enumerate() {
         at = at.min(if *sum == cost { d as u8 } else { u8::MAX });
     }
     let d = usize::from(at);
     let beside = [sums[d.saturating_sub(1)], sums[(d + 1).min(D - 1)]];
-    let (from, to) = (d.saturating_sub(1), (d + 1).min(D - 1));
-    sums[from] = u8::MAX;
-    sums[d] = u8::MAX;
-    sums[to] = u8::MAX;
-    Winner { disparity: at, cost, beside, second: least(sums) }
+    let below = at.saturating_sub(1);
+    let near = at.saturating_add(1).wrapping_sub(below);
+    let second = least(sums, |d| d.wrapping_sub(below) > near);
+    Winner { disparity: at, cost, beside, second }
 }
 
+/// The least of those that count.
 #[inline(always)]
-fn least<const D: usize>(cells: &[u8; D]) -> u8 {
+fn least<const D: usize>(cells: &[u8; D], counts: impl Fn(u8) -> bool) -> u8 {
     let mut least = u8::MAX;
-    for cell in cells {
-        least = least.min(*cell);
+    for (d, cell) in cells.iter().enumerate() {
+        least = least.min(if counts(d as u8) { *cell } else { u8::MAX });
     }
     least
 }

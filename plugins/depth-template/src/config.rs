@@ -56,6 +56,9 @@ pub struct DepthTemplateConfig {
     pub relief_free_m: f64,
     /// Depth error of the person at which the cost is full, m.
     pub relief_full_m: f64,
+    /// What is added to both per square metre of depth, 1/m: the noise of stereo,
+    /// `sigma_px / (f B)` for a scatter of its disparity, grows with the square.
+    pub relief_per_m2: f64,
     /// Part of the person's pixels that must have a reading, 0 to 1.
     pub min_foreground_valid: f64,
     /// Largest cost of a newcomer, and of a track that is not confirmed yet.
@@ -83,6 +86,10 @@ pub struct DepthTemplateConfig {
     /// is wholly visible (role `weigh`), nats. Neighbouring pixels err alike, so
     /// that this is far below the number of pixels.
     pub likelihood_nats: f64,
+    /// Depth error of a person in an imagined scene at which a pixel no longer
+    /// speaks for the person, m; never less than three standard deviations of
+    /// the depth.
+    pub likelihood_tolerance_m: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
     /// Standard deviation of the head's place across the viewing ray, m.
@@ -111,6 +118,7 @@ impl Default for DepthTemplateConfig {
             foreground_weight: 0.3,
             relief_free_m: 0.15,
             relief_full_m: 0.30,
+            relief_per_m2: 0.0,
             min_foreground_valid: 0.5,
             discover_cost: 0.16,
             follow_cost: 0.30,
@@ -122,6 +130,7 @@ impl Default for DepthTemplateConfig {
             follow_radius_m: 0.6,
             background_percentile: 90.0,
             likelihood_nats: 12.0,
+            likelihood_tolerance_m: 0.3,
             max_rows: 28,
             sigma_across_m: 0.03,
             sigma_depth_m: 0.03,

@@ -9,7 +9,7 @@ use tagalong_vision::RowSums;
 
 use crate::NAME;
 use crate::bank::{Bank, Pose};
-use crate::candidates::{body_below, boundary, head_width_m, tests_named};
+use crate::candidates::{body_below, boundary, head_width_m, is_below_something, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
@@ -245,10 +245,13 @@ impl DepthTemplate {
         let window = Rect::new(centre.x - reach, centre.y - reach, 2.0 * reach, 2.0 * reach);
         let c = &self.config;
         let limit = if track.confirmed { c.follow_cost } else { c.discover_cost };
-        self.scan(scene, &window, funnel, |_, local| {
+        self.scan(scene, &window, funnel, |this, local| {
             let head = scene.view.head(local.x as f64, local.y as f64, local.depth_m);
-            let near = (head.xy() - expected.xy()).norm() <= radius_m;
-            if near { Ok(()) } else { Err(tests_named::WINDOW) }
+            if (head.xy() - expected.xy()).norm() > radius_m {
+                return Err(tests_named::WINDOW);
+            }
+            let is_below = is_below_something(scene.rows, local, &this.config);
+            if is_below { Err(tests_named::BOUNDARY) } else { Ok(()) }
         });
         let Some(best) = group(&mut self.cells, 2.0 * radius_m).into_iter().next() else {
             return Ok(Vec::new());

@@ -90,8 +90,9 @@ impl Matcher {
         tally.foreground_cost += match self.config.cost {
             Cost::Robust => {
                 let off = |m: f64| RowSums::UNITS / (expected_m - m).max(0.1) - expected;
-                let free = off(self.config.relief_free_m).powi(2);
-                let full = off(self.config.relief_full_m).powi(2);
+                let noise_m = self.config.relief_per_m2 * depth_m * depth_m;
+                let free = off(self.config.relief_free_m + noise_m).powi(2);
+                let full = off(self.config.relief_full_m + noise_m).powi(2);
                 count * ((error / count - free) / (full - free)).clamp(0.0, 1.0)
             }
             Cost::Squared | Cost::Printed => error,
@@ -178,8 +179,11 @@ mod tests {
             seen += fg.len() as f64;
             let e = units / (z + row.relief_m).max(0.1);
             let off = |m: f64| units / (z + row.relief_m - m).max(0.1) - e;
-            let (free, full) =
-                (off(config.relief_free_m).powi(2), off(config.relief_full_m).powi(2));
+            let noise = config.relief_per_m2 * z * z;
+            let (free, full) = (
+                off(config.relief_free_m + noise).powi(2),
+                off(config.relief_full_m + noise).powi(2),
+            );
             let mean_error =
                 fg.iter().map(|v| (v - e).powi(2)).sum::<f64>() / fg.len().max(1) as f64;
             bad += fg.len() as f64 * ((mean_error - free) / (full - free)).clamp(0.0, 1.0);
@@ -219,13 +223,17 @@ mod tests {
         #[test]
         fn runs_equal_pixels(
             pixels in prop::collection::vec(prop_oneof![Just(f32::NAN), 1.5f32..2.5, 3.0f32..6.0], 48 * 40),
-            x in -4i64..52, y in -4i64..44, z in 1.5f64..4.0, roll in -0.4f64..0.4, which in 0usize..3,
+            x in -4i64..52, y in -4i64..44, z in 1.5f64..4.0, noise in 0.0f64..0.03, roll in -0.4f64..0.4, which in 0usize..3,
         ) {
             let rows = RowSums::new(&DepthImage::from_pixels(48, 40, pixels).unwrap(), 1);
             let pose = Pose::nearest(Direction::ALL[which], 0.3, roll, 40.0);
             let mut bank = Bank::new(100);
             let template = bank.template(pose);
-            let config = DepthTemplateConfig { min_foreground_valid: 0.2, ..Default::default() };
+            let config = DepthTemplateConfig {
+                min_foreground_valid: 0.2,
+                relief_per_m2: noise,
+                ..Default::default()
+            };
             let fast = Matcher::new(&config, 300.0).fit(&rows, template, x, y, z).map(|m| m.cost);
             let slow = slow(&config, &rows, template, x, y, z);
             prop_assert_eq!(fast.is_some(), slow.is_some());

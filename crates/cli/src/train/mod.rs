@@ -8,9 +8,11 @@
 
 mod card;
 mod held_out;
+mod panorama;
 mod photos;
 mod rooms;
 mod seen;
+mod windows;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +20,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::{
-    ConfigError, Context, Detection, Example, Frame, Registry, Trainer, Verifier, Wheels,
+    ConfigError, Context, Detection, Example, Frame, Kind, Registry, Trainer, Verifier, Wheels,
 };
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::Split;
@@ -49,7 +51,8 @@ const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 /// The arguments of `tagalong train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
-    /// The plugin to train, for example `svm-patch`.
+    /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
+    /// of the detector `omni-appearance`.
     pub plugin: String,
     /// Where the model goes; its card is written beside it
     /// [default: configs/models/<plugin>.toml].
@@ -121,7 +124,13 @@ struct Session<'a> {
 /// that cannot be read or written are 1.
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let session = Session::new(args, registry)?;
+    if args.plugin == panorama::NAME {
+        return panorama::train(&session, args);
+    }
     let mut trainer = session.trainer()?;
+    if registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector) {
+        return windows::train(&session, trainer.as_mut());
+    }
     let mut card = Card::new(args, session.sources());
     let mut doubter: Option<Box<dyn Verifier>> = None;
     for round in 0..=session.plan.rounds {
@@ -331,6 +340,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
         "color-texture" => "[training]\ntrees = [25, 50]",
+        "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
         _ => "",
     };
     text.parse().unwrap_or_default()

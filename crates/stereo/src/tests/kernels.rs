@@ -7,7 +7,9 @@ use super::reference::{self, Volume};
 use crate::census::BYTES;
 use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
+use crate::refine::Refiner;
 use crate::speckle::SpeckleFilter;
+use crate::texture::TextureTest;
 use crate::winner::Winner;
 use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window, winner};
 
@@ -76,15 +78,52 @@ proptest! {
     fn holes_are_bridged_pixel_by_pixel(
         values in prop::collection::vec(prop_oneof![Just(f32::NAN), 0.0..4.0_f32], 12 * 9),
         most in 0..6usize,
+        baselines in 0.0..2.0_f32,
         step in 0.0..3.0_f32,
     ) {
-        let slow = reference::without_holes(&values, 12, most, step);
+        let slow = reference::without_holes(&values, 12, (most, baselines), step);
         let mut fast = values.clone();
-        let filled = fill::holes(&mut fast, 12, most, step);
+        let bounds = fill::Most { px: most, baselines, step };
+        let filled = fill::holes(&mut fast, 12, &bounds);
         let holes = |image: &[f32]| image.iter().filter(|v| v.is_nan()).count();
         prop_assert_eq!(filled as usize, holes(&values) - holes(&fast));
         for (fast, slow) in fast.iter().zip(&slow) {
             let close = (fast - slow).abs() < 1e-5 || (fast.is_nan() && slow.is_nan());
+            prop_assert!(close, "{} {}", fast, slow);
+        }
+    }
+
+    #[test]
+    fn smooth_pixels_are_kept_between_textured_ones(
+        image in images(1),
+        values in prop::collection::vec(prop_oneof![Just(f32::NAN), 0.0..20.0_f32], 40),
+        least in 1..60u8,
+    ) {
+        let (image, height) = (&image[0], image[0].height());
+        let values = &values[..image.width()];
+        for y in 0..height {
+            let slow = reference::supported(values, image, y, least.into());
+            let mut fast = values.to_vec();
+            let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| image.row(y));
+            let dropped = TextureTest::default().apply(&mut fast, rows, least);
+            let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+            prop_assert_eq!(bits(&fast), bits(&slow));
+            let holes = |row: &[f32]| row.iter().filter(|v| v.is_nan()).count();
+            prop_assert_eq!(dropped as usize, holes(&fast) - holes(values));
+        }
+    }
+
+    #[test]
+    fn refined_disparities_equal_solved_windows(
+        pair in images(2),
+        values in prop::collection::vec(prop_oneof![Just(f32::NAN), 3.0..6.0_f32], 40 * 12),
+        radius in 1..5usize,
+    ) {
+        let mut fast = values[..pair[0].pixels().len()].to_vec();
+        let slow = reference::refined(&pair, &fast, radius);
+        Refiner::default().apply([&pair[0], &pair[1]], radius, &mut fast);
+        for (fast, slow) in fast.iter().zip(&slow) {
+            let close = (f64::from(*fast) - slow).abs() < 1e-2 || (fast.is_nan() && slow.is_nan());
             prop_assert!(close, "{} {}", fast, slow);
         }
     }
@@ -108,13 +147,12 @@ proptest! {
         }
         let mut excess: [Excess; 3] = Default::default();
         excess.iter_mut().for_each(|e| e.reset::<D>(grey.width()));
-        let [left, above, right] = &mut excess;
         let mut fast = Vec::new();
         for (y, costs) in rows.iter().enumerate() {
             let pixels = (grey.row(y), grey.row(y.saturating_sub(1)));
             let mut sums = vec![[0; D]; grey.width()];
-            paths::forward(costs, pixels, &penalties, above, right, &mut sums);
-            paths::backward(costs, pixels, &penalties, left, &mut sums);
+            paths::along(costs, pixels.0, &penalties, &mut sums);
+            paths::down(costs, pixels, &penalties, &mut excess, &mut sums);
             fast.extend(wide(sums.as_flattened()));
         }
         prop_assert_eq!(fast, slow);
@@ -149,9 +187,9 @@ proptest! {
 
     #[test]
     fn winners_are_the_least(cells in prop::collection::vec(any::<u8>(), D)) {
-        let mut sums: [u8; D] = cells.clone().try_into().expect("D of them");
+        let sums: [u8; D] = cells.clone().try_into().expect("D of them");
         let mut fast = [Winner::default()];
-        winner::row(std::slice::from_mut(&mut sums), &mut fast);
+        winner::row(std::slice::from_ref(&sums), &mut fast);
         let cost = *cells.iter().min().expect("some");
         let best = cells.iter().position(|c| *c == cost).expect("the least is there");
         let others = cells.iter().enumerate().filter(|(d, _)| d.abs_diff(best) > 1);

@@ -62,7 +62,7 @@ fn dissimilarity(
 }
 
 /// Fills holes along a row pixel by pixel.
-pub fn without_holes(image: &[f32], width: usize, most: usize, step: f32) -> Vec<f32> {
+pub fn without_holes(image: &[f32], width: usize, most: (usize, f32), step: f32) -> Vec<f32> {
     let mut filled = image.to_vec();
     for at in (0..image.len()).filter(|at| image[*at].is_nan()) {
         let (x, row) = (at % width, at / width * width);
@@ -70,7 +70,8 @@ pub fn without_holes(image: &[f32], width: usize, most: usize, step: f32) -> Vec
         let behind = (x..width).find(|x| !image[row + x].is_nan());
         let (Some(a), Some(b)) = (before, behind) else { continue };
         let (from, to) = (image[row + a], image[row + b]);
-        if b - a - 1 <= most && (to - from).abs() <= step {
+        let most = (most.0 as f32).max(most.1 * from.min(to));
+        if (b - a - 1) as f32 <= most && (to - from).abs() <= step {
             filled[at] = from + (to - from) * (x - a) as f32 / (b - a) as f32;
         }
     }
@@ -176,4 +177,84 @@ pub fn without_speckles(image: &[f32], width: usize, min_pixels: usize, step: f3
         }
     }
     cleaned
+}
+
+/// Half of Sobel's sum across pixel `x` of row `y`.
+fn sobel(image: &GreyImage, x: i64, y: i64) -> u32 {
+    let at = |dx, dy| i64::from(clamped(image, x + dx, y + dy));
+    let sum: i64 =
+        [(-1, 1), (0, 2), (1, 1)].map(|(dy, w)| w * (at(1, dy) - at(-1, dy))).iter().sum();
+    (sum.unsigned_abs() / 2) as u32
+}
+
+/// Drops the smooth pixels of row `y` that are nearer than a textured neighbour,
+/// or have none on a side.
+pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f32> {
+    let is_anchor = |x: &usize| !row[*x].is_nan() && sobel(image, *x as i64, y as i64) >= least;
+    let keeps = |x: usize| {
+        let sides = [(0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor)];
+        is_anchor(&x)
+            || sides
+                .iter()
+                .all(|at| at.is_some_and(|at| row[x] <= row[at] + 0.75_f32.max(0.1_f32 * row[at])))
+    };
+    (0..row.len()).map(|x| if keeps(x) { row[x] } else { f32::NAN }).collect()
+}
+
+/// Brightness and slope of a smoothed row at `x`; its border goes on.
+fn smoothed(image: &GreyImage, x: i64, y: i64) -> (f64, f64) {
+    let at = |x: i64| f64::from(clamped(image, x, y));
+    let level = |x: i64| 0.25 * (at(x - 1) + 2.0 * at(x) + at(x + 1));
+    (level(x), 0.5 * (level(x + 1) - level(x - 1)))
+}
+
+/// Slope and weighted disparity of a pixel, as Lucas and Kanade have them.
+fn equation(pair: &[GreyImage], x: i64, y: i64, d: f64) -> (f64, f64) {
+    let (own, own_slope) = smoothed(&pair[0], x, y);
+    let last = pair[1].width() as i64 - 1;
+    let at = (x as f64 - d).max(0.0);
+    let (low, part) = (at.floor(), at.fract());
+    let [(a, a_slope), (b, b_slope)] =
+        [0, 1].map(|i| smoothed(&pair[1], (low as i64 + i).min(last), y));
+    let g = 0.5 * (own_slope + a_slope + part * (b_slope - a_slope));
+    (g, g * d + a + part * (b - a) - own)
+}
+
+/// Sums of squares and products around the means, over the window's part of a row
+/// that is of one surface with column `x`.
+fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
+    let jumps = |a: usize, b: usize| (row[a] - row[b]).abs() > 1.0 || row[a].is_nan();
+    let from = (x.saturating_sub(radius) + 1..=x).rev().find(|x| jumps(*x, x - 1));
+    let to =
+        (x + 1..(x + radius + 1).min(row.len())).find(|x| jumps(*x, x - 1) || row[*x].is_nan());
+    let window =
+        from.unwrap_or(x.saturating_sub(radius))..to.unwrap_or((x + radius + 1).min(row.len()));
+    let all: Vec<(f64, f64)> =
+        window.map(|x| equation(pair, x as i64, y as i64, row[x].into())).collect();
+    let n = all.len() as f64;
+    let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
+    all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q)))
+}
+
+/// Refines disparities pixel by pixel.
+pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f64> {
+    let (width, height) = (pair[0].width(), pair[0].height());
+    let one = |at: usize| {
+        let (x, y, was) = (at % width, at / width, disparities[at]);
+        let (mut squares, mut sum) = (20.0, 20.0 * f64::from(was));
+        for y in y.saturating_sub(radius)..(y + radius + 1).min(height) {
+            let row = &disparities[y * width..(y + 1) * width];
+            if (row[x] - was).abs() <= 1.0 {
+                let (gg, gq) = row_of_window(pair, row, x, y, radius);
+                (squares, sum) = (squares + gg, sum + gq);
+            }
+        }
+        let was = f64::from(was);
+        (was + (sum / squares - was).clamp(-0.5, 0.5)).max(if was.is_nan() {
+            f64::NAN
+        } else {
+            0.0
+        })
+    };
+    (0..disparities.len()).map(one).collect()
 }
