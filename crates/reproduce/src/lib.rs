@@ -12,6 +12,7 @@
 //! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>`
 //! in the file of its system and name it in the system's list.
 
+mod depth_accuracy;
 mod findings;
 mod lab;
 mod stereo_svm_ekf;

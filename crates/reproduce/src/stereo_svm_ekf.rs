@@ -3,17 +3,25 @@
 use tagalong_eval::wilson;
 use tagalong_trials::{Occlusion, Outcome, Trial, TrialError, occlusions, outcome};
 
+use crate::depth_accuracy;
 use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
 
 /// The system.
 pub const SYSTEM: System = System {
     name: "stereo-svm-ekf",
     about: "P4: templates in stereo depth, an SVM that verifies, an extended Kalman filter",
-    experiments: &[Experiment {
-        name: "occlusion",
-        about: "Fig. 7: who is fully hidden is known again, by gap and duration",
-        run: occlusion,
-    }],
+    experiments: &[
+        Experiment {
+            name: "occlusion",
+            about: "Fig. 7: who is fully hidden is known again, by gap and duration",
+            run: occlusion,
+        },
+        Experiment {
+            name: "depth",
+            about: "the depth of a head against its range (about 1 % at 3 m)",
+            run: depth_accuracy::experiment,
+        },
+    ],
 };
 
 /// Confidence of intervals.
