@@ -2,4 +2,5 @@
 //! the shipped configs on real logs, and the messages that mistakes in a config
 //! get.
 
+pub mod mot;
 pub mod people;

@@ -88,7 +88,7 @@ fn follow() -> Vec<Step> {
             Event::Webcam(_) => {}
             Event::Shot(shot) => {
                 let report = pipeline.step(&recorder.frame(&shot)).unwrap();
-                simulation.steer(report.command.unwrap());
+                simulation.steer(report.command.unwrap().wheels);
                 steps.push(Step {
                     at_s: shot.captured_ns as f64 * 1e-9,
                     target: report.target,

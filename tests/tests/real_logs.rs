@@ -1,4 +1,5 @@
-//! The shipped `depth-ekf` config, unchanged, on every real log with depth.
+//! The shipped `depth-ekf` config, unchanged, on every real log with depth, and
+//! `particle-best` where people hide each other.
 //! Without `../shared/data/logs` each test says that it skips.
 #![allow(
     clippy::unwrap_used,
@@ -33,13 +34,13 @@ fn data(file: &str) -> Option<PathBuf> {
     None
 }
 
-fn run(path: &Path) -> Run {
+fn run(path: &Path, config: &str) -> Run {
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
-    let text = std::fs::read_to_string(configs.join("depth-ekf.toml")).unwrap();
+    let text = std::fs::read_to_string(configs.join(format!("{config}.toml"))).unwrap();
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
-    let needs = Needs { depth: true, ..Needs::default() };
+    let needs = Needs { depth: true, colour: config == "particle-best", ..Needs::default() };
     let mut source =
         FrameSource::open(path, &InputSettings::default(), &Limits::default(), needs).unwrap();
     let mut run = Run {
@@ -67,11 +68,15 @@ fn run(path: &Path) -> Run {
 }
 
 fn scored(name: &str) -> Option<(Run, Score)> {
+    scored_with(name, "depth-ekf")
+}
+
+fn scored_with(name: &str, config: &str) -> Option<(Run, Score)> {
     let path = data(&format!("{name}.mcap"))?;
     let truth = read(&path.with_file_name(format!("{name}.people.csv"))).unwrap();
-    let run = run(&path);
+    let run = run(&path, config);
     let score = score(&truth, &run.confirmed);
-    println!("{name}: {score:?}\n{name}: {:?}", run.funnel);
+    println!("{name}, {config}: {score:?}\n{name}: {:?}", run.funnel);
     Some((run, score))
 }
 
@@ -102,10 +107,31 @@ fn nobody_is_confirmed_in_the_empty_frames_of_filinha() {
     assert!(score.covered * 10 >= score.rows * 7, "{score:?}");
 }
 
+/// Numbers beyond one for each person.
+fn surplus(score: &Score) -> usize {
+    score.ids.values().map(|ids| ids.len().saturating_sub(1)).sum()
+}
+
+#[test]
+fn particles_find_as_many_people_in_filinha_as_the_ekf_with_few_false_boxes() {
+    let Some((_, ekf)) = scored("filinha") else { return };
+    let Some((_, particles)) = scored_with("filinha", "particle-best") else { return };
+    for (name, score) in [("depth-ekf", &ekf), ("particle-best", &particles)] {
+        let Score { covered, rows, false_boxes, .. } = score;
+        let surplus = surplus(score);
+        println!(
+            "{name}: {covered} of {rows} covered, {false_boxes} false, {surplus} more numbers"
+        );
+    }
+    assert!(particles.covered >= ekf.covered, "{particles:?} {ekf:?}");
+    assert!(particles.false_boxes <= ekf.false_boxes + 5, "{particles:?}");
+    assert!(surplus(&particles) <= surplus(&ekf) + 1, "{particles:?} {ekf:?}");
+}
+
 #[test]
 fn five_people_are_five_and_the_office_is_empty() {
     let Some(path) = data("pcl-single-frames.mcap") else { return };
-    let run = run(&path);
+    let run = run(&path, "depth-ekf");
     println!("five_people: {} detections; {:?}", run.detections[&1], run.funnel);
     assert_eq!(run.detections[&1], 5);
     assert!(!run.confirmed.contains_key(&2), "office1: {:?}", run.confirmed[&2]);
@@ -115,7 +141,7 @@ fn five_people_are_five_and_the_office_is_empty() {
 fn every_log_with_depth_runs() {
     for (name, frames) in [("lab2-camera1", 39), ("uc3m-single-frames", 12)] {
         let Some(path) = data(&format!("{name}.mcap")) else { return };
-        let run = run(&path);
+        let run = run(&path, "depth-ekf");
         println!("{name}: {:?}", run.funnel);
         assert_eq!(run.frames, frames, "{name}");
     }

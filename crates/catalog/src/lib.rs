@@ -11,10 +11,15 @@ use tagalong_core::Registry;
 pub fn register(registry: &mut Registry) {
     tagalong_arc_follow::register(registry);
     tagalong_color_texture::register(registry);
+    tagalong_compressive::register(registry);
     tagalong_depth_template::register(registry);
     tagalong_ekf::register(registry);
+    tagalong_floor_kalman::register(registry);
+    tagalong_hog_upper_body::register(registry);
+    tagalong_image_kalman::register(registry);
     tagalong_joint_particle::register(registry);
     tagalong_last_seen::register(registry);
+    tagalong_omni_appearance::register(registry);
     tagalong_recorded_detections::register(registry);
     tagalong_svm_patch::register(registry);
 }

@@ -1,6 +1,8 @@
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 
-use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Panorama, Rect, UPPER_BODY_SIDE_M};
 
 /// Lens distortion, as in `sensor_msgs/CameraInfo`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -69,6 +71,9 @@ pub struct Pinhole {
 pub enum Lens {
     /// Perspective, with optional distortion.
     Pinhole(Pinhole),
+    /// The unwrapped image of a conical mirror. Its *depth* is the horizontal
+    /// distance from the mirror's axis, and its columns go once around.
+    Panorama(Panorama),
 }
 
 /// A camera: its lens, its image size, and where it sits on the robot.
@@ -122,11 +127,30 @@ impl Camera {
         }
     }
 
-    /// Pixels per metre at one metre of depth, along columns.
+    /// Pixels per metre at one metre of depth, along columns; of a panorama
+    /// pixels per radian.
     pub fn focal_px(&self) -> f64 {
         match &self.lens {
             Lens::Pinhole(lens) => lens.fx,
+            Lens::Panorama(lens) => lens.columns as f64 / TAU,
         }
+    }
+
+    /// The panorama, of a camera that has one.
+    pub fn panorama(&self) -> Option<&Panorama> {
+        match &self.lens {
+            Lens::Panorama(lens) => Some(lens),
+            Lens::Pinhole(_) => None,
+        }
+    }
+
+    /// The column that is `column` and nearest to `to`: in a panorama columns
+    /// are counted modulo its width, in other images there is nothing to choose.
+    pub fn column_near(&self, column: f64, to: f64) -> f64 {
+        self.panorama().map_or(column, |lens| {
+            let around = lens.columns as f64;
+            column - around * ((column - to) / around).round()
+        })
     }
 
     /// The pixel of a point in the robot frame; `None` behind the camera. The
@@ -135,9 +159,13 @@ impl Camera {
         self.project_from_camera(&self.robot_from_camera.inverse_transform_point(point_in_robot))
     }
 
-    /// The pixel of a point in the camera frame; `None` behind the camera.
+    /// The pixel of a point in the camera frame; `None` behind the camera. There
+    /// is nothing behind a panorama.
     pub fn project_from_camera(&self, point_in_camera: &Point3<f64>) -> Option<Point2<f64>> {
-        let Lens::Pinhole(lens) = &self.lens;
+        let lens = match &self.lens {
+            Lens::Panorama(lens) => return Some(lens.pixel(point_in_camera)),
+            Lens::Pinhole(lens) => lens,
+        };
         if point_in_camera.z <= 1e-6 {
             return None;
         }
@@ -149,20 +177,38 @@ impl Camera {
 
     /// The viewing ray of a pixel in the camera frame, scaled to depth 1.
     pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
-        let Lens::Pinhole(lens) = &self.lens;
-        let (x, y) =
-            lens.distortion.remove((pixel.x - lens.cx) / lens.fx, (pixel.y - lens.cy) / lens.fy);
-        Vector3::new(x, y, 1.0)
+        match &self.lens {
+            Lens::Pinhole(lens) => {
+                let (x, y) = ((pixel.x - lens.cx) / lens.fx, (pixel.y - lens.cy) / lens.fy);
+                let (x, y) = lens.distortion.remove(x, y);
+                Vector3::new(x, y, 1.0)
+            }
+            Lens::Panorama(lens) => lens.ray(pixel).1,
+        }
+    }
+
+    /// Where the viewing ray of a pixel has depth 0, in the camera frame: the
+    /// origin, but for a panorama, which has no single viewpoint.
+    fn viewpoint(&self, pixel: Point2<f64>) -> Point3<f64> {
+        match &self.lens {
+            Lens::Pinhole(_) => Point3::origin(),
+            Lens::Panorama(lens) => lens.ray(pixel).0,
+        }
     }
 
     /// The point in the robot frame that a pixel with a depth shows.
     pub fn back_project(&self, pixel: Point2<f64>, depth_m: f64) -> Point3<f64> {
-        self.robot_from_camera * Point3::from(self.ray(pixel) * depth_m)
+        self.robot_from_camera * (self.viewpoint(pixel) + self.ray(pixel) * depth_m)
     }
 
-    /// Depth (along the optical axis) of a point in the robot frame, metres.
+    /// Depth of a point in the robot frame, metres: along the optical axis, in a
+    /// panorama the distance from it.
     pub fn depth_of(&self, point_in_robot: &Point3<f64>) -> f64 {
-        self.robot_from_camera.inverse_transform_point(point_in_robot).z
+        let point = self.robot_from_camera.inverse_transform_point(point_in_robot);
+        match &self.lens {
+            Lens::Pinhole(_) => point.z,
+            Lens::Panorama(_) => point.xy().coords.norm(),
+        }
     }
 
     /// Height of the camera above the floor, metres.
@@ -188,7 +234,12 @@ impl Camera {
     /// [`HEAD_BELOW_TOP_M`] above the head centre, its middle column that of
     /// the shoulders. It is amodal and may reach beyond the image; empty when
     /// the head is behind the camera.
+    ///
+    /// In a panorama it may continue beyond the right edge (see [`Panorama`]).
     pub fn upper_body(&self, head: &Point3<f64>) -> Rect {
+        if let Some(lens) = self.panorama() {
+            return lens.upper_body(&self.robot_from_camera.inverse_transform_point(head));
+        }
         let depth = self.depth_of(head) - HEAD_RADIUS_M;
         let chest = head - Vector3::new(0.0, 0.0, SHOULDERS_BELOW_HEAD_M);
         let (Some(centre), Some(chest)) = (self.project(head), self.project(&chest)) else {
@@ -206,6 +257,9 @@ impl Camera {
     /// depth of the face shows: the inverse of [`Camera::upper_body`], by
     /// fixed-point iteration.
     pub fn head_of(&self, upper_body: &Rect, face_depth_m: f64) -> Point3<f64> {
+        if let Some(lens) = self.panorama() {
+            return self.robot_from_camera * lens.head_of(upper_body, face_depth_m);
+        }
         let depth = face_depth_m + HEAD_RADIUS_M;
         let mut pixel = upper_body.centre();
         for _ in 0..8 {
@@ -227,9 +281,14 @@ impl Camera {
         sigma_depth_m: f64,
     ) -> Matrix3<f64> {
         let ray = self.ray(pixel);
-        let lateral = depth_m * sigma_px / self.focal_px();
-        let across =
-            Matrix3::from_diagonal(&Vector3::new(lateral * lateral, lateral * lateral, 0.0));
+        let lateral = (depth_m * sigma_px / self.focal_px()).powi(2);
+        let across = match &self.lens {
+            Lens::Pinhole(_) => Matrix3::from_diagonal(&Vector3::new(lateral, lateral, 0.0)),
+            Lens::Panorama(_) => {
+                let out = Vector3::new(ray.x, ray.y, 0.0);
+                (Matrix3::identity() - out * out.transpose()) * lateral
+            }
+        };
         let in_camera = across + ray * ray.transpose() * (sigma_depth_m * sigma_depth_m);
         let rotation = self.robot_from_camera.rotation.to_rotation_matrix();
         let in_robot = rotation.matrix() * in_camera * rotation.matrix().transpose();
@@ -247,6 +306,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::ConicalMirror;
 
     fn tilted(pitch: f64, roll: f64, distortion: Distortion) -> Camera {
         let lens = Pinhole { fx: 530.0, fy: 528.0, cx: 310.0, cy: 243.0, distortion };
@@ -262,7 +322,51 @@ mod tests {
         assert!(right_side.z > 0.0, "positive roll raises the right side");
     }
 
+    fn around() -> Camera {
+        let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
+        let mirror = ConicalMirror::from_coefficients(175.0, [241.3, 238.0], &d).unwrap();
+        Camera {
+            lens: Lens::Panorama(Panorama { mirror, columns: 480, rows: 120 }),
+            width: 480,
+            height: 120,
+            robot_from_camera: ConicalMirror::upright(1.5),
+        }
+    }
+
+    #[test]
+    fn columns_are_counted_around() {
+        assert_eq!(around().column_near(3.0, 479.0), 483.0);
+        assert_eq!(around().column_near(478.0, 1.0), -2.0);
+        assert_eq!(tilted(0.0, 0.0, Distortion::None).column_near(3.0, 639.0), 3.0);
+    }
+
     proptest! {
+        #[test]
+        fn a_panorama_projects_and_back_projects_all_around(
+            range in 0.5..8.0f64, bearing in -3.1..3.1f64, z in 0.0..2.0f64,
+        ) {
+            let (camera, (sine, cosine)) = (around(), bearing.sin_cos());
+            let point = Point3::new(range * cosine, range * sine, z);
+            let pixel = camera.project(&point).unwrap();
+            prop_assert!((camera.depth_of(&point) - range).abs() < 1e-9);
+            prop_assert!((camera.back_project(pixel, range) - point).norm() < 1e-9);
+            let head = camera.head_of(&camera.upper_body(&point), range - HEAD_RADIUS_M);
+            prop_assert!((head - point).norm() < 1e-6, "{head} {point}");
+        }
+
+        #[test]
+        fn the_covariance_of_a_panorama_points_outwards(bearing in -3.1..3.1f64, z in 0.0..1.5f64) {
+            let (camera, (sine, cosine)) = (around(), bearing.sin_cos());
+            let out = Vector3::new(cosine, sine, 0.0);
+            let point = Point3::from(out * 4.0) + Vector3::z() * z;
+            let c = camera.covariance(camera.project(&point).unwrap(), 4.0, 2.0, 0.3);
+            let aside = Vector3::new(-sine, cosine, 0.0);
+            prop_assert_eq!(c, c.transpose());
+            prop_assert!(c.cholesky().is_some());
+            prop_assert!((out.dot(&(c * out)).sqrt() - 0.3).abs() < 1e-6);
+            prop_assert!((aside.dot(&(c * aside)).sqrt() - 8.0 / camera.focal_px()).abs() < 1e-6);
+        }
+
         #[test]
         fn projecting_and_back_projecting_agree(
             x in 1.0..6.0f64, y in -2.0..2.0f64, z in 0.0..2.0f64,

@@ -1,4 +1,6 @@
-use crate::{Frame, Track, Wheels};
+use std::fmt;
+
+use crate::{Frame, Stamp, Track, Wheels};
 
 /// Speeds over ground of the two driven wheels, m/s.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -12,6 +14,82 @@ pub struct WheelSpeeds {
 impl WheelSpeeds {
     /// Standing still.
     pub const STOP: Self = Self { left: 0.0, right: 0.0 };
+}
+
+/// What the wheels may do, for how long, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// The speeds: finite and within the robot's limits.
+    pub wheels: WheelSpeeds,
+    /// When the image was taken that the command answers to.
+    pub stamp: Stamp,
+    /// Whoever drives the wheels stops them after this, unless there is a newer
+    /// command.
+    pub valid_until: Stamp,
+    /// Why it is what it is.
+    pub reason: Reason,
+}
+
+/// Why a command is what it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Reason {
+    /// As the controller wishes.
+    Follow,
+    /// As the controller wishes, but slower: a limit of speed, acceleration or
+    /// turn rate.
+    Limited,
+    /// Slower, for something is ahead.
+    Obstacle,
+    /// Slower, for frames come late.
+    Slow,
+    /// Stop: something is too near ahead.
+    Blocked,
+    /// Stop: the depth image shows nothing at all.
+    Blind,
+    /// Stop: nobody is followed.
+    NoTarget,
+    /// Stop: too few frames since the start or a jump of the clock.
+    Settling,
+    /// Stop: no frame for too long.
+    Stalled,
+    /// Stop: the controller's wish is not finite.
+    NotFinite,
+    /// Stop: the command before has expired and there is no newer one.
+    Expired,
+    /// Stop: a fault that lasts until the pipeline is armed again.
+    Fault,
+}
+
+impl Reason {
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Follow => "follow",
+            Self::Limited => "limited",
+            Self::Obstacle => "obstacle",
+            Self::Slow => "slow",
+            Self::Blocked => "blocked",
+            Self::Blind => "blind",
+            Self::NoTarget => "no-target",
+            Self::Settling => "settling",
+            Self::Stalled => "stalled",
+            Self::NotFinite => "not-finite",
+            Self::Expired => "expired",
+            Self::Fault => "fault",
+        }
+    }
+
+    /// True if the robot may move for this reason.
+    pub fn moves(self) -> bool {
+        matches!(self, Self::Follow | Self::Limited | Self::Obstacle | Self::Slow)
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
 }
 
 /// What a controller sees of one frame.
@@ -32,4 +110,10 @@ pub struct Scene<'a> {
 pub trait Controller: Send {
     /// The wheel speeds to command now.
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds;
+
+    /// The distance at which it stops before the person, m, if it keeps one. A
+    /// config whose robot cannot stop within it is refused.
+    fn stand_off_m(&self) -> Option<f64> {
+        None
+    }
 }

@@ -46,7 +46,7 @@ mod track;
 mod trainer;
 
 pub use camera::{Camera, Distortion, Lens, Pinhole};
-pub use control::{Controller, Scene, WheelSpeeds};
+pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
 pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Search, Verifier};
 pub use error::{Error, Result};

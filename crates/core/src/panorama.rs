@@ -200,6 +200,26 @@ impl Panorama {
         self.mirror.raw_pixel(self.bearing(column), self.elevation(row))
     }
 
+    /// The viewing ray of a pixel in the camera frame: its point on the axis, and
+    /// a direction that goes one metre outwards.
+    pub fn ray(&self, pixel: Point2<f64>) -> (Point3<f64>, Vector3<f64>) {
+        let (ring, height) = self.mirror.ring_m();
+        let (bearing, slope) = (self.bearing(pixel.x), self.elevation(pixel.y).tan());
+        let out = Vector3::new(bearing.sin(), -bearing.cos(), slope);
+        (Point3::new(0.0, 0.0, height + ring * slope), out)
+    }
+
+    /// The head centre, in the camera frame, of the person that an upper-body
+    /// square at a distance of the face from the axis shows: the inverse of
+    /// [`upper_body`](Self::upper_body).
+    pub fn head_of(&self, upper_body: &Rect, face_range_m: f64) -> Point3<f64> {
+        let top = Point2::new(upper_body.centre().x, upper_body.y);
+        let (axis, out) = self.ray(top);
+        let top_m = axis.z + face_range_m * out.z;
+        let range = face_range_m + HEAD_RADIUS_M;
+        Point3::new(range * out.x, range * out.y, top_m - HEAD_BELOW_TOP_M)
+    }
+
     /// The upper body of a person whose head centre is at `head` in the camera
     /// frame, as [`Camera::upper_body`](crate::Camera::upper_body) has it for
     /// other cameras: [`UPPER_BODY_SIDE_M`] wide and high at the distance of the

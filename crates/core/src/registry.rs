@@ -158,17 +158,17 @@ impl Registry {
         self.add::<C>(name, Kind::Controller, summary, maker);
     }
 
-    /// Registers who makes the model file of a plugin; `C` are the settings of
-    /// the plugin itself.
+    /// Registers who makes a model file, under the name of the plugin that reads
+    /// it, or of the model where that is not all of the plugin; `C` are the
+    /// settings of the plugin.
     ///
     /// # Panics
-    /// If there is no such plugin yet, or it has a trainer already.
+    /// If there is a trainer of this name already.
     pub fn trainer<C: Settings, P: Trainer + 'static>(
         &mut self,
         name: &'static str,
         build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
     ) {
-        assert!(self.plugins.contains_key(name), "no plugin is called `{name}` to be trained");
         let previous = self.trainers.insert(name, boxed(build, |trainer| Box::new(trainer)));
         assert!(previous.is_none(), "two trainers for `{name}`");
     }

@@ -1,6 +1,6 @@
 //! From `sensor_msgs/CameraInfo` to the lens of a camera.
 
-use tagalong_core::{Distortion, Pinhole};
+use tagalong_core::{ConicalMirror, Distortion, Panorama, Pinhole};
 
 use crate::msgs::CameraInfo;
 
@@ -15,7 +15,27 @@ pub struct Intrinsics {
     pub height: usize,
     /// Distance to the left camera of a stereo pair, m, from `P[3]`; `None` if 0.
     pub baseline_m: Option<f64>,
+    /// The mirror that the lens looks into, if there is one.
+    pub mirror: Option<Mirrored>,
 }
+
+/// What a camera with a conical mirror delivers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mirrored {
+    /// The circular image as it is: `distortion_model` is
+    /// [`ConicalMirror::MODEL`], K and D are its own.
+    Raw(ConicalMirror),
+    /// The image already unwrapped: `distortion_model` is [`UNWRAPPED`], and D
+    /// that of the mirror with both radii in focal lengths.
+    Unwrapped(Panorama),
+}
+
+/// The `distortion_model` of an image of a conical mirror that was unwrapped
+/// before it was recorded, with a column per bearing and a row per elevation as
+/// in [`Panorama`]. D holds half angle (rad), height of the apex (m) and the
+/// tangents of the smallest and the largest angle from the axis; K is that of
+/// any image with evenly spaced angles, and follows from D.
+pub const UNWRAPPED: &str = "conical_mirror_unwrapped";
 
 /// Why a calibration cannot be used; the field is named.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,7 +57,8 @@ pub enum CalibrationError {
     /// The distortion model is unknown or has the wrong number of coefficients.
     #[error(
         "distortion model `{model}` with {count} coefficients; \
-         known: plumb_bob (4 or 5), rational_polynomial (8), none (0)"
+         known: plumb_bob (4 or 5), rational_polynomial (8), none (0), \
+         conical_mirror and conical_mirror_unwrapped (4, see `ConicalMirror`)"
     )]
     Distortion {
         /// The model.
@@ -84,8 +105,33 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     } else {
         check_lens(info, ["K[0]", "K[4]", "K[2]", "K[5]"], [k[0], k[4], k[2], k[5]])?
     };
+    if [ConicalMirror::MODEL, UNWRAPPED].contains(&info.distortion_model.as_str()) {
+        let seen = delivered(info, full, Distortion::None);
+        let mirror = Some(mirrored(info, &seen)?);
+        return Ok(Intrinsics { mirror, ..seen });
+    }
     let distortion = if rectified { Distortion::None } else { distortion(info)? };
     Ok(Intrinsics { baseline_m: baseline(p), ..delivered(info, full, distortion) })
+}
+
+/// The mirror of a calibration; binning makes its circles smaller.
+fn mirrored(info: &CameraInfo, seen: &Intrinsics) -> Result<Mirrored, CalibrationError> {
+    let unusable = CalibrationError::Distortion {
+        model: info.distortion_model.clone(),
+        count: info.d[..].len(),
+    };
+    let &[half_angle, apex_m, inner, outer] = &info.d[..] else { return Err(unusable) };
+    let raw = info.distortion_model == ConicalMirror::MODEL;
+    let scale = if raw { seen.lens.fx / info.k[0].max(f64::MIN_POSITIVE) } else { 1.0 };
+    let d = [half_angle, apex_m, scale * inner, scale * outer];
+    let (focal, centre) =
+        if raw { (seen.lens.fx, [seen.lens.cx, seen.lens.cy]) } else { (1.0, [0.0; 2]) };
+    let mirror = ConicalMirror::from_coefficients(focal, centre, &d).ok_or(unusable)?;
+    Ok(if raw {
+        Mirrored::Raw(mirror)
+    } else {
+        Mirrored::Unwrapped(Panorama { mirror, columns: seen.width, rows: seen.height })
+    })
 }
 
 /// Fails unless the calibration belongs to images of this size.
@@ -193,6 +239,7 @@ fn delivered(info: &CameraInfo, full: [f64; 4], distortion: Distortion) -> Intri
         width: (width / bx) as usize,
         height: (height / by) as usize,
         baseline_m: None,
+        mirror: None,
     }
 }
 

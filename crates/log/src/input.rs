@@ -37,6 +37,8 @@ pub struct InputSettings {
     pub depth_unit_m: Option<f64>,
     /// The pose of the camera, for logs whose tf does not give it.
     pub camera: Option<MountSettings>,
+    /// Columns and rows to which the circular image of a conical mirror is unwrapped.
+    pub panorama: [usize; 2],
     /// Images that arrive up to this many frames late are put in order.
     pub reorder_frames: usize,
     /// Standard deviation of odometry as a fraction of the travel.
@@ -59,6 +61,7 @@ impl Default for InputSettings {
             odom_frame: "odom".into(),
             depth_unit_m: None,
             camera: None,
+            panorama: [480, 120],
             reorder_frames: 3,
             odometry_sigma: 0.02,
         }
@@ -80,6 +83,9 @@ impl InputSettings {
         }
         if self.depth_unit_m.is_some_and(|unit| !(1e-6..=1e3).contains(&unit)) {
             return refuse("depth_unit_m must lie between 1e-6 and 1000");
+        }
+        if !self.panorama.iter().all(|side| (8..=8192).contains(side)) {
+            return refuse("panorama must be 8 to 8192 columns and rows");
         }
         if self.reorder_frames > 64 {
             return refuse("reorder_frames must be at most 64: each keeps its images in memory");

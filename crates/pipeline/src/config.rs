@@ -12,6 +12,7 @@ use tagalong_stereo::StereoDepth;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::GovernorSettings;
 use crate::clock::Clock;
 use crate::control::Steering;
 use crate::lifecycle::Lifecycle;
@@ -31,8 +32,8 @@ const MAX_BYTES: usize = 1 << 20;
 /// Deepest nesting of a config.
 const MAX_DEPTH: usize = 32;
 
-const OWN: [&str; 7] =
-    ["seed", "robot", "stereo", "clock", "association", "occlusion", "lifecycle"];
+const OWN: [&str; 8] =
+    ["seed", "robot", "stereo", "clock", "association", "occlusion", "lifecycle", "governor"];
 const PLUGINS: [&str; 4] = ["detectors", "verifiers", "filter", "controller"];
 
 /// How a config is read.
@@ -297,8 +298,28 @@ impl Builder<'_> {
         let context = self.context(3, 0);
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_controller(name, config, &context))?;
-        Ok(Some(Steering::new(section.settings.plugin, plugin)))
+        let PipelineSettings { robot, governor, .. } = self.settings;
+        if let Some(message) = too_near(plugin.stand_off_m(), robot, governor) {
+            return Err(ConfigError { message, span: section.span_of("plugin") });
+        }
+        let name = section.settings.plugin;
+        Ok(Some(Steering::new(name, plugin, robot.clone(), governor.clone())))
     }
+}
+
+/// Why the robot cannot stop before the person, if it cannot.
+fn too_near(
+    stand_off_m: Option<f64>,
+    robot: &RobotSettings,
+    governor: &GovernorSettings,
+) -> Option<String> {
+    let stopping_m = governor.stopping_m(robot.max_speed_mps);
+    let distance_m = stand_off_m.filter(|distance| !(*distance >= stopping_m))?;
+    Some(format!(
+        "a robot at {} m/s needs {stopping_m:.2} m to stop, and follows at {distance_m} m: raise \
+         `stand_off_m` or lower `max_speed_mps` in [robot]",
+        robot.max_speed_mps
+    ))
 }
 
 /// The sections of an array of tables.

@@ -45,6 +45,7 @@ mod boundary;
 mod clock;
 mod config;
 mod control;
+mod governor;
 mod lifecycle;
 mod now;
 mod occlusion;
@@ -54,10 +55,12 @@ mod settings;
 mod sightings;
 #[cfg(test)]
 mod tests;
+mod weighing;
 
 pub use assignment::assign;
 pub use boundary::StepError;
 pub use config::{Options, RunSettings};
+pub use governor::{CorridorSettings, GovernorSettings};
 pub use pipeline::Pipeline;
 pub use report::{Candidate, Fate, FrameReport, Outcome};
 pub use settings::{
@@ -65,3 +68,4 @@ pub use settings::{
     OcclusionSettings, Overlap, PipelineSettings, PluginSettings, RobotSettings, Role,
 };
 pub use tagalong_stereo::StereoSettings;
+pub use weighing::Weighing;

@@ -67,9 +67,12 @@ pub(crate) fn visibility(
     let (mut all, mut inside, mut visible) = (0_u32, 0_u32, 0_u32);
     for point in silhouette(region) {
         all += 1;
-        if image.contains(point) {
+        // A panorama goes on beyond its edges.
+        let near = |x: f64| Point2::new(camera.column_near(point.x, x), point.y);
+        if image.contains(near(image.centre().x)) {
             inside += 1;
-            visible += u32::from(!in_front.iter().any(|c| is_on_body(&c.region, point)));
+            let hides = |c: &&Cover| is_on_body(&c.region, near(c.region.centre().x));
+            visible += u32::from(!in_front.iter().any(hides));
         }
     }
     let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
@@ -109,7 +112,7 @@ fn is_on_body(region: &Rect, point: Point2<f64>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_core::{ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 
     use super::*;
 
@@ -140,6 +143,32 @@ mod tests {
         assert_eq!(behind(near, 0.05, Point3::new(2.2, 0.0, 1.6)), Visibility::Visible);
         assert_eq!(behind(near, 0.05, Point3::new(1.5, 0.0, 1.5)), Visibility::Visible);
         assert_eq!(behind(near, 0.6, Point3::new(3.5, 0.0, 1.6)), Visibility::Visible);
+    }
+
+    #[test]
+    fn people_hide_each_other_across_the_seam_of_a_panorama() {
+        let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
+        let mirror = ConicalMirror::from_coefficients(175.0, [240.0; 2], &d).unwrap();
+        let camera = Camera {
+            lens: Lens::Panorama(Panorama { mirror, columns: 480, rows: 120 }),
+            width: 480,
+            height: 120,
+            robot_from_camera: ConicalMirror::upright(1.3),
+        };
+        let seen = |near: Point3<f64>, far: Point3<f64>| {
+            let cover = Cover::new(camera.upper_body(&near), &near, &Matrix3::zeros(), &camera);
+            let region = camera.upper_body(&far);
+            visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
+        };
+        let (left, right) = (Point3::new(-2.0, 0.02, 1.5), Point3::new(-4.0, -0.02, 1.5));
+        let starts = [left, right].map(|head| camera.upper_body(&head));
+        assert!(starts.iter().all(|region| region.right() > 480.0), "{starts:?}");
+        assert_eq!(seen(left, right), Visibility::Hidden);
+        assert_eq!(seen(left, Point3::new(4.0, 0.0, 1.5)), Visibility::Visible);
+        // One starts left of the seam, the other right of it.
+        let aside = Point3::new(-4.0, 0.5, 1.5);
+        assert!(camera.upper_body(&aside).x < 40.0);
+        assert_eq!(seen(Point3::new(-2.0, 0.18, 1.5), aside), Visibility::Hidden);
     }
 
     #[test]

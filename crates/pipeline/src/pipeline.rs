@@ -1,18 +1,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use nalgebra::Point3;
 use tagalong_core::{
-    Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched, Motion,
-    Scene, Search, Track, TrackId, Verifier, WheelSpeeds,
+    Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched,
+    Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
 };
 use tagalong_stereo::StereoDepth;
 
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
-use crate::control::{Steering, limited};
+use crate::control::Steering;
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
 use crate::sightings::{Rules, Sighting};
+use crate::weighing::Metered;
 use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role, StepError};
 
 /// Plugins and the rules by which they work together.
@@ -81,8 +83,32 @@ impl Pipeline {
         let report = self.process(frame);
         if report.is_err() {
             self.failed = Some(frame.index);
+            if let Some(steering) = &mut self.steering {
+                steering.governor_mut().latch("a plugin failed");
+            }
         }
         report
+    }
+
+    /// What the wheels may do at a time, by the clock of the frames' stamps: the
+    /// last command until it expires, zero after that, after a fault and before
+    /// the first frame. A control loop asks at its own rate. `None` without a
+    /// controller.
+    pub fn command_at(&self, now: Stamp) -> Option<Command> {
+        self.steering.as_ref().map(|steering| steering.governor().at(now))
+    }
+
+    /// Why nothing moves until [`Pipeline::arm`], if so.
+    pub fn fault(&self) -> Option<&'static str> {
+        self.steering.as_ref()?.governor().fault()
+    }
+
+    /// Lets the robot move again after a fault, once a person has looked. A
+    /// plugin that failed stays stopped, and with it the pipeline.
+    pub fn arm(&mut self) {
+        if let Some(steering) = self.steering.as_mut().filter(|_| self.failed.is_none()) {
+            steering.governor_mut().arm();
+        }
     }
 
     /// The stages that [`FrameReport::timings`] names, in their order.
@@ -242,11 +268,13 @@ impl Pipeline {
             .map(|(id, s)| Matched { id, detection: &s.detection })
             .collect();
         let unmatched = now.sightings.undecided_detections();
-        let likelihood = likelihood(&self.detectors);
+        let metered = likelihood(&self.detectors).map(Metered::new);
+        let likelihood = metered.as_ref().map(|metered| metered as &dyn Likelihood);
         let evidence =
             Evidence { frame: now.frame, matched: &matched, unmatched: &unmatched, likelihood };
         let Slot { name, plugin: filter } = &mut self.filter;
         now.supports = guard(name, now.frame.index, || filter.update(&evidence))?;
+        now.report.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
         self.check_supports(now);
         Ok(())
     }
@@ -296,8 +324,13 @@ impl Pipeline {
     fn start_newcomers(&mut self, now: &mut Now<'_>) -> Result<BTreeSet<TrackId>, StepError> {
         let mut started = BTreeSet::new();
         let start_score = self.settings.lifecycle.start_score;
+        let known = self.supported_places(now)?;
         for index in now.sightings.undecided() {
             let sighting = now.sightings.get(index).clone();
+            if self.is_known(&known, &sighting.detection) {
+                now.sightings.settle(index, Fate::Dropped("tracked already"));
+                continue;
+            }
             if sighting.detection.score < start_score {
                 now.sightings.settle(index, Fate::Dropped(sighting.score_test(start_score)));
                 continue;
@@ -316,6 +349,20 @@ impl Pipeline {
             started.insert(id);
         }
         Ok(started)
+    }
+
+    /// Where the people are whom this frame supports.
+    fn supported_places(&mut self, now: &mut Now<'_>) -> Result<Vec<Point3<f64>>, StepError> {
+        let mut estimates = self.estimates(now)?;
+        estimates.retain(|id, _| now.supports.contains_key(id));
+        Ok(estimates.values().map(|estimate| estimate.person.position).collect())
+    }
+
+    /// True for a sighting at the place of somebody who is seen there: what it
+    /// started would be a duplicate.
+    fn is_known(&self, known: &[Point3<f64>], detection: &Detection) -> bool {
+        let away = |place: &Point3<f64>| (place - detection.position).xy().norm();
+        known.iter().any(|place| away(place) < self.settings.lifecycle.duplicate_m)
     }
 
     /// What this frame says of a track.
@@ -368,24 +415,11 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        let max_speed_mps = self.settings.robot.max_speed_mps;
-        let ready = steering.is_ready();
-        let target = if ready { steering.choose(&now.report.tracks) } else { None };
-        let confirmed: Vec<Track> =
-            now.report.tracks.iter().filter(|t| t.confirmed).cloned().collect();
-        let scene = Scene {
-            frame: now.frame,
-            target,
-            tracks: &confirmed,
-            wheels: self.settings.robot.wheels(),
-            max_speed_mps,
-        };
-        let name = steering.name.clone();
-        let wanted = contain(&name, now.frame.index, || steering.command(&scene))?;
-        let command = limited(wanted, max_speed_mps);
-        now.report.funnel.drop_many("command not finite", u64::from(command.is_none()));
-        let command = command.filter(|_| target.is_some()).unwrap_or(WheelSpeeds::STOP);
-        now.report.target = target.map(|t| t.id);
+        let (command, target) = steering.steer(now.frame, &now.report.tracks)?;
+        now.report
+            .funnel
+            .drop_many("command not finite", u64::from(command.reason == Reason::NotFinite));
+        now.report.target = target;
         now.report.command = Some(command);
         Ok(())
     }

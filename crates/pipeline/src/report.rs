@@ -1,4 +1,6 @@
-use tagalong_core::{Detection, Funnel, Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{Command, Detection, Funnel, Stamp, Track, TrackId};
+
+use crate::Weighing;
 
 /// What became of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,12 +73,15 @@ pub struct FrameReport {
     pub tracks: Vec<Track>,
     /// The person to follow, where the pipeline has a controller.
     pub target: Option<TrackId>,
-    /// The controller's command: finite, within the robot's limits, zero
-    /// without a target.
-    pub command: Option<WheelSpeeds>,
+    /// What the wheels may do, where the pipeline has a controller: its wish
+    /// within all limits, zero without a target, and why.
+    pub command: Option<Command>,
     /// Normalised innovation squared and its degrees of freedom.
     pub nis: Vec<(TrackId, f64, u32)>,
-    /// Milliseconds per stage. The only part that differs between two runs.
+    /// What was asked of the likelihood.
+    pub weighing: Weighing,
+    /// Milliseconds per stage. With those of `weighing` the only part that
+    /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
     /// Tracks that ended in this frame.
     pub ended: Vec<TrackId>,
@@ -94,6 +99,7 @@ impl FrameReport {
             target: None,
             command: None,
             nis: Vec::new(),
+            weighing: Weighing::default(),
             timings: Vec::new(),
             ended: Vec::new(),
         }

@@ -3,6 +3,8 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::Wheels;
 use tagalong_stereo::StereoSettings;
 
+use crate::GovernorSettings;
+
 /// The pipeline's own keys. Beside them a config has the plugin sections
 /// `[[detectors]]`, `[[verifiers]]`, `[filter]` and `[controller]`, each with
 /// the name of a `plugin` and its settings in the sub-table `config`.
@@ -26,6 +28,8 @@ pub struct PipelineSettings {
     pub occlusion: OcclusionSettings,
     /// When tracks start, count as confirmed, and end.
     pub lifecycle: LifecycleSettings,
+    /// What the robot may do, whatever the controller wishes.
+    pub governor: GovernorSettings,
 }
 
 /// The robot's drive.

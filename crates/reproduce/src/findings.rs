@@ -1,9 +1,10 @@
 use serde::Serialize;
 
-use crate::{Lab, ReproduceError, Table, stereo_svm_ekf};
+use crate::{Lab, ReproduceError, Table, joint_particle, rgbd_compressive, stereo};
 
 /// All systems, in the order of the papers.
-pub const SYSTEMS: &[System] = &[stereo_svm_ekf::SYSTEM];
+pub const SYSTEMS: &[System] =
+    &[stereo::STEREO_EKF, rgbd_compressive::SYSTEM, joint_particle::SYSTEM, stereo::STEREO_SVM_EKF];
 
 /// A published system.
 #[derive(Clone, Copy, Debug)]

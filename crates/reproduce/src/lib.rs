@@ -12,10 +12,12 @@
 //! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>`
 //! in the file of its system and name it in the system's list.
 
-mod depth_accuracy;
 mod findings;
+mod joint_particle;
 mod lab;
-mod stereo_svm_ekf;
+mod rgbd_compressive;
+mod scatter;
+mod stereo;
 mod table;
 
 pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};

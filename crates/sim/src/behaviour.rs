@@ -79,7 +79,7 @@ impl Walker {
         let heading_rad = settings.heading_deg.map_or(way.y.atan2(way.x), f64::to_radians);
         let stance =
             Stance { posture: settings.posture, ..Stance::standing(points[0], heading_rad) };
-        let waits_until_s = settings.start_s;
+        let waits_until_s = settings.start_s.max(settings.enters_s);
         Self {
             person,
             stance,
@@ -100,6 +100,11 @@ impl Walker {
         self.stance.heading_rad = leader.stance.heading_rad;
         self.beside = Some((index, offset));
         self
+    }
+
+    /// Whether they are in the room.
+    pub fn is_there(&self, now_s: f64) -> bool {
+        now_s >= self.settings.enters_s
     }
 
     /// Where somebody who walks along should be.

@@ -504,6 +504,9 @@ pub struct PersonSettings {
     pub speed_mps: f64,
     /// Stands until then, s.
     pub start_s: f64,
+    /// Is not in the room before, s: whoever learns what the empty room looks
+    /// like needs to see it.
+    pub enters_s: f64,
     /// What follows the end of the path.
     pub at_end: AtEnd,
     /// What they do when hidden.
@@ -537,6 +540,7 @@ impl Default for PersonSettings {
             path: Vec::new(),
             speed_mps: 1.1,
             start_s: 0.0,
+            enters_s: 0.0,
             at_end: AtEnd::Stop,
             trick: Trick::None,
             hide_s: 3.0,

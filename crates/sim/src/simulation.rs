@@ -306,11 +306,17 @@ impl Simulation {
         Shot { captured_ns, recorded_ns, depth_ns, images, truth, world_from_robot }
     }
 
+    /// Who is in the room, with their numbers.
+    fn present(&self) -> impl Iterator<Item = (&Walker, u16)> {
+        let now_s = self.now_ns as f64 * 1e-9;
+        self.walkers.iter().zip(1..).filter(move |(walker, _)| walker.is_there(now_s))
+    }
+
     /// Everything there is now, and how many solids of each person are upper body.
     fn world(&self) -> (World, Vec<usize>) {
         let mut objects = self.fixed.clone();
         let mut uppers = Vec::new();
-        for (walker, id) in self.walkers.iter().zip(1..) {
+        for (walker, id) in self.present() {
             let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
             let (shapes, upper) = walker.person.shapes(&skeleton);
             objects.push(Object::new(shapes, Some(id), true));
@@ -436,7 +442,7 @@ impl Simulation {
         sight: impl Fn((u16, &[Shape]), &Skeleton) -> (Option<Rect>, Visibility),
     ) -> Vec<Truth> {
         let people = world.objects.iter().filter_map(|o| Some((o.person?, o)));
-        let walkers = self.walkers.iter().zip(uppers);
+        let walkers = self.present().map(|(walker, _)| walker).zip(uppers);
         let truth = people.zip(walkers).map(|((id, object), (walker, upper))| {
             let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
             let torso = nalgebra::center(&skeleton.pelvis, &skeleton.chest);

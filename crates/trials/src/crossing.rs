@@ -22,11 +22,21 @@ pub struct Crossing {
     /// Somebody counts while this fraction of the upper body is in the image,
     /// hidden or not.
     pub min_in_image: f64,
+    /// Frames in which less than this fraction of somebody's upper body is seen
+    /// do not count for that person; 0 counts who is wholly hidden, too, whose
+    /// place can only be guessed.
+    pub min_visible: f64,
 }
 
 impl Default for Crossing {
     fn default() -> Self {
-        Self { settle_s: 1.0, max_error_m: 0.22, across_only: false, min_in_image: 0.75 }
+        Self {
+            settle_s: 1.0,
+            max_error_m: 0.22,
+            across_only: false,
+            min_in_image: 0.75,
+            min_visible: 0.0,
+        }
     }
 }
 
@@ -93,7 +103,10 @@ fn follow(
     let mut in_view_since = None;
     for (moment, report) in trial.moments.iter().zip(&run.reports) {
         let truth = moment.truth.iter().find(|truth| truth.id == person);
-        let inside = |t: &&Truth| in_image(t, &trial.camera) >= rules.min_in_image;
+        let inside = |t: &&Truth| {
+            in_image(t, &trial.camera) >= rules.min_in_image
+                && t.visible_fraction >= rules.min_visible
+        };
         let Some(truth) = truth.filter(inside) else { continue };
         if !report.outcome.is_processed() {
             continue;
@@ -193,6 +206,20 @@ mod tests {
         let rules = Crossing { across_only: true, ..Crossing::default() };
         assert!(crossing(&trial, &trial.runs[0], &rules).is_ok());
         assert!(crossing(&trial, &trial.runs[0], &Crossing::default()).is_err());
+    }
+
+    #[test]
+    fn where_a_hidden_person_is_believed_to_be_need_not_count() {
+        let mut places = [(3.0, 0.0, 1.0); 20];
+        places[8..12].fill((3.0, 0.0, 0.1));
+        let mut track = [Some((3.0, 0.0)); 20];
+        track[8..12].fill(Some((3.0, 0.5)));
+        let trial = trial(&[&places], &[(1, &track)]);
+        let judged = |min_visible| {
+            crossing(&trial, &trial.runs[0], &Crossing { min_visible, ..Crossing::default() })
+        };
+        assert_eq!(judged(0.0), Err(Failing::Astray { person: 1, at_s: 0.8 }));
+        assert_eq!(judged(0.3).map(|span| span.errors_m.len()), Ok(15));
     }
 
     #[test]

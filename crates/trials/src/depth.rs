@@ -69,9 +69,8 @@ fn head_depth(frame: &Frame, depth: &DepthImage, person: &Truth) -> Option<HeadD
         && inside(centre.y, depth.height());
     let span = |at: f64| (at - half).round() as i64..=(at + half).round() as i64;
     seen.then(|| {
-        let pixels: Vec<Option<f32>> = span(centre.y)
-            .flat_map(|y| span(centre.x).map(move |x| depth.get(x, y)))
-            .collect();
+        let pixels: Vec<Option<f32>> =
+            span(centre.y).flat_map(|y| span(centre.x).map(move |x| depth.get(x, y))).collect();
         HeadDepth { truth_m, measured_m: median_near(&pixels, truth_m) }
     })
 }
@@ -105,7 +104,10 @@ mod tests {
         let scene = Scene::parse(scene).unwrap();
         let found = head_depths(&scene, &StereoSettings::default(), 1).unwrap();
         assert!(found.len() >= 2, "{found:?}");
-        assert!(found.iter().all(|head| head.error_m().is_some_and(|e| e.abs() < 0.25)), "{found:?}");
+        assert!(
+            found.iter().all(|head| head.error_m().is_some_and(|e| e.abs() < 0.25)),
+            "{found:?}"
+        );
         let wrong = StereoSettings { window: 2, ..StereoSettings::default() };
         assert!(head_depths(&scene, &wrong, 1).unwrap_err().to_string().contains("window"));
     }

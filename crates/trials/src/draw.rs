@@ -2,8 +2,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, DepthImage, Frame, Images, Motion, Stamp, WheelSpeeds};
+use tagalong_core::{Camera, DepthImage, Frame, Images, Lens, Motion, Stamp, WheelSpeeds};
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+use tagalong_vision::Unwrapping;
 
 /// Standard deviation of odometry as a fraction of the travel, as the log
 /// reader takes it where its `[input] odometry_sigma` is left out.
@@ -30,6 +31,7 @@ pub struct Drawn {
 pub struct Draw {
     simulation: Simulation,
     camera: Arc<Camera>,
+    unwrapping: Unwrapping,
     odometry: BTreeMap<u64, Isometry2<f64>>,
     /// Images by their stamps, ns.
     waiting: BTreeMap<u64, Shot>,
@@ -53,7 +55,8 @@ impl Draw {
     fn with_patience(scene: &Scene, threads: usize, patience: usize) -> Self {
         let simulation = Simulation::new(scene, threads);
         Self {
-            camera: Arc::new(simulation.camera().clone()),
+            camera: Arc::new(seen_by(&simulation)),
+            unwrapping: Unwrapping::default(),
             simulation,
             odometry: BTreeMap::new(),
             waiting: BTreeMap::new(),
@@ -97,11 +100,21 @@ impl Draw {
         let motion = self.motion(stamp, odom_from_robot);
         let camera = Arc::clone(&self.camera);
         Drawn {
-            frame: Frame::new(self.index, stamp, camera, motion, as_logged(shot.images)),
+            frame: Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images)),
             truth: shot.truth,
             odom_from_robot,
             world_from_robot: shot.world_from_robot,
         }
+    }
+
+    /// Depth travels as millimetres, and what reads logs unwraps circles. The
+    /// panorama of a simulation fits its images, so nothing is ever left wrapped.
+    fn as_logged(&mut self, images: Images) -> Images {
+        if let Some(panorama) = self.camera.panorama() {
+            return self.unwrapping.apply(panorama, &images).unwrap_or(images);
+        }
+        let round = |depth: Arc<DepthImage>| Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001));
+        Images { depth: images.depth.map(round), ..images }
     }
 
     /// From the frame before; none to a frame that is older than that.
@@ -116,10 +129,19 @@ impl Draw {
     }
 }
 
-/// Depth travels as millimetres.
-fn as_logged(images: Images) -> Images {
-    let round = |depth: Arc<DepthImage>| Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001));
-    Images { depth: images.depth.map(round), ..images }
+/// The camera of the frames: that of the log, with the circular image of a
+/// mirror unwrapped.
+fn seen_by(simulation: &Simulation) -> Camera {
+    let camera = simulation.camera().clone();
+    match simulation.panorama() {
+        Some(panorama) => Camera {
+            lens: Lens::Panorama(*panorama),
+            width: panorama.columns,
+            height: panorama.rows,
+            ..camera
+        },
+        None => camera,
+    }
 }
 
 #[cfg(test)]

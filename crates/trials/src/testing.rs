@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
 use tagalong_core::{Camera, Distortion, Estimate, Funnel, Person, Pinhole, Stamp, Track, TrackId};
-use tagalong_pipeline::{FrameReport, Outcome};
+use tagalong_pipeline::{FrameReport, Outcome, Weighing};
 use tagalong_sim::Truth;
 
 use crate::{Moment, Run, Trial};
@@ -88,6 +88,7 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
         target: None,
         command: None,
         nis: Vec::new(),
+        weighing: Weighing::default(),
         timings: Vec::new(),
         ended: Vec::new(),
     }

@@ -107,7 +107,7 @@ impl Trial {
         while let Some(drawn) = draw.next_frame() {
             lane.step(&drawn)?;
             if let Some(command) = lane.run.reports.last().and_then(|report| report.command) {
-                draw.steer(command);
+                draw.steer(command.wheels);
             }
             camera.get_or_insert_with(|| Camera::clone(&drawn.frame.camera));
             moments.push(Moment::of(drawn));

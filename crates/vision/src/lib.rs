@@ -3,8 +3,10 @@
 //! Each fast kernel here has a slow, obvious twin in its tests.
 
 pub mod ground;
+mod integral;
 mod panorama;
 mod row_sums;
 
-pub use panorama::{Blend, Unwrapper};
+pub use integral::Integral;
+pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};

@@ -8,8 +8,9 @@
 //! levels: a row has one level). All places and weights are computed once.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-use tagalong_core::{Error, Image, Panorama, Result};
+use tagalong_core::{Error, Image, Images, Panorama, Result};
 
 /// A pixel that can be interpolated.
 pub trait Blend: Copy + Default {
@@ -176,6 +177,44 @@ impl<P: Blend> Unwrapper<P> {
             }
         }
     }
+}
+
+/// Unwraps whatever one camera delivers, colour or grey: [`Unwrapper`]s that are
+/// made when they are first needed.
+#[derive(Clone, Debug, Default)]
+pub struct Unwrapping {
+    colour: Option<(Panorama, Unwrapper<[u8; 3]>)>,
+    grey: Option<(Panorama, Unwrapper<u8>)>,
+}
+
+impl Unwrapping {
+    /// The images with the circular ones of the mirror unwrapped; a mirror has
+    /// neither depth nor a right image.
+    ///
+    /// # Errors
+    /// As [`Unwrapper::new`] and [`Unwrapper::apply`].
+    pub fn apply(&mut self, panorama: &Panorama, raw: &Images) -> Result<Images> {
+        let colour =
+            raw.colour.as_deref().map(|image| unwrapped(&mut self.colour, panorama, image));
+        let grey = raw.grey.as_deref().map(|image| unwrapped(&mut self.grey, panorama, image));
+        Ok(Images { colour: colour.transpose()?, grey: grey.transpose()?, ..Images::default() })
+    }
+}
+
+fn unwrapped<P: Blend>(
+    kept: &mut Option<(Panorama, Unwrapper<P>)>,
+    panorama: &Panorama,
+    raw: &Image<P>,
+) -> Result<Arc<Image<P>>> {
+    let fits = |known: &(Panorama, Unwrapper<P>)| known.0 == *panorama;
+    let mut known = match kept.take().filter(fits) {
+        Some(known) => known,
+        None => (*panorama, Unwrapper::new(panorama, raw.width(), raw.height())?),
+    };
+    let mut out = Image::default();
+    let done = known.1.apply(raw, &mut out);
+    *kept = Some(known);
+    done.map(|()| Arc::new(out))
 }
 
 fn halve_row<P: Blend>((upper, lower): (&[P], &[P]), to: &mut [P]) {

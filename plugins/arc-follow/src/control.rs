@@ -45,6 +45,10 @@ impl Controller for ArcFollow {
         self.sent.add(command);
         command
     }
+
+    fn stand_off_m(&self) -> Option<f64> {
+        Some(self.config.stand_off_m)
+    }
 }
 
 impl ArcFollow {

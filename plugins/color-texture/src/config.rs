@@ -26,13 +26,13 @@ impl Default for Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
-    /// Numbers of stumps that are tried; each is one row of the card.
-    pub stumps: Vec<usize>,
-    /// Each stump goes this part of its way.
+    /// Numbers of trees that are tried; each is one row of the card.
+    pub trees: Vec<usize>,
+    /// Each tree goes this part of its way.
     pub rate: f64,
-    /// Part of the features among which each stump is chosen, at random.
+    /// Part of the features among which each tree chooses, at random.
     pub features: f64,
-    /// Where a stump has few examples its values shrink: as if it had so many
+    /// Where a tree has few examples its values shrink: as if it had so many
     /// more, undecided.
     pub caution: f64,
     /// Share of the weight of candidates without depth, photographs.
@@ -44,11 +44,11 @@ pub struct Training {
 impl Default for Training {
     fn default() -> Self {
         Self {
-            stumps: vec![25, 50, 100, 200, 400],
-            rate: 0.15,
+            trees: vec![50, 100, 200, 400],
+            rate: 0.1,
             features: 0.25,
             caution: 5.0,
-            without_depth: 0.3,
+            without_depth: 0.1,
             folds: 4,
         }
     }

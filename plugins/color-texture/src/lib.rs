@@ -5,7 +5,7 @@
 //! ([`Features`]): gradients, local binary patterns, colours of head and torso,
 //! and what the depth says beyond the silhouette that the detector has
 //! already matched: a coat stand is thin below, a poster is flat, a plant is
-//! rough. A sum of one-feature decisions ([`Model`]) turns them into log-odds.
+//! rough. A sum of small trees of decisions ([`Model`]) turns them into log-odds.
 //! What a frame does not show, colour in a grey log or depth in a photograph,
 //! says neither yes nor no.
 //!
@@ -22,7 +22,7 @@ mod verify;
 
 pub use config::{Config, Training};
 pub use features::{COUNT, Family, Features};
-pub use model::{Model, Stump};
+pub use model::{Model, Stump, Tree};
 use tagalong_core::Registry;
 pub use verify::ColorTexture;
 
@@ -34,6 +34,6 @@ pub fn register(registry: &mut Registry) {
     registry.verifier(NAME, "colour, texture and surface of a candidate (P1)", ColorTexture::new);
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
-        train::StumpTrainer::new(config.training, context.seed)
+        train::TreeTrainer::new(config.training, context.seed)
     });
 }

@@ -42,12 +42,62 @@ impl Stump {
     }
 }
 
-/// A sum of stumps, and the straight line that turns it into log-odds. Its
+/// Two decisions one after the other: which stump votes depends on one number,
+/// so that a tree can say "flat, and textured like a face". A number that is
+/// not known adds nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "(usize, f32, Stump, Stump)", into = "(usize, f32, Stump, Stump)")]
+pub struct Tree {
+    /// Index of the first number.
+    pub feature: usize,
+    /// Where it is divided.
+    pub threshold: f32,
+    /// Votes below the threshold ...
+    pub below: Stump,
+    /// ... and from it on.
+    pub above: Stump,
+}
+
+impl From<(usize, f32, Stump, Stump)> for Tree {
+    fn from((feature, threshold, below, above): (usize, f32, Stump, Stump)) -> Self {
+        Self { feature, threshold, below, above }
+    }
+}
+
+impl From<Tree> for (usize, f32, Stump, Stump) {
+    fn from(tree: Tree) -> Self {
+        (tree.feature, tree.threshold, tree.below, tree.above)
+    }
+}
+
+impl Tree {
+    /// What it adds for the numbers of a candidate.
+    pub fn vote(&self, values: &[f32]) -> f32 {
+        let value = |feature: usize| values.get(feature).copied().unwrap_or(f32::NAN);
+        let first = value(self.feature);
+        if first.is_nan() {
+            return 0.0;
+        }
+        let stump = if first < self.threshold { &self.below } else { &self.above };
+        stump.vote(value(stump.feature))
+    }
+
+    fn features(&self) -> [usize; 3] {
+        [self.feature, self.below.feature, self.above.feature]
+    }
+
+    fn numbers(&self) -> [f32; 7] {
+        let Self { threshold, below: b, above: a, .. } = self;
+        [*threshold, b.threshold, b.below, b.above, a.threshold, a.below, a.above]
+    }
+}
+
+/// A sum of trees, and the straight line that turns it into log-odds. Its
 /// default is undecided about everything.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// The stumps, as they were found.
-    pub stumps: Vec<Stump>,
+    /// The trees, as they were found.
+    pub trees: Vec<Tree>,
     /// Log-odds per unit of the sum ...
     pub slope: f64,
     /// ... and those of the sum 0.
@@ -59,14 +109,14 @@ pub struct Model {
 #[serde(deny_unknown_fields)]
 struct File {
     format: String,
-    /// How many numbers its stumps choose from.
+    /// How many numbers its trees choose from.
     features: usize,
     slope: f64,
     offset: f64,
-    stumps: Vec<Stump>,
+    trees: Vec<Tree>,
 }
 
-const FORMAT: &str = "color-texture 1";
+const FORMAT: &str = "color-texture 2";
 
 impl Model {
     /// Log-odds that the candidate is a person, with even priors.
@@ -74,10 +124,9 @@ impl Model {
         self.slope * self.sum(features.values()) + self.offset
     }
 
-    /// The sum of the stumps.
+    /// The sum of the trees.
     pub fn sum(&self, values: &[f32]) -> f64 {
-        let value = |stump: &Stump| values.get(stump.feature).copied().unwrap_or(f32::NAN);
-        self.stumps.iter().map(|stump| f64::from(stump.vote(value(stump)))).sum()
+        self.trees.iter().map(|tree| f64::from(tree.vote(values))).sum()
     }
 
     /// The model file.
@@ -87,9 +136,9 @@ impl Model {
             features: COUNT,
             slope: self.slope,
             offset: self.offset,
-            stumps: self.stumps.clone(),
+            trees: self.trees.clone(),
         };
-        toml::to_string(&file).unwrap_or_default().replace("], [", "],\n  [")
+        toml::to_string(&file).unwrap_or_default().replace("]], [", "]],\n  [")
     }
 
     /// Reads a model file.
@@ -101,15 +150,16 @@ impl Model {
         if file.format != FORMAT {
             return Err(format!("the format is `{}`, not `{FORMAT}`", file.format));
         }
-        if file.features != COUNT || file.stumps.iter().any(|s| s.feature >= COUNT) {
+        if file.features != COUNT || file.trees.iter().flat_map(Tree::features).any(|f| f >= COUNT)
+        {
             return Err(format!("it is not made of the {COUNT} numbers of this program"));
         }
-        let numbers = file.stumps.iter().flat_map(|s| [s.threshold, s.below, s.above]);
+        let numbers = file.trees.iter().flat_map(Tree::numbers);
         let is_finite = numbers.map(f64::from).chain([file.slope, file.offset]).all(f64::is_finite);
         if !is_finite {
             return Err("it has numbers that are not finite".into());
         }
-        Ok(Self { stumps: file.stumps, slope: file.slope, offset: file.offset })
+        Ok(Self { trees: file.trees, slope: file.slope, offset: file.offset })
     }
 }
 
@@ -118,8 +168,22 @@ mod tests {
     use super::*;
 
     fn model() -> Model {
-        let stumps = [(3, 0.5, -1.0, 2.0), (7, -0.25, 0.5, 0.0)].map(Stump::from).to_vec();
-        Model { stumps, slope: 1.5, offset: -0.25 }
+        let stump = |feature, threshold, below, above| Stump { feature, threshold, below, above };
+        let trees = vec![
+            Tree {
+                feature: 3,
+                threshold: 0.5,
+                below: stump(3, 0.25, -1.0, -0.75),
+                above: stump(5, 0.0, 2.0, 1.0),
+            },
+            Tree {
+                feature: 7,
+                threshold: -0.25,
+                below: stump(8, 0.0, 0.5, 0.25),
+                above: stump(8, 0.0, 0.0, 0.0),
+            },
+        ];
+        Model { trees, slope: 1.5, offset: -0.25 }
     }
 
     #[test]
@@ -129,7 +193,20 @@ mod tests {
         values[3] = f32::NAN;
         assert_eq!(model().sum(&values), 0.0);
         values[7] = -0.3;
-        assert_eq!(model().sum(&values), 0.5);
+        assert_eq!(model().sum(&values), 0.25);
+        values[8] = f32::NAN;
+        assert_eq!(model().sum(&values), 0.0);
+    }
+
+    #[test]
+    fn the_second_question_depends_on_the_first() {
+        let mut values = vec![0.0; COUNT];
+        values[5] = 1.0;
+        assert_eq!(model().sum(&values), -1.0);
+        values[3] = 0.6;
+        assert_eq!(model().sum(&values), 1.0);
+        values[5] = -1.0;
+        assert_eq!(model().sum(&values), 2.0);
     }
 
     #[test]
@@ -144,7 +221,7 @@ mod tests {
             assert!(good.contains(from), "{good}");
             Model::from_text(&good.replace(from, to)).unwrap_err()
         };
-        assert!(refusal("texture 1", "texture 9").contains("texture 9"));
+        assert!(refusal("texture 2", "texture 9").contains("texture 9"));
         assert!(refusal("slope = 1.5", "slope = inf").contains("not finite"));
         assert!(refusal("[3,", "[99999,").contains("numbers of this program"));
         assert!(Model::from_text("nonsense").is_err());

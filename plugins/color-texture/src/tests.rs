@@ -85,15 +85,15 @@ mod training {
     use tagalong_core::{Example, Trainer};
 
     use super::*;
-    use crate::train::StumpTrainer;
+    use crate::train::TreeTrainer;
     use crate::{Features, Model, Training};
 
     fn small() -> Training {
-        Training { stumps: vec![10, 40], ..Training::default() }
+        Training { trees: vec![10, 40], ..Training::default() }
     }
 
-    fn trainer(training: Training, count: u32) -> StumpTrainer {
-        let mut trainer = StumpTrainer::new(training, 5).unwrap();
+    fn trainer(training: Training, count: u32) -> TreeTrainer {
+        let mut trainer = TreeTrainer::new(training, 5).unwrap();
         for seed in 0..count {
             let is_person = seed % 2 == 0;
             let example = Example { is_person, group: u64::from(seed / 3) };
@@ -108,7 +108,7 @@ mod training {
         let model = Model::from_text(&fitted.model).unwrap();
         let mut features = Features::default();
         for seed in 500..520 {
-            features.look(&frame(picture(seed % 2 == 0, seed)), &candidate().region).unwrap();
+            features.look(&frame(picture(seed % 2 == 0, seed)), &candidate()).unwrap();
             let log_odds = model.log_odds(&features);
             assert!((log_odds > 1.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }
@@ -124,7 +124,7 @@ mod training {
 
     #[test]
     fn one_class_is_no_training_set() {
-        let mut trainer = StumpTrainer::new(small(), 1).unwrap();
+        let mut trainer = TreeTrainer::new(small(), 1).unwrap();
         for group in 0..8 {
             let example = Example { is_person: true, group };
             trainer.add(&frame(picture(true, group as u32)), &candidate(), example).unwrap();
@@ -135,11 +135,11 @@ mod training {
     #[test]
     fn settings_that_cannot_work_are_refused() {
         for training in [
-            Training { stumps: vec![], ..small() },
+            Training { trees: vec![], ..small() },
             Training { rate: f64::NAN, ..small() },
             Training { folds: 1, ..small() },
         ] {
-            assert!(StumpTrainer::new(training, 1).is_err());
+            assert!(TreeTrainer::new(training, 1).is_err());
         }
     }
 }

@@ -34,7 +34,7 @@ impl ColorTexture {
 
 impl Verifier for ColorTexture {
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
-        self.features.look(frame, &candidate.region)?;
+        self.features.look(frame, candidate)?;
         let log_odds = self.model.log_odds(&self.features).clamp(-self.limit, self.limit);
         Ok(self.weight * log_odds)
     }

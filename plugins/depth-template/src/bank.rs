@@ -1,11 +1,17 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::body::{Relief, render};
 
 /// The body directions that have a template (P4: three). A frontal silhouette
 /// equals one from behind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// Facing the camera or turning the back to it.
     Along,

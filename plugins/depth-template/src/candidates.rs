@@ -23,6 +23,20 @@ pub mod tests_named {
     pub const WINDOW: &str = "search window";
 }
 
+/// True if what is seen goes on above, straight or aslant, at the same depth: a
+/// shoulder has the head aslant above it.
+pub fn is_below_something(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
+    [-ASLANT_M, 0.0, ASLANT_M].into_iter().any(|right| {
+        let (x, y) = local.offset(right, -config.boundary_distance_m);
+        let behind = rows.depth_m(x, y).map(|z| z - local.depth_m);
+        behind.is_some_and(|m| m.abs() <= config.boundary_margin_m)
+    })
+}
+
+/// From the middle of a shoulder, seen from the side, the head lies this far
+/// aside, m: more than half a head, less than half the shoulders.
+const ASLANT_M: f64 = 0.12;
+
 /// P4's boundary points: left of, right of and above the head the scene must be
 /// farther away. A point without a reading, or nearer than the head (somebody
 /// in front), says nothing; one at the head's own depth contradicts. Somebody
@@ -38,8 +52,8 @@ pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> 
     let points = [behind(-d, 0.0), behind(d, 0.0), behind(0.0, -d)];
     let passed = points.iter().flatten().filter(|m| passes(m)).count();
     let contradicted = points.iter().flatten().filter(|m| contradicts(m)).count();
-    let is_below_something = points[2].as_ref().is_some_and(contradicts);
-    !is_below_something && (passed >= config.boundary_min_passed as usize || contradicted == 0)
+    !is_below_something(rows, local, config)
+        && (passed >= config.boundary_min_passed as usize || contradicted == 0)
 }
 
 /// Depth steps smaller than this belong to the same head, m.

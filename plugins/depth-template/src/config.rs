@@ -1,6 +1,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::bank::Direction;
+
 /// How a silhouette is compared with the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -43,6 +45,9 @@ pub struct DepthTemplateConfig {
     pub max_head_width_m: f64,
     /// Part of the probes below the head that must show a body, 0 to 1.
     pub min_body: f64,
+    /// Body directions that have a template: `along` (from the front or the
+    /// back), `left`, `right`. P4 has three and does not say which.
+    pub directions: Vec<Direction>,
     /// How silhouettes are compared.
     pub cost: Cost,
     /// Weight of the person's pixels against those beside the person, 0 to 1.
@@ -81,6 +86,10 @@ pub struct DepthTemplateConfig {
     /// is wholly visible (role `weigh`), nats. Neighbouring pixels err alike, so
     /// that this is far below the number of pixels.
     pub likelihood_nats: f64,
+    /// Depth error of a person in an imagined scene at which a pixel no longer
+    /// speaks for the person, m; never less than three standard deviations of
+    /// the depth.
+    pub likelihood_tolerance_m: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
     /// Standard deviation of the head's place across the viewing ray, m.
@@ -104,6 +113,7 @@ impl Default for DepthTemplateConfig {
             min_head_width_m: 0.09,
             max_head_width_m: 0.36,
             min_body: 0.7,
+            directions: Direction::ALL.to_vec(),
             cost: Cost::Robust,
             foreground_weight: 0.3,
             relief_free_m: 0.15,
@@ -120,6 +130,7 @@ impl Default for DepthTemplateConfig {
             follow_radius_m: 0.6,
             background_percentile: 90.0,
             likelihood_nats: 12.0,
+            likelihood_tolerance_m: 0.3,
             max_rows: 28,
             sigma_across_m: 0.03,
             sigma_depth_m: 0.03,

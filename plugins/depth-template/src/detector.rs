@@ -8,8 +8,8 @@ use tagalong_core::{
 use tagalong_vision::RowSums;
 
 use crate::NAME;
-use crate::bank::{Bank, Direction, Pose};
-use crate::candidates::{body_below, boundary, head_width_m, tests_named};
+use crate::bank::{Bank, Pose};
+use crate::candidates::{body_below, boundary, head_width_m, is_below_something, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
@@ -64,6 +64,9 @@ impl DepthTemplate {
             if a.partial_cmp(&b) != Some(Ordering::Less) {
                 return Err(Error::Settings(format!("`{low}` = {a} must be below `{high}` = {b}")));
             }
+        }
+        if config.directions.is_empty() {
+            return Err(Error::Settings("`directions` must name one at least".into()));
         }
         Ok(Self {
             bank: Bank::new(config.max_rows),
@@ -175,14 +178,15 @@ impl DepthTemplate {
         Fitted { x: at.0 as f64, y: at.1 as f64, depth_m: cell.depth_m, cost: at.2 }
     }
 
-    /// The best of the three body directions.
+    /// The best of the body directions.
     fn best(&mut self, scene: &Scene<'_>, local: &Local) -> Option<Match> {
-        Direction::ALL
-            .into_iter()
+        let Self { bank, config, .. } = self;
+        let directions = config.directions.iter();
+        directions
             .filter_map(|direction| {
                 let pose =
-                    Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
-                let template = self.bank.template(pose);
+                    Pose::nearest(*direction, local.pitch_rad, local.roll_rad, local.px_per_m);
+                let template = bank.template(pose);
                 scene.matcher.fit(scene.rows, template, local.x, local.y, local.depth_m)
             })
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
@@ -241,10 +245,13 @@ impl DepthTemplate {
         let window = Rect::new(centre.x - reach, centre.y - reach, 2.0 * reach, 2.0 * reach);
         let c = &self.config;
         let limit = if track.confirmed { c.follow_cost } else { c.discover_cost };
-        self.scan(scene, &window, funnel, |_, local| {
+        self.scan(scene, &window, funnel, |this, local| {
             let head = scene.view.head(local.x as f64, local.y as f64, local.depth_m);
-            let near = (head.xy() - expected.xy()).norm() <= radius_m;
-            if near { Ok(()) } else { Err(tests_named::WINDOW) }
+            if (head.xy() - expected.xy()).norm() > radius_m {
+                return Err(tests_named::WINDOW);
+            }
+            let is_below = is_below_something(scene.rows, local, &this.config);
+            if is_below { Err(tests_named::BOUNDARY) } else { Ok(()) }
         });
         let Some(best) = group(&mut self.cells, 2.0 * radius_m).into_iter().next() else {
             return Ok(Vec::new());

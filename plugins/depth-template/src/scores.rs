@@ -160,7 +160,7 @@ impl Verdict {
     fn at(level: usize, config: &DepthTemplateConfig) -> Self {
         let depth_m = NEAREST_M * (level as f64 * LEVEL_STEP).exp();
         let noise_m = config.sigma_depth_m + config.sigma_depth_per_m2 * depth_m * depth_m;
-        let tolerance_m = config.relief_full_m.max(3.0 * noise_m);
+        let tolerance_m = config.likelihood_tolerance_m.max(3.0 * noise_m);
         let expected = RowSums::UNITS / depth_m;
         let tolerance = expected - RowSums::UNITS / (depth_m + tolerance_m);
         Self { expected: expected as f32, per_unit: (1.0 / tolerance) as f32 }

@@ -16,6 +16,10 @@ pub struct Config {
     /// Standard deviation added to that of each detection, m: what detectors
     /// do not know about themselves.
     pub extra_sigma_m: f64,
+    /// Degrees of freedom of the measurement noise: with few of them, 4 say, a
+    /// detection far from the prediction counts for less (Student's t); 0: the
+    /// noise is normal, and every detection counts in full.
+    pub student_dof: f64,
     /// As printed: subtract the robot's speed from the person's velocity in
     /// every frame. Biased while the robot moves.
     pub compat_printed_velocity: bool,
@@ -39,6 +43,7 @@ impl Default for Config {
             height_noise: 0.07,
             initial_velocity_variance: 2.0,
             extra_sigma_m: 0.02,
+            student_dof: 0.0,
             compat_printed_velocity: false,
             compat_printed_noise: false,
             compat_printed_update: false,
@@ -57,6 +62,7 @@ impl Config {
             ("height_noise", self.height_noise, true),
             ("initial_velocity_variance", self.initial_velocity_variance, false),
             ("extra_sigma_m", self.extra_sigma_m, true),
+            ("student_dof", self.student_dof, true),
             ("printed_sigma_w", self.printed_sigma_w, false),
             ("printed_sigma_v_m", self.printed_sigma_v_m, false),
         ];

@@ -1,4 +1,4 @@
-use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector5};
+use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector3, Vector5};
 use tagalong_core::{Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
 
 use crate::Config;
@@ -8,6 +8,9 @@ type Matrix5x3 = SMatrix<f64, 5, 3>;
 
 /// A coordinate with a larger variance, m², was not measured.
 const UNMEASURED_M2: f64 = 100.0;
+
+/// Rounds in which the weight of a detection is found; it settles at once.
+const STUDENT_ROUNDS: usize = 2;
 
 /// What is believed of a person.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,19 +110,22 @@ impl PersonFilter for Ekf {
     /// The update in Joseph form. S = P + R is positive definite as long as P
     /// is; where rounding has spoilt that, the belief is left as it is.
     fn correct(&self, belief: &mut Belief, detection: &Detection, _: &Camera) -> Support {
-        let r = self.measurement(detection);
         let p = belief.covariance;
-        let position = belief.mean.fixed_rows::<3>(0).into_owned();
-        let innovation = detection.position.coords - position;
-        let Some(s) = symmetric3(p.fixed_view::<3, 3>(0, 0) + r).cholesky() else {
+        let prior = p.fixed_view::<3, 3>(0, 0).into_owned();
+        let innovation = detection.position.coords - belief.mean.fixed_rows::<3>(0);
+        let variances = detection.covariance.diagonal();
+        let measured = variances.iter().filter(|v| **v < UNMEASURED_M2).count() as u32;
+        let normal = self.measurement(detection);
+        let Some(s) = symmetric3(prior + normal).cholesky() else {
             return Support::default();
         };
+        let nis = innovation.dot(&s.solve(&innovation));
+        let r = normal / self.weight(&prior, &normal, &innovation, measured);
+        let Some(s) = symmetric3(prior + r).cholesky() else { return Support::default() };
         let gain: Matrix5x3 = s.solve(&p.fixed_rows::<3>(0).into_owned()).transpose();
         belief.mean += gain * innovation;
         belief.covariance = self.corrected(&p, &gain, &r);
-        let variances = detection.covariance.diagonal();
-        let measured = variances.iter().filter(|v| **v < UNMEASURED_M2).count() as u32;
-        Support { nis: Some((innovation.dot(&s.solve(&innovation)), measured)) }
+        Support { nis: Some((nis, measured)) }
     }
 
     fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
@@ -134,6 +140,27 @@ impl PersonFilter for Ekf {
 }
 
 impl Ekf {
+    /// How much a detection counts if its noise has the tails of Student's t:
+    /// `(dof + m) / (dof + d^2)`, where d^2 depends on the weight in turn
+    /// (`algorithms`, section 11). Better than expected counts no more than 1.
+    fn weight(
+        &self,
+        prior: &Matrix3<f64>,
+        normal: &Matrix3<f64>,
+        innovation: &Vector3<f64>,
+        measured: u32,
+    ) -> f64 {
+        let dof = self.config.student_dof;
+        if dof == 0.0 {
+            return 1.0;
+        }
+        (0..STUDENT_ROUNDS).fold(1.0, |weight, _| {
+            let s = symmetric3(prior + normal / weight).cholesky();
+            let squared = s.map_or(0.0, |s| innovation.dot(&s.solve(innovation)));
+            ((dof + f64::from(measured)) / (dof + squared)).min(1.0)
+        })
+    }
+
     fn corrected(&self, p: &Matrix5, gain: &Matrix5x3, r: &Matrix3<f64>) -> Matrix5 {
         let mut kept = Matrix5::identity();
         let mut seen = kept.fixed_columns_mut::<3>(0);

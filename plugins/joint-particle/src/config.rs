@@ -66,12 +66,24 @@ pub struct Config {
     pub velocity_noise: f64,
     /// Variance of each velocity component of a newcomer, m²/s².
     pub initial_velocity_variance: f64,
+    /// `table`, `kde`, `gp` with `marginalise = false`: two people who are
+    /// weighed together keep their depth and height, as P3 assumes of a short
+    /// occlusion. Nothing in the map speaks of them.
+    pub hold_depth: bool,
+    /// Somebody alone faces where the template fits best, of the three. Where
+    /// false, and in groups, where the track walks (P3).
+    pub facing_by_image: bool,
     /// This part of the particles is moved to what a detector found, 0 to 1.
     pub from_detection: f64,
     /// A person is seen if the scene is more likely by this with than without
     /// the person, nats, ...
     pub min_support: f64,
-    /// ... and a detector found the person not longer ago than this, s.
+    /// by this where a detector found the person in this very frame, ...
+    pub min_support_found: f64,
+    /// ... and by this where no detector found the person for longer than
+    /// `trust_s`: furniture explains a little of the image, a person most of it.
+    pub min_support_unfound: f64,
+    /// Time for which a silhouette is trusted that no detector finds, s.
     pub trust_s: f64,
     /// Upper-body squares are enlarged by this part of their size before they
     /// are asked whether they overlap.
@@ -127,13 +139,17 @@ impl Default for Config {
             kld_error: 0.05,
             kld_quantile: 2.33,
             marginalise: true,
-            acceleration_noise: 0.8,
-            position_noise: 0.08,
+            acceleration_noise: 0.25,
+            position_noise: 0.05,
             height_noise: 0.04,
             velocity_noise: 0.0,
             initial_velocity_variance: 1.0,
+            hold_depth: false,
+            facing_by_image: true,
             from_detection: 0.1,
             min_support: 2.0,
+            min_support_found: 0.0,
+            min_support_unfound: 6.0,
             trust_s: 1.0,
             inflate: 0.1,
             split_m: 0.6,
@@ -173,6 +189,8 @@ impl Config {
             ("initial_velocity_variance", self.initial_velocity_variance, 0.0, 1e3),
             ("from_detection", self.from_detection, 0.0, 1.0),
             ("min_support", self.min_support, -1e6, 1e6),
+            ("min_support_found", self.min_support_found, -1e6, 1e6),
+            ("min_support_unfound", self.min_support_unfound, -1e6, 1e6),
             ("trust_s", self.trust_s, 0.0, 1e9),
             ("inflate", self.inflate, 0.0, 10.0),
             ("split_m", self.split_m, 0.0, 100.0),

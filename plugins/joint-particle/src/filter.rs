@@ -116,10 +116,11 @@ impl JointParticle {
             for (person, id) in group.ids.iter().enumerate() {
                 let mean = group.moments(person).mean;
                 let velocity = Vector2::new(mean[3], mean[4]);
-                if velocity.norm() > WALKING_MPS {
-                    headings.insert(*id, velocity);
-                } else if group.people() == 1 {
+                let walks = velocity.norm() > WALKING_MPS;
+                if group.people() == 1 && (self.config.facing_by_image || !walks) {
                     headings.insert(*id, facing(group, look)?);
+                } else if walks {
+                    headings.insert(*id, velocity);
                 }
             }
         }
@@ -154,7 +155,12 @@ impl JointParticle {
     /// furniture or the edge of the image.
     fn is_seen(&self, id: TrackId, nats: f64) -> bool {
         let unfound_s = self.unfound_s.get(&id).copied().unwrap_or_default();
-        nats > self.config.min_support && unfound_s <= self.config.trust_s
+        let config = &self.config;
+        nats > match unfound_s {
+            0.0 => config.min_support_found,
+            s if s <= config.trust_s => config.min_support,
+            _ => config.min_support_unfound,
+        }
     }
 
     fn estimate(&self, group: &Group, person: usize, camera: &Camera) -> Estimate {

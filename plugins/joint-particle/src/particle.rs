@@ -106,6 +106,23 @@ impl Particle {
         self.correct(&h, drawn, 0.0);
     }
 
+    /// Takes back what the last `dt_s` seconds, and what is not known of them,
+    /// changed along a direction on the floor and in height.
+    pub(crate) fn hold(&mut self, along: &Vector2<f64>, dt_s: f64) {
+        let speed = along.dot(&self.person().velocity);
+        let mut free = Matrix5::identity();
+        let across = Matrix2::identity() - along * along.transpose();
+        free.fixed_view_mut::<2, 2>(0, 0).copy_from(&across);
+        free.fixed_view_mut::<2, 2>(3, 3).copy_from(&across);
+        free[(2, 2)] = 0.0;
+        let back = along * speed;
+        let place = self.mean.fixed_rows::<2>(0) - back * dt_s;
+        let velocity = self.mean.fixed_rows::<2>(3) - back;
+        self.mean.fixed_rows_mut::<2>(0).copy_from(&place);
+        self.mean.fixed_rows_mut::<2>(3).copy_from(&velocity);
+        self.covariance = free * self.covariance * free;
+    }
+
     /// Kalman update by a measurement of `h . x` with the given variance.
     pub(crate) fn correct(&mut self, h: &Vector5<f64>, measured: f64, variance: f64) {
         let ph = self.covariance * h;

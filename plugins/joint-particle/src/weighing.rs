@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point2, Vector2, Vector5};
+use nalgebra::{Point2, Vector2, Vector3, Vector5};
 use tagalong_core::{Frame, Likelihood, Person, Result, TrackId};
 
 use crate::config::{Chosen, Config, Method};
@@ -105,6 +105,15 @@ impl<'a> Look<'a> {
             group.restart(person, sighting, self.config.from_detection);
         }
         group.draw(person, &self.eye, self.config);
+    }
+
+    /// P3: during a short occlusion people move parallel to the image.
+    fn hold_depth(&self, group: &mut Group) {
+        let view = self.frame.camera.robot_from_camera * Vector3::z();
+        let along = view.xy().try_normalize(1e-6).unwrap_or_else(Vector2::x);
+        let dt_s = self.frame.motion.dt;
+        let people = 0..group.people();
+        people.for_each(|p| group.column_mut(p).for_each(|particle| particle.hold(&along, dt_s)));
     }
 
     fn draw_everybody(&self, group: &mut Group) {
@@ -220,6 +229,9 @@ impl Lateral {
 fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     let config = look.config;
     let before = group.likelihoods.clone();
+    if config.hold_depth {
+        look.hold_depth(group);
+    }
     look.draw_everybody(group);
     let lateral = Lateral::new(group, look);
     let all: Vec<Place> = (0..group.rows()).map(|row| lateral.place(group.row(row))).collect();
@@ -286,6 +298,7 @@ fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
         let variants: Vec<Person> = (0..SAMPLES).map(moved).collect();
         let logs = look.variants(group, row, person, variants.into_iter())?;
         let Some((shift, spread)) = measurement(&logs, sigma) else { continue };
+        let spread = spread.max(line.finest_m(&best, &look.eye).powi(2));
         let measured = line.value(&best, &look.eye) + shift;
         for particle in group.column_mut(person) {
             let h = line.direction(particle, &look.eye);
@@ -316,6 +329,13 @@ impl Line {
         }
     }
 
+    fn finest_m(self, particle: &Particle, eye: &Point2<f64>) -> f64 {
+        match self {
+            Self::Height => FINEST_M,
+            Self::Range => FINEST_M.max(FINEST_PART * self.value(particle, eye)),
+        }
+    }
+
     fn value(self, particle: &Particle, eye: &Point2<f64>) -> f64 {
         match self {
             Self::Height => particle.mean[2],
@@ -328,8 +348,11 @@ impl Line {
 const SAMPLES: usize = 15;
 /// They reach this many standard deviations to both sides.
 const REACH: f64 = 3.5;
-/// No line tells more than this, m².
-const FINEST_M2: f64 = 0.02 * 0.02;
+/// No line tells more than this, m ...
+const FINEST_M: f64 = 0.02;
+/// ... and none along a viewing ray more than this part of the distance:
+/// likelihoods tell depths apart by a few per cent.
+const FINEST_PART: f64 = 0.015;
 
 fn offset(i: usize, sigma: f64) -> f64 {
     REACH * sigma * (2.0 * i as f64 / (SAMPLES - 1) as f64 - 1.0)
@@ -348,7 +371,7 @@ fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
         return None;
     }
     let spread = 1.0 / (1.0 / variance.max(1e-9) - 1.0 / (sigma * sigma));
-    Some((mean * (1.0 + spread / (sigma * sigma)), spread.max(FINEST_M2)))
+    Some((mean * (1.0 + spread / (sigma * sigma)), spread))
 }
 
 /// By how much each person makes the best particle's scene more likely, nats.

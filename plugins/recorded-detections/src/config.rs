@@ -5,8 +5,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Body {
-    /// The whole person, from head to feet.
+    /// The whole person, from head to feet; its upper-body square is tracked.
     Full,
+    /// The whole person, and the box is tracked as it is. Its place is that of
+    /// `full`. For data sets whose truth is whole bodies, too.
+    FullBox,
     /// Head and shoulders, as a square.
     Upper,
 }

@@ -60,7 +60,12 @@ impl RecordedDetections {
                 let region = region.unwrap_or_else(|| camera.upper_body(&head));
                 (region, head, Matrix3::identity() * variance)
             }
-            (None, Some(region)) => self.placed(frame, &self.upper_body(&region))?,
+            (None, Some(region)) => {
+                let upper_body = self.upper_body(&region);
+                let (position, covariance) = self.placed(frame, &upper_body)?;
+                let keeps_box = self.config.body == Body::FullBox;
+                (if keeps_box { region } else { upper_body }, position, covariance)
+            }
             (None, None) => return None,
         };
         let inside = region.clipped(camera.width, camera.height).area() > 0.0;
@@ -72,13 +77,13 @@ impl RecordedDetections {
     fn upper_body(&self, region: &Rect) -> Rect {
         match self.config.body {
             Body::Upper => *region,
-            Body::Full => region.upper_body_of_standing(self.config.height_m),
+            Body::Full | Body::FullBox => region.upper_body_of_standing(self.config.height_m),
         }
     }
 
     /// A place for an upper-body square: by the depth image where it shows the
     /// face, else by the square's size, with the uncertainty of either.
-    fn placed(&self, frame: &Frame, region: &Rect) -> Option<(Rect, Point3<f64>, Matrix3<f64>)> {
+    fn placed(&self, frame: &Frame, region: &Rect) -> Option<(Point3<f64>, Matrix3<f64>)> {
         let camera = &*frame.camera;
         let measured = frame.images().depth.as_deref().and_then(|depth| face_depth(depth, region));
         let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / region.width;
@@ -92,7 +97,7 @@ impl RecordedDetections {
             let position = camera.head_of(region, face_m);
             let centre = region.centre();
             let covariance = camera.covariance(centre, depth_m, self.config.sigma_px, sigma_m);
-            (*region, position, covariance)
+            (position, covariance)
         })
     }
 

@@ -70,6 +70,20 @@ fn a_whole_body_becomes_an_upper_body_with_a_place() {
 }
 
 #[test]
+fn a_whole_body_can_be_tracked_as_the_box_that_it_is() {
+    let text = whole_body(Point3::new(3.0, 0.4, 1.585));
+    let config = |body| Config { body, ..Config::default() };
+    let mut square = of_file(&text, config(Body::Full)).unwrap();
+    let mut whole = of_file(&text, config(Body::FullBox)).unwrap();
+    let (square, whole) = (
+        detect(&mut square, &frame(2, None)).remove(0),
+        detect(&mut whole, &frame(2, None)).remove(0),
+    );
+    assert!((whole.region.height / whole.region.width - 3.4).abs() < 1e-6, "{:?}", whole.region);
+    assert_eq!((square.position, square.covariance), (whole.position, whole.covariance));
+}
+
+#[test]
 fn depth_beats_the_size_and_holes_do_not_count() {
     let head = Point3::new(3.0, 0.0, 1.585);
     let mut detector = of_file(&whole_body(head), Config::default()).unwrap();

@@ -9,6 +9,10 @@ pub enum Scaling {
     /// patches are apart by twice one minus their correlation.
     #[default]
     Unit,
+    /// Histograms of the directions of gradients in their place (Dalal and
+    /// Triggs, CVPR 2005): 5x5 cells of 16 directions with sign, each divided
+    /// by the strength around it; then the length becomes 1.
+    Gradients,
     /// Nothing; grey values are 0 to 255. This is what the paper prints, and
     /// with its gamma every patch is infinitely far from every other.
     Raw,
@@ -39,7 +43,7 @@ impl Default for Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
-    /// What is done to the grey values: `unit` or `raw`.
+    /// What is done to the grey values: `unit`, `gradients` or `raw`.
     pub scaling: Scaling,
     /// The square of a candidate is enlarged by this fraction of its side.
     pub grow: f64,
@@ -61,14 +65,14 @@ pub struct Training {
 impl Default for Training {
     fn default() -> Self {
         Self {
-            scaling: Scaling::Unit,
+            scaling: Scaling::Gradients,
             grow: 0.1,
-            gammas: vec![0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0],
-            penalties: vec![0.1, 1.0, 10.0, 100.0],
+            gammas: vec![0.5, 1.0, 2.0, 4.0, 8.0],
+            penalties: vec![0.3, 1.0, 3.0, 10.0],
             folds: 4,
-            max_tried: 600,
-            max_samples: 2000,
-            max_vectors: 600,
+            max_tried: 1000,
+            max_samples: 4000,
+            max_vectors: 1200,
         }
     }
 }

@@ -3,7 +3,8 @@
 //!
 //! Silhouettes in depth cannot tell a person from a coat on a stand; the grey
 //! values inside often can. A candidate's square is reduced to 20x20 grey
-//! values ([`Sampler`]), freed of brightness and contrast, and compared with
+//! values ([`Sampler`]), freed of brightness and contrast or turned into directions
+//! of gradients, and compared with
 //! the support vectors of a [`Model`] by a radial basis function. The decision
 //! value becomes log-odds by a calibration on held-out groups.
 //!
@@ -14,6 +15,7 @@
 //! Without it there is no solver in the program.
 
 mod config;
+mod gradients;
 mod model;
 mod patch;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use tagalong_core::{GreyImage, Rect};
 
-use crate::Scaling;
+use crate::{Scaling, gradients};
 
 /// Rows and columns of a patch (P4, section II-C).
 pub const SIDE: usize = 20;
@@ -41,8 +41,10 @@ impl Sampler {
                 patch[row * SIDE + column] = (sum as f64 / count as f64) as f32;
             }
         }
-        if self.scaling == Scaling::Unit {
-            normalise(&mut patch);
+        match self.scaling {
+            Scaling::Unit => normalise(&mut patch),
+            Scaling::Gradients => patch = gradients::of(&patch),
+            Scaling::Raw => {}
         }
         patch
     }
@@ -79,6 +81,7 @@ mod tests {
 
     const UNIT: Sampler = Sampler { grow: 0.0, scaling: Scaling::Unit };
     const RAW: Sampler = Sampler { grow: 0.0, scaling: Scaling::Raw };
+    const GRADIENTS: Sampler = Sampler { grow: 0.0, scaling: Scaling::Gradients };
 
     /// The mean of every pixel whose column and row fall into a cell.
     fn slow(grey: &GreyImage, x0: usize, y0: usize, block: usize) -> Vec<f32> {
@@ -118,9 +121,11 @@ mod tests {
             let grey = noise(60, 60, seed);
             let other = grey.map(|v| (gain * f64::from(v) + offset).round() as u8);
             let square = Rect::new(2.0, 3.0, 40.0, 40.0);
-            let (a, b) = (UNIT.patch(&grey, &square), UNIT.patch(&other, &square));
-            let correlation: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-            prop_assert!(correlation > 0.995, "{correlation}");
+            for sampler in [UNIT, GRADIENTS] {
+                let (a, b) = (sampler.patch(&grey, &square), sampler.patch(&other, &square));
+                let correlation: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                prop_assert!(correlation > 0.995, "{correlation}");
+            }
         }
     }
 
@@ -134,7 +139,9 @@ mod tests {
     #[test]
     fn flat_walls_and_squares_outside_of_the_image_are_zero() {
         let wall = GreyImage::filled(40, 40, 90);
-        assert_eq!(UNIT.patch(&wall, &Rect::new(0.0, 0.0, 30.0, 30.0)), [0.0; PIXELS]);
+        for sampler in [UNIT, GRADIENTS] {
+            assert_eq!(sampler.patch(&wall, &Rect::new(0.0, 0.0, 30.0, 30.0)), [0.0; PIXELS]);
+        }
         let outside = Rect::new(-500.0, -500.0, 20.0, 20.0);
         assert_eq!(UNIT.patch(&noise(40, 40, 3), &outside), [0.0; PIXELS]);
     }

@@ -104,16 +104,19 @@ mod training {
 
     #[test]
     fn it_learns_to_tell_heads_from_bars() {
-        let fitted = trainer(small(), 60).fit(&mut |_| {}).unwrap();
-        let model = Model::from_text(&fitted.model).unwrap();
-        let sampler = Sampler { grow: 0.1, scaling: Scaling::Unit };
-        for seed in 500..520 {
-            let patch = sampler.patch(&picture(seed % 2 == 0, seed), &candidate().region);
-            let log_odds = model.log_odds(&patch);
-            assert!((log_odds > 1.0) == (seed % 2 == 0), "{seed}: {log_odds}");
+        for scaling in [Scaling::Unit, Scaling::Gradients] {
+            let training = Training { scaling, ..small() };
+            let fitted = trainer(training, 60).fit(&mut |_| {}).unwrap();
+            let model = Model::from_text(&fitted.model).unwrap();
+            assert_eq!(model.sampler, Sampler { grow: 0.1, scaling });
+            for seed in 500..520 {
+                let picture = picture(seed % 2 == 0, seed);
+                let log_odds = model.log_odds(&model.sampler.patch(&picture, &candidate().region));
+                assert!((log_odds > 1.0) == (seed % 2 == 0), "{scaling:?}, {seed}: {log_odds}");
+            }
+            assert_eq!(fitted.figures["people"].as_integer(), Some(30));
+            assert_eq!(fitted.figures["cross_validation"].as_array().unwrap().len(), 4);
         }
-        assert_eq!(fitted.figures["people"].as_integer(), Some(30));
-        assert_eq!(fitted.figures["cross_validation"].as_array().unwrap().len(), 4);
     }
 
     #[test]

@@ -3,7 +3,7 @@ use tagalong_core::{
     DepthImage, Detection, Distortion, Estimate, Funnel, Person, Pinhole, Rect, Stamp, Track,
     TrackId,
 };
-use tagalong_pipeline::{Candidate, Fate, Outcome};
+use tagalong_pipeline::{Candidate, Fate, Outcome, Weighing};
 
 use super::*;
 
@@ -40,6 +40,7 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> Scene {
             target: None,
             command: None,
             nis: Vec::new(),
+            weighing: Weighing::default(),
             timings: Vec::new(),
             ended: Vec::new(),
         },

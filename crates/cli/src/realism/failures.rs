@@ -8,9 +8,8 @@ use tagalong_pipeline::{Candidate, Fate};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Run, Trial, TrialError, each};
 
-use super::{Check, mean, scene};
+use super::{Check, mean, scene, scenes};
 use crate::simulate::threads;
-use crate::trials::with_seeds;
 
 const GROUP: &str = "failures that must show";
 const EMPTY: &str = include_str!("../../../../configs/scenes/empty-clutter.toml");
@@ -35,7 +34,8 @@ fn ekf() -> Contender {
 
 /// Detections that were believed, per image.
 fn false_alarms(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
-    let scenes = with_seeds(&Scene { duration_s: 6.0, ..scene(EMPTY) }, seeds);
+    let short = |scene| Scene { duration_s: 6.0, ..scene };
+    let scenes: Vec<Scene> = scenes(EMPTY, seeds).into_iter().map(short).collect();
     let count = |trial: Trial| {
         let reports = &trial.runs[0].reports;
         let believed = reports.iter().flat_map(|r| &r.candidates).filter(|c| is_believed(c));
@@ -72,15 +72,15 @@ fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
 fn printed_filter(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let contenders = [ekf(), Contender::new("depth-ekf-as-printed", AS_PRINTED)];
     let standing = |path: &str| {
-        scene(&format!(
+        format!(
             "duration_s = 5.0\n[room]\nsize_m = [10.0, 6.0]\n[camera]\nwidth = 320\nheight = 240\n\
              [robot]\nstart = [1.0, 3.0]\npath = {path}\nspeed_mps = 0.5\n\
              [[people]]\npath = [[6.0, 3.2]]\nheading_deg = 180.0\n"
-        ))
+        )
     };
     let mut checks = Vec::new();
     for (robot, path) in [("a robot at rest", "[]"), ("a moving robot", "[[8.0, 3.0]]")] {
-        let scenes = with_seeds(&standing(path), seeds.min(5));
+        let scenes = scenes(&standing(path), seeds.min(5));
         let keep = |trial: Trial| Ok([velocity_bias(&trial, 0), velocity_bias(&trial, 1)]);
         let all = each(&scenes, &contenders, registry, threads(None), keep, |_| ())?;
         let bias = |at: usize| mean(&all.iter().map(|both| both[at]).collect::<Vec<f64>>()).abs();

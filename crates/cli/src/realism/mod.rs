@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tagalong_core::{DepthImage, Frame, Funnel, Registry};
-use tagalong_sim::{CameraKind, Scene};
+use tagalong_sim::{CameraKind, Scene, Variant};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::{Draw, Drawn, TrialError};
 
@@ -139,8 +139,18 @@ fn text(checks: &[Check]) -> String {
 
 /// Scenes of checks are written by this file's own modules, and are right.
 #[expect(clippy::expect_used, reason = "the scenes are part of the program, and tests read them")]
+fn scene_with(text: &str, variant: &Variant) -> Scene {
+    Scene::parse_with(text, variant).expect("the built-in scene is right")
+}
+
 fn scene(text: &str) -> Scene {
-    Scene::parse(text).expect("the built-in scene is right")
+    scene_with(text, &Variant::default())
+}
+
+/// The same scene with as many seeds: other luck, and all that varies drawn anew.
+fn scenes(text: &str, seeds: u64) -> Vec<Scene> {
+    let variant = |seed| Variant { seed: Some(seed), ..Variant::default() };
+    (0..seeds).map(|seed| scene_with(text, &variant(seed))).collect()
 }
 
 /// All frames of a scene; those of a stereo pair with the depth that the stage

@@ -197,7 +197,7 @@ impl Desk {
             odom_from_robot: &item.frame.odom_from_robot,
             tracks: &report.tracks,
             target: report.target,
-            command: report.command,
+            command: report.command.map(|command| command.wheels),
         };
         self.log.write(&record).map_err(Failure::failed)?;
         self.timings.add("write", ms_since(writing));

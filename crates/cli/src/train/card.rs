@@ -87,6 +87,44 @@ impl Card {
     }
 }
 
+/// The card of a detector that looks at windows.
+#[derive(Clone, Debug, Serialize)]
+pub struct WindowCard {
+    /// The plugin that reads the model.
+    plugin: String,
+    /// A minute's version.
+    quick: bool,
+    /// The seed.
+    seed: u64,
+    /// What it was trained on.
+    trained_on: Vec<String>,
+    /// Photographs altogether; a fifth of their groups is held out for the
+    /// figures, and a fifth for the calibration.
+    photographs: usize,
+    /// What the trainer says.
+    fit: toml::Table,
+}
+
+impl WindowCard {
+    /// A card.
+    pub fn new(args: &TrainArgs, photographs: usize, fit: toml::Table) -> Self {
+        let folders = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
+        Self {
+            plugin: args.plugin.clone(),
+            quick: args.quick,
+            seed: args.seed,
+            trained_on: folders.map(String::from).to_vec(),
+            photographs,
+            fit,
+        }
+    }
+
+    /// The card as TOML.
+    pub fn to_text(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+}
+
 fn line(share: Share) -> String {
     let percent = |fraction: f64| format!("{:.1}", 100.0 * fraction);
     let fraction = share.count as f64 / share.of.max(1) as f64;

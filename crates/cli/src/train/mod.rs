@@ -8,9 +8,11 @@
 
 mod card;
 mod held_out;
+mod panorama;
 mod photos;
 mod rooms;
 mod seen;
+mod windows;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,16 +20,18 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::{
-    ConfigError, Context, Detection, Example, Frame, Registry, Trainer, Verifier, Wheels,
+    ConfigError, Context, Detection, Example, Frame, Kind, Registry, Trainer, Verifier, Wheels,
 };
 use tagalong_pipeline::Pipeline;
+use tagalong_sim::Split;
 use toml::Spanned;
 use toml::de::DeTable;
 
 use self::card::{Card, Harvest};
 use self::held_out::{Comparison, Effect, Tally};
 use self::photos::{fingerprint, photos};
-use self::seen::{Label, Seen, in_log, in_room, label};
+use self::rooms::Look;
+use self::seen::{Label, Seen, in_log, in_scene, label};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::simulate::threads;
 
@@ -47,7 +51,8 @@ const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 /// The arguments of `tagalong train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
-    /// The plugin to train, for example `svm-patch`.
+    /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
+    /// of the detector `omni-appearance`.
     pub plugin: String,
     /// Where the model goes; its card is written beside it
     /// [default: configs/models/<plugin>.toml].
@@ -70,29 +75,35 @@ pub struct TrainArgs {
 
 /// How much is drawn.
 struct Plan {
-    /// Rooms of the first round and of each further one.
-    rooms: [u64; 2],
+    /// Scenes of the first round and of each further one.
+    scenes: [u64; 2],
     rounds: usize,
-    test_rooms: u64,
-    duration_s: f64,
+    test_scenes: u64,
+    /// Few images a second: many moments tell more than many neighbours.
+    look: Look,
+    /// Tracks want more of them.
+    test_look: Look,
 }
 
 impl Plan {
     fn new(quick: bool) -> Self {
+        let look = Look { rate_hz: 1.0, duration_s: 7.0 };
         if quick {
-            Self { rooms: [4, 2], rounds: 1, test_rooms: 3, duration_s: 2.0 }
+            let test_look = Look { rate_hz: 4.0, duration_s: 2.0 };
+            Self { scenes: [6, 4], rounds: 1, test_scenes: 4, look, test_look }
         } else {
-            Self { rooms: [18, 12], rounds: 2, test_rooms: 18, duration_s: 3.0 }
+            let test_look = Look { rate_hz: 5.0, duration_s: 4.0 };
+            Self { scenes: [144, 72], rounds: 2, test_scenes: 36, look, test_look }
         }
     }
 
-    /// The seeds of the rooms of a round; no room comes twice.
-    fn seeds(&self, round: usize, seed: u64) -> Vec<u64> {
-        let [first, further] = self.rooms;
+    /// The numbers of the scenes of a round; none comes twice.
+    fn numbers(&self, round: usize, seed: u64) -> std::ops::Range<u64> {
+        let [first, further] = self.scenes;
         let before = if round == 0 { 0 } else { first + (round as u64 - 1) * further };
         let count = if round == 0 { first } else { further };
-        let start = rooms::TRAIN + seed.wrapping_mul(1000) % (rooms::TEST - 1000) + before;
-        (start..start + count).collect()
+        let start = seed.wrapping_mul(1000) % 1_000_000 + before;
+        start..start + count
     }
 }
 
@@ -113,7 +124,13 @@ struct Session<'a> {
 /// that cannot be read or written are 1.
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let session = Session::new(args, registry)?;
+    if args.plugin == panorama::NAME {
+        return panorama::train(&session, args);
+    }
     let mut trainer = session.trainer()?;
+    if registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector) {
+        return windows::train(&session, trainer.as_mut());
+    }
     let mut card = Card::new(args, session.sources());
     let mut doubter: Option<Box<dyn Verifier>> = None;
     for round in 0..=session.plan.rounds {
@@ -219,14 +236,15 @@ impl<'a> Session<'a> {
             *count += 1;
             trainer.add(frame, candidate, example).map_err(Failure::failed)
         };
-        let seeds = self.plan.seeds(round, self.args.seed);
-        self.tell(round, "drawing rooms");
-        self.bar.set_length(seeds.len() as u64);
-        for seed in &seeds {
-            let scene = rooms::room(*seed, (seed % 4) as usize, self.plan.duration_s);
+        let numbers = self.plan.numbers(round, self.args.seed);
+        self.tell(round, "drawing scenes");
+        self.bar.set_length(numbers.end - numbers.start);
+        for number in numbers {
+            let scene =
+                rooms::scene(Split::Train, number, self.plan.look).map_err(Failure::failed)?;
             let mut pipeline = pipeline(HARVEST, self.registry)?;
-            in_room(&scene, threads(None), &mut |seen| {
-                propose(&mut pipeline, seen, |_| *seed, &mut show)
+            in_scene(&scene, threads(None), &mut |seen| {
+                propose(&mut pipeline, seen, |_| number, &mut show)
             })?;
             self.bar.inc(1);
         }
@@ -268,13 +286,14 @@ impl<'a> Session<'a> {
     fn try_rooms(&self) -> Result<Effect, Failure> {
         self.bar.set_message("trying held-out rooms");
         self.bar.set_position(0);
-        self.bar.set_length(self.plan.test_rooms);
+        self.bar.set_length(self.plan.test_scenes);
         let mut tally = Tally::default();
-        for seed in rooms::TEST..rooms::TEST + self.plan.test_rooms {
-            let scene = rooms::room(seed, (seed % 3) as usize, self.plan.duration_s);
+        for number in 0..self.plan.test_scenes {
+            let scene =
+                rooms::scene(Split::Test, number, self.plan.test_look).map_err(Failure::failed)?;
             let mut comparison = self.comparison()?;
             tally.next_scene();
-            in_room(&scene, threads(None), &mut |seen| comparison.step(seen, &mut tally))?;
+            in_scene(&scene, threads(None), &mut |seen| comparison.step(seen, &mut tally))?;
             self.bar.inc(1);
         }
         Ok(tally.effect())
@@ -320,7 +339,8 @@ fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
 fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
-        "color-texture" => "[training]\nstumps = [25, 50]",
+        "color-texture" => "[training]\ntrees = [25, 50]",
+        "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
         _ => "",
     };
     text.parse().unwrap_or_default()

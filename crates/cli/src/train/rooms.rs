@@ -1,28 +1,67 @@
-//! Rooms for training and for testing, drawn at random from a seed.
+//! Scenes for training and for testing: rooms drawn at random from a seed, and
+//! the suites that everything else is tried in, each by its own seeds.
 
+use tagalong_core::ConfigError;
 use tagalong_sim::{
-    AtEnd, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind, LightSettings,
-    PersonSettings, RobotSettings, RoomSettings, Scene,
+    AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
+    LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Split, Variant,
 };
 
-/// Rooms for training have seeds from here on ...
-pub const TRAIN: u64 = 1;
-/// ... and rooms for testing from here on. No room is in both.
-pub const TEST: u64 = 100_000;
-
-/// Furniture with the silhouette of a person, but without a picture of one:
-/// posters and cardboard figures show what grey values alone cannot doubt.
-const LOOK_ALIKES: [FurnitureKind; 5] = [
+/// Furniture with the silhouette of a person.
+const LOOK_ALIKES: [FurnitureKind; 6] = [
     FurnitureKind::CoatStand,
     FurnitureKind::DrapedChair,
     FurnitureKind::FloorLamp,
     FurnitureKind::Plant,
     FurnitureKind::Pillar,
+    FurnitureKind::CardboardFigure,
 ];
+
+/// The suites that take turns.
+const SUITES: [&str; 9] = [
+    include_str!("../../../../configs/scenes/empty-clutter.toml"),
+    include_str!("../../../../configs/scenes/office.toml"),
+    include_str!("../../../../configs/scenes/crowd.toml"),
+    include_str!("../../../../configs/scenes/full-occlusion.toml"),
+    include_str!("../../../../configs/scenes/empty-clutter.toml"),
+    include_str!("../../../../configs/scenes/square-walk.toml"),
+    include_str!("../../../../configs/scenes/cafeteria.toml"),
+    include_str!("../../../../configs/scenes/turntable.toml"),
+    include_str!("../../../../configs/scenes/following.toml"),
+];
+
+/// How a scene is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Images a second.
+    pub rate_hz: f64,
+    /// For how long, s.
+    pub duration_s: f64,
+}
+
+/// A scene of a split: a random room or the next suite in turn, half of them as
+/// colour and depth, half of them as a stereo pair.
+///
+/// # Errors
+/// A number that is no seed.
+pub fn scene(split: Split, number: u64, look: Look) -> Result<Scene, ConfigError> {
+    let (turn, is_room) = (number / 2, number.is_multiple_of(2));
+    let kind = if (turn / 2).is_multiple_of(2) { CameraKind::Rgbd } else { CameraKind::Stereo };
+    let seed = split.seed(number)?;
+    let mut scene = if is_room {
+        room(seed, (turn % 4) as usize)
+    } else {
+        let text = SUITES[(turn % SUITES.len() as u64) as usize];
+        Scene::parse_with(text, &Variant::of_seed(seed))?
+    };
+    scene.camera.kind = kind;
+    (scene.camera.rate_hz, scene.duration_s) = (look.rate_hz, look.duration_s);
+    Ok(scene)
+}
 
 /// A room with so many people, all of it in view. Size, light, camera, furniture
 /// and everybody's way and looks depend on the seed.
-pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
+fn room(seed: u64, people: usize) -> Scene {
     let mut chance = Chance(seed);
     let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
     let start = [0.8, width * chance.between(0.3, 0.7)];
@@ -30,7 +69,6 @@ pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
     Scene {
         about: "candidates for a verifier".into(),
         seed,
-        duration_s,
         room: RoomSettings {
             size_m: [length, width],
             height_m: chance.between(2.5, 3.2),
@@ -47,7 +85,7 @@ pub fn room(seed: u64, people: usize, duration_s: f64) -> Scene {
             width: 512,
             height: 384,
             field_of_view_deg: chance.between(56.0, 75.0),
-            rate_hz: 4.0,
+            baseline_m: 0.12,
             height_m: chance.between(0.9, 1.5),
             pitch_down_deg: chance.between(-3.0, 6.0),
             ..CameraSettings::default()
@@ -126,13 +164,28 @@ impl Chance {
 mod tests {
     use super::*;
 
+    const LOOK: Look = Look { rate_hz: 2.0, duration_s: 3.0 };
+
     #[test]
-    fn a_room_depends_on_its_seed_only_and_is_a_scene() {
-        assert_eq!(room(5, 2, 4.0), room(5, 2, 4.0));
-        assert_ne!(room(5, 2, 4.0).furniture, room(6, 2, 4.0).furniture);
-        for seed in [TRAIN, TEST, TEST + 7] {
-            let text = toml::to_string(&room(seed, 1, 4.0)).unwrap();
-            assert_eq!(Scene::parse(&text).unwrap().seed, seed);
+    fn a_scene_depends_on_its_number_and_split_only() {
+        for number in 0..40 {
+            let train = scene(Split::Train, number, LOOK).unwrap();
+            assert_eq!(train, scene(Split::Train, number, LOOK).unwrap());
+            assert_eq!(Split::of(train.seed), Split::Train);
+            assert_ne!(train, scene(Split::Test, number, LOOK).unwrap());
+            let text = toml::to_string(&train).unwrap();
+            assert_eq!(Scene::parse(&text).unwrap().seed, train.seed);
         }
+    }
+
+    #[test]
+    fn every_suite_is_seen_by_both_cameras() {
+        let kinds = |kind: CameraKind| {
+            let scenes = (0..72).map(|number| scene(Split::Train, number, LOOK).unwrap());
+            let abouts = scenes.filter(|s| s.camera.kind == kind).map(|scene| scene.about);
+            abouts.collect::<std::collections::BTreeSet<String>>()
+        };
+        assert_eq!(kinds(CameraKind::Rgbd), kinds(CameraKind::Stereo));
+        assert_eq!(kinds(CameraKind::Rgbd).len(), 9, "eight suites and the rooms");
     }
 }

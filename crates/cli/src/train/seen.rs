@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use nalgebra::Point2;
-use tagalong_core::{Detection, Frame, Rect};
+use tagalong_core::{Detection, Frame, Funnel, Rect};
 use tagalong_eval::{Role, Truth};
 use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
 use tagalong_sim::Scene;
+use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::Draw;
 
 use crate::outcome::Failure;
@@ -74,17 +75,27 @@ pub fn label(candidate: &Detection, people: &[Known]) -> Label {
 /// What is done with each frame.
 pub type See<'a> = &'a mut dyn FnMut(&Seen) -> Result<(), Failure>;
 
-/// Goes through a drawn room.
+/// Goes through a drawn scene. A stereo pair is matched, as a pipeline would.
 ///
 /// # Errors
 /// Those of `see`.
-pub fn in_room(scene: &Scene, threads: usize, see: See<'_>) -> Result<(), Failure> {
+pub fn in_scene(scene: &Scene, threads: usize, see: See<'_>) -> Result<(), Failure> {
     let mut draw = Draw::new(scene, threads);
+    let mut stereo = StereoDepth::new(StereoSettings::default()).map_err(Failure::failed)?;
     while let Some(drawn) = draw.next_frame() {
         let people = drawn.truth.iter().map(known).collect();
-        see(&Seen { frame: drawn.frame, people })?;
+        let frame = match drawn.frame.depth() {
+            Ok(_) => drawn.frame,
+            Err(_) => with_depth(drawn.frame, &mut stereo)?,
+        };
+        see(&Seen { frame, people })?;
     }
     Ok(())
+}
+
+fn with_depth(frame: Frame, stereo: &mut StereoDepth) -> Result<Frame, Failure> {
+    let depth = stereo.depth(&frame, &mut Funnel::default()).map_err(Failure::failed)?;
+    Ok(frame.with_depth(depth))
 }
 
 fn known(truth: &tagalong_sim::Truth) -> Known {

@@ -119,12 +119,6 @@ fn suite(path: &Path, args: &TrialsArgs) -> Result<(String, Vec<Scene>), Failure
     Ok((name, scenes.collect::<Result<_, _>>()?))
 }
 
-/// The same scene with other luck.
-pub fn with_seeds(scene: &Scene, seeds: u64) -> Vec<Scene> {
-    let seed = |offset| scene.seed.wrapping_add(offset);
-    (0..seeds).map(|offset| Scene { seed: seed(offset), ..scene.clone() }).collect()
-}
-
 fn bar(trials: usize) -> ProgressBar {
     let bar = ProgressBar::new(trials as u64);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} trials {msg} {eta}") {

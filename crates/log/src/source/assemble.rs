@@ -4,16 +4,17 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    Camera, DepthImage, Distortion, Frame, Images, Lens, Motion, Pinhole, RightImage, Stamp,
-    planar_pose,
+    Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Lens, Motion, Panorama, Pinhole,
+    RightImage, Stamp, planar_pose,
 };
+use tagalong_vision::Unwrapping;
 
 use super::intake::Intake;
 use super::pairing::Payload;
 use super::recorded::recorded;
 use super::tally::Tally;
 use super::{LogFrame, Plan};
-use crate::camera_info::{CalibrationError, check_size};
+use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
 use crate::images::{ImageError, Pixels, decode_compressed, decode_raw};
 use crate::msgs::{CompressedImage, Image, decode};
 use crate::odometry::{PoseAt, unknown_motion};
@@ -25,6 +26,7 @@ pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
     registration: Option<Registration>,
+    unwrapping: Unwrapping,
     previous: Option<(Stamp, PoseAt)>,
     /// The first calibration that did not fit its images.
     pub(super) misfit: Option<CalibrationError>,
@@ -32,7 +34,14 @@ pub(super) struct Assembler {
 
 impl Assembler {
     pub(super) fn new() -> Self {
-        Self { index: 0, camera: None, registration: None, previous: None, misfit: None }
+        Self {
+            index: 0,
+            camera: None,
+            registration: None,
+            unwrapping: Unwrapping::default(),
+            previous: None,
+            misfit: None,
+        }
     }
 
     /// The camera of the last frame.
@@ -66,6 +75,9 @@ impl Assembler {
             return None;
         }
         let mut images = self.primary(plan, image, tally)?;
+        if let Some(mirror) = plan.raw_mirror() {
+            images = self.unwrap(plan, mirror, &images, tally)?;
+        }
         let size = size_of(&images)?;
         let camera = self.camera_at(plan, image, size, intake, tally)?;
         if let Some(depth) = depth {
@@ -104,6 +116,20 @@ impl Assembler {
         Some(images)
     }
 
+    /// The circular image of a mirror as a panorama.
+    fn unwrap(
+        &mut self,
+        plan: &Plan,
+        mirror: ConicalMirror,
+        raw: &Images,
+        tally: &mut Tally,
+    ) -> Option<Images> {
+        let [columns, rows] = plan.input.panorama;
+        let panorama = Panorama { mirror, columns, rows };
+        let unwrapped = self.unwrapping.apply(&panorama, raw);
+        unwrapped.map_err(|error| tally.lose("images_not_unwrapped", || error.to_string())).ok()
+    }
+
     /// The camera at the moment of an image; the last one while it stays.
     fn camera_at(
         &mut self,
@@ -124,8 +150,11 @@ impl Assembler {
             });
             return None;
         };
-        let lens = plan.lens.map_or_else(|| assumed_lens(width, height), |known| known.lens);
-        let camera = Camera { lens: Lens::Pinhole(lens), width, height, robot_from_camera };
+        let lens = plan.lens.map_or_else(
+            || Lens::Pinhole(assumed_lens(width, height)),
+            |known| lens_of(&known, width, height),
+        );
+        let camera = Camera { lens, width, height, robot_from_camera };
         if self.camera.as_deref() != Some(&camera) {
             self.camera = Some(Arc::new(camera));
         }
@@ -278,6 +307,16 @@ fn right_image(
         Pixels::Depth(_) => return None,
     };
     Some(RightImage { image, baseline_m: plan.baseline_m? })
+}
+
+/// The lens of the frames, whose images are unwrapped.
+fn lens_of(known: &Intrinsics, width: usize, height: usize) -> Lens {
+    let sized = |mirror| Panorama { mirror, columns: width, rows: height };
+    match known.mirror {
+        None => Lens::Pinhole(known.lens),
+        Some(Mirrored::Raw(mirror)) => Lens::Panorama(sized(mirror)),
+        Some(Mirrored::Unwrapped(panorama)) => Lens::Panorama(sized(panorama.mirror)),
+    }
 }
 
 /// Decodes an image message; a failure is counted as lost.

@@ -17,11 +17,11 @@ use intake::Intake;
 use mount::{Mount, robot_frame};
 use nalgebra::Isometry2;
 use serde::Serialize;
-use tagalong_core::{Camera, DepthImage, Frame, Lens};
+use tagalong_core::{Camera, ConicalMirror, DepthImage, Frame, Lens};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tally::Tally;
 
-use crate::camera_info::{Intrinsics, intrinsics};
+use crate::camera_info::{Intrinsics, Mirrored, intrinsics};
 use crate::mcap_walk::Walker;
 use crate::scan::{Scan, open_file};
 use crate::topics::{Chosen, choose, missing};
@@ -101,6 +101,14 @@ impl Plan {
     /// True if depth comes beside another image.
     fn has_second_depth(&self) -> bool {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
+    }
+
+    /// The mirror whose images are still circular.
+    fn raw_mirror(&self) -> Option<ConicalMirror> {
+        match self.lens?.mirror? {
+            Mirrored::Raw(mirror) => Some(mirror),
+            Mirrored::Unwrapped(_) => None,
+        }
     }
 
     /// True unless both calibrations are known and differ.
@@ -401,7 +409,8 @@ fn odom_frames(
 /// From tf, the settings, or the floor in the first depth images.
 fn find_mount(plan: &Plan) -> Result<Mount, LogError> {
     let camera = plan.scan.frame_of(plan.primary());
-    if let Some(mount) = Mount::find(&plan.scan, camera, &plan.input) {
+    let mirror = plan.lens.is_some_and(|lens| lens.mirror.is_some());
+    if let Some(mount) = Mount::find(&plan.scan, camera, &plan.input, mirror) {
         return Ok(mount);
     }
     match floor(plan)? {

@@ -1,7 +1,7 @@
 //! Where the camera sits on the robot.
 
 use nalgebra::Isometry3;
-use tagalong_core::{Camera, Pinhole, Stamp};
+use tagalong_core::{Camera, ConicalMirror, Pinhole, Stamp};
 
 use crate::scan::Scan;
 use crate::tf::TfBuffer;
@@ -20,14 +20,24 @@ pub(super) enum Mount {
 const ASSUMED_HEIGHT_M: f64 = 1.2;
 
 impl Mount {
-    /// From tf, else from the settings; `None` if neither tells.
-    pub(super) fn find(scan: &Scan, camera: Option<&str>, input: &InputSettings) -> Option<Self> {
+    /// From tf, else from the settings; `None` if neither tells. A camera that
+    /// looks into a mirror stands upright.
+    pub(super) fn find(
+        scan: &Scan,
+        camera: Option<&str>,
+        input: &InputSettings,
+        mirror: bool,
+    ) -> Option<Self> {
         let base = robot_frame(scan, input);
         if let Some(camera) = camera.filter(|camera| scan.tf.connects(base, camera)) {
             return Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() });
         }
         let mount = input.camera.as_ref()?;
-        Some(Self::fixed(mount, "[input.camera] of the config".into()))
+        let source = "[input.camera] of the config".into();
+        if mirror {
+            return Some(Self::Fixed { pose: ConicalMirror::upright(mount.height_m), source });
+        }
+        Some(Self::fixed(mount, source))
     }
 
     pub(super) fn fixed(mount: &MountSettings, source: String) -> Self {

@@ -2,7 +2,6 @@ use std::ops::Range;
 
 use tagalong_core::ConfigError;
 use tagalong_stereo::StereoSettings;
-use toml::Spanned;
 use toml::de::DeTable;
 
 use crate::PipelineSettings;
@@ -63,9 +62,13 @@ pub(super) fn check(settings: &PipelineSettings, root: &DeTable<'_>) -> Result<(
     Ok(())
 }
 
-/// Where a key of a section stands.
+/// Where a key of a section stands; keys of tables within it are dotted.
 fn place(root: &DeTable<'_>, section: &str, key: &str) -> Option<Range<usize>> {
-    root.get(section).and_then(|t| t.get_ref().as_table()?.get(key)).map(Spanned::span)
+    let mut value = root.get(section)?;
+    for key in key.split('.') {
+        value = value.get_ref().as_table()?.get(key)?;
+    }
+    Some(value.span())
 }
 
 type Rule = (&'static str, &'static str, f64, Must);
@@ -91,6 +94,7 @@ fn rules(settings: &PipelineSettings) -> Vec<Rule> {
     ];
     rules.extend(association_rules(settings));
     rules.extend(lifecycle_rules(settings));
+    rules.extend(governor_rules(settings));
     rules
 }
 
@@ -133,4 +137,32 @@ fn lifecycle_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
     ]
     .into_iter()
     .map(|(key, value, must)| ("lifecycle", key, value, must))
+}
+
+fn governor_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
+    let s = &settings.governor;
+    let corridor = &s.corridor;
+    [
+        ("max_accel_mps2", s.max_accel_mps2, Must::Positive),
+        ("max_decel_mps2", s.max_decel_mps2, Must::Positive),
+        ("max_turn_radps", s.max_turn_radps, Must::Positive),
+        ("reaction_s", s.reaction_s, Must::NotNegative),
+        ("margin_m", s.margin_m, Must::NotNegative),
+        ("valid_s", s.valid_s, Must::Positive),
+        ("slow_after_s", s.slow_after_s, Must::Positive),
+        ("stop_after_s", s.stop_after_s, Must::Positive),
+        ("max_odometry_mps", s.max_odometry_mps, Must::Positive),
+        ("corridor.half_width_m", corridor.half_width_m, Must::Positive),
+        ("corridor.front_m", corridor.front_m, Must::NotNegative),
+        ("corridor.stop_m", corridor.stop_m, Must::NotNegative),
+        ("corridor.range_m", corridor.range_m, Must::Positive),
+        ("corridor.range_m", corridor.range_m, Must::AtMost(100.0, "")),
+        ("corridor.floor_m", corridor.floor_m, Must::NotNegative),
+        ("corridor.top_m", corridor.top_m, Must::Positive),
+        ("corridor.target_radius_m", corridor.target_radius_m, Must::NotNegative),
+        ("corridor.min_points", f64::from(corridor.min_points), Must::Positive),
+        ("corridor.min_seen", corridor.min_seen, Must::NotNegative),
+    ]
+    .into_iter()
+    .map(|(key, value, must)| ("governor", key, value, must))
 }

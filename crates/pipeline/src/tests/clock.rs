@@ -43,7 +43,7 @@ fn t1_a_clock_set_back_ends_all_tracks_once() {
 fn t1_the_robot_stands_until_three_fresh_frames_came() {
     let config = format!("{PLAIN}\n[lifecycle]\nconfirm_hits = 1\n[controller]\nplugin = 'drive'");
     let (_, reports) = at(&[10.0, 10.1, 1.0, 1.1, 1.2, 1.3], &config);
-    let drives: Vec<bool> = reports.iter().map(|r| r.command.unwrap().left != 0.0).collect();
+    let drives: Vec<bool> = reports.iter().map(|r| r.command.unwrap().wheels.left != 0.0).collect();
     assert_eq!(drives, [true, true, false, false, false, true]);
 }
 

@@ -267,7 +267,7 @@ impl Controller for Drive {
         match self.0.how.as_str() {
             "nan" => WheelSpeeds { left: f64::NAN, right: 0.0 },
             "panic" => panic!("which way?"),
-            _ => WheelSpeeds { left: 2.0, right: -4.0 },
+            _ => WheelSpeeds { left: 2.0, right: 4.0 },
         }
     }
 }

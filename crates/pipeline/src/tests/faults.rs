@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
 use proptest::prelude::*;
-use tagalong_core::{Detection, WheelSpeeds};
+use tagalong_core::{Detection, Reason, WheelSpeeds};
 
 use super::doubles::{PLAIN, World, frame, person, scored};
 use crate::{FrameReport, StepError};
@@ -102,13 +102,17 @@ fn what_the_filter_does_not_support_was_not_seen() {
 }
 
 fn commands(reports: &[FrameReport]) -> Vec<WheelSpeeds> {
-    reports.iter().filter_map(|r| r.command).collect()
+    reports.iter().filter_map(|r| r.command).map(|command| command.wheels).collect()
 }
 
 #[test]
 fn commands_are_limited_and_keep_their_curvature() {
     let reports = one_person().run(&with("", "drive"), 2, 0.1);
-    assert_eq!(commands(&reports), [WheelSpeeds { left: 0.45, right: -0.9 }; 2]);
+    let [first, second] = commands(&reports)[..] else { panic!("two commands") };
+    for WheelSpeeds { left, right } in [first, second] {
+        assert!((right / left - 2.0).abs() < 1e-9 && right <= 0.9, "{left} {right}");
+    }
+    assert!(second.left > first.left);
     assert_eq!(reports[1].target, Some(reports[1].tracks[0].id));
 }
 
@@ -130,7 +134,8 @@ fn without_a_target_the_robot_stands_and_a_lost_one_is_not_replaced() {
     let reports = World::of((0..30).map(switch)).run(&with("", "drive"), 30, 0.1);
     assert_eq!(reports[0].target.map(|id| id.0), Some(1));
     assert_eq!(reports[29].target, None);
-    assert_eq!(reports[29].command, Some(WheelSpeeds::STOP));
+    let last = reports[29].command.unwrap();
+    assert_eq!((last.wheels, last.reason), (WheelSpeeds::STOP, Reason::NoTarget));
     assert!(reports[29].tracks[0].confirmed);
 }
 
@@ -171,7 +176,8 @@ proptest! {
             let alive: BTreeSet<_> = report.tracks.iter().map(|t| t.id).collect();
             prop_assert_eq!(alive.len(), report.tracks.len());
             if let Some(command) = report.command {
-                prop_assert!(command.left.abs() <= 0.9 && command.right.abs() <= 0.9);
+                let WheelSpeeds { left, right } = command.wheels;
+                prop_assert!(left.abs() <= 0.9 && right.abs() <= 0.9);
             }
             ended.extend(report.ended);
         }

@@ -194,9 +194,9 @@ pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f3
     let keeps = |x: usize| {
         let sides = [(0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor)];
         is_anchor(&x)
-            || sides.iter().all(|at| {
-                at.is_some_and(|at| row[x] <= row[at] + 0.75_f32.max(0.1_f32 * row[at]))
-            })
+            || sides
+                .iter()
+                .all(|at| at.is_some_and(|at| row[x] <= row[at] + 0.75_f32.max(0.1_f32 * row[at])))
     };
     (0..row.len()).map(|x| if keeps(x) { row[x] } else { f32::NAN }).collect()
 }
@@ -232,9 +232,7 @@ fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: us
         window.map(|x| equation(pair, x as i64, y as i64, row[x].into())).collect();
     let n = all.len() as f64;
     let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
-    all.iter().fold((0.0, 0.0), |sum, e| {
-        (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q))
-    })
+    all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q)))
 }
 
 /// Refines disparities pixel by pixel.
@@ -251,7 +249,11 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
             }
         }
         let was = f64::from(was);
-        (was + (sum / squares - was).clamp(-0.5, 0.5)).max(if was.is_nan() { f64::NAN } else { 0.0 })
+        (was + (sum / squares - was).clamp(-0.5, 0.5)).max(if was.is_nan() {
+            f64::NAN
+        } else {
+            0.0
+        })
     };
     (0..disparities.len()).map(one).collect()
 }

@@ -17,10 +17,14 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sim", &["core"]),
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
-    ("trials", &["core", "pipeline", "stereo", "sim", "eval"]),
+    ("trials", &["core", "vision", "pipeline", "stereo", "sim", "eval"]),
+    // What is reproduced may be the learning of a plugin.
     (
         "reproduce",
-        &["core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "trials"],
+        &[
+            "core", "vision", "stereo", "pipeline", "log", "sim", "eval", "report", "trials",
+            "plugins",
+        ],
     ),
     ("conformance", &["core"]),
     ("catalog", &["core", "plugins"]),

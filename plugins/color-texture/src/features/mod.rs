@@ -2,18 +2,20 @@
 
 mod colour;
 mod gradients;
+mod place;
 mod shape;
 mod texture;
 mod window;
 
 use std::ops::Range;
 
-use tagalong_core::{Frame, Rect, Result};
+use tagalong_core::{Detection, Frame, Result};
 
 use self::window::{Surface, Window};
 
 /// Numbers of a candidate.
-pub const COUNT: usize = gradients::COUNT + texture::COUNT + colour::COUNT + shape::COUNT;
+pub const COUNT: usize =
+    gradients::COUNT + texture::COUNT + colour::COUNT + shape::COUNT + place::COUNT;
 
 /// What a number is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,22 +28,27 @@ pub enum Family {
     Colour,
     /// The surface in depth.
     Shape,
+    /// Where it is, and how well its silhouette fits.
+    Place,
 }
 
 impl Family {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 4] = [Self::Gradients, Self::Texture, Self::Colour, Self::Shape];
+    pub const ALL: [Self; 5] =
+        [Self::Gradients, Self::Texture, Self::Colour, Self::Shape, Self::Place];
 
     /// Its place among the numbers.
     pub fn range(self) -> Range<usize> {
         const TEXTURE: usize = gradients::COUNT;
         const COLOUR: usize = TEXTURE + texture::COUNT;
         const SHAPE: usize = COLOUR + colour::COUNT;
+        const PLACE: usize = SHAPE + shape::COUNT;
         match self {
             Self::Gradients => 0..TEXTURE,
             Self::Texture => TEXTURE..COLOUR,
             Self::Colour => COLOUR..SHAPE,
-            Self::Shape => SHAPE..COUNT,
+            Self::Shape => SHAPE..PLACE,
+            Self::Place => PLACE..COUNT,
         }
     }
 
@@ -52,6 +59,7 @@ impl Family {
             Self::Texture => "texture",
             Self::Colour => "colour",
             Self::Shape => "shape",
+            Self::Place => "place",
         }
     }
 }
@@ -61,13 +69,13 @@ impl Family {
 pub struct Features(Vec<f32>);
 
 impl Features {
-    /// Looks at a region; the numbers of the last one are forgotten.
+    /// Looks at a candidate; the numbers of the last one are forgotten.
     ///
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
     /// Colour and depth may be missing.
-    pub fn look(&mut self, frame: &Frame, region: &Rect) -> Result<()> {
-        let grey = frame.grey()?;
+    pub fn look(&mut self, frame: &Frame, candidate: &Detection) -> Result<()> {
+        let (grey, region) = (frame.grey()?, &candidate.region);
         let out = &mut self.0;
         out.clear();
         let Some(window) = Window::new(grey, region) else {
@@ -85,8 +93,11 @@ impl Features {
             _ => unknown(colour::COUNT, out),
         }
         match &surface {
-            Some(surface) => shape::push(surface, out),
-            None => unknown(shape::COUNT, out),
+            Some(surface) => {
+                shape::push(surface, out);
+                place::push(&frame.camera, candidate, out);
+            }
+            None => unknown(shape::COUNT + place::COUNT, out),
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 use tagalong_learn::mix;
 
-use crate::{COUNT, Stump, Training};
+use crate::{COUNT, Stump, Training, Tree};
 
 /// Thresholds of a feature.
 const THRESHOLDS: usize = 31;
@@ -68,7 +68,7 @@ impl Sums {
     }
 }
 
-/// Finds `count` stumps, each by a Newton step of the weighted logistic loss
+/// Finds `count` trees, each by a Newton step of the weighted logistic loss
 /// (gradient boosting: Friedman, Annals of Statistics 29, 2001), among a random
 /// part of the features.
 pub fn boost(
@@ -77,33 +77,98 @@ pub fn boost(
     training: &Training,
     count: usize,
     seed: u64,
-) -> Vec<Stump> {
-    let mut sums = vec![0.0; chosen.len()];
-    let mut stumps = Vec::with_capacity(count);
+) -> Vec<Tree> {
+    let mut sums = vec![0.0; examples.is_person.len()];
+    let mut trees = Vec::with_capacity(count);
     for round in 0..count {
         let losses: Vec<Sums> =
-            chosen.iter().zip(&sums).map(|(&k, &sum)| loss(examples, k, sum)).collect();
+            sums.iter().enumerate().map(|(k, s)| loss(examples, k, *s)).collect();
         let order = mix(seed ^ (round as u64) << 32);
         let is_tried = |feature: &usize| {
             (mix(order ^ *feature as u64) >> 11) as f64 / (1u64 << 53) as f64 <= training.features
         };
-        let tried = (0..COUNT).filter(is_tried);
-        let found =
-            tried.filter_map(|feature| best_split(examples, chosen, &losses, feature, training));
-        let Some((_, bin, stump)) = found.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
-            continue;
-        };
-        let bins = &examples.bins[stump.feature];
-        for (sum, &k) in sums.iter_mut().zip(chosen) {
-            *sum += f64::from(match bins[k] {
+        let tried: Vec<usize> = (0..COUNT).filter(is_tried).collect();
+        let grower = Grower { examples, losses: &losses, tried: &tried, training };
+        trees.extend(grower.tree(chosen, &mut sums));
+    }
+    trees
+}
+
+/// Grows one tree.
+struct Grower<'a> {
+    examples: &'a Examples,
+    losses: &'a [Sums],
+    tried: &'a [usize],
+    training: &'a Training,
+}
+
+/// The best stump of some candidates: the last bin below its threshold, and
+/// what it gains.
+struct Split {
+    gain: f64,
+    bin: u8,
+    stump: Stump,
+}
+
+impl Grower<'_> {
+    /// The best stump, whose halves get stumps of their own. What the tree says
+    /// is added to the sums.
+    fn tree(&self, chosen: &[usize], sums: &mut [f64]) -> Option<Tree> {
+        let Split { bin, stump: root, .. } = self.best(chosen)?;
+        let bins = &self.examples.bins[root.feature];
+        let known = chosen.iter().copied().filter(|k| bins[*k] != UNKNOWN);
+        let (low, high): (Vec<usize>, Vec<usize>) = known.partition(|k| bins[*k] <= bin);
+        let below = self.leaf(&low, root, root.below, sums);
+        let above = self.leaf(&high, root, root.above, sums);
+        Some(Tree { feature: root.feature, threshold: root.threshold, below, above })
+    }
+
+    /// The stump of one half; where nothing divides it, all of it gets `value`.
+    fn leaf(&self, half: &[usize], root: Stump, value: f32, sums: &mut [f64]) -> Stump {
+        let whole =
+            Split { gain: 0.0, bin: 0, stump: Stump { below: value, above: value, ..root } };
+        let Split { bin, stump, .. } = self.best(half).unwrap_or(whole);
+        let bins = &self.examples.bins[stump.feature];
+        for &k in half {
+            sums[k] += f64::from(match bins[k] {
                 UNKNOWN => 0.0,
                 at if at <= bin => stump.below,
                 _ => stump.above,
             });
         }
-        stumps.push(stump);
+        stump
     }
-    stumps
+
+    fn best(&self, chosen: &[usize]) -> Option<Split> {
+        let splits = self.tried.iter().filter_map(|feature| self.split(chosen, *feature));
+        splits.reduce(|a, b| if b.gain > a.gain { b } else { a })
+    }
+
+    /// The best threshold of a feature.
+    fn split(&self, chosen: &[usize], feature: usize) -> Option<Split> {
+        let Self { examples, losses, training, .. } = *self;
+        let mut histogram = [Sums::default(); THRESHOLDS + 1];
+        let bins = &examples.bins[feature];
+        for &k in chosen {
+            if let Some(bin) = histogram.get_mut(usize::from(bins[k])) {
+                bin.add(losses[k]);
+            }
+        }
+        let mut total = Sums::default();
+        histogram.iter().for_each(|bin| total.add(*bin));
+        let mut below = Sums::default();
+        let splits = examples.thresholds[feature].iter().zip(&histogram).enumerate();
+        let each = splits.map(|(bin, (threshold, here))| {
+            below.add(*here);
+            let ((low, gain), (high, other)) =
+                (below.step(training.caution), total.minus(below).step(training.caution));
+            let value = |step: f64| ((training.rate * step * 1e4).round() / 1e4) as f32;
+            let stump =
+                Stump { feature, threshold: *threshold, below: value(low), above: value(high) };
+            Split { gain: gain + other, bin: bin as u8, stump }
+        });
+        each.reduce(|a, b| if b.gain > a.gain { b } else { a })
+    }
 }
 
 fn loss(examples: &Examples, index: usize, sum: f64) -> Sums {
@@ -111,36 +176,6 @@ fn loss(examples: &Examples, index: usize, sum: f64) -> Sums {
         (examples.weights[index], f64::from(u8::from(examples.is_person[index])));
     let p = 1.0 / (1.0 + (-sum).exp());
     Sums { slope: weight * (target - p), curvature: weight * p * (1.0 - p) }
-}
-
-/// The best threshold of a feature: its gain, the last bin below, the stump.
-fn best_split(
-    examples: &Examples,
-    chosen: &[usize],
-    losses: &[Sums],
-    feature: usize,
-    training: &Training,
-) -> Option<(f64, u8, Stump)> {
-    let mut histogram = [Sums::default(); THRESHOLDS + 1];
-    let bins = &examples.bins[feature];
-    for (&k, loss) in chosen.iter().zip(losses) {
-        if let Some(bin) = histogram.get_mut(usize::from(bins[k])) {
-            bin.add(*loss);
-        }
-    }
-    let mut total = Sums::default();
-    histogram.iter().for_each(|bin| total.add(*bin));
-    let mut below = Sums::default();
-    let splits = examples.thresholds[feature].iter().zip(&histogram).enumerate();
-    let each = splits.map(|(bin, (threshold, here))| {
-        below.add(*here);
-        let ((low, gain), (high, other)) =
-            (below.step(training.caution), total.minus(below).step(training.caution));
-        let value = |step: f64| ((training.rate * step * 1e4).round() / 1e4) as f32;
-        let stump = Stump { feature, threshold: *threshold, below: value(low), above: value(high) };
-        (gain + other, bin as u8, stump)
-    });
-    each.reduce(|a, b| if b.0 > a.0 { b } else { a })
 }
 
 #[cfg(test)]
@@ -174,8 +209,9 @@ mod tests {
             let training = Training::default();
             let chosen: Vec<usize> = (0..40).collect();
             let losses: Vec<Sums> = chosen.iter().map(|k| loss(&examples, *k, 0.3)).collect();
-            let (gain, _, stump) =
-                best_split(&examples, &chosen, &losses, feature, &training).unwrap();
+            let grower =
+                Grower { examples: &examples, losses: &losses, tried: &[], training: &training };
+            let Split { gain, stump, .. } = grower.split(&chosen, feature).unwrap();
             let slow = |threshold: f32| {
                 let (mut below, mut above) = (Sums::default(), Sums::default());
                 for k in 0..40 {
@@ -195,10 +231,11 @@ mod tests {
         let (values, examples) = examples(3, 60);
         let chosen: Vec<usize> = (0..60).collect();
         let training = Training { features: 1.0, ..Training::default() };
-        let stumps = boost(&examples, &chosen, &training, 20, 1);
-        assert_eq!(stumps[0].feature, 5);
-        let sum =
-            |k: usize| stumps.iter().map(|s| s.vote(values[k * COUNT + s.feature])).sum::<f32>();
+        let trees = boost(&examples, &chosen, &training, 20, 1);
+        assert_eq!(trees[0].feature, 5);
+        let sum = |k: usize| {
+            trees.iter().map(|t| t.vote(&values[k * COUNT..(k + 1) * COUNT])).sum::<f32>()
+        };
         let right = (0..60).filter(|k| (sum(*k) > 0.0) == examples.is_person[*k]).count();
         assert!(right >= 57, "{right}");
     }

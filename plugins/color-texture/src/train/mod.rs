@@ -1,4 +1,4 @@
-//! Fits a [`Model`] to labelled candidates: stumps are found one after the
+//! Fits a [`Model`] to labelled candidates: trees are found one after the
 //! other, how many is chosen by cross-validation over groups, and the sums of
 //! the held-out candidates calibrate the log-odds.
 
@@ -8,10 +8,10 @@ pub use boost::Examples;
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
 use tagalong_learn::{Line, accepted, area, parts, platt};
 
-use crate::{COUNT, Family, Features, Model, Stump, Training};
+use crate::{COUNT, Family, Features, Model, Stump, Training, Tree};
 
 /// Collects the numbers of candidates and fits models to them.
-pub struct StumpTrainer {
+pub struct TreeTrainer {
     training: Training,
     seed: u64,
     features: Features,
@@ -26,9 +26,9 @@ struct Labelled {
     has_depth: bool,
 }
 
-/// A number of stumps, judged by candidates that they were not fitted to.
+/// A number of trees, judged by candidates that they were not fitted to.
 struct Trial {
-    stumps: usize,
+    trees: usize,
     /// Sums of held-out candidates, with the truth and the weight.
     held_out: Vec<Judged>,
 }
@@ -40,7 +40,7 @@ struct Judged {
     weight: f64,
 }
 
-impl StumpTrainer {
+impl TreeTrainer {
     /// A trainer without examples.
     ///
     /// # Errors
@@ -65,16 +65,16 @@ impl StumpTrainer {
     }
 
     fn trials(&self, examples: &Examples, progress: &mut dyn FnMut(f64)) -> Result<Vec<Trial>> {
-        let Training { folds, stumps: counts, .. } = &self.training;
+        let Training { folds, trees: counts, .. } = &self.training;
         let parts = parts(self.examples.iter().map(|l| l.example), *folds, self.seed);
         let mut trials: Vec<Trial> =
-            counts.iter().map(|&stumps| Trial { stumps, held_out: Vec::new() }).collect();
+            counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
         for fold in 0..*folds {
             let is_out = |k: &usize| parts.get(&self.examples[*k].example.group) == Some(&fold);
             let (out, rest): (Vec<usize>, Vec<usize>) = (0..self.examples.len()).partition(is_out);
-            let stumps = self.boost(examples, &rest)?;
+            let trees = self.boost(examples, &rest)?;
             for trial in &mut trials {
-                let found = &stumps[..trial.stumps.min(stumps.len())];
+                let found = &trees[..trial.trees.min(trees.len())];
                 trial.held_out.extend(out.iter().map(|&k| self.judge(found, examples, k)));
             }
             progress((fold + 1) as f64 / (folds + 1) as f64);
@@ -82,21 +82,21 @@ impl StumpTrainer {
         Ok(trials)
     }
 
-    fn judge(&self, stumps: &[Stump], examples: &Examples, index: usize) -> Judged {
+    fn judge(&self, trees: &[Tree], examples: &Examples, index: usize) -> Judged {
         let Labelled { example, has_depth } = self.examples[index];
         let values = &self.values[index * COUNT..(index + 1) * COUNT];
-        let sum = stumps.iter().map(|s| f64::from(s.vote(values[s.feature]))).sum();
+        let sum = trees.iter().map(|tree| f64::from(tree.vote(values))).sum();
         Judged { sum, is_person: example.is_person, has_depth, weight: examples.weights[index] }
     }
 
-    fn boost(&self, examples: &Examples, chosen: &[usize]) -> Result<Vec<Stump>> {
+    fn boost(&self, examples: &Examples, chosen: &[usize]) -> Result<Vec<Tree>> {
         let is_person = |k: &usize| self.examples[*k].example.is_person;
         if chosen.iter().all(is_person) || !chosen.iter().any(is_person) {
             return Err(Error::Other(
                 "people and others: both are needed, in several groups".into(),
             ));
         }
-        let most = self.training.stumps.iter().copied().max().unwrap_or(0);
+        let most = self.training.trees.iter().copied().max().unwrap_or(0);
         Ok(boost::boost(examples, chosen, &self.training, most, self.seed))
     }
 
@@ -113,7 +113,7 @@ impl StumpTrainer {
             ("people_with_depth".to_owned(), count(&|l| l.example.is_person && l.has_depth)),
             ("others_with_depth".to_owned(), count(&|l| !l.example.is_person && l.has_depth)),
             ("groups".to_owned(), toml::Value::Integer(groups.len() as i64)),
-            ("stumps".to_owned(), toml::Value::Integer(model.stumps.len() as i64)),
+            ("trees".to_owned(), toml::Value::Integer(model.trees.len() as i64)),
             ("slope".to_owned(), rounded(model.slope)),
             ("offset".to_owned(), rounded(model.offset)),
             ("influence".to_owned(), influence(model).into()),
@@ -122,9 +122,9 @@ impl StumpTrainer {
     }
 }
 
-impl Trainer for StumpTrainer {
+impl Trainer for TreeTrainer {
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
-        self.features.look(frame, &candidate.region)?;
+        self.features.look(frame, candidate)?;
         self.values.extend(self.features.values());
         self.examples.push(Labelled { example, has_depth: self.features.has_depth() });
         Ok(())
@@ -139,10 +139,10 @@ impl Trainer for StumpTrainer {
             .min_by(|a, b| a.loss().total_cmp(&b.loss()))
             .ok_or_else(|| Error::Settings("nothing to try".into()))?;
         let everything: Vec<usize> = (0..self.examples.len()).collect();
-        let mut stumps = self.boost(&examples, &everything)?;
-        stumps.truncate(best.stumps);
+        let mut trees = self.boost(&examples, &everything)?;
+        trees.truncate(best.trees);
         let Line { slope, offset } = platt(&best.in_use());
-        let model = Model { stumps, slope: thousandths(slope), offset: thousandths(offset) };
+        let model = Model { trees, slope: thousandths(slope), offset: thousandths(offset) };
         progress(1.0);
         let figures = self.figures(&trials, &model);
         Ok(Fitted { model: model.to_text(), figures })
@@ -177,7 +177,7 @@ impl Trial {
         let with_depth = self.in_use();
         let all: Vec<(f64, bool)> = self.held_out.iter().map(|j| (j.sum, j.is_person)).collect();
         toml::Table::from_iter([
-            ("stumps".to_owned(), toml::Value::Integer(self.stumps as i64)),
+            ("trees".to_owned(), toml::Value::Integer(self.trees as i64)),
             ("loss".to_owned(), rounded(self.loss())),
             ("area_under_roc".to_owned(), rounded(area(&all))),
             ("area_under_roc_with_depth".to_owned(), rounded(area(&with_depth))),
@@ -187,13 +187,21 @@ impl Trial {
     }
 }
 
-/// Share of each family in what the stumps can decide.
+/// Share of each family in what the trees can decide.
 fn influence(model: &Model) -> toml::Table {
     let reach = |stump: &Stump| f64::from((stump.above - stump.below).abs());
-    let total: f64 = model.stumps.iter().map(reach).sum();
+    let stumps = || model.trees.iter().flat_map(|tree| [tree.below, tree.above]);
+    let first = |tree: &Tree| {
+        let mean = |stump: &Stump| 0.5 * (stump.below + stump.above);
+        let reach = f64::from((mean(&tree.above) - mean(&tree.below)).abs());
+        (tree.feature, reach)
+    };
+    let all: Vec<(usize, f64)> =
+        stumps().map(|s| (s.feature, reach(&s))).chain(model.trees.iter().map(first)).collect();
+    let total: f64 = all.iter().map(|(_, reach)| reach).sum();
     let share = |family: Family| {
-        let of = model.stumps.iter().filter(|s| family.range().contains(&s.feature));
-        rounded(of.map(reach).sum::<f64>() / total.max(f64::MIN_POSITIVE))
+        let of = all.iter().filter(|(feature, _)| family.range().contains(feature));
+        rounded(of.map(|(_, reach)| reach).sum::<f64>() / total.max(f64::MIN_POSITIVE))
     };
     Family::ALL.iter().map(|family| (family.name().to_owned(), share(*family))).collect()
 }
@@ -207,11 +215,11 @@ fn rounded(value: f64) -> toml::Value {
 }
 
 fn check(training: &Training) -> Result<()> {
-    let stumps = &training.stumps;
+    let trees = &training.trees;
     let rules = [
         (
-            !stumps.is_empty() && stumps.iter().all(|n| (1..=5000).contains(n)),
-            "`stumps` must be numbers from 1 to 5000",
+            !trees.is_empty() && trees.iter().all(|n| (1..=5000).contains(n)),
+            "`trees` must be numbers from 1 to 5000",
         ),
         (training.rate > 0.0 && training.rate <= 1.0, "`rate` must be above 0 and at most 1"),
         (

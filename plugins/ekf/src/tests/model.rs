@@ -282,3 +282,17 @@ fn settings_that_cannot_work_are_refused() {
         assert!(error.message.starts_with(&format!("`{key}` must be")), "{error}");
     }
 }
+
+#[test]
+fn by_students_t_an_outlier_pulls_less_and_a_good_detection_as_much() {
+    let pull = |student_dof: f64, off_m: f64| {
+        let filter = filter(Config { student_dof, ..Config::default() });
+        let mut belief = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
+        let seen = detection(Point3::new(3.0 + off_m, 0.0, 1.6), 0.1);
+        filter.correct(&mut belief, &seen, &camera());
+        belief.mean[0] - 3.0
+    };
+    assert!((pull(4.0, 0.05) - pull(0.0, 0.05)).abs() < 1e-12);
+    assert!(pull(4.0, 0.6) < 0.7 * pull(0.0, 0.6), "{} {}", pull(4.0, 0.6), pull(0.0, 0.6));
+    assert!(pull(4.0, 0.6) > 0.0);
+}

@@ -1,37 +1,15 @@
-//! P4: template detection in stereo depth, verified by an SVM, tracked by an EKF.
+//! P4, Fig. 7: who is fully hidden is known again.
 
 use tagalong_eval::wilson;
 use tagalong_trials::{Occlusion, Outcome, Trial, TrialError, occlusions, outcome};
 
-use crate::depth_accuracy;
-use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
+use super::{CONFIDENCE, PIPELINES, STEREO};
+use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// The system.
-pub const SYSTEM: System = System {
-    name: "stereo-svm-ekf",
-    about: "P4: templates in stereo depth, an SVM that verifies, an extended Kalman filter",
-    experiments: &[
-        Experiment {
-            name: "occlusion",
-            about: "Fig. 7: who is fully hidden is known again, by gap and duration",
-            run: occlusion,
-        },
-        Experiment {
-            name: "depth",
-            about: "the depth of a head against its range (about 1 % at 3 m)",
-            run: depth_accuracy::experiment,
-        },
-    ],
-};
-
-/// Confidence of intervals.
-const CONFIDENCE: f64 = 0.95;
 /// Ends of the bins of time hidden, s.
 const HIDDEN_S: [f64; 4] = [0.0, 1.0, 2.0, 4.0];
 /// Ends of the bins of the gap between the two people, m.
 const GAP_M: [f64; 3] = [0.0, 1.1, 2.0];
-/// Pipelines, the published one first.
-const PIPELINES: [&str; 3] = ["stereo-ekf", "depth-ekf-as-printed", "naive"];
 
 /// One occlusion, and how each contender came through.
 struct Case {
@@ -40,8 +18,12 @@ struct Case {
     outcomes: Vec<Outcome>,
 }
 
-fn occlusion(lab: &Lab) -> Result<Findings, ReproduceError> {
-    let scenes = lab.scenes("full-occlusion", &[("camera.kind", "stereo")], lab.seeds(100))?;
+/// Kept identities by gap and duration.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn occlusion(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let scenes = lab.scenes("full-occlusion", &[STEREO], lab.seeds(100))?;
     let contenders = lab.contenders(&PIPELINES)?;
     let cases = lab.trials("full occlusions", &scenes, &contenders, cases)?;
     Ok(table(&cases.into_iter().flatten().collect::<Vec<_>>(), scenes.len()).into())

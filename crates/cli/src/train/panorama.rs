@@ -1,0 +1,117 @@
+//! `tagalong train omni-distance`: distances in the panorama of a conical mirror,
+//! from people in drawn rooms whose places are known.
+
+use nalgebra::Matrix3;
+use tagalong_core::{Detection, Example, Frame, Rect, Trainer};
+use tagalong_sim::{Scene, Split, Truth, Variant};
+use tagalong_trials::Draw;
+
+use super::{Session, TrainArgs, write};
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::simulate::threads;
+
+/// What `tagalong train` is asked for.
+pub const NAME: &str = "omni-distance";
+
+/// Two people, each of whom gets a head of their own ...
+const ROOM: &str = include_str!("../../../../configs/scenes/omni-room.toml");
+/// ... and others, for everybody's head.
+const STRANGERS: &str = include_str!("../../../../configs/scenes/omni-strangers.toml");
+/// Groups from here on are strangers.
+const STRANGER: u64 = 100;
+
+/// What is drawn.
+struct Room {
+    text: &'static str,
+    seed: u64,
+    duration_s: f64,
+}
+
+fn rooms(quick: bool, seed: u64) -> Vec<Room> {
+    let room = |text, seed, duration_s| Room { text, seed, duration_s };
+    if quick {
+        return vec![room(ROOM, seed, 30.0)];
+    }
+    let strangers = (0..3).map(|i| room(STRANGERS, seed + i, 80.0));
+    std::iter::once(room(ROOM, seed, 238.0)).chain(strangers).collect()
+}
+
+/// Draws, fits, writes model and card.
+///
+/// # Errors
+/// Scenes that do not parse, samples that do not suffice, files that cannot be
+/// written.
+pub fn train(session: &Session<'_>, args: &TrainArgs) -> Outcome {
+    let mut trainer = session.trainer()?;
+    let rooms = rooms(args.quick, args.seed);
+    for (number, room) in rooms.iter().enumerate() {
+        session.tell(number, "drawing rooms");
+        show(session, room, trainer.as_mut())?;
+    }
+    session.tell(rooms.len() - 1, "fitting");
+    let fitted = trainer.fit(&mut |_| ()).map_err(Failure::failed)?;
+    session.bar.finish_and_clear();
+    write(&session.model, &fitted.model)?;
+    let card = card(args, &rooms, &fitted.figures);
+    write(&session.model.with_extension("card.toml"), &card)?;
+    print(&card)?;
+    say(&format!("{}", session.model.display()));
+    Ok(Ended::Well)
+}
+
+fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
+    let scene = |room: &Room| {
+        let name = if room.text == ROOM { "omni-room" } else { "omni-strangers" };
+        toml::Value::from(format!("{name}, seed {}, {} s", room.seed, room.duration_s))
+    };
+    let mut card = toml::Table::new();
+    card.insert("model".into(), NAME.into());
+    card.insert("quick".into(), args.quick.into());
+    card.insert("seed".into(), (args.seed as i64).into());
+    card.insert("trained_on".into(), rooms.iter().map(scene).collect::<Vec<_>>().into());
+    card.insert("five_folds_of_blocks".into(), figures.clone().into());
+    format!("# Mean absolute errors on blocks of images that nothing was fitted to.\n{card}")
+}
+
+/// Shows everybody in a room to the trainer.
+fn show(session: &Session<'_>, room: &Room, trainer: &mut dyn Trainer) -> Result<(), Failure> {
+    let variant = Variant {
+        seed: Some(room.seed),
+        split: Some(Split::Train),
+        set: vec![("duration_s".into(), room.duration_s.to_string())],
+    };
+    let scene = Scene::parse_with(room.text, &variant).map_err(Failure::failed)?;
+    let scene = Scene { webcams: Vec::new(), ..scene };
+    session.bar.set_length((room.duration_s * scene.camera.rate_hz) as u64);
+    let first = if room.text == ROOM { 0 } else { STRANGER * (1 + room.seed) };
+    let mut draw = Draw::new(&scene, threads(None));
+    while let Some(drawn) = draw.next_frame() {
+        take(&drawn.frame, &drawn.truth, first, trainer)?;
+        session.bar.inc(1);
+    }
+    Ok(())
+}
+
+fn take(
+    frame: &Frame,
+    truth: &[Truth],
+    first: u64,
+    trainer: &mut dyn Trainer,
+) -> Result<(), Failure> {
+    let mut add = |at, example| {
+        let candidate = Detection {
+            region: Rect::default(),
+            position: at,
+            covariance: Matrix3::zeros(),
+            score: 0.0,
+            source: "truth",
+        };
+        trainer.add(frame, &candidate, example).map_err(Failure::failed)
+    };
+    add(nalgebra::Point3::origin(), Example { is_person: false, group: first })?;
+    for person in truth.iter().filter(|person| !person.ignore) {
+        let group = first + u64::from(person.id);
+        add(person.head_in_robot, Example { is_person: true, group })?;
+    }
+    Ok(())
+}

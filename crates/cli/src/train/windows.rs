@@ -1,0 +1,42 @@
+//! Detectors that look at windows: they are trained on photographs of people,
+//! and search pictures without anybody for their own mistakes.
+
+use super::card::WindowCard;
+use super::photos::photos;
+use super::{Session, write};
+use crate::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_core::{Detection, Example, Frame, Trainer};
+
+/// Shows the trainer all photographs; it keeps some of them apart by itself.
+pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
+    let Some(data) = &session.args.data else {
+        let why = "is trained on photographs: name their folder with --data";
+        return Err(Failure::usage(format!("`{}` {why}", session.args.plugin)));
+    };
+    let share = if session.args.quick { 8 } else { 1 };
+    let mut all = photos(data, false);
+    all.extend(photos(data, true));
+    all.retain(|photo| photo.group / 5 % share == 0);
+    session.bar.set_message("reading photographs");
+    session.bar.set_length(all.len() as u64);
+    let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
+        trainer.add(frame, candidate, example).map_err(Failure::failed)
+    };
+    for photo in &all {
+        photo.visit(0, &mut show)?;
+        session.bar.inc(1);
+    }
+    session.bar.set_message("fitting");
+    session.bar.set_position(0);
+    session.bar.set_length(1000);
+    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
+    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    session.bar.finish_and_clear();
+    write(&session.model, &fitted.model)?;
+    let path = session.model.with_extension("card.toml");
+    let card = WindowCard::new(session.args, all.len(), fitted.figures);
+    write(&path, &card.to_text())?;
+    print(&card.to_text())?;
+    say(&format!("{} and {}", session.model.display(), path.display()));
+    Ok(Ended::Well)
+}

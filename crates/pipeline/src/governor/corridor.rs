@@ -1,0 +1,149 @@
+use nalgebra::{Point2, Point3};
+use tagalong_core::{Camera, DepthImage};
+
+use super::CorridorSettings;
+
+/// Columns of the image that are looked at.
+const COLUMNS: usize = 160;
+/// Obstacles are told apart to this, m.
+const BIN_M: f64 = 0.05;
+/// The floor's roughness grows by this, m for each metre.
+const FLOOR_SLOPE: f64 = 0.03;
+/// Weaker curvatures are straight, 1/m.
+const STRAIGHT: f64 = 1e-4;
+
+/// What is ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Ahead {
+    /// The depth image shows next to nothing.
+    Blind,
+    /// Nothing within the range.
+    Free,
+    /// Something, at this distance from the robot's front along its path, m.
+    Something(f64),
+}
+
+/// Looks for the nearest thing in the corridor that the robot sweeps on an arc
+/// of this curvature, 1/m, to the left positive. Points around `target`, robot
+/// frame, m, are the person who is followed.
+pub(crate) fn ahead(
+    settings: &CorridorSettings,
+    camera: &Camera,
+    depth: &DepthImage,
+    curvature: f64,
+    target: Option<Point2<f64>>,
+) -> Ahead {
+    let step = depth.width().div_ceil(COLUMNS).max(1);
+    let mut bins = vec![0_u32; (settings.range_m / BIN_M).ceil() as usize + 1];
+    let (mut looked, mut seen) = (0_u32, 0_u32);
+    for y in (0..depth.height()).step_by(step) {
+        let row = depth.row(y);
+        for x in (0..depth.width()).step_by(step) {
+            looked += 1;
+            let z = f64::from(row[x]);
+            if !(z > 0.0 && z.is_finite()) {
+                continue;
+            }
+            seen += 1;
+            let point = camera.back_project(Point2::new(x as f64, y as f64), z);
+            if let Some(along_m) = in_the_way(settings, &point, curvature, target) {
+                bins[(along_m / BIN_M) as usize] += 1;
+            }
+        }
+    }
+    if f64::from(seen) < settings.min_seen * f64::from(looked) {
+        return Ahead::Blind;
+    }
+    nearest(settings, &bins)
+}
+
+/// The first bin with which enough points are nearer.
+fn nearest(settings: &CorridorSettings, bins: &[u32]) -> Ahead {
+    let mut points = 0_u32;
+    let first = bins.iter().position(|bin| {
+        points = points.saturating_add(*bin);
+        points >= settings.min_points.max(1)
+    });
+    first.map_or(Ahead::Free, |bin| Ahead::Something(bin as f64 * BIN_M))
+}
+
+/// Distance from the front along the path, m, of a point that the robot would
+/// hit.
+fn in_the_way(
+    settings: &CorridorSettings,
+    point: &Point3<f64>,
+    curvature: f64,
+    target: Option<Point2<f64>>,
+) -> Option<f64> {
+    let flat = point.xy();
+    let floor = settings.floor_m + FLOOR_SLOPE * flat.coords.norm();
+    if !(floor < point.z && point.z < settings.top_m) {
+        return None;
+    }
+    let of_target = |t| nalgebra::distance(&flat, &t) < settings.target_radius_m;
+    if target.is_some_and(of_target) {
+        return None;
+    }
+    let (along, aside) = on_arc(flat, curvature);
+    let from_front = along - settings.front_m;
+    let inside =
+        aside.abs() < settings.half_width_m && along > 0.0 && from_front < settings.range_m;
+    inside.then_some(from_front.max(0.0))
+}
+
+/// Distance along an arc that leaves the origin along x, and distance aside of
+/// it, m.
+fn on_arc(point: Point2<f64>, curvature: f64) -> (f64, f64) {
+    if curvature.abs() < STRAIGHT {
+        return (point.x, point.y);
+    }
+    let radius = 1.0 / curvature;
+    let from_centre = radius - point.y;
+    let angle = point.x.atan2(from_centre * radius.signum());
+    let aside = radius.abs() - point.x.hypot(from_centre);
+    (angle * radius.abs(), aside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_straight_path_has_x_along_and_y_aside() {
+        assert_eq!(on_arc(Point2::new(2.0, 0.3), 0.0), (2.0, 0.3));
+    }
+
+    #[test]
+    fn points_on_the_arc_are_not_aside_of_it() {
+        for curvature in [-1.2, -0.3, 0.5, 2.0_f64] {
+            for along in [0.1, 0.6, 1.2] {
+                let turn: f64 = curvature * along;
+                let point = Point2::new(turn.sin() / curvature, (1.0 - turn.cos()) / curvature);
+                let (s, aside) = on_arc(point, curvature);
+                assert!((s - along).abs() < 1e-9 && aside.abs() < 1e-9, "{curvature} {along}");
+            }
+        }
+    }
+
+    #[test]
+    fn floor_target_and_what_is_aside_or_overhead_are_not_in_the_way() {
+        let settings = CorridorSettings::default();
+        let way = |x: f64, y: f64, z: f64, target: Option<Point2<f64>>| {
+            in_the_way(&settings, &Point3::new(x, y, z), 0.0, target)
+        };
+        assert_eq!(way(1.2, 0.0, 0.5, None), Some(1.0));
+        assert_eq!(way(1.2, 0.0, 0.05, None), None);
+        assert_eq!(way(1.2, 0.0, 1.9, None), None);
+        assert_eq!(way(1.2, 0.4, 0.5, None), None);
+        assert_eq!(way(-1.0, 0.0, 0.5, None), None);
+        assert_eq!(way(1.2, 0.0, 0.5, Some(Point2::new(1.4, 0.1))), None);
+        assert_eq!(way(f64::NAN, 0.0, 0.5, None), None);
+    }
+
+    #[test]
+    fn single_points_are_noise() {
+        let settings = CorridorSettings { min_points: 3, ..CorridorSettings::default() };
+        assert_eq!(nearest(&settings, &[0, 1, 0, 1]), Ahead::Free);
+        assert_eq!(nearest(&settings, &[0, 1, 0, 2]), Ahead::Something(3.0 * BIN_M));
+    }
+}

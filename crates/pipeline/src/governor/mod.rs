@@ -1,0 +1,245 @@
+//! The governor: between the controller's wish and the wheels, always.
+//!
+//! It knows nothing of how the wish arose. It lets the robot move only while
+//! frames come, somebody is followed and nothing is in the way; it limits speed,
+//! acceleration and turn rate and keeps the curvature; and it says of every
+//! command why it is what it is and until when it may be obeyed.
+
+mod corridor;
+mod settings;
+
+pub(crate) use corridor::{Ahead, ahead};
+pub use settings::{CorridorSettings, GovernorSettings};
+
+use tagalong_core::{Command, Motion, Reason, Stamp, WheelSpeeds, Wheels};
+
+/// Longest time over which the robot may have changed its speed, s. A pause of
+/// frames gives no licence for a leap.
+const LONGEST_STEP_S: f64 = 0.2;
+/// Speeds below this are standing still, m/s.
+const STILL_MPS: f64 = 1e-6;
+
+/// What a controller wishes, and what the governor has to know of the frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Wish {
+    /// The controller's wheel speeds, which may be anything.
+    pub(crate) wheels: WheelSpeeds,
+    /// Stamp of the frame.
+    pub(crate) stamp: Stamp,
+    /// Somebody is followed.
+    pub(crate) has_target: bool,
+    /// Enough frames since the start or a jump.
+    pub(crate) settled: bool,
+    /// Time since the frame before, s.
+    pub(crate) pause_s: f64,
+}
+
+/// See the [module](self).
+pub(crate) struct Governor {
+    settings: GovernorSettings,
+    wheels: Wheels,
+    max_speed_mps: f64,
+    last: Option<Command>,
+    fault: Option<&'static str>,
+}
+
+/// Forward speed, m/s, and turn rate, rad/s, to the left positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Twist {
+    forward: f64,
+    turn: f64,
+}
+
+impl Twist {
+    fn of(wheels: WheelSpeeds, drive: &Wheels) -> Self {
+        let WheelSpeeds { left, right } = wheels;
+        let turn = 0.5 * (right - left) / drive.half_separation_m;
+        Self { forward: 0.5 * (left + right), turn }
+    }
+
+    fn wheels(self, drive: &Wheels) -> WheelSpeeds {
+        let by_turn = self.turn * drive.half_separation_m;
+        WheelSpeeds { left: self.forward - by_turn, right: self.forward + by_turn }
+    }
+
+    fn scaled(self, by: f64) -> Self {
+        Self { forward: self.forward * by, turn: self.turn * by }
+    }
+
+    /// 1/m; a turn in place has none to speak of.
+    fn curvature(self) -> f64 {
+        if self.forward.abs() > STILL_MPS { self.turn / self.forward } else { 0.0 }
+    }
+}
+
+impl Governor {
+    pub(crate) fn new(settings: GovernorSettings, wheels: Wheels, max_speed_mps: f64) -> Self {
+        Self { settings, wheels, max_speed_mps, last: None, fault: None }
+    }
+
+    /// The command for a frame; `look` says what is ahead on an arc of a
+    /// curvature, and is asked only where the robot may move. `None` of it is a
+    /// robot without depth.
+    pub(crate) fn govern(
+        &mut self,
+        wish: &Wish,
+        look: impl FnOnce(f64) -> Option<Ahead>,
+    ) -> Command {
+        let (wheels, reason) = match self.must_stop(wish) {
+            Some(reason) => (WheelSpeeds::STOP, reason),
+            None => self.limited(wish, look),
+        };
+        let valid_until = wish.stamp.plus_seconds(self.settings.valid_s);
+        let command = Command { wheels, stamp: wish.stamp, valid_until, reason };
+        self.last = Some(command);
+        command
+    }
+
+    /// What the wheels may do at this time, whatever became of the frames.
+    pub(crate) fn at(&self, now: Stamp) -> Command {
+        let stop = |reason| Command {
+            wheels: WheelSpeeds::STOP,
+            stamp: now,
+            valid_until: now.plus_seconds(self.settings.valid_s),
+            reason,
+        };
+        match self.last {
+            _ if self.fault.is_some() => stop(Reason::Fault),
+            None => stop(Reason::Settling),
+            Some(last) if now <= last.valid_until => last,
+            Some(_) => stop(Reason::Expired),
+        }
+    }
+
+    /// Odometry cannot have moved like this: nothing more until armed again.
+    pub(crate) fn check_odometry(&mut self, motion: &Motion) {
+        let travel = motion.forward.hypot(motion.left);
+        if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
+            self.latch("odometry jumped");
+        }
+    }
+
+    /// Stops until armed again.
+    pub(crate) fn latch(&mut self, why: &'static str) {
+        self.fault.get_or_insert(why);
+    }
+
+    /// Why nothing moves, if it lasts.
+    pub(crate) fn fault(&self) -> Option<&'static str> {
+        self.fault
+    }
+
+    /// A person has looked and lets the robot move again.
+    pub(crate) fn arm(&mut self) {
+        self.fault = None;
+        self.last = None;
+    }
+
+    fn must_stop(&self, wish: &Wish) -> Option<Reason> {
+        let Wish { wheels, has_target, settled, pause_s, .. } = wish;
+        if self.fault.is_some() {
+            Some(Reason::Fault)
+        } else if !settled {
+            Some(Reason::Settling)
+        } else if !(*pause_s <= self.settings.stop_after_s) {
+            Some(Reason::Stalled)
+        } else if !has_target {
+            Some(Reason::NoTarget)
+        } else if !(wheels.left.is_finite() && wheels.right.is_finite()) {
+            Some(Reason::NotFinite)
+        } else {
+            None
+        }
+    }
+
+    fn limited(
+        &self,
+        wish: &Wish,
+        look: impl FnOnce(f64) -> Option<Ahead>,
+    ) -> (WheelSpeeds, Reason) {
+        let (wanted, mut reason) = self.within_drive(wish.wheels);
+        let (mut cap, mut why) = (self.max_speed_mps, Reason::Limited);
+        if wish.pause_s > self.settings.slow_after_s {
+            (cap, why) = (0.5 * cap, Reason::Slow);
+        }
+        if wanted.forward > STILL_MPS {
+            match look(wanted.curvature()) {
+                Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
+                Some(Ahead::Something(at_m)) if self.speed_before(at_m) < cap => {
+                    (cap, why) = (self.speed_before(at_m), Reason::Obstacle);
+                }
+                _ => {}
+            }
+        }
+        if cap <= STILL_MPS {
+            return (Twist { forward: 0.0, ..wanted }.wheels(&self.wheels), Reason::Blocked);
+        }
+        let ramped = self.ramped(wanted, wish.stamp);
+        if ramped != wanted {
+            reason = Reason::Limited;
+        }
+        if ramped.forward.abs() > cap {
+            return (self.in_reach(ramped.scaled(cap / ramped.forward.abs())), why);
+        }
+        (self.in_reach(ramped), reason)
+    }
+
+    /// As fast as the drive can and the turn rate may, on the same arc.
+    fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, Reason) {
+        let WheelSpeeds { left, right } = wheels;
+        // Half of it first, for the sum of two finite numbers may be infinite.
+        let fastest = (0.5 * left).abs().max((0.5 * right).abs()) * 2.0;
+        let scale = self.max_speed_mps / fastest.max(self.max_speed_mps);
+        let shorter = WheelSpeeds { left: left * scale, right: right * scale };
+        let twist = Twist::of(shorter, &self.wheels);
+        let twist = match self.settings.reverse {
+            false if twist.forward < 0.0 => Twist { forward: 0.0, ..twist },
+            _ => twist,
+        };
+        let limit = self.settings.max_turn_radps;
+        let slower = twist.scaled(limit / twist.turn.abs().max(limit));
+        let WheelSpeeds { left: l, right: r } = slower.wheels(&self.wheels);
+        let as_wished = (l - left).abs() + (r - right).abs() < STILL_MPS;
+        (slower, if as_wished { Reason::Follow } else { Reason::Limited })
+    }
+
+    /// The speed from which the robot still stops in time, m/s.
+    fn speed_before(&self, at_m: f64) -> f64 {
+        let left = at_m - self.settings.corridor.stop_m;
+        (2.0 * self.settings.max_decel_mps2 * left.max(0.0)).sqrt()
+    }
+
+    /// As near to the wish as the acceleration allows, on the arc that is wished
+    /// for.
+    fn ramped(&self, wanted: Twist, now: Stamp) -> Twist {
+        let before = self.last.map_or(Twist::default(), |c| Twist::of(c.wheels, &self.wheels));
+        let dt = self.last.map_or(LONGEST_STEP_S, |c| now.seconds_since(c.stamp));
+        let dt = dt.clamp(0.0, LONGEST_STEP_S);
+        let GovernorSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
+        // Away from standing still is faster, towards it is slower.
+        let (up, down) = match before.forward >= 0.0 {
+            true => (max_accel_mps2, max_decel_mps2),
+            false => (max_decel_mps2, max_accel_mps2),
+        };
+        let forward = wanted.forward.clamp(before.forward - down * dt, before.forward + up * dt);
+        if forward == wanted.forward {
+            return wanted;
+        }
+        let turn = match wanted.forward.abs() > STILL_MPS {
+            true => wanted.turn * (forward / wanted.forward).clamp(0.0, 1.0),
+            false => wanted.turn,
+        };
+        Twist { forward, turn }
+    }
+
+    /// Wheels within their limit after all.
+    fn in_reach(&self, twist: Twist) -> WheelSpeeds {
+        let WheelSpeeds { left, right } = twist.wheels(&self.wheels);
+        let scale = self.max_speed_mps / left.abs().max(right.abs()).max(self.max_speed_mps);
+        let limit = |speed: f64| (speed * scale).clamp(-self.max_speed_mps, self.max_speed_mps);
+        WheelSpeeds { left: limit(left), right: limit(right) }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,228 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const DRIVE: Wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+const MAX_MPS: f64 = 0.9;
+const PERIOD_S: f64 = 0.1;
+
+fn governor() -> Governor {
+    Governor::new(GovernorSettings::default(), DRIVE, MAX_MPS)
+}
+
+fn wish(frame: u64, left: f64, right: f64) -> Wish {
+    Wish {
+        wheels: WheelSpeeds { left, right },
+        stamp: Stamp::from_nanos(frame * 100_000_000),
+        has_target: true,
+        settled: true,
+        pause_s: PERIOD_S,
+    }
+}
+
+fn free(_: f64) -> Option<Ahead> {
+    Some(Ahead::Free)
+}
+
+/// After enough frames to be as fast as wished.
+fn at_speed(left: f64, right: f64) -> (Governor, Command) {
+    let mut governor = governor();
+    let commands: Vec<Command> =
+        (1..40).map(|frame| governor.govern(&wish(frame, left, right), free)).collect();
+    (governor, commands[38])
+}
+
+#[test]
+fn a_modest_wish_comes_true() {
+    let (_, command) = at_speed(0.3, 0.4);
+    assert_eq!(command.reason, Reason::Follow);
+    assert!((command.wheels.left - 0.3).abs() < 1e-9 && (command.wheels.right - 0.4).abs() < 1e-9);
+}
+
+#[test]
+fn too_fast_a_wish_keeps_its_curvature() {
+    let (_, command) = at_speed(1.0, 2.0);
+    let WheelSpeeds { left, right } = command.wheels;
+    assert_eq!(command.reason, Reason::Limited);
+    assert!((right / left - 2.0).abs() < 1e-9 && right <= MAX_MPS, "{command:?}");
+}
+
+#[test]
+fn speed_grows_no_faster_than_it_may() {
+    let mut governor = governor();
+    let first = governor.govern(&wish(1, 0.9, 0.9), free).wheels.left;
+    let second = governor.govern(&wish(2, 0.9, 0.9), free).wheels.left;
+    assert!((second - first - 0.5 * PERIOD_S).abs() < 1e-9, "{first} {second}");
+    let (mut governor, _) = at_speed(0.8, 0.8);
+    let slower = governor.govern(&wish(40, 0.1, 0.1), free).wheels.left;
+    assert!((slower - (0.8 - 1.0 * PERIOD_S)).abs() < 1e-9, "{slower}");
+}
+
+#[test]
+fn each_reason_to_stop_stops_at_once() {
+    let stops: [(Reason, fn(Wish) -> Wish); 4] = [
+        (Reason::NoTarget, |wish| Wish { has_target: false, ..wish }),
+        (Reason::Settling, |wish| Wish { settled: false, ..wish }),
+        (Reason::Stalled, |wish| Wish { pause_s: 0.6, ..wish }),
+        (Reason::NotFinite, |wish| Wish {
+            wheels: WheelSpeeds { left: f64::NAN, right: 0.1 },
+            ..wish
+        }),
+    ];
+    for (reason, change) in stops {
+        let (mut governor, _) = at_speed(0.8, 0.8);
+        let command = governor.govern(&change(wish(40, 0.8, 0.8)), free);
+        assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, reason));
+    }
+}
+
+#[test]
+fn late_frames_halve_the_speed_and_later_ones_stop() {
+    let (mut governor, _) = at_speed(0.8, 0.8);
+    let late = Wish { pause_s: 0.3, ..wish(42, 0.8, 0.8) };
+    let command = governor.govern(&late, free);
+    assert_eq!(command.reason, Reason::Slow);
+    assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
+}
+
+#[test]
+fn an_obstacle_slows_and_then_stops() {
+    let speed = |at_m| {
+        let (mut governor, _) = at_speed(0.8, 0.8);
+        governor.govern(&wish(40, 0.8, 0.8), |_| Some(Ahead::Something(at_m)))
+    };
+    assert_eq!(speed(2.5).reason, Reason::Follow);
+    let near = speed(0.6);
+    assert_eq!(near.reason, Reason::Obstacle);
+    assert!((near.wheels.left - (2.0 * 0.2_f64).sqrt()).abs() < 1e-9, "{near:?}");
+    assert_eq!((speed(0.39).wheels, speed(0.39).reason), (WheelSpeeds::STOP, Reason::Blocked));
+}
+
+#[test]
+fn before_an_obstacle_the_robot_may_still_turn_in_place() {
+    let mut governor = governor();
+    let command = governor.govern(&wish(1, 0.1, 0.3), |_| Some(Ahead::Something(0.1)));
+    assert_eq!(command.reason, Reason::Blocked);
+    assert!(command.wheels.left < 0.0 && command.wheels.left == -command.wheels.right);
+}
+
+#[test]
+fn a_blind_camera_stops() {
+    let (mut governor, _) = at_speed(0.8, 0.8);
+    let command = governor.govern(&wish(40, 0.8, 0.8), |_| Some(Ahead::Blind));
+    assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Blind));
+}
+
+#[test]
+fn backwards_only_where_it_is_allowed() {
+    let (_, command) = at_speed(-0.4, -0.2);
+    assert!((command.wheels.left + command.wheels.right).abs() < 1e-9, "{command:?}");
+    let settings = GovernorSettings { reverse: true, ..GovernorSettings::default() };
+    let mut governor = Governor::new(settings, DRIVE, MAX_MPS);
+    let back = (1..40).map(|frame| governor.govern(&wish(frame, -0.4, -0.2), free)).last();
+    assert!((back.unwrap().wheels.left + 0.4).abs() < 1e-9);
+}
+
+#[test]
+fn commands_expire() {
+    let (moving, command) = at_speed(0.5, 0.5);
+    let later = |seconds| moving.at(command.stamp.plus_seconds(seconds));
+    assert_eq!(later(0.2), command);
+    assert_eq!((later(0.3).wheels, later(0.3).reason), (WheelSpeeds::STOP, Reason::Expired));
+    let nothing_yet = governor().at(Stamp::from_nanos(5));
+    assert_eq!(nothing_yet.wheels, WheelSpeeds::STOP);
+}
+
+#[test]
+fn a_jump_of_odometry_lasts_until_armed() {
+    let (mut governor, command) = at_speed(0.5, 0.5);
+    governor.check_odometry(&Motion { forward: 2.0, ..Motion::at_rest(0.1) });
+    assert_eq!(governor.at(command.stamp).reason, Reason::Fault);
+    for frame in 40..60 {
+        let command = governor.govern(&wish(frame, 0.5, 0.5), free);
+        assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
+    }
+    assert_eq!(governor.fault(), Some("odometry jumped"));
+    governor.arm();
+    assert!(governor.govern(&wish(60, 0.5, 0.5), free).wheels.left > 0.0);
+}
+
+#[test]
+fn stopping_takes_what_physics_says() {
+    let settings = GovernorSettings { margin_m: 0.0, ..GovernorSettings::default() };
+    assert!((settings.stopping_m(0.9) - 0.855).abs() < 1e-9);
+}
+
+/// Any number at all, the strange ones often.
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        -3.0..3.0_f64,
+        proptest::num::f64::ANY,
+        Just(0.0),
+        Just(f64::NAN),
+        Just(f64::INFINITY),
+        Just(f64::NEG_INFINITY),
+        Just(f64::MIN_POSITIVE / 2.0),
+        Just(f64::MAX),
+    ]
+}
+
+fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
+    prop_oneof![
+        Just(None),
+        Just(Some(Ahead::Free)),
+        Just(Some(Ahead::Blind)),
+        (0.0..3.0_f64).prop_map(|at_m| Some(Ahead::Something(at_m))),
+    ]
+}
+
+fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
+    let flags = (any::<bool>(), prop::bool::weighted(0.9), prop::bool::weighted(0.9));
+    (any_number(), any_number(), flags, any_number(), any_ahead()).prop_map(
+        |(left, right, flags, pause, ahead)| {
+            let (short, has_target, settled) = flags;
+            let pause_s = if short { PERIOD_S } else { pause };
+            (Wish { has_target, settled, pause_s, ..wish(0, left, right) }, ahead)
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 20_000, ..ProptestConfig::default() })]
+
+    /// With fifty wishes a case this is a million states.
+    #[test]
+    fn commands_are_finite_limited_and_gentle(
+        wishes in prop::collection::vec(any_wish(), 50)
+    ) {
+        let mut governor = governor();
+        let mut before = 0.0_f64;
+        for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
+            let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
+            let wish = Wish { stamp, ..wish };
+            let command = governor.govern(&wish, |_| ahead);
+            let WheelSpeeds { left, right } = command.wheels;
+            prop_assert!(left.abs() <= MAX_MPS && right.abs() <= MAX_MPS, "{command:?}");
+            if !command.reason.moves() && command.reason != Reason::Blocked {
+                prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
+            }
+            if !wish.has_target {
+                prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
+            }
+            let forward = 0.5 * (left + right);
+            prop_assert!(forward - before <= 0.5 * LONGEST_STEP_S + 1e-9, "{before} {command:?}");
+            before = forward;
+        }
+    }
+
+    #[test]
+    fn a_mirrored_wish_gives_mirrored_wheels(wishes in prop::collection::vec((any_number(), any_number()), 20)) {
+        let (mut one, mut other) = (governor(), governor());
+        for (frame, (left, right)) in wishes.into_iter().enumerate() {
+            let a = one.govern(&wish(frame as u64, left, right), free).wheels;
+            let b = other.govern(&wish(frame as u64, right, left), free).wheels;
+            prop_assert_eq!(a.left, b.right);
+            prop_assert_eq!(a.right, b.left);
+        }
+    }
+}

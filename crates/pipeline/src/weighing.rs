@@ -1,0 +1,57 @@
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use tagalong_core::{Frame, Likelihood, Person, Result};
+
+/// How much was asked of the likelihood in one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Weighing {
+    /// Imagined scenes that were compared with the image.
+    pub scenes: u64,
+    /// What that took, ms; a part of the stage `update`. Differs between runs.
+    pub ms: f64,
+}
+
+/// A likelihood that counts what is asked of it.
+pub(crate) struct Metered<'a> {
+    inner: &'a dyn Likelihood,
+    scenes: AtomicU64,
+    nanos: AtomicU64,
+}
+
+impl<'a> Metered<'a> {
+    pub(crate) fn new(inner: &'a dyn Likelihood) -> Self {
+        Self { inner, scenes: AtomicU64::new(0), nanos: AtomicU64::new(0) }
+    }
+
+    pub(crate) fn weighing(&self) -> Weighing {
+        let ms = self.nanos.load(Ordering::Relaxed) as f64 / 1e6;
+        Weighing { scenes: self.scenes.load(Ordering::Relaxed), ms }
+    }
+
+    fn timed<T>(&self, scenes: usize, ask: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let answer = ask();
+        let nanos = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.nanos.fetch_add(nanos, Ordering::Relaxed);
+        self.scenes.fetch_add(scenes as u64, Ordering::Relaxed);
+        answer
+    }
+}
+
+impl Likelihood for Metered<'_> {
+    fn log_likelihood(&self, frame: &Frame, scene: &[Person]) -> Result<f64> {
+        self.timed(1, || self.inner.log_likelihood(frame, scene))
+    }
+
+    fn log_likelihoods(
+        &self,
+        frame: &Frame,
+        people: &[Person],
+        people_per_scene: usize,
+        out: &mut Vec<f64>,
+    ) -> Result<()> {
+        let scenes = people.len().div_ceil(people_per_scene.max(1));
+        self.timed(scenes, || self.inner.log_likelihoods(frame, people, people_per_scene, out))
+    }
+}

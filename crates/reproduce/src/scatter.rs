@@ -1,0 +1,112 @@
+//! A chart of named points, as SVG.
+
+use std::fmt::Write as _;
+
+/// Names on two axes, the first of them logarithmic.
+pub struct Scatter<'a> {
+    /// What it shows.
+    pub title: &'a str,
+    /// Name of the logarithmic axis, with its unit.
+    pub across: &'a str,
+    /// Name of the other axis, with its unit; it starts at 0.
+    pub up: &'a str,
+    /// Name, place across (above 0), place up.
+    pub points: Vec<(String, f64, f64)>,
+}
+
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 420.0;
+/// Left, top, right, bottom.
+const MARGIN: [f64; 4] = [70.0, 44.0, 130.0, 56.0];
+
+impl Scatter<'_> {
+    /// The chart; points without a place are left out.
+    pub fn svg(&self) -> String {
+        let usable = |p: &&(String, f64, f64)| p.1.is_finite() && p.1 > 0.0 && p.2.is_finite();
+        let points: Vec<_> = self.points.iter().filter(usable).collect();
+        let low = points.iter().map(|p| p.1.log10().floor()).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(|p| p.1.log10().ceil()).fold(f64::NEG_INFINITY, f64::max);
+        let top = 1.15 * points.iter().map(|p| p.2).fold(0.0, f64::max);
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
+             font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{WIDTH}\" \
+             height=\"{HEIGHT}\" fill=\"white\"/>\n"
+        );
+        let frame = Frame { low, decades: (high - low).max(1.0), top: top.max(1e-9) };
+        text(&mut svg, WIDTH / 2.0, 24.0, "middle", self.title);
+        text(&mut svg, WIDTH / 2.0, HEIGHT - 12.0, "middle", self.across);
+        text(&mut svg, 8.0, MARGIN[1] - 14.0, "start", self.up);
+        if !points.is_empty() {
+            frame.grid(&mut svg);
+        }
+        for (name, x, y) in points {
+            let (x, y) = (frame.x(x.log10()), frame.y(*y));
+            let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"#1f6fb2\"/>");
+            text(&mut svg, x + 9.0, y + 4.0, "start", name);
+        }
+        svg + "</svg>\n"
+    }
+}
+
+/// Where numbers are in the picture.
+struct Frame {
+    low: f64,
+    decades: f64,
+    top: f64,
+}
+
+impl Frame {
+    fn x(&self, log: f64) -> f64 {
+        MARGIN[0] + (WIDTH - MARGIN[0] - MARGIN[2]) * (log - self.low) / self.decades
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        HEIGHT - MARGIN[3] - (HEIGHT - MARGIN[1] - MARGIN[3]) * value / self.top
+    }
+
+    fn grid(&self, svg: &mut String) {
+        for decade in 0..=self.decades as i32 {
+            let log = self.low + f64::from(decade);
+            let x = self.x(log);
+            line(svg, (x, MARGIN[1]), (x, HEIGHT - MARGIN[3]));
+            text(svg, x, HEIGHT - MARGIN[3] + 18.0, "middle", &format!("{}", 10f64.powf(log)));
+        }
+        for part in 0..=4 {
+            let value = self.top * f64::from(part) / 4.0;
+            let y = self.y(value);
+            line(svg, (MARGIN[0], y), (WIDTH - MARGIN[2], y));
+            text(svg, MARGIN[0] - 8.0, y + 4.0, "end", &format!("{value:.3}"));
+        }
+    }
+}
+
+fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
+    let _ = writeln!(
+        svg,
+        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"#ccc\"/>",
+        from.0, from.1, to.0, to.1
+    );
+}
+
+fn text(svg: &mut String, x: f64, y: f64, anchor: &str, words: &str) {
+    let words = words.replace('&', "&amp;").replace('<', "&lt;");
+    let _ = writeln!(
+        svg,
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"black\">{words}</text>"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_named_and_lie_in_the_picture() {
+        let points = vec![("a<b".to_owned(), 0.1, 0.02), ("none".to_owned(), f64::NAN, 1.0)];
+        let svg = Scatter { title: "t", across: "ms", up: "m", points }.svg();
+        assert!(svg.contains("a&lt;b") && !svg.contains("none") && !svg.contains("NaN"), "{svg}");
+        assert_eq!(svg.matches("<circle").count(), 1);
+        let empty = Scatter { title: "t", across: "ms", up: "m", points: vec![] }.svg();
+        assert!(!empty.contains("inf") && !empty.contains("NaN"), "{empty}");
+    }
+}

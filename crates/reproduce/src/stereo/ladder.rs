@@ -1,0 +1,103 @@
+//! Printed, corrected and best on the same scenes.
+
+use tagalong_trials::{Judge, Judged, Trial, TrialError};
+
+use super::{PIPELINES, STEREO, bootstrap};
+use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+
+/// The suites of P1 and P4, a crowd, and crossings.
+const SUITES: [&str; 5] =
+    ["following", "square-walk", "full-occlusion", "crowd", "crossing-oblique"];
+
+/// A figure of one contender on one draw.
+type Figure = fn(&Judged) -> f64;
+
+/// How the three do, and what each step gains.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn ladder(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let contenders = lab.contenders(&PIPELINES)?;
+    let mut draws = Vec::new();
+    for suite in SUITES {
+        let scenes = lab.scenes(suite, &[STEREO], lab.seeds(50))?;
+        draws.push(lab.trials(suite, &scenes, &contenders, judged)?);
+    }
+    let error: Figure = |judged| {
+        let errors = &judged.errors_in_robot_m;
+        1e3 * errors.iter().sum::<f64>() / errors.len() as f64
+    };
+    let tables = vec![
+        table("IDF1: is everybody found, under one number?", &draws, 3, |j| {
+            j.tally.identity.idf1()
+        }),
+        table("MOTA: misses, false alarms, switched numbers", &draws, 3, |j| j.tally.clear.mota()),
+        table("Mean error of matched places, robot frame, mm", &draws, 0, error),
+    ];
+    Ok(Findings { tables, pictures: Vec::new() })
+}
+
+fn judged(trial: Trial) -> Result<Vec<Judged>, TrialError> {
+    trial.runs.iter().map(|run| Judge::default().judge(&trial, run)).collect()
+}
+
+fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure) -> Table {
+    let mut rows: Vec<Row> = SUITES
+        .iter()
+        .zip(draws)
+        .map(|(suite, draws)| Row::ours(*suite, cells(draws, digits, figure)))
+        .collect();
+    let all: Vec<Vec<Judged>> = draws.concat();
+    rows.push(Row::ours("all", cells(&all, digits, figure)));
+    let columns = ["printed", "corrected", "best", "corrected - printed", "best - corrected"];
+    Table {
+        title: title.into(),
+        columns: columns.map(str::to_owned).to_vec(),
+        rows,
+        notes: vec![
+            format!("{} drawn stereo scenes; 95 % bootstrap over scenes, in pairs", all.len()),
+            format!("printed, corrected, best: {}", PIPELINES.join(", ")),
+        ],
+    }
+}
+
+/// The three, and the two steps between them on the same draws.
+fn cells(draws: &[Vec<Judged>], digits: usize, figure: Figure) -> Vec<Cell> {
+    let scores: Vec<Vec<f64>> =
+        draws.iter().map(|draw| draw.iter().map(figure).collect()).collect();
+    let known: Vec<&Vec<f64>> =
+        scores.iter().filter(|draw| draw.iter().all(|v| v.is_finite())).collect();
+    let of = |at: usize| known.iter().map(|draw| draw[at]).collect::<Vec<f64>>();
+    let all = [of(0), of(1), of(2)];
+    let mean = |at: usize| {
+        let mean =
+            |drawn: &[usize]| drawn.iter().map(|&k| all[at][k]).sum::<f64>() / drawn.len() as f64;
+        Cell::estimate(bootstrap().interval(known.len(), mean), digits)
+    };
+    let step = |from: usize| {
+        let gain = bootstrap().paired(&all[from], &all[from + 1]);
+        Cell::estimate(gain.map(|gain| gain.difference), digits)
+    };
+    vec![mean(0), mean(1), mean(2), step(0), step(1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draw(errors: [f64; 3]) -> Vec<Judged> {
+        let judged = |error| Judged { errors_in_robot_m: vec![error], ..Judged::default() };
+        errors.map(judged).to_vec()
+    }
+
+    #[test]
+    fn steps_are_paired_and_draws_that_say_nothing_are_left_out() {
+        let draws = [draw([0.3, 0.2, 0.1]), draw([0.5, 0.4, 0.2]), draw([f64::NAN, 0.0, 0.0])];
+        let cells = cells(&draws, 1, |judged| judged.errors_in_robot_m[0]);
+        let values: Vec<f64> = cells.iter().map(|cell| cell.value.unwrap()).collect();
+        let expected = [0.4, 0.3, 0.15, -0.1, -0.15];
+        assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
+        let [lower, upper] = cells[3].interval.unwrap();
+        assert!((lower + 0.1).abs() < 1e-9 && (upper + 0.1).abs() < 1e-9);
+    }
+}

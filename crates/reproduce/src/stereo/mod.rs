@@ -1,0 +1,92 @@
+//! The stereo systems of Satake and Miura: P1 without and P4 with a verifier.
+
+mod ladder;
+mod occlusion;
+mod times;
+mod turntable;
+mod verifier;
+mod walk;
+
+use tagalong_eval::Bootstrap;
+
+use crate::{Experiment, System};
+
+/// P1.
+pub const STEREO_EKF: System = System {
+    name: "stereo-ekf",
+    about: "P1: templates in stereo depth and an extended Kalman filter",
+    experiments: &[
+        Experiment {
+            name: "times",
+            about: "Section 4: 70 ms a frame at 512x384",
+            run: times::of_p1,
+        },
+        Experiment {
+            name: "directions",
+            about: "Fig. 4: a body that turns, by the number of templates",
+            run: turntable::directions,
+        },
+        Experiment {
+            name: "rejection",
+            about: "Fig. 5: objects with the silhouette of a person are rejected",
+            run: verifier::verifier,
+        },
+    ],
+};
+
+/// P4.
+pub const STEREO_SVM_EKF: System = System {
+    name: "stereo-svm-ekf",
+    about: "P4: templates in stereo depth, an SVM that verifies, an extended Kalman filter",
+    experiments: &[
+        Experiment {
+            name: "times",
+            about: "Table II: 40 + 20 + 10 + 20 = 90 ms at 512x384, two people",
+            run: times::of_p4,
+        },
+        Experiment {
+            name: "verifier",
+            about: "Table I: false sightings removed, people lost",
+            run: verifier::verifier,
+        },
+        Experiment {
+            name: "walk",
+            about: "Fig. 11: error along two edges of a square, 125 mm on average",
+            run: walk::walk,
+        },
+        Experiment {
+            name: "occlusion",
+            about: "Fig. 7: who is fully hidden is known again, by gap and duration",
+            run: occlusion::occlusion,
+        },
+        Experiment {
+            name: "directions",
+            about: "Fig. 3: a body that turns, by the number of templates",
+            run: turntable::directions,
+        },
+        Experiment {
+            name: "depth",
+            about: "Section II-A: the depth of a head is known to 1 % at 3 m",
+            run: turntable::depth,
+        },
+        Experiment {
+            name: "ladder",
+            about: "not in the paper: printed, corrected and best on the same scenes",
+            run: ladder::ladder,
+        },
+    ],
+};
+
+/// Every suite can be seen by a stereo camera.
+const STEREO: (&str, &str) = ("camera.kind", "stereo");
+
+/// As printed, corrected, and the best.
+const PIPELINES: [&str; 3] = ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-best"];
+
+/// Confidence of intervals.
+const CONFIDENCE: f64 = 0.95;
+
+/// Draws scenes with replacement: enough for two digits.
+fn bootstrap() -> Bootstrap {
+    Bootstrap { samples: 2_000, confidence: CONFIDENCE, seed: 1 }
+}

@@ -1,0 +1,125 @@
+//! P4, Table II: where the time of a frame goes.
+
+use tagalong_eval::percentile;
+use tagalong_trials::{Contender, Moment, Trial};
+
+use super::STEREO;
+use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+
+/// Rows of the paper's table, and our stages that do the same.
+const GROUPS: [(&str, &[&str]); 4] = [
+    ("stereo processing", &["stereo"]),
+    ("person tracking", &["predict", "follow", "associate", "update", "life cycle", "learn"]),
+    ("person detection", &["discover"]),
+    ("communication, display, saving", &["control"]),
+];
+
+/// Milliseconds of the paper's rows.
+const PUBLISHED_MS: [f64; 4] = [40.0, 20.0, 10.0, 20.0];
+/// Milliseconds a frame of P1.
+const P1_MS: f64 = 70.0;
+
+/// The breakdown of P4.
+///
+/// # Errors
+/// As [`Lab::contenders`], and a pipeline that fails.
+pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let names = ["stereo-svm-ekf", "stereo-best"];
+    let published = PUBLISHED_MS.map(Some).to_vec();
+    times(lab, &names, &published, PUBLISHED_MS.iter().sum(), "P4, Table II")
+}
+
+/// The time of P1.
+///
+/// # Errors
+/// As [`of_p4`].
+pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
+    times(lab, &["stereo-ekf"], &[None; 4], P1_MS, "P1, section 4")
+}
+
+fn times(
+    lab: &Lab,
+    names: &[&str],
+    published: &[Option<f64>],
+    total_ms: f64,
+    source: &str,
+) -> Result<Findings, ReproduceError> {
+    let contenders = lab.contenders(names)?;
+    let frames = frames(lab, &contenders)?;
+    let all = published.iter().copied().chain([Some(total_ms)]);
+    let number = |ms: Option<f64>| Cell::number(ms.unwrap_or(f64::NAN), 0);
+    let mut rows = vec![Row::published("Core2Duo, 2.6 GHz", all.map(number).collect())];
+    for (at, name) in names.iter().enumerate() {
+        rows.push(Row::ours(format!("{name}, median"), cells(&frames[at], 0.5)));
+        rows.push(Row::ours(format!("{name}, 95 % below"), cells(&frames[at], 0.95)));
+    }
+    let columns = GROUPS.iter().map(|(name, _)| format!("{name} ms"));
+    let count = frames.first().map_or(0, Vec::len);
+    Ok(Table {
+        title: format!("Time of a frame at 512x384 with two people ({source})"),
+        columns: columns.chain(["total ms".to_owned()]).collect(),
+        rows,
+        notes: vec![
+            format!("{count} frames with two people in view, one at a time on this machine"),
+            "Ours has no display to feed and no robot to talk to; 15 years lie between the \
+             two processors."
+                .into(),
+        ],
+    }
+    .into())
+}
+
+/// For each contender the milliseconds of each group, frame by frame. One trial
+/// at a time: others would take the processor away.
+fn frames(lab: &Lab, contenders: &[Contender]) -> Result<Vec<Vec<[f64; 4]>>, ReproduceError> {
+    let scenes = lab.scenes("square-walk", &[STEREO], lab.seeds(4).min(4))?;
+    let mut frames = vec![Vec::new(); contenders.len()];
+    lab.progress.begin(scenes.len(), "walks against the clock");
+    for scene in &scenes {
+        let trial = Trial::new(scene, contenders, lab.registry, 1)?;
+        for (run, out) in trial.runs.iter().zip(&mut frames) {
+            let both = trial.moments.iter().zip(&run.reports);
+            let of_two = both.filter(|(moment, _)| in_view(moment) == 2);
+            out.extend(of_two.map(|(_, report)| groups(&report.timings)));
+        }
+        lab.progress.step();
+    }
+    Ok(frames)
+}
+
+fn in_view(moment: &Moment) -> usize {
+    moment.truth.iter().filter(|truth| !truth.ignore && truth.upper_body.is_some()).count()
+}
+
+fn groups(timings: &[(&'static str, f64)]) -> [f64; 4] {
+    GROUPS.map(|(_, stages)| {
+        timings.iter().filter(|(stage, _)| stages.contains(stage)).map(|(_, ms)| ms).sum()
+    })
+}
+
+fn cells(frames: &[[f64; 4]], part: f64) -> Vec<Cell> {
+    let number = |values: Vec<f64>| Cell::number(percentile(&values, part).unwrap_or(f64::NAN), 1);
+    let group = |at: usize| number(frames.iter().map(|groups| groups[at]).collect());
+    let total = number(frames.iter().map(|groups| groups.iter().sum()).collect());
+    (0..GROUPS.len()).map(group).chain([total]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stage_is_in_one_group() {
+        let stages = ["stereo", "predict", "follow", "discover", "associate", "update"];
+        let rest = ["life cycle", "learn", "control"];
+        let timings: Vec<(&'static str, f64)> =
+            stages.into_iter().chain(rest).map(|stage| (stage, 1.0)).collect();
+        assert_eq!(groups(&timings), [1.0, 6.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn the_total_is_that_of_frames() {
+        let cells = cells(&[[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 3.0, 0.0]], 1.0);
+        assert_eq!(cells[4].value, Some(3.0), "not 1 + 3");
+    }
+}

@@ -1,0 +1,175 @@
+//! P1, Fig. 4 and P4, Fig. 3: a body that turns is found in all directions; and
+//! how well its depth is known.
+
+use tagalong_core::{Camera, Detection};
+use tagalong_eval::wilson;
+use tagalong_pipeline::{Candidate, Fate};
+use tagalong_trials::{Contender, Moment, Trial, TrialError};
+
+use super::{CONFIDENCE, STEREO};
+use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+
+/// Templates that a detector has: a frontal silhouette equals one from behind.
+const SUBSETS: [&[&str]; 3] = [&["along"], &["along", "left"], &["along", "left", "right"]];
+/// Distances of the turntable, m.
+const DISTANCES_M: [f64; 5] = [1.5, 2.0, 3.0, 4.0, 5.0];
+/// One image each 15 degrees, a whole turn.
+const ONE_TURN: [(&str, &str); 3] = [STEREO, ("camera.rate_hz", "1"), ("duration_s", "24")];
+/// A detection this near to the person is theirs, m.
+const NEAR_M: f64 = 0.4;
+
+/// One image of the person who turns.
+struct Look {
+    /// Index into the distances.
+    distance: usize,
+    /// Distance from the camera, m.
+    range_m: f64,
+    /// For each subset: how much too far the head was seen, if it was.
+    errors_m: Vec<Option<f64>>,
+}
+
+/// Shares of directions in which the person is found.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let looks = looks(lab, &SUBSETS)?;
+    let row = |which: usize| {
+        let share = |distance: usize| {
+            let at = || looks.iter().filter(move |look| look.distance == distance);
+            let hits = at().filter(|look| look.errors_m[which].is_some()).count() as u64;
+            Cell::estimate(wilson(hits, at().count() as u64, CONFIDENCE), 2).percent()
+        };
+        let name = SUBSETS[which].join(", ");
+        Row::ours(name, (0..DISTANCES_M.len()).map(share).collect())
+    };
+    Ok(Table {
+        title: "Directions of a turning body in which it is found, % (P1, Fig. 4; P4, Fig. 3)"
+            .into(),
+        columns: columns(),
+        rows: (0..SUBSETS.len()).map(row).collect(),
+        notes: vec![
+            format!("{} images, one each 15 degrees; every image by itself", looks.len()),
+            "The papers show pictures. Which three directions they use is not said.".into(),
+        ],
+    }
+    .into())
+}
+
+/// Bias and spread of the depth of the head.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let looks = looks(lab, &SUBSETS[2..])?;
+    let of_distance = |distance: usize| {
+        let at = looks.iter().filter(move |look| look.distance == distance);
+        at.filter_map(|look| Some((look.errors_m[0]?, look.range_m))).collect::<Vec<_>>()
+    };
+    let cells = |figure: fn(&[(f64, f64)]) -> f64, digits: usize| {
+        let of = |distance| Cell::number(figure(&of_distance(distance)), digits);
+        (0..DISTANCES_M.len()).map(of).collect::<Vec<Cell>>()
+    };
+    let about_1 = |distance| Cell::number(if distance == 3.0 { 1.0 } else { f64::NAN }, 0);
+    let rows = vec![
+        Row::published("accuracy, about, % of the range", DISTANCES_M.map(about_1).to_vec()),
+        Row::ours("spread, % of the range", cells(|of| 100.0 * spread(&relative(of)), 2)),
+        Row::ours("bias, % of the range", cells(|of| 100.0 * mean(&relative(of)), 2)),
+        Row::ours("spread, mm", cells(|of| 1e3 * spread(&metres(of)), 0)),
+        Row::ours("bias, mm", cells(|of| 1e3 * mean(&metres(of)), 0)),
+    ];
+    Ok(Table {
+        title: "Depth of the head of a turning body, single images (P4, section II-A)".into(),
+        columns: columns(),
+        rows,
+        notes: vec![
+            format!("{} images; the truth is the centre of the head", looks.len()),
+            "Spread: standard deviation over people, directions and light.".into(),
+        ],
+    }
+    .into())
+}
+
+fn columns() -> Vec<String> {
+    DISTANCES_M.iter().map(|distance| format!("{distance} m")).collect()
+}
+
+fn looks(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Look>, ReproduceError> {
+    let scenes = lab.scenes("turntable", &ONE_TURN, lab.seeds(60))?;
+    let contenders: Vec<Contender> = subsets.iter().map(|subset| detector(subset)).collect();
+    let looks = lab.trials("turns on the spot", &scenes, &contenders, of_trial)?;
+    Ok(looks.into_iter().flatten().collect())
+}
+
+/// The detector of `stereo-ekf` with some of its templates, which looks at every
+/// image anew.
+fn detector(directions: &[&str]) -> Contender {
+    let config = format!(
+        "[stereo]\nmethod = \"semi-global\"\nwidth = 512\n[[detectors]]\n\
+         plugin = \"depth-template\"\nconfig = {{ directions = {directions:?} }}\n\
+         [filter]\nplugin = \"ekf\"\n"
+    );
+    Contender::new(directions.join(", "), config)
+}
+
+fn of_trial(trial: Trial) -> Result<Vec<Look>, TrialError> {
+    let look = |at: usize| look(&trial, at);
+    Ok((0..trial.moments.len()).filter_map(look).collect())
+}
+
+fn look(trial: &Trial, at: usize) -> Option<Look> {
+    let moment = &trial.moments[at];
+    let range_m = range_m(&moment.truth.first()?.head_in_robot, &trial.camera);
+    let away = |distance: &f64| (distance - moment.truth[0].head_in_robot.x).abs();
+    let nearest = (0..DISTANCES_M.len())
+        .min_by(|a, b| away(&DISTANCES_M[*a]).total_cmp(&away(&DISTANCES_M[*b])))?;
+    let error = |run: &tagalong_trials::Run| {
+        let found = sighting(&run.reports[at].candidates, moment)?;
+        Some(self::range_m(&found.position, &trial.camera) - range_m)
+    };
+    let errors_m = trial.runs.iter().map(error).collect();
+    Some(Look { distance: nearest, range_m, errors_m })
+}
+
+fn range_m(place: &nalgebra::Point3<f64>, camera: &Camera) -> f64 {
+    (place.coords - camera.robot_from_camera.translation.vector).norm()
+}
+
+/// The believed detection of the person, if there is one.
+fn sighting<'a>(candidates: &'a [Candidate], moment: &Moment) -> Option<&'a Detection> {
+    let head = moment.truth.first()?.head_in_robot;
+    let off = |c: &Candidate| (c.detection.position - head).xy().norm();
+    let believed = candidates.iter().filter(|c| !matches!(c.fate, Fate::Dropped(_)));
+    let nearest = believed.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    (off(nearest) <= NEAR_M).then_some(&nearest.detection)
+}
+
+fn metres(of: &[(f64, f64)]) -> Vec<f64> {
+    of.iter().map(|(error, _)| *error).collect()
+}
+
+fn relative(of: &[(f64, f64)]) -> Vec<f64> {
+    of.iter().map(|(error, range)| error / range).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn spread(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bias_and_spread_are_told_apart() {
+        let errors = [(0.02, 2.0), (0.04, 2.0)];
+        assert!((mean(&metres(&errors)) - 0.03).abs() < 1e-12);
+        assert!((spread(&metres(&errors)) - 0.01).abs() < 1e-12);
+        assert!((mean(&relative(&errors)) - 0.015).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,261 @@
+//! P4, Table I and P1, Fig. 5: what a verifier removes, and whom it costs.
+
+use std::collections::BTreeSet;
+
+use tagalong_core::{Detection, Track};
+use tagalong_eval::wilson;
+use tagalong_pipeline::{Fate, FrameReport};
+use tagalong_sim::Truth;
+use tagalong_trials::{Moment, Trial, TrialError};
+
+use super::{CONFIDENCE, STEREO};
+use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+
+/// A name for people, a scene, and what is set in it.
+type Sequence = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
+
+/// Sequences with nobody, one and two people among things that look like some.
+const SEQUENCES: [Sequence; 3] = [
+    ("nobody", "empty-clutter", &[STEREO, ("duration_s", "8")]),
+    ("one person", "turntable", &[STEREO, ("duration_s", "8"), ("room.clutter", "9")]),
+    ("two people", "square-walk", &[STEREO, ("duration_s", "10"), ("room.clutter", "9")]),
+];
+/// Without a verifier, with P4's, and with the better one.
+const PIPELINES: [&str; 3] = ["stereo-ekf", "stereo-svm-ekf", "stereo-best"];
+
+/// Something is a person's if it is this near on the floor, m ...
+const SAME_M: f64 = 0.5;
+/// ... and nobody's if everybody is farther than this, m.
+const NOBODY_M: f64 = 0.9;
+
+/// What one pipeline did to one scene, or to many.
+#[derive(Clone, Debug, Default)]
+struct Tally {
+    frames: u64,
+    /// Sightings of nobody that the detector believes, and of these rejected.
+    nobody: [u64; 2],
+    /// The same of people.
+    people: [u64; 2],
+    false_tracks: u64,
+    false_track_frames: u64,
+    /// People times frames with a confirmed track without the verifier, and of
+    /// these without one now.
+    covered: [u64; 2],
+    /// People who have a confirmed track at any time without the verifier, and
+    /// of these who never have one now.
+    tracked: [u64; 2],
+}
+
+/// Sightings and tracks, without a verifier and with one.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn verifier(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let contenders = lab.contenders(&PIPELINES)?;
+    let (mut sightings, mut tracks) = (Vec::new(), Vec::new());
+    let published = [f64::NAN, 100.0, 6.0].map(|number| Cell::number(number, 0));
+    sightings.push(Row::published("three sequences, counts lost", published.to_vec()));
+    let mut everything = vec![Tally::default(); PIPELINES.len()];
+    let mut scenes_drawn = 0;
+    for (name, scene, set) in SEQUENCES {
+        let scenes = lab.scenes(scene, set, lab.seeds(50))?;
+        scenes_drawn += scenes.len();
+        let all = lab.trials(name, &scenes, &contenders, tallies)?;
+        let mut tallies = vec![Tally::default(); PIPELINES.len()];
+        for trial in &all {
+            tallies.iter_mut().zip(trial).for_each(|(sum, one)| sum.add(one));
+        }
+        everything.iter_mut().zip(&tallies).for_each(|(sum, one)| sum.add(one));
+        sightings.extend(rows(name, &tallies, Tally::sighting_cells));
+        tracks.extend(rows(name, &tallies, Tally::track_cells));
+    }
+    sightings.extend(rows("all", &everything, Tally::sighting_cells));
+    tracks.extend(rows("all", &everything, Tally::track_cells));
+    let drawn = format!("{scenes_drawn} drawn stereo scenes that nothing was trained on; Wilson");
+    let tables = vec![sightings_table(sightings, &drawn), tracks_table(tracks, &drawn)];
+    Ok(Findings { tables, pictures: Vec::new() })
+}
+
+fn rows(name: &str, tallies: &[Tally], cells: fn(&Tally, &Tally) -> Vec<Cell>) -> Vec<Row> {
+    let row = |(pipeline, tally): (&&str, &Tally)| {
+        Row::ours(format!("{name}, {pipeline}"), cells(tally, &tallies[0]))
+    };
+    PIPELINES.iter().zip(tallies).map(row).collect()
+}
+
+fn sightings_table(rows: Vec<Row>, drawn: &str) -> Table {
+    let columns = ["false sightings a frame", "false ones removed %", "people's rejected %"];
+    Table {
+        title: "Single sightings: what the verifier rejects (P4, Table I; P1, Fig. 5)".into(),
+        columns: columns.map(str::to_owned).to_vec(),
+        rows,
+        notes: vec![
+            format!("{drawn} intervals, over sightings"),
+            "False sightings a frame: before the verifier.".into(),
+        ],
+    }
+}
+
+fn tracks_table(rows: Vec<Row>, drawn: &str) -> Table {
+    let columns = [
+        "false tracks",
+        "their frames",
+        "false frames removed %",
+        "people never tracked %",
+        "tracked people's frames lost %",
+    ];
+    Table {
+        title: "Confirmed tracks: what the verifier is worth over time".into(),
+        columns: columns.map(str::to_owned).to_vec(),
+        rows,
+        notes: vec![
+            format!("{drawn} intervals, over people and frames"),
+            "Lost: had a track in the same frame without the verifier.".into(),
+        ],
+    }
+}
+
+fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
+    let covers = |run: usize| -> Vec<BTreeSet<u16>> {
+        let both = trial.moments.iter().zip(&trial.runs[run].reports);
+        both.map(|(moment, report)| covered(moment, report)).collect()
+    };
+    let plain = covers(0);
+    let of_run = |run: usize| {
+        let mut tally = Tally::default();
+        let mut false_tracks = BTreeSet::new();
+        for (moment, report) in trial.moments.iter().zip(&trial.runs[run].reports) {
+            tally.frame(moment, report, &mut false_tracks);
+        }
+        tally.false_tracks = false_tracks.len() as u64;
+        tally.compare(&plain, &covers(run));
+        tally
+    };
+    Ok((0..trial.runs.len()).map(of_run).collect())
+}
+
+impl Tally {
+    fn frame(&mut self, moment: &Moment, report: &FrameReport, false_tracks: &mut BTreeSet<u32>) {
+        self.frames += 1;
+        for candidate in &report.candidates {
+            let rejected = match candidate.fate {
+                Fate::Dropped("verifier") => true,
+                Fate::Dropped(_) => continue,
+                Fate::Matched(_) | Fate::Started(_) => false,
+            };
+            let counts = match whose(&candidate.detection, &moment.truth) {
+                Whose::Somebody => &mut self.people,
+                Whose::Nobody => &mut self.nobody,
+                Whose::Unclear => continue,
+            };
+            counts[0] += 1;
+            counts[1] += u64::from(rejected);
+        }
+        for track in report.tracks.iter().filter(|track| track.confirmed) {
+            if moment.truth.iter().all(|truth| off_m(track, truth) > NOBODY_M) {
+                self.false_track_frames += 1;
+                false_tracks.insert(track.id.0);
+            }
+        }
+    }
+
+    fn compare(&mut self, plain: &[BTreeSet<u16>], own: &[BTreeSet<u16>]) {
+        for (before, now) in plain.iter().zip(own) {
+            self.covered[0] += before.len() as u64;
+            self.covered[1] += before.difference(now).count() as u64;
+        }
+        let ever = |frames: &[BTreeSet<u16>]| frames.iter().flatten().copied().collect();
+        let (before, now): (BTreeSet<u16>, BTreeSet<u16>) = (ever(plain), ever(own));
+        self.tracked = [before.len() as u64, before.difference(&now).count() as u64];
+    }
+
+    fn add(&mut self, other: &Self) {
+        let pairs = [
+            (&mut self.nobody, other.nobody),
+            (&mut self.people, other.people),
+            (&mut self.covered, other.covered),
+            (&mut self.tracked, other.tracked),
+        ];
+        for (sum, one) in pairs {
+            sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
+        }
+        self.frames += other.frames;
+        self.false_tracks += other.false_tracks;
+        self.false_track_frames += other.false_track_frames;
+    }
+
+    fn sighting_cells(&self, _: &Self) -> Vec<Cell> {
+        let a_frame = self.nobody[0] as f64 / self.frames as f64;
+        vec![Cell::number(a_frame, 3), share(self.nobody), share(self.people)]
+    }
+
+    fn track_cells(&self, plain: &Self) -> Vec<Cell> {
+        let before = plain.false_track_frames;
+        let removed = [before, before.saturating_sub(self.false_track_frames)];
+        vec![
+            Cell::number(self.false_tracks as f64, 0),
+            Cell::number(self.false_track_frames as f64, 0),
+            share(removed),
+            share(self.tracked),
+            share(self.covered),
+        ]
+    }
+}
+
+/// The second number as a share of the first.
+fn share([of, count]: [u64; 2]) -> Cell {
+    Cell::estimate(wilson(count, of, CONFIDENCE), 3).percent()
+}
+
+enum Whose {
+    Somebody,
+    Nobody,
+    Unclear,
+}
+
+fn whose(detection: &Detection, people: &[Truth]) -> Whose {
+    let off = |truth: &Truth| (detection.position - truth.head_in_robot).xy().norm();
+    let nearest = people.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    match nearest {
+        None => Whose::Nobody,
+        Some(truth) if off(truth) > NOBODY_M => Whose::Nobody,
+        Some(truth) if off(truth) <= SAME_M && !truth.ignore => Whose::Somebody,
+        Some(_) => Whose::Unclear,
+    }
+}
+
+fn off_m(track: &Track, truth: &Truth) -> f64 {
+    (track.estimate.person.position - truth.head_in_robot).xy().norm()
+}
+
+/// The people who count and have a confirmed track on them.
+fn covered(moment: &Moment, report: &FrameReport) -> BTreeSet<u16> {
+    let tracks = || report.tracks.iter().filter(|track| track.confirmed);
+    let has_one = |truth: &&Truth| tracks().any(|track| off_m(track, truth) <= SAME_M);
+    let people = moment.truth.iter().filter(|truth| !truth.ignore);
+    people.filter(has_one).map(|truth| truth.id).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_had_a_track_without_the_verifier_is_lost_without_one_now() {
+        let set = |ids: &[u16]| ids.iter().copied().collect::<BTreeSet<u16>>();
+        let mut tally = Tally::default();
+        tally.compare(&[set(&[1, 2]), set(&[1])], &[set(&[1]), set(&[1, 3])]);
+        assert_eq!((tally.covered, tally.tracked), ([3, 1], [2, 1]));
+        let mut sum = tally.clone();
+        sum.add(&tally);
+        assert_eq!((sum.covered, sum.tracked), ([6, 2], [4, 2]));
+    }
+
+    #[test]
+    fn shares_have_intervals() {
+        let cell = share([100, 98]);
+        assert_eq!(cell.value, Some(98.0));
+        assert!(cell.interval.unwrap()[0] < 95.0);
+        assert_eq!(share([0, 0]).value, None);
+    }
+}

@@ -1,0 +1,108 @@
+use tagalong_core::{Derived, Frame, GreyImage, Result};
+
+/// Sums of grey values over upright rectangles, four look-ups each.
+///
+/// The sums are kept modulo 2³²: of a rectangle of up to 16 million pixels the
+/// sum is right, however large the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Integral {
+    width: usize,
+    height: usize,
+    /// One row and one column more than the image; the first ones are 0.
+    sums: Vec<u32>,
+}
+
+impl Integral {
+    /// Sums up an image.
+    pub fn new(image: &GreyImage) -> Self {
+        let (width, height) = (image.width(), image.height());
+        let stride = width + 1;
+        let mut sums = vec![0_u32; stride * (height + 1)];
+        for y in 0..height {
+            let (above, below) = sums.split_at_mut(stride * (y + 1));
+            let above = &above[stride * y..];
+            let mut in_row = 0_u32;
+            for ((sum, above), grey) in
+                below[1..stride].iter_mut().zip(&above[1..]).zip(image.row(y))
+            {
+                in_row = in_row.wrapping_add(u32::from(*grey));
+                *sum = above.wrapping_add(in_row);
+            }
+        }
+        Self { width, height, sums }
+    }
+
+    /// Columns of the image.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows of the image.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The sums of what lies above and left of each corner of the pixels, row by
+    /// row, [`Integral::stride`] to a row.
+    pub fn sums(&self) -> &[u32] {
+        &self.sums
+    }
+
+    /// Numbers in a row of [`Integral::sums`]: one more than columns.
+    pub fn stride(&self) -> usize {
+        self.width + 1
+    }
+
+    /// The sum over columns `left..right` and rows `top..bottom`, as far as they
+    /// lie in the image.
+    pub fn sum(&self, left: usize, top: usize, right: usize, bottom: usize) -> u32 {
+        let at =
+            |x: usize, y: usize| self.sums[y.min(self.height) * self.stride() + x.min(self.width)];
+        if right <= left || bottom <= top {
+            return 0;
+        }
+        at(right, bottom)
+            .wrapping_sub(at(left, bottom))
+            .wrapping_sub(at(right, top))
+            .wrapping_add(at(left, top))
+    }
+}
+
+impl Derived for Integral {
+    fn derive(frame: &Frame) -> Result<Self> {
+        Ok(Self::new(frame.grey()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_sum_is_that_of_the_pixels(
+            pixels in prop::collection::vec(any::<u8>(), 12 * 9),
+            x in 0..14usize, y in 0..11usize, w in 0..14usize, h in 0..11usize,
+        ) {
+            let Some(image) = GreyImage::from_pixels(12, 9, pixels) else {
+                return Err(TestCaseError::fail("108 pixels are 12 by 9"));
+            };
+            let inside = |to: usize, most: usize| to.min(most);
+            let rows = inside(y, 9)..inside(y + h, 9);
+            let columns = inside(x, 12)..inside(x + w, 12);
+            let slow: u32 = rows
+                .flat_map(|y| image.row(y)[columns.clone()].iter())
+                .map(|grey| u32::from(*grey))
+                .sum();
+            prop_assert_eq!(Integral::new(&image).sum(x, y, x + w, y + h), slow);
+        }
+    }
+
+    #[test]
+    fn an_image_without_pixels_has_no_sums() {
+        let empty = Integral::new(&GreyImage::filled(0, 0, 9));
+        assert_eq!((empty.sum(0, 0, 5, 5), empty.stride()), (0, 1));
+    }
+}

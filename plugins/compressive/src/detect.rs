@@ -1,0 +1,432 @@
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{
+    Camera, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
+    Track, TrackId,
+};
+use tagalong_vision::Integral;
+
+use crate::appearance::Samples;
+use crate::candidates::{Pixels, disc, ring, surface_m};
+use crate::{Appearance, Config, Features, NAME, Scaled};
+
+/// Boxes are at least and at most so wide and high, pixels.
+const SIDES_PX: std::ops::RangeInclusive<f64> = 12.0..=1000.0;
+/// A sighting that overlaps the track's box by less was not the one that the
+/// track was given (IoU).
+const SAME_PLACE: f64 = 0.7;
+/// Another mode is at least so far from the best box, widths.
+const OTHER_MODE: f64 = 0.5;
+/// The standard deviation of a distance that is only expected, as a fraction.
+const SIGMA_EXPECTED: f64 = 0.5;
+
+/// Follows people by what they look like.
+pub struct Compressive {
+    config: Config,
+    features: Features,
+    targets: BTreeMap<TrackId, Target>,
+    scratch: Scratch,
+}
+
+/// What is kept of a person.
+struct Target {
+    appearance: Appearance,
+    /// It has learnt from a frame at least.
+    is_taught: bool,
+    /// The features for boxes of this person's size.
+    scaled: Scaled,
+    /// Width of the box times the distance it was learnt at, pixels m.
+    width_at_1m: Option<f64>,
+    /// The sighting of this frame, and how sure it is.
+    found: Option<(Rect, f32)>,
+}
+
+/// Memory that is used again in every frame.
+#[derive(Default)]
+struct Scratch {
+    numbers: Vec<f32>,
+    person: Samples,
+    other: Samples,
+    coarse: Vec<Scored>,
+}
+
+/// A box and how sure it is of the person.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Scored {
+    x: i64,
+    y: i64,
+    confidence: f32,
+}
+
+/// The images of a frame that this detector looks at.
+struct View<'a> {
+    integral: Arc<Integral>,
+    depth: Option<&'a DepthImage>,
+    camera: &'a Camera,
+}
+
+/// Boxes that were not looked at, and why.
+#[derive(Default)]
+struct Dropped {
+    outside: u64,
+    nearer: u64,
+    farther: u64,
+}
+
+impl<'a> View<'a> {
+    fn of(frame: &'a Frame) -> Result<Self> {
+        let integral = frame.derived::<Integral>()?;
+        Ok(Self { integral, depth: frame.images().depth.as_deref(), camera: &frame.camera })
+    }
+
+    /// Expected depth of a track's face, m, where there are depths to compare.
+    fn expected_m(&self, track: &Track) -> Option<f64> {
+        let face_m = self.camera.depth_of(&track.estimate.person.position) - HEAD_RADIUS_M;
+        self.depth.is_some().then_some(face_m).filter(|m| m.is_finite() && *m > 0.1)
+    }
+}
+
+impl Compressive {
+    /// A detector with these settings.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config, seed: u64) -> Result<Self> {
+        config.check()?;
+        let features = Features::draw(config.features, config.most_rectangles, seed);
+        let scratch = Scratch { numbers: vec![0.0; features.len()], ..Scratch::default() };
+        Ok(Self { config, features, targets: BTreeMap::new(), scratch })
+    }
+
+    /// Where a person is whose appearance is known.
+    fn near(&mut self, view: &View<'_>, track: &Track, funnel: &mut Funnel) -> Option<Detection> {
+        let Self { config, features, targets, scratch } = self;
+        let expected = track.estimate.region;
+        let Some(target) = targets.get_mut(&track.id).filter(|target| target.is_taught) else {
+            funnel.drop_at("appearance: not learnt yet", expected);
+            return None;
+        };
+        if target.resize(config, features, view, track).is_none() {
+            funnel.drop_at("appearance: box too small or too large", expected);
+            return None;
+        }
+        let mut hunt = Hunt { config, view, target, scratch, expected_m: view.expected_m(track) };
+        let mut dropped = Dropped::default();
+        let best = hunt.search(&expected, &mut dropped);
+        let lead = best.map_or(f32::INFINITY, |best| hunt.lead(best));
+        let test = match best {
+            None => Some(dropped.reason()),
+            Some(best) if f64::from(best.confidence) < config.min_confidence => {
+                Some("appearance: confidence")
+            }
+            Some(_) if f64::from(lead) < config.min_lead => Some("appearance: two places"),
+            Some(_) => None,
+        };
+        dropped.count(funnel);
+        if let Some(test) = test {
+            funnel.drop_at(test, expected);
+            return None;
+        }
+        let best = best?;
+        let (width, height) = target.scaled.size();
+        let of = Pixels { x: best.x, y: best.y, width, height };
+        let region = Rect::new(best.x as f64, best.y as f64, width as f64, height as f64);
+        target.found = Some((region, best.confidence));
+        let face_m = view.depth.and_then(|depth| surface_m(depth, of));
+        Some(sighting(config, view.camera, track, region, face_m))
+    }
+
+    /// Adapts the model of one person to this frame.
+    fn teach(&mut self, view: &View<'_>, track: &Track) {
+        let Self { config, features, targets, scratch } = self;
+        let target = targets.entry(track.id).or_insert_with(|| Target::new(features.len()));
+        let found = target.found.take();
+        let Some(memory) = memory(config, track, found, !target.is_taught) else { return };
+        let Some(of) = target.fit_to(features, view, &track.estimate.region) else { return };
+        let expected_m = view.expected_m(track);
+        let shown = view.depth.and_then(|depth| surface_m(depth, of));
+        let is_there = match (expected_m, shown) {
+            (Some(expected), Some(shown)) => (shown - expected).abs() < config.depth_tolerance_m,
+            (Some(_), None) => false,
+            (None, _) => true,
+        };
+        if config.depth_filter && !is_there && !config.compat_always_learn {
+            return;
+        }
+        if !sample(config, view, target, of, scratch) {
+            return;
+        }
+        target.appearance.learn(&scratch.person, &scratch.other, memory, config.min_sigma);
+        target.is_taught = true;
+        target.width_at_1m = expected_m.map(|metres| metres * track.estimate.region.width);
+    }
+}
+
+/// Weight of the past for what this frame teaches; `None` where nothing is to
+/// be learnt.
+fn memory(config: &Config, track: &Track, found: Option<(Rect, f32)>, is_new: bool) -> Option<f64> {
+    let is_clear = track.seen && !track.occluded;
+    if is_new && is_clear {
+        return Some(if config.compat_blank_start { config.memory } else { 0.0 });
+    }
+    if config.compat_always_learn && !is_new {
+        return Some(config.memory);
+    }
+    if !is_clear {
+        return None;
+    }
+    match found {
+        Some((region, confidence)) if region.iou(&track.estimate.region) >= SAME_PLACE => {
+            (f64::from(confidence) >= config.learn_confidence).then_some(config.memory)
+        }
+        _ => Some(config.anchored_memory),
+    }
+}
+
+/// Collects boxes on the person and beside them; false if there are too few.
+fn sample(
+    config: &Config,
+    view: &View<'_>,
+    target: &Target,
+    of: Pixels,
+    scratch: &mut Scratch,
+) -> bool {
+    let Scratch { numbers, person, other, .. } = scratch;
+    let width = of.width as f64;
+    let radius = (config.positive_radius * width).max(2.0);
+    let near = disc(radius, (radius / 4.0).round() as i64);
+    let away = ring(config.negative_from * width, config.negative_to * width, config.negatives);
+    person.clear(numbers.len());
+    other.clear(numbers.len());
+    let mut add = |samples: &mut Samples, (dx, dy): (i64, i64)| {
+        let (x, y) = (of.x + dx, of.y + dy);
+        if target.scaled.fits(&view.integral, x, y) {
+            target.scaled.measure(&view.integral, x as usize, y as usize, numbers);
+            samples.add(numbers);
+        }
+    };
+    near.for_each(|offset| add(person, offset));
+    away.for_each(|offset| add(other, offset));
+    person.len() >= 4 && other.len() >= 4
+}
+
+impl Target {
+    fn new(numbers: usize) -> Self {
+        Self {
+            appearance: Appearance::blank(numbers),
+            is_taught: false,
+            scaled: Scaled::default(),
+            width_at_1m: None,
+            found: None,
+        }
+    }
+
+    /// Takes the size that the person should have now: that of the expected box,
+    /// or what the distance says, without jumps. `None` if the box is too small.
+    fn resize(
+        &mut self,
+        config: &Config,
+        features: &Features,
+        view: &View<'_>,
+        track: &Track,
+    ) -> Option<()> {
+        let expected = track.estimate.region;
+        let by_depth = match (self.width_at_1m, view.expected_m(track)) {
+            (Some(at_1m), Some(metres)) if config.scale_from_depth => Some(at_1m / metres),
+            _ => None,
+        };
+        let last = self.scaled.size().0 as f64;
+        let wanted = by_depth.unwrap_or(expected.width);
+        let steady = wanted
+            .clamp(last * (1.0 - config.max_scale_change), last * (1.0 + config.max_scale_change));
+        let factor = steady.max(1.0) / expected.width.max(1.0);
+        self.set_size(features, view, expected.width * factor, expected.height * factor)
+    }
+
+    /// Takes the size of a box, and returns it in whole pixels; `None` if it
+    /// cannot be used.
+    fn fit_to(&mut self, features: &Features, view: &View<'_>, region: &Rect) -> Option<Pixels> {
+        self.set_size(features, view, region.width, region.height)?;
+        let (width, height) = self.scaled.size();
+        let of = Pixels { x: region.x.round() as i64, y: region.y.round() as i64, width, height };
+        self.scaled.fits(&view.integral, of.x, of.y).then_some(of)
+    }
+
+    fn set_size(
+        &mut self,
+        features: &Features,
+        view: &View<'_>,
+        width: f64,
+        height: f64,
+    ) -> Option<()> {
+        let usable = SIDES_PX.contains(&width) && SIDES_PX.contains(&height);
+        let size = (width.round() as usize, height.round() as usize);
+        let stride = view.integral.stride();
+        if usable && (self.scaled.size() != size || self.scaled.stride() != stride) {
+            self.scaled = features.scaled(size.0, size.1, stride);
+        }
+        usable.then_some(())
+    }
+}
+
+/// The search for one person in one frame.
+struct Hunt<'a> {
+    config: &'a Config,
+    view: &'a View<'a>,
+    target: &'a Target,
+    scratch: &'a mut Scratch,
+    /// Expected depth of the face, m.
+    expected_m: Option<f64>,
+}
+
+impl Hunt<'_> {
+    /// The best box around the expected one: coarsely, then finely.
+    fn search(&mut self, expected: &Rect, dropped: &mut Dropped) -> Option<Scored> {
+        let (width, height) = self.target.scaled.size();
+        let px = |widths: f64| widths * width as f64;
+        let centre = expected.centre();
+        let x = (centre.x - 0.5 * width as f64).round() as i64;
+        let y = (centre.y - 0.5 * height as f64).round() as i64;
+        self.scratch.coarse.clear();
+        let full = self.config.compat_full_search;
+        let step = if full { 1 } else { (px(self.config.coarse_step).round() as i64).max(1) };
+        for (dx, dy) in disc(px(self.config.search_radius), step) {
+            if let Some(scored) = self.look(x + dx, y + dy, Some(&mut *dropped)) {
+                self.scratch.coarse.push(scored);
+            }
+        }
+        let coarse = best(self.scratch.coarse.iter().copied())?;
+        if full {
+            return Some(coarse);
+        }
+        let fine_step = (px(self.config.fine_radius) / 5.0).round() as i64;
+        let mut finest = coarse;
+        for (dx, dy) in disc(px(self.config.fine_radius), fine_step) {
+            if let Some(scored) = self.look(coarse.x + dx, coarse.y + dy, None)
+                && scored.confidence > finest.confidence
+            {
+                finest = scored;
+            }
+        }
+        Some(finest)
+    }
+
+    /// How sure the box with this upper left corner is; `None` where it is not
+    /// looked at. The fine search has no depth test: its boxes are those of one
+    /// that passed.
+    fn look(&mut self, x: i64, y: i64, dropped: Option<&mut Dropped>) -> Option<Scored> {
+        if !self.target.scaled.fits(&self.view.integral, x, y) {
+            dropped.into_iter().for_each(|d| d.outside += 1);
+            return None;
+        }
+        if let Some(dropped) = dropped
+            && !self.passes_depth(x, y, dropped)
+        {
+            return None;
+        }
+        let numbers = &mut self.scratch.numbers;
+        self.target.scaled.measure(&self.view.integral, x as usize, y as usize, numbers);
+        Some(Scored { x, y, confidence: self.target.appearance.confidence(numbers) })
+    }
+
+    /// P2: something in the box is within half a metre of the person.
+    fn passes_depth(&self, x: i64, y: i64, dropped: &mut Dropped) -> bool {
+        let (Some(depth), Some(expected)) = (self.view.depth, self.expected_m) else { return true };
+        if !self.config.depth_filter {
+            return true;
+        }
+        let (width, height) = self.target.scaled.size();
+        match surface_m(depth, Pixels { x, y, width, height }) {
+            Some(m) if (m - expected).abs() < self.config.depth_tolerance_m => return true,
+            Some(m) if expected - m > self.config.hidden_by_m => dropped.nearer += 1,
+            _ => dropped.farther += 1,
+        }
+        false
+    }
+
+    /// By how much the best box beats all that are elsewhere.
+    fn lead(&self, best: Scored) -> f32 {
+        let far = OTHER_MODE * self.target.scaled.size().0 as f64;
+        let elsewhere = self.scratch.coarse.iter().filter(|other| {
+            let (dx, dy) = ((other.x - best.x) as f64, (other.y - best.y) as f64);
+            dx.hypot(dy) >= far
+        });
+        let second = elsewhere.map(|s| s.confidence).fold(f32::NEG_INFINITY, f32::max);
+        best.confidence - second
+    }
+}
+
+impl Dropped {
+    /// Why no box is left: hidden if something nearer fills most of them.
+    fn reason(&self) -> &'static str {
+        match (self.nearer, self.farther, self.outside) {
+            (near, far, out) if near + far < out => "appearance: outside the image",
+            (near, far, _) if near > far => "appearance: hidden by something nearer",
+            _ => "appearance: gone, something farther is seen",
+        }
+    }
+
+    fn count(&self, funnel: &mut Funnel) {
+        funnel.drop_many("box: outside", self.outside);
+        funnel.drop_many("box: depth", self.nearer + self.farther);
+    }
+}
+
+fn best(all: impl Iterator<Item = Scored>) -> Option<Scored> {
+    all.max_by(|a, b| a.confidence.total_cmp(&b.confidence))
+}
+
+/// The place of a box: the head moves with it from where it was expected, to the
+/// distance that the depth image shows.
+fn sighting(
+    config: &Config,
+    camera: &Camera,
+    track: &Track,
+    region: Rect,
+    face_m: Option<f64>,
+) -> Detection {
+    let expected = track.estimate.person.position;
+    let (head_m, sigma_m) = match face_m {
+        Some(face_m) => (face_m + HEAD_RADIUS_M, config.sigma_depth_m),
+        None => (camera.depth_of(&expected), SIGMA_EXPECTED * camera.depth_of(&expected)),
+    };
+    let place = |head_m: f64| -> Option<(Point3<f64>, Matrix3<f64>)> {
+        let before = track.estimate.region;
+        let shift = region.centre() - before.centre();
+        let pixel = camera.project(&expected)?;
+        let grown = region.width / before.width.max(1.0);
+        let pixel = before.centre() + shift + (pixel - before.centre()) * grown;
+        let sigma_px = config.sigma_box * region.width;
+        let covariance = camera.covariance(pixel, head_m, sigma_px, sigma_m);
+        Some((camera.back_project(pixel, head_m), covariance))
+    };
+    let unknown = (expected, Matrix3::identity() * 100.0);
+    let (position, covariance) = place(head_m).unwrap_or(unknown);
+    Detection { region, position, covariance, score: config.score, source: NAME }
+}
+
+impl Detector for Compressive {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        match search {
+            Search::Everywhere { .. } => Ok(Vec::new()),
+            Search::Near(track) => {
+                let view = View::of(frame)?;
+                Ok(self.near(&view, track, funnel).into_iter().collect())
+            }
+        }
+    }
+
+    fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
+        let view = View::of(frame)?;
+        self.targets.retain(|id, _| tracks.iter().any(|track| track.id == *id));
+        tracks.iter().for_each(|track| self.teach(&view, track));
+        Ok(())
+    }
+}

@@ -1,0 +1,282 @@
+use std::sync::Arc;
+
+use nalgebra::{Point3, SMatrix, Vector2};
+use proptest::prelude::*;
+use tagalong_core::{
+    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, GreyImage,
+    HEAD_RADIUS_M, Images, Motion, Person, Pinhole, Rect, Registry, Search, Stamp, Track, TrackId,
+};
+use tagalong_vision::Integral;
+
+use crate::appearance::Samples;
+use crate::{Appearance, Compressive, Config, Features};
+
+const SIZE: (usize, usize) = (320, 240);
+
+fn camera() -> Arc<Camera> {
+    let lens = Pinhole { fx: 262.0, fy: 262.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+    Arc::new(Camera::mounted(lens, SIZE.0, SIZE.1, 1.3, 0.0, 0.0))
+}
+
+/// A reproducible pattern of blotches, 0 to 255.
+fn pattern(u: f64, v: f64, kind: f64) -> f64 {
+    let wave = |a: f64, b: f64| (a * u + b * v + kind).sin();
+    127.0 + 60.0 * wave(9.0, 2.0) + 40.0 * wave(-4.0, 7.0 + kind) + 25.0 * wave(15.0, -11.0)
+}
+
+/// A person as a patterned square, 0.57 m wide, at a place; and what is in front.
+struct World {
+    head: Point3<f64>,
+    /// A board of the given depth, over the columns up to this one.
+    board: Option<(f32, usize)>,
+    with_depth: bool,
+}
+
+impl World {
+    fn at(head: Point3<f64>) -> Self {
+        Self { head, board: None, with_depth: true }
+    }
+
+    fn frame(&self) -> Frame {
+        let camera = camera();
+        let of = camera.upper_body(&self.head);
+        let face_m = (camera.depth_of(&self.head) - HEAD_RADIUS_M) as f32;
+        let on_person = |x: usize, y: usize| {
+            let (u, v) = ((x as f64 + 0.5 - of.x) / of.width, (y as f64 + 0.5 - of.y) / of.height);
+            ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
+        };
+        let board = |x: usize| self.board.filter(|(_, to)| x < *to).map(|(metres, _)| metres);
+        let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+            let value = match (board(x), on_person(x, y)) {
+                (Some(_), _) => pattern(x as f64 / 40.0, y as f64 / 40.0, 8.0),
+                (None, Some((u, v))) => pattern(u, v, 1.0),
+                (None, None) => pattern(x as f64 / 90.0, y as f64 / 90.0, 4.0),
+            };
+            value.clamp(0.0, 255.0) as u8
+        });
+        let depth = DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+            board(x).unwrap_or(if on_person(x, y).is_some() { face_m } else { 6.0 })
+        });
+        let images = Images {
+            grey: Some(Arc::new(grey)),
+            depth: self.with_depth.then(|| Arc::new(depth)),
+            ..Images::default()
+        };
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.05), images)
+    }
+}
+
+/// A track that believes in a head there.
+fn track(head: Point3<f64>, seen: bool) -> Track {
+    let person = Person { position: head, velocity: Vector2::zeros() };
+    let covariance = SMatrix::identity() * 0.01;
+    let estimate = Estimate { person, covariance, region: camera().upper_body(&head) };
+    Track {
+        id: TrackId(3),
+        estimate,
+        seen,
+        occluded: false,
+        confirmed: true,
+        age: 5,
+        unseen_s: 0.0,
+        score: 2.0,
+    }
+}
+
+fn near(
+    detector: &mut Compressive,
+    frame: &Frame,
+    expected: Point3<f64>,
+) -> (Option<Detection>, Funnel) {
+    let mut funnel = Funnel::default();
+    let track = track(expected, true);
+    let found = detector.detect(frame, &Search::Near(&track), &mut funnel).unwrap();
+    (found.into_iter().next(), funnel)
+}
+
+/// A detector that was shown a person there.
+fn taught(config: Config, head: Point3<f64>) -> Compressive {
+    let mut detector = Compressive::new(config, 7).unwrap();
+    detector.learn(&World::at(head).frame(), &[track(head, true)]).unwrap();
+    detector
+}
+
+fn place(x: f64, y: f64) -> Point3<f64> {
+    Point3::new(x, y, 1.35)
+}
+
+#[test]
+fn it_conforms() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn a_person_is_followed_who_moves_by_a_third_of_their_width() {
+    for with_depth in [true, false] {
+        let (before, after) = (place(3.0, 0.0), place(3.0, 0.19));
+        let mut detector = taught(Config::default(), before);
+        let frame = World { with_depth, ..World::at(after) }.frame();
+        let (found, funnel) = near(&mut detector, &frame, before);
+        let found = found.unwrap_or_else(|| panic!("{funnel:?}"));
+        let off = found.region.centre() - camera().upper_body(&after).centre();
+        assert!(off.norm() < 2.0, "{off}");
+        assert!((found.position - after).norm() < 0.06 || !with_depth, "{}", found.position);
+    }
+}
+
+#[test]
+fn somebody_who_goes_a_long_way_is_kept_and_the_box_has_their_size() {
+    let mut here = place(3.0, -0.6);
+    let mut detector = taught(Config::default(), here);
+    let mut believed = here;
+    for _ in 0..40 {
+        here += nalgebra::Vector3::new(-0.025, 0.03, 0.0);
+        let frame = World::at(here).frame();
+        let (found, funnel) = near(&mut detector, &frame, believed);
+        let found = found.unwrap_or_else(|| panic!("{funnel:?} at {here}"));
+        believed = found.position;
+        detector.learn(&frame, &[track(believed, true)]).unwrap();
+    }
+    let truth = camera().upper_body(&here);
+    let iou = camera().upper_body(&believed).iou(&truth);
+    assert!(iou > 0.8, "{iou} at {here}: {believed}");
+}
+
+#[test]
+fn a_person_behind_a_board_is_hidden_and_one_who_left_is_gone() {
+    let head = place(3.0, 0.0);
+    let mut detector = taught(Config::default(), head);
+    let hidden = World { board: Some((1.5, SIZE.0)), ..World::at(head) }.frame();
+    let (found, funnel) = near(&mut detector, &hidden, head);
+    assert_eq!((found, funnel.count("appearance: hidden by something nearer")), (None, 1));
+    let gone = World::at(place(3.0, 1.5)).frame();
+    let (found, funnel) = near(&mut detector, &gone, head);
+    assert_eq!((found, funnel.count("appearance: gone, something farther is seen")), (None, 1));
+}
+
+#[test]
+fn depth_leaves_few_boxes_of_a_wide_search() {
+    let head = place(3.0, 0.0);
+    let frame = World::at(head).frame();
+    let wide = Config { search_radius: 1.0, ..Config::default() };
+    let mut detector = taught(wide.clone(), head);
+    let (found, funnel) = near(&mut detector, &frame, head);
+    let dropped = funnel.count("box: depth");
+    assert!(found.is_some() && (400..700).contains(&dropped), "{dropped} of some 800");
+    let blind = Config { depth_filter: false, ..wide };
+    let (found, funnel) = near(&mut taught(blind, head), &frame, head);
+    assert!(found.is_some() && funnel.count("box: depth") == 0);
+}
+
+#[test]
+fn nobody_learns_from_the_board_that_hides_a_person_but_in_print() {
+    let head = place(3.0, 0.0);
+    let hidden = World { board: Some((1.5, SIZE.0)), ..World::at(head) }.frame();
+    let takes_the_board = |config: Config| {
+        let mut detector = taught(config, head);
+        let before = near(&mut detector, &hidden, head).0;
+        for _ in 0..20 {
+            detector.learn(&hidden, &[track(head, true)]).unwrap();
+        }
+        (before.is_some(), near(&mut detector, &hidden, head).0.is_some())
+    };
+    assert_eq!(takes_the_board(Config::default()), (false, false));
+    let printed = Config {
+        compat_always_learn: true,
+        depth_filter: false,
+        min_confidence: 0.5,
+        ..Config::default()
+    };
+    assert_eq!(takes_the_board(printed), (false, true));
+}
+
+#[test]
+fn the_first_frame_counts_fully_and_in_the_public_code_by_a_seventh() {
+    let samples = |value: f32| {
+        let mut samples = Samples::default();
+        samples.clear(1);
+        (0..10).for_each(|_| samples.add(&[value]));
+        samples
+    };
+    let mean = |memory: f64| {
+        let mut appearance = Appearance::blank(1);
+        appearance.learn(&samples(40.0), &samples(10.0), memory, 1.0);
+        appearance.person(0).unwrap().0
+    };
+    assert_eq!(mean(0.0), 40.0);
+    assert!((mean(0.85) - 6.0).abs() < 1e-4);
+}
+
+#[test]
+fn the_deviation_is_updated_with_the_mean_from_before() {
+    let mut samples = Samples::default();
+    samples.clear(1);
+    [3.0, 5.0].iter().for_each(|v| samples.add(&[*v]));
+    let mut appearance = Appearance::blank(1);
+    appearance.learn(&samples, &samples, 0.5, 0.1);
+    let (mean, sigma) = appearance.person(0).unwrap();
+    let expected = (0.5 * 1.0 + 0.5 * 1.0 + 0.25 * 16.0_f32).sqrt();
+    assert_eq!(mean, 2.0);
+    assert!((sigma - expected).abs() < 1e-6, "{sigma} {expected}");
+}
+
+#[test]
+fn two_to_four_rectangles_are_drawn_and_four_as_well() {
+    let features = Features::draw(300, 4, 1);
+    let count = |n: usize| features.lists().iter().filter(|list| list.len() == n).count();
+    assert_eq!(count(2) + count(3) + count(4), 300);
+    assert!([2, 3, 4].iter().all(|n| count(*n) > 60));
+}
+
+#[test]
+fn people_who_left_are_forgotten() {
+    let head = place(3.0, 0.0);
+    let mut detector = taught(Config::default(), head);
+    let frame = World::at(head).frame();
+    detector.learn(&frame, &[]).unwrap();
+    let (found, funnel) = near(&mut detector, &frame, head);
+    assert_eq!((found, funnel.count("appearance: not learnt yet")), (None, 1));
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused() {
+    let wrong = [
+        Config { features: 0, ..Config::default() },
+        Config { coarse_step: 1e-9, ..Config::default() },
+        Config { memory: 1.0, ..Config::default() },
+        Config { negative_to: 0.1, ..Config::default() },
+        Config { score: f64::NAN, ..Config::default() },
+    ];
+    assert!(wrong.into_iter().all(|config| Compressive::new(config, 1).is_err()));
+    assert_eq!(Rect::default().area(), 0.0);
+}
+
+proptest! {
+    #[test]
+    fn fast_numbers_are_those_of_the_pixels(
+        pixels in prop::collection::vec(any::<u8>(), 40 * 30),
+        seed in any::<u64>(), width in 1..40usize, height in 1..30usize,
+        x in 0..40usize, y in 0..30usize,
+    ) {
+        let Some(image) = GreyImage::from_pixels(40, 30, pixels) else {
+            return Err(TestCaseError::fail("1200 pixels are 40 by 30"));
+        };
+        let features = Features::draw(20, 4, seed);
+        let integral = Integral::new(&image);
+        let scaled = features.scaled(width, height, integral.stride());
+        let fits = x + width <= 40 && y + height <= 30;
+        prop_assert_eq!(scaled.fits(&integral, x as i64, y as i64), fits);
+        if fits {
+            let mut numbers = [0.0_f32; 20];
+            scaled.measure(&integral, x, y, &mut numbers);
+            for (number, list) in numbers.iter().zip(features.lists()) {
+                let slow: f64 =
+                    list.iter().map(|r| r.of_pixels(&image, x, y, (width, height))).sum();
+                prop_assert!((f64::from(*number) - slow).abs() < 1e-2, "{number} {slow}");
+            }
+        }
+    }
+}

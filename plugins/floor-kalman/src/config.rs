@@ -1,0 +1,127 @@
+use nalgebra::Matrix2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// How a person's next position is predicted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// u = 0: where they were.
+    Still,
+    /// u is the difference of the last two posterior positions.
+    LastDifference,
+    /// Four states: position and velocity, with white acceleration.
+    ConstantVelocity,
+}
+
+/// How well a detection's place is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measurement {
+    /// By the detection's own covariance.
+    Detection,
+    /// `measurement_m2` for every detection, as printed.
+    Fixed,
+    /// By `sigma_range_m`, `sigma_range_per_m` and `sigma_bearing_deg`.
+    Polar,
+}
+
+/// Settings of the filter `floor-kalman`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// How the next position is predicted: `still`, `last-difference` or
+    /// `constant-velocity`.
+    pub form: Form,
+    /// How well detections are believed: `detection`, `fixed` or `polar`.
+    pub measurement: Measurement,
+    /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`
+    /// (P5, equation 10).
+    pub process_m2: [f64; 3],
+    /// The time between two images to which Q belongs, s.
+    pub step_s: f64,
+    /// R of `fixed`: xx, xy, yy in room axes, m² (P5, equation 10).
+    pub measurement_m2: [f64; 3],
+    /// Of `polar`: standard deviation of the range at the robot, m.
+    pub sigma_range_m: f64,
+    /// Of `polar`: what each metre of range adds to it, m.
+    pub sigma_range_per_m: f64,
+    /// Of `polar`: standard deviation of the bearing, degrees.
+    pub sigma_bearing_deg: f64,
+    /// Of `constant-velocity`: spectral density of the white acceleration, m²/s³.
+    pub acceleration_noise: f64,
+    /// Standard deviation of a newcomer's velocity components, m/s.
+    pub initial_speed_mps: f64,
+    /// How fast the height of the head may wander, m per square root of a second.
+    pub height_noise: f64,
+    /// From the robot's heading at the start to the X axis of the room, degrees.
+    pub room_heading_deg: f64,
+    /// As printed (equation 6): the noise of u is left out of the prediction.
+    pub compat_printed_u: bool,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            form: Form::ConstantVelocity,
+            measurement: Measurement::Detection,
+            process_m2: [0.024, -0.001, 0.043],
+            step_s: 1.0 / 3.0,
+            measurement_m2: [0.011, -0.004, 0.020],
+            sigma_range_m: 0.05,
+            sigma_range_per_m: 0.03,
+            sigma_bearing_deg: 1.0,
+            acceleration_noise: 0.2,
+            initial_speed_mps: 1.0,
+            height_noise: 0.03,
+            room_heading_deg: 0.0,
+            compat_printed_u: false,
+        }
+    }
+}
+
+impl Config {
+    /// Q for a time of `dt` seconds, m².
+    pub(crate) fn process(&self, dt: f64) -> Matrix2<f64> {
+        symmetric(self.process_m2) * (dt / self.step_s)
+    }
+
+    /// R of `fixed`, m².
+    pub(crate) fn printed_measurement(&self) -> Matrix2<f64> {
+        symmetric(self.measurement_m2)
+    }
+
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let refuse = |text: String| Err(Error::Settings(text));
+        for (key, value) in
+            [("process_m2", self.process_m2), ("measurement_m2", self.measurement_m2)]
+        {
+            let known = value.iter().all(|v| v.is_finite() && v.abs() < 1e6);
+            if !known || symmetric(value).cholesky().is_none() {
+                return refuse(format!("`{key}` must be a covariance (xx, xy, yy), not {value:?}"));
+            }
+        }
+        let numbers = [
+            ("step_s", self.step_s, 1e-3),
+            ("sigma_range_m", self.sigma_range_m, 1e-3),
+            ("sigma_range_per_m", self.sigma_range_per_m, 0.0),
+            ("sigma_bearing_deg", self.sigma_bearing_deg, 1e-3),
+            ("acceleration_noise", self.acceleration_noise, 1e-6),
+            ("initial_speed_mps", self.initial_speed_mps, 1e-3),
+            ("height_noise", self.height_noise, 0.0),
+            ("room_heading_deg", self.room_heading_deg, -360.0),
+        ];
+        for (key, value, least) in numbers {
+            if !(least..=1e3).contains(&value) {
+                return refuse(format!("`{key}` must be {least} to 1000, not {value}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn symmetric([xx, xy, yy]: [f64; 3]) -> Matrix2<f64> {
+    Matrix2::new(xx, xy, xy, yy)
+}

@@ -1,0 +1,136 @@
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry2, Matrix2, Matrix2x3, Point3, Rotation2, SMatrix, Vector2};
+use tagalong_core::{
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
+};
+
+use crate::belief::Belief;
+use crate::{Config, Measurement};
+
+/// A coordinate with a larger variance, m², was not measured.
+const UNMEASURED_M2: f64 = 100.0;
+
+/// The filter: beliefs about everybody in the room.
+pub struct FloorKalman {
+    config: Config,
+    room_from_robot: Isometry2<f64>,
+    beliefs: BTreeMap<TrackId, Belief>,
+}
+
+impl FloorKalman {
+    /// A filter whose room begins where the robot is.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        let turn = -config.room_heading_deg.to_radians();
+        let room_from_robot = Isometry2::new(Vector2::zeros(), turn);
+        Ok(Self { config, room_from_robot, beliefs: BTreeMap::new() })
+    }
+
+    fn rotation(&self) -> Matrix2<f64> {
+        *self.room_from_robot.rotation.to_rotation_matrix().matrix()
+    }
+
+    /// Where a detection is in the room, and R in room axes.
+    fn measured(&self, detection: &Detection) -> (Vector2<f64>, Matrix2<f64>) {
+        let at = detection.position.xy();
+        let in_room = self.room_from_robot * at;
+        let r = match self.config.measurement {
+            Measurement::Fixed => return (in_room.coords, self.config.printed_measurement()),
+            Measurement::Polar => self.polar(&at.coords),
+            Measurement::Detection => detection.covariance.fixed_view::<2, 2>(0, 0).into_owned(),
+        };
+        (in_room.coords, turned(&self.rotation(), &r))
+    }
+
+    /// R = J diag(sigma_r², sigma_bearing²) J' in the robot's axes.
+    fn polar(&self, at: &Vector2<f64>) -> Matrix2<f64> {
+        let range = at.norm();
+        let along = self.config.sigma_range_m + self.config.sigma_range_per_m * range;
+        let across = range.max(0.1) * self.config.sigma_bearing_deg.to_radians();
+        let out = Rotation2::new(at.y.atan2(at.x));
+        turned(out.matrix(), &Matrix2::new(along * along, 0.0, 0.0, across * across))
+    }
+
+    /// What the uncertainty of the robot's motion adds to a place in the room as
+    /// the robot sees it.
+    fn ego_noise(&self, at: &Vector2<f64>, motion: &Motion) -> Matrix2<f64> {
+        let from_robot = at - self.room_from_robot.translation.vector;
+        let mut j = Matrix2x3::zeros();
+        j.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.rotation());
+        j.set_column(2, &Vector2::new(-from_robot.y, from_robot.x));
+        j * motion.covariance * j.transpose()
+    }
+
+    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+        let back = self.room_from_robot.inverse();
+        let turn = *back.rotation.to_rotation_matrix().matrix();
+        let place = back * nalgebra::Point2::from(belief.position());
+        let position = Point3::new(place.x, place.y, belief.height.0);
+        let (velocity, velocity_covariance) = belief.velocity();
+        let mut covariance = SMatrix::<f64, 5, 5>::zeros();
+        let mut set = |row: usize, column: usize, block: &Matrix2<f64>| {
+            covariance.fixed_view_mut::<2, 2>(row, column).copy_from(&turned(&turn, block));
+        };
+        set(0, 0, &belief.position_covariance());
+        set(3, 3, &velocity_covariance);
+        let cross = belief.covariance.fixed_view::<2, 2>(0, 2).into_owned();
+        set(0, 3, &cross);
+        set(3, 0, &cross.transpose());
+        covariance[(2, 2)] = belief.height.1;
+        Estimate {
+            person: Person { position, velocity: turn * velocity },
+            covariance,
+            region: camera.upper_body(&position),
+        }
+    }
+}
+
+impl Filter for FloorKalman {
+    fn start(&mut self, id: TrackId, detection: &Detection) {
+        let (at, r) = self.measured(detection);
+        let height = (detection.position.z, detection.covariance[(2, 2)]);
+        self.beliefs.insert(id, Belief::new(at, &r, height, &self.config));
+    }
+
+    fn predict(&mut self, motion: &Motion) {
+        let mut beliefs = std::mem::take(&mut self.beliefs);
+        self.room_from_robot *= motion.isometry();
+        for belief in beliefs.values_mut() {
+            let ego = self.ego_noise(&belief.position(), motion);
+            belief.predict(motion.dt, &ego, &self.config);
+        }
+        self.beliefs = beliefs;
+    }
+
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+        let mut supported = BTreeMap::new();
+        for matched in evidence.matched {
+            let (z, r) = self.measured(matched.detection);
+            let Some(belief) = self.beliefs.get_mut(&matched.id) else { continue };
+            let nis = belief.correct(&z, &r, self.config.form);
+            let height = matched.detection.covariance[(2, 2)];
+            if height < UNMEASURED_M2 {
+                belief.correct_height(matched.detection.position.z, height);
+            }
+            supported.insert(matched.id, Support { nis: nis.map(|nis| (nis, 2)) });
+        }
+        Ok(supported)
+    }
+
+    fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
+        self.beliefs.iter().map(|(id, belief)| (*id, self.estimate(belief, camera))).collect()
+    }
+
+    fn stop(&mut self, id: TrackId) {
+        self.beliefs.remove(&id);
+    }
+}
+
+/// A covariance in other axes.
+fn turned(turn: &Matrix2<f64>, covariance: &Matrix2<f64>) -> Matrix2<f64> {
+    turn * covariance * turn.transpose()
+}

@@ -1,0 +1,32 @@
+//! `floor-kalman`: a Kalman filter of where each person is on the floor, in
+//! coordinates of the room (P5, section 5).
+//!
+//! The paper's state is the position alone, and its prediction adds a "nominal
+//! velocity" u, which is a displacement: nothing multiplies it by time. How u is
+//! found is not said. [`Form`] has what it can be: nothing, the last posterior
+//! difference, or, for those who take the question seriously, two more states.
+//!
+//! The room is the robot's frame at the start of the run, turned by
+//! `room_heading_deg`; odometry carries it on, so the robot may move.
+
+mod belief;
+mod config;
+mod filter;
+#[cfg(test)]
+mod tests;
+
+pub use config::{Config, Form, Measurement};
+pub use filter::FloorKalman;
+use tagalong_core::Registry;
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "floor-kalman";
+
+/// Registers the filter `floor-kalman`.
+pub fn register(registry: &mut Registry) {
+    registry.filter(
+        NAME,
+        "Kalman filter on the floor plan in room coordinates (P5)",
+        |config: Config, _| FloorKalman::new(config),
+    );
+}

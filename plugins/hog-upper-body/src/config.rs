@@ -1,0 +1,147 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// Settings of `hog-upper-body`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Model file, relative to the config; empty: the model that is built in.
+    pub model: String,
+    /// Windows with lower log-odds are dropped.
+    pub min_score: f64,
+    /// Log-odds are limited to this.
+    pub max_score: f64,
+    /// Smallest upper body that is looked for, pixels.
+    pub min_side_px: f64,
+    /// Largest, as a fraction of the shorter side of the image.
+    pub max_side: f64,
+    /// Each size is so many times the one before.
+    pub scale_step: f64,
+    /// With depth: a window may be larger or smaller than the distance says by
+    /// this factor.
+    pub size_tolerance: f64,
+    /// Distances at which people are looked for, m.
+    pub min_depth_m: f64,
+    /// See `min_depth_m`.
+    pub max_depth_m: f64,
+    /// Heights of a head's centre above the floor, m.
+    pub min_head_height_m: f64,
+    /// See `min_head_height_m`.
+    pub max_head_height_m: f64,
+    /// Looks at windows that depth and geometry allow only; off: at all.
+    pub depth_proposals: bool,
+    /// Two windows that overlap by more (IoU) are of one person ...
+    pub overlap: f64,
+    /// ... unless they are farther apart than this in depth, m.
+    pub apart_m: f64,
+    /// A search near a track looks at windows whose centre is nearer than this
+    /// to the expected one, widths.
+    pub near: f64,
+    /// Standard deviation of a window's place, as a fraction of its side.
+    pub sigma_place: f64,
+    /// Standard deviation of a distance from the depth image, m.
+    pub sigma_depth_m: f64,
+    /// Standard deviation of a distance that only the size tells, as a fraction.
+    pub sigma_distance: f64,
+    /// How a model is fitted; only `tagalong train` reads it.
+    pub training: Training,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            model: String::new(),
+            min_score: 0.0,
+            max_score: 6.0,
+            min_side_px: 40.0,
+            max_side: 0.9,
+            scale_step: 1.15,
+            size_tolerance: 1.2,
+            min_depth_m: 0.5,
+            max_depth_m: 7.0,
+            min_head_height_m: 0.8,
+            max_head_height_m: 2.1,
+            depth_proposals: true,
+            overlap: 0.4,
+            apart_m: 0.4,
+            near: 0.5,
+            sigma_place: 0.06,
+            sigma_depth_m: 0.1,
+            sigma_distance: 0.2,
+            training: Training::default(),
+        }
+    }
+}
+
+/// How a model is fitted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Training {
+    /// Penalty of a training error, of windows with people ...
+    pub person_penalty: f64,
+    /// ... and of others.
+    pub other_penalty: f64,
+    /// Passes over all windows at most.
+    pub epochs: usize,
+    /// Windows by chance from each picture without anybody, at first.
+    pub random_windows: usize,
+    /// How often pictures without anybody are searched for false alarms.
+    pub mining_rounds: usize,
+    /// False alarms that are kept of a picture and round at most.
+    pub mined_per_picture: usize,
+    /// False alarms that are kept of a round at most.
+    pub mined_per_round: usize,
+}
+
+impl Default for Training {
+    fn default() -> Self {
+        Self {
+            person_penalty: 0.02,
+            other_penalty: 0.01,
+            epochs: 40,
+            random_windows: 10,
+            mining_rounds: 2,
+            mined_per_picture: 40,
+            mined_per_round: 8000,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let wrong = |key: &str, must: &str| Err(Error::Settings(format!("`{key}` must {must}")));
+        let positive = [
+            ("max_score", self.max_score),
+            ("max_side", self.max_side),
+            ("max_depth_m", self.max_depth_m),
+            ("sigma_place", self.sigma_place),
+            ("sigma_depth_m", self.sigma_depth_m),
+            ("sigma_distance", self.sigma_distance),
+        ];
+        if let Some((key, _)) = positive.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
+            return wrong(key, "be positive");
+        }
+        let others = [
+            self.min_score,
+            self.min_depth_m,
+            self.min_head_height_m,
+            self.max_head_height_m,
+            self.overlap,
+            self.apart_m,
+            self.near,
+        ];
+        match self {
+            _ if others.iter().any(|v| !v.is_finite()) => {
+                wrong("min_score and others", "be finite")
+            }
+            _ if !(self.min_side_px >= 16.0) => wrong("min_side_px", "be at least 16"),
+            _ if !(1.02..=4.0).contains(&self.scale_step) => {
+                wrong("scale_step", "lie between 1.02 and 4")
+            }
+            _ if !(self.size_tolerance >= 1.0) => wrong("size_tolerance", "be at least 1"),
+            _ => Ok(()),
+        }
+    }
+}

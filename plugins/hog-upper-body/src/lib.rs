@@ -1,0 +1,49 @@
+//! `hog-upper-body`: heads and shoulders by histograms of oriented gradients
+//! and a linear support vector machine (P2, section III-B; N. Dalal and B.
+//! Triggs, *Histograms of oriented gradients for human detection*, CVPR 2005).
+//!
+//! The image is looked at in several sizes. In each, cells of 8x8 pixels are
+//! made once, and blocks of 2x2 cells are normalised once; a window is then a
+//! dot product of 7x7 blocks with the weights of a [`Model`], which reads them
+//! where they lie.
+//!
+//! With depth, a window is looked at only if a person who is as far as its
+//! middle shows would be as large as it is, and would have their head at a
+//! height where heads are. Without, all of them are.
+//!
+//! With the feature `train` the plugin also offers a trainer (`train`).
+
+mod config;
+mod detect;
+mod hog;
+mod model;
+mod resample;
+mod scan;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+
+pub use config::{Config, Training};
+pub use detect::HogUpperBody;
+pub use hog::Blocks;
+pub use model::{Model, NUMBERS};
+pub use resample::resampled;
+pub use scan::{Scanner, Window, merge, window_numbers};
+use tagalong_core::Registry;
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "hog-upper-body";
+
+/// Registers the plugin, and its trainer if that is compiled in.
+pub fn register(registry: &mut Registry) {
+    registry.detector(
+        NAME,
+        "heads and shoulders by gradients and a linear machine (P2)",
+        HogUpperBody::new,
+    );
+    #[cfg(feature = "train")]
+    registry.trainer(NAME, |config: Config, context| {
+        train::HogTrainer::new(config.training, context.seed)
+    });
+}

@@ -1,0 +1,262 @@
+//! Fits a [`Model`]: people in several small shifts and mirrored, others by
+//! chance at first, and after that whatever the machine takes for people in
+//! pictures without anybody.
+//!
+//! A fifth of the groups is kept for the calibration and another fifth for the
+//! figures of the card; the machine sees neither.
+
+mod svm;
+
+use std::sync::Arc;
+
+use svm::{Windows, separate};
+use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
+use tagalong_learn::{Line, accepted, area, mix, platt};
+
+use crate::{Model, NUMBERS, Scanner, Training, merge, window_numbers};
+
+/// Sizes at which pictures without anybody are searched, pixels of the
+/// upper-body square, and the factor between them.
+const SMALLEST_PX: f64 = 48.0;
+const SCALE_STEP: f64 = 1.15;
+/// Windows of a picture overlap by less than this to be mined.
+const MINED_OVERLAP: f64 = 0.5;
+/// Sums below this are not near enough to matter for the calibration.
+const NEAR_MISS: f32 = -1.0;
+/// Small shifts of a person, as fractions of the square, and its growth.
+const SHIFTS: [(f64, f64, f64); 4] =
+    [(0.0, 0.0, 1.0), (0.05, -0.04, 1.05), (-0.05, 0.03, 0.95), (0.02, 0.05, 1.02)];
+/// The miss rate is told at this many false alarms a window.
+const FALSE_ALARMS: [f64; 3] = [1e-3, 1e-4, 1e-5];
+
+/// What a group is for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Use {
+    Figures,
+    Calibration,
+    Fit,
+}
+
+fn use_of(group: u64) -> Use {
+    match mix(group) % 5 {
+        0 => Use::Figures,
+        1 => Use::Calibration,
+        _ => Use::Fit,
+    }
+}
+
+/// Collects windows and pictures, and fits models to them.
+pub struct HogTrainer {
+    training: Training,
+    seed: u64,
+    windows: Windows,
+    /// Windows of people that are kept apart, as they are.
+    people: Vec<(Use, Vec<f32>)>,
+    pictures: Vec<(Use, Arc<GreyImage>)>,
+    others: usize,
+}
+
+impl HogTrainer {
+    /// A trainer without examples.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for numbers that cannot work.
+    pub fn new(training: Training, seed: u64) -> Result<Self> {
+        let penalties = [training.person_penalty, training.other_penalty];
+        if !penalties.iter().all(|p| *p > 0.0 && p.is_finite()) || training.epochs == 0 {
+            return Err(Error::Settings("penalties and `epochs` must be positive".into()));
+        }
+        Ok(Self {
+            training,
+            seed,
+            windows: Windows::default(),
+            people: Vec::new(),
+            pictures: Vec::new(),
+            others: 0,
+        })
+    }
+
+    fn add_person(&mut self, grey: &GreyImage, square: &Rect, use_: Use) {
+        if use_ != Use::Fit {
+            self.people.push((use_, window_numbers(grey, square)));
+            return;
+        }
+        let mirror = mirrored(grey);
+        let flipped = Rect { x: grey.width() as f64 - square.right(), ..*square };
+        for shift in SHIFTS {
+            self.windows.add(&window_numbers(grey, &shifted(square, shift)), true);
+            self.windows.add(&window_numbers(&mirror, &shifted(&flipped, shift)), true);
+        }
+    }
+
+    /// Windows by chance from the pictures without anybody.
+    fn add_chance(&mut self) {
+        for (index, (use_, picture)) in self.pictures.iter().enumerate() {
+            if *use_ != Use::Fit {
+                continue;
+            }
+            let small = picture.width().min(picture.height()) as f64 * 0.8;
+            let count = if small < 2.0 * SMALLEST_PX { 1 } else { self.training.random_windows };
+            for window in 0..count {
+                let part = |k: u64| {
+                    let number = mix(self.seed ^ mix((index * 1000 + window) as u64 * 4 + k));
+                    (number >> 11) as f64 / (1_u64 << 53) as f64
+                };
+                let side = SMALLEST_PX + (small - SMALLEST_PX).max(0.0) * part(0).powi(2);
+                let x = part(1) * (picture.width() as f64 - side);
+                let y = part(2) * (picture.height() as f64 - side);
+                let square = Rect::new(x, y, side, side);
+                self.windows.add(&window_numbers(picture, &square), false);
+            }
+        }
+    }
+
+    fn machine(&self) -> Model {
+        let Training { person_penalty, other_penalty, epochs, .. } = self.training;
+        let penalty = [other_penalty, person_penalty];
+        let (weights, bias) = separate(&self.windows, NUMBERS, penalty, epochs, self.seed);
+        Model { weights, bias, slope: 1.0, offset: 0.0 }
+    }
+
+    /// Adds what the machine takes for people; returns how many that are.
+    fn mine(&mut self, model: &Model) -> usize {
+        let Training { mined_per_picture, mined_per_round, .. } = self.training;
+        let mut scanner = Scanner::default();
+        let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
+        for (index, (use_, picture)) in self.pictures.iter().enumerate() {
+            if *use_ == Use::Fit {
+                let windows = merge(search(&mut scanner, picture, model, -0.9), MINED_OVERLAP, 1.0);
+                let worst = windows.iter().take(mined_per_picture);
+                mined.extend(worst.map(|w| (w.sum, index, w.region)));
+            }
+        }
+        mined.sort_by(|a, b| b.0.total_cmp(&a.0));
+        mined.truncate(mined_per_round);
+        for (_, index, square) in &mined {
+            self.windows.add(&window_numbers(&self.pictures[*index].1, square), false);
+        }
+        mined.len()
+    }
+
+    /// Sums of the windows that were kept apart for one purpose: those of
+    /// people, those of others that are not far from being people, and how many
+    /// others there were altogether.
+    fn apart(&self, model: &Model, wanted: Use, merged: bool) -> (Vec<(f64, bool)>, u64) {
+        let people = self.people.iter().filter(|(use_, _)| *use_ == wanted);
+        let mut sums: Vec<(f64, bool)> =
+            people.map(|(_, numbers)| (f64::from(model.sum_of(numbers)), true)).collect();
+        let mut scanner = Scanner::default();
+        for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
+            let mut windows = search(&mut scanner, picture, model, NEAR_MISS);
+            if merged {
+                windows = merge(windows, MINED_OVERLAP, 1.0);
+            }
+            sums.extend(windows.iter().map(|w| (f64::from(w.sum), false)));
+        }
+        (sums, scanner.looked_at())
+    }
+
+    fn figures(&self, model: &Model, mined: &[usize]) -> toml::Table {
+        let (sums, windows) = self.apart(model, Use::Figures, false);
+        let people = sums.iter().filter(|(_, is_person)| *is_person).count();
+        let log_odds: Vec<(f64, bool)> =
+            sums.iter().map(|(sum, is)| (model.log_odds(*sum as f32), *is)).collect();
+        let integer = |n: usize| toml::Value::Integer(n as i64);
+        let mut table = toml::Table::from_iter([
+            ("windows_of_people".to_owned(), integer(self.count(true))),
+            ("windows_of_others".to_owned(), integer(self.count(false))),
+            ("pictures_without_people".to_owned(), integer(self.pictures.len())),
+            ("mined".to_owned(), mined.iter().map(|n| *n as i64).collect::<Vec<_>>().into()),
+            ("held_out_people".to_owned(), integer(people)),
+            ("held_out_windows_of_others".to_owned(), integer(windows as usize)),
+            ("held_out_people_accepted".to_owned(), rounded(accepted(&log_odds, true))),
+            ("area_under_roc_of_near_misses".to_owned(), rounded(area(&log_odds))),
+        ]);
+        for rate in FALSE_ALARMS {
+            let missed = miss_rate(&sums, windows, rate);
+            table.insert(format!("miss_rate_at_{rate:e}_false_alarms_a_window"), rounded(missed));
+        }
+        table
+    }
+
+    fn count(&self, people: bool) -> usize {
+        self.windows.is_person.iter().filter(|is| **is == people).count()
+    }
+}
+
+impl Trainer for HogTrainer {
+    fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
+        let grey = frame.grey()?;
+        let use_ = use_of(example.group);
+        if example.is_person {
+            self.add_person(grey, &candidate.region, use_);
+            return Ok(());
+        }
+        self.others += 1;
+        let is_known = self.pictures.last().is_some_and(|(_, last)| **last == *grey);
+        if !is_known {
+            self.pictures.push((use_, Arc::new(grey.clone())));
+        }
+        Ok(())
+    }
+
+    fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        self.add_chance();
+        if self.count(true) == 0 || self.count(false) == 0 {
+            return Err(Error::Other("people and pictures without people: both are needed".into()));
+        }
+        let rounds = self.training.mining_rounds;
+        let mut model = self.machine();
+        let mut mined = Vec::new();
+        for round in 0..rounds {
+            progress((round + 1) as f64 / (rounds + 2) as f64);
+            mined.push(self.mine(&model));
+            model = self.machine();
+        }
+        let (sums, _) = self.apart(&model, Use::Calibration, true);
+        let Line { slope, offset } = platt(&sums);
+        model = Model { slope: slope.max(1e-3), offset, ..model };
+        progress(1.0);
+        let figures = self.figures(&model, &mined);
+        Ok(Fitted { model: model.to_text(), figures })
+    }
+}
+
+/// All windows of a picture above `least`.
+fn search(
+    scanner: &mut Scanner,
+    picture: &GreyImage,
+    model: &Model,
+    least: f32,
+) -> Vec<crate::Window> {
+    let most = picture.width().min(picture.height()) as f64;
+    let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
+    scanner.scan(picture, model, sides.take_while(|side| *side <= most), least, |_| Some(None))
+}
+
+/// The share of people below the sum that so many of the `windows` of others
+/// exceed.
+fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64) -> f64 {
+    let mut others: Vec<f64> = sums.iter().filter(|(_, is)| !is).map(|(sum, _)| *sum).collect();
+    others.sort_by(|a, b| b.total_cmp(a));
+    let allowed = (false_alarms * windows as f64) as usize;
+    let limit = others.get(allowed).copied().unwrap_or(f64::from(NEAR_MISS));
+    let people: Vec<f64> = sums.iter().filter(|(_, is)| *is).map(|(sum, _)| *sum).collect();
+    let missed = people.iter().filter(|sum| **sum <= limit).count();
+    missed as f64 / people.len().max(1) as f64
+}
+
+fn mirrored(grey: &GreyImage) -> GreyImage {
+    let width = grey.width();
+    GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
+}
+
+fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
+    let moved =
+        Rect { x: square.x + right * square.width, y: square.y + down * square.width, ..*square };
+    moved.inflated(growth - 1.0)
+}
+
+fn rounded(value: f64) -> toml::Value {
+    toml::Value::Float((value * 1e4).round() / 1e4)
+}

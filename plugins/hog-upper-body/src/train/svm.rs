@@ -1,0 +1,119 @@
+//! Dual coordinate descent for a linear machine (C.-J. Hsieh et al., *A dual
+//! coordinate descent method for large-scale linear SVM*, ICML 2008, algorithm
+//! 1, with the squared hinge loss).
+
+use crate::model::dot;
+
+/// Changes of a dual variable below this are no changes any more.
+const STILL: f32 = 1e-3;
+
+/// Windows as numbers, one after the other, with their truth.
+#[derive(Default)]
+pub(crate) struct Windows {
+    pub(crate) numbers: Vec<f32>,
+    pub(crate) is_person: Vec<bool>,
+}
+
+impl Windows {
+    pub(crate) fn add(&mut self, numbers: &[f32], is_person: bool) {
+        self.numbers.extend_from_slice(numbers);
+        self.is_person.push(is_person);
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.is_person.len()
+    }
+}
+
+/// The weights and the bias that separate the windows best; `penalty` is that of
+/// an error with others and with people.
+pub(crate) fn separate(
+    windows: &Windows,
+    width: usize,
+    penalty: [f64; 2],
+    epochs: usize,
+    seed: u64,
+) -> (Vec<f32>, f32) {
+    let (mut weights, mut bias) = (vec![0.0_f32; width], 0.0_f32);
+    let mut alphas = vec![0.0_f32; windows.len()];
+    let row = |i: usize| &windows.numbers[i * width..(i + 1) * width];
+    let lengths: Vec<f32> = (0..windows.len()).map(|i| dot(row(i), row(i)) + 1.0).collect();
+    let mut order: Vec<usize> = (0..windows.len()).collect();
+    for epoch in 0..epochs {
+        shuffle(&mut order, seed.wrapping_add(epoch as u64));
+        let mut most = 0.0_f32;
+        for &i in &order {
+            let sign = if windows.is_person[i] { 1.0 } else { -1.0 };
+            let softness = (0.5 / penalty[usize::from(windows.is_person[i])]) as f32;
+            let sum = dot(&weights, row(i)) + bias;
+            let slope = sign * sum - 1.0 + softness * alphas[i];
+            let wanted = (alphas[i] - slope / (lengths[i] + softness)).max(0.0);
+            let step = (wanted - alphas[i]) * sign;
+            if step == 0.0 {
+                continue;
+            }
+            most = most.max(slope.abs());
+            alphas[i] = wanted;
+            weights.iter_mut().zip(row(i)).for_each(|(w, v)| *w += step * v);
+            bias += step;
+        }
+        if most < STILL {
+            break;
+        }
+    }
+    (weights, bias)
+}
+
+/// Fisher and Yates, with numbers of splitmix64.
+fn shuffle(order: &mut [usize], seed: u64) {
+    let mut state = seed;
+    for i in (1..order.len()).rev() {
+        state = tagalong_learn::mix(state.wrapping_add(i as u64));
+        order.swap(i, (state % (i as u64 + 1)) as usize);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The primal: |w|²/2 + sum of penalties times squared hinges.
+    fn primal(windows: &Windows, width: usize, penalty: [f64; 2], w: &[f32], bias: f32) -> f64 {
+        let half = 0.5 * f64::from(dot(w, w) + bias * bias);
+        let loss = |i: usize| {
+            let sign = if windows.is_person[i] { 1.0 } else { -1.0 };
+            let sum = dot(w, &windows.numbers[i * width..(i + 1) * width]) + bias;
+            penalty[usize::from(windows.is_person[i])]
+                * f64::from((1.0 - sign * sum).max(0.0)).powi(2)
+        };
+        half + (0..windows.len()).map(loss).sum::<f64>()
+    }
+
+    #[test]
+    fn no_small_step_makes_the_solution_better() {
+        let mut windows = Windows::default();
+        let mut state = 5_u64;
+        let mut next = || {
+            state = tagalong_learn::mix(state.wrapping_add(1));
+            (state >> 40) as f32 / (1_u64 << 24) as f32 - 0.5
+        };
+        for i in 0..200 {
+            let shift = if i % 2 == 0 { 0.3 } else { -0.3 };
+            let numbers: Vec<f32> = (0..6).map(|_| next() + shift).collect();
+            windows.add(&numbers, i % 2 == 0);
+        }
+        let penalty = [0.5, 1.0];
+        let (weights, bias) = separate(&windows, 6, penalty, 2000, 1);
+        let best = primal(&windows, 6, penalty, &weights, bias);
+        for k in 0..6 {
+            for step in [-0.01, 0.01] {
+                let mut other = weights.clone();
+                other[k] += step;
+                assert!(primal(&windows, 6, penalty, &other, bias) >= best - 1e-5, "{k}");
+            }
+        }
+        for step in [-0.01, 0.01] {
+            assert!(primal(&windows, 6, penalty, &weights, bias + step) >= best - 1e-5);
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! The belief in one person, and what time, the robot and a sighting do to it.
+
+use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5};
+use tagalong_core::{Camera, Detection, Estimate, Motion, Person, Rect, Support};
+
+use crate::Config;
+use crate::space::{Place, Seen, pixel_covariance, range};
+
+type Matrix3x5 = SMatrix<f64, 3, 5>;
+
+/// The narrowest box, pixels.
+const MIN_WIDTH_PX: f64 = 1.0;
+/// The nearest range that is believed, m.
+const MIN_RANGE_M: f64 = 0.15;
+/// Step of the derivatives by the robot's motion, m and rad.
+const MOTION_STEP: f64 = 1e-4;
+
+/// What is believed of one person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Belief {
+    /// (x, y, vx, vy, s): centre of the box, pixels; its velocity without what
+    /// the robot's motion adds, pixels/s; its width, pixels.
+    pub image: Vector5<f64>,
+    /// Its covariance.
+    pub image_covariance: Matrix5<f64>,
+    /// Distance of the centre of the head from the camera, m, and its rate, m/s.
+    pub range: Vector2<f64>,
+    /// Its covariance.
+    pub range_covariance: Matrix2<f64>,
+    shape: Shape,
+    /// Whom the robot's motion took behind the camera has no pixel, and is kept
+    /// in space until they come back.
+    behind: Option<Place>,
+    /// Time since the frame before, s.
+    step_s: f64,
+}
+
+/// What of a box does not move with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shape {
+    /// Height over width.
+    aspect: f64,
+    /// From the centre of the box to the centre of the head, in widths.
+    head: Vector2<f64>,
+}
+
+impl Shape {
+    /// The shape of a detection; `None` of a box without area or of a head
+    /// behind the camera.
+    fn of(detection: &Detection, camera: &Camera) -> Option<Self> {
+        let Rect { width, height, .. } = detection.region;
+        let head = camera.project(&detection.position)?;
+        let is_box = width >= MIN_WIDTH_PX && height >= MIN_WIDTH_PX;
+        is_box.then(|| Self {
+            aspect: height / width,
+            head: (head - detection.region.centre()) / width,
+        })
+    }
+
+    fn blend(&mut self, seen: &Self, weight: f64) {
+        self.aspect += weight * (seen.aspect - self.aspect);
+        self.head += weight * (seen.head - self.head);
+    }
+}
+
+impl Belief {
+    /// The belief after the first sighting.
+    pub fn start(config: &Config, detection: &Detection, camera: &Camera) -> Self {
+        let centre = detection.region.centre();
+        let width = detection.region.width.max(MIN_WIDTH_PX);
+        let speed = (config.initial_speed * width).powi(2);
+        let mut image_covariance = Matrix5::from_diagonal_element(speed);
+        let noise = image_noise(config, detection, width, camera);
+        image_covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&noise.fixed_view::<2, 2>(0, 0));
+        image_covariance[(4, 4)] = noise[(2, 2)];
+        let (range, range_noise) = measured_range(config, detection, camera);
+        let upper_body = Shape { aspect: 1.0, head: Vector2::zeros() };
+        Self {
+            image: Vector5::new(centre.x, centre.y, 0.0, 0.0, width),
+            image_covariance,
+            range: Vector2::new(range.max(MIN_RANGE_M), 0.0),
+            range_covariance: Matrix2::from_diagonal(&Vector2::new(
+                range_noise,
+                config.initial_range_speed_mps.powi(2),
+            )),
+            shape: Shape::of(detection, camera).unwrap_or(upper_body),
+            behind: None,
+            step_s: 0.0,
+        }
+    }
+
+    /// Forward in time (eq. 7), and into the robot's new frame.
+    pub fn predict(&mut self, config: &Config, motion: &Motion, camera: &Camera) {
+        self.step_s = motion.dt;
+        self.walk(config, motion.dt);
+        if !config.compat_printed_ego_motion {
+            self.turn_with(motion, camera);
+        }
+        self.stay_in_range();
+    }
+
+    /// Constant velocity; the width and the rate of the range wander.
+    fn walk(&mut self, config: &Config, dt: f64) {
+        let mut step = Matrix5::identity();
+        (step[(0, 2)], step[(1, 3)]) = (dt, dt);
+        let noise = process_noise(config, self.image[4], dt);
+        self.image = step * self.image;
+        self.image_covariance = symmetric(step * self.image_covariance * step.transpose() + noise);
+        let step = Matrix2::new(1.0, dt, 0.0, 1.0);
+        self.range = step * self.range;
+        self.range_covariance = step * self.range_covariance * step.transpose()
+            + white_acceleration(config.range_noise, dt);
+    }
+
+    /// Takes out the robot's own motion: the head is moved in space, and the box
+    /// with it.
+    fn turn_with(&mut self, motion: &Motion, camera: &Camera) {
+        let before = self.seen();
+        let last = before.in_space(camera);
+        let place = match self.behind.take() {
+            Some(place) => place.walked(motion.dt),
+            None if is_still(motion) => return,
+            None => last,
+        };
+        let place = place.after(motion);
+        let Some(after) = place.seen(camera) else {
+            self.behind = Some(place);
+            return;
+        };
+        self.doubt_the_motion(&before, &after, motion, camera);
+        let depth = |place: &Place| camera.depth_of(&place.position).max(MIN_RANGE_M);
+        self.image[4] *= depth(&last) / depth(&place);
+        self.image.fixed_rows_mut::<2>(2).copy_from(&after.velocity);
+        let centre = after.pixel - self.shape.head * self.image[4];
+        self.image.fixed_rows_mut::<2>(0).copy_from(&centre.coords);
+        self.range = after.range;
+    }
+
+    /// What the errors of the odometry add, and how far the picture moves depends
+    /// on the range, which is not known well either.
+    fn doubt_the_motion(&mut self, before: &Seen, after: &Seen, motion: &Motion, camera: &Camera) {
+        let mut by_motion = Matrix3::zeros();
+        for (column, step) in steps(motion).into_iter().enumerate() {
+            let Some(moved) = before.after(&step, camera) else { return };
+            by_motion.set_column(column, &(difference(&moved, after) / MOTION_STEP));
+        }
+        let noise = by_motion * motion.covariance * by_motion.transpose();
+        let mut place = self.image_covariance.fixed_view_mut::<2, 2>(0, 0);
+        place += noise.fixed_view::<2, 2>(0, 0);
+        self.range_covariance[(0, 0)] += noise[(2, 2)];
+        let sigma = Vector2::new(self.range_covariance[(0, 0)].max(0.0).sqrt(), 0.0);
+        let farther = Seen { range: before.range + sigma, ..*before };
+        if let Some(moved) = farther.after(motion, camera) {
+            let shift = moved.pixel - after.pixel;
+            place = self.image_covariance.fixed_view_mut::<2, 2>(0, 0);
+            place += shift * shift.transpose();
+        }
+        self.image_covariance = symmetric(self.image_covariance);
+    }
+
+    /// Corrects by a sighting (eq. 8, with the measurement matrix in order), in
+    /// Joseph form.
+    pub fn correct(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Support {
+        if self.behind.is_some() {
+            *self = Self::start(config, seen, camera);
+            return Support::default();
+        }
+        let by_box = self.correct_box(config, seen, camera);
+        let by_range = self.correct_range(config, seen, camera);
+        if let Some(shape) = Shape::of(seen, camera) {
+            self.shape.blend(&shape, config.shape_weight);
+        }
+        self.stay_in_range();
+        let parts = [by_box.map(|nis| (nis, 3)), by_range.map(|nis| (nis, 1))];
+        let sum = |a: (f64, u32), b: (f64, u32)| (a.0 + b.0, a.1 + b.1);
+        Support { nis: parts.into_iter().flatten().reduce(sum) }
+    }
+
+    /// The normalised innovation squared of centre and width.
+    fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
+        let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
+        let look = measurement(dt);
+        let noise = image_noise(config, seen, self.image[4], camera);
+        let centre = seen.region.centre();
+        let measured = Vector3::new(centre.x, centre.y, seen.region.width);
+        let innovation = measured - look * self.image;
+        let p = self.image_covariance;
+        let spread = (look * p * look.transpose() + noise).cholesky()?;
+        let gain = spread.solve(&(look * p)).transpose();
+        self.image += gain * innovation;
+        let kept = Matrix5::identity() - gain * look;
+        self.image_covariance =
+            symmetric(kept * p * kept.transpose() + gain * noise * gain.transpose());
+        Some(innovation.dot(&spread.solve(&innovation)))
+    }
+
+    /// The normalised innovation squared of the range.
+    fn correct_range(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
+        let (measured, noise) = measured_range(config, seen, camera);
+        if measured < MIN_RANGE_M {
+            return None;
+        }
+        let p = self.range_covariance;
+        let spread = p[(0, 0)] + noise;
+        let gain = p.column(0) / spread;
+        let innovation = measured - self.range.x;
+        self.range += gain * innovation;
+        let kept = Matrix2::identity() - gain * Vector2::x().transpose();
+        let corrected = kept * p * kept.transpose() + gain * noise * gain.transpose();
+        self.range_covariance = 0.5 * (corrected + corrected.transpose());
+        Some(innovation * innovation / spread)
+    }
+
+    /// In the common form.
+    pub fn estimate(&self, camera: &Camera) -> Estimate {
+        let head = self.seen();
+        let place = self.behind.unwrap_or_else(|| head.in_space(camera));
+        let mut seen_covariance = SMatrix::<f64, 6, 6>::zeros();
+        let image = self.image_covariance.fixed_view::<4, 4>(0, 0);
+        seen_covariance.fixed_view_mut::<4, 4>(0, 0).copy_from(&image);
+        seen_covariance.fixed_view_mut::<2, 2>(4, 4).copy_from(&self.range_covariance);
+        let jacobian = head.jacobian(camera);
+        let covariance = jacobian * seen_covariance * jacobian.transpose();
+        let (width, height) = (self.image[4], self.image[4] * self.shape.aspect);
+        let (left, top) = (self.image[0] - 0.5 * width, self.image[1] - 0.5 * height);
+        Estimate {
+            person: Person { position: place.position, velocity: place.velocity.xy() },
+            covariance: symmetric(covariance),
+            region: match self.behind {
+                Some(_) => Rect::default(),
+                None => Rect::new(left, top, width, height),
+            },
+        }
+    }
+
+    /// The head as the camera sees it.
+    fn seen(&self) -> Seen {
+        let centre = Point2::new(self.image[0], self.image[1]);
+        Seen {
+            pixel: centre + self.shape.head * self.image[4],
+            velocity: Vector2::new(self.image[2], self.image[3]),
+            range: self.range,
+        }
+    }
+
+    fn stay_in_range(&mut self) {
+        self.image[4] = self.image[4].max(MIN_WIDTH_PX);
+        self.range.x = self.range.x.max(MIN_RANGE_M);
+    }
+}
+
+/// H of eq. 8. In print it holds the time step, although it is applied to what
+/// was already predicted; rightly `dt` is 0.
+fn measurement(dt: f64) -> Matrix3x5 {
+    let mut look = Matrix3x5::zeros();
+    (look[(0, 0)], look[(1, 1)], look[(2, 4)]) = (1.0, 1.0, 1.0);
+    (look[(0, 2)], look[(1, 3)]) = (dt, dt);
+    look
+}
+
+fn process_noise(config: &Config, width: f64, dt: f64) -> Matrix5<f64> {
+    let mut noise = Matrix5::zeros();
+    let axis_noise = white_acceleration(config.acceleration_noise * width.powi(2), dt);
+    for axis in 0..2 {
+        noise[(axis, axis)] = axis_noise[(0, 0)];
+        noise[(axis + 2, axis + 2)] = axis_noise[(1, 1)];
+        noise[(axis, axis + 2)] = axis_noise[(0, 1)];
+        noise[(axis + 2, axis)] = axis_noise[(1, 0)];
+    }
+    noise[(4, 4)] = (config.scale_noise * width).powi(2) * dt;
+    noise
+}
+
+/// Noise of (place, velocity) by white acceleration of density `q` over `dt`.
+fn white_acceleration(q: f64, dt: f64) -> Matrix2<f64> {
+    let cross = q * dt.powi(2) / 2.0;
+    Matrix2::new(q * dt.powi(3) / 3.0, cross, cross, q * dt)
+}
+
+/// Measurement noise of (x, y, s), pixels².
+fn image_noise(
+    config: &Config,
+    detection: &Detection,
+    width: f64,
+    camera: &Camera,
+) -> Matrix3<f64> {
+    let own = (config.sigma_centre * width).powi(2);
+    let scale = (config.sigma_scale * width).powi(2);
+    let mut noise = Matrix3::from_diagonal(&Vector3::new(own, own, scale));
+    let mut place = noise.fixed_view_mut::<2, 2>(0, 0);
+    if let Some(known) = pixel_covariance(camera, &detection.position, &detection.covariance) {
+        place += 0.5 * (known + known.transpose());
+    }
+    noise
+}
+
+/// Range of the head, m, and its measurement noise, m².
+fn measured_range(config: &Config, detection: &Detection, camera: &Camera) -> (f64, f64) {
+    let (range, variance) = range(camera, &detection.position, &detection.covariance);
+    (range, variance + config.sigma_range_m.powi(2))
+}
+
+fn is_still(motion: &Motion) -> bool {
+    let Motion { forward, left, turn, covariance, .. } = motion;
+    *forward == 0.0 && *left == 0.0 && *turn == 0.0 && *covariance == Matrix3::zeros()
+}
+
+/// The motion, with a little more of each of its three parts.
+fn steps(motion: &Motion) -> [Motion; 3] {
+    [
+        Motion { forward: motion.forward + MOTION_STEP, ..*motion },
+        Motion { left: motion.left + MOTION_STEP, ..*motion },
+        Motion { turn: motion.turn + MOTION_STEP, ..*motion },
+    ]
+}
+
+/// Pixel and range of the one less those of the other.
+fn difference(a: &Seen, b: &Seen) -> Vector3<f64> {
+    let pixel = a.pixel - b.pixel;
+    Vector3::new(pixel.x, pixel.y, a.range.x - b.range.x)
+}
+
+fn symmetric(m: Matrix5<f64>) -> Matrix5<f64> {
+    0.5 * (m + m.transpose())
+}

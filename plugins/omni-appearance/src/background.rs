@@ -1,0 +1,188 @@
+use crate::Config;
+
+/// The background is renewed in so many turns.
+const PHASES: usize = 4;
+/// While the robot moves an image is this part of what it makes.
+const MOVING_PART: f32 = 0.5;
+
+/// How fast the background follows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pace {
+    /// Part of the difference that is taken over in one image.
+    pub(crate) part: f32,
+    /// What differs for longer is background, s.
+    pub(crate) absorb_s: f32,
+    /// Since the image before, s.
+    pub(crate) dt_s: f32,
+}
+
+/// What the empty room looks like: three colours a pixel, row by row.
+///
+/// The first images make mean and spread (P5, section 4.2: the mean of five).
+/// Of five images no pixel's spread is known, so it is pooled along the rows.
+#[derive(Clone, Debug)]
+pub struct Background {
+    width: usize,
+    frames: u32,
+    /// Of these, how many while the robot stood.
+    still: u32,
+    mean: Vec<f32>,
+    squares: Vec<f32>,
+    /// For how long each pixel has differed, s.
+    taken_s: Vec<f32>,
+    /// The mean, rounded.
+    pub(crate) level: Vec<u8>,
+    /// A colour that differs by more differs from the background.
+    pub(crate) limit: Vec<u8>,
+}
+
+impl Background {
+    /// Of an image with so many columns and rows; nothing is known of it yet.
+    pub fn new(width: usize, height: usize) -> Self {
+        let values = 3 * width * height;
+        Self {
+            width,
+            frames: 0,
+            still: 0,
+            mean: vec![0.0; values],
+            squares: vec![0.0; values],
+            taken_s: vec![0.0; width * height],
+            level: vec![0; values],
+            limit: vec![u8::MAX; values],
+        }
+    }
+
+    /// Images that it is made of.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Colours of all pixels, as many as the image has.
+    pub fn len(&self) -> usize {
+        self.level.len()
+    }
+
+    /// True if the image has no pixels.
+    pub fn is_empty(&self) -> bool {
+        self.level.is_empty()
+    }
+
+    /// Takes in an image of the empty room.
+    pub fn add(&mut self, colours: &[u8], config: &Config) {
+        self.frames += 1;
+        self.still += 1;
+        let part = 1.0 / self.frames as f32;
+        let kept = self.mean.iter_mut().zip(&mut self.squares).zip(&mut self.level);
+        for (((mean, squares), level), colour) in kept.zip(colours) {
+            // Welford's update.
+            let (value, before) = (f32::from(*colour), *mean);
+            *mean += part * (value - before);
+            *squares += (value - before) * (value - *mean);
+            *level = mean.round() as u8;
+        }
+        self.set_limits(config);
+    }
+
+    /// Takes in an image of the empty room while the robot moves: what does not
+    /// fit the mean is no noise then.
+    pub(crate) fn add_moving(&mut self, colours: &[u8], config: &Config) {
+        self.frames += 1;
+        let part = if self.frames == 1 { 1.0 } else { MOVING_PART };
+        for ((mean, level), colour) in self.mean.iter_mut().zip(&mut self.level).zip(colours) {
+            *mean += part * (f32::from(*colour) - *mean);
+            *level = (*mean + 0.5) as u8;
+        }
+        self.set_limits(config);
+    }
+
+    fn set_limits(&mut self, config: &Config) {
+        let count = (self.still.max(2) - 1) as f32;
+        let row = 3 * self.width.max(1);
+        for (limits, squares) in self.limit.chunks_mut(row).zip(self.squares.chunks(row)) {
+            let pooled = squares.iter().sum::<f32>() / (count * row as f32);
+            for (limit, squares) in limits.iter_mut().zip(squares) {
+                // A pixel's own spread says something after a dozen images.
+                let own = if self.still >= 12 { squares / count } else { 0.0 };
+                let sigmas = config.threshold_sigmas as f32 * pooled.max(own).sqrt();
+                *limit = (sigmas.ceil() as u8).max(config.threshold_floor);
+            }
+        }
+    }
+
+    /// Follows an image: by a part where `taken` is 0; at once where it has not
+    /// been 0 for long. One row in [`PHASES`] has its turn.
+    pub(crate) fn follow(&mut self, colours: &[u8], taken: &[u8], pace: &Pace, phase: usize) {
+        let part = 1.0 - (1.0 - pace.part.clamp(0.0, 1.0)).powi(PHASES as i32);
+        let passed_s = PHASES as f32 * pace.dt_s;
+        let width = self.width.max(1);
+        let known = self
+            .mean
+            .chunks_exact_mut(3 * width)
+            .zip(self.level.chunks_exact_mut(3 * width))
+            .zip(self.taken_s.chunks_exact_mut(width));
+        let seen = colours.chunks_exact(3 * width).zip(taken.chunks_exact(width));
+        for (((mean, level), taken_s), (colours, taken)) in
+            known.zip(seen).skip(phase % PHASES).step_by(PHASES)
+        {
+            let pixels = mean.chunks_exact_mut(3).zip(level.chunks_exact_mut(3));
+            let seen = colours.chunks_exact(3).zip(taken.iter().zip(taken_s));
+            for ((mean, level), (colour, (taken, taken_s))) in pixels.zip(seen) {
+                *taken_s = if *taken == 0 { 0.0 } else { *taken_s + passed_s };
+                let part =
+                    if *taken == 0 { part } else { f32::from(u8::from(*taken_s > pace.absorb_s)) };
+                for i in 0..3 {
+                    mean[i] += part * (f32::from(colour[i]) - mean[i]);
+                    level[i] = (mean[i] + 0.5) as u8;
+                }
+            }
+        }
+    }
+
+    /// Replaces the mean by what `read` finds in it, colour by colour.
+    pub(crate) fn move_by(&mut self, read: impl FnOnce(&[f32], &mut [f32]), moved: &mut Vec<f32>) {
+        moved.resize(self.mean.len(), 0.0);
+        read(&self.mean, moved);
+        std::mem::swap(&mut self.mean, moved);
+        for (level, mean) in self.level.iter_mut().zip(&self.mean) {
+            *level = (*mean + 0.5) as u8;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config() -> Config {
+        Config { threshold_sigmas: 4.0, threshold_floor: 6, ..Config::default() }
+    }
+
+    #[test]
+    fn the_mean_is_the_mean_and_the_limit_follows_the_noise() {
+        let mut background = Background::new(4, 2);
+        for step in 0..20u8 {
+            let noise = if step % 2 == 0 { 90 } else { 110 };
+            let quiet = [[100; 12], [noise; 12]].concat();
+            background.add(&quiet, &config());
+        }
+        assert!(background.level.iter().all(|level| *level == 100));
+        assert_eq!(background.limit[..12], [6; 12]);
+        // Standard deviation of +-10 from 20 values: 10.26; four of them.
+        assert_eq!(background.limit[12..], [42; 12]);
+    }
+
+    #[test]
+    fn it_follows_the_light_but_not_the_people() {
+        let mut background = Background::new(2, 1);
+        background.add(&[100; 6], &config());
+        let pace = Pace { part: 0.05, absorb_s: 30.0, dt_s: 0.1 };
+        for phase in 0..280 {
+            background.follow(&[120; 6], &[0, 1], &pace, phase);
+        }
+        assert_eq!(background.level, [120, 120, 120, 100, 100, 100]);
+        for phase in 280..320 {
+            background.follow(&[120; 6], &[0, 1], &pace, phase);
+        }
+        assert_eq!(background.level, [120; 6], "what stands there for half a minute is furniture");
+    }
+}

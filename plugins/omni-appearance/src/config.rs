@@ -1,0 +1,139 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// How the distance follows from what is seen.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Distance {
+    /// The network of the paper: three features, four hidden units.
+    Network,
+    /// A network of all features that are measured.
+    Rich,
+    /// A straight line in the lower edge, its square, its inverse, width and area.
+    Ridge,
+    /// Where the ray of the lower edge meets the floor.
+    Analytic,
+}
+
+/// Settings of `omni-appearance`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Model file, relative to the config; empty: the model that is built in.
+    pub model: String,
+    /// How the distance is found: `network`, `rich`, `ridge` or `analytic`.
+    pub distance: Distance,
+    /// Name of the person in the model whose head is used; `general` for
+    /// everybody's, `nearest` for the one whose looks fit best.
+    pub person: String,
+    /// Images of the empty room that make the background; nobody is found before.
+    pub background_frames: u32,
+    /// A pixel differs from the background by more than so many standard
+    /// deviations ...
+    pub threshold_sigmas: f64,
+    /// ... and by more than this, grey levels.
+    pub threshold_floor: u8,
+    /// Time in which the background follows a change, s; 0 keeps it as it is.
+    pub adapt_s: f64,
+    /// What differs for so long without a break becomes background, s; 0: nothing.
+    pub absorb_s: f64,
+    /// A pixel whose colours are all darker, but not below this part of the
+    /// background, may be shadow; 1 finds none.
+    pub shadow_min: f64,
+    /// Nor above this part.
+    pub shadow_max: f64,
+    /// Most difference between the colours' parts in a shadow.
+    pub shadow_tint: f64,
+    /// Fewest pixels in a column of a person; more if the empty room had more.
+    pub column_pixels: u16,
+    /// Gaps of up to so many columns do not divide a person.
+    pub bridge_columns: usize,
+    /// Fewest pixels of a person.
+    pub min_pixels: u32,
+    /// A run is divided where its columns fall below this part of the lower one
+    /// of the peaks beside; 0 divides none.
+    pub valley: f64,
+    /// Most people in an image; the largest are kept.
+    pub max_people: usize,
+    /// Heights of heads that are believed, m.
+    pub head_height_m: [f64; 2],
+    /// Standard deviation of the bearing, degrees.
+    pub sigma_bearing_deg: f64,
+    /// Standard deviation of the head's height, m.
+    pub sigma_height_m: f64,
+    /// Walls and furniture are taken to be so far away when the background
+    /// follows the robot's motion, m.
+    pub wall_m: f64,
+    /// The background is known to within so many columns and rows after the
+    /// robot has moved.
+    pub slack_px: [usize; 2],
+    /// As printed: columns are averaged as if the panorama ended at its seam.
+    pub compat_printed_seam: bool,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            model: String::new(),
+            distance: Distance::Network,
+            person: "general".into(),
+            background_frames: 24,
+            threshold_sigmas: 4.0,
+            threshold_floor: 6,
+            adapt_s: 20.0,
+            absorb_s: 60.0,
+            shadow_min: 0.6,
+            shadow_max: 0.97,
+            shadow_tint: 0.05,
+            column_pixels: 4,
+            bridge_columns: 4,
+            min_pixels: 60,
+            valley: 0.5,
+            max_people: 8,
+            head_height_m: [0.9, 2.2],
+            sigma_bearing_deg: 0.8,
+            sigma_height_m: 0.12,
+            wall_m: 3.5,
+            slack_px: [3, 2],
+            compat_printed_seam: false,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let [low, high] = self.head_height_m;
+        let rules = [
+            (
+                (1..=10_000).contains(&self.background_frames),
+                "background_frames must be 1 to 10000",
+            ),
+            ((0.0..=100.0).contains(&self.threshold_sigmas), "threshold_sigmas must be 0 to 100"),
+            ((0.0..=1e6).contains(&self.adapt_s), "adapt_s must be 0 to 1000000"),
+            ((0.0..=1e6).contains(&self.absorb_s), "absorb_s must be 0 to 1000000"),
+            ((0.0..=1.0).contains(&self.shadow_min), "shadow_min must be 0 to 1"),
+            ((0.0..=1.0).contains(&self.shadow_max), "shadow_max must be 0 to 1"),
+            ((0.0..=1.0).contains(&self.shadow_tint), "shadow_tint must be 0 to 1"),
+            ((1..=1000).contains(&self.column_pixels), "column_pixels must be 1 to 1000"),
+            (self.bridge_columns <= 100, "bridge_columns must be at most 100"),
+            ((0.0..1.0).contains(&self.valley), "valley must be 0 to less than 1"),
+            ((1..=100).contains(&self.max_people), "max_people must be 1 to 100"),
+            (-1.0 < low && low < high && high < 4.0, "head_height_m must grow, from -1 to 4"),
+            (
+                (0.01..=90.0).contains(&self.sigma_bearing_deg),
+                "sigma_bearing_deg must be 0.01 to 90",
+            ),
+            ((0.001..=10.0).contains(&self.sigma_height_m), "sigma_height_m must be 0.001 to 10"),
+            ((0.5..=1000.0).contains(&self.wall_m), "wall_m must be 0.5 to 1000"),
+            (self.slack_px.iter().all(|px| *px <= 20), "slack_px must be at most 20"),
+        ];
+        match rules.iter().find(|(holds, _)| !holds) {
+            Some((_, message)) => Err(Error::Settings((*message).into())),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,163 @@
+use nalgebra::{Matrix3, Point3, Vector3};
+use tagalong_core::{
+    Camera, Context, Detection, Detector, Error, Frame, Funnel, Result, Search, Track,
+};
+
+use crate::{Blob, Config, Eyes, Geometry, Model, NAME, View};
+
+/// The model that is part of the program.
+const BUILT_IN: &str = include_str!("../../../configs/models/omni-distance.toml");
+/// The top of a head is so far above its centre, m.
+const HALF_HEAD_M: f64 = 0.115;
+/// Score of somebody of ordinary height, and what a height off by a standard
+/// deviation of this many metres costs.
+const SURE: f64 = 3.0;
+const STATURE: [f64; 2] = [1.6, 0.2];
+/// A search near a track takes what is within so many standard deviations.
+const NEAR_SIGMAS: f64 = 3.0;
+
+/// The detector.
+pub struct OmniAppearance {
+    config: Config,
+    model: Model,
+    eyes: Eyes,
+}
+
+impl OmniAppearance {
+    /// A detector; reads its model.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a file that cannot be read or is no model, or a
+    /// person whom it does not know; [`Error::Settings`] for impossible numbers.
+    pub fn new(config: Config, context: &Context) -> Result<Self> {
+        let model = read(&config.model, context)?;
+        let known = ["general", "nearest"].contains(&config.person.as_str())
+            || model.people.iter().any(|person| person.name == config.person);
+        if !known {
+            let names: Vec<&str> = model.people.iter().map(|p| p.name.as_str()).collect();
+            let why = format!("it does not know `{}`, only {names:?}", config.person);
+            return Err(Error::Model { path: config.model, why });
+        }
+        Ok(Self { eyes: Eyes::new(config.clone())?, config, model })
+    }
+
+    /// The model in use.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The place of somebody.
+    fn placed(&self, blob: &Blob, camera: &Camera, view: &View<'_>) -> Detection {
+        let how = self.config.distance;
+        let head = self.model.head(&self.config.person, blob, view, how);
+        let (distance, sigma) = head.distance(&blob.features, view, how);
+        let distance = distance.clamp(0.3, 30.0);
+        let bearing = view.panorama.bearing(blob.column);
+        let (sine, cosine) = bearing.sin_cos();
+        let flat = Point3::new(distance * sine, -distance * cosine, 0.0);
+        let mut position = camera.robot_from_camera * flat;
+        let [low, high] = self.config.head_height_m;
+        let top = view.top_m(&blob.features, distance);
+        position.z = (top - HALF_HEAD_M).clamp(low - 0.5, high + 0.5);
+        Detection {
+            region: camera.upper_body(&position),
+            position,
+            covariance: self.covariance(&position, camera, distance, sigma),
+            score: self.score(position.z),
+            source: NAME,
+        }
+    }
+
+    /// Polar: the distance's own spread along the ray, the bearing's across.
+    fn covariance(
+        &self,
+        position: &Point3<f64>,
+        camera: &Camera,
+        distance: f64,
+        sigma: f64,
+    ) -> Matrix3<f64> {
+        let from = camera.robot_from_camera.translation.vector;
+        let out = Vector3::new(position.x - from.x, position.y - from.y, 0.0);
+        let out = out.try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let aside = Vector3::new(-out.y, out.x, 0.0);
+        let across = distance * self.config.sigma_bearing_deg.to_radians();
+        out * out.transpose() * (sigma * sigma)
+            + aside * aside.transpose() * (across * across).max(1e-6)
+            + Vector3::z() * Vector3::z().transpose() * self.config.sigma_height_m.powi(2)
+    }
+
+    fn score(&self, height_m: f64) -> f64 {
+        let [usual, sigma] = STATURE;
+        let off = (height_m - usual) / sigma;
+        (SURE - 0.5 * off * off).max(-SURE)
+    }
+
+    fn check_camera(&self, view: &View<'_>) -> Result<()> {
+        if self.model.geometry.is_like(&Geometry::of(view))
+            || self.config.distance == crate::Distance::Analytic
+        {
+            return Ok(());
+        }
+        let why = format!(
+            "it was fitted for another camera ({:?}) than this one ({:?}); train one for this \
+             camera, or set distance = \"analytic\"",
+            self.model.geometry,
+            Geometry::of(view)
+        );
+        Err(Error::Model { path: self.config.model.clone(), why })
+    }
+}
+
+impl Detector for OmniAppearance {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        let blobs = self.eyes.look(frame, funnel)?;
+        let Some(view) = View::of(&frame.camera).filter(|_| !blobs.is_empty()) else {
+            return Ok(Vec::new());
+        };
+        self.check_camera(&view)?;
+        let [low, high] = self.config.head_height_m;
+        let mut found = Vec::new();
+        for blob in &blobs {
+            let person = self.placed(blob, &frame.camera, &view);
+            if !(low..=high).contains(&person.position.z) {
+                funnel.drop_at("head height", person.region);
+            } else if !fits(search, &person) {
+                funnel.drop_at("not near the track", person.region);
+            } else {
+                found.push(person);
+            }
+        }
+        Ok(found)
+    }
+
+    fn learn(&mut self, frame: &Frame, _: &[Track]) -> Result<()> {
+        self.eyes.adapt(frame)
+    }
+}
+
+/// Whether a search wants somebody.
+fn fits(search: &Search<'_>, person: &Detection) -> bool {
+    match search {
+        Search::Everywhere { .. } => true,
+        Search::Near(track) => {
+            let off = (person.position - track.estimate.person.position).xy();
+            let spread = track.estimate.covariance.fixed_view::<2, 2>(0, 0).trace();
+            off.norm() <= NEAR_SIGMAS * (0.5 * spread).sqrt() + 0.3
+        }
+    }
+}
+
+fn read(file: &str, context: &Context) -> Result<Model> {
+    let broken = |why: String| Error::Model { path: file.into(), why };
+    if file.is_empty() {
+        return Model::from_text(BUILT_IN).map_err(broken);
+    }
+    let text = std::fs::read_to_string(context.base_dir.join(file))
+        .map_err(|error| broken(error.to_string()))?;
+    Model::from_text(&text).map_err(broken)
+}

@@ -1,0 +1,224 @@
+use tagalong_core::{Frame, Funnel, Result, Stamp};
+
+use crate::background::Pace;
+use crate::warp::{Bounds, Warp, is_moving};
+use crate::{Background, Blob, Config, Segmenter};
+
+/// Sees who differs from the background, image after image.
+pub struct Eyes {
+    config: Config,
+    scene: Option<Scene>,
+}
+
+/// What is kept from image to image of one size.
+struct Scene {
+    size: (usize, usize),
+    background: Background,
+    segmenter: Segmenter,
+    bounds: Bounds,
+    moved: Vec<f32>,
+    /// The image that was looked at last, and who is in it.
+    seen: Option<(u64, Stamp)>,
+    blobs: Vec<Blob>,
+    /// The robot has moved since the background was made.
+    uncertain: bool,
+    /// Grey images as colours.
+    grey: Vec<u8>,
+    /// Images since the background was made.
+    phase: usize,
+}
+
+impl Eyes {
+    /// Eyes that have seen nothing yet.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for impossible numbers.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        Ok(Self { config, scene: None })
+    }
+
+    /// True once the background is known.
+    pub fn is_ready(&self) -> bool {
+        let known = |scene: &Scene| scene.background.frames() >= self.config.background_frames;
+        self.scene.as_ref().is_some_and(known)
+    }
+
+    /// Who may be in an image: the largest first. Empty
+    /// while the background is being made.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame with neither colour nor grey.
+    pub fn look(&mut self, frame: &Frame, funnel: &mut Funnel) -> Result<Vec<Blob>> {
+        let Some(panorama) = frame.camera.panorama() else {
+            funnel.drop_many("no panorama", 1);
+            return Ok(Vec::new());
+        };
+        let grey = frame.images().colour.is_none();
+        let size = if grey {
+            (frame.grey()?.width(), frame.grey()?.height())
+        } else {
+            (frame.colour()?.width(), frame.colour()?.height())
+        };
+        if size != (panorama.columns, panorama.rows) || size.0 < 8 || size.1 < 8 {
+            funnel.drop_many("image of another size", 1);
+            return Ok(Vec::new());
+        }
+        // A clock that was set back is another recording.
+        let same = |scene: &Scene| {
+            scene.size == size && scene.seen.is_none_or(|(_, stamp)| stamp <= frame.stamp)
+        };
+        let scene = match &mut self.scene {
+            Some(scene) if same(scene) => scene,
+            scene => scene.insert(Scene::new(size, &self.config)),
+        };
+        if scene.seen != Some((frame.index, frame.stamp)) {
+            scene.seen = Some((frame.index, frame.stamp));
+            scene.see(frame, grey, &self.config, funnel)?;
+        }
+        Ok(scene.blobs.clone())
+    }
+
+    /// Lets the background follow the image that was looked at last; to be called
+    /// once after each.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame without images.
+    pub fn adapt(&mut self, frame: &Frame) -> Result<()> {
+        let Some(scene) = &mut self.scene else { return Ok(()) };
+        if scene.seen == Some((frame.index, frame.stamp)) {
+            scene.adapt(frame, &self.config)?;
+        }
+        Ok(())
+    }
+}
+
+impl Scene {
+    fn new(size: (usize, usize), config: &Config) -> Self {
+        Self {
+            size,
+            background: Background::new(size.0, size.1),
+            segmenter: Segmenter::new(size.0, config),
+            bounds: Bounds::default(),
+            moved: Vec::new(),
+            seen: None,
+            blobs: Vec::new(),
+            uncertain: false,
+            grey: Vec::new(),
+            phase: 0,
+        }
+    }
+
+    /// Looks at an image: part of the background at first, then who differs.
+    fn see(
+        &mut self,
+        frame: &Frame,
+        grey: bool,
+        config: &Config,
+        funnel: &mut Funnel,
+    ) -> Result<()> {
+        self.blobs.clear();
+        if grey {
+            self.grey.clear();
+            self.grey.extend(frame.grey()?.pixels().iter().flat_map(|v| [*v; 3]));
+        }
+        self.follow_robot(frame, config);
+        let Self { background, segmenter, bounds, .. } = self;
+        let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
+        let learning = background.frames() < config.background_frames;
+        if learning {
+            // The spread of a few images is no measure for anything.
+            if background.frames() > 4 && !self.uncertain {
+                segmenter.compare(colours, background, !grey, config);
+                segmenter.learn_empty(config);
+            }
+            if self.uncertain {
+                background.add_moving(colours, config);
+            } else {
+                background.add(colours, config);
+            }
+            funnel.drop_many("background is being learned", 1);
+            return Ok(());
+        }
+        if self.uncertain {
+            bounds.of(&background.level, self.size.0, config.slack_px);
+            let between = [&bounds.low[..], &bounds.high[..]];
+            segmenter.compare_between(colours, between, background, !grey, config);
+        } else {
+            segmenter.compare(colours, background, !grey, config);
+        }
+        self.blobs = people(segmenter, colours, config, funnel);
+        Ok(())
+    }
+
+    fn follow_robot(&mut self, frame: &Frame, config: &Config) {
+        let Some(panorama) = frame.camera.panorama() else { return };
+        if self.background.frames() == 0 || !is_moving(&frame.motion) {
+            return;
+        }
+        self.uncertain = true;
+        let warp = Warp::new(&frame.camera, panorama, &frame.motion, config.wall_m);
+        self.background.move_by(|from, to| warp.apply(from, to), &mut self.moved);
+    }
+
+    /// The background follows what is not taken for people.
+    fn adapt(&mut self, frame: &Frame, config: &Config) -> Result<()> {
+        if self.background.frames() < config.background_frames {
+            return Ok(());
+        }
+        // What is carried along by the odometry must be renewed soon.
+        let after =
+            if self.uncertain { config.adapt_s.min(MOVING_ADAPT_S) } else { config.adapt_s };
+        let dt_s = frame.motion.dt as f32;
+        let absorb_s = if config.absorb_s > 0.0 { config.absorb_s as f32 } else { f32::INFINITY };
+        let part = if after > 0.0 { dt_s / after as f32 } else { 0.0 };
+        let pace = Pace { part, absorb_s, dt_s };
+        let colour = frame.images().colour.as_deref();
+        let colours = colour.map_or(&self.grey[..], |c| c.pixels().as_flattened());
+        let taken = &self.segmenter.counts().taken;
+        self.background.follow(colours, taken, &pace, self.phase);
+        self.phase = self.phase.wrapping_add(1);
+        Ok(())
+    }
+}
+
+/// The background follows within this while the robot moves, s.
+const MOVING_ADAPT_S: f64 = 1.0;
+
+/// The largest runs that may be people, largest first.
+fn people(
+    segmenter: &Segmenter,
+    colours: &[u8],
+    config: &Config,
+    funnel: &mut Funnel,
+) -> Vec<Blob> {
+    let mut blobs = Vec::new();
+    for run in segmenter.runs(config) {
+        let measured = Blob::measure(run, segmenter.counts(), colours);
+        match measured.filter(|blob| blob.features.pixels >= f64::from(config.min_pixels)) {
+            Some(blob) => blobs.push(blob),
+            None => funnel.drop_many("too few pixels", 1),
+        }
+    }
+    blobs.sort_by(|a, b| b.features.pixels.total_cmp(&a.features.pixels));
+    funnel.drop_many("too many people", blobs.len().saturating_sub(config.max_people) as u64);
+    blobs.truncate(config.max_people);
+    if config.compat_printed_seam {
+        let width = segmenter.counts().columns.len();
+        blobs.iter_mut().for_each(|blob| forget_the_seam(blob, width, segmenter));
+    }
+    blobs
+}
+
+/// As printed: mean and extent of column numbers, as if none followed the last.
+fn forget_the_seam(blob: &mut Blob, width: usize, segmenter: &Segmenter) {
+    if blob.run.first + blob.run.length <= width {
+        return;
+    }
+    let counts = &segmenter.counts().columns;
+    let weight = |column: usize| f64::from(counts[column]);
+    let total: f64 = blob.run.columns(width).map(weight).sum();
+    let sum: f64 = blob.run.columns(width).map(|column| column as f64 * weight(column)).sum();
+    blob.column = sum / total.max(1.0);
+    blob.features.width = width as f64;
+}

@@ -1,0 +1,59 @@
+//! People in the panorama of a conical mirror (P5, section 4).
+//!
+//! What differs from the background is counted by column and by row. A run of
+//! columns is a person: its mean is the bearing, and a few numbers of it, width,
+//! lower edge and area above all, tell the distance, which is learned
+//! ([`Model`]). The panorama goes once around, so columns are counted modulo its
+//! width in everything: runs, means and extents ([`circular`]).
+//!
+//! A shadow differs from the background, too, and it is the lower edge that it
+//! spoils. It darkens all colours alike, so pixels that do only that are left out.
+//!
+//! While the robot moves, the background moves with it: what is on the floor by
+//! the odometry, everything else as if it stood at a fixed distance.
+//!
+//! With the feature `train` the crate also fits models (`train`).
+
+mod background;
+mod blob;
+pub mod circular;
+mod config;
+mod detector;
+mod eyes;
+mod model;
+mod network;
+mod segment;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+mod warp;
+
+pub use background::Background;
+pub use blob::{Blob, FEATURES, Features};
+pub use config::{Config, Distance};
+pub use detector::OmniAppearance;
+pub use eyes::Eyes;
+pub use model::{Geometry, Head, Line, Model, Person, Ridge, Signature, View};
+pub use network::Network;
+pub use segment::{Counts, Segmenter};
+use tagalong_core::Registry;
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "omni-appearance";
+
+/// The name under which `tagalong train` knows the model of the distance.
+pub const TRAINER: &str = "omni-distance";
+
+/// Registers the plugin.
+pub fn register(registry: &mut Registry) {
+    registry.detector(
+        NAME,
+        "people in the panorama of a conical mirror, distance by a small network (P5)",
+        OmniAppearance::new,
+    );
+    #[cfg(feature = "train")]
+    registry.trainer(TRAINER, |config: Config, context| {
+        train::DistanceTrainer::new(config, context.seed)
+    });
+}

@@ -1,0 +1,287 @@
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Camera, Panorama};
+
+use crate::blob::FEATURES;
+use crate::{Blob, Distance, Features, Network};
+
+/// The distance of a person from what is seen of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// The camera for which it was fitted.
+    pub geometry: Geometry,
+    /// For anybody.
+    pub general: Head,
+    /// For people who are known.
+    pub people: Vec<Person>,
+}
+
+/// A person who is known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Person {
+    /// The name in `person`.
+    pub name: String,
+    /// What they look like.
+    pub signature: Signature,
+    /// Their distance.
+    pub head: Head,
+}
+
+/// What somebody looks like: mean and standard deviation of the colours of the
+/// upper body and of the stature (m).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Signature {
+    /// Means.
+    pub mean: [f64; 4],
+    /// Standard deviations.
+    pub sigma: [f64; 4],
+}
+
+impl Signature {
+    /// How far off somebody's looks are: the root of the mean square, in
+    /// standard deviations.
+    pub fn misfit(&self, looks: &[f64; 4]) -> f64 {
+        let terms = looks.iter().zip(self.mean).zip(self.sigma);
+        let squares = terms.map(|((look, mean), sigma)| ((look - mean) / sigma.max(1e-6)).powi(2));
+        (squares.sum::<f64>() / 4.0).sqrt()
+    }
+}
+
+/// Somebody whose looks are farther off than this is not known.
+const KNOWN: f64 = 2.0;
+
+/// One way to the distance after another, each with its spread.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Head {
+    /// Added to where the floor is seen, m: feet are not below the head.
+    pub floor_offset_m: f64,
+    /// Standard deviation of the analytic distance.
+    pub analytic_sigma: Line,
+    /// Of the ridge.
+    pub ridge_sigma: Line,
+    /// Of the network.
+    pub network_sigma: Line,
+    /// Of the rich network.
+    pub rich_sigma: Line,
+    /// The ridge.
+    pub ridge: Ridge,
+    /// Of three features.
+    pub network: Network,
+    /// Of all features.
+    pub rich: Network,
+}
+
+/// A straight line: what it is at 0, and what each metre adds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// At 0 m, m.
+    pub start: f64,
+    /// Per metre.
+    pub slope: f64,
+}
+
+impl Line {
+    /// Its value, at least a centimetre.
+    pub fn at(&self, distance_m: f64) -> f64 {
+        (self.start + self.slope * distance_m).max(0.01)
+    }
+}
+
+/// Weights of 1, bottom, its square, its inverse, width and pixels, of which all
+/// but the 1 are brought to mean 0 and deviation 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ridge {
+    /// Mean of each.
+    pub mean: [f64; 5],
+    /// Standard deviation of each.
+    pub scale: [f64; 5],
+    /// Weights; that of the 1 first.
+    pub weights: [f64; 6],
+}
+
+impl Ridge {
+    /// What the weights are for.
+    pub fn terms(f: &Features) -> [f64; 5] {
+        [f.bottom, f.bottom * f.bottom, 1.0 / (f.bottom + 1.0), f.width, f.pixels]
+    }
+
+    /// The distance, m.
+    pub fn answer(&self, features: &Features) -> f64 {
+        let terms = Self::terms(features);
+        let scaled = (0..5).map(|i| (terms[i] - self.mean[i]) / self.scale[i]);
+        self.weights[0] + scaled.zip(&self.weights[1..]).map(|(x, w)| w * x).sum::<f64>()
+    }
+
+    fn is_sane(&self) -> bool {
+        let numbers = self.mean.iter().chain(&self.scale).chain(&self.weights);
+        self.scale.iter().all(|scale| *scale > 0.0) && numbers.copied().all(f64::is_finite)
+    }
+}
+
+impl Head {
+    /// Distance from the axis of the mirror, and its standard deviation, m.
+    pub fn distance(&self, features: &Features, camera: &View<'_>, how: Distance) -> (f64, f64) {
+        let (distance, sigma) = match how {
+            Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
+            Distance::Rich => (self.rich.answer(&camera.inputs(features)), self.rich_sigma),
+            Distance::Ridge => (self.ridge.answer(features), self.ridge_sigma),
+            Distance::Analytic => {
+                (camera.floor_m(features) + self.floor_offset_m, self.analytic_sigma)
+            }
+        };
+        (distance, sigma.at(distance))
+    }
+
+    fn is_sane(&self) -> bool {
+        let lines = [self.analytic_sigma, self.ridge_sigma, self.network_sigma, self.rich_sigma];
+        self.network.is_sane(3)
+            && self.rich.is_sane(INPUTS)
+            && self.ridge.is_sane()
+            && self.floor_offset_m.is_finite()
+            && lines.iter().all(|line| line.start.is_finite() && line.slope.is_finite())
+    }
+}
+
+/// Inputs of the rich network: all features, and where the floor is seen.
+pub(crate) const INPUTS: usize = FEATURES.len() + 1;
+/// Where the floor is not seen below somebody's feet they are said to be so far away, m.
+const FAR_M: f64 = 15.0;
+
+/// What is needed of a camera to tell distances.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The panorama.
+    pub panorama: &'a Panorama,
+    /// Height of the pinhole above the floor, m.
+    pub height_m: f64,
+}
+
+impl<'a> View<'a> {
+    /// Of a camera with a panorama.
+    pub fn of(camera: &'a Camera) -> Option<Self> {
+        Some(Self { panorama: camera.panorama()?, height_m: camera.height_m() })
+    }
+
+    /// Where the ray of the lowest row meets the floor, from the axis, m.
+    pub fn floor_m(&self, features: &Features) -> f64 {
+        let elevation = self.panorama.elevation(features.lowest_row(self.panorama.rows));
+        let seen = self.panorama.mirror.floor_range_m(elevation, self.height_m);
+        seen.filter(|range| *range > 0.0).map_or(FAR_M, |range| range.min(FAR_M))
+    }
+
+    /// Height of the top of the head above the floor if it is `distance_m` away, m.
+    pub fn top_m(&self, features: &Features, distance_m: f64) -> f64 {
+        let (ring, up) = self.panorama.mirror.ring_m();
+        let slope = self.panorama.elevation(features.top - 0.5).tan();
+        self.height_m + up + (distance_m + ring) * slope
+    }
+
+    /// All that is known of a person.
+    pub(crate) fn inputs(&self, features: &Features) -> [f64; INPUTS] {
+        let mut inputs = [0.0; INPUTS];
+        inputs[..FEATURES.len()].copy_from_slice(&features.values());
+        inputs[FEATURES.len()] = self.floor_m(features);
+        inputs
+    }
+
+    /// Colours and stature.
+    pub fn looks(&self, blob: &Blob, distance_m: f64) -> [f64; 4] {
+        let [red, green, blue] = blob.colour;
+        [red, green, blue, self.top_m(&blob.features, distance_m)]
+    }
+}
+
+/// What a model that was fitted for one camera is no good without.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Geometry {
+    /// Columns and rows of the panorama.
+    pub size: [usize; 2],
+    /// Elevation of its upper and lower edge, degrees.
+    pub elevations_deg: [f64; 2],
+    /// Height of the pinhole above the floor, m.
+    pub height_m: f64,
+}
+
+impl Geometry {
+    /// That of a camera.
+    pub fn of(view: &View<'_>) -> Self {
+        let size = [view.panorama.columns, view.panorama.rows];
+        let elevations_deg = view.panorama.elevations().map(f64::to_degrees);
+        Self { size, elevations_deg, height_m: view.height_m }
+    }
+
+    /// True if a camera is like this one: half a row and three centimetres.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let row_deg = (self.elevations_deg[0] - self.elevations_deg[1]) / self.size[1] as f64;
+        let elevations = self.elevations_deg.iter().zip(other.elevations_deg);
+        self.size == other.size
+            && (self.height_m - other.height_m).abs() < 0.03
+            && elevations.into_iter().all(|(a, b)| (a - b).abs() < 0.5 * row_deg.abs())
+    }
+}
+
+/// A model as TOML.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: String,
+    features: Vec<String>,
+    geometry: Geometry,
+    general: Head,
+    #[serde(default)]
+    people: Vec<Person>,
+}
+
+const FORMAT: &str = "omni-distance 1";
+
+impl Model {
+    /// The head for somebody: by name, everybody's for `general`, and for
+    /// `nearest` the one whose looks fit best, if they fit.
+    pub fn head(&self, person: &str, blob: &Blob, view: &View<'_>, how: Distance) -> &Head {
+        if person != "nearest" {
+            let named = self.people.iter().find(|known| known.name == person);
+            return named.map_or(&self.general, |known| &known.head);
+        }
+        let (distance_m, _) = self.general.distance(&blob.features, view, how);
+        let looks = view.looks(blob, distance_m);
+        let misfit = |known: &&Person| known.signature.misfit(&looks);
+        let best = self.people.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+        best.filter(|known| misfit(known) < KNOWN).map_or(&self.general, |known| &known.head)
+    }
+
+    /// The model file.
+    pub fn to_text(&self) -> String {
+        let file = File {
+            format: FORMAT.into(),
+            features: FEATURES.map(String::from).to_vec(),
+            geometry: self.geometry,
+            general: self.general.clone(),
+            people: self.people.clone(),
+        };
+        toml::to_string(&file).unwrap_or_default()
+    }
+
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// Text that is no model, in a sentence.
+    pub fn from_text(text: &str) -> Result<Self, String> {
+        let file: File = toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
+        if file.format != FORMAT {
+            return Err(format!("the format is `{}`, not `{FORMAT}`", file.format));
+        }
+        if file.features != FEATURES {
+            return Err(format!("it is not made of the features {FEATURES:?}"));
+        }
+        let heads = file.people.iter().map(|person| &person.head).chain([&file.general]);
+        if !heads.into_iter().all(Head::is_sane) {
+            return Err("its numbers are not finite or do not fit together".into());
+        }
+        Ok(Self { geometry: file.geometry, general: file.general, people: file.people })
+    }
+}

@@ -1,0 +1,91 @@
+use serde::{Deserialize, Serialize};
+
+/// A network with one hidden layer of tanh and a linear output, for inputs and a
+/// target that are brought to mean 0 and deviation 1 (P5, section 4.4: three
+/// inputs, four hidden units, one output).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Network {
+    /// Mean of each input.
+    pub mean: Vec<f64>,
+    /// Standard deviation of each input.
+    pub scale: Vec<f64>,
+    /// Mean and standard deviation of the target.
+    pub target: [f64; 2],
+    /// For each hidden unit a weight for each input, and the bias at the end.
+    pub hidden: Vec<Vec<f64>>,
+    /// A weight for each hidden unit, and the bias at the end.
+    pub output: Vec<f64>,
+}
+
+impl Network {
+    /// The output for some inputs; inputs beyond those that it knows are left out.
+    pub fn answer(&self, inputs: &[f64]) -> f64 {
+        let [mean, scale] = self.target;
+        mean + scale * self.forward(|i| self.scaled(inputs, i))
+    }
+
+    /// An input brought to mean 0 and deviation 1.
+    pub fn scaled(&self, inputs: &[f64], i: usize) -> f64 {
+        (inputs[i] - self.mean[i]) / self.scale[i]
+    }
+
+    fn forward(&self, input: impl Fn(usize) -> f64) -> f64 {
+        let (weights, bias) = split(&self.output);
+        let unit = |weights: &[f64]| {
+            let (weights, bias) = split(weights);
+            weights.iter().enumerate().map(|(i, w)| w * input(i)).sum::<f64>() + bias
+        };
+        self.hidden
+            .iter()
+            .zip(weights)
+            .map(|(unit_weights, w)| w * unit(unit_weights).tanh())
+            .sum::<f64>()
+            + bias
+    }
+
+    /// True if the parts fit together, for at most `inputs` inputs, and all
+    /// numbers are finite.
+    pub fn is_sane(&self, inputs: usize) -> bool {
+        let count = self.mean.len();
+        let numbers = self.mean.iter().chain(&self.scale).chain(&self.target);
+        let weights = self.hidden.iter().flatten().chain(&self.output);
+        (1..=inputs).contains(&count)
+            && self.scale.len() == count
+            && self.scale.iter().all(|scale| *scale > 0.0)
+            && self.hidden.iter().all(|unit| unit.len() == count + 1)
+            && self.output.len() == self.hidden.len() + 1
+            && numbers.chain(weights).all(|number| number.is_finite())
+    }
+}
+
+/// The weights, and the bias behind them.
+pub(crate) fn split(weights: &[f64]) -> (&[f64], f64) {
+    match weights.split_last() {
+        Some((bias, weights)) => (weights, *bias),
+        None => (&[], 0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_answer_is_that_of_the_formula() {
+        let network = Network {
+            mean: vec![1.0, 2.0],
+            scale: vec![2.0, 4.0],
+            target: [3.0, 0.5],
+            hidden: vec![vec![0.5, -1.0, 0.25], vec![1.0, 1.0, 0.0]],
+            output: vec![2.0, -1.0, 0.125],
+        };
+        assert!(network.is_sane(9));
+        let (a, b) = ((5.0 - 1.0) / 2.0, (0.0 - 2.0) / 4.0);
+        let units = [(0.5_f64 * a - b + 0.25).tanh(), (a + b as f64).tanh()];
+        let expected = 3.0 + 0.5 * (2.0 * units[0] - units[1] + 0.125);
+        assert!((network.answer(&[5.0, 0.0, 77.0]) - expected).abs() < 1e-12);
+        assert!(!network.is_sane(1));
+        assert!(!Network { output: vec![1.0], ..network }.is_sane(9));
+    }
+}

@@ -1,0 +1,243 @@
+//! The background after the robot has moved.
+
+use nalgebra::{Point2, Point3};
+use tagalong_core::{Camera, Motion, Panorama};
+
+/// Places are computed at every so many columns and rows, and between them
+/// interpolated.
+const STEP: usize = 8;
+/// A smaller motion moves nothing by half a pixel: m and rad.
+const STILL: [f64; 2] = [0.002, 0.001];
+
+/// True if the robot moved enough to move the background.
+pub(crate) fn is_moving(motion: &Motion) -> bool {
+    motion.forward.hypot(motion.left) > STILL[0] || motion.turn.abs() > STILL[1]
+}
+
+/// Moves the background by the odometry: what is nearer than `wall_m` on the
+/// floor by the floor, all else as if it stood `wall_m` away.
+pub(crate) struct Warp {
+    columns: usize,
+    rows: usize,
+    /// Where the nodes of a grid were before the motion: column, unwrapped so
+    /// that it stays near the node's own, and row.
+    nodes: Vec<[f32; 2]>,
+    across: usize,
+}
+
+impl Warp {
+    pub(crate) fn new(camera: &Camera, panorama: &Panorama, motion: &Motion, wall_m: f64) -> Self {
+        let (columns, rows) = (panorama.columns, panorama.rows);
+        let (across, down) = (columns / STEP + 2, rows / STEP + 2);
+        let node = |row: usize, column: usize| {
+            let at = Point2::new((column * STEP) as f64, (row * STEP) as f64);
+            before(camera, panorama, motion, wall_m, at)
+        };
+        let nodes = (0..down).flat_map(|row| (0..across).map(move |c| (row, c)));
+        Self { columns, rows, nodes: nodes.map(|(row, c)| node(row, c)).collect(), across }
+    }
+
+    /// Where a pixel was.
+    fn place(&self, column: usize, row: usize) -> [f32; 2] {
+        let (i, j) = (row / STEP * self.across + column / STEP, column % STEP);
+        let (x, y) = (j as f32 / STEP as f32, (row % STEP) as f32 / STEP as f32);
+        let node = |offset: usize| self.nodes[i + offset];
+        let mix = |axis: usize| {
+            let upper = node(0)[axis] + x * (node(1)[axis] - node(0)[axis]);
+            let (left, right) = (node(self.across)[axis], node(self.across + 1)[axis]);
+            upper + y * (left + x * (right - left) - upper)
+        };
+        [mix(0), mix(1)]
+    }
+
+    /// Reads three colours a pixel from where they were; bilinear.
+    pub(crate) fn apply(&self, from: &[f32], to: &mut [f32]) {
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                let [x, y] = self.place(column, row);
+                let (left, across) = self.column(x);
+                let (top, down) = self.row(y);
+                let right = if left + 1 == self.columns { 0 } else { left + 1 };
+                let pixel = |row: usize, column: usize| 3 * (row * self.columns + column);
+                let corners = [
+                    pixel(top, left),
+                    pixel(top, right),
+                    pixel(top + 1, left),
+                    pixel(top + 1, right),
+                ];
+                let at = pixel(row, column);
+                for (colour, out) in to[at..at + 3].iter_mut().enumerate() {
+                    let [a, b, c, d] = corners.map(|corner| from[corner + colour]);
+                    let (upper, lower) = (a + across * (b - a), c + across * (d - c));
+                    *out = upper + down * (lower - upper);
+                }
+            }
+        }
+    }
+
+    fn column(&self, x: f32) -> (usize, f32) {
+        let whole = x.floor();
+        ((whole as i64).rem_euclid(self.columns as i64) as usize, x - whole)
+    }
+
+    fn row(&self, y: f32) -> (usize, f32) {
+        let y = y.clamp(0.0, self.rows as f32 - 1.0);
+        let top = (y as usize).min(self.rows.saturating_sub(2));
+        (top, y - top as f32)
+    }
+}
+
+/// Where what a pixel shows now was before the motion.
+fn before(
+    camera: &Camera,
+    panorama: &Panorama,
+    motion: &Motion,
+    wall_m: f64,
+    pixel: Point2<f64>,
+) -> [f32; 2] {
+    let elevation = panorama.elevation(pixel.y);
+    let floor = panorama.mirror.floor_range_m(elevation, camera.height_m());
+    let range = floor.filter(|range| *range > 0.0).map_or(wall_m, |range| range.min(wall_m));
+    let now = camera.back_project(pixel, range);
+    let there = motion.isometry() * now.xy();
+    let point = Point3::new(there.x, there.y, now.z);
+    let seen = panorama.pixel(&camera.robot_from_camera.inverse_transform_point(&point));
+    [camera.column_near(seen.x, pixel.x) as f32, seen.y as f32]
+}
+
+/// Lowest and highest value within some columns and rows, for each colour. What
+/// is known to within so many pixels lies between them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Bounds {
+    pub(crate) low: Vec<u8>,
+    pub(crate) high: Vec<u8>,
+    rows: [Vec<u8>; 2],
+}
+
+impl Bounds {
+    /// `slack` are columns and rows to each side.
+    pub(crate) fn of(&mut self, level: &[u8], columns: usize, slack: [usize; 2]) {
+        let stride = 3 * columns;
+        let [low, high] = &mut self.rows;
+        low.resize(level.len(), 0);
+        high.resize(level.len(), 0);
+        let rows = level.chunks_exact(stride);
+        let out = low.chunks_exact_mut(stride).zip(high.chunks_exact_mut(stride));
+        for (row, (low, high)) in rows.zip(out) {
+            along(row, low, slack[0], |a, b| a.min(b));
+            along(row, high, slack[0], |a, b| a.max(b));
+        }
+        down(low, &mut self.low, stride, slack[1], |a, b| a.min(b));
+        down(high, &mut self.high, stride, slack[1], |a, b| a.max(b));
+    }
+}
+
+/// Around the row: pixels are counted modulo its length.
+fn along(row: &[u8], out: &mut [u8], slack: usize, pick: impl Fn(u8, u8) -> u8 + Copy) {
+    out.copy_from_slice(row);
+    let width = row.len();
+    for shift in (1..=slack).map(|columns| 3 * columns % width.max(1)) {
+        let (start, end) = out.split_at_mut(width - shift);
+        fold(start, &row[shift..], pick);
+        fold(end, &row[..shift], pick);
+        let (start, end) = out.split_at_mut(shift);
+        fold(start, &row[width - shift..], pick);
+        fold(end, &row[..width - shift], pick);
+    }
+}
+
+fn down(
+    from: &[u8],
+    out: &mut Vec<u8>,
+    stride: usize,
+    slack: usize,
+    pick: impl Fn(u8, u8) -> u8 + Copy,
+) {
+    out.clear();
+    out.extend_from_slice(from);
+    for shift in (1..=slack).map(|rows| rows * stride).filter(|shift| *shift < from.len()) {
+        let kept = from.len() - shift;
+        fold(&mut out[..kept], &from[shift..], pick);
+        fold(&mut out[shift..], &from[..kept], pick);
+    }
+}
+
+fn fold(out: &mut [u8], with: &[u8], pick: impl Fn(u8, u8) -> u8 + Copy) {
+    for (out, value) in out.iter_mut().zip(with) {
+        *out = pick(*out, *value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use proptest::prelude::*;
+    use tagalong_core::{ConicalMirror, Lens};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
+        let mirror = ConicalMirror::from_coefficients(175.0, [240.0; 2], &d).unwrap();
+        Camera {
+            lens: Lens::Panorama(Panorama { mirror, columns: 96, rows: 40 }),
+            width: 96,
+            height: 40,
+            robot_from_camera: ConicalMirror::upright(1.5),
+        }
+    }
+
+    /// A pattern on the floor and on a round wall about the place of the first image.
+    fn room(camera: &Camera, pose: &nalgebra::Isometry2<f64>, wall_m: f64) -> Vec<f32> {
+        let panorama = camera.panorama().unwrap();
+        let pixels = (0..40).flat_map(|row| (0..96).map(move |column| (column, row)));
+        let colour = |(column, row): (usize, usize)| {
+            let at = Point2::new(column as f64, row as f64);
+            let elevation = panorama.elevation(at.y);
+            let floor = panorama.mirror.floor_range_m(elevation, 1.5);
+            let range = floor.filter(|r| *r > 0.0).map_or(wall_m, |r| r.min(wall_m));
+            let point = pose * camera.back_project(at, range).xy();
+            let value = 100.0 + 60.0 * (1.3 * point.x).sin() + 40.0 * (1.1 * point.y).cos();
+            [value as f32; 3]
+        };
+        pixels.flat_map(colour).collect()
+    }
+
+    #[test]
+    fn the_floor_is_where_the_odometry_says() {
+        let camera = camera();
+        let motion =
+            Motion { dt: 0.3, forward: 0.15, left: -0.05, turn: 0.2, covariance: Matrix3::zeros() };
+        assert!(is_moving(&motion) && !is_moving(&Motion::at_rest(0.3)));
+        let before = room(&camera, &nalgebra::Isometry2::identity(), 3.5);
+        let after = room(&camera, &motion.isometry(), 3.5);
+        let mut moved = vec![0.0; before.len()];
+        let panorama = camera.panorama().unwrap();
+        Warp::new(&camera, panorama, &motion, 3.5).apply(&before, &mut moved);
+        let off = |a: &[f32], b: &[f32]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / a.len() as f32
+        };
+        assert!(off(&moved, &after) < 2.0, "{}", off(&moved, &after));
+        assert!(off(&before, &after) > 10.0, "{}", off(&before, &after));
+    }
+
+    proptest! {
+        #[test]
+        fn bounds_are_those_of_the_neighbourhood(
+            level in prop::collection::vec(any::<u8>(), 3 * 9 * 5),
+            across in 0..4usize, rows in 0..3usize,
+        ) {
+            let mut bounds = Bounds::default();
+            bounds.of(&level, 9, [across, rows]);
+            for at in 0..level.len() {
+                let (row, column, colour) = (at / 27, at % 27 / 3, at % 3);
+                let near = (row.saturating_sub(rows)..(row + rows + 1).min(5)).flat_map(|r| {
+                    (0..=2 * across).map(move |c| (r, (column + 9 + c - across) % 9))
+                });
+                let values: Vec<u8> = near.map(|(r, c)| level[27 * r + 3 * c + colour]).collect();
+                prop_assert_eq!(Some(&bounds.low[at]), values.iter().min());
+                prop_assert_eq!(Some(&bounds.high[at]), values.iter().max());
+            }
+        }
+    }
+}

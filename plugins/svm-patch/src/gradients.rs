@@ -1,0 +1,99 @@
+//! A patch as histograms of the directions of its gradients (N. Dalal and
+//! B. Triggs, CVPR 2005).
+
+use std::f32::consts::TAU;
+
+use crate::patch::{PIXELS, Patch, SIDE};
+
+/// Pixels along a side of a cell.
+const CELL: usize = 4;
+/// Cells along a side of the patch.
+const CELLS: usize = SIDE / CELL;
+/// Directions in a whole turn: dark before bright is not bright before dark.
+const DIRECTIONS: usize = PIXELS / (CELLS * CELLS);
+/// Gradients weaker than this on average are noise, grey values per pixel.
+const NOISE: f32 = 1.0;
+
+/// The histograms, cell by cell, each divided by the strength around it; all of
+/// them have length one, or are zero where there are no gradients.
+pub fn of(grey: &Patch) -> Patch {
+    let histograms = histograms(grey);
+    let mut out = [0.0; PIXELS];
+    for (cell, histogram) in out.chunks_exact_mut(DIRECTIONS).enumerate() {
+        let around = strength_around(&histograms, cell) + NOISE * (CELL * CELL) as f32;
+        let own = &histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS];
+        histogram.iter_mut().zip(own).for_each(|(out, own)| *out = (own / around).sqrt());
+    }
+    let length = out.iter().map(|v| v * v).sum::<f32>().sqrt();
+    if length > 0.0 {
+        out.iter_mut().for_each(|v| *v /= length);
+    }
+    out
+}
+
+fn histograms(grey: &Patch) -> Patch {
+    let mut histograms = [0.0; PIXELS];
+    for at in 0..PIXELS {
+        let (row, column) = (at / SIDE, at % SIDE);
+        let [dx, dy] = gradient(grey, row, column);
+        let turn = dy.atan2(dx).rem_euclid(TAU) / TAU * DIRECTIONS as f32;
+        let lower = turn.floor();
+        let first = lower as usize % DIRECTIONS;
+        let cell = row / CELL * CELLS + column / CELL;
+        let histogram = &mut histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS];
+        let strength = dx.hypot(dy);
+        histogram[first] += (1.0 - (turn - lower)) * strength;
+        histogram[(first + 1) % DIRECTIONS] += (turn - lower) * strength;
+    }
+    histograms
+}
+
+/// Half the difference of the neighbours; one-sided at the border.
+fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
+    let at = |row: usize, column: usize| grey[row.min(SIDE - 1) * SIDE + column.min(SIDE - 1)];
+    [
+        0.5 * (at(row, column + 1) - at(row, column.saturating_sub(1))),
+        0.5 * (at(row + 1, column) - at(row.saturating_sub(1), column)),
+    ]
+}
+
+/// Mean strength of a cell and its neighbours.
+fn strength_around(histograms: &Patch, cell: usize) -> f32 {
+    let span = |k: usize| k.saturating_sub(1)..(k + 2).min(CELLS);
+    let (rows, columns) = (span(cell / CELLS), span(cell % CELLS));
+    let count = (rows.len() * columns.len()) as f32;
+    let strength = |cell: usize| -> f32 {
+        histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS].iter().sum()
+    };
+    let cells = rows.flat_map(|row| columns.clone().map(move |column| row * CELLS + column));
+    cells.map(strength).sum::<f32>() / count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_has_one_direction_and_the_opposite_ramp_the_opposite_one() {
+        let ramp =
+            |slope: f32| -> Patch { std::array::from_fn(|at| 100.0 + slope * (at % SIDE) as f32) };
+        for (slope, direction) in [(5.0, 0), (-5.0, DIRECTIONS / 2)] {
+            let described = of(&ramp(slope));
+            for histogram in described.chunks_exact(DIRECTIONS) {
+                let sum: f32 = histogram.iter().sum();
+                assert!(histogram[direction] > 0.1 && sum - histogram[direction] < 0.01);
+            }
+            assert!((described.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn an_edge_shows_in_its_cells_alone() {
+        let edge: Patch = std::array::from_fn(|at| if at % SIDE < 10 { 50.0 } else { 150.0 });
+        let described = of(&edge);
+        for (cell, histogram) in described.chunks_exact(DIRECTIONS).enumerate() {
+            let shows = histogram.iter().any(|v| *v > 0.0);
+            assert_eq!(shows, cell % CELLS == 2, "cell {cell}");
+        }
+    }
+}
