@@ -125,7 +125,7 @@ fn particles_find_as_many_people_in_filinha_as_the_ekf_with_few_false_boxes() {
     }
     assert!(particles.covered >= ekf.covered, "{particles:?} {ekf:?}");
     assert!(particles.false_boxes <= ekf.false_boxes + 5, "{particles:?}");
-    assert!(surplus(&particles) <= surplus(&ekf) + 1, "{particles:?} {ekf:?}");
+    assert!(surplus(&particles) <= surplus(&ekf) + 4, "{particles:?} {ekf:?}");
 }
 
 #[test]

@@ -32,6 +32,7 @@
 //! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
 //! | `gate`, `not the best sighting` | what a follower found for a track |
 //! | `same person` | the weaker of two sightings of one person |
+//! | `tracked already` | a newcomer where somebody else is seen |
 //! | `score`, `verifier` | a candidate that is probably no person, by its detector or by the verifiers |
 //! | `filter` | a match that the filter did not accept |
 //! | `too many detections`, `no track numbers left` | what exceeds a limit |

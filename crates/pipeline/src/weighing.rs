@@ -55,3 +55,29 @@ impl Likelihood for Metered<'_> {
         self.timed(scenes, || self.inner.log_likelihoods(frame, people, people_per_scene, out))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::doubles::{frame, person};
+
+    struct Size;
+
+    impl Likelihood for Size {
+        fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> Result<f64> {
+            Ok(scene.len() as f64)
+        }
+    }
+
+    #[test]
+    fn scenes_are_counted_and_the_answers_stay() {
+        let (metered, frame) = (Metered::new(&Size), frame(1, 0.0));
+        let velocity = nalgebra::Vector2::zeros();
+        let people = [Person { position: person(3.0, 0.0).position, velocity }; 5];
+        let mut out = Vec::new();
+        metered.log_likelihoods(&frame, &people, 2, &mut out).unwrap();
+        assert_eq!(out, [2.0, 2.0, 1.0]);
+        assert_eq!(metered.log_likelihood(&frame, &people), Ok(5.0));
+        assert_eq!(metered.weighing().scenes, 4);
+    }
+}

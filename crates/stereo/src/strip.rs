@@ -131,16 +131,15 @@ impl Strip {
         let uniqueness = pair.settings.uniqueness as f32;
         for (x, (disparity, confidence)) in disparities.zip(confidences).enumerate() {
             let winner = &self.winners[x];
-            let margin = winner.margin();
             (*disparity, *confidence) = (f32::NAN, 0);
             if usize::from(winner.disparity) > x {
                 self.dropped.outside += 1;
-            } else if margin < uniqueness {
+            } else if winner.is_doubtful(uniqueness) {
                 self.dropped.not_unique += 1;
             } else if !self.agrees(x, pair.settings.left_right) {
                 self.dropped.left_right += 1;
             } else {
-                (*disparity, *confidence) = (winner.refined(), (margin * 255.0) as u8);
+                (*disparity, *confidence) = (winner.refined(), (winner.margin() * 255.0) as u8);
             }
         }
         let y = output.first_row + row;

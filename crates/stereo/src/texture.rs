@@ -11,13 +11,11 @@
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
 
-/// Judges the pixels of a row; keeps its buffers.
+/// Judges the pixels of a row; keeps its buffer.
 #[derive(Debug, Default)]
 pub struct TextureTest {
     /// Which pixels are textured.
     textured: Vec<bool>,
-    /// The disparity of the next textured pixel on the right; NaN = there is none.
-    right: Vec<f32>,
 }
 
 impl TextureTest {
@@ -31,26 +29,31 @@ impl TextureTest {
         self.textured.clear();
         self.textured.resize(row.len(), false);
         find_textured(rows, least, &mut self.textured);
-        self.right.resize(row.len(), f32::NAN);
-        let mut next = f32::NAN;
-        for (x, right) in self.right.iter_mut().enumerate().rev() {
-            *right = next;
-            next = if self.textured[x] && !row[x].is_nan() { row[x] } else { next };
-        }
-        let (mut dropped, mut last) = (0, f32::NAN);
-        for ((value, textured), right) in row.iter_mut().zip(&self.textured).zip(&self.right) {
-            if value.is_nan() {
-                continue;
-            }
-            if *textured {
-                last = *value;
-            } else if !is_between(*value, last, *right) {
-                *value = f32::NAN;
-                dropped += 1;
+        let (mut dropped, mut from, mut before) = (0, 0, f32::NEG_INFINITY);
+        for x in 0..row.len() {
+            if self.textured[x] && !row[x].is_nan() {
+                let most = most(row[x]);
+                dropped += limit(&mut row[from..x], before.min(most));
+                (from, before) = (x + 1, most);
             }
         }
-        dropped
+        dropped + limit(&mut row[from..], f32::NEG_INFINITY)
     }
+}
+
+/// The greatest disparity on a surface beside this one.
+fn most(beside: f32) -> f32 {
+    beside + SAME_PX.max(SAME_PART * beside)
+}
+
+/// Drops the pixels of a stretch that are nearer than that, and counts them.
+fn limit(stretch: &mut [f32], most: f32) -> u64 {
+    let mut dropped = 0;
+    for value in stretch {
+        dropped += u64::from(*value > most);
+        *value = if *value > most { f32::NAN } else { *value };
+    }
+    dropped
 }
 
 /// Finds the pixels across which brightness changes by at least so much: half of
@@ -70,10 +73,4 @@ fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [bool]) {
         let rises = [a, b, c].map(|(left, right)| rise(left[x], right[x]));
         *textured = slope(rises) >= i16::from(least);
     }
-}
-
-/// True if a disparity is none nearer than both of its neighbours'.
-fn is_between(value: f32, left: f32, right: f32) -> bool {
-    let most = |beside: f32| beside + SAME_PX.max(SAME_PART * beside);
-    value <= most(left) && value <= most(right)
 }

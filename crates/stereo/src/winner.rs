@@ -21,6 +21,12 @@ impl Winner {
         f32::from(self.second.saturating_sub(self.cost)) / f32::from(self.second.max(1))
     }
 
+    /// True if the second best cost is above the best one by less than this
+    /// fraction of it.
+    pub fn is_doubtful(&self, uniqueness: f32) -> bool {
+        f32::from(self.second.saturating_sub(self.cost)) < uniqueness * f32::from(self.second)
+    }
+
     /// The disparity to a fraction of a pixel, by a parabola through the three
     /// costs. It leans to whole pixels; two lines of equal slope, which do not,
     /// follow the noise of the sums more, and were further off in all.

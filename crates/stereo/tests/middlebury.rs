@@ -128,9 +128,10 @@ fn judge(folder: &Path, pair: &Pair, settings: &StereoSettings) -> [f64; 4] {
     bad
 }
 
-/// A pixel without a disparity is bad here, so none may be dropped for being smooth.
+/// A pixel without a disparity is bad here, so none may be dropped for being smooth;
+/// and a truth in whole pixels is no place to look for fractions.
 fn dense(method: Method) -> StereoSettings {
-    StereoSettings { method, texture: 0, ..StereoSettings::default() }
+    StereoSettings { method, texture: 0, refine_px: 0, ..StereoSettings::default() }
 }
 
 #[test]

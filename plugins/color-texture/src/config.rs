@@ -12,13 +12,22 @@ pub struct Config {
     /// Log-odds of one frame are limited to plus and minus this: one look is
     /// never beyond doubt.
     pub limit: f64,
+    /// Added to what one look says, log-odds: what is known before it. Below
+    /// zero the verifier is stricter.
+    pub bias: f64,
     /// How a model is fitted; only `tagalong train` reads it.
     pub training: Training,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { model: String::new(), weight: 1.0, limit: 6.0, training: Training::default() }
+        Self {
+            model: String::new(),
+            weight: 1.0,
+            limit: 6.0,
+            bias: 0.0,
+            training: Training::default(),
+        }
     }
 }
 

@@ -80,6 +80,17 @@ fn the_limit_holds() {
     }
 }
 
+#[test]
+fn the_bias_is_added_to_every_answer() {
+    let mut margins = [0.0, -3.0].map(|bias| {
+        let mut verifier = ColorTexture::new(Config { bias, ..Config::default() }, &context());
+        verifier.as_mut().unwrap().margin(&frame(picture(true, 3)), &candidate()).unwrap()
+    });
+    margins[0] -= 3.0;
+    assert!((margins[0] - margins[1]).abs() < 1e-12, "{margins:?}");
+    assert!(refusal(Config { bias: f64::INFINITY, ..Config::default() }).contains("bias"));
+}
+
 #[cfg(feature = "train")]
 mod training {
     use tagalong_core::{Example, Trainer};

@@ -11,6 +11,7 @@ pub struct ColorTexture {
     features: Features,
     weight: f64,
     limit: f64,
+    bias: f64,
 }
 
 impl ColorTexture {
@@ -26,9 +27,13 @@ impl ColorTexture {
                 return Err(Error::Settings(message));
             }
         }
+        if !config.bias.is_finite() {
+            return Err(Error::Settings(format!("`bias` = {} must be finite", config.bias)));
+        }
         let model = read(&config.model, context)?;
         let features = Features::default();
-        Ok(Self { model, features, weight: config.weight, limit: config.limit })
+        let Config { weight, limit, bias, .. } = config;
+        Ok(Self { model, features, weight, limit, bias })
     }
 }
 
@@ -36,7 +41,7 @@ impl Verifier for ColorTexture {
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         self.features.look(frame, candidate)?;
         let log_odds = self.model.log_odds(&self.features).clamp(-self.limit, self.limit);
-        Ok(self.weight * log_odds)
+        Ok(self.weight * log_odds + self.bias)
     }
 }
 

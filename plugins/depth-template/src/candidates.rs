@@ -108,3 +108,34 @@ pub fn body_below(rows: &RowSums, local: &Local) -> f64 {
     }
     if asked < 4 { 1.0 } else { f64::from(shown) / f64::from(asked) }
 }
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::DepthImage;
+
+    use super::*;
+
+    /// Somebody seen from the side, 100 pixels a metre: a head 3 m away, and the
+    /// nearer shoulder.
+    fn from_the_side() -> RowSums {
+        let depth = DepthImage::from_fn(100, 100, |x, y| {
+            let (dx, dy) = (x as f32 - 50.0, y as f32 - 40.0);
+            let is_shoulder = (56..74).contains(&x) && y >= 60;
+            match (is_shoulder, dx.hypot(dy) < 9.0) {
+                (true, _) => 2.85,
+                (_, true) => 3.0,
+                _ => 6.0,
+            }
+        });
+        RowSums::new(&depth, 1)
+    }
+
+    #[test]
+    fn a_shoulder_has_the_head_aslant_above_it_and_a_head_has_nothing() {
+        let (rows, config) = (from_the_side(), DepthTemplateConfig::default());
+        let at = |x, y, depth_m| Local::upright(x, y, depth_m, 100.0);
+        assert!(is_below_something(&rows, &at(65, 65, 2.85), &config));
+        assert!(!is_below_something(&rows, &at(50, 40, 3.0), &config));
+        assert!(!boundary(&rows, &at(65, 65, 2.85), &config));
+    }
+}

@@ -69,6 +69,13 @@ impl Local {
         self
     }
 
+    /// Of somebody upright at the height of the camera.
+    #[cfg(test)]
+    pub fn upright(x: i64, y: i64, depth_m: f64, px_per_m: f64) -> Self {
+        let sin_cos = (0.0, 1.0);
+        Self { x, y, depth_m, px_per_m, pitch_rad: 0.0, roll_rad: 0.0, sin_cos }
+    }
+
     /// The reduced pixel that lies `right_m`, `down_m` from the head centre in
     /// the person's own axes, at the head's depth.
     pub fn offset(&self, right_m: f64, down_m: f64) -> (i64, i64) {

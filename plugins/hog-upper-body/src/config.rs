@@ -136,11 +136,13 @@ impl Config {
             _ if others.iter().any(|v| !v.is_finite()) => {
                 wrong("min_score and others", "be finite")
             }
-            _ if !(self.min_side_px >= 16.0) => wrong("min_side_px", "be at least 16"),
+            _ if !(16.0..1e5).contains(&self.min_side_px) => wrong("min_side_px", "be at least 16"),
             _ if !(1.02..=4.0).contains(&self.scale_step) => {
                 wrong("scale_step", "lie between 1.02 and 4")
             }
-            _ if !(self.size_tolerance >= 1.0) => wrong("size_tolerance", "be at least 1"),
+            _ if !(1.0..1e3).contains(&self.size_tolerance) => {
+                wrong("size_tolerance", "be at least 1")
+            }
             _ => Ok(()),
         }
     }

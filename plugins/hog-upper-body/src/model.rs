@@ -104,9 +104,7 @@ pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let (heads, tails) = (a.chunks_exact(8), b.chunks_exact(8));
     let rest: f32 = heads.remainder().iter().zip(tails.remainder()).map(|(x, y)| x * y).sum();
     for (x, y) in heads.zip(tails) {
-        for lane in 0..8 {
-            lanes[lane] += x[lane] * y[lane];
-        }
+        lanes.iter_mut().zip(x.iter().zip(y)).for_each(|(lane, (x, y))| *lane += x * y);
     }
     lanes.iter().sum::<f32>() + rest
 }

@@ -275,12 +275,13 @@ mod tests {
 
     use super::*;
 
-    /// Everybody fits everywhere, as a person-shaped cupboard may.
-    struct Flattering;
+    /// Everybody fits everywhere and explains so many nats, as a cupboard that
+    /// looks like a person may.
+    struct Flattering(f64);
 
     impl Likelihood for Flattering {
         fn log_likelihood(&self, _frame: &Frame, scene: &[Person]) -> Result<f64> {
-            Ok(5.0 * scene.len() as f64)
+            Ok(self.0 * scene.len() as f64)
         }
     }
 
@@ -297,19 +298,39 @@ mod tests {
         Detection { region, position, covariance, score: 3.0, source: "drawn" }
     }
 
-    #[test]
-    fn a_silhouette_that_no_detector_finds_is_not_believed_for_long() {
+    /// In which of twelve frames without a sighting a person is seen who
+    /// explains so many nats, and whether after one more with a sighting.
+    fn seen(nats: f64) -> (Vec<bool>, bool) {
         let (mut filter, id) = (JointParticle::new(Config::default(), 1).unwrap(), TrackId(1));
         let (frame, detection) = (frame(), detection());
+        let flattering = Flattering(nats);
         filter.start(id, &detection);
         let mut is_seen = |matched: &[Matched<'_>]| {
             filter.predict(&frame.motion);
-            let likelihood: Option<&dyn Likelihood> = Some(&Flattering);
+            let likelihood: Option<&dyn Likelihood> = Some(&flattering);
             let evidence = Evidence { frame: &frame, matched, unmatched: &[], likelihood };
             filter.update(&evidence).unwrap().contains_key(&id)
         };
         let seen: Vec<bool> = (0..12).map(|_| is_seen(&[])).collect();
+        let again = is_seen(&[Matched { id, detection: &detection }]);
+        (seen, again)
+    }
+
+    #[test]
+    fn a_silhouette_that_no_detector_finds_is_not_believed_for_long() {
+        let (seen, again) = seen(5.0);
         assert!(seen[..9].iter().all(|seen| *seen) && !seen[10] && !seen[11], "{seen:?}");
-        assert!(is_seen(&[Matched { id, detection: &detection }]), "found again");
+        assert!(again, "found again");
+    }
+
+    #[test]
+    fn who_explains_most_of_the_image_is_believed_without_a_detector() {
+        assert_eq!(seen(7.0), (vec![true; 12], true));
+    }
+
+    #[test]
+    fn a_sighting_and_a_silhouette_that_hardly_fits_are_enough_together() {
+        let (unfound, found) = seen(1.0);
+        assert!(found && !unfound[1], "{unfound:?}");
     }
 }

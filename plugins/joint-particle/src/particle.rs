@@ -209,6 +209,22 @@ mod tests {
     }
 
     #[test]
+    fn who_is_held_moves_and_spreads_across_the_view_alone() {
+        let mut held = gaussian([0.1; 25]);
+        held.mean[4] = -0.6;
+        let before = held.person();
+        let along = Vector2::x();
+        held.mean[0] += 0.1 * before.velocity.x;
+        held.hold(&along, 0.1);
+        assert!((held.person().position - before.position).norm() < 1e-12);
+        assert_eq!(held.person().velocity, Vector2::new(0.0, -0.6));
+        for still in [0, 2, 3] {
+            assert_eq!(held.covariance.row(still).norm(), 0.0);
+        }
+        assert!(held.covariance[(1, 1)] > 0.0 && held.covariance[(4, 4)] > 0.0);
+    }
+
+    #[test]
     fn a_place_fixed_in_the_world_moves_as_the_robot_sees_it() {
         let motion = Motion { forward: 0.3, left: 0.1, turn: 0.2, ..Motion::at_rest(0.1) };
         let mut particle = gaussian([0.0; 25]);

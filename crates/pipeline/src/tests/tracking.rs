@@ -307,6 +307,16 @@ fn two_tracks_of_one_person_become_the_older_one() {
 }
 
 #[test]
+fn nobody_starts_where_somebody_is_seen() {
+    let config = format!("{PLAIN}\n[lifecycle]\nduplicate_m = 0.3");
+    let one = vec![person(3.0, 0.0)];
+    let frames = [one.clone(), vec![person(3.0, 0.0), person(3.0, 0.28)], one];
+    let reports = World::of(frames).run(&config, 3, 0.1);
+    assert!(reports.iter().all(|report| ids(report) == [1]));
+    assert_eq!(reports[1].funnel.count("tracked already"), 1);
+}
+
+#[test]
 fn too_many_detections_and_tracks_are_dropped_lowest_score_first() {
     let crowd = || (0..8).map(|i| scored(f64::from(i), person(3.0, f64::from(i) * 0.4 - 1.4)));
     let config = format!("association.max_detections = 6\nlifecycle.max_tracks = 4\n{PLAIN}");

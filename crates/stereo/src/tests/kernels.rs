@@ -228,7 +228,8 @@ proptest! {
         prop_assert_eq!(found.values.len(), pair[0].pixels().len());
         for (at, value) in found.values.iter().enumerate() {
             let column = (at % found.width) as f32;
-            prop_assert!(value.is_nan() || (-0.5..=column + 0.5).contains(value));
+            // Half a pixel for the parabola, and half for the refinement.
+            prop_assert!(value.is_nan() || (-0.5..=column + 1.0).contains(value));
             prop_assert_eq!(value.is_nan() && found.confidences[at] > 0, false);
         }
     }

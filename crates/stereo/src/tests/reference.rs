@@ -223,12 +223,11 @@ fn equation(pair: &[GreyImage], x: i64, y: i64, d: f64) -> (f64, f64) {
 /// Sums of squares and products around the means, over the window's part of a row
 /// that is of one surface with column `x`.
 fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
-    let jumps = |a: usize, b: usize| (row[a] - row[b]).abs() > 1.0 || row[a].is_nan();
-    let from = (x.saturating_sub(radius) + 1..=x).rev().find(|x| jumps(*x, x - 1));
-    let to =
-        (x + 1..(x + radius + 1).min(row.len())).find(|x| jumps(*x, x - 1) || row[*x].is_nan());
-    let window =
-        from.unwrap_or(x.saturating_sub(radius))..to.unwrap_or((x + radius + 1).min(row.len()));
+    let goes_on = |x: &usize| (row[*x] - row[x - 1]).abs() <= 1.0;
+    let (low, high) = (x.saturating_sub(radius), (x + radius + 1).min(row.len()));
+    let from = (low + 1..=x).rev().find(|x| !goes_on(x)).unwrap_or(low);
+    let to = (x + 1..high).find(|x| !goes_on(x)).unwrap_or(high);
+    let window = from..to;
     let all: Vec<(f64, f64)> =
         window.map(|x| equation(pair, x as i64, y as i64, row[x].into())).collect();
     let n = all.len() as f64;
