@@ -170,7 +170,11 @@ impl Scene {
         let after =
             if self.uncertain { config.adapt_s.min(MOVING_ADAPT_S) } else { config.adapt_s };
         let dt_s = frame.motion.dt as f32;
-        let absorb_s = if config.absorb_s > 0.0 { config.absorb_s as f32 } else { f32::INFINITY };
+        let absorb_s = match config.absorb_s {
+            after_s if after_s <= 0.0 => f32::INFINITY,
+            after_s if self.uncertain => after_s.min(MOVING_ABSORB_S) as f32,
+            after_s => after_s as f32,
+        };
         let part = if after > 0.0 { dt_s / after as f32 } else { 0.0 };
         let pace = Pace { part, absorb_s, dt_s };
         let colour = frame.images().colour.as_deref();
@@ -182,8 +186,10 @@ impl Scene {
     }
 }
 
-/// The background follows within this while the robot moves, s.
+/// The background follows within this while the robot moves, s ...
 const MOVING_ADAPT_S: f64 = 1.0;
+/// ... and where it no longer fits, it is given up after this, s.
+const MOVING_ABSORB_S: f64 = 1.5;
 
 /// The largest runs that may be people, largest first.
 fn people(

@@ -1,1 +1,204 @@
+use std::path::PathBuf;
+use std::sync::Arc;
 
+use nalgebra::{Point2, Point3};
+use tagalong_core::{
+    Camera, ConicalMirror, Context, Detection, Detector, Frame, Funnel, Images, Lens, Motion,
+    Panorama, Registry, RgbImage, Search, Stamp, Wheels,
+};
+
+use crate::{Config, Distance, Model, OmniAppearance};
+
+const COLUMNS: usize = 480;
+const ROWS: usize = 120;
+
+fn camera(height_m: f64) -> Arc<Camera> {
+    let d = [67.5_f64.to_radians(), 0.05, 2.0_f64.to_radians().tan(), 53.0_f64.to_radians().tan()];
+    let mirror = ConicalMirror::from_coefficients(1.0, [0.0; 2], &d).unwrap();
+    Arc::new(Camera {
+        lens: Lens::Panorama(Panorama { mirror, columns: COLUMNS, rows: ROWS }),
+        width: COLUMNS,
+        height: ROWS,
+        robot_from_camera: ConicalMirror::upright(height_m),
+    })
+}
+
+fn context() -> Context {
+    let wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+    Context { seed: 1, base_dir: PathBuf::from("."), wheels }
+}
+
+fn detector(config: Config) -> OmniAppearance {
+    OmniAppearance::new(Config { background_frames: 12, ..config }, &context()).unwrap()
+}
+
+fn analytic() -> Config {
+    Config { distance: Distance::Analytic, ..Config::default() }
+}
+
+/// A striped room with noise, and upright boxes with clothes of two colours,
+/// 1.75 m high and 0.45 m wide, that stand at these places of the robot frame.
+fn frame(index: u64, camera: &Arc<Camera>, people: &[Point2<f64>]) -> Frame {
+    let panorama = *camera.panorama().unwrap();
+    let mut state = index.wrapping_mul(0x9E37_79B9) | 1;
+    let mut image = RgbImage::from_fn(COLUMNS, ROWS, |x, y| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        let noise = ((state >> 40) % 5) as u8;
+        let wall = 130 + 20 * u8::from(x / 15 % 2 == 0) + y as u8 / 4;
+        [wall + noise, wall + noise / 2, wall - noise]
+    });
+    for place in people {
+        let range = place.coords.norm();
+        let head = camera.project(&Point3::new(place.x, place.y, 1.75)).unwrap();
+        let feet = camera.project(&Point3::new(place.x, place.y, 0.0)).unwrap();
+        let half = (0.225 / range).atan() / std::f64::consts::TAU * COLUMNS as f64;
+        for row in head.y.ceil().max(0.0) as usize..=(feet.y.floor() as usize).min(ROWS - 1) {
+            for column in (head.x - half).ceil() as i64..=(head.x + half).floor() as i64 {
+                let at = row * COLUMNS + column.rem_euclid(COLUMNS as i64) as usize;
+                let shirt = (row as f64) < 0.5 * (head.y + feet.y);
+                image.pixels_mut()[at] = if shirt { [200, 40, 40] } else { [20, 25, 60] };
+            }
+        }
+    }
+    assert!(panorama.mirror.is_sane());
+    let images = Images { colour: Some(Arc::new(image)), ..Images::default() };
+    let stamp = Stamp::from_nanos(index * 333_000_000);
+    Frame::new(index, stamp, Arc::clone(camera), Motion::at_rest(0.333), images)
+}
+
+fn see(detector: &mut OmniAppearance, frame: &Frame) -> Vec<Detection> {
+    let found = detector
+        .detect(frame, &Search::Everywhere { occupied: &[] }, &mut Funnel::default())
+        .unwrap();
+    detector.learn(frame, &[]).unwrap();
+    found
+}
+
+/// A detector that knows the empty room.
+fn ready(config: Config, camera: &Arc<Camera>) -> OmniAppearance {
+    let mut detector = detector(config);
+    for index in 1..=14 {
+        assert_eq!(see(&mut detector, &frame(index, camera, &[])), []);
+    }
+    detector
+}
+
+fn around(range: f64, bearing_deg: f64) -> Point2<f64> {
+    let (sine, cosine) = bearing_deg.to_radians().sin_cos();
+    Point2::new(range * cosine, range * sine)
+}
+
+#[test]
+fn people_are_found_all_around_and_across_the_seam() {
+    let camera = camera(1.55);
+    let mut detector = ready(analytic(), &camera);
+    for step in 0..24_u32 {
+        let place = around(2.5 + 0.1 * f64::from(step), 15.0 * f64::from(step) + 172.0);
+        let found = see(&mut detector, &frame(20 + u64::from(step), &camera, &[place]));
+        assert_eq!(found.len(), 1, "{place}");
+        let person = &found[0];
+        let off = (person.position.xy() - place).norm();
+        assert!(off < 0.35, "{place}: {:?}", person.position);
+        assert!((person.position.z - 1.63).abs() < 0.15, "{:?}", person.position);
+        assert!(person.is_sane() && person.covariance.cholesky().is_some());
+        assert!(person.region.x >= 0.0 && person.region.x < COLUMNS as f64, "{:?}", person.region);
+    }
+}
+
+#[test]
+fn by_the_printed_seam_a_person_behind_the_robot_is_in_front_of_it() {
+    let camera = camera(1.55);
+    let behind = around(3.0, 180.0);
+    let mut found = Vec::new();
+    for compat_printed_seam in [false, true] {
+        let mut detector = ready(Config { compat_printed_seam, ..analytic() }, &camera);
+        found.push(see(&mut detector, &frame(20, &camera, &[behind]))[0].position.x);
+    }
+    assert!(found[0] < -2.5 && found[1] > 2.5, "{found:?}");
+}
+
+#[test]
+fn three_people_are_three() {
+    let camera = camera(1.55);
+    let mut detector = ready(analytic(), &camera);
+    let places = [around(2.5, 178.0), around(3.5, 20.0), around(3.0, -60.0)];
+    let found = see(&mut detector, &frame(20, &camera, &places));
+    assert_eq!(found.len(), 3);
+    for place in places {
+        let near = |d: &&Detection| (d.position.xy() - place).norm() < 0.35;
+        assert_eq!(found.iter().filter(near).count(), 1, "{place}");
+    }
+}
+
+#[test]
+fn a_model_of_another_camera_is_refused_in_words() {
+    let low = camera(1.1);
+    let mut learned = ready(Config::default(), &low);
+    let person = frame(20, &low, &[around(2.5, 0.0)]);
+    let everywhere = Search::Everywhere { occupied: &[] };
+    let error = learned.detect(&person, &everywhere, &mut Funnel::default()).unwrap_err();
+    assert!(error.to_string().contains("another camera"), "{error}");
+    assert_eq!(see(&mut ready(analytic(), &low), &person).len(), 1);
+}
+
+#[test]
+fn the_shipped_model_is_one() {
+    let text = include_str!("../../../configs/models/omni-distance.toml");
+    let model = Model::from_text(text).unwrap();
+    assert_eq!(Model::from_text(&model.to_text()).unwrap(), model);
+    assert_eq!(model.people.len(), 2);
+    let refused = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();
+    assert!(refused("distance 1", "distance 9").contains("distance 9"));
+    assert!(refused("\"width\"", "\"girth\"").contains("features"));
+    assert!(refused("floor_offset_m = ", "floor_offset_m = inf #").contains("finite"));
+}
+
+#[test]
+fn somebody_whom_the_model_does_not_know_is_refused() {
+    let config = Config { person: "person-77".into(), ..Config::default() };
+    let error = OmniAppearance::new(config, &context()).err().unwrap().to_string();
+    assert!(error.contains("person-77") && error.contains("person-1"), "{error}");
+}
+
+#[test]
+fn it_keeps_the_promises_of_its_kind() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[cfg(feature = "train")]
+mod fits {
+    use super::*;
+    use crate::train::{Collector, Training, head};
+
+    /// People at known places: all ways to the distance get near it, and the same
+    /// seed gives the same head.
+    #[test]
+    fn a_head_is_fitted_to_people_whose_places_are_known() {
+        let camera = camera(1.55);
+        let config = Config { background_frames: 12, ..Config::default() };
+        let mut collector = Collector::new(config).unwrap();
+        for index in 1..=132 {
+            let range = 2.0 + 0.025 * (index as f64 * 7.0 % 100.0);
+            let place = around(range, 11.0 * index as f64);
+            let people = if index <= 12 { vec![] } else { vec![place] };
+            let heads: Vec<_> =
+                people.iter().map(|p: &Point2<f64>| (1, Point3::new(p.x, p.y, 1.63))).collect();
+            collector.add(&frame(index, &camera, &people), &heads).unwrap();
+        }
+        assert!(collector.samples.len() == 120 && collector.missed == 0);
+        let training =
+            Training { epochs: 300, rich_epochs: 300, restarts: 2, ..Training::default() };
+        let fitted = head(&collector.samples, &training, 3).unwrap();
+        assert_eq!(head(&collector.samples, &training, 3).unwrap(), fitted);
+        for how in [Distance::Network, Distance::Rich, Distance::Ridge, Distance::Analytic] {
+            let errors =
+                collector.samples.iter().map(|s| (s.distance(&fitted, how) - s.distance_m).abs());
+            let mean = errors.sum::<f64>() / 120.0;
+            assert!(mean < 0.12, "{how:?}: {mean}");
+        }
+        assert!(head(&collector.samples[..5], &training, 3).is_err());
+    }
+}
