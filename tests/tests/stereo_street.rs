@@ -46,7 +46,7 @@ fn a_pedestrian_at_eleven_metres_is_tracked_and_followed() {
         (place.xy() - PEDESTRIAN_M).norm() < 0.8
     });
     assert!(near.is_some(), "{:?}", last.tracks);
-    let wheels = reports.iter().filter_map(|report| report.command);
+    let wheels = reports.iter().filter_map(|report| report.command).map(|command| command.wheels);
     let moving = wheels.filter(|wheels| wheels.left + wheels.right > 0.0).count();
     assert!(moving > 0, "{:?}", reports.iter().map(|r| r.command).collect::<Vec<_>>());
 }

@@ -314,7 +314,8 @@ fn too_near(
     governor: &GovernorSettings,
 ) -> Option<String> {
     let stopping_m = governor.stopping_m(robot.max_speed_mps);
-    let distance_m = stand_off_m.filter(|distance| !(*distance >= stopping_m))?;
+    let stops = |distance: f64| distance >= stopping_m;
+    let distance_m = stand_off_m.filter(|distance| !stops(*distance))?;
     Some(format!(
         "a robot at {} m/s needs {stopping_m:.2} m to stop, and follows at {distance_m} m: raise \
          `stand_off_m` or lower `max_speed_mps` in [robot]",

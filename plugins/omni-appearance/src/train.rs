@@ -199,7 +199,8 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
     if samples.len() < 10 {
         return Err(Error::Other(format!("{} samples are too few to fit", samples.len())));
     }
-    let held = |s: &Sample| mix(s.frame / training.block_frames ^ seed) % training.held_out == 0;
+    let block = |s: &Sample| (s.frame / training.block_frames) ^ seed;
+    let held = |s: &Sample| mix(block(s)).is_multiple_of(training.held_out);
     let targets: Vec<f64> = samples.iter().map(|s| s.distance_m).collect();
     let held: Vec<bool> = samples.iter().map(held).collect();
     let printed: Vec<Vec<f64>> =

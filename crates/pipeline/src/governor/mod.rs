@@ -137,11 +137,12 @@ impl Governor {
 
     fn must_stop(&self, wish: &Wish) -> Option<Reason> {
         let Wish { wheels, has_target, settled, pause_s, .. } = wish;
+        let in_time = *pause_s <= self.settings.stop_after_s;
         if self.fault.is_some() {
             Some(Reason::Fault)
         } else if !settled {
             Some(Reason::Settling)
-        } else if !(*pause_s <= self.settings.stop_after_s) {
+        } else if !in_time {
             Some(Reason::Stalled)
         } else if !has_target {
             Some(Reason::NoTarget)
