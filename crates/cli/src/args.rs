@@ -8,8 +8,8 @@ use crate::demo::DemoArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::simulate::SimulateArgs;
 use crate::train::TrainArgs;
-use crate::triangulate::TriangulateArgs;
 use crate::trials::TrialsArgs;
+use crate::triangulate::TriangulateArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.
