@@ -371,7 +371,9 @@ fn filters(title: &str, walks: &[Walk]) -> Table {
         columns: ["error", "difference to the model alone"].map(String::from).to_vec(),
         rows,
         notes: vec![
-            format!("{images} images of two walks; the shipped model, fitted to other scenes"),
+            format!(
+                "{images} images of two walks; the shipped model, fitted to another draw of this scene"
+            ),
             "Differences are paired, by a bootstrap of blocks of 5 s: neighbouring images are not \
              independent, as the paper's t-test takes them to be."
                 .into(),
