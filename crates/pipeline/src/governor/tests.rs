@@ -60,7 +60,8 @@ fn speed_grows_no_faster_than_it_may() {
 
 #[test]
 fn each_reason_to_stop_stops_at_once() {
-    let stops: [(Reason, fn(Wish) -> Wish); 4] = [
+    type Change = fn(Wish) -> Wish;
+    let stops: [(Reason, Change); 4] = [
         (Reason::NoTarget, |wish| Wish { has_target: false, ..wish }),
         (Reason::Settling, |wish| Wish { settled: false, ..wish }),
         (Reason::Stalled, |wish| Wish { pause_s: 0.6, ..wish }),
