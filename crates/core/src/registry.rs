@@ -402,10 +402,4 @@ mod tests {
         assert_eq!(refusal("fixed"), fixed);
         assert!(refusal("countng").contains("did you mean `counting`?"));
     }
-
-    #[test]
-    #[should_panic(expected = "no plugin is called `counting`")]
-    fn a_trainer_needs_its_plugin() {
-        Registry::default().trainer("counting", |_: Config, _| Ok(Counting));
-    }
 }

@@ -42,7 +42,9 @@ fn every_scene_can_be_drawn_for_every_split_and_camera() {
             let scene = parse(&variant);
             assert_eq!((scene.split(), &scene), (split, &parse(&variant)), "{name}");
             let shot = first_shot(scene.clone());
-            assert_eq!(shot.truth.len(), scene.number_of_people(), "{name}");
+            let late = scene.people.iter().filter(|person| person.enters_s > 0.0);
+            let late: usize = late.map(|person| 1 + person.companions).sum();
+            assert_eq!(shot.truth.len() + late, scene.number_of_people(), "{name}");
             for kind in ["rgbd", "stereo"] {
                 let other = parse(&variant.clone().with("camera.kind", kind));
                 assert_eq!(other.camera.kind == CameraKind::Stereo, kind == "stereo", "{name}");
