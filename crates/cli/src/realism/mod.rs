@@ -156,9 +156,14 @@ fn scenes(text: &str, seeds: u64) -> Vec<Scene> {
 /// All frames of a scene; those of a stereo pair with the depth that the stage
 /// of the pipelines finds.
 fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn> + use<> {
+    drawn_with(scene, StereoSettings::default())
+}
+
+/// The same with depth by other settings of the stage.
+fn drawn_with(scene: &Scene, settings: StereoSettings) -> impl Iterator<Item = Drawn> + use<> {
     let mut draw = Draw::new(scene, crate::simulate::threads(None));
     let is_pair = scene.camera.kind == CameraKind::Stereo;
-    let mut stereo = StereoDepth::new(StereoSettings::default()).ok().filter(|_| is_pair);
+    let mut stereo = StereoDepth::new(settings).ok().filter(|_| is_pair);
     std::iter::from_fn(move || {
         let drawn = draw.next_frame()?;
         let depth = stereo.as_mut().map(|s| s.depth(&drawn.frame, &mut Funnel::default()));
