@@ -125,6 +125,7 @@ impl Pipeline {
             resolved,
             frames: 0,
             failed: None,
+            sketches: false,
         };
         Ok((pipeline, run))
     }
