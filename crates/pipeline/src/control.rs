@@ -2,7 +2,7 @@ use tagalong_core::{Command, Controller, Frame, Scene, Stamp, Track, TrackId};
 
 use crate::boundary::{StepError, contain};
 use crate::governor::{Ahead, Governor, Wish, ahead};
-use crate::{GovernorSettings, RobotSettings};
+use crate::{CorridorSettings, GovernorSettings, RobotSettings};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
@@ -14,7 +14,6 @@ pub(crate) struct Steering {
     name: String,
     controller: Box<dyn Controller>,
     governor: Governor,
-    corridor: GovernorSettings,
     robot: RobotSettings,
     target: Option<TrackId>,
     fresh: u32,
@@ -31,8 +30,7 @@ impl Steering {
         Self {
             name,
             controller,
-            governor: Governor::new(settings.clone(), robot.wheels(), robot.max_speed_mps),
-            corridor: settings,
+            governor: Governor::new(settings, robot.wheels(), robot.max_speed_mps),
             robot,
             target: None,
             fresh: FRESH_FRAMES,
@@ -83,7 +81,7 @@ impl Steering {
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };
         self.last = Some(frame.stamp);
-        let look = |curvature| look(&self.corridor, frame, curvature, target.as_ref());
+        let look = |corridor: &_, curvature| look(corridor, frame, curvature, target.as_ref());
         Ok((self.governor.govern(&wish, look), target.map(|track| track.id)))
     }
 
@@ -105,12 +103,12 @@ impl Steering {
 
 /// What the depth image shows ahead; nothing to say without one.
 fn look(
-    settings: &GovernorSettings,
+    corridor: &CorridorSettings,
     frame: &Frame,
     curvature: f64,
     target: Option<&Track>,
 ) -> Option<Ahead> {
     let depth = frame.depth().ok()?;
     let target = target.map(|track| track.estimate.person.position.xy());
-    Some(ahead(&settings.corridor, &frame.camera, depth, curvature, target))
+    Some(ahead(corridor, &frame.camera, depth, curvature, target))
 }

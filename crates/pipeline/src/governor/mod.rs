@@ -77,13 +77,13 @@ impl Governor {
         Self { settings, wheels, max_speed_mps, last: None, fault: None }
     }
 
-    /// The command for a frame; `look` says what is ahead on an arc of a
-    /// curvature, and is asked only where the robot may move. `None` of it is a
-    /// robot without depth.
+    /// The command for a frame; `look` says what is ahead in the corridor along
+    /// an arc of a curvature, and is asked only where the robot may move. `None`
+    /// of it is a robot without depth.
     pub(crate) fn govern(
         &mut self,
         wish: &Wish,
-        look: impl FnOnce(f64) -> Option<Ahead>,
+        look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
     ) -> Command {
         let (wheels, reason) = match self.must_stop(wish) {
             Some(reason) => (WheelSpeeds::STOP, reason),
@@ -156,7 +156,7 @@ impl Governor {
     fn limited(
         &self,
         wish: &Wish,
-        look: impl FnOnce(f64) -> Option<Ahead>,
+        look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
     ) -> (WheelSpeeds, Reason) {
         let (wanted, mut reason) = self.within_drive(wish.wheels);
         let (mut cap, mut why) = (self.max_speed_mps, Reason::Limited);
@@ -164,7 +164,7 @@ impl Governor {
             (cap, why) = (0.5 * cap, Reason::Slow);
         }
         if wanted.forward > STILL_MPS {
-            match look(wanted.curvature()) {
+            match look(&self.settings.corridor, wanted.curvature()) {
                 Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
                 Some(Ahead::Something(at_m)) if self.speed_before(at_m) < cap => {
                     (cap, why) = (self.speed_before(at_m), Reason::Obstacle);
@@ -180,27 +180,23 @@ impl Governor {
             reason = Reason::Limited;
         }
         if ramped.forward.abs() > cap {
-            return (self.in_reach(ramped.scaled(cap / ramped.forward.abs())), why);
+            let slower = ramped.scaled(cap / ramped.forward.abs());
+            return (self.in_reach(slower.wheels(&self.wheels)), why);
         }
-        (self.in_reach(ramped), reason)
+        (self.in_reach(ramped.wheels(&self.wheels)), reason)
     }
 
     /// As fast as the drive can and the turn rate may, on the same arc.
     fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, Reason) {
-        let WheelSpeeds { left, right } = wheels;
-        // Half of it first, for the sum of two finite numbers may be infinite.
-        let fastest = (0.5 * left).abs().max((0.5 * right).abs()) * 2.0;
-        let scale = self.max_speed_mps / fastest.max(self.max_speed_mps);
-        let shorter = WheelSpeeds { left: left * scale, right: right * scale };
-        let twist = Twist::of(shorter, &self.wheels);
+        let twist = Twist::of(self.in_reach(wheels), &self.wheels);
         let twist = match self.settings.reverse {
             false if twist.forward < 0.0 => Twist { forward: 0.0, ..twist },
             _ => twist,
         };
         let limit = self.settings.max_turn_radps;
         let slower = twist.scaled(limit / twist.turn.abs().max(limit));
-        let WheelSpeeds { left: l, right: r } = slower.wheels(&self.wheels);
-        let as_wished = (l - left).abs() + (r - right).abs() < STILL_MPS;
+        let WheelSpeeds { left, right } = slower.wheels(&self.wheels);
+        let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
         (slower, if as_wished { Reason::Follow } else { Reason::Limited })
     }
 
@@ -233,11 +229,11 @@ impl Governor {
         Twist { forward, turn }
     }
 
-    /// Wheels within their limit after all.
-    fn in_reach(&self, twist: Twist) -> WheelSpeeds {
-        let WheelSpeeds { left, right } = twist.wheels(&self.wheels);
-        let scale = self.max_speed_mps / left.abs().max(right.abs()).max(self.max_speed_mps);
-        let limit = |speed: f64| (speed * scale).clamp(-self.max_speed_mps, self.max_speed_mps);
+    /// As fast as the faster wheel can, on the same arc.
+    fn in_reach(&self, WheelSpeeds { left, right }: WheelSpeeds) -> WheelSpeeds {
+        let most = self.max_speed_mps;
+        let scale = most / left.abs().max(right.abs()).max(most);
+        let limit = |speed: f64| (speed * scale).clamp(-most, most);
         WheelSpeeds { left: limit(left), right: limit(right) }
     }
 }

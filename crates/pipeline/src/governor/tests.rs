@@ -20,7 +20,7 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
     }
 }
 
-fn free(_: f64) -> Option<Ahead> {
+fn free(_: &CorridorSettings, _: f64) -> Option<Ahead> {
     Some(Ahead::Free)
 }
 
@@ -90,7 +90,7 @@ fn late_frames_halve_the_speed_and_later_ones_stop() {
 fn an_obstacle_slows_and_then_stops() {
     let speed = |at_m| {
         let (mut governor, _) = at_speed(0.8, 0.8);
-        governor.govern(&wish(40, 0.8, 0.8), |_| Some(Ahead::Something(at_m)))
+        governor.govern(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Something(at_m)))
     };
     assert_eq!(speed(2.5).reason, Reason::Follow);
     let near = speed(0.6);
@@ -102,7 +102,7 @@ fn an_obstacle_slows_and_then_stops() {
 #[test]
 fn before_an_obstacle_the_robot_may_still_turn_in_place() {
     let mut governor = governor();
-    let command = governor.govern(&wish(1, 0.1, 0.3), |_| Some(Ahead::Something(0.1)));
+    let command = governor.govern(&wish(1, 0.1, 0.3), |_, _| Some(Ahead::Something(0.1)));
     assert_eq!(command.reason, Reason::Blocked);
     assert!(command.wheels.left < 0.0 && command.wheels.left == -command.wheels.right);
 }
@@ -110,7 +110,7 @@ fn before_an_obstacle_the_robot_may_still_turn_in_place() {
 #[test]
 fn a_blind_camera_stops() {
     let (mut governor, _) = at_speed(0.8, 0.8);
-    let command = governor.govern(&wish(40, 0.8, 0.8), |_| Some(Ahead::Blind));
+    let command = governor.govern(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Blind));
     assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Blind));
 }
 
@@ -201,7 +201,7 @@ proptest! {
         for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
             let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
             let wish = Wish { stamp, ..wish };
-            let command = governor.govern(&wish, |_| ahead);
+            let command = governor.govern(&wish, |_, _| ahead);
             let WheelSpeeds { left, right } = command.wheels;
             prop_assert!(left.abs() <= MAX_MPS && right.abs() <= MAX_MPS, "{command:?}");
             if !command.reason.moves() && command.reason != Reason::Blocked {
