@@ -44,6 +44,11 @@ impl Steering {
         self.fresh = 0;
     }
 
+    /// The distance that the controller keeps, m, if it keeps one.
+    pub(crate) fn stand_off_m(&self) -> Option<f64> {
+        self.controller.stand_off_m()
+    }
+
     pub(crate) fn governor(&self) -> &Governor {
         &self.governor
     }

@@ -98,6 +98,17 @@ impl Pipeline {
         self.steering.as_ref().map(|steering| steering.governor().at(now))
     }
 
+    /// True if the config has a controller: frames lead to commands.
+    pub fn has_controller(&self) -> bool {
+        self.steering.is_some()
+    }
+
+    /// The distance that the controller keeps from the person, m, if there is a
+    /// controller and it keeps one.
+    pub fn stand_off_m(&self) -> Option<f64> {
+        self.steering.as_ref()?.stand_off_m()
+    }
+
     /// Why nothing moves until [`Pipeline::arm`], if so.
     pub fn fault(&self) -> Option<&'static str> {
         self.steering.as_ref()?.governor().fault()
