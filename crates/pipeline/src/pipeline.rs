@@ -335,8 +335,12 @@ impl Pipeline {
     fn start_newcomers(&mut self, now: &mut Now<'_>) -> Result<BTreeSet<TrackId>, StepError> {
         let mut started = BTreeSet::new();
         let start_score = self.settings.lifecycle.start_score;
+        let undecided = now.sightings.undecided();
+        if undecided.is_empty() {
+            return Ok(started);
+        }
         let known = self.supported_places(now)?;
-        for index in now.sightings.undecided() {
+        for index in undecided {
             let sighting = now.sightings.get(index).clone();
             if self.is_known(&known, &sighting.detection) {
                 now.sightings.settle(index, Fate::Dropped("tracked already"));
@@ -363,8 +367,8 @@ impl Pipeline {
     }
 
     /// Where the people are whom this frame supports.
-    fn supported_places(&mut self, now: &mut Now<'_>) -> Result<Vec<Point3<f64>>, StepError> {
-        let mut estimates = self.estimates(now)?;
+    fn supported_places(&mut self, now: &Now<'_>) -> Result<Vec<Point3<f64>>, StepError> {
+        let mut estimates = self.believed(now)?;
         estimates.retain(|id, _| now.supports.contains_key(id));
         Ok(estimates.values().map(|estimate| estimate.person.position).collect())
     }
@@ -485,8 +489,7 @@ impl Pipeline {
     /// The beliefs of all tracks. One that is missing or not finite ends its
     /// track: no such number leaves the pipeline.
     fn estimates(&mut self, now: &mut Now<'_>) -> Result<BTreeMap<TrackId, Estimate>, StepError> {
-        let Slot { name, plugin: filter } = &mut self.filter;
-        let mut all = contain(name, now.frame.index, || filter.estimates(&now.frame.camera))?;
+        let mut all = self.believed(now)?;
         let before = all.len();
         all.retain(|id, _| self.lifecycle.get(*id).is_some());
         now.report.funnel.drop_many("estimate of an unknown track", (before - all.len()) as u64);
@@ -497,6 +500,12 @@ impl Pipeline {
             }
         }
         Ok(all)
+    }
+
+    /// What the filter says of the people, as it says it.
+    fn believed(&mut self, now: &Now<'_>) -> Result<BTreeMap<TrackId, Estimate>, StepError> {
+        let Slot { name, plugin: filter } = &mut self.filter;
+        contain(name, now.frame.index, || filter.estimates(&now.frame.camera))
     }
 
     fn end(&mut self, now: &mut Now<'_>, id: TrackId, test: &'static str) -> Result<(), StepError> {
