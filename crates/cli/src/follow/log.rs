@@ -22,6 +22,10 @@ struct FrameJson {
     stamp_ns: u64,
     frame: u64,
     target: Option<u32>,
+    state: Option<&'static str>,
+    why: Option<&'static str>,
+    belief: Option<f64>,
+    likeness: Vec<(u32, f64)>,
     wheels_mps: Option<[f64; 2]>,
     reason: Option<&'static str>,
     valid_until_ns: Option<u64>,
@@ -73,10 +77,16 @@ impl Witness for RideLog {
 
 fn json(report: &FrameReport) -> String {
     let command = report.command.as_ref();
+    let lock = report.lock.as_ref();
+    let likeness = lock.iter().flat_map(|lock| &lock.likeness);
     let frame = FrameJson {
         stamp_ns: report.stamp.nanos(),
         frame: report.index,
         target: report.target.map(|id| id.0),
+        state: lock.map(|lock| lock.state.name()),
+        why: lock.map(|lock| lock.why),
+        belief: lock.and_then(|lock| lock.belief),
+        likeness: likeness.map(|(id, likeness)| (id.0, *likeness)).collect(),
         wheels_mps: command.map(|command| [command.wheels.left, command.wheels.right]),
         reason: command.map(|command| command.reason.name()),
         valid_until_ns: command.map(|command| command.valid_until.nanos()),

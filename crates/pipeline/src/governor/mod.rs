@@ -26,12 +26,37 @@ pub(crate) struct Wish {
     pub(crate) wheels: WheelSpeeds,
     /// Stamp of the frame.
     pub(crate) stamp: Stamp,
-    /// Somebody is followed.
-    pub(crate) has_target: bool,
+    /// What the robot moves for.
+    pub(crate) aim: Aim,
     /// Enough frames since the start or a jump.
     pub(crate) settled: bool,
     /// Time since the frame before, s.
     pub(crate) pause_s: f64,
+}
+
+/// What the robot moves for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// Nothing: it stands.
+    Nobody,
+    /// A person who is followed.
+    Person,
+    /// Somebody who may not be the person: at half speed.
+    Perhaps,
+    /// To find the person again, at half speed.
+    Search,
+}
+
+impl Aim {
+    /// The reason for an ordinary command.
+    fn reason(self) -> Reason {
+        match self {
+            Self::Nobody => Reason::NoTarget,
+            Self::Person => Reason::Follow,
+            Self::Perhaps => Reason::Unsure,
+            Self::Search => Reason::Search,
+        }
+    }
 }
 
 /// See the [module](self).
@@ -136,7 +161,7 @@ impl Governor {
     }
 
     fn must_stop(&self, wish: &Wish) -> Option<Reason> {
-        let Wish { wheels, has_target, settled, pause_s, .. } = wish;
+        let Wish { wheels, aim, settled, pause_s, .. } = wish;
         let in_time = *pause_s <= self.settings.stop_after_s;
         if self.fault.is_some() {
             Some(Reason::Fault)
@@ -144,7 +169,7 @@ impl Governor {
             Some(Reason::Settling)
         } else if !in_time {
             Some(Reason::Stalled)
-        } else if !has_target {
+        } else if *aim == Aim::Nobody {
             Some(Reason::NoTarget)
         } else if !(wheels.left.is_finite() && wheels.right.is_finite()) {
             Some(Reason::NotFinite)
@@ -158,10 +183,13 @@ impl Governor {
         wish: &Wish,
         look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
     ) -> (WheelSpeeds, Reason) {
-        let (wanted, mut reason) = self.within_drive(wish.wheels);
+        let (wanted, as_wished) = self.within_drive(wish.wheels);
         let (mut cap, mut why) = (self.max_speed_mps, Reason::Limited);
+        if wish.aim != Aim::Person {
+            (cap, why) = (0.5 * cap, wish.aim.reason());
+        }
         if wish.pause_s > self.settings.slow_after_s {
-            (cap, why) = (0.5 * cap, Reason::Slow);
+            (cap, why) = (0.5 * self.max_speed_mps, Reason::Slow);
         }
         if wanted.forward > STILL_MPS {
             match look(&self.settings.corridor, wanted.curvature()) {
@@ -176,9 +204,8 @@ impl Governor {
             return (Twist { forward: 0.0, ..wanted }.wheels(&self.wheels), Reason::Blocked);
         }
         let ramped = self.ramped(wanted, wish.stamp);
-        if ramped != wanted {
-            reason = Reason::Limited;
-        }
+        let as_wished = as_wished && ramped == wanted;
+        let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
         if ramped.forward.abs() > cap {
             let slower = ramped.scaled(cap / ramped.forward.abs());
             return (self.in_reach(slower.wheels(&self.wheels)), why);
@@ -186,8 +213,9 @@ impl Governor {
         (self.in_reach(ramped.wheels(&self.wheels)), reason)
     }
 
-    /// As fast as the drive can and the turn rate may, on the same arc.
-    fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, Reason) {
+    /// As fast as the drive can and the turn rate may, on the same arc, and
+    /// whether that is as wished.
+    fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
         let twist = Twist::of(self.in_reach(wheels), &self.wheels);
         let twist = match self.settings.reverse {
             false if twist.forward < 0.0 => Twist { forward: 0.0, ..twist },
@@ -197,7 +225,7 @@ impl Governor {
         let slower = twist.scaled(limit / twist.turn.abs().max(limit));
         let WheelSpeeds { left, right } = slower.wheels(&self.wheels);
         let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
-        (slower, if as_wished { Reason::Follow } else { Reason::Limited })
+        (slower, as_wished)
     }
 
     /// The speed from which the robot still stops in time, m/s.

@@ -14,7 +14,7 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
     Wish {
         wheels: WheelSpeeds { left, right },
         stamp: Stamp::from_nanos(frame * 100_000_000),
-        has_target: true,
+        aim: Aim::Person,
         settled: true,
         pause_s: PERIOD_S,
     }
@@ -62,7 +62,7 @@ fn speed_grows_no_faster_than_it_may() {
 fn each_reason_to_stop_stops_at_once() {
     type Change = fn(Wish) -> Wish;
     let stops: [(Reason, Change); 4] = [
-        (Reason::NoTarget, |wish| Wish { has_target: false, ..wish }),
+        (Reason::NoTarget, |wish| Wish { aim: Aim::Nobody, ..wish }),
         (Reason::Settling, |wish| Wish { settled: false, ..wish }),
         (Reason::Stalled, |wish| Wish { pause_s: 0.6, ..wish }),
         (Reason::NotFinite, |wish| Wish {
@@ -84,6 +84,21 @@ fn late_frames_halve_the_speed_and_later_ones_stop() {
     let command = governor.govern(&late, free);
     assert_eq!(command.reason, Reason::Slow);
     assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
+}
+
+#[test]
+fn whoever_may_be_the_wrong_one_is_followed_at_half_speed() {
+    for (aim, reason) in [(Aim::Perhaps, Reason::Unsure), (Aim::Search, Reason::Search)] {
+        let (mut governor, _) = at_speed(0.8, 0.8);
+        let unsure = |frame| Wish { aim, ..wish(frame, 0.8, 0.8) };
+        let command = governor.govern(&unsure(40), free);
+        assert_eq!(command.reason, reason);
+        assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
+        let slow = Wish { wheels: WheelSpeeds { left: 0.3, right: 0.3 }, ..unsure(41) };
+        assert_eq!(governor.govern(&slow, free).reason, Reason::Limited);
+        let slow = Wish { stamp: Stamp::from_nanos(4_300_000_000), ..slow };
+        assert_eq!(governor.govern(&slow, free).reason, reason);
+    }
 }
 
 #[test]
@@ -178,12 +193,13 @@ fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
 }
 
 fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
-    let flags = (any::<bool>(), prop::bool::weighted(0.9), prop::bool::weighted(0.9));
+    let aims = [Aim::Person, Aim::Perhaps, Aim::Search, Aim::Nobody];
+    let flags = (any::<bool>(), prop::sample::select(&aims[..]), prop::bool::weighted(0.9));
     (any_number(), any_number(), flags, any_number(), any_ahead()).prop_map(
         |(left, right, flags, pause, ahead)| {
-            let (short, has_target, settled) = flags;
+            let (short, aim, settled) = flags;
             let pause_s = if short { PERIOD_S } else { pause };
-            (Wish { has_target, settled, pause_s, ..wish(0, left, right) }, ahead)
+            (Wish { aim, settled, pause_s, ..wish(0, left, right) }, ahead)
         },
     )
 }
@@ -207,7 +223,7 @@ proptest! {
             if !command.reason.moves() && command.reason != Reason::Blocked {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
-            if !wish.has_target {
+            if wish.aim == Aim::Nobody {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
             let forward = 0.5 * (left + right);

@@ -221,8 +221,16 @@ impl RideJudge {
         nearest.is_some_and(|truth| truth.id == WHOM && off(&truth) <= self.same_m)
     }
 
-    fn likeness(&self, _: &Ride) -> Vec<(f64, bool)> {
-        Vec::new()
+    fn likeness(&self, ride: &Ride) -> Vec<(f64, bool)> {
+        let frames = ride.moments.iter().zip(&ride.reports);
+        let of_frame = |(moment, report): (&Moment, &FrameReport)| -> Vec<(f64, bool)> {
+            let seen = |id| report.tracks.iter().find(|track| track.id == id && track.seen);
+            let likeness = report.lock.iter().flat_map(|lock| &lock.likeness);
+            likeness
+                .filter_map(|(id, likeness)| Some((*likeness, self.is_of(seen(*id)?, moment))))
+                .collect()
+        };
+        frames.flat_map(of_frame).collect()
     }
 }
 
