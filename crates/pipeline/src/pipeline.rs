@@ -9,7 +9,7 @@ use tagalong_stereo::StereoDepth;
 
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
-use crate::control::Steering;
+use crate::control::{Steered, Steering};
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
@@ -96,6 +96,25 @@ impl Pipeline {
     /// controller.
     pub fn command_at(&self, now: Stamp) -> Option<Command> {
         self.steering.as_ref().map(|steering| steering.governor().at(now))
+    }
+
+    /// Follows the person of this track from the next frame on, and forgets whom
+    /// it followed before.
+    pub fn choose_target(&mut self, track: TrackId) {
+        if let Some(steering) = &mut self.steering {
+            steering.follow(track);
+        }
+    }
+
+    /// True if the config has a controller: frames lead to commands.
+    pub fn has_controller(&self) -> bool {
+        self.steering.is_some()
+    }
+
+    /// The distance that the controller keeps from the person, m, if there is a
+    /// controller and it keeps one.
+    pub fn stand_off_m(&self) -> Option<f64> {
+        self.steering.as_ref()?.stand_off_m()
     }
 
     /// Why nothing moves until [`Pipeline::arm`], if so.
@@ -419,11 +438,12 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        let (command, target) = steering.steer(now.frame, &now.report.tracks)?;
+        let Steered { command, target, lock } = steering.steer(now.frame, &now.report.tracks)?;
         now.report
             .funnel
             .drop_many("command not finite", u64::from(command.reason == Reason::NotFinite));
         now.report.target = target;
+        now.report.lock = Some(lock);
         now.report.command = Some(command);
         Ok(())
     }

@@ -31,6 +31,8 @@ const CROWD_PAIRS: f64 = 0.3;
 const STEP_NS: u64 = 20_000_000;
 /// People keep this far away from the middle of the robot, m.
 const ROBOT_M: f64 = 0.5;
+/// Half the width of a person, m.
+const BODY_M: f64 = 0.2;
 /// Below this visible fraction nobody can be expected to find somebody.
 const LEAST_VISIBLE: f64 = 0.2;
 
@@ -116,6 +118,15 @@ pub struct Truth {
     pub ignore: bool,
 }
 
+/// How much room a robot has, m; negative is contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clearance {
+    /// To the nearest person; infinite where nobody is.
+    pub people_m: f64,
+    /// To the nearest piece of furniture or wall.
+    pub things_m: f64,
+}
+
 /// A scene in motion. Same scene, same events, whatever the number of threads.
 pub struct Simulation {
     scene: Scene,
@@ -199,6 +210,23 @@ impl Simulation {
     /// for the robot is left alone.
     pub fn steer(&mut self, command: WheelSpeeds) {
         self.robot.steer(self.now_ns as f64 * 1e-9, command);
+    }
+
+    /// How much room a round robot of this radius has where it is.
+    pub fn clearance(&self, radius_m: f64) -> Clearance {
+        let robot = Point2::from(self.robot.pose.translation.vector);
+        let gap = |at: &Point2<f64>, its_m: f64| (at - robot).norm() - its_m - radius_m;
+        let people = self.present().map(|(walker, _)| gap(&walker.stance.place, BODY_M));
+        let things = self.obstacles.iter().map(|o| gap(&o.at, o.radius_m));
+        let walls = self.scene.room.size_m.into_iter().zip([robot.x, robot.y]);
+        let walls = walls.map(|(size_m, at)| at.min(size_m - at) - radius_m);
+        let least = |gaps: &mut dyn Iterator<Item = f64>| gaps.fold(f64::INFINITY, f64::min);
+        Clearance { people_m: least(&mut { people }), things_m: least(&mut things.chain(walls)) }
+    }
+
+    /// The robot's forward speed over ground, m/s.
+    pub fn speed_mps(&self) -> f64 {
+        self.robot.speed_mps()
     }
 
     /// The next thing that the robot records; `None` at the end of the scene.
