@@ -4,7 +4,6 @@ use tagalong_core::GreyImage;
 
 use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
-use crate::texture::TextureTest;
 use crate::winner::Winner;
 use crate::{Dropped, Method, StereoSettings, cost, paths, window, winner};
 
@@ -26,7 +25,6 @@ pub struct Strip {
     /// Costs of the rows in the window, and their sums.
     ring: Vec<Vec<u8>>,
     columns: Vec<u8>,
-    texture: TextureTest,
     /// What was dropped.
     pub dropped: Dropped,
 }
@@ -142,11 +140,6 @@ impl Strip {
                 (*disparity, *confidence) = (winner.refined(), (winner.margin() * 255.0) as u8);
             }
         }
-        let y = output.first_row + row;
-        let near = [y.saturating_sub(1), y, (y + 1).min(pair.left.height() - 1)];
-        let values = &mut output.disparities[row * width..(row + 1) * width];
-        let (least, rows) = (pair.settings.texture, near.map(|y| pair.left.row(y)));
-        self.dropped.unsupported += self.texture.apply(values, rows, least);
     }
 
     /// The best disparity of each column of the right image, among those that
