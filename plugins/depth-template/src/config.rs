@@ -91,6 +91,10 @@ pub struct DepthTemplateConfig {
     /// speaks for the person, m; never less than three standard deviations of
     /// the depth.
     pub likelihood_tolerance_m: f64,
+    /// How much of what lies beside a person in an imagined scene, at the same
+    /// depth, counts against the person where there is more on one side than on
+    /// the other, 0 to 1: a rucksack or an arm. What is on both sides counts whole.
+    pub likelihood_one_sided: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
     /// How far the centre of a head lies behind the depth that is measured of
@@ -136,6 +140,7 @@ impl Default for DepthTemplateConfig {
             background_percentile: 90.0,
             likelihood_nats: 12.0,
             likelihood_tolerance_m: 0.3,
+            likelihood_one_sided: 0.3,
             max_rows: 28,
             centre_behind_m: HEAD_RADIUS_M,
             sigma_across_m: 0.03,

@@ -70,8 +70,8 @@ pub struct Config {
     /// weighed together keep their depth and height, as P3 assumes of a short
     /// occlusion. Nothing in the map speaks of them.
     pub hold_depth: bool,
-    /// Somebody alone faces where the template fits best, of the three. Where
-    /// false, and in groups, where the track walks (P3).
+    /// People face where the template fits best, of the three. Where false, and
+    /// where all fit alike, where the track walks (P3).
     pub facing_by_image: bool,
     /// This part of the particles is moved to what a detector found, 0 to 1.
     pub from_detection: f64,
@@ -139,7 +139,7 @@ impl Default for Config {
             kld_error: 0.05,
             kld_quantile: 2.33,
             marginalise: true,
-            acceleration_noise: 0.25,
+            acceleration_noise: 0.1,
             position_noise: 0.05,
             height_noise: 0.04,
             velocity_noise: 0.0,

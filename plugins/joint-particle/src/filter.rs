@@ -108,8 +108,7 @@ impl JointParticle {
         self.groups.extend(joined);
     }
 
-    /// Bodies face where people walk; who hardly moves and is alone faces
-    /// where the image says.
+    /// Bodies face where the image says, or else where people walk, or as before.
     fn turn(&mut self, look: &mut Look<'_>) -> Result<BTreeMap<TrackId, Vector2<f64>>> {
         let mut headings = self.headings.clone();
         for group in &self.groups {
@@ -117,11 +116,12 @@ impl JointParticle {
                 let mean = group.moments(person).mean;
                 let velocity = Vector2::new(mean[3], mean[4]);
                 let walks = velocity.norm() > WALKING_MPS;
-                if group.people() == 1 && (self.config.facing_by_image || !walks) {
-                    headings.insert(*id, facing(group, look)?);
-                } else if walks {
-                    headings.insert(*id, velocity);
-                }
+                let stands_alone = group.people() == 1 && !walks;
+                let by_image = match self.config.facing_by_image || stands_alone {
+                    true => facing(group, person, look)?,
+                    false => None,
+                };
+                headings.extend(by_image.or(walks.then_some(velocity)).map(|way| (*id, way)));
             }
         }
         Ok(headings)

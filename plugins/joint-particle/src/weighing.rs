@@ -394,18 +394,27 @@ pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
         .collect()
 }
 
-/// Which way somebody who hardly moves faces: the template that fits best of
-/// those seen along the viewing ray, facing left and facing right.
-pub(crate) fn facing(group: &Group, look: &mut Look<'_>) -> Result<Vector2<f64>> {
+/// Which way somebody faces: the template that fits best of those seen along the
+/// viewing ray, facing left and facing right. `None` where they fit alike, as
+/// those of somebody hidden do.
+pub(crate) fn facing(
+    group: &Group,
+    person: usize,
+    look: &mut Look<'_>,
+) -> Result<Option<Vector2<f64>>> {
     let row = group.best();
-    let particle = &group.row(row)[0];
+    let particle = &group.row(row)[person];
     let left = across(&(particle.floor() - look.eye));
     let ways = [Vector2::zeros(), left, -left];
     let variants = ways.map(|velocity| Person { velocity, ..particle.person() });
-    let logs = look.variants(group, row, 0, variants.into_iter())?;
-    let best = heaviest(&logs, 1).first().copied().unwrap_or_default();
-    Ok(ways[best])
+    let logs = look.variants(group, row, person, variants.into_iter())?;
+    let order = heaviest(&logs, ways.len());
+    let tells = logs[order[0]] - logs[order[2]] > TELLING_NATS;
+    Ok(tells.then_some(ways[order[0]]))
 }
+
+/// Templates that differ by less fit alike, nats.
+const TELLING_NATS: f64 = 0.5;
 
 #[cfg(test)]
 mod tests {
