@@ -70,5 +70,7 @@ pub use settings::{
     OcclusionSettings, Overlap, PipelineSettings, PluginSettings, RobotSettings, Role,
 };
 pub use tagalong_stereo::StereoSettings;
-pub use target::{LockReport, LockState, LooksSettings, SearchSettings, TargetSettings};
+pub use target::{
+    Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,
+};
 pub use weighing::Weighing;

@@ -86,7 +86,7 @@ fn json(report: &FrameReport) -> String {
         state: lock.map(|lock| lock.state.name()),
         why: lock.map(|lock| lock.why),
         belief: lock.and_then(|lock| lock.belief),
-        likeness: likeness.map(|(id, likeness)| (id.0, *likeness)).collect(),
+        likeness: likeness.map(|like| (like.track.0, like.probability)).collect(),
         wheels_mps: command.map(|command| [command.wheels.left, command.wheels.right]),
         reason: command.map(|command| command.reason.name()),
         valid_until_ns: command.map(|command| command.valid_until.nanos()),

@@ -247,7 +247,11 @@ fn report(args: &FollowArgs, results: &[Followed]) -> Result<(), Failure> {
         }
     }
     let Some(folder) = &args.output else { return Ok(()) };
-    for (name, text) in [("follow.json", &json), ("follow.md", &joined(Table::markdown))] {
+    let markdown = joined(Table::markdown);
+    let likeness = table::likeness_csv(results);
+    for (name, text) in
+        [("follow.json", &json), ("follow.md", &markdown), ("likeness.csv", &likeness)]
+    {
         let path = folder.join(name);
         let why = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
         fs::write(&path, text).map_err(why)?;

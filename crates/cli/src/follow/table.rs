@@ -116,7 +116,10 @@ fn reliability(results: &[Followed], pipeline: &str) -> Option<Table> {
     let of: Vec<&Ridden> =
         results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
     let bin = |(p, _): &(f64, bool)| ((p * BINS as f64) as usize).min(BINS - 1);
-    let all: Vec<(f64, bool)> = of.iter().flat_map(|ride| &ride.likeness).copied().collect();
+    let all: Vec<(f64, bool)> = of
+        .iter()
+        .flat_map(|ride| ride.likeness.iter().map(|(like, same)| (like.probability, *same)))
+        .collect();
     let row = |at: usize| {
         let within: Vec<&(f64, bool)> = all.iter().filter(|one| bin(one) == at).collect();
         let (count, same) =
@@ -154,4 +157,20 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
         }
     }
     all
+}
+
+/// What the lock thought of each sighting, and whether it was the person, with
+/// the differences that it was made of; nothing stands for what is not known.
+pub fn likeness_csv(results: &[Followed]) -> String {
+    let mut out = "suite,pipeline,seed,same,probability,torso,legs,texture,height_m,rivals\n".to_owned();
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
+    for Followed { suite, pipeline, ridden, .. } in results {
+        for (like, same) in &ridden.likeness {
+            let d = &like.differences;
+            let numbers = [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals].map(number).join(",");
+            let (seed, p) = (ridden.seed, like.probability);
+            out += &format!("{suite},{pipeline},{seed},{},{p:.4},{numbers}\n", u8::from(*same));
+        }
+    }
+    out
 }

@@ -1,7 +1,7 @@
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
 use tagalong_core::Track;
-use tagalong_pipeline::FrameReport;
+use tagalong_pipeline::{FrameReport, Likeness};
 use tagalong_sim::Truth;
 
 use super::{Ride, Tick};
@@ -11,6 +11,8 @@ use crate::Moment;
 const WHOM: u16 = 1;
 /// A longer pause between frames counts as this one, s.
 const LONGEST_PAUSE_S: f64 = 0.5;
+/// A slower robot does not touch anybody: they touch it, m/s.
+const MOVES_MPS: f64 = 0.05;
 /// Jerk is that between accelerations over this time, s.
 const JERK_S: f64 = 0.1;
 /// A person's speed is that over about this time, s.
@@ -83,16 +85,15 @@ pub struct Ridden {
     pub distance_kept_s: f64,
     /// Times without the person after the first with them.
     pub episodes: Vec<Episode>,
-    /// Least room to people, m; none where nobody is.
+    /// Least room to people while the robot moved, m; none where nobody is.
     pub clearance_people_m: Option<f64>,
     /// Least room to furniture and walls while the robot moved, m.
     pub clearance_things_m: Option<f64>,
     /// Root of the mean square of the forward jerk, m/s³.
     pub jerk_mps3: f64,
-    /// How probable the lock thought it that somebody is the person, and whether
-    /// it was so.
+    /// What the lock thought of each sighting, and whether it was the person.
     #[serde(skip)]
-    pub likeness: Vec<(f64, bool)>,
+    pub likeness: Vec<(Likeness, bool)>,
 }
 
 /// Who is followed in a frame.
@@ -128,6 +129,7 @@ impl RideJudge {
             (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
             _ => false,
         };
+        let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
         let episodes = episodes(&looks);
         let longest_wrong_s = longest(&looks, |look| look.whom == Whom::Wrong);
         Ridden {
@@ -141,13 +143,8 @@ impl RideJudge {
             slow_s: sum(&slow),
             distance_kept_s: sum(&|look| slow(look) && near(look)),
             episodes,
-            clearance_people_m: least(ride.ticks.iter().map(|tick| tick.clearance.people_m)),
-            clearance_things_m: least(
-                ride.ticks
-                    .iter()
-                    .filter(|tick| tick.speed_mps.abs() > 0.02)
-                    .map(|tick| tick.clearance.things_m),
-            ),
+            clearance_people_m: least(moving().map(|tick| tick.clearance.people_m)),
+            clearance_things_m: least(moving().map(|tick| tick.clearance.things_m)),
             jerk_mps3: jerk(&ride.ticks),
             likeness: self.likeness(ride),
         }
@@ -221,14 +218,12 @@ impl RideJudge {
         nearest.is_some_and(|truth| truth.id == WHOM && off(&truth) <= self.same_m)
     }
 
-    fn likeness(&self, ride: &Ride) -> Vec<(f64, bool)> {
+    fn likeness(&self, ride: &Ride) -> Vec<(Likeness, bool)> {
         let frames = ride.moments.iter().zip(&ride.reports);
-        let of_frame = |(moment, report): (&Moment, &FrameReport)| -> Vec<(f64, bool)> {
-            let seen = |id| report.tracks.iter().find(|track| track.id == id && track.seen);
+        let of_frame = |(moment, report): (&Moment, &FrameReport)| -> Vec<(Likeness, bool)> {
+            let track = |id| report.tracks.iter().find(|track| track.id == id);
             let likeness = report.lock.iter().flat_map(|lock| &lock.likeness);
-            likeness
-                .filter_map(|(id, likeness)| Some((*likeness, self.is_of(seen(*id)?, moment))))
-                .collect()
+            likeness.filter_map(|l| Some((*l, self.is_of(track(l.track)?, moment)))).collect()
         };
         frames.flat_map(of_frame).collect()
     }
