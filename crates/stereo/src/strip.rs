@@ -67,9 +67,7 @@ impl Strip {
             let grey = (pair.left.row(y), pair.left.row(y.saturating_sub(1)));
             let costs = self.costs.as_chunks::<D>().0;
             let sums = self.sums.as_chunks_mut::<D>().0;
-            sums.fill([0; D]);
-            paths::along(costs, grey.0, pair.penalties, sums);
-            paths::down(costs, grey, pair.penalties, &mut self.excess, sums);
+            paths::sums(costs, grey, pair.penalties, &mut self.excess, sums);
             if y >= output.first_row {
                 self.decide::<D>(pair, y - output.first_row, output);
             }

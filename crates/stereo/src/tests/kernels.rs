@@ -150,8 +150,7 @@ proptest! {
         for (y, costs) in rows.iter().enumerate() {
             let pixels = (grey.row(y), grey.row(y.saturating_sub(1)));
             let mut sums = vec![[0; D]; grey.width()];
-            paths::along(costs, pixels.0, &penalties, &mut sums);
-            paths::down(costs, pixels, &penalties, &mut excess, &mut sums);
+            paths::sums(costs, pixels, &penalties, &mut excess, &mut sums);
             fast.extend(wide(sums.as_flattened()));
         }
         prop_assert_eq!(fast, slow);
