@@ -27,25 +27,38 @@ const MOST_PX: f32 = 1.0;
 pub const MAX_RADIUS: usize = 16;
 /// Pixels that are worked on at once.
 const LANES: usize = 16;
+/// Stands for an unknown disparity where numbers must be finite.
+const UNKNOWN: f32 = 1e6;
 
 /// Refines disparities; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct Refiner {
-    left: Line,
-    right: Line,
+    left: Vec<[f32; 2]>,
+    right: Vec<[f32; 2]>,
+    padded: Vec<u8>,
     row: Equations,
-    /// By pixel: the squared slopes of its window's row, and their product with the
-    /// disparity.
-    squares: Vec<f32>,
-    products: Vec<f32>,
-    window: [Vec<f32>; 2],
-    refined: Vec<f32>,
+    /// Of the window's row around each pixel; there is room behind the last.
+    sums: Sums,
+    was: Vec<f32>,
 }
 
-/// True if two disparities are of one surface; never for an unknown one.
+/// By pixel: the squared slopes, and their product with the disparity.
+#[derive(Debug, Default)]
+struct Sums {
+    squares: Vec<f32>,
+    products: Vec<f32>,
+}
+
+/// Some values that lie side by side.
 #[inline(always)]
-fn is_same(a: f32, b: f32) -> bool {
-    (a - b).abs() <= SAME_PX
+fn lanes(row: &[f32], from: usize) -> &[f32; LANES] {
+    &row[from..].as_chunks().0[0]
+}
+
+/// 1 where two disparities are of one surface; 0 for an unknown one.
+#[inline(always)]
+fn same(a: f32, b: f32) -> f32 {
+    if (a - b).abs() <= SAME_PX { 1.0 } else { 0.0 }
 }
 
 impl Refiner {
@@ -58,81 +71,44 @@ impl Refiner {
         disparities: &mut [f32],
     ) {
         let (width, height) = (left.width(), left.height());
-        self.squares.resize(disparities.len(), 0.0);
-        self.products.resize(disparities.len(), 0.0);
-        let sums = self.squares.chunks_exact_mut(width).zip(self.products.chunks_exact_mut(width));
-        for (y, sums) in sums.enumerate() {
-            self.left.load(left.row(y));
-            self.right.load(right.row(y));
-            self.row.load(&self.left, &self.right, &disparities[y * width..(y + 1) * width]);
-            across(&self.row, radius, sums);
+        for row in [&mut self.sums.squares, &mut self.sums.products, &mut self.was] {
+            row.resize(disparities.len() + LANES, 0.0);
         }
-        self.refined.clear();
-        self.refined.extend_from_slice(disparities);
-        for (y, refined) in self.refined.chunks_exact_mut(width).enumerate() {
-            self.window.iter_mut().for_each(|row| row.clear());
-            self.window.iter_mut().for_each(|row| row.resize(width, 0.0));
-            let own = &disparities[y * width..(y + 1) * width];
-            for near in y.saturating_sub(radius)..(y + radius + 1).min(height) {
-                let from = near * width;
-                let sums = [&self.squares[from..], &self.products[from..]];
-                add(own, &disparities[from..], sums, &mut self.window);
-            }
-            solve(&self.window, refined);
+        for (y, row) in disparities.chunks_exact(width).enumerate() {
+            levels(left.row(y), &mut self.padded, &mut self.left);
+            levels(right.row(y), &mut self.padded, &mut self.right);
+            self.row.load(&self.left, &self.right, row);
+            across(&self.row, radius, y * width..(y + 1) * width, &mut self.sums);
         }
-        disparities.copy_from_slice(&self.refined);
+        self.was[..disparities.len()].copy_from_slice(disparities);
+        for (y, row) in disparities.chunks_exact_mut(width).enumerate() {
+            let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);
+            down(&self.was, &self.sums, (y, rows), row);
+        }
     }
 }
 
-/// A row of an image.
-#[derive(Debug, Default)]
-struct Line {
-    padded: Vec<u8>,
-    /// Brightness, with weights 1, 2, 1, so that lines between pixels follow it, and
-    /// its change from pixel to pixel; the last pixel twice.
-    level: Vec<f32>,
-    slope: Vec<f32>,
-}
-
-impl Line {
-    fn load(&mut self, row: &[u8]) {
-        self.padded.clear();
-        self.padded.resize(2, row[0]);
-        self.padded.extend_from_slice(row);
-        self.padded.resize(row.len() + 5, row[row.len() - 1]);
-        self.level.resize(row.len() + 1, 0.0);
-        self.slope.resize(row.len() + 1, 0.0);
-        levels(&self.padded, &mut self.level, &mut self.slope);
-        self.level[row.len()] = self.level[row.len() - 1];
-        self.slope[row.len()] = self.slope[row.len() - 1];
-    }
-
-    /// Level and slope between the pixels; the border goes on.
-    #[inline(always)]
-    fn between(&self, at: f32) -> (f32, f32) {
-        let last = self.level.len() - 2;
-        let i = (at.max(0.0) as usize).min(last);
-        let part = (at - i as f32).clamp(0.0, 1.0);
-        let mix = |row: &[f32]| row[i] + part * (row[i + 1] - row[i]);
-        (mix(&self.level), mix(&self.slope))
-    }
-}
-
+/// Of each pixel the brightness, with weights 1, 2, 1, so that lines between pixels
+/// follow it, and its change from pixel to pixel; of the last one twice.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn levels(padded: &[u8], level: &mut [f32], slope: &mut [f32]) {
-    let width = level.len();
-    let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|from| &padded[from..from + width]);
-    let slope = &mut slope[..width];
-    for x in 0..width {
-        let [a, b, c, d, e] = [a[x], b[x], c[x], d[x], e[x]].map(f32::from);
-        level[x] = 0.25 * (b + 2.0 * c + d);
-        slope[x] = 0.125 * (e + 2.0 * (d - b) - a);
+fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
+    let width = row.len();
+    padded.clear();
+    padded.resize(2, row[0]);
+    padded.extend_from_slice(row);
+    padded.resize(width + 4, row[width - 1]);
+    levels.resize(width + 1, [0.0; 2]);
+    let padded = &padded[..width + 4];
+    for (x, level) in levels[..width].iter_mut().enumerate() {
+        let at = |i: usize| i32::from(padded[x + i]);
+        let (a, b, c, d, e) = (at(0), at(1), at(2), at(3), at(4));
+        *level = [0.25 * (b + 2 * c + d) as f32, 0.125 * (e + 2 * (d - b) - a) as f32];
     }
+    levels[width] = levels[width - 1];
 }
 
 /// What the pixels of a row say of their disparity `d`: `g d = q`, in grey levels, of
-/// strong slopes less.
-/// There is room for a window on both sides, of unknown disparities.
+/// strong slopes less. There is room for a window on both sides.
 #[derive(Debug, Default)]
 struct Equations {
     d: Vec<f32>,
@@ -141,77 +117,99 @@ struct Equations {
 }
 
 impl Equations {
-    fn load(&mut self, left: &Line, right: &Line, disparities: &[f32]) {
-        let room = disparities.len() + 2 * MAX_RADIUS + LANES;
-        for (row, value) in [(&mut self.d, f32::NAN), (&mut self.g, 0.0), (&mut self.q, 0.0)] {
-            row.resize(room, value);
+    fn load(&mut self, left: &[[f32; 2]], right: &[[f32; 2]], disparities: &[f32]) {
+        let (from, to) = (MAX_RADIUS, MAX_RADIUS + disparities.len());
+        for (row, value) in [(&mut self.d, UNKNOWN), (&mut self.g, 0.0), (&mut self.q, 0.0)] {
+            row.resize(to + MAX_RADIUS + LANES, value);
+            row[to..].fill(value);
         }
-        let inside = MAX_RADIUS..MAX_RADIUS + disparities.len();
-        self.d[inside.end..].fill(f32::NAN);
-        self.d[inside.clone()].copy_from_slice(disparities);
-        let rows = self.g[inside.clone()].iter_mut().zip(&mut self.q[inside]);
-        let own = left.level.iter().zip(&left.slope).zip(disparities);
-        for ((x, (g, q)), ((l, slope), d)) in rows.enumerate().zip(own) {
-            let (level, r_slope) = right.between(x as f32 - d);
-            let slope = 0.5 * (slope + r_slope);
-            let weight = 1.0 / (1.0 + slope * slope / (STRONG * STRONG)).sqrt();
-            *g = weight * slope;
-            *q = weight * (slope * d + level - l);
+        for (own, d) in self.d[from..to].iter_mut().zip(disparities) {
+            *own = if d.is_nan() { UNKNOWN } else { *d };
         }
+        let (g, q) = (&mut self.g[from..to], &mut self.q[from..to]);
+        between(right, &self.d[from..to], g, q);
+        solve_for(left, &self.d[from..to], g, q);
+    }
+}
+
+/// Brightness and slope of the right image where the left pixels are in it; its
+/// border goes on.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn between(right: &[[f32; 2]], disparities: &[f32], slope: &mut [f32], level: &mut [f32]) {
+    let last = (right.len() - 2) as f32;
+    for (x, ((d, slope), level)) in disparities.iter().zip(slope).zip(level).enumerate() {
+        let at = (x as f32 - d).clamp(0.0, last);
+        let i = at as u32;
+        let part = at - i as f32;
+        let [here, next] = [right[i as usize], right[i as usize + 1]];
+        *level = here[0] + part * (next[0] - here[0]);
+        *slope = here[1] + part * (next[1] - here[1]);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn solve_for(left: &[[f32; 2]], disparities: &[f32], g: &mut [f32], q: &mut [f32]) {
+    for (((own, d), g), q) in left.iter().zip(disparities).zip(g).zip(q) {
+        let slope = 0.5 * (own[1] + *g);
+        let weight = 1.0 / (1.0 + slope * slope * (1.0 / (STRONG * STRONG))).sqrt();
+        *q = weight * (slope * d + *q - own[0]);
+        *g = weight * slope;
     }
 }
 
 /// Sums up over the windows' part of a row that is of one surface, around the means.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn across(row: &Equations, radius: usize, (squares, products): (&mut [f32], &mut [f32])) {
-    let chunks = squares.chunks_mut(LANES).zip(products.chunks_mut(LANES));
-    for (i, (squares, products)) in chunks.enumerate() {
+fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &mut Sums) {
+    for (i, at) in place.step_by(LANES).enumerate() {
         let from = MAX_RADIUS + i * LANES;
-        let own: [f32; LANES] = std::array::from_fn(|lane| row.d[from..from + LANES][lane]);
+        let own = lanes(&row.d, from);
         let [mut n, mut d, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 6];
         for near in from - radius..from + radius + 1 {
-            let [ds, gs, qs] = [&row.d, &row.g, &row.q].map(|row| &row[near..near + LANES]);
+            let (ds, gs, qs) = (lanes(&row.d, near), lanes(&row.g, near), lanes(&row.q, near));
             for lane in 0..LANES {
-                let same = is_same(own[lane], ds[lane]);
-                let if_same = |value: f32| if same { value } else { 0.0 };
-                n[lane] += if_same(1.0);
-                d[lane] += if_same(ds[lane]);
-                g[lane] += if_same(gs[lane]);
-                q[lane] += if_same(qs[lane]);
-                gg[lane] += if_same(gs[lane] * gs[lane]);
-                gq[lane] += if_same(gs[lane] * qs[lane]);
+                let same = same(own[lane], ds[lane]);
+                let slope = same * gs[lane];
+                n[lane] += same;
+                d[lane] += same * ds[lane];
+                g[lane] += slope;
+                q[lane] += same * qs[lane];
+                gg[lane] += slope * gs[lane];
+                gq[lane] += slope * qs[lane];
             }
         }
-        let (mut square, mut product) = ([0.0; LANES], [0.0; LANES]);
+        let squares = &mut out.squares[at..].as_chunks_mut::<LANES>().0[0];
+        let products = &mut out.products[at..].as_chunks_mut::<LANES>().0[0];
         for lane in 0..LANES {
             let mean = g[lane] / n[lane];
-            square[lane] = (gg[lane] - mean * g[lane]).max(0.0) + PRIOR * n[lane];
-            product[lane] = gq[lane] - mean * q[lane] + PRIOR * d[lane];
+            squares[lane] = gg[lane] - mean * g[lane] + PRIOR * n[lane];
+            products[lane] = gq[lane] - mean * q[lane] + PRIOR * d[lane];
         }
-        squares.copy_from_slice(&square[..squares.len()]);
-        products.copy_from_slice(&product[..products.len()]);
     }
 }
 
-/// Adds the sums of a row where it is of the same surface.
+/// Solves for the disparities of row `y` with the sums of some rows.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn add(own: &[f32], near: &[f32], sums: [&[f32]; 2], window: &mut [Vec<f32>; 2]) {
-    let width = own.len();
-    let (near, [squares, products]) = (&near[..width], sums.map(|row| &row[..width]));
-    let [all_squares, all_products] = window;
-    let (all_squares, all_products) = (&mut all_squares[..width], &mut all_products[..width]);
-    for x in 0..width {
-        let same = is_same(own[x], near[x]);
-        all_squares[x] += if same { squares[x] } else { 0.0 };
-        all_products[x] += if same { products[x] } else { 0.0 };
-    }
-}
-
-/// Solves for the disparities.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn solve([squares, products]: &[Vec<f32>; 2], disparities: &mut [f32]) {
-    for ((d, squares), product) in disparities.iter_mut().zip(squares).zip(products) {
-        let new = *d + (product / squares - *d).clamp(-MOST_PX, MOST_PX);
-        *d = if new < 0.0 { 0.0 } else { new };
+fn down(was: &[f32], sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), row: &mut [f32]) {
+    let width = row.len();
+    for (i, new) in row.chunks_mut(LANES).enumerate() {
+        let own = lanes(was, y * width + i * LANES);
+        let (mut squares, mut products) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for near in rows.clone() {
+            let at = near * width + i * LANES;
+            let (ds, ss) = (lanes(was, at), lanes(&sums.squares, at));
+            let ps = lanes(&sums.products, at);
+            for lane in 0..LANES {
+                let same = same(own[lane], ds[lane]);
+                squares[lane] += same * ss[lane];
+                products[lane] += same * ps[lane];
+            }
+        }
+        let mut solved = [0.0; LANES];
+        for lane in 0..LANES {
+            let change = products[lane] / squares[lane] - own[lane];
+            let d = own[lane] + change.clamp(-MOST_PX, MOST_PX);
+            solved[lane] = if d < 0.0 { 0.0 } else { d };
+        }
+        new.copy_from_slice(&solved[..new.len()]);
     }
 }

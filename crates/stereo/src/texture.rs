@@ -15,11 +15,14 @@ use tagalong_core::GreyImage;
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
 
-/// Judges pixels by row; keeps its buffer.
+/// Judges pixels by row; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct TextureTest {
-    /// Which pixels are textured.
-    textured: Vec<bool>,
+    /// All bits of those that are textured.
+    textured: Vec<u32>,
+    /// The disparity of the last textured pixel up to each one, and of the next.
+    before: Vec<f32>,
+    behind: Vec<f32>,
 }
 
 impl TextureTest {
@@ -40,41 +43,57 @@ impl TextureTest {
 
     /// As above, for a row of the image with its neighbours.
     fn judge(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u8) -> u64 {
-        self.textured.clear();
-        self.textured.resize(row.len(), false);
-        find_textured(rows, least, &mut self.textured);
-        let (mut dropped, mut from, mut before) = (0, 0, f32::NAN);
-        for x in 0..row.len() {
-            if self.textured[x] && !row[x].is_nan() {
-                let beside = row[x];
-                dropped += limit(&mut row[from..x], expected(before, beside));
-                (from, before) = (x + 1, beside);
-            }
+        for buffer in [&mut self.before, &mut self.behind] {
+            buffer.resize(row.len(), f32::NAN);
         }
-        dropped + limit(&mut row[from..], f32::NAN)
+        self.textured.resize(row.len(), 0);
+        find_textured(rows, least, &mut self.textured);
+        let mut last = f32::NAN.to_bits();
+        for x in 0..row.len() {
+            self.before[x] = carried(&mut last, row[x], self.textured[x]);
+        }
+        last = f32::NAN.to_bits();
+        for x in (0..row.len()).rev() {
+            self.behind[x] = carried(&mut last, row[x], self.textured[x]);
+        }
+        u64::from(limit(row, &self.before, &self.behind))
     }
 }
 
+/// Carries the disparities of textured pixels on. All bits at once, since no one can
+/// foresee which pixels are textured, a processor neither.
+#[inline(always)]
+fn carried(last: &mut u32, own: f32, textured: u32) -> f32 {
+    let is_anchor = if own.is_nan() { 0 } else { textured };
+    *last = (own.to_bits() & is_anchor) | (*last & !is_anchor);
+    f32::from_bits(*last)
+}
+
 /// How much disparities of one surface differ at most.
+#[inline(always)]
 fn tolerance(disparity: f32) -> f32 {
     SAME_PX.max(SAME_PART * disparity)
 }
 
 /// The disparity between two textured pixels; NaN where there is only one.
+#[inline(always)]
 fn expected(a: f32, b: f32) -> f32 {
-    let far = a.min(b);
-    let is_one_surface = (a - b).abs() <= tolerance(far);
-    if is_one_surface || a.is_nan() || b.is_nan() { 0.5 * (a + b) } else { far }
+    let far = if a < b { a } else { b };
+    let mean = 0.5 * (a + b);
+    if (a - b).abs() > tolerance(far) { far } else { mean }
 }
 
-/// Drops the pixels of a stretch that have another disparity, and counts them.
-fn limit(stretch: &mut [f32], expected: f32) -> u64 {
+/// Drops the pixels that have another disparity than expected, and counts them.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
+    let (before, behind) = (&before[..row.len()], &behind[..row.len()]);
     let mut dropped = 0;
-    for value in stretch.iter_mut().filter(|value| !value.is_nan()) {
-        let off = (*value - expected).abs();
-        if off.is_nan() || off > tolerance(expected) {
-            (*value, dropped) = (f32::NAN, dropped + 1);
-        }
+    for (x, value) in row.iter_mut().enumerate() {
+        let expected = expected(before[x], behind[x]);
+        let stays = (*value - expected).abs() <= tolerance(expected);
+        // A sum that may overflow is no vector instruction.
+        dropped = u32::wrapping_add(dropped, u32::from(!stays & !value.is_nan()));
+        *value = if stays { *value } else { f32::NAN };
     }
     dropped
 }
@@ -82,18 +101,19 @@ fn limit(stretch: &mut [f32], expected: f32) -> u64 {
 /// Finds the pixels across which brightness changes by at least so much: half of
 /// Sobel's sum. The first and the last column have a neighbour on one side only.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [bool]) {
+fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [u32]) {
     let rise = |a: u8, b: u8| i16::from(b).wrapping_sub(i16::from(a));
     let slope = |[a, b, c]: [i16; 3]| a.wrapping_add(b.wrapping_mul(2)).wrapping_add(c).abs() / 2;
+    let mask = |slope: i16| if slope >= i16::from(least) { u32::MAX } else { 0 };
     let last = textured.len() - 1;
     for (x, from, to) in [(0, 0, 1.min(last)), (last, last.saturating_sub(1), last)] {
-        textured[x] = slope(rows.map(|row| rise(row[from], row[to]))) >= i16::from(least);
+        textured[x] = mask(slope(rows.map(|row| rise(row[from], row[to]))));
     }
     let Some(middle) = textured.get_mut(1..last) else { return };
     let width = middle.len();
     let [a, b, c] = rows.map(|row| (&row[..width], &row[2..width + 2]));
     for (x, textured) in middle.iter_mut().enumerate() {
         let rises = [a, b, c].map(|(left, right)| rise(left[x], right[x]));
-        *textured = slope(rises) >= i16::from(least);
+        *textured = mask(slope(rises));
     }
 }

@@ -10,8 +10,8 @@ use crate::paths::{Excess, Penalties};
 use crate::refine::Refiner;
 use crate::speckle::SpeckleFilter;
 use crate::texture::TextureTest;
-use crate::winner::Winner;
-use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window, winner};
+use crate::winner::{Found, Winners};
+use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window};
 
 const D: usize = 16;
 
@@ -150,8 +150,7 @@ proptest! {
         for (y, costs) in rows.iter().enumerate() {
             let pixels = (grey.row(y), grey.row(y.saturating_sub(1)));
             let mut sums = vec![[0; D]; grey.width()];
-            paths::along(costs, pixels.0, &penalties, &mut sums);
-            paths::down(costs, pixels, &penalties, &mut excess, &mut sums);
+            paths::sums(costs, pixels, &penalties, &mut excess, &mut sums);
             fast.extend(wide(sums.as_flattened()));
         }
         prop_assert_eq!(fast, slow);
@@ -187,17 +186,39 @@ proptest! {
     #[test]
     fn winners_are_the_least(cells in prop::collection::vec(any::<u8>(), D)) {
         let sums: [u8; D] = cells.clone().try_into().expect("D of them");
-        let mut fast = [Winner::default()];
-        winner::row(std::slice::from_ref(&sums), &mut fast);
+        let mut fast = Winners::default();
+        fast.resize(1);
+        fast.find(std::slice::from_ref(&sums));
         let cost = *cells.iter().min().expect("some");
         let best = cells.iter().position(|c| *c == cost).expect("the least is there");
         let others = cells.iter().enumerate().filter(|(d, _)| d.abs_diff(best) > 1);
-        prop_assert_eq!((usize::from(fast[0].disparity), fast[0].cost), (best, cost));
-        prop_assert_eq!(Some(fast[0].second), others.map(|(_, c)| *c).min());
+        prop_assert_eq!((usize::from(fast.disparity[0]), fast.cost[0]), (best, cost));
+        prop_assert_eq!(Some(fast.second[0]), others.map(|(_, c)| *c).min());
         let beside = [cells[best.saturating_sub(1)], cells[(best + 1).min(D - 1)]];
-        prop_assert_eq!(fast[0].beside, beside);
-        prop_assert!((fast[0].refined() - best as f32).abs() <= 0.5);
-        prop_assert!((0.0..=1.0).contains(&fast[0].margin()));
+        prop_assert_eq!([fast.below[0], fast.above[0]], beside);
+    }
+
+    #[test]
+    fn judged_winners_are_unique_and_agree_from_the_right(
+        rows in prop::collection::vec(prop::array::uniform5(0..12u8), 1..30),
+        uniqueness in 0.0..0.5_f32,
+        tolerance in 0..3u8,
+    ) {
+        let width = rows.len();
+        let [disparity, cost, second, below, above] =
+            std::array::from_fn(|i| rows.iter().map(|row| row[i]).collect::<Vec<u8>>());
+        let second: Vec<u8> = second.iter().zip(&cost).map(|(s, c)| s + c).collect();
+        let winners = Winners { disparity, cost, below, above, second };
+        let (mut disparities, mut confidences) = (vec![0.0; width], vec![0; width]);
+        let mut found = Found { disparities: &mut disparities, confidences: &mut confidences };
+        let refused = winners.judge(uniqueness, &mut found);
+        let disagree = winners.look_from_right(tolerance, &mut Vec::new(), &mut disparities);
+        let (slow, counts) = reference::judged(&winners, uniqueness, tolerance);
+        prop_assert_eq!([refused.outside, refused.not_unique, disagree], counts);
+        for (fast, slow) in disparities.iter().zip(slow) {
+            let close = (fast - slow).abs() < 1e-5 || (fast.is_nan() && slow.is_nan());
+            prop_assert!(close, "{} {}", fast, slow);
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use tagalong_core::GreyImage;
 
 use crate::census::NEIGHBOURS;
 use crate::cost::{MOST_BRIGHTNESS, MOST_SLOPE, SLOPE_WEIGHT};
+use crate::winner::Winners;
 
 fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
     let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
@@ -258,4 +259,33 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
         if new < 0.0 { 0.0 } else { new }
     };
     (0..disparities.len()).map(one).collect()
+}
+
+/// The disparities of winners that stand the tests, and how many fail: outside of the
+/// right image, not unique, contradicted from the right.
+pub fn judged(winners: &Winners, uniqueness: f32, tolerance: u8) -> (Vec<f32>, [u32; 3]) {
+    let d = |x: usize| usize::from(winners.disparity[x]);
+    let mut counts = [0; 3];
+    let mut one = |x: usize| {
+        let (cost, second) = (f32::from(winners.cost[x]), f32::from(winners.second[x]));
+        if d(x) > x {
+            counts[0] += 1;
+            return f32::NAN;
+        }
+        if (second - cost).max(0.0) < uniqueness * second {
+            counts[1] += 1;
+            return f32::NAN;
+        }
+        let rivals = (0..winners.cost.len()).filter(|other| *other + d(x) == x + d(*other));
+        let best = rivals.min_by_key(|other| winners.cost[*other]).unwrap();
+        if d(best).abs_diff(d(x)) > usize::from(tolerance) {
+            counts[2] += 1;
+            return f32::NAN;
+        }
+        let (below, above) = (f32::from(winners.below[x]), f32::from(winners.above[x]));
+        let rise = below + above - 2.0 * cost;
+        d(x) as f32 + if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 }
+    };
+    let all = (0..winners.cost.len()).map(&mut one).collect();
+    (all, counts)
 }
