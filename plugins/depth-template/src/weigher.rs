@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Result};
+use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Rect, Result};
 
 use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;
@@ -139,9 +139,32 @@ impl Likelihood for Weigher {
         tools.cast = cast;
         Ok(())
     }
+
+    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
+        let image = frame.derived::<Working>()?;
+        Ok(self.tools().silhouettes(frame, &image, scene))
+    }
 }
 
 impl Tools {
+    /// The bodies of a scene where nobody nearer is, as runs in the image.
+    fn silhouettes(&mut self, frame: &Frame, image: &Working, scene: &[Person]) -> Vec<Vec<Rect>> {
+        let view = self.view_of(frame, image);
+        let cast: Vec<Option<Placed>> =
+            scene.iter().map(|person| self.place(person, &frame.camera, &view)).collect();
+        let visible = |person: &Placed| -> Vec<Rect> {
+            let rows = person.rows(image.0.height() as i64);
+            let runs = rows.flat_map(|(line, row)| {
+                let nearer = cast.iter().flatten().filter(|p| p.depth_m < person.depth_m);
+                let bodies: Vec<Span> = nearer.filter_map(|p| p.body(line)).collect();
+                let step = person.silhouette.step;
+                outside(person.inside(row), bodies).into_iter().map(move |run| (line, run, step))
+            });
+            runs.map(|(line, run, step)| view.full_run(line, run, step)).collect()
+        };
+        cast.iter().map(|person| person.as_ref().map(visible).unwrap_or_default()).collect()
+    }
+
     /// The view of this frame's camera; it seldom changes.
     fn view_of(&mut self, frame: &Frame, image: &Working) -> Arc<View> {
         match &self.view {
@@ -306,12 +329,12 @@ fn rivals(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
 impl Placed {
     /// The rows of the silhouette that are looked at, with their lines.
     fn rows(&self, height: i64) -> impl Iterator<Item = (i64, &TemplateRow)> {
-        let first = self.y + self.silhouette.rows.first().map_or(0, |row| row.dy);
-        let step = self.silhouette.step;
-        let skip = (-first).rem_euclid(step);
-        let rows = self.silhouette.rows.iter().skip(skip as usize).step_by(step as usize);
-        let rows = rows.map(|row| (self.y + row.dy, row));
-        rows.filter(move |(line, _)| (0..height).contains(line))
+        let Silhouette { rows, step, .. } = &*self.silhouette;
+        let first = self.y + rows.first().map_or(0, |row| row.dy);
+        let start = (first + (-first).rem_euclid(*step)).max(0);
+        let end = height.min(first + rows.len() as i64).max(start);
+        let rows = rows.get((start - first) as usize..(end - first) as usize).unwrap_or_default();
+        (start..).step_by(*step as usize).zip(rows.iter().step_by(*step as usize))
     }
 
     fn spot(&self) -> Spot {
@@ -377,6 +400,20 @@ fn union_of(masks: &mut Vec<Span>, spans: impl Iterator<Item = Span>) {
         }
         touches
     });
+}
+
+/// The parts of a span that no mask covers.
+fn outside(span: Span, mut masks: Vec<Span>) -> Vec<Span> {
+    masks.sort_unstable();
+    let mut left = Vec::new();
+    let mut from = span.0;
+    for (start, end) in masks {
+        left.push((from, start.min(span.1)));
+        from = from.max(end);
+    }
+    left.push((from, span.1));
+    left.retain(|(from, to)| from < to);
+    left
 }
 
 /// Sum over the masked parts of a span.
@@ -564,6 +601,22 @@ mod tests {
         assert_eq!(of(2.0, 0.0, -1.0, 0.2), Direction::Along);
         assert_eq!(of(2.0, 2.0, 1.0, 1.0), Direction::Along, "along the ray, not the axis");
         assert_eq!(of(2.0, 0.0, 0.0, 0.1), Direction::Along, "too slow to tell");
+    }
+
+    #[test]
+    fn what_is_shown_of_somebody_is_what_nobody_hides() {
+        assert_eq!(outside((2, 12), vec![(8, 9), (1, 3), (2, 6)]), [(6, 8), (9, 12)]);
+        assert_eq!(outside((2, 12), vec![(0, 20)]), []);
+        let (near, far) = (standing(1.8, 0.0), standing(3.0, 0.35));
+        let frame = painted(&[near, far]);
+        let weigher = Weigher::new(&DepthTemplateConfig::default());
+        let area = |scene: &[Person]| -> Vec<f64> {
+            let runs = weigher.silhouettes(&frame, scene).unwrap();
+            runs.iter().map(|runs| runs.iter().map(Rect::area).sum()).collect()
+        };
+        let (alone, together) = (area(&[far])[0], area(&[far, near]));
+        assert!(together[0] > 0.2 * alone && together[0] < 0.9 * alone, "{alone} {together:?}");
+        assert_eq!(together[1], area(&[near])[0]);
     }
 
     #[test]

@@ -139,7 +139,7 @@ impl Default for Config {
             kld_error: 0.05,
             kld_quantile: 2.33,
             marginalise: true,
-            acceleration_noise: 0.1,
+            acceleration_noise: 0.25,
             position_noise: 0.05,
             height_noise: 0.04,
             velocity_noise: 0.0,

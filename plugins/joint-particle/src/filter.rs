@@ -2,7 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support,
+    TrackId,
 };
 
 use crate::config::{Config, Method};
@@ -11,7 +12,7 @@ use crate::identity::Wardrobe;
 use crate::overlap::Overlaps;
 use crate::particle::{Particle, Transition};
 use crate::resampling::{effective_size, kld_size};
-use crate::weighing::{Look, facing, support, weigh};
+use crate::weighing::{Look, facing, sketch, support, weigh};
 
 /// The filter: particles of people, alone or together.
 pub struct JointParticle {
@@ -229,6 +230,15 @@ impl Filter for JointParticle {
         }
         self.ahead_s = if config.compat_condensation { self.dt_s } else { 0.0 };
         Ok(seen)
+    }
+
+    fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
+        let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
+        let Some(likelihood) = evidence.likelihood else { return Ok(shown) };
+        let mut look =
+            Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
+        self.groups.iter().try_for_each(|group| sketch(group, &mut look, &mut shown))?;
+        Ok(shown)
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
