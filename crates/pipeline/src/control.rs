@@ -1,4 +1,4 @@
-use tagalong_core::{Command, Controller, Frame, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{Command, Controller, Frame, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds};
 
 use crate::boundary::{StepError, contain};
 use crate::governor::{Ahead, Aim, Governor, Wish, ahead};
@@ -72,14 +72,20 @@ impl Steering {
         &mut self.governor
     }
 
-    /// The command for a frame, and who is followed.
+    /// The command for a frame, and who is followed; `motion` is the robot's since
+    /// the last frame that was processed.
     ///
     /// # Errors
     /// The controller panicked.
-    pub(crate) fn steer(&mut self, frame: &Frame, tracks: &[Track]) -> Result<Steered, StepError> {
+    pub(crate) fn steer(
+        &mut self,
+        frame: &Frame,
+        motion: &Motion,
+        tracks: &[Track],
+    ) -> Result<Steered, StepError> {
         self.governor.check_odometry(&frame.motion);
         let settled = self.is_settled();
-        let lock = self.lock.update(frame, tracks, settled);
+        let lock = self.lock.update(frame, motion, tracks, settled);
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         let wheels = self.ask(frame, tracks, target)?;
@@ -94,7 +100,7 @@ impl Steering {
         self.last = Some(frame.stamp);
         let look = |corridor: &_, curvature| look(corridor, frame, curvature, target);
         let command = self.governor.govern(&wish, look);
-        self.search.hear(command.reason == Reason::Blocked, frame.motion.dt);
+        self.search.hear(command.reason == Reason::Blocked, motion.dt);
         Ok(Steered { command, target: target.map(|track| track.id), lock })
     }
 

@@ -210,7 +210,7 @@ impl Pipeline {
     /// Every belief, into the robot's new frame; then whom to expect where.
     fn predict(&mut self, now: &mut Now<'_>, motion: Option<Motion>) -> Result<(), StepError> {
         if let Some(motion) = motion {
-            now.dt_s = motion.dt;
+            now.motion = motion;
             let Slot { name, plugin: filter } = &mut self.filter;
             contain(name, now.frame.index, || filter.predict(&motion))?;
             self.lifecycle.grow_older(motion.dt);
@@ -448,7 +448,8 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        let Steered { command, target, lock } = steering.steer(now.frame, &now.report.tracks)?;
+        let Steered { command, target, lock } = 
+            steering.steer(now.frame, &now.motion, &now.report.tracks)?;
         now.report
             .funnel
             .drop_many("command not finite", u64::from(command.reason == Reason::NotFinite));
@@ -558,7 +559,7 @@ impl Pipeline {
         Rules {
             association: &self.settings.association,
             start_score: self.lifecycle.settings().start_score,
-            dt_s: now.dt_s,
+            dt_s: now.motion.dt,
         }
     }
 

@@ -193,8 +193,8 @@ fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
 }
 
 fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
-    let aims = [Aim::Person, Aim::Perhaps, Aim::Search, Aim::Nobody];
-    let flags = (any::<bool>(), prop::sample::select(&aims[..]), prop::bool::weighted(0.9));
+    let aims = vec![Aim::Person, Aim::Perhaps, Aim::Search, Aim::Nobody];
+    let flags = (any::<bool>(), prop::sample::select(aims), prop::bool::weighted(0.9));
     (any_number(), any_number(), flags, any_number(), any_ahead()).prop_map(
         |(left, right, flags, pause, ahead)| {
             let (short, aim, settled) = flags;

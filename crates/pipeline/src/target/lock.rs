@@ -9,6 +9,8 @@ use super::settings::TargetSettings;
 
 /// Log-odds are bounded by this: no single look is certain.
 const CERTAIN: f64 = 6.0;
+/// A track that is out of sight for longer may come back as somebody else, s.
+const UNSEEN_S: f64 = 0.25;
 /// Somebody may have moved by this much more than their speed says, m.
 const REACH_M: f64 = 0.6;
 
@@ -102,6 +104,8 @@ pub(crate) struct Lock {
     memory: Memory,
     /// Log-odds that the followed track is the person.
     belief: f64,
+    /// Somebody came near or the track was out of sight: it may have changed over.
+    doubtful: bool,
     sightings: u32,
     last: Option<LastSeen>,
     /// Smoothed log-odds of others while the person is lost, and how often in a
@@ -118,6 +122,7 @@ impl Lock {
             track: None,
             memory: Memory::default(),
             belief: 0.0,
+            doubtful: false,
             sightings: 0,
             last: None,
             candidates: BTreeMap::new(),
@@ -131,13 +136,16 @@ impl Lock {
         *self = Self::new(settings);
     }
 
-    /// After a jump of the clock nobody knows where anybody is.
+    /// After a jump of the clock nobody knows where anybody is: who is remembered
+    /// is lost, who is not is chosen anew.
     pub(crate) fn reset(&mut self) {
-        self.last = None;
-        self.candidates.clear();
-        if self.state.follows() {
+        if !self.settings.remember {
+            *self = Self::new(self.settings.clone());
+        } else if self.state.follows() {
             self.lose("the clock jumped");
         }
+        self.last = None;
+        self.candidates.clear();
     }
 
     pub(crate) fn state(&self) -> LockState {
@@ -161,8 +169,14 @@ impl Lock {
 
     /// Takes in a frame; `tracks` are near to far, `may_choose` says whether
     /// somebody may be chosen yet.
-    pub(crate) fn update(&mut self, frame: &Frame, tracks: &[Track], may_choose: bool) -> LockReport {
-        self.move_along(&frame.motion);
+    pub(crate) fn update(
+        &mut self,
+        frame: &Frame,
+        motion: &Motion,
+        tracks: &[Track],
+        may_choose: bool,
+    ) -> LockReport {
+        self.move_along(motion);
         let looks = self.looks(frame, tracks);
         let likeness = self.likeness(&looks);
         let log_odds = likeness.iter().map(|(like, odds)| (like.track, *odds)).collect();
@@ -237,10 +251,28 @@ impl Lock {
             return self.miss();
         }
         self.see(track);
-        if let Some(odds) = log_odds.get(&track.id) {
+        self.weigh(log_odds.get(&track.id).copied(), self.is_alone(track, tracks));
+        self.judge();
+    }
+
+    /// A track that nobody came near and that was always in sight is the same
+    /// person, whatever they look like from this side. Otherwise looks decide.
+    fn weigh(&mut self, odds: Option<f64>, alone: bool) {
+        self.doubtful |= !alone;
+        let evidence = if self.doubtful { odds } else { Some(CERTAIN) };
+        if let Some(odds) = evidence {
             self.belief += self.settings.belief_weight * (odds - self.belief);
         }
-        self.judge();
+        let sure = self.belief >= logit(self.settings.again_from)
+            && self.sightings >= self.settings.again_sightings;
+        self.doubtful &= !(alone && sure && !self.state.doubts());
+    }
+
+    /// Nobody else is near a track.
+    fn is_alone(&self, track: &Track, tracks: &[Track]) -> bool {
+        let place = |track: &Track| track.estimate.person.position.xy();
+        let off_m = |other: &Track| nalgebra::distance(&place(track), &place(other));
+        tracks.iter().all(|other| other.id == track.id || off_m(other) >= self.settings.alone_m)
     }
 
     /// The track is not seen.
@@ -249,6 +281,8 @@ impl Lock {
         if !self.settings.remember {
             return;
         }
+        self.sightings = 0;
+        self.doubtful |= ago_s > UNSEEN_S;
         if ago_s > self.settings.lose_after_s {
             self.lose("out of sight");
         } else if ago_s > self.settings.doubt_after_s && self.state != LockState::Suspect {
@@ -304,6 +338,7 @@ impl Lock {
         if times >= self.settings.again_sightings {
             self.track = Some(id);
             self.belief = belief;
+            self.doubtful = true;
             self.sightings = 0;
             self.candidates.clear();
             self.see(track);
@@ -343,28 +378,17 @@ impl Lock {
     }
 
     /// Learns what the person looks like, and others, while that is certain.
-    fn learn(&mut self, tracks: &[Track], looks: BTreeMap<TrackId, Looks>) {
+    fn learn(&mut self, tracks: &[Track], mut looks: BTreeMap<TrackId, Looks>) {
         let certain = matches!(self.state, LockState::Training | LockState::Locked);
-        let place = |id: &TrackId| {
-            tracks.iter().find(|t| t.id == *id).map(|t| t.estimate.person.position.xy())
-        };
-        let Some(own) = self.track.filter(|_| certain) else { return };
-        let alone = |id: &TrackId| {
-            let others = tracks.iter().filter(|t| t.id != *id);
-            let near = |t: &Track| {
-                place(id).is_none_or(|here| {
-                    nalgebra::distance(&here, &t.estimate.person.position.xy())
-                        < self.settings.alone_m
-                })
-            };
-            !others.into_iter().any(near)
-        };
-        let alone: Vec<bool> = looks.keys().map(alone).collect();
-        for ((id, looks), alone) in looks.into_iter().zip(alone) {
-            match alone {
-                true if id == own && self.belief > 0.0 => self.memory.learn(looks),
-                true if id != own => self.memory.learn_other(looks),
-                _ => {}
+        if !certain || self.doubtful {
+            return;
+        }
+        let alone: Vec<&Track> = tracks.iter().filter(|t| self.is_alone(t, tracks)).collect();
+        for track in alone {
+            match looks.remove(&track.id) {
+                Some(looks) if Some(track.id) == self.track => self.memory.learn(looks),
+                Some(looks) => self.memory.learn_other(looks),
+                None => {}
             }
         }
     }

@@ -35,7 +35,8 @@ pub struct TargetSettings {
     pub again_sightings: u32,
     /// Nobody gets farther than at this speed from where they were seen last, m/s.
     pub reach_mps: f64,
-    /// Nothing is learned of people who are nearer to each other than this, m.
+    /// Somebody nearer to the person than this may be taken for them, m: looks are
+    /// compared, and nothing is learned.
     pub alone_m: f64,
     /// What differences in looks say.
     pub looks: LooksSettings,
@@ -56,7 +57,7 @@ impl Default for TargetSettings {
             refuse_below: 0.15,
             doubt_after_s: 0.5,
             lose_after_s: 2.0,
-            again_from: 0.8,
+            again_from: 0.7,
             again_sightings: 5,
             reach_mps: 2.0,
             alone_m: 0.8,
@@ -68,8 +69,9 @@ impl Default for TargetSettings {
 
 /// The log-odds that two sightings are of one person: for each kind of
 /// difference its weight times how far it is below what is even, summed up.
-/// Hellinger distances lie between 0, the same, and 1. The numbers were fitted to
-/// drawn people of the training split (see the README of `configs/`).
+/// Hellinger distances lie between 0, the same, and 1. The numbers follow a logistic
+/// regression over rides of the training split; `tagalong follow -o DIR` writes what
+/// it needs to `likeness.csv`, and prints how far the probabilities can be believed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooksSettings {
@@ -91,10 +93,10 @@ pub struct LooksSettings {
 impl Default for LooksSettings {
     fn default() -> Self {
         Self {
-            torso: [0.35, 8.0],
-            legs: [0.35, 6.0],
-            texture: [0.3, 2.0],
-            height: [0.05, 40.0],
+            torso: [0.26, 7.0],
+            legs: [0.3, 1.0],
+            texture: [0.12, 8.0],
+            height: [0.06, 14.0],
             rivals: 4.0,
         }
     }
