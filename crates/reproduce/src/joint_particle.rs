@@ -2,7 +2,6 @@
 
 use nalgebra::Point3;
 use tagalong_core::{Camera, Track};
-use tagalong_eval::wilson;
 use tagalong_pipeline::FrameReport;
 use tagalong_sim::Truth;
 use tagalong_trials::{Contender, Crossing, Failing, Moment, Run, Trial, TrialError, crossing};
@@ -40,8 +39,6 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// Confidence of intervals.
-const CONFIDENCE: f64 = 0.95;
 /// An estimate farther from a head than this on the floor is no estimate of it, m.
 const FAR_M: f64 = 1.0;
 /// Who is seen less than this is hidden (the default of `[occlusion]`).
@@ -214,9 +211,7 @@ impl Trials {
         let all = |_: &&Result| true;
         let good = |result: &&Result| result.in_image;
         let trials = self.of(at).filter(|r| r.is_trial).count();
-        let share_of = |all: usize, count: usize| {
-            Cell::estimate(wilson(count as u64, all as u64, CONFIDENCE), 3).percent()
-        };
+        let share_of = |all: usize, count: usize| Cell::share(count as u64, all as u64, 1);
         let share = |count: usize| share_of(trials, count);
         let across = self.of(at).filter(|r| r.in_image).count();
         let mean = |values: Vec<f64>, digits| Cell::number(mean(&values), digits);
