@@ -42,6 +42,7 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> Scene {
             nis: Vec::new(),
             weighing: Weighing::default(),
             sketch: Sketch::default(),
+            lock: None,
             timings: Vec::new(),
             ended: Vec::new(),
         },
