@@ -609,8 +609,8 @@ mod tests {
         let bare = painted(&[near]);
         let depth_m = near.position.x as f32 - 0.08;
         let depth = DepthImage::from_fn(80, 60, |x, y| {
-            let [on_left, on_right] = [28..31, 49..52].map(|columns| columns.contains(&x));
-            let is_load = (30..45).contains(&y) && (left && on_left || right && on_right);
+            let [on_left, on_right] = [30..35, 45..50].map(|columns| columns.contains(&x));
+            let is_load = (8..24).contains(&y) && (left && on_left || right && on_right);
             let seen_m = bare.depth().unwrap().get(x as i64, y as i64).unwrap_or(f32::NAN);
             if is_load { seen_m.min(depth_m) } else { seen_m }
         });
