@@ -5,6 +5,7 @@ use tagalong_core::{
 };
 use tagalong_pipeline::{Candidate, Fate, Outcome, Weighing};
 
+use super::canvas::LINE_PX;
 use super::*;
 
 fn track(id: u32, camera: &Camera) -> Track {
@@ -70,7 +71,8 @@ fn what_the_filter_imagines_shows_in_the_image() {
     let with = picture(&scene, &Trails::default());
     assert_eq!(changed(&without, &with, 100..130), 60, "a run");
     assert!(changed(&without, &with, 195..206) > 0, "a particle");
-    assert_eq!(changed(&without, &with, 0..40), 200, "a map of 20 x 10 pixels");
+    let title = 2 * LINE_PX as usize;
+    assert_eq!(changed(&without, &with, 0..40), 20 * 10 + title, "a map, and its title's bar");
 }
 
 #[test]
