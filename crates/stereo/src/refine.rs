@@ -4,7 +4,8 @@
 //!
 //! B. Lucas and T. Kanade, *An iterative image registration technique with an
 //! application to stereo vision*, IJCAI 1981, section 4, one step, along the row.
-//! The brightness of each row of the window may differ by a constant, and what the
+//! The right camera may be more sensitive, by a factor that the contrast of each row
+//! tells; the brightness of each row of the window may differ by a constant; what the
 //! pixels of the window had for disparities counts a little: where brightness says
 //! nothing, that leaves their mean.
 //!
@@ -21,6 +22,10 @@ const SAME_PX: f32 = 1.0;
 const PRIOR: f32 = 1.0;
 /// A slope beyond this many grey levels counts little more than one of it.
 const STRONG: f32 = 6.0;
+/// Variance of brightness to which the noise of a row is nothing.
+const FAINT: f32 = 4.0;
+/// Mean brightness.
+const MIDDLE: f32 = 128.0;
 /// A disparity changes by at most this, px: brightness is no straight line for long.
 const MOST_PX: f32 = 1.0;
 /// Largest radius of a window, px.
@@ -126,9 +131,9 @@ impl Equations {
         for (own, d) in self.d[from..to].iter_mut().zip(disparities) {
             *own = if d.is_nan() { UNKNOWN } else { *d };
         }
-        let (g, q) = (&mut self.g[from..to], &mut self.q[from..to]);
-        between(right, &self.d[from..to], g, q);
-        solve_for(left, &self.d[from..to], g, q);
+        let (d, g, q) = (&self.d[from..to], &mut self.g[from..to], &mut self.q[from..to]);
+        between(right, d, g, q);
+        solve_for(left, d, gain(left, d, q), g, q);
     }
 }
 
@@ -148,13 +153,31 @@ fn between(right: &[[f32; 2]], disparities: &[f32], slope: &mut [f32], level: &m
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn solve_for(left: &[[f32; 2]], disparities: &[f32], g: &mut [f32], q: &mut [f32]) {
+fn solve_for(left: &[[f32; 2]], disparities: &[f32], gain: f32, g: &mut [f32], q: &mut [f32]) {
     for (((own, d), g), q) in left.iter().zip(disparities).zip(g).zip(q) {
+        let own = own.map(|left| gain * left);
         let slope = 0.5 * (own[1] + *g);
         let weight = 1.0 / (1.0 + slope * slope * (1.0 / (STRONG * STRONG))).sqrt();
         *q = weight * (slope * d + *q - own[0]);
         *g = weight * slope;
     }
+}
+
+/// By how much the contrast of a row is greater in the right image, where there are
+/// matches.
+fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
+    let [mut n, mut l, mut r, mut ll, mut rr] = [0.0_f32; 5];
+    for ((own, d), other) in left.iter().zip(disparities).zip(right) {
+        let known = if *d < UNKNOWN { 1.0 } else { 0.0 };
+        let (own, other) = (own[0] - MIDDLE, *other - MIDDLE);
+        n += known;
+        l += known * own;
+        r += known * other;
+        ll += known * own * own;
+        rr += known * other * other;
+    }
+    let contrast = |sum: f32, squares: f32| squares - sum * sum / n.max(1.0) + FAINT * n.max(1.0);
+    (contrast(r, rr) / contrast(l, ll)).sqrt().clamp(0.5, 2.0)
 }
 
 /// Sums up over the windows' part of a row that is of one surface, around the means.

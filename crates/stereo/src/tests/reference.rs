@@ -213,17 +213,35 @@ fn smoothed(image: &GreyImage, x: i64, y: i64) -> (f64, f64) {
 
 /// Slope, and slope times disparity, of a pixel, as Lucas and Kanade have them, with
 /// less weight on strong slopes.
-fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64) -> (f64, f64) {
-    let (x, y) = (x as i64, y as i64);
-    let (own, own_slope) = smoothed(&pair[0], x, y);
-    let last = pair[1].width() as i64 - 1;
+fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64, gain: f64) -> (f64, f64) {
+    let (own, own_slope) = smoothed(&pair[0], x as i64, y as i64);
+    let (other, slope) = matched(&pair[1], x, y, d);
+    let g = 0.5 * (gain * own_slope + slope);
+    let weight = 1.0 / (1.0 + (g / 6.0).powi(2)).sqrt();
+    (weight * g, weight * (g * d + other - gain * own))
+}
+
+/// Brightness and slope of the right image where pixel `x` of the left one is.
+fn matched(right: &GreyImage, x: usize, y: usize, d: f64) -> (f64, f64) {
+    let last = right.width() as i64 - 1;
     let at = (x as f64 - d).clamp(0.0, last as f64);
     let (low, part) = (at.floor(), at.fract());
     let [(a, a_slope), (b, b_slope)] =
-        [0, 1].map(|i| smoothed(&pair[1], (low as i64 + i).min(last), y));
-    let g = 0.5 * (own_slope + a_slope + part * (b_slope - a_slope));
-    let weight = 1.0 / (1.0 + (g / 6.0).powi(2)).sqrt();
-    (weight * g, weight * (g * d + a + part * (b - a) - own))
+        [0, 1].map(|i| smoothed(right, (low as i64 + i).min(last), y as i64));
+    (a + part * (b - a), a_slope + part * (b_slope - a_slope))
+}
+
+/// The ratio of the deviations of a row's brightness in the two images.
+fn gain(pair: &[GreyImage], row: &[f32], y: usize) -> f64 {
+    let known: Vec<usize> = (0..row.len()).filter(|x| !row[*x].is_nan()).collect();
+    let variance = |level: &dyn Fn(usize) -> f64| {
+        let n = known.len().max(1) as f64;
+        let mean = known.iter().map(|x| level(*x)).sum::<f64>() / n;
+        4.0 + known.iter().map(|x| (level(*x) - mean).powi(2)).sum::<f64>() / n
+    };
+    let left = variance(&|x| smoothed(&pair[0], x as i64, y as i64).0);
+    let right = variance(&|x| matched(&pair[1], x, y, row[x].into()).0);
+    (right / left).sqrt().clamp(0.5, 2.0)
 }
 
 /// Sums of squares and products around the means, over the window's part of a row
@@ -231,7 +249,9 @@ fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64) -> (f64, f64) {
 fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
     let near = x.saturating_sub(radius)..(x + radius + 1).min(row.len());
     let same: Vec<usize> = near.filter(|near| (row[*near] - row[x]).abs() <= 1.0).collect();
-    let all: Vec<(f64, f64)> = same.iter().map(|x| equation(pair, *x, y, row[*x].into())).collect();
+    let gain = gain(pair, row, y);
+    let all: Vec<(f64, f64)> =
+        same.iter().map(|x| equation(pair, *x, y, row[*x].into(), gain)).collect();
     let n = all.len() as f64;
     let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
     let was = same.iter().map(|x| f64::from(row[*x])).sum::<f64>();
