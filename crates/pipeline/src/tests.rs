@@ -1,5 +1,7 @@
 mod clock;
-pub(crate) mod doubles;
+mod commands;
 mod faults;
 mod stereo;
+mod target;
 mod tracking;
+pub(crate) mod doubles;

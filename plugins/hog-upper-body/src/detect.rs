@@ -1,7 +1,7 @@
 use nalgebra::Matrix3;
 use tagalong_core::{
-    Camera, Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Rect,
-    Result, Search, UPPER_BODY_SIDE_M,
+    Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
+    Search, UPPER_BODY_SIDE_M,
 };
 
 use crate::{Config, Model, NAME, Scanner, Window, merge};
@@ -29,7 +29,7 @@ impl HogUpperBody {
     /// [`Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
-        let model = read(&config.model, context)?;
+        let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
         Ok(Self { config, model, scanner: Scanner::default() })
     }
 
@@ -61,16 +61,6 @@ impl HogUpperBody {
         };
         detection.is_sane().then_some(detection)
     }
-}
-
-fn read(file: &str, context: &Context) -> Result<Model> {
-    let broken = |why: String| Error::Model { path: file.into(), why };
-    if file.is_empty() {
-        return Model::from_text(BUILT_IN).map_err(broken);
-    }
-    let text = std::fs::read_to_string(context.base_dir.join(file))
-        .map_err(|error| broken(error.to_string()))?;
-    Model::from_text(&text).map_err(broken)
 }
 
 /// The median depth in the middle of a square, m.
