@@ -5,9 +5,10 @@
 //! B. Lucas and T. Kanade, *An iterative image registration technique with an
 //! application to stereo vision*, IJCAI 1981, section 4, one step, along the row.
 //! The right camera may be more sensitive, by a factor that the contrast of each row
-//! tells; the brightness of each row of the window may differ by a constant; what the
-//! pixels of the window had for disparities counts a little: where brightness says
-//! nothing, that leaves their mean.
+//! tells; the brightness of each row of the window may differ by a constant. Where
+//! brightness says nothing, a disparity stays what it was: a mean over the window
+//! would blur the step between a person and the wall behind, which is less than a
+//! pixel beyond 4 m.
 //!
 //! The outline of a round thing lies behind its front, by the radius of a head for a
 //! head, and has the strongest slopes. They count less than their square, so that a
@@ -19,7 +20,7 @@ use tagalong_core::GreyImage;
 const SAME_PX: f32 = 1.0;
 /// Weight of a disparity as it was: the variance of the noise of a pixel, in grey
 /// levels, over that of the disparity, in pixels.
-const PRIOR: f32 = 1.0;
+const PRIOR: f32 = 20.0;
 /// A slope beyond this many grey levels counts little more than one of it.
 const STRONG: f32 = 6.0;
 /// Variance of brightness to which the noise of a row is nothing.
@@ -27,7 +28,7 @@ const FAINT: f32 = 4.0;
 /// Mean brightness.
 const MIDDLE: f32 = 128.0;
 /// A disparity changes by at most this, px: brightness is no straight line for long.
-const MOST_PX: f32 = 1.0;
+const MOST_PX: f32 = 0.5;
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 16;
 /// Pixels that are worked on at once.
@@ -186,14 +187,13 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
     for (i, at) in place.step_by(LANES).enumerate() {
         let from = MAX_RADIUS + i * LANES;
         let own = lanes(&row.d, from);
-        let [mut n, mut d, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 6];
+        let [mut n, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 5];
         for near in from - radius..from + radius + 1 {
             let (ds, gs, qs) = (lanes(&row.d, near), lanes(&row.g, near), lanes(&row.q, near));
             for lane in 0..LANES {
                 let same = same(own[lane], ds[lane]);
                 let slope = same * gs[lane];
                 n[lane] += same;
-                d[lane] += same * ds[lane];
                 g[lane] += slope;
                 q[lane] += same * qs[lane];
                 gg[lane] += slope * gs[lane];
@@ -204,8 +204,8 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
         let products = &mut out.products[at..].as_chunks_mut::<LANES>().0[0];
         for lane in 0..LANES {
             let mean = g[lane] / n[lane];
-            squares[lane] = gg[lane] - mean * g[lane] + PRIOR * n[lane];
-            products[lane] = gq[lane] - mean * q[lane] + PRIOR * d[lane];
+            squares[lane] = (gg[lane] - mean * g[lane]).max(0.0);
+            products[lane] = gq[lane] - mean * q[lane];
         }
     }
 }
@@ -216,7 +216,10 @@ fn down(was: &[f32], sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), ro
     let width = row.len();
     for (i, new) in row.chunks_mut(LANES).enumerate() {
         let own = lanes(was, y * width + i * LANES);
-        let (mut squares, mut products) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        let (mut squares, mut products) = ([PRIOR; LANES], [0.0_f32; LANES]);
+        for lane in 0..LANES {
+            products[lane] = PRIOR * own[lane];
+        }
         for near in rows.clone() {
             let at = near * width + i * LANES;
             let (ds, ss) = (lanes(was, at), lanes(&sums.squares, at));

@@ -245,7 +245,7 @@ fn gain(pair: &[GreyImage], row: &[f32], y: usize) -> f64 {
 }
 
 /// Sums of squares and products around the means, over the window's part of a row
-/// that is of one surface with column `x`; each pixel's own disparity counts one.
+/// that is of one surface with column `x`.
 fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
     let near = x.saturating_sub(radius)..(x + radius + 1).min(row.len());
     let same: Vec<usize> = near.filter(|near| (row[*near] - row[x]).abs() <= 1.0).collect();
@@ -254,11 +254,10 @@ fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: us
         same.iter().map(|x| equation(pair, *x, y, row[*x].into(), gain)).collect();
     let n = all.len() as f64;
     let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
-    let was = same.iter().map(|x| f64::from(row[*x])).sum::<f64>();
     let add = |sum: (f64, f64), e: &(f64, f64)| {
         (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q))
     };
-    all.iter().fold((n, was), add)
+    all.iter().fold((0.0, 0.0), add)
 }
 
 /// Refines disparities pixel by pixel.
@@ -266,7 +265,7 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
     let (width, height) = (pair[0].width(), pair[0].height());
     let one = |at: usize| {
         let (x, y, was) = (at % width, at / width, disparities[at]);
-        let (mut squares, mut sum) = (0.0, 0.0);
+        let (mut squares, mut sum) = (20.0, 20.0 * f64::from(was));
         for y in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let row = &disparities[y * width..(y + 1) * width];
             if (row[x] - was).abs() <= 1.0 {
@@ -275,7 +274,7 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
             }
         }
         let was = f64::from(was);
-        let new = was + (sum / squares - was).clamp(-1.0, 1.0);
+        let new = was + (sum / squares - was).clamp(-0.5, 0.5);
         if new < 0.0 { 0.0 } else { new }
     };
     (0..disparities.len()).map(one).collect()
