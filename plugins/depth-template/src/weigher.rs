@@ -226,9 +226,8 @@ impl Tools {
     fn taken(&mut self, scene: &[Placed], k: usize) -> Found {
         if scene.len() <= 2 {
             let other = rivals(scene, k).next();
-            return other.map_or_else(Found::default, |other| {
-                self.taken_by_one(&scene[k], other, k == 1)
-            });
+            return other
+                .map_or_else(Found::default, |other| self.taken_by_one(&scene[k], other, k == 1));
         }
         let Self { scores, masks, .. } = self;
         let person = &scene[k];
@@ -260,8 +259,7 @@ impl Tools {
                 continue;
             }
             let pixels = self.scores.row(line as usize, person.levels.behind(row.relief_m));
-            let [left, right] =
-                person.beside(row).map(|side| pixels.of(common(side, body)).beside);
+            let [left, right] = person.beside(row).map(|side| pixels.of(common(side, body)).beside);
             let covered = match is_nearer {
                 true => pixels.of(common(person.inside(row), body)).covered,
                 false => 0,
@@ -487,7 +485,9 @@ mod tests {
                         let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
                         sum += if hidden { 0 } else { pixel.covered };
                     } else if x < edge || end <= x {
-                        let is_rival = |p: &&Placed| p.depth_m < person.depth_m + config.likelihood_tolerance_m;
+                        let is_rival = |p: &&Placed| {
+                            p.depth_m < person.depth_m + config.likelihood_tolerance_m
+                        };
                         let others = cast.iter().enumerate().filter(|(i, _)| *i != k);
                         let mut rivals = others.map(|(_, p)| p).filter(is_rival);
                         let taken = rivals.any(|p| inside(p.body(line), x));
@@ -603,6 +603,35 @@ mod tests {
         assert_eq!(of(2.0, 0.0, 0.0, 0.1), Direction::Along, "too slow to tell");
     }
 
+    /// Somebody with something at the same depth beside the body, on the left,
+    /// the right or both sides.
+    fn laden(near: Person, left: bool, right: bool) -> Frame {
+        let bare = painted(&[near]);
+        let depth_m = near.position.x as f32 - 0.08;
+        let depth = DepthImage::from_fn(80, 60, |x, y| {
+            let [on_left, on_right] = [30..35, 45..50].map(|columns| columns.contains(&x));
+            let is_load = (8..24).contains(&y) && (left && on_left || right && on_right);
+            let seen_m = bare.depth().unwrap().get(x as i64, y as i64).unwrap_or(f32::NAN);
+            if is_load { seen_m.min(depth_m) } else { seen_m }
+        });
+        frame(depth.pixels().to_vec())
+    }
+
+    #[test]
+    fn a_rucksack_costs_less_than_furniture_on_both_sides() {
+        let near = standing(1.8, 0.0);
+        let of = |left, right| weight(&laden(near, left, right), &[near]);
+        let (bare, one, both) = (of(false, false), of(true, false), of(true, true));
+        assert!(one < bare && (bare - one) * 3.0 < bare - both, "{bare} {one} {both}");
+    }
+
+    #[test]
+    fn who_is_behind_does_not_explain_what_is_seen_in_front() {
+        let (near, frame) = (standing(1.8, 0.0), laden(standing(1.8, 0.0), true, true));
+        let gain = |y| weight(&frame, &[near, standing(3.2, y)]) - weight(&frame, &[near]);
+        assert!((-8..=8).all(|i| gain(0.05 * f64::from(i)) < 0.05), "{} {}", gain(0.2), gain(0.3));
+    }
+
     #[test]
     fn what_is_shown_of_somebody_is_what_nobody_hides() {
         assert_eq!(outside((2, 12), vec![(8, 9), (1, 3), (2, 6)]), [(6, 8), (9, 12)]);
@@ -624,6 +653,7 @@ mod tests {
         let mut masks = Vec::new();
         union_of(&mut masks, [(5, 9), (1, 3), (2, 6)].into_iter());
         assert_eq!(masks, [(1, 9)]);
-        assert_eq!(masked(&masks, (2, 12), |(a, b)| b - a), 7);
+        let length = |(from, to): Span| i32::try_from(to - from).unwrap();
+        assert_eq!(masked(&masks, (2, 12), length), 7);
     }
 }

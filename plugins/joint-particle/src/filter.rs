@@ -2,8 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support,
-    TrackId,
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support, TrackId,
 };
 
 use crate::config::{Config, Method};
@@ -235,8 +234,7 @@ impl Filter for JointParticle {
     fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
         let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
         let Some(likelihood) = evidence.likelihood else { return Ok(shown) };
-        let mut look =
-            Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
+        let mut look = Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
         self.groups.iter().try_for_each(|group| sketch(group, &mut look, &mut shown))?;
         Ok(shown)
     }
@@ -324,6 +322,28 @@ mod tests {
         let seen: Vec<bool> = (0..12).map(|_| is_seen(&[])).collect();
         let again = is_seen(&[Matched { id, detection: &detection }]);
         (seen, again)
+    }
+
+    #[test]
+    fn a_picture_shows_every_particle_and_a_map_of_two_people_who_overlap() {
+        let config = Config { method: Method::Kde, ..Config::default() };
+        let (mut filter, frame) = (JointParticle::new(config.clone(), 1).unwrap(), frame());
+        let farther = Detection { position: Point3::new(3.0, 0.1, 1.6), ..detection() };
+        filter.start(TrackId(1), &detection());
+        filter.start(TrackId(2), &farther);
+        filter.predict(&frame.motion);
+        let likelihood: Option<&dyn Likelihood> = Some(&Flattering(3.0));
+        let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+        filter.update(&evidence).unwrap();
+        let before = filter.estimates(&frame.camera);
+        let sketch = filter.sketch(&evidence).unwrap();
+        assert_eq!(filter.estimates(&frame.camera), before, "looking changes nothing");
+        let of = |id| sketch.points.iter().filter(|point| point.id == TrackId(id)).count();
+        let rows = config.joint_side * config.joint_side;
+        assert_eq!([of(1), of(2)], [rows, rows]);
+        let titles: Vec<&str> = sketch.maps.iter().map(|map| map.title.as_str()).collect();
+        assert_eq!(titles, ["1 before 2: table", "1 before 2: approximated"]);
+        assert!(sketch.maps.iter().all(|map| (map.columns, map.values.len()) == (61, 1281)));
     }
 
     #[test]
