@@ -134,6 +134,7 @@ impl Pipeline {
             resolved,
             frames: 0,
             failed: None,
+            sketches: false,
         };
         Ok((pipeline, run))
     }

@@ -31,6 +31,7 @@ pub struct Pipeline {
     /// Processed frames.
     pub(crate) frames: u64,
     pub(crate) failed: Option<u64>,
+    pub(crate) sketches: bool,
 }
 
 /// A plugin under its name.
@@ -128,6 +129,12 @@ impl Pipeline {
         if let Some(steering) = self.steering.as_mut().filter(|_| self.failed.is_none()) {
             steering.governor_mut().arm();
         }
+    }
+
+    /// Lets the filter show its work in [`FrameReport::sketch`]. That takes time,
+    /// which counts as that of the stage `update`, and changes nothing else.
+    pub fn sketch(&mut self, wanted: bool) {
+        self.sketches = wanted;
     }
 
     /// The stages that [`FrameReport::timings`] names, in their order.
@@ -294,6 +301,9 @@ impl Pipeline {
         let Slot { name, plugin: filter } = &mut self.filter;
         now.supports = guard(name, now.frame.index, || filter.update(&evidence))?;
         now.report.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
+        if self.sketches {
+            now.report.sketch = guard(name, now.frame.index, || filter.sketch(&evidence))?;
+        }
         self.check_supports(now);
         Ok(())
     }

@@ -1,4 +1,4 @@
-use tagalong_core::{Command, Detection, Funnel, Stamp, Track, TrackId};
+use tagalong_core::{Command, Detection, Funnel, Sketch, Stamp, Track, TrackId};
 
 use crate::{LockReport, Weighing};
 
@@ -82,6 +82,9 @@ pub struct FrameReport {
     pub nis: Vec<(TrackId, f64, u32)>,
     /// What was asked of the likelihood.
     pub weighing: Weighing,
+    /// What the filter shows of its work, where [`crate::Pipeline::sketch`] asks
+    /// for it.
+    pub sketch: Sketch,
     /// Milliseconds per stage. With those of `weighing` the only part that
     /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
@@ -103,6 +106,7 @@ impl FrameReport {
             command: None,
             nis: Vec::new(),
             weighing: Weighing::default(),
+            sketch: Sketch::default(),
             timings: Vec::new(),
             ended: Vec::new(),
         }
