@@ -1,9 +1,13 @@
-use tagalong_core::{Command, Controller, Frame, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{
+    Command, Controller, Frame, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
+};
 
 use crate::boundary::{StepError, contain};
 use crate::governor::{Ahead, Aim, Governor, Wish, ahead};
 use crate::target::{Lock, Search};
-use crate::{CorridorSettings, LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings};
+use crate::{
+    CorridorSettings, LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings,
+};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;

@@ -448,7 +448,7 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        let Steered { command, target, lock } = 
+        let Steered { command, target, lock } =
             steering.steer(now.frame, &now.motion, &now.report.tracks)?;
         now.report
             .funnel

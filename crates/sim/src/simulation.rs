@@ -220,7 +220,8 @@ impl Simulation {
     /// How much room a round robot of this radius has where it is.
     pub fn clearance(&self, radius_m: f64) -> Clearance {
         let robot = Point2::from(self.robot.pose.translation.vector);
-        let people = self.present().map(|(walker, _)| (walker.stance.place - robot).norm() - BODY_M);
+        let people =
+            self.present().map(|(walker, _)| (walker.stance.place - robot).norm() - BODY_M);
         let least = |distances: &mut dyn Iterator<Item = f64>| {
             distances.fold(f64::INFINITY, f64::min) - radius_m
         };

@@ -221,12 +221,14 @@ mod tests {
 
     #[test]
     fn somebody_farther_off_in_the_same_direction_is_another_one() {
-        let tracks: [(u32, &[_]); 2] =
-            [(1, &[Some((5.0, 0.0)); 20]), (2, &[Some((3.2, 0.3)); 20])];
+        let tracks: [(u32, &[_]); 2] = [(1, &[Some((5.0, 0.0)); 20]), (2, &[Some((3.2, 0.3)); 20])];
         let near = [(3.0, 0.2, 1.0); 20];
         let trial = trial(&[&near], &tracks);
         let rules = Crossing { across_only: true, ..Crossing::default() };
-        assert_eq!(crossing(&trial, &trial.runs[0], &rules).map(|span| span.errors_m.len()), Ok(19));
+        assert_eq!(
+            crossing(&trial, &trial.runs[0], &rules).map(|span| span.errors_m.len()),
+            Ok(19)
+        );
         let trial = crate::testing::trial(&[&near], &tracks[..1]);
         let alone = crossing(&trial, &trial.runs[0], &rules);
         assert_eq!(alone, Err(Failing::NotFound { person: 1 }));

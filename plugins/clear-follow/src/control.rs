@@ -54,8 +54,12 @@ impl ClearFollow {
 
     /// What stands around; people walk and are told apart.
     fn look(&mut self, scene: &Scene<'_>) {
-        let people: Vec<Point2<f64>> =
-            scene.tracks.iter().chain(scene.target).map(|t| t.estimate.person.position.xy()).collect();
+        let people: Vec<Point2<f64>> = scene
+            .tracks
+            .iter()
+            .chain(scene.target)
+            .map(|t| t.estimate.person.position.xy())
+            .collect();
         let is_thing =
             |at: &Point2<f64>| people.iter().all(|p| nalgebra::distance(p, at) > PERSON_M);
         self.around.move_along(&scene.frame.motion, self.config.memory_s);

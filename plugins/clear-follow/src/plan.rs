@@ -25,7 +25,8 @@ impl Twist {
     fn after(self, seconds: f64) -> Isometry2<f64> {
         let turn = self.turn_rate * seconds;
         let half = 0.5 * turn;
-        let chord = self.speed_mps * seconds * if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
+        let chord =
+            self.speed_mps * seconds * if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
         Isometry2::new(Vector2::new(half.cos(), half.sin()) * chord, turn)
     }
 }
@@ -98,7 +99,8 @@ fn clearance(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
 /// How far somebody else is before the person at the end of the horizon, 0 to 1.
 fn hidden(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
     let pose = twist.after(config.horizon_s);
-    let seen = |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
+    let seen =
+        |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
     let person = seen(&around.person);
     let Some(sight) = person.try_normalize(1e-6) else { return 0.0 };
     let before = |other: &Walker| {

@@ -44,8 +44,7 @@ fn command(
     let images = Images { depth: depth.map(Arc::new), ..Images::default() };
     let frame = Frame::new(1, Stamp::default(), camera(), motion, images);
     let tracks = target.map_or(&[][..], std::slice::from_ref);
-    let scene =
-        Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+    let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
     controller.command(&scene)
 }
 

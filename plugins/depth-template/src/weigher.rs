@@ -226,9 +226,8 @@ impl Tools {
     fn taken(&mut self, scene: &[Placed], k: usize) -> Found {
         if scene.len() <= 2 {
             let other = rivals(scene, k).next();
-            return other.map_or_else(Found::default, |other| {
-                self.taken_by_one(&scene[k], other, k == 1)
-            });
+            return other
+                .map_or_else(Found::default, |other| self.taken_by_one(&scene[k], other, k == 1));
         }
         let Self { scores, masks, .. } = self;
         let person = &scene[k];
@@ -260,8 +259,7 @@ impl Tools {
                 continue;
             }
             let pixels = self.scores.row(line as usize, person.levels.behind(row.relief_m));
-            let [left, right] =
-                person.beside(row).map(|side| pixels.of(common(side, body)).beside);
+            let [left, right] = person.beside(row).map(|side| pixels.of(common(side, body)).beside);
             let covered = match is_nearer {
                 true => pixels.of(common(person.inside(row), body)).covered,
                 false => 0,
@@ -487,7 +485,9 @@ mod tests {
                         let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
                         sum += if hidden { 0 } else { pixel.covered };
                     } else if x < edge || end <= x {
-                        let is_rival = |p: &&Placed| p.depth_m < person.depth_m + config.likelihood_tolerance_m;
+                        let is_rival = |p: &&Placed| {
+                            p.depth_m < person.depth_m + config.likelihood_tolerance_m
+                        };
                         let others = cast.iter().enumerate().filter(|(i, _)| *i != k);
                         let mut rivals = others.map(|(_, p)| p).filter(is_rival);
                         let taken = rivals.any(|p| inside(p.body(line), x));

@@ -2,8 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support,
-    TrackId,
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support, TrackId,
 };
 
 use crate::config::{Config, Method};
@@ -235,8 +234,7 @@ impl Filter for JointParticle {
     fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
         let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
         let Some(likelihood) = evidence.likelihood else { return Ok(shown) };
-        let mut look =
-            Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
+        let mut look = Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
         self.groups.iter().try_for_each(|group| sketch(group, &mut look, &mut shown))?;
         Ok(shown)
     }

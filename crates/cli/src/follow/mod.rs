@@ -155,10 +155,7 @@ fn jobs(args: &FollowArgs, registry: &Registry) -> Result<Vec<Job>, Failure> {
     Ok(jobs)
 }
 
-fn contenders(
-    args: &FollowArgs,
-    registry: &Registry,
-) -> Result<Vec<Contender>, Failure> {
+fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, Failure> {
     let read = |path: &PathBuf| {
         let file = ConfigFile::read(path)?;
         let (pipeline, _) = file.pipeline(registry, None)?;
@@ -191,8 +188,9 @@ fn scenes(args: &FollowArgs) -> Result<Vec<PathBuf>, Failure> {
 fn variant(args: &FollowArgs, seed: u64) -> Variant {
     let latency = args.latency_ms.map(|ms| f64::from(ms) * 1e-3);
     let faults = [("robot.latency_s", latency), ("faults.dropped", args.drop)];
-    let faults =
-        faults.into_iter().filter_map(|(key, value)| Some((key.to_owned(), format!("{:?}", value?))));
+    let faults = faults
+        .into_iter()
+        .filter_map(|(key, value)| Some((key.to_owned(), format!("{:?}", value?))));
     let set = args.set.iter().cloned().chain(faults).collect();
     Variant { seed: Some(seed), split: Some(args.split), set }
 }

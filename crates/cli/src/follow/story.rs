@@ -19,9 +19,10 @@ pub fn story(ride: &Ride) -> Vec<String> {
 
 fn words(report: &FrameReport) -> String {
     let whom = report.target.map_or("nobody".into(), |id| format!("track {id}"));
-    let lock = report.lock.as_ref().map_or(String::new(), |lock| {
-        format!(" ({}: {})", lock.state.name(), lock.why)
-    });
+    let lock = report
+        .lock
+        .as_ref()
+        .map_or(String::new(), |lock| format!(" ({}: {})", lock.state.name(), lock.why));
     let why = report.command.map_or("-", |command| command.reason.name());
     format!("{whom}{lock}: {why}")
 }

@@ -16,9 +16,19 @@ const BINS: usize = 10;
 pub fn tables(results: &[Followed]) -> Vec<Table> {
     let judge = RideJudge::default();
     let columns = [
-        "rides", "kept %", "wrong %", "longest wrong s", "refound %", "in view %", "distance %",
+        "rides",
+        "kept %",
+        "wrong %",
+        "longest wrong s",
+        "refound %",
+        "in view %",
+        "distance %",
         "farther m",
-        "contacts", "to people m", "to things m", "jerk m/s3", "ms/frame",
+        "contacts",
+        "to people m",
+        "to things m",
+        "jerk m/s3",
+        "ms/frame",
     ];
     let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
     let mut suites = unique(results.iter().map(|result| result.suite.as_str()));
@@ -28,7 +38,8 @@ pub fn tables(results: &[Followed]) -> Vec<Table> {
     }
     for suite in suites {
         for pipeline in &pipelines {
-            let of = |r: &&Followed| (suite.is_empty() || r.suite == suite) && r.pipeline == *pipeline;
+            let of =
+                |r: &&Followed| (suite.is_empty() || r.suite == suite) && r.pipeline == *pipeline;
             let chosen: Vec<&Followed> = results.iter().filter(of).collect();
             let name = if suite.is_empty() { "all scenes" } else { suite };
             rows.push(Row::ours(format!("{name}: {pipeline}"), cells(&chosen, &judge)));
@@ -166,12 +177,14 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 /// What the lock thought of each sighting, and whether it was the person, with
 /// the differences that it was made of; nothing stands for what is not known.
 pub fn likeness_csv(results: &[Followed]) -> String {
-    let mut out = "suite,pipeline,seed,same,probability,torso,legs,texture,height_m,rivals\n".to_owned();
+    let mut out =
+        "suite,pipeline,seed,same,probability,torso,legs,texture,height_m,rivals\n".to_owned();
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
     for Followed { suite, pipeline, ridden, .. } in results {
         for (like, same) in &ridden.likeness {
             let d = &like.differences;
-            let numbers = [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals].map(number).join(",");
+            let numbers =
+                [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals].map(number).join(",");
             let (seed, p) = (ridden.seed, like.probability);
             out += &format!("{suite},{pipeline},{seed},{},{p:.4},{numbers}\n", u8::from(*same));
         }

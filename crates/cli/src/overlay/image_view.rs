@@ -85,12 +85,8 @@ fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
     for (i, value) in map.values.iter().enumerate() {
         let (x, y) = ((i % map.columns.max(1)) as f64, (i / map.columns.max(1)) as f64);
         let shade = (255.0 * value.clamp(0.0, 1.0)) as u8;
-        let cell = Rect::new(
-            MAP_MARGIN_PX + CELL_PX * x,
-            bottom - height + CELL_PX * y,
-            CELL_PX,
-            CELL_PX,
-        );
+        let cell =
+            Rect::new(MAP_MARGIN_PX + CELL_PX * x, bottom - height + CELL_PX * y, CELL_PX, CELL_PX);
         canvas.fill(&cell, Ink::solid([shade, shade / 2, 255 - shade]));
     }
     canvas.text(Point2::new(MAP_MARGIN_PX, bottom - height - LINE_PX), &map.title, TITLE);

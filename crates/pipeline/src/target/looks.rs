@@ -170,7 +170,8 @@ fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
     let bright = ((most - 0.2) / 0.4).clamp(0.0, 1.0);
     let hue = hue(r, g, b, most, most - least) * HUES as f64;
     let (first, share) = (hue.floor(), hue - hue.floor());
-    for (bin, share) in [(first as usize % HUES, 1.0 - share), ((first as usize + 1) % HUES, share)] {
+    for (bin, share) in [(first as usize % HUES, 1.0 - share), ((first as usize + 1) % HUES, share)]
+    {
         histogram[bin] += coloured * share * (1.0 - bright);
         histogram[HUES + bin] += coloured * share * bright;
     }

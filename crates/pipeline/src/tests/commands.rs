@@ -9,8 +9,7 @@ use crate::{LockState, Pipeline};
 /// A pipeline that has driven after somebody for two seconds.
 fn driving(how: &str) -> (World, Pipeline) {
     let world = World::of((0..60).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
-    let config =
-        format!("{PLAIN}\n[controller]\nplugin = 'drive'\nconfig = {{ how = '{how}' }}\n");
+    let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\nconfig = {{ how = '{how}' }}\n");
     let mut pipeline = world.pipeline(&config);
     for index in 1..=20 {
         pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
@@ -31,8 +30,7 @@ fn after(index: u64, t_s: f64, motion: Motion) -> Frame {
 /// The command for a frame that comes that much later.
 fn paused(pause_s: f64) -> (Pipeline, Command) {
     let (_, mut pipeline) = driving("");
-    let report =
-        pipeline.step(&after(21, 2.0 + pause_s, Motion::at_rest(pause_s))).unwrap();
+    let report = pipeline.step(&after(21, 2.0 + pause_s, Motion::at_rest(pause_s))).unwrap();
     (pipeline, report.command.unwrap())
 }
 
@@ -111,7 +109,10 @@ fn p1_a_plugin_that_panics_stops_the_robot_in_the_same_tick() {
     let world = World::of((0..30).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
     for (of, config) in [
         ("drive", "[controller]\nplugin = 'drive'\nconfig = { how = 'panic at 21' }"),
-        ("choosy", "[controller]\nplugin = 'drive'\n[[verifiers]]\nplugin = 'choosy'\nconfig = { how = 'panic at 21' }"),
+        (
+            "choosy",
+            "[controller]\nplugin = 'drive'\n[[verifiers]]\nplugin = 'choosy'\nconfig = { how = 'panic at 21' }",
+        ),
     ] {
         let mut pipeline = world.pipeline(&format!("{PLAIN}\n{config}\n"));
         (1..=20).for_each(|i| drop(pipeline.step(&frame(i, i as f64 * 0.1)).unwrap()));

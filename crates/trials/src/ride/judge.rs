@@ -124,9 +124,8 @@ impl RideJudge {
         let sum = |counts: &dyn Fn(&Look) -> bool| -> f64 {
             looks.iter().filter(|look| counts(look)).fold(0.0, |sum, look| sum + look.dt_s)
         };
-        let slow = |l: &Look| {
-            l.whom == Whom::Right && l.speed_mps.is_some_and(|mps| mps < self.slow_mps)
-        };
+        let slow =
+            |l: &Look| l.whom == Whom::Right && l.speed_mps.is_some_and(|mps| mps < self.slow_mps);
         let near = |l: &Look| match (l.range_m, ride.stand_off_m) {
             (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
             _ => false,
@@ -308,7 +307,11 @@ fn jerk(ticks: &[Tick]) -> f64 {
         .windows(3)
         .map(|w| ((w[2].1 - 2.0 * w[1].1 + w[0].1) / (JERK_S * JERK_S)).powi(2))
         .collect();
-    if squares.is_empty() { 0.0 } else { (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() }
+    if squares.is_empty() {
+        0.0
+    } else {
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    }
 }
 
 #[cfg(test)]
@@ -361,8 +364,7 @@ mod tests {
     fn a_steady_speed_has_no_jerk_and_a_sudden_stop_has() {
         let clearance = tagalong_sim::Clearance { people_m: 1.0, things_m: 1.0 };
         let ride = |speed: &dyn Fn(usize) -> f64| -> Vec<Tick> {
-            let tick =
-                |i: usize| Tick { at_s: i as f64 * 0.02, speed_mps: speed(i), clearance };
+            let tick = |i: usize| Tick { at_s: i as f64 * 0.02, speed_mps: speed(i), clearance };
             (0..200).map(tick).collect()
         };
         assert!(jerk(&ride(&|_| 0.5)) < 1e-9);

@@ -4,7 +4,7 @@ mod judge;
 
 use std::time::Instant;
 
-pub use judge::{Episode, RideJudge, Ridden};
+pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_core::{Registry, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_sim::{Clearance, Event, Scene, Simulation};
@@ -87,11 +87,8 @@ impl Ride {
             took_ms: Vec::new(),
             ticks: Vec::new(),
         };
-        let failed = |error| TrialError::Step {
-            pipeline: contender.name.clone(),
-            seed: scene.seed,
-            error,
-        };
+        let failed =
+            |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
         while let Some(drawn) = ride.next_frame(&mut draw, &pipeline, witness) {
             let start = Instant::now();
             let report = pipeline.step(&drawn.frame).map_err(failed)?;
