@@ -4,10 +4,11 @@ use tagalong_core::{
     Result, Search, UPPER_BODY_SIDE_M,
 };
 
-use crate::{Config, Model, NAME, Scanner, Window, merge};
+use crate::{Config, Kind, Model, NAME, Scanner, Window, merge};
 
-/// The model that is part of the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/hog-upper-body.toml");
+/// The models that are part of the program.
+const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
+const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
 
 /// Places a side at which the depth of a window is read.
 const TAPS: usize = 5;
@@ -29,8 +30,8 @@ impl HogUpperBody {
     /// [`Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
-        let model = read(&config.model, context)?;
-        Ok(Self { config, model, scanner: Scanner::default() })
+        let model = read(&config, context)?;
+        Ok(Self { config, scanner: Scanner::new(model.kind()), model })
     }
 
     /// The sizes that are looked for, pixels.
@@ -63,10 +64,12 @@ impl HogUpperBody {
     }
 }
 
-fn read(file: &str, context: &Context) -> Result<Model> {
+fn read(config: &Config, context: &Context) -> Result<Model> {
+    let file = &config.model;
     let broken = |why: String| Error::Model { path: file.into(), why };
     if file.is_empty() {
-        return Model::from_text(BUILT_IN).map_err(broken);
+        let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
+        return Model::from_text(built_in).map_err(broken);
     }
     let text = std::fs::read_to_string(context.base_dir.join(file))
         .map_err(|error| broken(error.to_string()))?;
