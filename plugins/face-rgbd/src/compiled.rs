@@ -102,9 +102,9 @@ impl Compiled {
         self.stride
     }
 
-    /// The sums of the first stage of `count` windows of row `y`, `step` columns
-    /// apart from `first` on.
-    pub fn first(
+    /// Takes `count` windows of row `y`, `step` columns apart from `first` on, and
+    /// measures their contrast.
+    pub fn start(
         &self,
         level: &Level,
         (first, y): (usize, usize),
@@ -113,17 +113,30 @@ impl Compiled {
         count: usize,
     ) {
         let start = y * self.stride + first;
-        let (sums, squares) = (&level.sums()[start..], &level.squares()[start..]);
         row.columns.clear();
         row.columns.extend((0..count).map(|i| (first + i * step) as u32));
         row.contrast.clear();
         row.contrast.resize(count, 1.0);
         if self.is_normalised {
+            let (sums, squares) = (&level.sums()[start..], &level.squares()[start..]);
             contrasts(sums, squares, &self.middle, self.area, step, &mut row.contrast);
         }
+    }
+
+    /// The sums of a stage for all windows of [`Compiled::start`].
+    pub fn all(
+        &self,
+        stage: usize,
+        level: &Level,
+        (first, y): (usize, usize),
+        step: usize,
+        row: &mut Row,
+    ) {
+        let sums = &level.sums()[y * self.stride + first..];
+        let count = row.columns.len();
         row.sums.clear();
         row.sums.resize(count, 0.0);
-        for weak in &self.stages[0].weak {
+        for weak in &self.stages[stage].weak {
             match weak {
                 Weak::Stump(stump) => {
                     row.values.clear();
@@ -144,7 +157,14 @@ impl Compiled {
         }
     }
 
-    /// True if a window of [`Compiled::first`] is not empty.
+    /// True if it pays to judge all windows of a row by a stage, so that neighbours
+    /// are judged at once, though only `alive` of `count` are still in question.
+    pub fn pays(&self, stage: usize, alive: usize, count: usize) -> bool {
+        let is_stump = |weak: &Weak| matches!(weak, Weak::Stump(_));
+        self.stages.get(stage).is_some_and(|s| s.weak.iter().all(is_stump)) && 6 * alive > count
+    }
+
+    /// True if a window of [`Compiled::start`] is not empty.
     pub fn is_worth_it(row: &Row, window: usize) -> bool {
         row.contrast[window] != 0.0
     }
@@ -159,9 +179,9 @@ impl Compiled {
         self.stages.last().map_or(0.0, |stage| sum - stage.threshold)
     }
 
-    /// Keeps the windows that passed the first stage, and of those the ones that
-    /// pass the others, too.
-    pub fn rest(&self, level: &Level, y: usize, row: &mut Row, chosen: &[usize]) {
+    /// Keeps the `chosen` windows, and of those the ones that pass all stages from
+    /// `stage` on.
+    pub fn rest(&self, stage: usize, level: &Level, y: usize, row: &mut Row, chosen: &[usize]) {
         for (to, from) in chosen.iter().enumerate() {
             row.columns[to] = row.columns[*from];
             row.contrast[to] = row.contrast[*from];
@@ -169,7 +189,7 @@ impl Compiled {
         }
         row.truncate(chosen.len());
         let sums = &level.sums()[y * self.stride..];
-        for stage in self.stages.iter().skip(1) {
+        for stage in self.stages.iter().skip(stage) {
             if row.columns.is_empty() {
                 return;
             }

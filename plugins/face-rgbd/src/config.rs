@@ -63,7 +63,7 @@ impl Default for Config {
             min_neighbours: 2,
             min_side_px: 24.0,
             max_side: 0.9,
-            scale_step: 1.1,
+            scale_step: 1.05,
             depth_proposals: true,
             min_face_m: 0.10,
             max_face_m: 0.19,
@@ -103,7 +103,8 @@ pub struct Training {
     /// Other windows that a stage is trained with, and that all stages before it
     /// pass.
     pub others: usize,
-    /// Fewer than this are not to be found any more, and it is done.
+    /// Where fewer than this are to be found, a stage would know them by heart: it
+    /// is done.
     pub fewest_others: usize,
 }
 
@@ -118,7 +119,7 @@ impl Default for Training {
             depth: 2,
             features: 2500,
             others: 5000,
-            fewest_others: 300,
+            fewest_others: 2000,
         }
     }
 }

@@ -130,7 +130,9 @@ impl Scanner {
         take: &mut impl FnMut(Seen<'_>),
     ) {
         let Self { level, compiled, row, wanted, chosen, looked_at } = self;
-        compiled.first(level, (first * step, y), step, row, count);
+        let place = (first * step, y);
+        compiled.start(level, place, step, row, count);
+        compiled.all(0, level, place, step, row);
         chosen.clear();
         let mut at = 0;
         while at < count {
@@ -145,7 +147,13 @@ impl Scanner {
             }
             at += 1;
         }
-        compiled.rest(level, y, row, chosen);
+        let mut stage = 1;
+        while compiled.pays(stage, chosen.len(), count) {
+            compiled.all(stage, level, place, step, row);
+            chosen.retain(|at| compiled.passes(stage, row.sums[*at]));
+            stage += 1;
+        }
+        compiled.rest(stage, level, y, row, chosen);
         for (x, sum) in row.columns.iter().zip(&row.sums) {
             take(Seen { level, x: *x as usize, y, margin: compiled.margin(*sum) });
         }

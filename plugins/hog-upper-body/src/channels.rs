@@ -2,8 +2,7 @@
 //! small cells and compared with what is around (after P. Dollar et al., *Fast
 //! feature pyramids for object detection*, PAMI 36, 2014).
 
-use std::f32::consts::PI;
-
+use crate::gradients::Gradients;
 use crate::hog::CELL as HOG_CELL;
 
 /// Side of a cell, pixels.
@@ -25,6 +24,7 @@ pub struct Channels {
     /// Scratch: the lengths of gradients around a cell, and what a pass reads.
     around: Vec<f32>,
     before: Vec<f32>,
+    gradients: Gradients,
 }
 
 impl Channels {
@@ -45,48 +45,44 @@ impl Channels {
             self.add(rows, y / CELL);
         }
         self.compare();
-        self.before.clone_from(&self.values);
-        smooth(
-            &self.before,
-            &mut self.values,
-            (self.columns, self.rows),
-            DEPTH,
-            &[0.25, 0.5, 0.25],
-        );
+        self.before.resize(self.values.len(), 0.0);
+        let size = (self.columns, self.rows);
+        smooth(&mut self.values, &mut self.before, size, DEPTH, &[0.25, 0.5, 0.25]);
     }
 
     /// Adds a row of pixels to its cells.
-    fn add(&mut self, [above, row, below]: [&[f32]; 3], cell_row: usize) {
+    fn add(&mut self, rows: [&[f32]; 3], cell_row: usize) {
         let start = cell_row * self.columns * DEPTH;
         let share = 1.0 / (255.0 * (CELL * CELL) as f32);
-        for (cell, values) in
-            self.values[start..].chunks_exact_mut(DEPTH).take(self.columns).enumerate()
-        {
-            for x in cell * CELL..(cell + 1) * CELL {
-                values[0] += share * row[x + 1];
-                let gx = 0.5 * share * (row[x + 2] - row[x]);
-                let gy = 0.5 * share * (below[x + 1] - above[x + 1]);
-                let length = (gx * gx + gy * gy).sqrt();
-                if length > 0.0 {
-                    let (bins, part) = direction(gx, gy);
-                    values[1] += length;
-                    values[2 + bins[0]] += length * (1.0 - part);
-                    values[2 + bins[1]] += length * part;
-                }
+        self.gradients.fill(rows);
+        let Gradients { length, turn } = &self.gradients;
+        let cells = self.values[start..].chunks_exact_mut(DEPTH).take(self.columns);
+        let pixels = length.chunks_exact(CELL).zip(turn.chunks_exact(CELL));
+        let pixels = pixels.zip(rows[1][1..].chunks_exact(CELL));
+        for (values, ((length, turn), grey)) in cells.zip(pixels) {
+            values[0] += share * grey.iter().sum::<f32>();
+            for (length, turn) in length.iter().zip(turn) {
+                let length = 0.5 * share * length;
+                let at = turn * BINS as f32;
+                let bin = at as usize;
+                let part = at - bin as f32;
+                values[1] += length;
+                values[2 + bin % BINS] += length * (1.0 - part);
+                values[2 + (bin + 1) % BINS] += length * part;
             }
         }
     }
 
     /// Divides gradients by what is usual around their cell.
     fn compare(&mut self) {
-        self.before.clear();
-        self.before.extend(self.values.chunks_exact(DEPTH).map(|cell| cell[1]));
         self.around.clear();
-        self.around.resize(self.before.len(), 0.0);
+        self.around.extend(self.values.chunks_exact(DEPTH).map(|cell| cell[1]));
+        self.before.resize(self.values.len(), 0.0);
         let weights = [1.0, 2.0, 3.0, 2.0, 1.0].map(|w: f32| w / 9.0);
-        smooth(&self.before, &mut self.around, (self.columns, self.rows), 1, &weights);
+        smooth(&mut self.around, &mut self.before, (self.columns, self.rows), 1, &weights);
         for (cell, around) in self.values.chunks_exact_mut(DEPTH).zip(&self.around) {
-            cell[1..].iter_mut().for_each(|value| *value /= around + FAINT);
+            let scale = 1.0 / (around + FAINT);
+            cell[1..].iter_mut().for_each(|value| *value *= scale);
         }
     }
 
@@ -101,42 +97,53 @@ impl Channels {
     }
 }
 
-/// The two nearest directions, and the share of the second.
-fn direction(gx: f32, gy: f32) -> ([usize; 2], f32) {
-    let angle = gy.atan2(gx);
-    let angle = if angle < 0.0 { angle + PI } else { angle };
-    let at = angle * (BINS as f32 / PI);
-    let below = (at as usize).min(BINS);
-    ([below % BINS, (below + 1) % BINS], at - below as f32)
-}
-
-/// A weighted mean over neighbours in rows and then in columns; at the border
-/// what is there counts more.
+/// Weighted means over neighbours in columns and then in rows; at the border what
+/// is there counts more. `scratch` is as long as the values, at least.
 fn smooth(
-    from: &[f32],
-    to: &mut [f32],
+    values: &mut [f32],
+    scratch: &mut [f32],
     (columns, rows): (usize, usize),
     depth: usize,
     weights: &[f32],
 ) {
-    let reach = weights.len() / 2;
-    let pass = |from: &[f32], to: &mut [f32], at: usize, length: usize, step: usize, i: usize| {
-        let first = i.saturating_sub(reach);
-        let last = (i + reach).min(length - 1);
-        let used = &weights[first + reach - i..=last + reach - i];
-        let total: f32 = used.iter().sum();
-        for channel in 0..depth {
-            let neighbours = used.iter().enumerate();
-            let sum: f32 =
-                neighbours.map(|(k, w)| w * from[at + (first + k) * step * depth + channel]).sum();
-            to[at + i * step * depth + channel] = sum / total;
-        }
-    };
-    let mut across = vec![0.0_f32; from.len()];
+    let row = columns * depth;
     for y in 0..rows {
-        (0..columns).for_each(|x| pass(from, &mut across, y * columns * depth, columns, 1, x));
+        let (first, used, scale) = present(y, rows, weights);
+        let out = &mut scratch[y * row..(y + 1) * row];
+        out.fill(0.0);
+        for (from, weight) in (first..).zip(used) {
+            add_scaled(out, &values[from * row..(from + 1) * row], scale * weight);
+        }
     }
-    for x in 0..columns {
-        (0..rows).for_each(|y| pass(&across, to, x * depth, rows, columns, y));
+    let reach = weights.len() / 2;
+    for (from, to) in scratch.chunks_exact(row).zip(values.chunks_exact_mut(row)).take(rows) {
+        to.fill(0.0);
+        let whole = reach.min(columns)..columns.saturating_sub(reach).max(reach.min(columns));
+        for (k, weight) in weights.iter().enumerate().filter(|_| !whole.is_empty()) {
+            let begin = (whole.start + k - reach) * depth;
+            let inner = &mut to[whole.start * depth..whole.end * depth];
+            let length = inner.len();
+            add_scaled(inner, &from[begin..begin + length], *weight);
+        }
+        for x in (0..whole.start).chain(whole.end..columns) {
+            let (first, used, scale) = present(x, columns, weights);
+            for (neighbour, weight) in (first..).zip(used) {
+                let from = &from[neighbour * depth..(neighbour + 1) * depth];
+                add_scaled(&mut to[x * depth..(x + 1) * depth], from, scale * weight);
+            }
+        }
     }
+}
+
+/// The first neighbour that is there, the weights of those that are, and what
+/// makes them sum to 1.
+fn present(at: usize, length: usize, weights: &[f32]) -> (usize, &[f32], f32) {
+    let reach = weights.len() / 2;
+    let (first, last) = (at.saturating_sub(reach), (at + reach).min(length - 1));
+    let used = &weights[first + reach - at..=last + reach - at];
+    (first, used, 1.0 / used.iter().sum::<f32>())
+}
+
+fn add_scaled(to: &mut [f32], from: &[f32], scale: f32) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * from);
 }

@@ -18,6 +18,7 @@
 mod channels;
 mod config;
 mod detect;
+mod gradients;
 mod hog;
 mod model;
 mod resample;
@@ -36,7 +37,7 @@ pub use model::{Field, Kind, Machine, Model, NUMBERS};
 pub use resample::resampled;
 pub use scan::{Scanner, Window, merge, window_numbers, window_of};
 use tagalong_core::Registry;
-pub use trees::Tree;
+pub use trees::{Tree, Trees};
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "hog-upper-body";

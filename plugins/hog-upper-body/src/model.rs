@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::channels::Channels;
 use crate::hog::{BLOCK, Blocks};
-use crate::trees::{self, Tree};
+use crate::trees::{self, Trees};
 
 /// Blocks along a side of a window: 64 pixels.
 pub(crate) const SIDE: usize = 7;
@@ -36,7 +36,7 @@ pub enum Machine {
         bias: f32,
     },
     /// A sum of what trees say of cells.
-    Trees(Vec<Tree>),
+    Trees(Trees),
 }
 
 /// What a machine looks at, for all windows of an image in one size.
@@ -96,7 +96,8 @@ pub struct Model {
 struct Kept {
     format: String,
     machine: Kind,
-    bias: f32,
+    /// The bias of a linear machine; where trees give a window up.
+    level: f32,
     slope: f64,
     offset: f64,
     /// Little-endian numbers in base64: weights, or trees.
@@ -121,7 +122,7 @@ impl Model {
                 rows.map(of).sum::<f32>() + bias
             }
             (Machine::Trees(trees), Field::Channels(channels)) => {
-                trees::sum_in(trees, channels, 2 * x, 2 * y)
+                trees.sum_in(channels, 2 * x, 2 * y)
             }
             _ => f32::MIN,
         }
@@ -131,7 +132,7 @@ impl Model {
     pub fn sum_of(&self, numbers: &[f32]) -> f32 {
         match &self.machine {
             Machine::Linear { weights, bias } => dot(weights, numbers) + bias,
-            Machine::Trees(trees) => trees::sum_of(trees, numbers),
+            Machine::Trees(trees) => trees.sum_of(numbers),
         }
     }
 
@@ -147,16 +148,16 @@ impl Model {
 
     /// The content of a model file.
     pub fn to_text(&self) -> String {
-        let (bias, bytes) = match &self.machine {
+        let (level, bytes) = match &self.machine {
             Machine::Linear { weights, bias } => {
                 (*bias, weights.iter().flat_map(|w| w.to_le_bytes()).collect())
             }
-            Machine::Trees(trees) => (0.0, trees::to_bytes(trees)),
+            Machine::Trees(all) => (all.hopeless, trees::to_bytes(&all.trees)),
         };
         let kept = Kept {
             format: FORMAT.into(),
             machine: self.kind(),
-            bias,
+            level,
             slope: self.slope,
             offset: self.offset,
             numbers: BASE64_STANDARD.encode(bytes),
@@ -174,16 +175,18 @@ impl Model {
             return Err(format!("its format is `{}`, expected `{FORMAT}`", kept.format));
         }
         let bytes = BASE64_STANDARD.decode(&kept.numbers).map_err(|error| error.to_string())?;
-        let Kept { machine, bias, slope, offset, .. } = kept;
-        let finite = bias.is_finite() && slope.is_finite() && offset.is_finite();
+        let Kept { machine, level, slope, offset, .. } = kept;
+        let finite = level.is_finite() && slope.is_finite() && offset.is_finite();
         if !finite || slope <= 0.0 {
             return Err(
                 "it has numbers that are no numbers, or a slope that is not positive".into()
             );
         }
         let machine = match machine {
-            Kind::Linear => Machine::Linear { weights: weights(&bytes)?, bias },
-            Kind::Trees => Machine::Trees(trees::from_bytes(&bytes)?),
+            Kind::Linear => Machine::Linear { weights: weights(&bytes)?, bias: level },
+            Kind::Trees => {
+                Machine::Trees(Trees { trees: trees::from_bytes(&bytes)?, hopeless: level })
+            }
         };
         Ok(Self { machine, slope, offset })
     }
@@ -202,6 +205,7 @@ fn weights(bytes: &[u8]) -> Result<Vec<f32>, String> {
 }
 
 /// Sums in eight lanes of a fixed order: fast, and the same on every machine.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut lanes = [0.0_f32; 8];
     let (heads, tails) = (a.chunks_exact(8), b.chunks_exact(8));

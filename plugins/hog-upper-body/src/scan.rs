@@ -6,7 +6,7 @@ use tagalong_core::{GreyImage, Rect};
 
 use crate::hog::CELL;
 use crate::model::{Field, Kind, Model, SIDE};
-use crate::resample::resampled;
+use crate::resample::{Resampler, resampled};
 
 /// Side of a window, pixels of the resampled image.
 pub(crate) const WINDOW_PX: usize = (SIDE + 1) * CELL;
@@ -38,13 +38,20 @@ pub struct Window {
 #[derive(Clone, Debug)]
 pub struct Scanner {
     field: Field,
+    resampler: Resampler,
+    pixels: Vec<f32>,
     looked_at: u64,
 }
 
 impl Scanner {
     /// For models of one kind.
     pub fn new(kind: Kind) -> Self {
-        Self { field: Field::new(kind), looked_at: 0 }
+        Self {
+            field: Field::new(kind),
+            resampler: Resampler::default(),
+            pixels: Vec::new(),
+            looked_at: 0,
+        }
     }
 
     /// How many windows were looked at so far.
@@ -96,8 +103,9 @@ impl Scanner {
         let long = |from: i64, to: i64| ((to - from) as usize + SIDE + 1) * CELL + 2 * AROUND_PX;
         let (width, height) = (long(left, right), long(top, bottom));
         let start = |cell: i64| ((cell * CELL as i64) as f64 - AROUND_PX as f64) * step;
-        let pixels = resampled(image, (start(left), start(top)), step, width, height);
-        self.field.fill(&pixels, width);
+        let origin = (start(left), start(top));
+        self.resampler.fill(image, origin, step, (width, height), &mut self.pixels);
+        self.field.fill(&self.pixels, width);
         for (x, y, depth_m) in wanted {
             let at = |cell: i64, first: i64| (cell - first) as usize + AROUND;
             let sum = model.sum(&self.field, at(x, left), at(y, top));

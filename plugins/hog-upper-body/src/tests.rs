@@ -7,8 +7,8 @@ use crate::model::SIDE;
 use crate::scan::WINDOW_PX;
 use crate::trees::CHANNEL_NUMBERS;
 use crate::{
-    Blocks, Channels, Kind, Machine, Model, NUMBERS, Scanner, Tree, Window, merge, resampled,
-    window_numbers,
+    Blocks, Channels, Kind, Machine, Model, NUMBERS, Scanner, Tree, Trees, Window, merge,
+    resampled, window_numbers,
 };
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
@@ -86,7 +86,8 @@ fn trees() -> Model {
         below: [0.5, 0.12, 0.3],
         values: [0.25, -0.5, 1.0, -0.125],
     };
-    Model { machine: Machine::Trees((1..30).map(tree).collect()), slope: 1.0, offset: 0.0 }
+    let trees = Trees { trees: (1..30).map(tree).collect(), hopeless: -2.0 };
+    Model { machine: Machine::Trees(trees), slope: 1.0, offset: 0.0 }
 }
 
 #[test]

@@ -7,9 +7,7 @@ use crate::model::SIDE;
 pub(crate) const CELLS: usize = 2 * (SIDE + 1);
 /// Numbers of a window.
 pub(crate) const CHANNEL_NUMBERS: usize = CELLS * CELLS * DEPTH;
-/// A window whose sum falls below this is given up ...
-const HOPELESS: f32 = -2.0;
-/// ... after this many trees at the earliest.
+/// A window is given up after this many trees at the earliest.
 const PATIENCE: usize = 32;
 /// Bytes of a tree in a file.
 const BYTES: usize = 3 * 6 + 4 * 4;
@@ -51,32 +49,56 @@ impl Tree {
     }
 }
 
-/// The sum of trees over the numbers that `number` gives; what has no hope left is
-/// given up, with the sum so far.
-fn sum(trees: &[Tree], number: impl Fn(u16) -> f32) -> f32 {
-    let mut sum = 0.0;
-    for (count, tree) in trees.iter().enumerate() {
-        sum += tree.value(&number);
-        if sum < HOPELESS && count >= PATIENCE {
-            break;
+/// Trees one after the other; a window whose sum falls below `hopeless` is given up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trees {
+    /// The trees.
+    pub trees: Vec<Tree>,
+    /// The least sum on the way.
+    pub hopeless: f32,
+}
+
+impl Trees {
+    /// The sum over the numbers that `number` gives, or that at which the window
+    /// was given up.
+    fn sum(&self, number: impl Fn(u16) -> f32) -> f32 {
+        let mut sum = 0.0;
+        for (count, tree) in self.trees.iter().enumerate() {
+            sum += tree.value(&number);
+            if sum < self.hopeless && count >= PATIENCE {
+                break;
+            }
         }
+        sum
     }
-    sum
-}
 
-/// The sum of the window whose first cell is at (x, y).
-pub(crate) fn sum_in(trees: &[Tree], channels: &Channels, x: usize, y: usize) -> f32 {
-    const ROW: usize = CELLS * DEPTH;
-    let (cells, stride) = (channels.from(x, y), channels.stride());
-    sum(trees, |number| {
-        let number = usize::from(number);
-        cells[number / ROW * stride + number % ROW]
-    })
-}
+    /// The sum of the window whose first cell is at (x, y).
+    pub(crate) fn sum_in(&self, channels: &Channels, x: usize, y: usize) -> f32 {
+        const ROW: usize = CELLS * DEPTH;
+        let (cells, stride) = (channels.from(x, y), channels.stride());
+        self.sum(|number| {
+            let number = usize::from(number);
+            cells[number / ROW * stride + number % ROW]
+        })
+    }
 
-/// The sum of a window's numbers.
-pub(crate) fn sum_of(trees: &[Tree], numbers: &[f32]) -> f32 {
-    sum(trees, |number| numbers[usize::from(number)])
+    /// The sum of a window's numbers.
+    pub fn sum_of(&self, numbers: &[f32]) -> f32 {
+        self.sum(|number| numbers[usize::from(number)])
+    }
+
+    /// The least sum on the way to the end, once windows may be given up.
+    #[cfg(feature = "train")]
+    pub(crate) fn least_on_the_way(&self, numbers: &[f32]) -> f32 {
+        let (mut sum, mut least) = (0.0, f32::MAX);
+        for (count, tree) in self.trees.iter().enumerate() {
+            sum += tree.value(|number| numbers[usize::from(number)]);
+            if count >= PATIENCE {
+                least = least.min(sum);
+            }
+        }
+        least
+    }
 }
 
 pub(crate) fn to_bytes(trees: &[Tree]) -> Vec<u8> {

@@ -7,7 +7,7 @@ use super::{Picture, Use};
 use crate::{Cascade, Scanner, grouped, scales};
 
 /// As in use: see [`crate::Config`].
-const SCALE_STEP: f64 = 1.1;
+const SCALE_STEP: f64 = 1.05;
 const MIN_NEIGHBOURS: usize = 2;
 /// A window is of a face if they overlap by this (IoU).
 const SAME: f64 = 0.5;

@@ -38,7 +38,8 @@ impl Patch {
         let only = Cascade { stages: last, features: cascade.features.clone(), ..*cascade };
         let compiled = Compiled::new(&only, self.level.stride());
         let mut row = Row::default();
-        compiled.first(&self.level, (0, 0), 1, &mut row, 1);
+        compiled.start(&self.level, (0, 0), 1, &mut row, 1);
+        compiled.all(0, &self.level, (0, 0), 1, &mut row);
         compiled.passes(0, row.sums[0])
     }
 }

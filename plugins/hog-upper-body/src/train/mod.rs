@@ -16,7 +16,7 @@ use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, R
 use tagalong_learn::{Line, accepted, area, mix, platt};
 
 use crate::scan::FILLED;
-use crate::{Kind, Machine, Model, Scanner, Training, merge, window_numbers, window_of};
+use crate::{Kind, Machine, Model, Scanner, Training, Trees, merge, window_numbers, window_of};
 
 /// Sizes at which pictures without anybody are searched, pixels of the
 /// upper-body square, and the factor between them.
@@ -24,8 +24,14 @@ const SMALLEST_PX: f64 = 32.0;
 const SCALE_STEP: f64 = 1.15;
 /// Windows of a picture overlap by less than this to be mined.
 const MINED_OVERLAP: f64 = 0.5;
-/// Sums below this are not near enough to matter for the calibration.
-const NEAR_MISS: f32 = -1.0;
+/// Windows with lower sums are no near misses: they are neither mined nor matter
+/// for the calibration. A linear machine wants people above 1; sums of trees spread
+/// more.
+const NEAR_MISS: [f32; 2] = [-1.0, -6.0];
+/// While others are mined, trees give a window up below this.
+const HOPELESS: f32 = -8.0;
+/// In use, they may give up this part of the people that they were not grown with.
+const GIVEN_UP: f64 = 0.01;
 /// Small shifts of a person, as fractions of the square, and its growth.
 const SHIFTS: [(f64, f64, f64); 4] =
     [(0.0, 0.0, 1.0), (0.05, -0.04, 1.05), (-0.05, 0.03, 0.95), (0.02, 0.05, 1.02)];
@@ -140,7 +146,8 @@ impl HogTrainer {
             }
             Kind::Trees => {
                 let count = (trees >> (2 * rounds_left).min(31)).max(16);
-                Machine::Trees(boosted(&self.windows, count, numbers, self.seed))
+                let trees = boosted(&self.windows, count, numbers, self.seed);
+                Machine::Trees(Trees { trees, hopeless: HOPELESS })
             }
         };
         Model { machine, slope: 1.0, offset: 0.0 }
@@ -153,7 +160,11 @@ impl HogTrainer {
         let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
         for (index, (use_, picture)) in self.pictures.iter().enumerate() {
             if *use_ == Use::Fit {
-                let windows = merge(search(&mut scanner, picture, model, -0.9), MINED_OVERLAP, 1.0);
+                let windows = merge(
+                    search(&mut scanner, picture, model, self.near_miss()),
+                    MINED_OVERLAP,
+                    1.0,
+                );
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
             }
@@ -175,7 +186,7 @@ impl HogTrainer {
             people.map(|(_, numbers)| (f64::from(model.sum_of(numbers)), true)).collect();
         let mut scanner = Scanner::new(self.kind);
         for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
-            let mut windows = search(&mut scanner, picture, model, NEAR_MISS);
+            let mut windows = search(&mut scanner, picture, model, self.near_miss());
             if merged {
                 windows = merge(windows, MINED_OVERLAP, 1.0);
             }
@@ -202,10 +213,24 @@ impl HogTrainer {
             ("area_under_roc_of_near_misses".to_owned(), rounded(area(&log_odds))),
         ]);
         for rate in FALSE_ALARMS {
-            let missed = miss_rate(&sums, windows, rate);
+            let missed = miss_rate(&sums, windows, rate, self.near_miss());
             table.insert(format!("miss_rate_at_{rate:e}_false_alarms_a_window"), rounded(missed));
         }
         table
+    }
+
+    fn near_miss(&self) -> f32 {
+        NEAR_MISS[usize::from(self.kind == Kind::Trees)]
+    }
+
+    /// Lets trees give windows up, as early as people allow who are kept apart.
+    fn hurry(&self, model: &mut Model) {
+        let Machine::Trees(trees) = &mut model.machine else { return };
+        let apart = self.people.iter().filter(|(use_, _)| *use_ == Use::Calibration);
+        let mut least: Vec<f32> = apart.map(|(_, n)| trees.least_on_the_way(n)).collect();
+        least.sort_by(f32::total_cmp);
+        let given_up = (GIVEN_UP * least.len() as f64) as usize;
+        trees.hopeless = least.get(given_up).copied().unwrap_or(HOPELESS).min(0.0);
     }
 
     fn count(&self, people: bool) -> usize {
@@ -241,6 +266,7 @@ impl Trainer for HogTrainer {
             mined.push(self.mine(&model));
             model = self.machine(round + 1);
         }
+        self.hurry(&mut model);
         let (sums, _) = self.apart(&model, Use::Calibration, true);
         let Line { slope, offset } = platt(&sums);
         model = Model { slope: slope.max(1e-3), offset, ..model };
@@ -264,11 +290,11 @@ fn search(
 
 /// The share of people below the sum that so many of the `windows` of others
 /// exceed.
-fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64) -> f64 {
+fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f32) -> f64 {
     let mut others: Vec<f64> = sums.iter().filter(|(_, is)| !is).map(|(sum, _)| *sum).collect();
     others.sort_by(|a, b| b.total_cmp(a));
     let allowed = (false_alarms * windows as f64) as usize;
-    let limit = others.get(allowed).copied().unwrap_or(f64::from(NEAR_MISS));
+    let limit = others.get(allowed).copied().unwrap_or(f64::from(near_miss));
     let people: Vec<f64> = sums.iter().filter(|(_, is)| *is).map(|(sum, _)| *sum).collect();
     let missed = people.iter().filter(|sum| **sum <= limit).count();
     missed as f64 / people.len().max(1) as f64
