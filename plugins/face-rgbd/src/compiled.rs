@@ -25,11 +25,66 @@ struct Stump {
     values: [f32; 2],
 }
 
+/// A question about rectangles, and one more on either side.
+#[derive(Clone, Debug)]
+struct Pair {
+    /// The first question, the one if yes, and the one if not.
+    parts: [[(Corners, f32); 3]; 3],
+    thresholds: [f32; 3],
+    /// Yes and yes, yes and no, no and yes, no and no.
+    values: [f32; 4],
+}
+
 #[derive(Clone, Debug)]
 enum Weak {
-    /// One question about rectangles, the usual case.
+    /// One question about rectangles.
     Stump(Stump),
+    /// Two of them.
+    Pair(Box<Pair>),
     Tree(Tree),
+}
+
+impl Weak {
+    fn new(tree: &Tree, looks: &[Look]) -> Self {
+        stump(tree, looks).or_else(|| pair(tree, looks)).unwrap_or_else(|| Self::Tree(tree.clone()))
+    }
+}
+
+/// The rectangles and the threshold of a node.
+fn asked(node: &Node, looks: &[Look]) -> Option<([(Corners, f32); 3], f32)> {
+    match (looks.get(node.feature)?, node.split) {
+        (Look::Haar(parts), Split::Below(threshold)) => Some((*parts, threshold)),
+        _ => None,
+    }
+}
+
+fn stump(tree: &Tree, looks: &[Look]) -> Option<Weak> {
+    let [Node { next: [Next::Leaf(yes), Next::Leaf(no)], .. }] = tree[..] else { return None };
+    let (parts, threshold) = asked(&tree[0], looks)?;
+    Some(Weak::Stump(Stump { parts, threshold, values: [yes, no] }))
+}
+
+/// A leaf where a question could be asks one that everybody answers with yes.
+fn pair(tree: &Tree, looks: &[Look]) -> Option<Weak> {
+    let (first, threshold) = asked(tree.first()?, looks)?;
+    let mut pair = Pair {
+        parts: [first; 3],
+        thresholds: [threshold, f32::INFINITY, f32::INFINITY],
+        values: [0.0; 4],
+    };
+    for (side, next) in tree[0].next.iter().enumerate() {
+        let leaves = match next {
+            Next::Leaf(value) => [*value; 2],
+            Next::Node(to) => {
+                let node = &tree[*to];
+                let [Next::Leaf(yes), Next::Leaf(no)] = node.next else { return None };
+                (pair.parts[1 + side], pair.thresholds[1 + side]) = asked(node, looks)?;
+                [yes, no]
+            }
+        };
+        pair.values[2 * side..2 * side + 2].copy_from_slice(&leaves);
+    }
+    Some(Weak::Pair(Box::new(pair)))
 }
 
 #[derive(Clone, Debug)]
@@ -47,8 +102,8 @@ pub struct Row {
     contrast: Vec<f32>,
     /// Sums of the current stage.
     pub sums: Vec<f32>,
-    /// Scratch: values of a feature.
-    values: Vec<f32>,
+    /// Scratch: values of features.
+    values: [Vec<f32>; 3],
 }
 
 /// A cascade whose features are offsets for one length of rows.
@@ -75,21 +130,16 @@ impl Compiled {
             }
         };
         let looks: Vec<Look> = cascade.features.iter().map(look).collect();
-        let weak = |tree: &Tree| match (&tree[..], looks.get(tree[0].feature)) {
-            (
-                [Node { split: Split::Below(t), next: [Next::Leaf(a), Next::Leaf(b)], .. }],
-                Some(Look::Haar(parts)),
-            ) => Weak::Stump(Stump { parts: *parts, threshold: *t, values: [*a, *b] }),
-            _ => Weak::Tree(tree.clone()),
-        };
+        let weak = |tree: &Tree| Weak::new(tree, &looks);
         let stages = cascade.stages.iter().map(|stage| Stage {
             threshold: stage.threshold,
             weak: stage.trees.iter().map(weak).collect(),
         });
+        let stages = stages.collect();
         let middle = cascade.middle();
         Self {
             stride,
-            stages: stages.collect(),
+            stages,
             looks,
             middle: corners(&middle, stride),
             area: (middle.width * middle.height) as f64,
@@ -139,13 +189,15 @@ impl Compiled {
         for weak in &self.stages[stage].weak {
             match weak {
                 Weak::Stump(stump) => {
-                    row.values.clear();
-                    row.values.resize(count, 0.0);
-                    let used = stump.parts.iter().filter(|(_, weight)| *weight != 0.0);
-                    for (corners, weight) in used {
-                        add_part(sums, corners, *weight, step, &mut row.values);
+                    let [values, ..] = &mut row.values;
+                    fill(values, &stump.parts, sums, step, count);
+                    decide(values, &row.contrast, stump, &mut row.sums);
+                }
+                Weak::Pair(pair) => {
+                    for (values, parts) in row.values.iter_mut().zip(&pair.parts) {
+                        fill(values, parts, sums, step, count);
                     }
-                    decide(&row.values, &row.contrast, stump, &mut row.sums);
+                    decide_pair(&row.values, &row.contrast, pair, &mut row.sums);
                 }
                 Weak::Tree(tree) => {
                     let windows = row.contrast.iter().zip(&mut row.sums).enumerate();
@@ -160,8 +212,8 @@ impl Compiled {
     /// True if it pays to judge all windows of a row by a stage, so that neighbours
     /// are judged at once, though only `alive` of `count` are still in question.
     pub fn pays(&self, stage: usize, alive: usize, count: usize) -> bool {
-        let is_stump = |weak: &Weak| matches!(weak, Weak::Stump(_));
-        self.stages.get(stage).is_some_and(|s| s.weak.iter().all(is_stump)) && 6 * alive > count
+        let is_flat = |weak: &Weak| !matches!(weak, Weak::Tree(_));
+        self.stages.get(stage).is_some_and(|s| s.weak.iter().all(is_flat)) && 6 * alive > count
     }
 
     /// True if a window of [`Compiled::start`] is not empty.
@@ -208,6 +260,15 @@ impl Compiled {
                 for ((column, contrast), sum) in windows {
                     let value = haar(parts, &sums[*column as usize..]) * contrast;
                     *sum += if value < *threshold { values[0] } else { values[1] };
+                }
+            }
+            Weak::Pair(pair) => {
+                let Pair { parts, thresholds, values } = &**pair;
+                for ((column, contrast), sum) in windows {
+                    let sums = &sums[*column as usize..];
+                    let is_no = |k: usize| haar(&parts[k], sums) * contrast >= thresholds[k];
+                    let side = usize::from(is_no(0));
+                    *sum += values[2 * side + usize::from(is_no(1 + side))];
                 }
             }
             Weak::Tree(tree) => {
@@ -314,6 +375,33 @@ fn add_part(sums: &[u32], corners: &Corners, weight: f32, step: usize, values: &
         1 => (0..=last).for_each(|i| add(i, i)),
         2 => (0..=last).for_each(|i| add(i, 2 * i)),
         _ => (0..=last).for_each(|i| add(i, step * i)),
+    }
+}
+
+/// The values of a feature for a row of windows, before their contrast.
+fn fill(
+    values: &mut Vec<f32>,
+    parts: &[(Corners, f32); 3],
+    sums: &[u32],
+    step: usize,
+    count: usize,
+) {
+    values.clear();
+    values.resize(count, 0.0);
+    for (corners, weight) in parts.iter().filter(|(_, weight)| *weight != 0.0) {
+        add_part(sums, corners, *weight, step, values);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn decide_pair(values: &[Vec<f32>; 3], contrast: &[f32], pair: &Pair, sums: &mut [f32]) {
+    let Pair { thresholds: [first, yes, no], values: leaves, .. } = pair;
+    let [a, b, c] = values;
+    let windows = a.iter().zip(b).zip(c).zip(contrast).zip(sums);
+    for ((((a, b), c), contrast), sum) in windows {
+        let if_yes = if b * contrast < *yes { leaves[0] } else { leaves[1] };
+        let if_no = if c * contrast < *no { leaves[2] } else { leaves[3] };
+        *sum += if a * contrast < *first { if_yes } else { if_no };
     }
 }
 

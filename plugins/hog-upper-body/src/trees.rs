@@ -115,7 +115,7 @@ pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Vec<Tree>, String> {
         let known = tree.numbers.iter().all(|n| usize::from(*n) < CHANNEL_NUMBERS);
         known && !tree.below.iter().any(|v| v.is_nan()) && tree.values.iter().all(|v| v.is_finite())
     };
-    if trees.is_empty() || bytes.len() % BYTES != 0 || !trees.iter().all(is_right) {
+    if trees.is_empty() || !bytes.len().is_multiple_of(BYTES) || !trees.iter().all(is_right) {
         return Err("its trees are broken".into());
     }
     Ok(trees)
