@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
+use crate::follow::FollowArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::simulate::SimulateArgs;
 use crate::train::TrainArgs;
@@ -68,6 +69,9 @@ pub enum Command {
     /// Draws the log of a robot among people, with the truth, from a scene
     #[command(after_help = SIMULATE_HELP)]
     Simulate(SimulateArgs),
+    /// Lets a pipeline steer the simulated robot after somebody, and judges it
+    #[command(after_help = FOLLOW_HELP)]
+    Follow(FollowArgs),
     /// Compares pipelines on many draws of the same scenes, in memory
     #[command(after_help = TRIALS_HELP)]
     Trials(TrialsArgs),
@@ -100,6 +104,17 @@ Needs no file, and half a minute.
 Examples:
   tagalong demo
   tagalong demo -o another-demo --seed 3";
+
+const FOLLOW_HELP: &str = "\
+Prints how long the right person was followed, and the wrong one, how soon somebody who came back was
+found, the distance, the room to people and things, and how smooth the ride was. The log of a ride has
+its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames).
+
+Examples:
+  tagalong follow
+  tagalong follow configs/follow-best.toml configs/scenes/follow-passing.toml -o rides
+  tagalong follow configs/follow-best.toml --seeds 50 --against configs/follow-as-printed.toml
+  tagalong follow configs/follow-best.toml --latency-ms 150 --drop 0.2 --format markdown";
 
 const REPRODUCE_HELP: &str = "\
 Everything is drawn with seeds of the test split. The whole of a system takes minutes to an hour.

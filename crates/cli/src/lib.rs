@@ -19,6 +19,7 @@ mod bench;
 mod commands;
 mod config_file;
 mod demo;
+mod follow;
 mod needs;
 mod outcome;
 mod overlay;
@@ -76,6 +77,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
         Command::Bench(args) => bench::bench(args, registry),
         Command::Demo(args) => demo::demo(args, registry),
+        Command::Follow(args) => follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => simulate::simulate(args, registry),
         Command::Triangulate(args) => triangulate::triangulate(args),

@@ -25,6 +25,7 @@ pub mod figure;
 mod filters;
 mod general;
 mod likelihoods;
+pub mod patch;
 mod random;
 mod scenes;
 mod subject;
@@ -37,9 +38,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::slice;
 
-use tagalong_core::{Kind, Registry};
+use tagalong_core::{Context, Kind, Registry};
 
-use subject::Subject;
+use subject::{Subject, WHEELS};
 
 /// One promise that one plugin broke.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,6 +57,12 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "plugin `{}` fails the check \"{}\": {}", self.plugin, self.check, self.what)
     }
+}
+
+/// What a plugin is built with in tests: seed 1, paths from the working
+/// directory, the drive of a small robot.
+pub fn context() -> Context {
+    Context { seed: 1, base_dir: PathBuf::from("."), wheels: WHEELS }
 }
 
 /// A check: its name, and what it does with a plugin. The error is a sentence.

@@ -39,6 +39,10 @@ pub enum Reason {
     /// As the controller wishes, but slower: a limit of speed, acceleration or
     /// turn rate.
     Limited,
+    /// At most half as fast: it may be somebody else who is followed.
+    Unsure,
+    /// At most half as fast, to find a person again who is lost.
+    Search,
     /// Slower, for something is ahead.
     Obstacle,
     /// Slower, for frames come late.
@@ -67,6 +71,8 @@ impl Reason {
         match self {
             Self::Follow => "follow",
             Self::Limited => "limited",
+            Self::Unsure => "unsure",
+            Self::Search => "search",
             Self::Obstacle => "obstacle",
             Self::Slow => "slow",
             Self::Blocked => "blocked",
@@ -82,7 +88,15 @@ impl Reason {
 
     /// True if the robot may move for this reason.
     pub fn moves(self) -> bool {
-        matches!(self, Self::Follow | Self::Limited | Self::Obstacle | Self::Slow)
+        matches!(
+            self,
+            Self::Follow
+                | Self::Limited
+                | Self::Unsure
+                | Self::Search
+                | Self::Obstacle
+                | Self::Slow
+        )
     }
 }
 

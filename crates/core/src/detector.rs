@@ -1,6 +1,6 @@
 use nalgebra::Point3;
 
-use crate::{Detection, Frame, Funnel, Person, Result, Track};
+use crate::{Detection, Frame, Funnel, Person, Rect, Result, Track};
 
 /// What a detector is asked.
 #[derive(Clone, Copy)]
@@ -78,6 +78,16 @@ pub trait Likelihood: Send + Sync {
             out.push(self.log_likelihood(frame, scene)?);
         }
         Ok(())
+    }
+
+    /// For each person of the scene the runs of pixels that are compared with the
+    /// person's depth, near over far. For pictures; none by default.
+    ///
+    /// # Errors
+    /// As [`Likelihood::log_likelihood`].
+    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
+        let _ = frame;
+        Ok(vec![Vec::new(); scene.len()])
     }
 }
 

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 
-use crate::{Camera, Detection, Frame, Likelihood, Motion, Rect, Result, TrackId};
+use crate::{Camera, Detection, Frame, Likelihood, Motion, Rect, Result, Sketch, TrackId};
 
 /// A person in the robot frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +85,16 @@ pub trait Filter: Send {
 
     /// Forgets a person.
     fn stop(&mut self, id: TrackId);
+
+    /// What the filter would show of its work on a frame that it was just updated
+    /// with, by the same evidence. Asked for pictures alone.
+    ///
+    /// # Errors
+    /// As [`Filter::update`].
+    fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
+        let _ = evidence;
+        Ok(Sketch::default())
+    }
 
     /// True if the filter cannot work without a [`Likelihood`]; checked when
     /// the pipeline is built.

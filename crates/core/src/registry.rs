@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use toml::Spanned;
 
 use crate::{
-    ConfigError, Controller, Detector, Filter, Result, Settings, Trainer, Value, Verifier, Wheels,
-    commented_defaults, nearest, parse_settings,
+    ConfigError, Controller, Detector, Error, Filter, Result, Settings, Trainer, Value, Verifier,
+    Wheels, commented_defaults, nearest, parse_settings,
 };
 
 /// The four kinds of plugin.
@@ -42,6 +42,28 @@ pub struct Context {
     pub base_dir: PathBuf,
     /// The drive of the robot.
     pub wheels: Wheels,
+}
+
+impl Context {
+    /// A learned model: that of `file`, a path relative to the config, or the
+    /// plugin's own where the config names no file.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a file that cannot be read or that `parse` refuses.
+    pub fn model<M>(
+        &self,
+        file: &str,
+        built_in: &str,
+        parse: impl FnOnce(&str) -> std::result::Result<M, String>,
+    ) -> Result<M> {
+        let broken = |why: String| Error::Model { path: file.into(), why };
+        if file.is_empty() {
+            return parse(built_in).map_err(broken);
+        }
+        let text = std::fs::read_to_string(self.base_dir.join(file))
+            .map_err(|error| broken(error.to_string()))?;
+        parse(&text).map_err(broken)
+    }
 }
 
 type Build<P> =

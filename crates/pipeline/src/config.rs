@@ -32,8 +32,17 @@ const MAX_BYTES: usize = 1 << 20;
 /// Deepest nesting of a config.
 const MAX_DEPTH: usize = 32;
 
-const OWN: [&str; 8] =
-    ["seed", "robot", "stereo", "clock", "association", "occlusion", "lifecycle", "governor"];
+const OWN: [&str; 9] = [
+    "seed",
+    "robot",
+    "stereo",
+    "clock",
+    "association",
+    "occlusion",
+    "lifecycle",
+    "target",
+    "governor",
+];
 const PLUGINS: [&str; 4] = ["detectors", "verifiers", "filter", "controller"];
 
 /// How a config is read.
@@ -125,6 +134,7 @@ impl Pipeline {
             resolved,
             frames: 0,
             failed: None,
+            sketches: false,
         };
         Ok((pipeline, run))
     }
@@ -303,7 +313,7 @@ impl Builder<'_> {
             return Err(ConfigError { message, span: section.span_of("plugin") });
         }
         let name = section.settings.plugin;
-        Ok(Some(Steering::new(name, plugin, robot.clone(), governor.clone())))
+        Ok(Some(Steering::new(name, plugin, self.settings)))
     }
 }
 

@@ -1,49 +1,71 @@
-use tagalong_core::{Command, Controller, Frame, Scene, Stamp, Track, TrackId};
+use tagalong_core::{
+    Command, Controller, Frame, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
+};
 
 use crate::boundary::{StepError, contain};
-use crate::governor::{Ahead, Governor, Wish, ahead};
-use crate::{GovernorSettings, RobotSettings};
+use crate::governor::{Ahead, Aim, Governor, Wish, ahead};
+use crate::target::{Lock, Search};
+use crate::{
+    CorridorSettings, LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings,
+};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
 
-/// The controller, whom it follows, and the governor of its commands. Followed
-/// is the nearest confirmed person in front at first, then that one while the
-/// track lives, and nobody after that.
+/// The controller, the lock on whom it follows, and the governor of its commands.
 pub(crate) struct Steering {
     name: String,
     controller: Box<dyn Controller>,
+    lock: Lock,
+    search: Search,
+    search_settings: SearchSettings,
     governor: Governor,
-    corridor: GovernorSettings,
     robot: RobotSettings,
-    target: Option<TrackId>,
     fresh: u32,
     last: Option<Stamp>,
+}
+
+/// What came of a frame.
+pub(crate) struct Steered {
+    pub(crate) command: Command,
+    pub(crate) target: Option<TrackId>,
+    pub(crate) lock: LockReport,
 }
 
 impl Steering {
     pub(crate) fn new(
         name: String,
         controller: Box<dyn Controller>,
-        robot: RobotSettings,
-        settings: GovernorSettings,
+        settings: &PipelineSettings,
     ) -> Self {
+        let PipelineSettings { robot, governor, target, .. } = settings;
         Self {
             name,
             controller,
-            governor: Governor::new(settings.clone(), robot.wheels(), robot.max_speed_mps),
-            corridor: settings,
-            robot,
-            target: None,
+            lock: Lock::new(target.clone()),
+            search: Search::default(),
+            search_settings: target.search.clone(),
+            governor: Governor::new(governor.clone(), robot.wheels(), robot.max_speed_mps),
+            robot: robot.clone(),
             fresh: FRESH_FRAMES,
             last: None,
         }
     }
 
-    /// After a jump of the clock nothing is known: choose anew, and wait.
+    /// After a jump of the clock nobody is where they were: wait.
     pub(crate) fn reset(&mut self) {
-        self.target = None;
+        self.lock.reset();
         self.fresh = 0;
+    }
+
+    /// Follows this track from now on.
+    pub(crate) fn follow(&mut self, track: TrackId) {
+        self.lock.choose(track);
+    }
+
+    /// The distance that the controller keeps, m, if it keeps one.
+    pub(crate) fn stand_off_m(&self) -> Option<f64> {
+        self.controller.stand_off_m()
     }
 
     pub(crate) fn governor(&self) -> &Governor {
@@ -54,46 +76,75 @@ impl Steering {
         &mut self.governor
     }
 
-    /// The command for a frame, and who is followed.
+    /// The command for a frame, and who is followed; `motion` is the robot's since
+    /// the last frame that was processed.
     ///
     /// # Errors
     /// The controller panicked.
     pub(crate) fn steer(
         &mut self,
         frame: &Frame,
+        motion: &Motion,
         tracks: &[Track],
-    ) -> Result<(Command, Option<TrackId>), StepError> {
+    ) -> Result<Steered, StepError> {
         self.governor.check_odometry(&frame.motion);
         let settled = self.is_settled();
-        let target = if settled { self.choose(tracks).cloned() } else { None };
-        let confirmed: Vec<Track> = tracks.iter().filter(|t| t.confirmed).cloned().collect();
-        let scene = Scene {
-            frame,
-            target: target.as_ref(),
-            tracks: &confirmed,
-            wheels: self.robot.wheels(),
-            max_speed_mps: self.robot.max_speed_mps,
-        };
-        let wheels = contain(&self.name, frame.index, || self.controller.command(&scene))?;
+        let lock = self.lock.update(frame, motion, tracks, settled);
+        let followed = self.lock.followed();
+        let target = tracks.iter().find(|track| Some(track.id) == followed);
+        let wheels = self.ask(frame, tracks, target)?;
+        let (wheels, aim) = self.aim(wheels);
         let wish = Wish {
             wheels,
             stamp: frame.stamp,
-            has_target: target.is_some(),
+            aim,
             settled,
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };
         self.last = Some(frame.stamp);
-        let look = |curvature| look(&self.corridor, frame, curvature, target.as_ref());
-        Ok((self.governor.govern(&wish, look), target.map(|track| track.id)))
+        let look = |corridor: &_, curvature| look(corridor, frame, curvature, target);
+        let command = self.governor.govern(&wish, look);
+        self.search.hear(command.reason == Reason::Blocked, motion.dt);
+        Ok(Steered { command, target: target.map(|track| track.id), lock })
     }
 
-    /// The track to follow, among tracks ordered near to far.
-    fn choose<'t>(&mut self, tracks: &'t [Track]) -> Option<&'t Track> {
-        if self.target.is_none() {
-            let in_front = |t: &&Track| t.confirmed && t.estimate.person.position.x > 0.0;
-            self.target = tracks.iter().find(in_front).map(|t| t.id);
+    fn ask(
+        &mut self,
+        frame: &Frame,
+        tracks: &[Track],
+        target: Option<&Track>,
+    ) -> Result<WheelSpeeds, StepError> {
+        let confirmed: Vec<Track> = tracks.iter().filter(|t| t.confirmed).cloned().collect();
+        let scene = Scene {
+            frame,
+            target,
+            tracks: &confirmed,
+            wheels: self.robot.wheels(),
+            max_speed_mps: self.robot.max_speed_mps,
+        };
+        contain(&self.name, frame.index, || self.controller.command(&scene))
+    }
+
+    /// What the wheels turn for: the controller's wish while somebody is followed,
+    /// the search's while the person is lost.
+    fn aim(&mut self, wheels: WheelSpeeds) -> (WheelSpeeds, Aim) {
+        match self.lock.state() {
+            LockState::Initial => (WheelSpeeds::STOP, Aim::Nobody),
+            LockState::Lost => match self.look_for() {
+                Some(wheels) => (wheels, Aim::Search),
+                None => (WheelSpeeds::STOP, Aim::Nobody),
+            },
+            state => {
+                self.search = Search::default();
+                (wheels, if state.doubts() { Aim::Perhaps } else { Aim::Person })
+            }
         }
-        tracks.iter().find(|t| Some(t.id) == self.target)
+    }
+
+    fn look_for(&mut self) -> Option<WheelSpeeds> {
+        let last = self.lock.last_seen()?;
+        let (lost_s, wheels) = (self.lock.since_s(), self.robot.wheels());
+        self.search.wish(&self.search_settings, last, lost_s, &wheels)
     }
 
     /// True once enough frames were processed since the last reset; counts one.
@@ -105,12 +156,12 @@ impl Steering {
 
 /// What the depth image shows ahead; nothing to say without one.
 fn look(
-    settings: &GovernorSettings,
+    corridor: &CorridorSettings,
     frame: &Frame,
     curvature: f64,
     target: Option<&Track>,
 ) -> Option<Ahead> {
     let depth = frame.depth().ok()?;
     let target = target.map(|track| track.estimate.person.position.xy());
-    Some(ahead(&settings.corridor, &frame.camera, depth, curvature, target))
+    Some(ahead(corridor, &frame.camera, depth, curvature, target))
 }

@@ -54,6 +54,7 @@ mod pipeline;
 mod report;
 mod settings;
 mod sightings;
+mod target;
 #[cfg(test)]
 mod tests;
 mod weighing;
@@ -69,4 +70,7 @@ pub use settings::{
     OcclusionSettings, Overlap, PipelineSettings, PluginSettings, RobotSettings, Role,
 };
 pub use tagalong_stereo::StereoSettings;
+pub use target::{
+    Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,
+};
 pub use weighing::Weighing;

@@ -9,7 +9,7 @@ use tagalong_stereo::StereoDepth;
 
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
-use crate::control::Steering;
+use crate::control::{Steered, Steering};
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
@@ -31,6 +31,7 @@ pub struct Pipeline {
     /// Processed frames.
     pub(crate) frames: u64,
     pub(crate) failed: Option<u64>,
+    pub(crate) sketches: bool,
 }
 
 /// A plugin under its name.
@@ -98,6 +99,25 @@ impl Pipeline {
         self.steering.as_ref().map(|steering| steering.governor().at(now))
     }
 
+    /// Follows the person of this track from the next frame on, and forgets whom
+    /// it followed before.
+    pub fn choose_target(&mut self, track: TrackId) {
+        if let Some(steering) = &mut self.steering {
+            steering.follow(track);
+        }
+    }
+
+    /// True if the config has a controller: frames lead to commands.
+    pub fn has_controller(&self) -> bool {
+        self.steering.is_some()
+    }
+
+    /// The distance that the controller keeps from the person, m, if there is a
+    /// controller and it keeps one.
+    pub fn stand_off_m(&self) -> Option<f64> {
+        self.steering.as_ref()?.stand_off_m()
+    }
+
     /// Why nothing moves until [`Pipeline::arm`], if so.
     pub fn fault(&self) -> Option<&'static str> {
         self.steering.as_ref()?.governor().fault()
@@ -109,6 +129,12 @@ impl Pipeline {
         if let Some(steering) = self.steering.as_mut().filter(|_| self.failed.is_none()) {
             steering.governor_mut().arm();
         }
+    }
+
+    /// Lets the filter show its work in [`FrameReport::sketch`]. That takes time,
+    /// which counts as that of the stage `update`, and changes nothing else.
+    pub fn sketch(&mut self, wanted: bool) {
+        self.sketches = wanted;
     }
 
     /// The stages that [`FrameReport::timings`] names, in their order.
@@ -184,7 +210,7 @@ impl Pipeline {
     /// Every belief, into the robot's new frame; then whom to expect where.
     fn predict(&mut self, now: &mut Now<'_>, motion: Option<Motion>) -> Result<(), StepError> {
         if let Some(motion) = motion {
-            now.dt_s = motion.dt;
+            now.motion = motion;
             let Slot { name, plugin: filter } = &mut self.filter;
             contain(name, now.frame.index, || filter.predict(&motion))?;
             self.lifecycle.grow_older(motion.dt);
@@ -275,6 +301,9 @@ impl Pipeline {
         let Slot { name, plugin: filter } = &mut self.filter;
         now.supports = guard(name, now.frame.index, || filter.update(&evidence))?;
         now.report.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
+        if self.sketches {
+            now.report.sketch = guard(name, now.frame.index, || filter.sketch(&evidence))?;
+        }
         self.check_supports(now);
         Ok(())
     }
@@ -324,8 +353,12 @@ impl Pipeline {
     fn start_newcomers(&mut self, now: &mut Now<'_>) -> Result<BTreeSet<TrackId>, StepError> {
         let mut started = BTreeSet::new();
         let start_score = self.settings.lifecycle.start_score;
+        let undecided = now.sightings.undecided();
+        if undecided.is_empty() {
+            return Ok(started);
+        }
         let known = self.supported_places(now)?;
-        for index in now.sightings.undecided() {
+        for index in undecided {
             let sighting = now.sightings.get(index).clone();
             if self.is_known(&known, &sighting.detection) {
                 now.sightings.settle(index, Fate::Dropped("tracked already"));
@@ -352,8 +385,8 @@ impl Pipeline {
     }
 
     /// Where the people are whom this frame supports.
-    fn supported_places(&mut self, now: &mut Now<'_>) -> Result<Vec<Point3<f64>>, StepError> {
-        let mut estimates = self.estimates(now)?;
+    fn supported_places(&mut self, now: &Now<'_>) -> Result<Vec<Point3<f64>>, StepError> {
+        let mut estimates = self.believed(now)?;
         estimates.retain(|id, _| now.supports.contains_key(id));
         Ok(estimates.values().map(|estimate| estimate.person.position).collect())
     }
@@ -415,11 +448,13 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        let (command, target) = steering.steer(now.frame, &now.report.tracks)?;
+        let Steered { command, target, lock } =
+            steering.steer(now.frame, &now.motion, &now.report.tracks)?;
         now.report
             .funnel
             .drop_many("command not finite", u64::from(command.reason == Reason::NotFinite));
         now.report.target = target;
+        now.report.lock = Some(lock);
         now.report.command = Some(command);
         Ok(())
     }
@@ -474,8 +509,7 @@ impl Pipeline {
     /// The beliefs of all tracks. One that is missing or not finite ends its
     /// track: no such number leaves the pipeline.
     fn estimates(&mut self, now: &mut Now<'_>) -> Result<BTreeMap<TrackId, Estimate>, StepError> {
-        let Slot { name, plugin: filter } = &mut self.filter;
-        let mut all = contain(name, now.frame.index, || filter.estimates(&now.frame.camera))?;
+        let mut all = self.believed(now)?;
         let before = all.len();
         all.retain(|id, _| self.lifecycle.get(*id).is_some());
         now.report.funnel.drop_many("estimate of an unknown track", (before - all.len()) as u64);
@@ -486,6 +520,12 @@ impl Pipeline {
             }
         }
         Ok(all)
+    }
+
+    /// What the filter says of the people, as it says it.
+    fn believed(&mut self, now: &Now<'_>) -> Result<BTreeMap<TrackId, Estimate>, StepError> {
+        let Slot { name, plugin: filter } = &mut self.filter;
+        contain(name, now.frame.index, || filter.estimates(&now.frame.camera))
     }
 
     fn end(&mut self, now: &mut Now<'_>, id: TrackId, test: &'static str) -> Result<(), StepError> {
@@ -519,7 +559,7 @@ impl Pipeline {
         Rules {
             association: &self.settings.association,
             start_score: self.lifecycle.settings().start_score,
-            dt_s: now.dt_s,
+            dt_s: now.motion.dt,
         }
     }
 

@@ -1,6 +1,6 @@
-use tagalong_core::{Command, Detection, Funnel, Stamp, Track, TrackId};
+use tagalong_core::{Command, Detection, Funnel, Sketch, Stamp, Track, TrackId};
 
-use crate::Weighing;
+use crate::{LockReport, Weighing};
 
 /// What became of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,8 @@ pub struct FrameReport {
     pub tracks: Vec<Track>,
     /// The person to follow, where the pipeline has a controller.
     pub target: Option<TrackId>,
+    /// How sure it is who that is, where the pipeline has a controller.
+    pub lock: Option<LockReport>,
     /// What the wheels may do, where the pipeline has a controller: its wish
     /// within all limits, zero without a target, and why.
     pub command: Option<Command>,
@@ -80,6 +82,9 @@ pub struct FrameReport {
     pub nis: Vec<(TrackId, f64, u32)>,
     /// What was asked of the likelihood.
     pub weighing: Weighing,
+    /// What the filter shows of its work, where [`crate::Pipeline::sketch`] asks
+    /// for it.
+    pub sketch: Sketch,
     /// Milliseconds per stage. With those of `weighing` the only part that
     /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
@@ -97,9 +102,11 @@ impl FrameReport {
             funnel: Funnel::default(),
             tracks: Vec::new(),
             target: None,
+            lock: None,
             command: None,
             nis: Vec::new(),
             weighing: Weighing::default(),
+            sketch: Sketch::default(),
             timings: Vec::new(),
             ended: Vec::new(),
         }

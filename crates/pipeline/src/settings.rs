@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::Wheels;
 use tagalong_stereo::StereoSettings;
 
-use crate::GovernorSettings;
+use crate::{GovernorSettings, TargetSettings};
 
 /// The pipeline's own keys. Beside them a config has the plugin sections
 /// `[[detectors]]`, `[[verifiers]]`, `[filter]` and `[controller]`, each with
@@ -28,6 +28,8 @@ pub struct PipelineSettings {
     pub occlusion: OcclusionSettings,
     /// When tracks start, count as confirmed, and end.
     pub lifecycle: LifecycleSettings,
+    /// Who is followed.
+    pub target: TargetSettings,
     /// What the robot may do, whatever the controller wishes.
     pub governor: GovernorSettings,
 }

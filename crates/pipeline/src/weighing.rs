@@ -1,7 +1,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use tagalong_core::{Frame, Likelihood, Person, Result};
+use tagalong_core::{Frame, Likelihood, Person, Rect, Result};
 
 /// How much was asked of the likelihood in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,6 +53,10 @@ impl Likelihood for Metered<'_> {
     ) -> Result<()> {
         let scenes = people.len().div_ceil(people_per_scene.max(1));
         self.timed(scenes, || self.inner.log_likelihoods(frame, people, people_per_scene, out))
+    }
+
+    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
+        self.inner.silhouettes(frame, scene)
     }
 }
 

@@ -1,5 +1,8 @@
 use serde::Serialize;
-use tagalong_eval::Interval;
+use tagalong_eval::{Interval, wilson};
+
+/// Confidence of the intervals of shares.
+const CONFIDENCE: f64 = 0.95;
 
 /// A table: published numbers and ours.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -63,6 +66,12 @@ impl Cell {
             interval: Some([lower, upper]),
             ..Self::number(estimate, digits)
         })
+    }
+
+    /// So many of so many in per cent, with its Wilson interval; nothing of
+    /// nothing.
+    pub fn share(count: u64, of: u64, digits: usize) -> Self {
+        Self::estimate(wilson(count, of, CONFIDENCE), digits + 2).percent()
     }
 
     /// The same times a hundred: a fraction as per cent.

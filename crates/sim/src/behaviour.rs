@@ -127,7 +127,7 @@ impl Walker {
         keep_off: &[Point2<f64>],
         obstacles: &[Obstacle],
     ) {
-        self.look_ahead();
+        self.look_ahead(now_s);
         let wanted = match lead {
             Some(lead) => self.follow(lead),
             None if now_s < self.waits_until_s => Vector2::zeros(),
@@ -185,13 +185,15 @@ impl Walker {
     }
 
     /// Goes on to the next point of the path where one is reached.
-    fn look_ahead(&mut self) {
+    fn look_ahead(&mut self, now_s: f64) {
         let path = &self.settings.path;
         let reached =
             |point: &[f64; 2]| (self.stance.place - Point2::from(*point)).norm() < REACHED_M;
         if path.len() < 2 || !path.get(self.ahead).is_some_and(reached) {
             return;
         }
+        let rest_s = self.settings.rest_s.get(self.ahead).copied().unwrap_or(0.0);
+        self.waits_until_s = self.waits_until_s.max(now_s + rest_s);
         self.ahead += 1;
         if self.ahead == path.len() {
             match self.settings.at_end {
@@ -206,6 +208,8 @@ impl Walker {
     fn reverse(&mut self) {
         let left = self.settings.path.len().saturating_sub(self.ahead);
         self.settings.path.reverse();
+        self.settings.rest_s.resize(self.settings.path.len(), 0.0);
+        self.settings.rest_s.reverse();
         self.ahead = (left + 1).min(self.settings.path.len() - 1);
         if left == 0 {
             self.ahead = 1;
@@ -370,6 +374,20 @@ mod tests {
         walk(&mut walkers, 12.0, |w| fastest = fastest.max(w[0].stance.speed_mps));
         assert!((walkers[0].stance.place - Point2::new(4.0, 3.0)).norm() < 0.3);
         assert!(walkers[0].stance.speed_mps < 0.02 && (fastest - 1.1).abs() < 0.1, "{fastest}");
+    }
+
+    #[test]
+    fn a_walker_rests_where_it_says_and_then_goes_on() {
+        let mut one = walker(&[[1.0, 1.0], [3.0, 1.0], [5.0, 1.0]], Trick::None);
+        one.settings.rest_s = vec![0.0, 4.0];
+        let mut walkers = [one];
+        let mut rested = 0;
+        walk(&mut walkers, 11.0, |w| {
+            let there = (w[0].stance.place.x - 3.0).abs() < 0.6;
+            rested += usize::from(there && w[0].stance.speed_mps < 0.1);
+        });
+        assert!((2.0..4.0).contains(&(rested as f64 * 0.02)), "{rested}");
+        assert!(walkers[0].stance.place.x > 4.5, "{}", walkers[0].stance.place);
     }
 
     #[test]

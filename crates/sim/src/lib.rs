@@ -68,7 +68,7 @@ pub use scene::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Trick,
 };
-pub use simulation::{Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
+pub use simulation::{Clearance, Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
 pub use split::Split;
 pub use variation::Variant;
 pub use webcam::WebcamSettings;

@@ -173,6 +173,10 @@ impl Scene {
                 self.people.iter().all(|p| (0.0..=2.0).contains(&p.speed_mps)),
                 "speed_mps must be in 0 to 2",
             ),
+            (
+                self.people.iter().all(|p| p.rest_s.iter().all(|s| (0.0..=3600.0).contains(s))),
+                "rest_s must be in 0 to 3600",
+            ),
         ];
         let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(webcams);
@@ -504,6 +508,9 @@ pub struct PersonSettings {
     pub speed_mps: f64,
     /// Stands until then, s.
     pub start_s: f64,
+    /// Rests at the points of the path for this long on every visit, s; none where
+    /// the list ends.
+    pub rest_s: Vec<f64>,
     /// Is not in the room before, s: whoever learns what the empty room looks
     /// like needs to see it.
     pub enters_s: f64,
@@ -540,6 +547,7 @@ impl Default for PersonSettings {
             path: Vec::new(),
             speed_mps: 1.1,
             start_s: 0.0,
+            rest_s: Vec::new(),
             enters_s: 0.0,
             at_end: AtEnd::Stop,
             trick: Trick::None,

@@ -1,6 +1,7 @@
 //! A scene in motion: what a robot would record, in the order in which it would.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{
@@ -31,6 +32,12 @@ const CROWD_PAIRS: f64 = 0.3;
 const STEP_NS: u64 = 20_000_000;
 /// People keep this far away from the middle of the robot, m.
 const ROBOT_M: f64 = 0.5;
+/// Rays in so many directions, and at these heights, m, feel for things around
+/// the robot.
+const FEELERS: u32 = 48;
+const FEELERS_M: [f64; 4] = [0.15, 0.45, 0.8, 1.2];
+/// Half the width of a person, m.
+const BODY_M: f64 = 0.2;
 /// Below this visible fraction nobody can be expected to find somebody.
 const LEAST_VISIBLE: f64 = 0.2;
 
@@ -116,6 +123,15 @@ pub struct Truth {
     pub ignore: bool,
 }
 
+/// How much room a robot has, m; negative is contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clearance {
+    /// To the nearest person; infinite where nobody is.
+    pub people_m: f64,
+    /// To the nearest piece of furniture or wall.
+    pub things_m: f64,
+}
+
 /// A scene in motion. Same scene, same events, whatever the number of threads.
 pub struct Simulation {
     scene: Scene,
@@ -199,6 +215,36 @@ impl Simulation {
     /// for the robot is left alone.
     pub fn steer(&mut self, command: WheelSpeeds) {
         self.robot.steer(self.now_ns as f64 * 1e-9, command);
+    }
+
+    /// How much room a round robot of this radius has where it is.
+    pub fn clearance(&self, radius_m: f64) -> Clearance {
+        let robot = Point2::from(self.robot.pose.translation.vector);
+        let people =
+            self.present().map(|(walker, _)| (walker.stance.place - robot).norm() - BODY_M);
+        let least = |distances: &mut dyn Iterator<Item = f64>| {
+            distances.fold(f64::INFINITY, f64::min) - radius_m
+        };
+        let rays = FEELERS_M.into_iter().flat_map(|height_m| {
+            (0..FEELERS).map(move |i| (height_m, TAU * f64::from(i) / f64::from(FEELERS)))
+        });
+        let things = rays.map(|(height_m, angle)| {
+            let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            self.first_thing(&Point3::new(robot.x, robot.y, height_m), &ray)
+        });
+        Clearance { people_m: least(&mut { people }), things_m: least(&mut { things }) }
+    }
+
+    /// How far it is to furniture or a wall in a direction of length one, m.
+    fn first_thing(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+        let solids = self.fixed.iter().flat_map(|object| &object.shapes);
+        let met = solids.filter(|shape| shape.near(eye, ray, 1.0)).filter_map(|s| s.meet(eye, ray));
+        met.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The robot's forward speed over ground, m/s.
+    pub fn speed_mps(&self) -> f64 {
+        self.robot.speed_mps()
     }
 
     /// The next thing that the robot records; `None` at the end of the scene.

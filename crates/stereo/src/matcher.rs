@@ -5,6 +5,7 @@ use crate::refine::Refiner;
 use crate::settings::MAX_DISPARITIES;
 use crate::speckle::SpeckleFilter;
 use crate::strip::{Output, Pair, Strip};
+use crate::texture::TextureTest;
 use crate::{Dropped, StereoSettings, fill};
 
 /// Rows of a strip. Strips do not depend on the number of threads, so that the
@@ -19,6 +20,7 @@ pub struct Matcher {
     strips: Vec<Strip>,
     speckles: SpeckleFilter,
     refiner: Refiner,
+    texture: TextureTest,
     disparities: Vec<f32>,
     confidences: Vec<u8>,
 }
@@ -54,6 +56,7 @@ impl Matcher {
             strips: Vec::new(),
             speckles: SpeckleFilter::default(),
             refiner: Refiner::default(),
+            texture: TextureTest::default(),
             disparities: Vec::new(),
             confidences: Vec::new(),
         })
@@ -79,15 +82,16 @@ impl Matcher {
         if width * height > 0 {
             self.fill(left, right, max_disparity)?;
         }
+        let (holes, settings) = (self.holes(), &self.settings);
+        let (pixels, step) = (settings.speckle_pixels, settings.speckle_step as f32);
         let mut dropped = Dropped::default();
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
-        let (pixels, step) = (self.settings.speckle_pixels, self.settings.speckle_step as f32);
-        dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
-        let holes = self.holes();
-        dropped.filled = fill::holes(&mut self.disparities, width, &holes);
-        if self.settings.refine_px > 0 {
-            self.refiner.apply([left, right], self.settings.refine_px, &mut self.disparities);
+        if settings.refine_px > 0 {
+            self.refiner.apply([left, right], settings.refine_px, &mut self.disparities);
         }
+        dropped.unsupported = self.texture.apply(left, settings.texture, &mut self.disparities);
+        dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
+        dropped.filled = fill::holes(&mut self.disparities, width, &holes);
         let gone = self.disparities.iter().zip(&mut self.confidences);
         gone.filter(|(d, _)| d.is_nan()).for_each(|(_, confidence)| *confidence = 0);
         let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());

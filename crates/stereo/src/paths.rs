@@ -53,11 +53,43 @@ fn step<const D: usize>(
     large: u8,
     sum: &mut [u8; D],
 ) -> [u8; D] {
-    let mut after = [0; D];
     let before = &before[..D + 2];
+    let own = std::array::from_fn(|d| before[d + 1]);
+    let beside = std::array::from_fn(|d| before[d].min(before[d + 2]));
+    ahead(cost, &own, &beside, small, large, sum)
+}
+
+/// As [`step`], from a pixel whose costs are still in registers.
+#[inline(always)]
+fn step_on<const D: usize>(
+    cost: &[u8; D],
+    own: &[u8; D],
+    small: u8,
+    large: u8,
+    sum: &mut [u8; D],
+) -> [u8; D] {
+    let (mut beside, mut above) = ([u8::MAX; D], [u8::MAX; D]);
+    beside[1..].copy_from_slice(&own[..D - 1]);
+    above[..D - 1].copy_from_slice(&own[1..]);
     for d in 0..D {
-        let side = before[d].min(before[d + 2]).saturating_add(small);
-        after[d] = cost[d].saturating_add(before[d + 1].min(side).min(large));
+        beside[d] = beside[d].min(above[d]);
+    }
+    ahead(cost, own, &beside, small, large, sum)
+}
+
+#[inline(always)]
+fn ahead<const D: usize>(
+    cost: &[u8; D],
+    own: &[u8; D],
+    beside: &[u8; D],
+    small: u8,
+    large: u8,
+    sum: &mut [u8; D],
+) -> [u8; D] {
+    let mut after = [0; D];
+    for d in 0..D {
+        let side = beside[d].saturating_add(small);
+        after[d] = cost[d].saturating_add(own[d].min(side).min(large));
     }
     let mut least = u8::MAX;
     for a in after {
@@ -69,6 +101,7 @@ fn step<const D: usize>(
     }
     after
 }
+
 /// Where the excess costs of pixel `x` begin, one disparity early.
 #[inline(always)]
 const fn place<const D: usize>(x: usize) -> usize {
@@ -81,36 +114,11 @@ fn jump(penalties: &Penalties, a: u8, b: u8) -> u8 {
     penalties.large[usize::from(a.abs_diff(b))]
 }
 
-/// Adds the costs of the paths from the left and from the right to the sums of a
-/// row. A path waits for its own last step; two of them wait together.
+/// Writes the sums of the costs of all paths in a row: `excess` are those from above
+/// left, above and above right. A path along the row waits for its own last step;
+/// meanwhile the others go on.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn along<const D: usize>(
-    costs: &[[u8; D]],
-    row: &[u8],
-    penalties: &Penalties,
-    sums: &mut [[u8; D]],
-) {
-    let last = costs.len() - 1;
-    let mut lines = [[u8::MAX; 512]; 2];
-    for line in &mut lines {
-        line[1..=D].fill(0);
-    }
-    let [from_left, from_right] = &mut lines;
-    for x in 0..=last {
-        let large = jump(penalties, row[x], row[x.saturating_sub(1)]);
-        let after = step(&costs[x], from_left, penalties.small, large, &mut sums[x]);
-        from_left[1..=D].copy_from_slice(&after);
-        let x = last - x;
-        let large = jump(penalties, row[x], row[(x + 1).min(last)]);
-        let after = step(&costs[x], from_right, penalties.small, large, &mut sums[x]);
-        from_right[1..=D].copy_from_slice(&after);
-    }
-}
-
-/// Adds the costs of the paths from above, on the left and on the right too, to
-/// the sums of a row.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn down<const D: usize>(
+pub fn sums<const D: usize>(
     costs: &[[u8; D]],
     (row, row_above): (&[u8], &[u8]),
     penalties: &Penalties,
@@ -118,20 +126,32 @@ pub fn down<const D: usize>(
     sums: &mut [[u8; D]],
 ) {
     let (last, small) = (costs.len() - 1, penalties.small);
-    // The path from the left writes where it reads next.
-    let mut beside = [u8::MAX; 512];
-    beside[1..=D].fill(0);
+    let [mut from_left, mut from_right] = [[0; D]; 2];
+    // The path from above left reads next where it writes: it waits for a pixel.
+    let mut waiting = [0; D];
     for x in 0..=last {
-        let (cost, mut sum, here) = (&costs[x], sums[x], place::<D>(x + 1));
+        let (cost, before, here) = (&costs[x], place::<D>(x), place::<D>(x + 1));
+        // The path from the right was here first in the right half.
+        let mut sum = if 2 * x <= last { [0; D] } else { sums[x] };
         let large = |from: usize| jump(penalties, row[x], row_above[from]);
-        let after = step(cost, &beside, small, large(x.saturating_sub(1)), &mut sum);
-        beside[1..=D].copy_from_slice(&left.cells[here + 1..=here + D]);
-        left.cells[here + 1..=here + D].copy_from_slice(&after);
+        let (west, east) = (x.saturating_sub(1), (x + 1).min(last));
+        let after = step(cost, &left.cells[before..], small, large(west), &mut sum);
+        left.cells[before + 1..=before + D].copy_from_slice(&waiting);
+        waiting = after;
         let after = step(cost, &above.cells[here..], small, large(x), &mut sum);
         above.cells[here + 1..=here + D].copy_from_slice(&after);
         let next = place::<D>(x + 2);
-        let after = step(cost, &right.cells[next..], small, large((x + 1).min(last)), &mut sum);
+        let after = step(cost, &right.cells[next..], small, large(east), &mut sum);
         right.cells[here + 1..=here + D].copy_from_slice(&after);
+        let large = jump(penalties, row[x], row[west]);
+        from_left = step_on(cost, &from_left, small, large, &mut sum);
+        sums[x] = sum;
+        let x = last - x;
+        let mut sum = if 2 * x > last { [0; D] } else { sums[x] };
+        let large = jump(penalties, row[x], row[(x + 1).min(last)]);
+        from_right = step_on(&costs[x], &from_right, small, large, &mut sum);
         sums[x] = sum;
     }
+    let here = place::<D>(last + 1);
+    left.cells[here + 1..=here + D].copy_from_slice(&waiting);
 }

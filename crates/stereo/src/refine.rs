@@ -4,82 +4,66 @@
 //!
 //! B. Lucas and T. Kanade, *An iterative image registration technique with an
 //! application to stereo vision*, IJCAI 1981, section 4, one step, along the row.
-//! The brightness of each row of the window may differ by a constant.
+//! The brightness of each row of the window may differ by a constant, and what the
+//! pixels of the window had for disparities counts a little: where brightness says
+//! nothing, that leaves their mean.
+//!
+//! The outline of a round thing lies behind its front, by the radius of a head for a
+//! head, and has the strongest slopes. They count less than their square, so that a
+//! face is where its faint features are.
 
 use tagalong_core::GreyImage;
 
 /// Neighbours whose disparities differ by at most this are of one surface, px.
 const SAME_PX: f32 = 1.0;
-/// Weight of the disparity as it was: the variance of the noise of a pixel, in grey
+/// Weight of a disparity as it was: the variance of the noise of a pixel, in grey
 /// levels, over that of the disparity, in pixels.
-const PRIOR: f32 = 20.0;
+const PRIOR: f32 = 1.0;
+/// A slope beyond this many grey levels counts little more than one of it.
+const STRONG: f32 = 6.0;
 /// A disparity changes by at most this, px: brightness is no straight line for long.
-const MOST_PX: f32 = 0.5;
+const MOST_PX: f32 = 1.0;
+/// Largest radius of a window, px.
+pub const MAX_RADIUS: usize = 16;
+/// Pixels that are worked on at once.
+const LANES: usize = 16;
+/// Stands for an unknown disparity where numbers must be finite.
+const UNKNOWN: f32 = 1e6;
 
 /// Refines disparities; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct Refiner {
-    left: Line,
-    right: Line,
-    sums: Vec<Sums>,
-    /// By pixel: the squared slopes in its window, and their product with the
-    /// disparity.
-    slopes: Vec<f32>,
-    products: Vec<f32>,
-    window: Window,
-    refined: Vec<f32>,
+    left: Vec<[f32; 2]>,
+    right: Vec<[f32; 2]>,
+    padded: Vec<u8>,
+    row: Equations,
+    /// Of the window's row around each pixel; there is room behind the last.
+    sums: Sums,
+    was: Vec<f32>,
 }
 
-/// Sums over the rows of the windows around the pixels of a row.
+/// By pixel: the squared slopes, and their product with the disparity.
 #[derive(Debug, Default)]
-struct Window {
-    squares: Vec<f32>,
-    sums: Vec<f32>,
-}
-
-impl Window {
-    fn clear(&mut self, width: usize) {
-        for row in [&mut self.squares, &mut self.sums] {
-            row.clear();
-            row.resize(width, 0.0);
-        }
-    }
-}
-
-/// Sums over the pixels of a row up to some place: slope `g`, and `q`, the slope
-/// times the disparity that explains the difference in brightness.
-#[derive(Clone, Copy, Debug, Default)]
 struct Sums {
-    g: f32,
-    q: f32,
-    gg: f32,
-    gq: f32,
+    squares: Vec<f32>,
+    products: Vec<f32>,
 }
 
-impl Sums {
-    #[inline(always)]
-    fn with(self, g: f32, q: f32) -> Self {
-        Self { g: self.g + g, q: self.q + q, gg: self.gg + g * g, gq: self.gq + g * q }
-    }
-
-    /// Squares and products around the means, from `first` to here.
-    #[inline(always)]
-    fn since(self, first: Self, count: f32) -> (f32, f32) {
-        let (g, q) = (self.g - first.g, self.q - first.q);
-        let (gg, gq) = (self.gg - first.gg, self.gq - first.gq);
-        ((gg - g * g / count).max(0.0), gq - g * q / count)
-    }
-}
-
-/// True if two disparities are of one surface; never for an unknown one.
+/// Some values that lie side by side.
 #[inline(always)]
-fn is_same(a: f32, b: f32) -> bool {
-    (a - b).abs() <= SAME_PX
+fn lanes(row: &[f32], from: usize) -> &[f32; LANES] {
+    &row[from..].as_chunks().0[0]
+}
+
+/// 1 where two disparities are of one surface; 0 for an unknown one.
+#[inline(always)]
+fn same(a: f32, b: f32) -> f32 {
+    if (a - b).abs() <= SAME_PX { 1.0 } else { 0.0 }
 }
 
 impl Refiner {
     /// Refines the disparities of the left image in windows of `2 * radius + 1`
-    /// columns and rows.
+    /// columns and rows; `radius` is at most [`MAX_RADIUS`].
     pub fn apply(
         &mut self,
         [left, right]: [&GreyImage; 2],
@@ -87,140 +71,145 @@ impl Refiner {
         disparities: &mut [f32],
     ) {
         let (width, height) = (left.width(), left.height());
-        self.slopes.resize(disparities.len(), 0.0);
-        self.products.resize(disparities.len(), 0.0);
-        for y in 0..height {
-            self.left.load(left.row(y));
-            self.right.load(right.row(y));
-            let place = y * width..(y + 1) * width;
-            let [slopes, products] = [&mut self.slopes, &mut self.products];
-            let sums = (&mut slopes[place.clone()], &mut products[place.clone()]);
-            let lines = (&self.left, &self.right);
-            along(lines, &disparities[place], radius, &mut self.sums, sums);
+        for row in [&mut self.sums.squares, &mut self.sums.products, &mut self.was] {
+            row.resize(disparities.len() + LANES, 0.0);
         }
-        self.refined.clear();
-        self.refined.extend_from_slice(disparities);
-        for (y, refined) in self.refined.chunks_exact_mut(width).enumerate() {
-            self.window.clear(width);
-            let own = &disparities[y * width..(y + 1) * width];
-            for near in y.saturating_sub(radius)..(y + radius + 1).min(height) {
-                let from = near * width;
-                let (slopes, products) = (&self.slopes[from..], &self.products[from..]);
-                add(own, &disparities[from..], slopes, products, &mut self.window);
-            }
-            solve(&self.window, refined);
+        for (y, row) in disparities.chunks_exact(width).enumerate() {
+            levels(left.row(y), &mut self.padded, &mut self.left);
+            levels(right.row(y), &mut self.padded, &mut self.right);
+            self.row.load(&self.left, &self.right, row);
+            across(&self.row, radius, y * width..(y + 1) * width, &mut self.sums);
         }
-        disparities.copy_from_slice(&self.refined);
+        self.was[..disparities.len()].copy_from_slice(disparities);
+        for (y, row) in disparities.chunks_exact_mut(width).enumerate() {
+            let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);
+            down(&self.was, &self.sums, (y, rows), row);
+        }
     }
 }
 
-/// A row of an image.
+/// Of each pixel the brightness, with weights 1, 2, 1, so that lines between pixels
+/// follow it, and its change from pixel to pixel; of the last one twice.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
+    let width = row.len();
+    padded.clear();
+    padded.resize(2, row[0]);
+    padded.extend_from_slice(row);
+    padded.resize(width + 4, row[width - 1]);
+    levels.resize(width + 1, [0.0; 2]);
+    let padded = &padded[..width + 4];
+    for (x, level) in levels[..width].iter_mut().enumerate() {
+        let at = |i: usize| i32::from(padded[x + i]);
+        let (a, b, c, d, e) = (at(0), at(1), at(2), at(3), at(4));
+        *level = [0.25 * (b + 2 * c + d) as f32, 0.125 * (e + 2 * (d - b) - a) as f32];
+    }
+    levels[width] = levels[width - 1];
+}
+
+/// What the pixels of a row say of their disparity `d`: `g d = q`, in grey levels, of
+/// strong slopes less. There is room for a window on both sides.
 #[derive(Debug, Default)]
-struct Line {
-    padded: Vec<u8>,
-    /// Brightness, times 4: weights 1, 2, 1, so that lines between pixels follow it.
-    level: Vec<f32>,
-    /// Its change from pixel to pixel, times 8.
-    slope: Vec<f32>,
+struct Equations {
+    d: Vec<f32>,
+    g: Vec<f32>,
+    q: Vec<f32>,
 }
 
-impl Line {
-    fn load(&mut self, row: &[u8]) {
-        self.padded.clear();
-        self.padded.resize(2, row[0]);
-        self.padded.extend_from_slice(row);
-        self.padded.resize(row.len() + 4, row[row.len() - 1]);
-        self.level.resize(row.len(), 0.0);
-        self.slope.resize(row.len(), 0.0);
-        levels(&self.padded, &mut self.level, &mut self.slope);
-    }
-
-    /// Level and slope between the pixels; the border goes on.
-    #[inline(always)]
-    fn between(&self, at: f32) -> (f32, f32) {
-        let last = self.level.len() - 1;
-        let at = at.max(0.0);
-        let i = (at as usize).min(last);
-        let part = (at - i as f32).min(1.0);
-        let next = (i + 1).min(last);
-        let mix = |row: &[f32]| row[i] + part * (row[next] - row[i]);
-        (mix(&self.level), mix(&self.slope))
-    }
-}
-
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn levels(padded: &[u8], level: &mut [f32], slope: &mut [f32]) {
-    let width = level.len();
-    let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|from| &padded[from..from + width]);
-    for x in 0..width {
-        let [a, b, c, d, e] = [a[x], b[x], c[x], d[x], e[x]].map(f32::from);
-        level[x] = b + 2.0 * c + d;
-        slope[x] = e + 2.0 * (d - b) - a;
-    }
-}
-
-/// Sums up along a row, within the surface of each pixel.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn along(
-    (left, right): (&Line, &Line),
-    disparities: &[f32],
-    radius: usize,
-    sums: &mut Vec<Sums>,
-    (slopes, products): (&mut [f32], &mut [f32]),
-) {
-    let width = disparities.len();
-    let mut from = 0;
-    while from < width {
-        let mut end = from + 1;
-        while end < width && is_same(disparities[end], disparities[end - 1]) {
-            end += 1;
+impl Equations {
+    fn load(&mut self, left: &[[f32; 2]], right: &[[f32; 2]], disparities: &[f32]) {
+        let (from, to) = (MAX_RADIUS, MAX_RADIUS + disparities.len());
+        for (row, value) in [(&mut self.d, UNKNOWN), (&mut self.g, 0.0), (&mut self.q, 0.0)] {
+            row.resize(to + MAX_RADIUS + LANES, value);
+            row[to..].fill(value);
         }
-        sums.clear();
-        sums.push(Sums::default());
-        for x in from..end {
-            let before = sums[x - from];
-            sums.push(if disparities[x].is_nan() {
-                before
-            } else {
-                let (g, q) = equation(left, right, x, disparities[x]);
-                before.with(g, q)
-            });
+        for (own, d) in self.d[from..to].iter_mut().zip(disparities) {
+            *own = if d.is_nan() { UNKNOWN } else { *d };
         }
-        for x in from..end {
-            let (a, b) = (x.saturating_sub(radius).max(from), (x + radius + 1).min(end));
-            (slopes[x], products[x]) = sums[b - from].since(sums[a - from], (b - a) as f32);
-        }
-        from = end;
+        let (g, q) = (&mut self.g[from..to], &mut self.q[from..to]);
+        between(right, &self.d[from..to], g, q);
+        solve_for(left, &self.d[from..to], g, q);
     }
 }
 
-/// What a pixel says of its disparity `d`: `g d = q`, in grey levels.
-#[inline(always)]
-fn equation(left: &Line, right: &Line, x: usize, disparity: f32) -> (f32, f32) {
-    let (level, slope) = right.between(x as f32 - disparity);
-    let g = 0.0625 * (left.slope[x] + slope);
-    (g, g * disparity + 0.25 * (level - left.level[x]))
-}
-
-/// Adds the values of a row where it is of the same surface.
+/// Brightness and slope of the right image where the left pixels are in it; its
+/// border goes on.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn add(own: &[f32], near: &[f32], slopes: &[f32], products: &[f32], window: &mut Window) {
-    let width = own.len();
-    let (near, slopes, products) = (&near[..width], &slopes[..width], &products[..width]);
-    let (squares, sums) = (&mut window.squares[..width], &mut window.sums[..width]);
-    for x in 0..width {
-        let same = is_same(own[x], near[x]);
-        squares[x] += if same { slopes[x] } else { 0.0 };
-        sums[x] += if same { products[x] } else { 0.0 };
+fn between(right: &[[f32; 2]], disparities: &[f32], slope: &mut [f32], level: &mut [f32]) {
+    let last = (right.len() - 2) as f32;
+    for (x, ((d, slope), level)) in disparities.iter().zip(slope).zip(level).enumerate() {
+        let at = (x as f32 - d).clamp(0.0, last);
+        let i = at as u32;
+        let part = at - i as f32;
+        let [here, next] = [right[i as usize], right[i as usize + 1]];
+        *level = here[0] + part * (next[0] - here[0]);
+        *slope = here[1] + part * (next[1] - here[1]);
     }
 }
 
-/// Solves for the disparities, with what they were as a weak prior.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn solve(window: &Window, disparities: &mut [f32]) {
-    for ((d, squares), sum) in disparities.iter_mut().zip(&window.squares).zip(&window.sums) {
-        let change = (PRIOR * *d + sum) / (PRIOR + squares) - *d;
-        let new = *d + change.clamp(-MOST_PX, MOST_PX);
-        *d = if new < 0.0 { 0.0 } else { new };
+fn solve_for(left: &[[f32; 2]], disparities: &[f32], g: &mut [f32], q: &mut [f32]) {
+    for (((own, d), g), q) in left.iter().zip(disparities).zip(g).zip(q) {
+        let slope = 0.5 * (own[1] + *g);
+        let weight = 1.0 / (1.0 + slope * slope * (1.0 / (STRONG * STRONG))).sqrt();
+        *q = weight * (slope * d + *q - own[0]);
+        *g = weight * slope;
+    }
+}
+
+/// Sums up over the windows' part of a row that is of one surface, around the means.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &mut Sums) {
+    for (i, at) in place.step_by(LANES).enumerate() {
+        let from = MAX_RADIUS + i * LANES;
+        let own = lanes(&row.d, from);
+        let [mut n, mut d, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 6];
+        for near in from - radius..from + radius + 1 {
+            let (ds, gs, qs) = (lanes(&row.d, near), lanes(&row.g, near), lanes(&row.q, near));
+            for lane in 0..LANES {
+                let same = same(own[lane], ds[lane]);
+                let slope = same * gs[lane];
+                n[lane] += same;
+                d[lane] += same * ds[lane];
+                g[lane] += slope;
+                q[lane] += same * qs[lane];
+                gg[lane] += slope * gs[lane];
+                gq[lane] += slope * qs[lane];
+            }
+        }
+        let squares = &mut out.squares[at..].as_chunks_mut::<LANES>().0[0];
+        let products = &mut out.products[at..].as_chunks_mut::<LANES>().0[0];
+        for lane in 0..LANES {
+            let mean = g[lane] / n[lane];
+            squares[lane] = gg[lane] - mean * g[lane] + PRIOR * n[lane];
+            products[lane] = gq[lane] - mean * q[lane] + PRIOR * d[lane];
+        }
+    }
+}
+
+/// Solves for the disparities of row `y` with the sums of some rows.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn down(was: &[f32], sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), row: &mut [f32]) {
+    let width = row.len();
+    for (i, new) in row.chunks_mut(LANES).enumerate() {
+        let own = lanes(was, y * width + i * LANES);
+        let (mut squares, mut products) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for near in rows.clone() {
+            let at = near * width + i * LANES;
+            let (ds, ss) = (lanes(was, at), lanes(&sums.squares, at));
+            let ps = lanes(&sums.products, at);
+            for lane in 0..LANES {
+                let same = same(own[lane], ds[lane]);
+                squares[lane] += same * ss[lane];
+                products[lane] += same * ps[lane];
+            }
+        }
+        let mut solved = [0.0; LANES];
+        for lane in 0..LANES {
+            let change = products[lane] / squares[lane] - own[lane];
+            let d = own[lane] + change.clamp(-MOST_PX, MOST_PX);
+            solved[lane] = if d < 0.0 { 0.0 } else { d };
+        }
+        new.copy_from_slice(&solved[..new.len()]);
     }
 }

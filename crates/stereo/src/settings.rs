@@ -38,7 +38,7 @@ pub struct StereoSettings {
     pub left_right: u8,
     /// Least change of brightness across a textured pixel (half of Sobel's sum: twice
     /// the height of a step). Others keep their disparity only between textured
-    /// ones that are as near; 0 keeps them all.
+    /// ones that have it, too; 0 keeps them all.
     pub texture: u8,
     /// Patches of fewer pixels than this are taken for errors.
     pub speckle_pixels: usize,
@@ -82,7 +82,7 @@ impl Default for StereoSettings {
             speckle_step: 2.0,
             fill_px: 8,
             fill_baselines: 1.0,
-            refine_px: 4,
+            refine_px: 2,
             window: 9,
             small_penalty: 6,
             large_penalty: 40,

@@ -4,9 +4,8 @@ use tagalong_core::GreyImage;
 
 use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
-use crate::texture::TextureTest;
-use crate::winner::Winner;
-use crate::{Dropped, Method, StereoSettings, cost, paths, window, winner};
+use crate::winner::{Found, Winners};
+use crate::{Dropped, Method, StereoSettings, cost, paths, window};
 
 /// Rows above a strip from which the paths into it come.
 const RUN_UP: usize = 16;
@@ -18,15 +17,14 @@ pub struct Strip {
     right: Features,
     costs: Vec<u8>,
     sums: Vec<u8>,
-    winners: Vec<Winner>,
-    /// Best disparity and its cost by column of the right image.
-    from_right: Vec<(u8, u8)>,
+    winners: Winners,
+    /// Best cost and its disparity by column of the right image.
+    from_right: Vec<u16>,
     /// Excess costs of the paths from above left, above and above right.
     excess: [Excess; 3],
     /// Costs of the rows in the window, and their sums.
     ring: Vec<Vec<u8>>,
     columns: Vec<u8>,
-    texture: TextureTest,
     /// What was dropped.
     pub dropped: Dropped,
 }
@@ -52,7 +50,7 @@ impl Strip {
         let width = pair.left.width();
         self.costs.resize(width * D, 0);
         self.sums.resize(width * D, 0);
-        self.winners.resize(width, Winner::default());
+        self.winners.resize(width);
         self.dropped = Dropped::default();
         match pair.settings.method {
             Method::Block => self.block::<D>(pair, output),
@@ -69,9 +67,7 @@ impl Strip {
             let grey = (pair.left.row(y), pair.left.row(y.saturating_sub(1)));
             let costs = self.costs.as_chunks::<D>().0;
             let sums = self.sums.as_chunks_mut::<D>().0;
-            sums.fill([0; D]);
-            paths::along(costs, grey.0, pair.penalties, sums);
-            paths::down(costs, grey, pair.penalties, &mut self.excess, sums);
+            paths::sums(costs, grey, pair.penalties, &mut self.excess, sums);
             if y >= output.first_row {
                 self.decide::<D>(pair, y - output.first_row, output);
             }
@@ -122,49 +118,17 @@ impl Strip {
 
     /// Writes the disparities of a row, where they stand the tests.
     fn decide<const D: usize>(&mut self, pair: &Pair<'_>, row: usize, output: &mut Output<'_>) {
-        let width = pair.left.width();
-        winner::row(self.sums.as_chunks::<D>().0, &mut self.winners);
-        self.look_from_right(width);
-        let place = row * width..(row + 1) * width;
-        let disparities = output.disparities[place.clone()].iter_mut();
-        let confidences = output.confidences[place].iter_mut();
-        let uniqueness = pair.settings.uniqueness as f32;
-        for (x, (disparity, confidence)) in disparities.zip(confidences).enumerate() {
-            let winner = &self.winners[x];
-            (*disparity, *confidence) = (f32::NAN, 0);
-            if usize::from(winner.disparity) > x {
-                self.dropped.outside += 1;
-            } else if winner.is_doubtful(uniqueness) {
-                self.dropped.not_unique += 1;
-            } else if !self.agrees(x, pair.settings.left_right) {
-                self.dropped.left_right += 1;
-            } else {
-                (*disparity, *confidence) = (winner.refined(), (winner.margin() * 255.0) as u8);
-            }
-        }
-        let y = output.first_row + row;
-        let near = [y.saturating_sub(1), y, (y + 1).min(pair.left.height() - 1)];
-        let values = &mut output.disparities[row * width..(row + 1) * width];
-        let (least, rows) = (pair.settings.texture, near.map(|y| pair.left.row(y)));
-        self.dropped.unsupported += self.texture.apply(values, rows, least);
-    }
-
-    /// The best disparity of each column of the right image, among those that
-    /// won in the left one.
-    fn look_from_right(&mut self, width: usize) {
-        self.from_right.clear();
-        self.from_right.resize(width, (0, u8::MAX));
-        for (x, winner) in self.winners.iter().enumerate() {
-            let Some(seen) = x.checked_sub(usize::from(winner.disparity)) else { continue };
-            if winner.cost < self.from_right[seen].1 {
-                self.from_right[seen] = (winner.disparity, winner.cost);
-            }
-        }
-    }
-
-    fn agrees(&self, x: usize, tolerance: u8) -> bool {
-        let disparity = self.winners[x].disparity;
-        let (back, _) = self.from_right[x - usize::from(disparity)];
-        disparity.abs_diff(back) <= tolerance
+        let place = row * pair.left.width()..(row + 1) * pair.left.width();
+        let disparities = &mut output.disparities[place.clone()];
+        let confidences = &mut output.confidences[place];
+        let settings = pair.settings;
+        self.winners.find(self.sums.as_chunks::<D>().0);
+        let mut found = Found { disparities, confidences };
+        let refused = self.winners.judge(settings.uniqueness as f32, &mut found);
+        let (tolerance, best) = (settings.left_right, &mut self.from_right);
+        let disagree = self.winners.look_from_right(tolerance, best, found.disparities);
+        self.dropped.outside += u64::from(refused.outside);
+        self.dropped.not_unique += u64::from(refused.not_unique);
+        self.dropped.left_right += u64::from(disagree);
     }
 }

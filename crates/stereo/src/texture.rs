@@ -2,56 +2,98 @@
 //!
 //! Where an image is smooth, costs tell nothing, and paths carry the disparity of
 //! a person's outline far into a bare wall. An outline belongs to the nearer
-//! surface. So a smooth pixel keeps its disparity only if it is no nearer than
-//! both of its textured neighbours in the row: the inside of a person is bounded
-//! by the person on both sides, the wall beside is not.
+//! surface. So a smooth pixel keeps its disparity only if it is that of its textured
+//! neighbours in the row, or of the farther one of them: the inside of a person is
+//! bounded by the person on both sides, the wall beside is not. What is too far is
+//! dropped as what is too near: noise that is cut on one side only leaves all
+//! surfaces too far.
+
+use tagalong_core::GreyImage;
 
 /// Disparities that differ by less than this, px, or by less than a tenth, are of
 /// one surface: people are not flat.
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
 
-/// Judges the pixels of a row; keeps its buffer.
+/// Judges pixels by row; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct TextureTest {
-    /// Which pixels are textured.
-    textured: Vec<bool>,
+    /// All bits of those that are textured.
+    textured: Vec<u32>,
+    /// The disparity of the last textured pixel up to each one, and of the next.
+    before: Vec<f32>,
+    behind: Vec<f32>,
 }
 
 impl TextureTest {
-    /// Sets the disparities of a row that nothing supports to NaN, and returns how
-    /// many. `rows` are the row of the image and its neighbours, `least` is the
-    /// least slope of a textured pixel.
-    pub fn apply(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u8) -> u64 {
+    /// Sets the disparities of an image that nothing supports to NaN, and returns
+    /// how many. `least` is the least slope of a textured pixel; 0 leaves them all.
+    pub fn apply(&mut self, image: &GreyImage, least: u8, disparities: &mut [f32]) -> u64 {
         if least == 0 {
             return 0;
         }
-        self.textured.clear();
-        self.textured.resize(row.len(), false);
-        find_textured(rows, least, &mut self.textured);
-        let (mut dropped, mut from, mut before) = (0, 0, f32::NEG_INFINITY);
-        for x in 0..row.len() {
-            if self.textured[x] && !row[x].is_nan() {
-                let most = most(row[x]);
-                dropped += limit(&mut row[from..x], before.min(most));
-                (from, before) = (x + 1, most);
-            }
+        let last = image.height().saturating_sub(1);
+        let rows = disparities.chunks_exact_mut(image.width().max(1)).enumerate();
+        rows.map(|(y, row)| {
+            let near = [y.saturating_sub(1), y, (y + 1).min(last)];
+            self.judge(row, near.map(|y| image.row(y)), least)
+        })
+        .sum()
+    }
+
+    /// As above, for a row of the image with its neighbours.
+    fn judge(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u8) -> u64 {
+        for buffer in [&mut self.before, &mut self.behind] {
+            buffer.resize(row.len(), f32::NAN);
         }
-        dropped + limit(&mut row[from..], f32::NEG_INFINITY)
+        self.textured.resize(row.len(), 0);
+        find_textured(rows, least, &mut self.textured);
+        let mut last = f32::NAN.to_bits();
+        for x in 0..row.len() {
+            self.before[x] = carried(&mut last, row[x], self.textured[x]);
+        }
+        last = f32::NAN.to_bits();
+        for x in (0..row.len()).rev() {
+            self.behind[x] = carried(&mut last, row[x], self.textured[x]);
+        }
+        u64::from(limit(row, &self.before, &self.behind))
     }
 }
 
-/// The greatest disparity on a surface beside this one.
-fn most(beside: f32) -> f32 {
-    beside + SAME_PX.max(SAME_PART * beside)
+/// Carries the disparities of textured pixels on. All bits at once, since no one can
+/// foresee which pixels are textured, a processor neither.
+#[inline(always)]
+fn carried(last: &mut u32, own: f32, textured: u32) -> f32 {
+    let is_anchor = if own.is_nan() { 0 } else { textured };
+    *last = (own.to_bits() & is_anchor) | (*last & !is_anchor);
+    f32::from_bits(*last)
 }
 
-/// Drops the pixels of a stretch that are nearer than that, and counts them.
-fn limit(stretch: &mut [f32], most: f32) -> u64 {
+/// How much disparities of one surface differ at most.
+#[inline(always)]
+fn tolerance(disparity: f32) -> f32 {
+    SAME_PX.max(SAME_PART * disparity)
+}
+
+/// The disparity between two textured pixels; NaN where there is only one.
+#[inline(always)]
+fn expected(a: f32, b: f32) -> f32 {
+    let far = if a < b { a } else { b };
+    let mean = 0.5 * (a + b);
+    if (a - b).abs() > tolerance(far) { far } else { mean }
+}
+
+/// Drops the pixels that have another disparity than expected, and counts them.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
+    let (before, behind) = (&before[..row.len()], &behind[..row.len()]);
     let mut dropped = 0;
-    for value in stretch {
-        dropped += u64::from(*value > most);
-        *value = if *value > most { f32::NAN } else { *value };
+    for (x, value) in row.iter_mut().enumerate() {
+        let expected = expected(before[x], behind[x]);
+        let stays = (*value - expected).abs() <= tolerance(expected);
+        // A sum that may overflow is no vector instruction.
+        dropped = u32::wrapping_add(dropped, u32::from(!stays & !value.is_nan()));
+        *value = if stays { *value } else { f32::NAN };
     }
     dropped
 }
@@ -59,18 +101,19 @@ fn limit(stretch: &mut [f32], most: f32) -> u64 {
 /// Finds the pixels across which brightness changes by at least so much: half of
 /// Sobel's sum. The first and the last column have a neighbour on one side only.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [bool]) {
+fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [u32]) {
     let rise = |a: u8, b: u8| i16::from(b).wrapping_sub(i16::from(a));
     let slope = |[a, b, c]: [i16; 3]| a.wrapping_add(b.wrapping_mul(2)).wrapping_add(c).abs() / 2;
+    let mask = |slope: i16| if slope >= i16::from(least) { u32::MAX } else { 0 };
     let last = textured.len() - 1;
     for (x, from, to) in [(0, 0, 1.min(last)), (last, last.saturating_sub(1), last)] {
-        textured[x] = slope(rows.map(|row| rise(row[from], row[to]))) >= i16::from(least);
+        textured[x] = mask(slope(rows.map(|row| rise(row[from], row[to]))));
     }
     let Some(middle) = textured.get_mut(1..last) else { return };
     let width = middle.len();
     let [a, b, c] = rows.map(|row| (&row[..width], &row[2..width + 2]));
     for (x, textured) in middle.iter_mut().enumerate() {
         let rises = [a, b, c].map(|(left, right)| rise(left[x], right[x]));
-        *textured = slope(rises) >= i16::from(least);
+        *textured = mask(slope(rises));
     }
 }

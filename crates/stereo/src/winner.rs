@@ -1,72 +1,152 @@
 //! From the costs of all disparities of a row to the best ones.
 
-/// The best disparity of a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Winner {
-    /// The disparity with the lowest cost, px.
-    pub disparity: u8,
+/// The best disparities of a row, column by column.
+#[derive(Clone, Debug, Default)]
+pub struct Winners {
+    /// The disparity with the lowest cost, px: the least of them.
+    pub disparity: Vec<u8>,
     /// Its cost ...
-    pub cost: u8,
+    pub cost: Vec<u8>,
     /// ... and those of the disparities below and above; its own where there
     /// is none.
-    pub beside: [u8; 2],
+    pub below: Vec<u8>,
+    pub above: Vec<u8>,
     /// The lowest cost of a disparity that is not beside the best one.
-    pub second: u8,
+    pub second: Vec<u8>,
 }
 
-impl Winner {
-    /// How far the second best cost is above the best one, as a fraction of
-    /// the second, 0 to 1.
-    pub fn margin(&self) -> f32 {
-        f32::from(self.second.saturating_sub(self.cost)) / f32::from(self.second.max(1))
+/// What was found of a row.
+pub struct Found<'a> {
+    /// Disparities to a fraction of a pixel, px; NaN where there is none.
+    pub disparities: &'a mut [f32],
+    /// How far the second best cost is above the best one, as a fraction of the
+    /// second, 0 to 255.
+    pub confidences: &'a mut [u8],
+}
+
+/// Pixels without a disparity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Refused {
+    /// Their match would lie outside of the right image.
+    pub outside: u32,
+    /// Another match is nearly as good.
+    pub not_unique: u32,
+}
+
+impl Winners {
+    /// Room for the columns of a row.
+    pub fn resize(&mut self, width: usize) {
+        let Self { disparity, cost, below, above, second } = self;
+        for row in [disparity, cost, below, above, second] {
+            row.resize(width, 0);
+        }
     }
 
-    /// True if the second best cost is above the best one by less than this
-    /// fraction of it.
-    pub fn is_doubtful(&self, uniqueness: f32) -> bool {
-        f32::from(self.second.saturating_sub(self.cost)) < uniqueness * f32::from(self.second)
+    /// Finds the best disparity of each pixel.
+    pub fn find<const D: usize>(&mut self, sums: &[[u8; D]]) {
+        row(sums, self);
     }
 
-    /// The disparity to a fraction of a pixel, by a parabola through the three
-    /// costs. It leans to whole pixels; two lines of equal slope, which do not,
-    /// follow the noise of the sums more, and were further off in all.
-    pub fn refined(&self) -> f32 {
-        let [below, above] = self.beside.map(f32::from);
-        let rise = below + above - 2.0 * f32::from(self.cost);
-        let offset = if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 };
-        f32::from(self.disparity) + offset
+    /// Writes the disparities that lie within the right image and whose second best
+    /// cost is higher by at least the fraction `uniqueness` of it.
+    pub fn judge(&self, uniqueness: f32, found: &mut Found<'_>) -> Refused {
+        judge(self, uniqueness, found)
+    }
+
+    /// Drops the disparities of pixels whose match in the right image has another
+    /// best disparity, among those that won in the left one: off by more than
+    /// `tolerance`; returns how many that were. `best` is a buffer.
+    pub fn look_from_right(
+        &self,
+        tolerance: u8,
+        best: &mut Vec<u16>,
+        disparities: &mut [f32],
+    ) -> u32 {
+        const LEFT_OF_IMAGE: usize = 256;
+        best.clear();
+        best.resize(self.disparity.len() + LEFT_OF_IMAGE, u16::MAX);
+        let seen = |x: usize, d: u8| x + LEFT_OF_IMAGE - usize::from(d);
+        for (x, (d, cost)) in self.disparity.iter().zip(&self.cost).enumerate() {
+            let best = &mut best[seen(x, *d)];
+            *best = (*best).min(u16::from_be_bytes([*cost, *d]));
+        }
+        let mut dropped = 0;
+        for (x, (d, value)) in self.disparity.iter().zip(disparities).enumerate() {
+            let [_, back] = best[seen(x, *d)].to_be_bytes();
+            let differ = d.abs_diff(back) > tolerance;
+            dropped += u32::from(differ & !value.is_nan());
+            *value = if differ { f32::NAN } else { *value };
+        }
+        dropped
     }
 }
 
-/// Finds the best disparity of each pixel.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn row<const D: usize>(sums: &[[u8; D]], winners: &mut [Winner]) {
-    for (sums, winner) in sums.iter().zip(winners) {
-        *winner = best(sums);
+fn row<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
+    let width = sums.len();
+    let Winners { disparity, cost, below, above, second } = winners;
+    let [disparity, cost, below, above, second] =
+        [disparity, cost, below, above, second].map(|row| &mut row[..width]);
+    for (x, sums) in sums.iter().enumerate() {
+        let [least, at] = best(sums).to_be_bytes();
+        let d = usize::from(at);
+        (disparity[x], cost[x]) = (at, least);
+        (below[x], above[x]) = (sums[d.saturating_sub(1)], sums[(d + 1).min(D - 1)]);
+        second[x] = rival(sums, at);
     }
 }
 
+/// The lowest cost, and in the lower byte its disparity.
 #[inline(always)]
-fn best<const D: usize>(sums: &[u8; D]) -> Winner {
-    let cost = least(sums, |_| true);
-    let mut at = u8::MAX;
+fn best<const D: usize>(sums: &[u8; D]) -> u16 {
+    let mut best = u16::MAX;
     for (d, sum) in sums.iter().enumerate() {
-        at = at.min(if *sum == cost { d as u8 } else { u8::MAX });
+        best = best.min(u16::from_be_bytes([*sum, d as u8]));
     }
-    let d = usize::from(at);
-    let beside = [sums[d.saturating_sub(1)], sums[(d + 1).min(D - 1)]];
+    best
+}
+
+/// The lowest cost of a disparity that is not beside this one.
+#[inline(always)]
+fn rival<const D: usize>(sums: &[u8; D], at: u8) -> u8 {
     let below = at.saturating_sub(1);
     let near = at.saturating_add(1).wrapping_sub(below);
-    let second = least(sums, |d| d.wrapping_sub(below) > near);
-    Winner { disparity: at, cost, beside, second }
-}
-
-/// The least of those that count.
-#[inline(always)]
-fn least<const D: usize>(cells: &[u8; D], counts: impl Fn(u8) -> bool) -> u8 {
     let mut least = u8::MAX;
-    for (d, cell) in cells.iter().enumerate() {
-        least = least.min(if counts(d as u8) { *cell } else { u8::MAX });
+    for (d, sum) in sums.iter().enumerate() {
+        let is_beside = (d as u8).wrapping_sub(below) <= near;
+        least = least.min(if is_beside { u8::MAX } else { *sum });
     }
     least
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn judge(winners: &Winners, uniqueness: f32, found: &mut Found<'_>) -> Refused {
+    let width = found.disparities.len();
+    let Winners { disparity, cost, below, above, second } = winners;
+    let (disparity, cost, second) = (&disparity[..width], &cost[..width], &second[..width]);
+    let (below, above) = (&below[..width], &above[..width]);
+    let (values, confidences) = (&mut *found.disparities, &mut found.confidences[..width]);
+    let (mut outside_count, mut not_unique_count) = (0_u32, 0_u32);
+    for x in 0..width {
+        let (d, rival) = (disparity[x], f32::from(second[x]));
+        let ahead = f32::from(second[x].saturating_sub(cost[x]));
+        let outside = u32::from(d) > x as u32;
+        let not_unique = !outside & (ahead < uniqueness * rival);
+        // A sum that may overflow is no vector instruction.
+        outside_count = outside_count.wrapping_add(u32::from(outside));
+        not_unique_count = not_unique_count.wrapping_add(u32::from(not_unique));
+        let value = f32::from(d) + offset(below[x].into(), cost[x].into(), above[x].into());
+        values[x] = if outside | not_unique { f32::NAN } else { value };
+        confidences[x] = (255.0 * ahead / rival.max(1.0)) as u8;
+    }
+    Refused { outside: outside_count, not_unique: not_unique_count }
+}
+
+/// The fraction of a pixel, by a parabola through three costs. It leans to whole
+/// pixels; two lines of equal slope, which do not, follow the noise of the sums more,
+/// and were further off in all.
+#[inline(always)]
+fn offset(below: f32, cost: f32, above: f32) -> f32 {
+    let rise = below + above - 2.0 * cost;
+    if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 }
 }

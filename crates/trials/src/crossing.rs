@@ -118,8 +118,11 @@ fn follow(
         match own {
             None => {
                 own = confirmed
-                    .find(|t| !taken.contains(&t.id) && error(t) <= rules.max_error_m)
-                    .map(|track| track.id);
+                    .filter(|t| !taken.contains(&t.id) && error(t) <= rules.max_error_m)
+                    .map(|t| (apart_m(truth, t), t.id))
+                    .filter(|(apart_m, _)| *apart_m < SAME_M)
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+                    .map(|(_, id)| id);
                 if own.is_none() && at_s - since > rules.settle_s {
                     return Err(Failing::NotFound { person });
                 }
@@ -138,12 +141,20 @@ fn follow(
     Ok(())
 }
 
+/// Somebody farther away than this is another one, though in the same direction, m.
+const SAME_M: f64 = 1.0;
+
+/// Distance on the floor.
+fn apart_m(truth: &Truth, track: &Track) -> f64 {
+    (track.estimate.person.position - truth.head_in_robot).xy().norm()
+}
+
 impl Crossing {
     fn error_m(&self, truth: &Truth, track: &Track, camera: &Camera) -> f64 {
-        let off = (track.estimate.person.position - truth.head_in_robot).xy();
         if !self.across_only {
-            return off.norm();
+            return apart_m(truth, track);
         }
+        let off = (track.estimate.person.position - truth.head_in_robot).xy();
         let eye = camera.robot_from_camera.translation.vector;
         let sight = (truth.head_in_robot.coords - eye).xy();
         let across = Vector2::new(-sight.y, sight.x).try_normalize(1e-6);
@@ -206,6 +217,21 @@ mod tests {
         let rules = Crossing { across_only: true, ..Crossing::default() };
         assert!(crossing(&trial, &trial.runs[0], &rules).is_ok());
         assert!(crossing(&trial, &trial.runs[0], &Crossing::default()).is_err());
+    }
+
+    #[test]
+    fn somebody_farther_off_in_the_same_direction_is_another_one() {
+        let tracks: [(u32, &[_]); 2] = [(1, &[Some((5.0, 0.0)); 20]), (2, &[Some((3.2, 0.3)); 20])];
+        let near = [(3.0, 0.2, 1.0); 20];
+        let trial = trial(&[&near], &tracks);
+        let rules = Crossing { across_only: true, ..Crossing::default() };
+        assert_eq!(
+            crossing(&trial, &trial.runs[0], &rules).map(|span| span.errors_m.len()),
+            Ok(19)
+        );
+        let trial = crate::testing::trial(&[&near], &tracks[..1]);
+        let alone = crossing(&trial, &trial.runs[0], &rules);
+        assert_eq!(alone, Err(Failing::NotFound { person: 1 }));
     }
 
     #[test]

@@ -71,10 +71,28 @@ impl Draw {
         self.simulation.steer(command);
     }
 
+    /// The scene in motion.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
     /// The next frame; `None` at the end of the scene.
     pub fn next_frame(&mut self) -> Option<Drawn> {
+        self.next_frame_while(|_, _| None)
+    }
+
+    /// The next frame, with somebody at the wheels until it comes: `at_wheels`
+    /// sees all that happens, and may command them.
+    pub fn next_frame_while(
+        &mut self,
+        mut at_wheels: impl FnMut(&Simulation, &Event) -> Option<WheelSpeeds>,
+    ) -> Option<Drawn> {
         while self.waiting.len() <= self.patience {
-            match self.simulation.next_event() {
+            let event = self.simulation.next_event();
+            if let Some(wheels) = event.as_ref().and_then(|e| at_wheels(&self.simulation, e)) {
+                self.simulation.steer(wheels);
+            }
+            match event {
                 Some(Event::Odometry(reading)) => {
                     self.odometry.insert(reading.at_ns, reading.odom_from_robot);
                     self.odometry = self.odometry.split_off(&reading.at_ns.saturating_sub(KEPT_NS));

@@ -17,6 +17,9 @@
 //! position errors in two frames), [`crossing`] (is everybody tracked in all
 //! frames?) and [`occlusions`] (is somebody known again?).
 //!
+//! A [`Ride`] closes the loop: the contender drives the robot, and a [`RideJudge`]
+//! says how well it stayed with the person.
+//!
 //! The result of a list of scenes depends on the scenes and configs alone, not
 //! on the number of threads.
 
@@ -27,6 +30,7 @@ mod draw;
 mod judge;
 mod occlusion;
 mod parallel;
+mod ride;
 #[cfg(test)]
 mod testing;
 mod trial;
@@ -37,5 +41,6 @@ pub use depth::{HeadDepth, head_depths};
 pub use draw::{Draw, Drawn, ODOMETRY_SIGMA};
 pub use judge::{Judge, Judged};
 pub use occlusion::{Occlusion, Outcome, occlusions, outcome};
-pub use parallel::each;
+pub use parallel::{each, in_order};
+pub use ride::{Episode, Ridden, Ride, RideJudge, Tick, Witness};
 pub use trial::{Moment, Run, Trial, TrialError};

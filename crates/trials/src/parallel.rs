@@ -19,24 +19,39 @@ pub fn each<T: Send>(
     keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
     done: impl Fn(usize) + Sync,
 ) -> Result<Vec<T>, TrialError> {
+    let trial = |scene: &Scene| Trial::new(scene, contenders, registry, 1).and_then(&keep);
+    in_order(scenes, threads, trial, done)
+}
+
+/// What `work` makes of each thing, in the order of the things, `threads` at a
+/// time; `done` hears after each how many are through.
+///
+/// # Errors
+/// The error of the first thing, in the order of the list, that has one.
+pub fn in_order<S: Sync, T: Send>(
+    things: &[S],
+    threads: usize,
+    work: impl Fn(&S) -> Result<T, TrialError> + Sync,
+    done: impl Fn(usize) + Sync,
+) -> Result<Vec<T>, TrialError> {
     let (next, through) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let work = || {
+    let worker = || {
         let mut kept = Vec::new();
-        while let Some((at, scene)) = take(scenes, &next) {
-            let result = Trial::new(scene, contenders, registry, 1).and_then(&keep);
+        while let Some((at, thing)) = take(things, &next) {
+            let result = work(thing);
             let failed = result.is_err();
             kept.push((at, result));
             done(through.fetch_add(1, Ordering::Relaxed) + 1);
             if failed {
                 // The others need not go on.
-                next.store(scenes.len(), Ordering::Relaxed);
+                next.store(things.len(), Ordering::Relaxed);
             }
         }
         kept
     };
     let mut all = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
-        let mut all = work();
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(worker)).collect();
+        let mut all = worker();
         for other in others {
             all.extend(other.join().map_err(|_| TrialError::Panicked)?);
         }
@@ -46,7 +61,7 @@ pub fn each<T: Send>(
     all.into_iter().map(|(_, result)| result).collect()
 }
 
-fn take<'a>(scenes: &'a [Scene], next: &AtomicUsize) -> Option<(usize, &'a Scene)> {
+fn take<'a, S>(things: &'a [S], next: &AtomicUsize) -> Option<(usize, &'a S)> {
     let at = next.fetch_add(1, Ordering::Relaxed);
-    scenes.get(at).map(|scene| (at, scene))
+    things.get(at).map(|thing| (at, thing))
 }

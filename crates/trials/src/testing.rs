@@ -1,7 +1,9 @@
 //! Trials written by hand.
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
-use tagalong_core::{Camera, Distortion, Estimate, Funnel, Person, Pinhole, Stamp, Track, TrackId};
+use tagalong_core::{
+    Camera, Distortion, Estimate, Funnel, Person, Pinhole, Sketch, Stamp, Track, TrackId,
+};
 use tagalong_pipeline::{FrameReport, Outcome, Weighing};
 use tagalong_sim::Truth;
 
@@ -89,6 +91,7 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
         command: None,
         nis: Vec::new(),
         weighing: Weighing::default(),
+        sketch: Sketch::default(),
         timings: Vec::new(),
         ended: Vec::new(),
     }

@@ -26,6 +26,9 @@ pub enum TrialError {
     /// Tracks that cannot be scored.
     #[error(transparent)]
     Eval(#[from] EvalError),
+    /// Whoever watched could not write it down.
+    #[error("{0}")]
+    Witness(String),
     /// A thread that works on trials died.
     #[error("a trial panicked; please report this")]
     Panicked,
@@ -89,32 +92,6 @@ impl Trial {
         Ok(Self::of(scene, camera, moments, lanes))
     }
 
-    /// Draws a scene in which the contender's controller drives the robot.
-    /// Images that come late are late for it, too.
-    ///
-    /// # Errors
-    /// A config that is wrong, or a plugin that fails.
-    pub fn steered(
-        scene: &Scene,
-        contender: &Contender,
-        registry: &Registry,
-        threads: usize,
-    ) -> Result<Self, TrialError> {
-        let mut draw = Draw::live(scene, threads);
-        let mut lane = Lane::new(scene, contender, registry)?;
-        let mut moments = Vec::new();
-        let mut camera = None;
-        while let Some(drawn) = draw.next_frame() {
-            lane.step(&drawn)?;
-            if let Some(command) = lane.run.reports.last().and_then(|report| report.command) {
-                draw.steer(command.wheels);
-            }
-            camera.get_or_insert_with(|| Camera::clone(&drawn.frame.camera));
-            moments.push(Moment::of(drawn));
-        }
-        Ok(Self::of(scene, camera, moments, vec![lane]))
-    }
-
     fn of(scene: &Scene, camera: Option<Camera>, moments: Vec<Moment>, lanes: Vec<Lane>) -> Self {
         let camera =
             camera.unwrap_or_else(|| tagalong_sim::Simulation::new(scene, 1).camera().clone());
@@ -124,7 +101,7 @@ impl Trial {
 }
 
 impl Moment {
-    fn of(drawn: Drawn) -> Self {
+    pub(crate) fn of(drawn: Drawn) -> Self {
         let Drawn { frame, truth, odom_from_robot, world_from_robot } = drawn;
         Self { stamp: frame.stamp, truth, odom_from_robot, world_from_robot }
     }

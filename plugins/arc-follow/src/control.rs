@@ -1,10 +1,9 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use tagalong_core::{Controller, Motion, Scene, Track, WheelSpeeds, Wheels};
+use tagalong_core::{Controller, Motion, Scene, Sent, Track, WheelSpeeds, Wheels};
 
 use crate::aim::Aim;
 use crate::config::{Config, MOST, Path};
-use crate::sent::Sent;
 
 /// A longer pause between frames counts as this one, s.
 const LONGEST_STEP_S: f64 = 0.5;

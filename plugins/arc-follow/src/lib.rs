@@ -18,7 +18,6 @@
 mod aim;
 mod config;
 mod control;
-mod sent;
 #[cfg(test)]
 mod tests;
 

@@ -30,7 +30,7 @@ impl ColorTexture {
         if !config.bias.is_finite() {
             return Err(Error::Settings(format!("`bias` = {} must be finite", config.bias)));
         }
-        let model = read(&config.model, context)?;
+        let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
         let features = Features::default();
         let Config { weight, limit, bias, .. } = config;
         Ok(Self { model, features, weight, limit, bias })
@@ -43,14 +43,4 @@ impl Verifier for ColorTexture {
         let log_odds = self.model.log_odds(&self.features).clamp(-self.limit, self.limit);
         Ok(self.weight * log_odds + self.bias)
     }
-}
-
-fn read(file: &str, context: &Context) -> Result<Model> {
-    let broken = |why: String| Error::Model { path: file.into(), why };
-    if file.is_empty() {
-        return Model::from_text(BUILT_IN).map_err(broken);
-    }
-    let text = std::fs::read_to_string(context.base_dir.join(file))
-        .map_err(|error| broken(error.to_string()))?;
-    Model::from_text(&text).map_err(broken)
 }

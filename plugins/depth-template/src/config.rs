@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::HEAD_RADIUS_M;
 
 use crate::bank::Direction;
 
@@ -90,8 +91,16 @@ pub struct DepthTemplateConfig {
     /// speaks for the person, m; never less than three standard deviations of
     /// the depth.
     pub likelihood_tolerance_m: f64,
+    /// How much of what lies beside a person in an imagined scene, at the same
+    /// depth, counts against the person where there is more on one side than on
+    /// the other, 0 to 1: a rucksack or an arm. What is on both sides counts whole.
+    pub likelihood_one_sided: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
+    /// How far the centre of a head lies behind the depth that is measured of
+    /// it, m. Stereo sees less than the radius of the head: the contrast is at
+    /// its outline, which lies behind the face.
+    pub centre_behind_m: f64,
     /// Standard deviation of the head's place across the viewing ray, m.
     pub sigma_across_m: f64,
     /// Standard deviation of the head's depth at 0 m ...
@@ -131,7 +140,9 @@ impl Default for DepthTemplateConfig {
             background_percentile: 90.0,
             likelihood_nats: 12.0,
             likelihood_tolerance_m: 0.3,
+            likelihood_one_sided: 0.3,
             max_rows: 28,
+            centre_behind_m: HEAD_RADIUS_M,
             sigma_across_m: 0.03,
             sigma_depth_m: 0.03,
             sigma_depth_per_m2: 0.003,

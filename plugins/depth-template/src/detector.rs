@@ -270,7 +270,7 @@ impl DepthTemplate {
         let pixel = scene.view.full_pixel(person.x, person.y);
         let px_per_m = frame.camera.focal_px() / person.depth_m;
         let depth_m = head_depth_m(frame.depth()?, pixel.x, pixel.y, px_per_m, person.depth_m);
-        let position = frame.camera.back_project(pixel, depth_m + HEAD_RADIUS_M);
+        let position = frame.camera.back_project(pixel, depth_m + c.centre_behind_m);
         let sigma_depth_m = c.sigma_depth_m + c.sigma_depth_per_m2 * depth_m * depth_m;
         let sigma_px = c.sigma_across_m * px_per_m;
         Ok(Detection {

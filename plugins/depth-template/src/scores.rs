@@ -111,6 +111,7 @@ impl Scores {
 
     /// The sums along a row inside the image. Their runs are clipped to the
     /// columns that were prepared.
+    #[inline]
     pub fn row(&mut self, line: usize, level: Level) -> Row<'_> {
         let place = line * LEVELS + level.0;
         if self.places[place] == NONE {
@@ -145,6 +146,7 @@ pub struct Row<'a> {
 
 impl Row<'_> {
     /// Sum over the pixels `from..to`.
+    #[inline]
     pub fn of(&self, (from, to): (i64, i64)) -> Sum {
         let last = self.sums.len() as i64 - 1;
         let a = (from - self.first).clamp(0, last);

@@ -172,6 +172,12 @@ impl View {
         Local { x, y, depth_m, px_per_m, pitch_rad, roll_rad, sin_cos: roll_rad.sin_cos() }
     }
 
+    /// The full-size pixels of a run in `lines` reduced rows from `line` on.
+    pub fn full_run(&self, line: i64, (from, to): (i64, i64), lines: i64) -> Rect {
+        let size = |pixels: i64| self.scale * pixels as f64;
+        Rect::new(size(from), size(line), size(to - from), size(lines))
+    }
+
     /// The upper-body square of a head at a reduced pixel and depth.
     pub fn region(&self, x: f64, y: f64, depth_m: f64) -> Rect {
         self.camera.upper_body(&self.head(x, y, depth_m))

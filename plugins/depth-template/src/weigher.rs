@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Result};
+use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Rect, Result};
 
 use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;
@@ -22,11 +22,13 @@ pub struct Weigher {
 
 /// What is reused from scene to scene and from frame to frame.
 struct Tools {
+    tolerance_m: f64,
+    one_sided: f64,
     silhouettes: Silhouettes,
     view: Option<Arc<View>>,
     scores: Scores,
     cast: Vec<Placed>,
-    alone: BTreeMap<Spot, i64>,
+    alone: BTreeMap<Spot, Found>,
     masks: Vec<Span>,
 }
 
@@ -68,6 +70,8 @@ struct Placed {
     x: i64,
     y: i64,
     depth_m: f64,
+    /// Who is nearer than this may be what is seen where this person is, m.
+    reach_m: f64,
     levels: Levels,
 }
 
@@ -75,6 +79,8 @@ impl Weigher {
     /// A weigher.
     pub fn new(config: &DepthTemplateConfig) -> Self {
         let tools = Tools {
+            tolerance_m: config.likelihood_tolerance_m,
+            one_sided: config.likelihood_one_sided,
             silhouettes: Silhouettes { bank: Bank::new(usize::MAX), kept: Vec::new() },
             view: None,
             scores: Scores::new(config),
@@ -133,9 +139,32 @@ impl Likelihood for Weigher {
         tools.cast = cast;
         Ok(())
     }
+
+    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
+        let image = frame.derived::<Working>()?;
+        Ok(self.tools().silhouettes(frame, &image, scene))
+    }
 }
 
 impl Tools {
+    /// The bodies of a scene where nobody nearer is, as runs in the image.
+    fn silhouettes(&mut self, frame: &Frame, image: &Working, scene: &[Person]) -> Vec<Vec<Rect>> {
+        let view = self.view_of(frame, image);
+        let cast: Vec<Option<Placed>> =
+            scene.iter().map(|person| self.place(person, &frame.camera, &view)).collect();
+        let visible = |person: &Placed| -> Vec<Rect> {
+            let rows = person.rows(image.0.height() as i64);
+            let runs = rows.flat_map(|(line, row)| {
+                let nearer = cast.iter().flatten().filter(|p| p.depth_m < person.depth_m);
+                let bodies: Vec<Span> = nearer.filter_map(|p| p.body(line)).collect();
+                let step = person.silhouette.step;
+                outside(person.inside(row), bodies).into_iter().map(move |run| (line, run, step))
+            });
+            runs.map(|(line, run, step)| view.full_run(line, run, step)).collect()
+        };
+        cast.iter().map(|person| person.as_ref().map(visible).unwrap_or_default()).collect()
+    }
+
     /// The view of this frame's camera; it seldom changes.
     fn view_of(&mut self, frame: &Frame, image: &Working) -> Arc<View> {
         match &self.view {
@@ -161,7 +190,8 @@ impl Tools {
         let direction = direction(person, camera);
         let pose = Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
         let silhouette = self.silhouettes.of(pose);
-        Some(Placed { silhouette, x, y, depth_m, levels: Levels::of_face(depth_m) })
+        let reach_m = depth_m + self.tolerance_m;
+        Some(Placed { silhouette, x, y, depth_m, reach_m, levels: Levels::of_face(depth_m) })
     }
 
     /// The weight of a scene, near to far, in units of one person.
@@ -171,70 +201,108 @@ impl Tools {
 
     /// What person `k` of the scene explains, as a part of the whole person.
     fn weigh_one(&mut self, scene: &[Placed], k: usize) -> f64 {
-        let sum = self.alone(&scene[k]) - self.taken(scene, k);
-        sum as f64 / (f64::from(ONE) * scene[k].silhouette.area)
+        let alone = self.alone(&scene[k]);
+        let taken = self.taken(scene, k);
+        alone.without(taken).weight(self.one_sided) / (f64::from(ONE) * scene[k].silhouette.area)
     }
 
-    /// What a person explains where nobody else is.
-    fn alone(&mut self, person: &Placed) -> i64 {
+    /// What a person finds where nobody else is.
+    fn alone(&mut self, person: &Placed) -> Found {
         let Self { scores, alone, .. } = self;
         *alone.entry(person.spot()).or_insert_with(|| {
-            let mut sum = 0;
+            let mut found = Found::default();
             for (line, row) in person.rows(scores.height()) {
                 let pixels = scores.row(line as usize, person.levels.behind(row.relief_m));
                 let [left, right] = person.beside(row).map(|side| pixels.of(side).beside);
-                sum += i64::from(pixels.of(person.inside(row)).covered - left - right);
+                found.add(pixels.of(person.inside(row)).covered, left, right);
             }
-            sum
+            found
         })
     }
 
     /// How much of that the others take: the body where nearer ones hide it,
-    /// and what is beside it where it is theirs.
-    fn taken(&mut self, scene: &[Placed], k: usize) -> i64 {
+    /// and what is beside it where it is theirs. Who is clearly farther away is
+    /// not what is seen at this person's depth.
+    fn taken(&mut self, scene: &[Placed], k: usize) -> Found {
         if scene.len() <= 2 {
-            let other = others(scene, k).next();
-            return other.map_or(0, |other| self.taken_by_one(&scene[k], other, k == 1));
+            let other = rivals(scene, k).next();
+            return other
+                .map_or_else(Found::default, |other| self.taken_by_one(&scene[k], other, k == 1));
         }
         let Self { scores, masks, .. } = self;
         let person = &scene[k];
-        let mut sum = 0;
+        let mut taken = Found::default();
         for (line, row) in person.rows(scores.height()) {
-            union_of(masks, others(scene, k).filter_map(|p| p.body(line)));
+            union_of(masks, rivals(scene, k).filter_map(|p| p.body(line)));
             if masks.is_empty() {
                 continue;
             }
             let pixels = scores.row(line as usize, person.levels.behind(row.relief_m));
-            for side in person.beside(row) {
-                sum -= masked(masks, side, |part| i64::from(pixels.of(part).beside));
-            }
-            if k + 1 < scene.len() {
-                union_of(masks, scene[..k].iter().filter_map(|p| p.body(line)));
-            }
-            sum += masked(masks, person.inside(row), |part| i64::from(pixels.of(part).covered));
+            let [left, right] =
+                person.beside(row).map(|side| masked(masks, side, |part| pixels.of(part).beside));
+            union_of(masks, scene[..k].iter().filter_map(|p| p.body(line)));
+            let covered = masked(masks, person.inside(row), |part| pixels.of(part).covered);
+            taken.add(covered, left, right);
         }
-        sum
+        taken
     }
 
     /// The same where there is one other, who needs no union. Most rows of most
     /// pairs do not meet, and are left before their sums are asked for.
-    fn taken_by_one(&mut self, person: &Placed, other: &Placed, is_nearer: bool) -> i64 {
+    fn taken_by_one(&mut self, person: &Placed, other: &Placed, is_nearer: bool) -> Found {
         let half = person.silhouette.half_width;
         let window = (person.x - half, person.x + half + 1);
-        let mut sum = 0;
+        let mut taken = Found::default();
         for (line, row) in person.rows(self.scores.height()) {
             let Some(body) = other.body(line).map(|body| common(body, window)) else { continue };
             if body.0 >= body.1 {
                 continue;
             }
             let pixels = self.scores.row(line as usize, person.levels.behind(row.relief_m));
-            let [left, right] = person.beside(row).map(|side| pixels.of(common(side, body)));
-            sum -= i64::from(left.beside + right.beside);
-            if is_nearer {
-                sum += i64::from(pixels.of(common(person.inside(row), body)).covered);
-            }
+            let [left, right] = person.beside(row).map(|side| pixels.of(common(side, body)).beside);
+            let covered = match is_nearer {
+                true => pixels.of(common(person.inside(row), body)).covered,
+                false => 0,
+            };
+            taken.add(covered, left, right);
         }
-        sum
+        taken
+    }
+}
+
+/// What a silhouette finds in the image, in units of 1 / [`ONE`] pixels.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    /// Pixels of the body that speak for the person, less those against.
+    covered: i64,
+    /// Pixels left of the body at the person's depth.
+    left: i64,
+    /// The same on the right.
+    right: i64,
+}
+
+impl Found {
+    fn add(&mut self, covered: i32, left: i32, right: i32) {
+        self.covered += i64::from(covered);
+        self.left += i64::from(left);
+        self.right += i64::from(right);
+    }
+
+    fn without(self, taken: Self) -> Self {
+        Self {
+            covered: self.covered - taken.covered,
+            left: self.left - taken.left,
+            right: self.right - taken.right,
+        }
+    }
+
+    /// What goes on at the same depth on both sides is no person but furniture
+    /// or a wall; on one side it may be a rucksack or an arm, and counts as the
+    /// part `one_sided`.
+    fn weight(self, one_sided: f64) -> f64 {
+        let Self { covered, left, right } = self;
+        let (both, rest) = (2 * left.min(right), left.abs_diff(right));
+        (covered - both) as f64 - one_sided * rest as f64
     }
 }
 
@@ -250,20 +318,21 @@ const MAX_DEPTH_M: f64 = 20.0;
 /// Nobody is looked for farther outside of the image than this.
 const MAX_PIXEL: f64 = 4000.0;
 
-/// Everybody in the scene but `k`.
-fn others(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
-    scene[..k].iter().chain(&scene[k + 1..])
+/// Everybody in the scene who may be what is seen where person `k` is.
+fn rivals(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
+    let reach_m = scene[k].reach_m;
+    scene[..k].iter().chain(scene[k + 1..].iter().take_while(move |p| p.depth_m < reach_m))
 }
 
 impl Placed {
     /// The rows of the silhouette that are looked at, with their lines.
     fn rows(&self, height: i64) -> impl Iterator<Item = (i64, &TemplateRow)> {
-        let first = self.y + self.silhouette.rows.first().map_or(0, |row| row.dy);
-        let step = self.silhouette.step;
-        let skip = (-first).rem_euclid(step);
-        let rows = self.silhouette.rows.iter().skip(skip as usize).step_by(step as usize);
-        let rows = rows.map(|row| (self.y + row.dy, row));
-        rows.filter(move |(line, _)| (0..height).contains(line))
+        let Silhouette { rows, step, .. } = &*self.silhouette;
+        let first = self.y + rows.first().map_or(0, |row| row.dy);
+        let start = (first + (-first).rem_euclid(*step)).max(0);
+        let end = height.min(first + rows.len() as i64).max(start);
+        let rows = rows.get((start - first) as usize..(end - first) as usize).unwrap_or_default();
+        (start..).step_by(*step as usize).zip(rows.iter().step_by(*step as usize))
     }
 
     fn spot(&self) -> Spot {
@@ -331,8 +400,22 @@ fn union_of(masks: &mut Vec<Span>, spans: impl Iterator<Item = Span>) {
     });
 }
 
+/// The parts of a span that no mask covers.
+fn outside(span: Span, mut masks: Vec<Span>) -> Vec<Span> {
+    masks.sort_unstable();
+    let mut left = Vec::new();
+    let mut from = span.0;
+    for (start, end) in masks {
+        left.push((from, start.min(span.1)));
+        from = from.max(end);
+    }
+    left.push((from, span.1));
+    left.retain(|(from, to)| from < to);
+    left
+}
+
 /// Sum over the masked parts of a span.
-fn masked(masks: &[Span], span: Span, sum: impl Fn(Span) -> i64) -> i64 {
+fn masked(masks: &[Span], span: Span, sum: impl Fn(Span) -> i32) -> i32 {
     let parts = masks.iter().map(|mask| common(*mask, span));
     parts.filter(|(from, to)| from < to).map(sum).sum()
 }
@@ -376,6 +459,7 @@ mod tests {
 
     /// The weight of a scene pixel by pixel: who is in front at each one?
     fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
+        let config = DepthTemplateConfig::default();
         let image = frame.derived::<Working>().unwrap();
         let mut tools = weigher.tools();
         let view = tools.view_of(frame, &image);
@@ -385,7 +469,7 @@ mod tests {
         let inside = |span: Option<Span>, x: i64| span.is_some_and(|(a, b)| a <= x && x < b);
         let mut weight = 0.0;
         for (k, person) in cast.iter().enumerate() {
-            let mut sum = 0;
+            let (mut sum, mut beside) = (0, [0, 0]);
             for (index, row) in person.silhouette.rows.iter().enumerate() {
                 let line = person.y + person.silhouette.rows[0].dy + index as i64;
                 if line % person.silhouette.step != 0 || !(0..60).contains(&line) {
@@ -401,12 +485,19 @@ mod tests {
                         let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
                         sum += if hidden { 0 } else { pixel.covered };
                     } else if x < edge || end <= x {
-                        let taken = others(&cast, k).any(|p| inside(p.body(line), x));
-                        sum -= if taken { 0 } else { pixel.beside };
+                        let is_rival = |p: &&Placed| {
+                            p.depth_m < person.depth_m + config.likelihood_tolerance_m
+                        };
+                        let others = cast.iter().enumerate().filter(|(i, _)| *i != k);
+                        let mut rivals = others.map(|(_, p)| p).filter(is_rival);
+                        let taken = rivals.any(|p| inside(p.body(line), x));
+                        beside[usize::from(x >= end)] += if taken { 0 } else { pixel.beside };
                     }
                 }
             }
-            weight += f64::from(sum) / (f64::from(ONE) * person.silhouette.area);
+            let both = 2 * beside[0].min(beside[1]);
+            let one = config.likelihood_one_sided * f64::from((beside[0] - beside[1]).abs());
+            weight += (f64::from(sum - both) - one) / (f64::from(ONE) * person.silhouette.area);
         }
         weigher.nats * weight
     }
@@ -510,6 +601,22 @@ mod tests {
         assert_eq!(of(2.0, 0.0, -1.0, 0.2), Direction::Along);
         assert_eq!(of(2.0, 2.0, 1.0, 1.0), Direction::Along, "along the ray, not the axis");
         assert_eq!(of(2.0, 0.0, 0.0, 0.1), Direction::Along, "too slow to tell");
+    }
+
+    #[test]
+    fn what_is_shown_of_somebody_is_what_nobody_hides() {
+        assert_eq!(outside((2, 12), vec![(8, 9), (1, 3), (2, 6)]), [(6, 8), (9, 12)]);
+        assert_eq!(outside((2, 12), vec![(0, 20)]), []);
+        let (near, far) = (standing(1.8, 0.0), standing(3.0, 0.35));
+        let frame = painted(&[near, far]);
+        let weigher = Weigher::new(&DepthTemplateConfig::default());
+        let area = |scene: &[Person]| -> Vec<f64> {
+            let runs = weigher.silhouettes(&frame, scene).unwrap();
+            runs.iter().map(|runs| runs.iter().map(Rect::area).sum()).collect()
+        };
+        let (alone, together) = (area(&[far])[0], area(&[far, near]));
+        assert!(together[0] > 0.2 * alone && together[0] < 0.9 * alone, "{alone} {together:?}");
+        assert_eq!(together[1], area(&[near])[0]);
     }
 
     #[test]

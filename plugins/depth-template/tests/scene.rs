@@ -71,6 +71,16 @@ fn one_person_is_found_where_she_stands_at_any_resolution() {
 }
 
 #[test]
+fn the_centre_of_the_head_is_as_far_behind_its_surface_as_told() {
+    let frame = frame(320, 5.0, &[Point3::new(2.5, 0.0, 1.6)]);
+    let depth_m = |centre_behind_m| {
+        let config = DepthTemplateConfig { centre_behind_m, ..DepthTemplateConfig::default() };
+        frame.camera.depth_of(&discover(config, &frame).0[0].position)
+    };
+    assert!((depth_m(0.08) - depth_m(0.03) - 0.05).abs() < 1e-9);
+}
+
+#[test]
 fn a_person_close_to_a_wall_is_found() {
     let scene = frame(640, 3.5, &[Point3::new(3.0, 0.0, 1.6)]);
     assert_eq!(discover(DepthTemplateConfig::default(), &scene).0.len(), 1);

@@ -1,7 +1,7 @@
 use nalgebra::Point2;
 use tagalong_core::{
-    Camera, Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Rect,
-    Result, Search,
+    Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
+    Search,
 };
 
 use crate::{Cascade, Config, Group, Hit, NAME, Proposals, Scanner, grouped, scales};
@@ -29,11 +29,11 @@ impl FaceRgbd {
     /// A detector; reads its cascade.
     ///
     /// # Errors
-    /// [`Error::Model`] for a file that cannot be read or is no cascade,
-    /// [`Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no cascade,
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
-        let cascade = read(&config.model, context)?;
+        let cascade = context.model(&config.model, BUILT_IN, Cascade::from_xml)?;
         Ok(Self {
             config,
             line: cascade.calibration.unwrap_or((1.0, 0.0)),
@@ -102,16 +102,6 @@ impl FaceRgbd {
         };
         detection.is_sane().then_some(detection)
     }
-}
-
-fn read(file: &str, context: &Context) -> Result<Cascade> {
-    let broken = |why: String| Error::Model { path: file.into(), why };
-    if file.is_empty() {
-        return Cascade::from_xml(BUILT_IN).map_err(broken);
-    }
-    let text = std::fs::read_to_string(context.base_dir.join(file))
-        .map_err(|error| broken(error.to_string()))?;
-    Cascade::from_xml(&text).map_err(broken)
 }
 
 /// The median depth in the middle of a window, m.

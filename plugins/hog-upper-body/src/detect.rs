@@ -1,7 +1,7 @@
 use nalgebra::Matrix3;
 use tagalong_core::{
-    Camera, Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Rect,
-    Result, Search, UPPER_BODY_SIDE_M,
+    Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
+    Search, UPPER_BODY_SIDE_M,
 };
 
 use crate::{Config, Kind, Model, NAME, Scanner, Window, merge};
@@ -26,11 +26,12 @@ impl HogUpperBody {
     /// A detector; reads its model.
     ///
     /// # Errors
-    /// [`Error::Model`] for a file that cannot be read or is no model,
-    /// [`Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
-        let model = read(&config, context)?;
+        let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
+        let model = context.model(&config.model, built_in, Model::from_text)?;
         Ok(Self { config, scanner: Scanner::new(model.kind()), model })
     }
 
@@ -62,18 +63,6 @@ impl HogUpperBody {
         };
         detection.is_sane().then_some(detection)
     }
-}
-
-fn read(config: &Config, context: &Context) -> Result<Model> {
-    let file = &config.model;
-    let broken = |why: String| Error::Model { path: file.into(), why };
-    if file.is_empty() {
-        let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
-        return Model::from_text(built_in).map_err(broken);
-    }
-    let text = std::fs::read_to_string(context.base_dir.join(file))
-        .map_err(|error| broken(error.to_string()))?;
-    Model::from_text(&text).map_err(broken)
 }
 
 /// The median depth in the middle of a square, m.

@@ -70,8 +70,8 @@ pub struct Config {
     /// weighed together keep their depth and height, as P3 assumes of a short
     /// occlusion. Nothing in the map speaks of them.
     pub hold_depth: bool,
-    /// Somebody alone faces where the template fits best, of the three. Where
-    /// false, and in groups, where the track walks (P3).
+    /// People face where the template fits best, of the three. Where false, and
+    /// where all fit alike, where the track walks (P3).
     pub facing_by_image: bool,
     /// This part of the particles is moved to what a detector found, 0 to 1.
     pub from_detection: f64,

@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support, TrackId,
 };
 
 use crate::config::{Config, Method};
@@ -11,7 +11,7 @@ use crate::identity::Wardrobe;
 use crate::overlap::Overlaps;
 use crate::particle::{Particle, Transition};
 use crate::resampling::{effective_size, kld_size};
-use crate::weighing::{Look, facing, support, weigh};
+use crate::weighing::{Look, facing, sketch, support, weigh};
 
 /// The filter: particles of people, alone or together.
 pub struct JointParticle {
@@ -108,8 +108,7 @@ impl JointParticle {
         self.groups.extend(joined);
     }
 
-    /// Bodies face where people walk; who hardly moves and is alone faces
-    /// where the image says.
+    /// Bodies face where the image says, or else where people walk, or as before.
     fn turn(&mut self, look: &mut Look<'_>) -> Result<BTreeMap<TrackId, Vector2<f64>>> {
         let mut headings = self.headings.clone();
         for group in &self.groups {
@@ -117,11 +116,12 @@ impl JointParticle {
                 let mean = group.moments(person).mean;
                 let velocity = Vector2::new(mean[3], mean[4]);
                 let walks = velocity.norm() > WALKING_MPS;
-                if group.people() == 1 && (self.config.facing_by_image || !walks) {
-                    headings.insert(*id, facing(group, look)?);
-                } else if walks {
-                    headings.insert(*id, velocity);
-                }
+                let stands_alone = group.people() == 1 && !walks;
+                let by_image = match self.config.facing_by_image || stands_alone {
+                    true => facing(group, person, look)?,
+                    false => None,
+                };
+                headings.extend(by_image.or(walks.then_some(velocity)).map(|way| (*id, way)));
             }
         }
         Ok(headings)
@@ -229,6 +229,14 @@ impl Filter for JointParticle {
         }
         self.ahead_s = if config.compat_condensation { self.dt_s } else { 0.0 };
         Ok(seen)
+    }
+
+    fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
+        let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
+        let Some(likelihood) = evidence.likelihood else { return Ok(shown) };
+        let mut look = Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
+        self.groups.iter().try_for_each(|group| sketch(group, &mut look, &mut shown))?;
+        Ok(shown)
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {

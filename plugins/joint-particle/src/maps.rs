@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::config::Config;
+use crate::config::{Config, Method};
 
 /// Where two people are across the viewing ray of the near one's mean: near,
 /// far, m.
@@ -68,6 +68,39 @@ impl Gp {
     }
 }
 
+/// The likelihood over the places, known at some of them.
+#[derive(Clone, Debug)]
+pub enum LikelihoodMap {
+    /// At all places of a table.
+    Table(Grid, Vec<f64>),
+    /// At a few; a sum of kernels.
+    Kernels(Vec<Place>, Vec<f64>, Kernel),
+    /// At a few; interpolated.
+    Gp(Gp),
+}
+
+impl LikelihoodMap {
+    /// The map of a method. Where there is no Gaussian process, kernels are summed.
+    pub fn new(method: Method, places: Vec<Place>, known: Vec<f64>, config: &Config) -> Self {
+        let kernel = Kernel::new(config);
+        let gp = match method {
+            Method::Table => return Self::Table(Grid::new(config), known),
+            Method::Gp => Gp::fit(places.clone(), &known, kernel, config.nugget),
+            _ => None,
+        };
+        gp.map_or(Self::Kernels(places, known, kernel), Self::Gp)
+    }
+
+    /// The likelihood at a place.
+    pub fn at(&self, at: &Place) -> f64 {
+        match self {
+            Self::Table(grid, known) => grid.look_up(known, at),
+            Self::Kernels(places, known, kernel) => parzen(places, known, *kernel, at),
+            Self::Gp(gp) => gp.at(at),
+        }
+    }
+}
+
 /// The places of P3's full table.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
@@ -93,6 +126,11 @@ impl Grid {
         let value = |axis: usize, i: usize| i as f64 * self.step - self.reach[axis];
         let rows = 0..self.sides[0];
         rows.flat_map(|i| (0..self.sides[1]).map(move |j| [value(0, i), value(1, j)])).collect()
+    }
+
+    /// Places of the far person for each of the near one.
+    pub fn columns(&self) -> usize {
+        self.sides[1]
     }
 
     /// The value of the nearest place; outside of the table that of its edge.

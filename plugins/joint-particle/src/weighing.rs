@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2, Vector3, Vector5};
-use tagalong_core::{Frame, Likelihood, Person, Result, TrackId};
+use tagalong_core::{
+    Frame, Likelihood, Person, Result, Silhouette, Sketch, SketchMap, SketchPoint, TrackId,
+};
 
 use crate::config::{Chosen, Config, Method};
 use crate::group::Group;
-use crate::maps::{Gp, Grid, Kernel, Place, parzen};
+use crate::maps::{Grid, LikelihoodMap, Place};
 use crate::particle::{Particle, across};
 use crate::resampling::{effective_size, from_logs, heaviest, normalise};
 
@@ -205,6 +207,28 @@ impl Lateral {
         Self { near, far, origin, across, means }
     }
 
+    fn places(&self, group: &Group) -> Vec<Place> {
+        (0..group.rows()).map(|row| self.place(group.row(row))).collect()
+    }
+
+    /// The map of a method: from a table, or from the chosen places.
+    fn map(
+        &self,
+        group: &Group,
+        look: &mut Look<'_>,
+        method: Method,
+        chosen: &[Place],
+    ) -> Result<LikelihoodMap> {
+        let grid = Grid::new(look.config);
+        let places = if method == Method::Table { grid.places() } else { chosen.to_vec() };
+        for place in &places {
+            let scene = self.scene(place);
+            [0, 1].into_iter().for_each(|i| look.add(group.ids[i], &scene[i]));
+        }
+        let known = relative(&look.ask(2)?);
+        Ok(LikelihoodMap::new(method, places, known, look.config))
+    }
+
     fn place(&self, row: &[Particle]) -> Place {
         [self.near, self.far].map(|p| self.across.dot(&(row[p].floor() - self.origin)))
     }
@@ -227,35 +251,15 @@ impl Lateral {
 /// P3, section III: a map of the likelihood over the lateral places is made
 /// from a table, or from a few particles, and looked up by all.
 fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
-    let config = look.config;
     let before = group.likelihoods.clone();
-    if config.hold_depth {
+    if look.config.hold_depth {
         look.hold_depth(group);
     }
     look.draw_everybody(group);
     let lateral = Lateral::new(group, look);
-    let all: Vec<Place> = (0..group.rows()).map(|row| lateral.place(group.row(row))).collect();
-    let grid = Grid::new(config);
-    let places = match config.method {
-        Method::Table => grid.places(),
-        _ => chosen(&all, &before, config),
-    };
-    for place in &places {
-        let scene = lateral.scene(place);
-        [0, 1].into_iter().for_each(|i| look.add(group.ids[i], &scene[i]));
-    }
-    let known = relative(&look.ask(2)?);
-    let kernel = Kernel::new(config);
-    let gp = match config.method {
-        Method::Gp => Gp::fit(places.clone(), &known, kernel, config.nugget),
-        _ => None,
-    };
-    let value = |at: &Place| match (config.method, &gp) {
-        (Method::Table, _) => grid.look_up(&known, at),
-        (Method::Gp, Some(gp)) => gp.at(at),
-        _ => parzen(&places, &known, kernel, at),
-    };
-    group.likelihoods = all.iter().map(value).collect();
+    let all = lateral.places(group);
+    let map = lateral.map(group, look, look.config.method, &chosen(&all, &before, look.config))?;
+    group.likelihoods = all.iter().map(|at| map.at(at)).collect();
     let weights = group.weights.iter().zip(&group.likelihoods);
     group.weights = weights.map(|(weight, likelihood)| weight * likelihood).collect();
     normalise(&mut group.weights);
@@ -394,18 +398,69 @@ pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
         .collect()
 }
 
-/// Which way somebody who hardly moves faces: the template that fits best of
-/// those seen along the viewing ray, facing left and facing right.
-pub(crate) fn facing(group: &Group, look: &mut Look<'_>) -> Result<Vector2<f64>> {
+/// What there is to see of a group: its particles, the scene of the best one, and
+/// how likely the lateral places of two people are.
+pub(crate) fn sketch(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Result<()> {
+    let best = group.best();
+    let heaviest = group.weights[best].max(f64::MIN_POSITIVE);
+    for (row, weight) in group.weights.iter().enumerate() {
+        let points = group.row(row).iter().zip(&group.ids).filter_map(|(particle, id)| {
+            let pixel = look.frame.camera.project(&particle.person().position)?;
+            Some(SketchPoint { id: *id, pixel, weight: weight / heaviest })
+        });
+        sketch.points.extend(points);
+    }
+    let people = group.row(best).iter().zip(&group.ids);
+    let scene: Vec<Person> = people.map(|(particle, id)| look.person(*id, particle)).collect();
+    let bodies = look.likelihood.silhouettes(look.frame, &scene)?;
+    let bodies = group.ids.iter().zip(bodies).map(|(id, runs)| Silhouette { id: *id, runs });
+    sketch.silhouettes.extend(bodies);
+    if group.people() == 2 {
+        sketch_maps(group, look, sketch)?;
+    }
+    Ok(())
+}
+
+/// P3, Figure 7: the table (b), and what a few particles make of it (d).
+fn sketch_maps(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Result<()> {
+    let (lateral, grid) = (Lateral::new(group, look), Grid::new(look.config));
+    let chosen = chosen(&lateral.places(group), &group.likelihoods, look.config);
+    let approximated = matches!(look.config.method, Method::Kde | Method::Gp);
+    let kinds = [(Method::Table, "table"), (look.config.method, "approximated")];
+    for (method, name) in kinds.into_iter().take(1 + usize::from(approximated)) {
+        let map = lateral.map(group, look, method, &chosen)?;
+        let values: Vec<f64> = grid.places().iter().map(|at| map.at(at)).collect();
+        let most = values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        sketch.maps.push(SketchMap {
+            title: format!("{} before {}: {name}", group.ids[lateral.near], group.ids[lateral.far]),
+            columns: grid.columns(),
+            values: values.into_iter().map(|value| value / most).collect(),
+        });
+    }
+    Ok(())
+}
+
+/// Which way somebody faces: the template that fits best of those seen along the
+/// viewing ray, facing left and facing right. `None` where they fit alike, as
+/// those of somebody hidden do.
+pub(crate) fn facing(
+    group: &Group,
+    person: usize,
+    look: &mut Look<'_>,
+) -> Result<Option<Vector2<f64>>> {
     let row = group.best();
-    let particle = &group.row(row)[0];
+    let particle = &group.row(row)[person];
     let left = across(&(particle.floor() - look.eye));
     let ways = [Vector2::zeros(), left, -left];
     let variants = ways.map(|velocity| Person { velocity, ..particle.person() });
-    let logs = look.variants(group, row, 0, variants.into_iter())?;
-    let best = heaviest(&logs, 1).first().copied().unwrap_or_default();
-    Ok(ways[best])
+    let logs = look.variants(group, row, person, variants.into_iter())?;
+    let order = heaviest(&logs, ways.len());
+    let tells = logs[order[0]] - logs[order[2]] > TELLING_NATS;
+    Ok(tells.then_some(ways[order[0]]))
 }
+
+/// Templates that differ by less fit alike, nats.
+const TELLING_NATS: f64 = 0.5;
 
 #[cfg(test)]
 mod tests {

@@ -30,7 +30,7 @@ impl OmniAppearance {
     /// [`Error::Model`] for a file that cannot be read or is no model, or a
     /// person whom it does not know; [`Error::Settings`] for impossible numbers.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        let model = read(&config.model, context)?;
+        let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
         let known = ["general", "nearest"].contains(&config.person.as_str())
             || model.people.iter().any(|person| person.name == config.person);
         if !known {
@@ -150,14 +150,4 @@ fn fits(search: &Search<'_>, person: &Detection) -> bool {
             off.norm() <= NEAR_SIGMAS * (0.5 * spread).sqrt() + 0.3
         }
     }
-}
-
-fn read(file: &str, context: &Context) -> Result<Model> {
-    let broken = |why: String| Error::Model { path: file.into(), why };
-    if file.is_empty() {
-        return Model::from_text(BUILT_IN).map_err(broken);
-    }
-    let text = std::fs::read_to_string(context.base_dir.join(file))
-        .map_err(|error| broken(error.to_string()))?;
-    Model::from_text(&text).map_err(broken)
 }

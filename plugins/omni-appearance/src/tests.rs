@@ -1,10 +1,10 @@
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3};
+use tagalong_conformance::context;
 use tagalong_core::{
-    Camera, ConicalMirror, Context, Detection, Detector, Frame, Funnel, Images, Lens, Motion,
-    Panorama, Registry, RgbImage, Search, Stamp, Wheels,
+    Camera, ConicalMirror, Detection, Detector, Frame, Funnel, Images, Lens, Motion, Panorama,
+    Registry, RgbImage, Search, Stamp,
 };
 
 use crate::{Config, Distance, Model, OmniAppearance};
@@ -21,11 +21,6 @@ fn camera(height_m: f64) -> Arc<Camera> {
         height: ROWS,
         robot_from_camera: ConicalMirror::upright(height_m),
     })
-}
-
-fn context() -> Context {
-    let wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
-    Context { seed: 1, base_dir: PathBuf::from("."), wheels }
 }
 
 fn detector(config: Config) -> OmniAppearance {

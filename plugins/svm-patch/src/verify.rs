@@ -25,7 +25,7 @@ impl SvmPatch {
                 return Err(Error::Settings(message));
             }
         }
-        let model = read(&config.model, context)?;
+        let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
         Ok(Self { model, weight: config.weight, limit: config.limit })
     }
 }
@@ -36,14 +36,4 @@ impl Verifier for SvmPatch {
         let log_odds = self.model.log_odds(&patch).clamp(-self.limit, self.limit);
         Ok(self.weight * log_odds)
     }
-}
-
-fn read(file: &str, context: &Context) -> Result<Model> {
-    let broken = |why: String| Error::Model { path: file.into(), why };
-    if file.is_empty() {
-        return Model::from_text(BUILT_IN).map_err(broken);
-    }
-    let text = std::fs::read_to_string(context.base_dir.join(file))
-        .map_err(|error| broken(error.to_string()))?;
-    Model::from_text(&text).map_err(broken)
 }

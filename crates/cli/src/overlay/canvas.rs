@@ -37,6 +37,11 @@ impl Canvas {
         Self { image: RgbImage::filled(width, height, rgb) }
     }
 
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.image.height()
+    }
+
     /// What was drawn.
     pub fn into_image(self) -> RgbImage {
         self.image

@@ -1,5 +1,5 @@
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, Images, Rect, RgbImage, Track};
+use tagalong_core::{DepthImage, Images, Rect, RgbImage, Sketch, SketchMap, SketchPoint, Track};
 use tagalong_pipeline::Fate;
 
 use super::canvas::{Canvas, Ink, LINE_PX};
@@ -19,6 +19,7 @@ pub fn draw(scene: &Scene, trails: &Trails) -> Canvas {
     if let Some(picture) = background(&scene.images) {
         canvas.paste(&picture, 0);
     }
+    draw_sketch(&mut canvas, &scene.report.sketch);
     draw_rejected(&mut canvas, scene);
     draw_trails(&mut canvas, scene, trails);
     // Far to near, so that near people cover far ones.
@@ -54,6 +55,42 @@ fn shaded(depth: &DepthImage) -> RgbImage {
 fn title(scene: &Scene) -> String {
     let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
     format!("frame {}  {} s  {people} seen", scene.report.index, scene.report.stamp)
+}
+
+/// What the filter imagines (P3, Figures 5 to 7): bodies, particles, and maps in
+/// the lower left corner.
+fn draw_sketch(canvas: &mut Canvas, sketch: &Sketch) {
+    for body in &sketch.silhouettes {
+        let ink = colour_of(body.id.0).faint(0.4);
+        body.runs.iter().for_each(|run| canvas.fill(run, ink));
+    }
+    for SketchPoint { id, pixel, weight } in &sketch.points {
+        let opacity = 0.25 + 0.75 * weight.clamp(0.0, 1.0);
+        canvas.disc(*pixel, 1.5, colour_of(id.0).faint(opacity as f32));
+    }
+    let mut bottom = canvas.height() as f64 - MAP_MARGIN_PX;
+    for map in &sketch.maps {
+        bottom -= draw_map(canvas, map, bottom) + MAP_MARGIN_PX;
+    }
+}
+
+/// Side of a map's cell, and what is left free around a map, pixels.
+const CELL_PX: f64 = 2.0;
+const MAP_MARGIN_PX: f64 = 4.0;
+
+/// One map with its title, above `bottom`; returns its height, pixels.
+fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
+    let rows = map.values.len().div_ceil(map.columns.max(1));
+    let height = CELL_PX * rows as f64;
+    for (i, value) in map.values.iter().enumerate() {
+        let (x, y) = ((i % map.columns.max(1)) as f64, (i / map.columns.max(1)) as f64);
+        let shade = (255.0 * value.clamp(0.0, 1.0)) as u8;
+        let cell =
+            Rect::new(MAP_MARGIN_PX + CELL_PX * x, bottom - height + CELL_PX * y, CELL_PX, CELL_PX);
+        canvas.fill(&cell, Ink::solid([shade, shade / 2, 255 - shade]));
+    }
+    canvas.text(Point2::new(MAP_MARGIN_PX, bottom - height - LINE_PX), &map.title, TITLE);
+    height + LINE_PX
 }
 
 /// What was dropped, with the test that dropped it.

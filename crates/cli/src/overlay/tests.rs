@@ -1,7 +1,7 @@
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Distortion, Estimate, Funnel, Person, Pinhole, Rect, Stamp, Track,
-    TrackId,
+    DepthImage, Detection, Distortion, Estimate, Funnel, Person, Pinhole, Rect, Sketch, Stamp,
+    Track, TrackId,
 };
 use tagalong_pipeline::{Candidate, Fate, Outcome, Weighing};
 
@@ -41,6 +41,7 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> Scene {
             command: None,
             nis: Vec::new(),
             weighing: Weighing::default(),
+            sketch: Sketch::default(),
             timings: Vec::new(),
             ended: Vec::new(),
         },

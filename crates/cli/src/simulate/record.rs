@@ -23,6 +23,8 @@ const WHEEL_JOINTS: [&str; 2] = ["left_wheel_joint", "right_wheel_joint"];
 const JPEG_QUALITY: u8 = 85;
 /// Where the scene itself is kept.
 const SCENE_TOPIC: &str = "/simulation/scene";
+/// What a pipeline that drives makes of each image.
+const PURSUIT_TOPIC: &str = "/follow/frames";
 /// Where the robot really is in the room. Nothing under `/truth` is for trackers.
 const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
 /// Where the webcams really hang in the room: to find that out is the task of
@@ -69,6 +71,15 @@ impl Recorder {
             Event::Shot(shot) => self.shot(shot),
             Event::Webcam(shot) => self.webcam(shot),
         }
+    }
+
+    /// Writes what a pipeline made of an image that was captured then, since the
+    /// start, and what it told the wheels.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the disk says no.
+    pub fn pursuit(&mut self, captured_ns: u64, json: String) -> Result<(), WriteError> {
+        self.log.send(PURSUIT_TOPIC, after(captured_ns), &StringMsg { data: json })
     }
 
     /// Completes the file.

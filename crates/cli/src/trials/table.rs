@@ -8,8 +8,6 @@ use super::contest::Result;
 
 /// Confidence of all intervals.
 const CONFIDENCE: f64 = 0.95;
-/// Samples of the bootstrap: enough for two digits.
-const SAMPLES: usize = 2_000;
 
 /// Contenders on suites.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -82,7 +80,7 @@ impl Table {
         };
         let base = idf1(others.len());
         for (at, contender) in others.iter().enumerate() {
-            self.gains.extend(bootstrap().paired(&base, &idf1(at)).map(|gain| GainRow {
+            self.gains.extend(Bootstrap::default().paired(&base, &idf1(at)).map(|gain| GainRow {
                 suite: suite.to_owned(),
                 pipeline: contender.name.clone(),
                 baseline: baseline.name.clone(),
@@ -158,10 +156,6 @@ impl Table {
     }
 }
 
-fn bootstrap() -> Bootstrap {
-    Bootstrap { samples: SAMPLES, confidence: CONFIDENCE, seed: 1 }
-}
-
 fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {
     let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &results[i].clear)).mota();
     let idf1 =
@@ -172,8 +166,8 @@ fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {
         suite: suite.to_owned(),
         pipeline: pipeline.to_owned(),
         draws: results.len(),
-        mota: bootstrap().interval(results.len(), mota),
-        idf1: bootstrap().interval(results.len(), idf1),
+        mota: Bootstrap::default().interval(results.len(), mota),
+        idf1: Bootstrap::default().interval(results.len(), idf1),
         error: PositionError::of(&errors),
         success: wilson(successes, results.len() as u64, CONFIDENCE),
         switches: results.iter().map(|result| result.clear.id_switches).sum(),

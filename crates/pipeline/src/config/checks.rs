@@ -12,6 +12,7 @@ enum Must {
     Positive,
     NotNegative,
     Fraction,
+    Inside,
     Finite,
     Number,
     AtLeast(f64, &'static str),
@@ -24,6 +25,7 @@ impl Must {
             Self::Positive => value.is_finite() && value > 0.0,
             Self::NotNegative => value.is_finite() && value >= 0.0,
             Self::Fraction => value > 0.0 && value <= 1.0,
+            Self::Inside => value > 0.0 && value < 1.0,
             Self::Finite => value.is_finite(),
             Self::Number => !value.is_nan(),
             Self::AtLeast(limit, _) => value >= limit,
@@ -36,6 +38,7 @@ impl Must {
             Self::Positive => "positive".into(),
             Self::NotNegative => "at least 0".into(),
             Self::Fraction => "above 0 and at most 1".into(),
+            Self::Inside => "above 0 and below 1".into(),
             Self::Finite => "finite".into(),
             Self::Number => "a number".into(),
             Self::AtLeast(limit, what) => format!("at least {limit}{what}"),
@@ -95,6 +98,7 @@ fn rules(settings: &PipelineSettings) -> Vec<Rule> {
     rules.extend(association_rules(settings));
     rules.extend(lifecycle_rules(settings));
     rules.extend(governor_rules(settings));
+    rules.extend(target_rules(settings));
     rules
 }
 
@@ -165,4 +169,38 @@ fn governor_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
     ]
     .into_iter()
     .map(|(key, value, must)| ("governor", key, value, must))
+}
+
+fn target_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
+    let s = &settings.target;
+    let search = &s.search;
+    let sightings = f64::from(s.again_sightings);
+    [
+        ("choose_within_deg", s.choose_within_deg, Must::Positive),
+        ("choose_within_m", s.choose_within_m, Must::Positive),
+        ("training_sightings", f64::from(s.training_sightings), Must::Positive),
+        ("belief_weight", s.belief_weight, Must::Fraction),
+        ("doubt_below", s.doubt_below, Must::Inside),
+        ("refuse_below", s.refuse_below, Must::Inside),
+        ("refuse_below", s.refuse_below, Must::AtMost(s.doubt_below, ", as `doubt_below`")),
+        ("doubt_after_s", s.doubt_after_s, Must::Positive),
+        ("lose_after_s", s.lose_after_s, Must::AtLeast(s.doubt_after_s, ", as `doubt_after_s`")),
+        ("again_from", s.again_from, Must::Inside),
+        ("again_sightings", sightings, Must::Positive),
+        ("reach_mps", s.reach_mps, Must::Positive),
+        ("alone_m", s.alone_m, Must::NotNegative),
+        ("looks.torso", s.looks.torso[1], Must::NotNegative),
+        ("looks.legs", s.looks.legs[1], Must::NotNegative),
+        ("looks.texture", s.looks.texture[1], Must::NotNegative),
+        ("looks.height", s.looks.height[1], Must::NotNegative),
+        ("looks.rivals", s.looks.rivals, Must::NotNegative),
+        ("search.wait_s", search.wait_s, Must::NotNegative),
+        ("search.turn_radps", search.turn_radps, Must::Positive),
+        ("search.speed_mps", search.speed_mps, Must::Positive),
+        ("search.arrive_m", search.arrive_m, Must::Positive),
+        ("search.drive_s", search.drive_s, Must::NotNegative),
+        ("search.give_up_s", search.give_up_s, Must::NotNegative),
+    ]
+    .into_iter()
+    .map(|(key, value, must)| ("target", key, value, must))
 }

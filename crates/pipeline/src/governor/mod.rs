@@ -26,12 +26,37 @@ pub(crate) struct Wish {
     pub(crate) wheels: WheelSpeeds,
     /// Stamp of the frame.
     pub(crate) stamp: Stamp,
-    /// Somebody is followed.
-    pub(crate) has_target: bool,
+    /// What the robot moves for.
+    pub(crate) aim: Aim,
     /// Enough frames since the start or a jump.
     pub(crate) settled: bool,
     /// Time since the frame before, s.
     pub(crate) pause_s: f64,
+}
+
+/// What the robot moves for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// Nothing: it stands.
+    Nobody,
+    /// A person who is followed.
+    Person,
+    /// Somebody who may not be the person: at half speed.
+    Perhaps,
+    /// To find the person again, at half speed.
+    Search,
+}
+
+impl Aim {
+    /// The reason for an ordinary command.
+    fn reason(self) -> Reason {
+        match self {
+            Self::Nobody => Reason::NoTarget,
+            Self::Person => Reason::Follow,
+            Self::Perhaps => Reason::Unsure,
+            Self::Search => Reason::Search,
+        }
+    }
 }
 
 /// See the [module](self).
@@ -77,13 +102,13 @@ impl Governor {
         Self { settings, wheels, max_speed_mps, last: None, fault: None }
     }
 
-    /// The command for a frame; `look` says what is ahead on an arc of a
-    /// curvature, and is asked only where the robot may move. `None` of it is a
-    /// robot without depth.
+    /// The command for a frame; `look` says what is ahead in the corridor along
+    /// an arc of a curvature, and is asked only where the robot may move. `None`
+    /// of it is a robot without depth.
     pub(crate) fn govern(
         &mut self,
         wish: &Wish,
-        look: impl FnOnce(f64) -> Option<Ahead>,
+        look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
     ) -> Command {
         let (wheels, reason) = match self.must_stop(wish) {
             Some(reason) => (WheelSpeeds::STOP, reason),
@@ -136,7 +161,7 @@ impl Governor {
     }
 
     fn must_stop(&self, wish: &Wish) -> Option<Reason> {
-        let Wish { wheels, has_target, settled, pause_s, .. } = wish;
+        let Wish { wheels, aim, settled, pause_s, .. } = wish;
         let in_time = *pause_s <= self.settings.stop_after_s;
         if self.fault.is_some() {
             Some(Reason::Fault)
@@ -144,7 +169,7 @@ impl Governor {
             Some(Reason::Settling)
         } else if !in_time {
             Some(Reason::Stalled)
-        } else if !has_target {
+        } else if *aim == Aim::Nobody {
             Some(Reason::NoTarget)
         } else if !(wheels.left.is_finite() && wheels.right.is_finite()) {
             Some(Reason::NotFinite)
@@ -156,15 +181,18 @@ impl Governor {
     fn limited(
         &self,
         wish: &Wish,
-        look: impl FnOnce(f64) -> Option<Ahead>,
+        look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
     ) -> (WheelSpeeds, Reason) {
-        let (wanted, mut reason) = self.within_drive(wish.wheels);
+        let (wanted, as_wished) = self.within_drive(wish.wheels);
         let (mut cap, mut why) = (self.max_speed_mps, Reason::Limited);
+        if wish.aim != Aim::Person {
+            (cap, why) = (0.5 * cap, wish.aim.reason());
+        }
         if wish.pause_s > self.settings.slow_after_s {
-            (cap, why) = (0.5 * cap, Reason::Slow);
+            (cap, why) = (0.5 * self.max_speed_mps, Reason::Slow);
         }
         if wanted.forward > STILL_MPS {
-            match look(wanted.curvature()) {
+            match look(&self.settings.corridor, wanted.curvature()) {
                 Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
                 Some(Ahead::Something(at_m)) if self.speed_before(at_m) < cap => {
                     (cap, why) = (self.speed_before(at_m), Reason::Obstacle);
@@ -176,32 +204,28 @@ impl Governor {
             return (Twist { forward: 0.0, ..wanted }.wheels(&self.wheels), Reason::Blocked);
         }
         let ramped = self.ramped(wanted, wish.stamp);
-        if ramped != wanted {
-            reason = Reason::Limited;
-        }
+        let as_wished = as_wished && ramped == wanted;
+        let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
         if ramped.forward.abs() > cap {
-            return (self.in_reach(ramped.scaled(cap / ramped.forward.abs())), why);
+            let slower = ramped.scaled(cap / ramped.forward.abs());
+            return (self.in_reach(slower.wheels(&self.wheels)), why);
         }
-        (self.in_reach(ramped), reason)
+        (self.in_reach(ramped.wheels(&self.wheels)), reason)
     }
 
-    /// As fast as the drive can and the turn rate may, on the same arc.
-    fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, Reason) {
-        let WheelSpeeds { left, right } = wheels;
-        // Half of it first, for the sum of two finite numbers may be infinite.
-        let fastest = (0.5 * left).abs().max((0.5 * right).abs()) * 2.0;
-        let scale = self.max_speed_mps / fastest.max(self.max_speed_mps);
-        let shorter = WheelSpeeds { left: left * scale, right: right * scale };
-        let twist = Twist::of(shorter, &self.wheels);
+    /// As fast as the drive can and the turn rate may, on the same arc, and
+    /// whether that is as wished.
+    fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
+        let twist = Twist::of(self.in_reach(wheels), &self.wheels);
         let twist = match self.settings.reverse {
             false if twist.forward < 0.0 => Twist { forward: 0.0, ..twist },
             _ => twist,
         };
         let limit = self.settings.max_turn_radps;
         let slower = twist.scaled(limit / twist.turn.abs().max(limit));
-        let WheelSpeeds { left: l, right: r } = slower.wheels(&self.wheels);
-        let as_wished = (l - left).abs() + (r - right).abs() < STILL_MPS;
-        (slower, if as_wished { Reason::Follow } else { Reason::Limited })
+        let WheelSpeeds { left, right } = slower.wheels(&self.wheels);
+        let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
+        (slower, as_wished)
     }
 
     /// The speed from which the robot still stops in time, m/s.
@@ -233,11 +257,11 @@ impl Governor {
         Twist { forward, turn }
     }
 
-    /// Wheels within their limit after all.
-    fn in_reach(&self, twist: Twist) -> WheelSpeeds {
-        let WheelSpeeds { left, right } = twist.wheels(&self.wheels);
-        let scale = self.max_speed_mps / left.abs().max(right.abs()).max(self.max_speed_mps);
-        let limit = |speed: f64| (speed * scale).clamp(-self.max_speed_mps, self.max_speed_mps);
+    /// As fast as the faster wheel can, on the same arc.
+    fn in_reach(&self, WheelSpeeds { left, right }: WheelSpeeds) -> WheelSpeeds {
+        let most = self.max_speed_mps;
+        let scale = most / left.abs().max(right.abs()).max(most);
+        let limit = |speed: f64| (speed * scale).clamp(-most, most);
         WheelSpeeds { left: limit(left), right: limit(right) }
     }
 }

@@ -14,13 +14,13 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
     Wish {
         wheels: WheelSpeeds { left, right },
         stamp: Stamp::from_nanos(frame * 100_000_000),
-        has_target: true,
+        aim: Aim::Person,
         settled: true,
         pause_s: PERIOD_S,
     }
 }
 
-fn free(_: f64) -> Option<Ahead> {
+fn free(_: &CorridorSettings, _: f64) -> Option<Ahead> {
     Some(Ahead::Free)
 }
 
@@ -62,7 +62,7 @@ fn speed_grows_no_faster_than_it_may() {
 fn each_reason_to_stop_stops_at_once() {
     type Change = fn(Wish) -> Wish;
     let stops: [(Reason, Change); 4] = [
-        (Reason::NoTarget, |wish| Wish { has_target: false, ..wish }),
+        (Reason::NoTarget, |wish| Wish { aim: Aim::Nobody, ..wish }),
         (Reason::Settling, |wish| Wish { settled: false, ..wish }),
         (Reason::Stalled, |wish| Wish { pause_s: 0.6, ..wish }),
         (Reason::NotFinite, |wish| Wish {
@@ -87,10 +87,25 @@ fn late_frames_halve_the_speed_and_later_ones_stop() {
 }
 
 #[test]
+fn whoever_may_be_the_wrong_one_is_followed_at_half_speed() {
+    for (aim, reason) in [(Aim::Perhaps, Reason::Unsure), (Aim::Search, Reason::Search)] {
+        let (mut governor, _) = at_speed(0.8, 0.8);
+        let unsure = |frame| Wish { aim, ..wish(frame, 0.8, 0.8) };
+        let command = governor.govern(&unsure(40), free);
+        assert_eq!(command.reason, reason);
+        assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
+        let slow = Wish { wheels: WheelSpeeds { left: 0.3, right: 0.3 }, ..unsure(41) };
+        assert_eq!(governor.govern(&slow, free).reason, Reason::Limited);
+        let slow = Wish { stamp: Stamp::from_nanos(4_300_000_000), ..slow };
+        assert_eq!(governor.govern(&slow, free).reason, reason);
+    }
+}
+
+#[test]
 fn an_obstacle_slows_and_then_stops() {
     let speed = |at_m| {
         let (mut governor, _) = at_speed(0.8, 0.8);
-        governor.govern(&wish(40, 0.8, 0.8), |_| Some(Ahead::Something(at_m)))
+        governor.govern(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Something(at_m)))
     };
     assert_eq!(speed(2.5).reason, Reason::Follow);
     let near = speed(0.6);
@@ -102,7 +117,7 @@ fn an_obstacle_slows_and_then_stops() {
 #[test]
 fn before_an_obstacle_the_robot_may_still_turn_in_place() {
     let mut governor = governor();
-    let command = governor.govern(&wish(1, 0.1, 0.3), |_| Some(Ahead::Something(0.1)));
+    let command = governor.govern(&wish(1, 0.1, 0.3), |_, _| Some(Ahead::Something(0.1)));
     assert_eq!(command.reason, Reason::Blocked);
     assert!(command.wheels.left < 0.0 && command.wheels.left == -command.wheels.right);
 }
@@ -110,7 +125,7 @@ fn before_an_obstacle_the_robot_may_still_turn_in_place() {
 #[test]
 fn a_blind_camera_stops() {
     let (mut governor, _) = at_speed(0.8, 0.8);
-    let command = governor.govern(&wish(40, 0.8, 0.8), |_| Some(Ahead::Blind));
+    let command = governor.govern(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Blind));
     assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Blind));
 }
 
@@ -178,12 +193,13 @@ fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
 }
 
 fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
-    let flags = (any::<bool>(), prop::bool::weighted(0.9), prop::bool::weighted(0.9));
+    let aims = vec![Aim::Person, Aim::Perhaps, Aim::Search, Aim::Nobody];
+    let flags = (any::<bool>(), prop::sample::select(aims), prop::bool::weighted(0.9));
     (any_number(), any_number(), flags, any_number(), any_ahead()).prop_map(
         |(left, right, flags, pause, ahead)| {
-            let (short, has_target, settled) = flags;
+            let (short, aim, settled) = flags;
             let pause_s = if short { PERIOD_S } else { pause };
-            (Wish { has_target, settled, pause_s, ..wish(0, left, right) }, ahead)
+            (Wish { aim, settled, pause_s, ..wish(0, left, right) }, ahead)
         },
     )
 }
@@ -201,13 +217,13 @@ proptest! {
         for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
             let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
             let wish = Wish { stamp, ..wish };
-            let command = governor.govern(&wish, |_| ahead);
+            let command = governor.govern(&wish, |_, _| ahead);
             let WheelSpeeds { left, right } = command.wheels;
             prop_assert!(left.abs() <= MAX_MPS && right.abs() <= MAX_MPS, "{command:?}");
             if !command.reason.moves() && command.reason != Reason::Blocked {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
-            if !wish.has_target {
+            if wish.aim == Aim::Nobody {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
             let forward = 0.5 * (left + right);

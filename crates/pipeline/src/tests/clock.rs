@@ -42,9 +42,13 @@ fn t1_a_clock_set_back_ends_all_tracks_once() {
 #[test]
 fn t1_the_robot_stands_until_three_fresh_frames_came() {
     let config = format!("{PLAIN}\n[lifecycle]\nconfirm_hits = 1\n[controller]\nplugin = 'drive'");
-    let (_, reports) = at(&[10.0, 10.1, 1.0, 1.1, 1.2, 1.3], &config);
-    let drives: Vec<bool> = reports.iter().map(|r| r.command.unwrap().wheels.left != 0.0).collect();
-    assert_eq!(drives, [true, true, false, false, false, true]);
+    let drives = |config: &str| -> Vec<bool> {
+        let (_, reports) = at(&[10.0, 10.1, 1.0, 1.1, 1.2, 1.3], config);
+        reports.iter().map(|r| r.command.unwrap().wheels.left != 0.0).collect()
+    };
+    let without_memory = config.clone() + "\n[target]\nremember = false\n";
+    assert_eq!(drives(&without_memory), [true, true, false, false, false, true]);
+    assert_eq!(drives(&config)[2..], [false; 4], "whoever is there has to look like the person");
 }
 
 #[test]

@@ -169,6 +169,7 @@ impl Verifier for Choosy {
         match self.0.how.as_str() {
             "nan" => Ok(f64::NAN),
             "panic" => panic!("no"),
+            "panic at 21" if frame.index == 21 => panic!("no"),
             "once" => Ok(if frame.index == 8 { -2.5 } else { 0.5 }),
             "fail" => Err(Error::Other("has no opinion".into())),
             _ => Ok(if candidate.position.y > 0.0 { -4.0 } else { 0.0 }),
@@ -263,8 +264,9 @@ impl Filter for Odd {
 struct Drive(Config);
 
 impl Controller for Drive {
-    fn command(&mut self, _: &Scene<'_>) -> WheelSpeeds {
+    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
         match self.0.how.as_str() {
+            "panic at 21" if scene.frame.index == 21 => panic!("which way?"),
             "nan" => WheelSpeeds { left: f64::NAN, right: 0.0 },
             "panic" => panic!("which way?"),
             _ => WheelSpeeds { left: 2.0, right: 4.0 },

@@ -1,8 +1,9 @@
 //! Printed, corrected and best on the same scenes.
 
+use tagalong_eval::Bootstrap;
 use tagalong_trials::{Judge, Judged, Trial, TrialError};
 
-use super::{PIPELINES, STEREO, bootstrap};
+use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// The suites of P1 and P4, a crowd, and crossings.
@@ -72,10 +73,10 @@ fn cells(draws: &[Vec<Judged>], digits: usize, figure: Figure) -> Vec<Cell> {
     let mean = |at: usize| {
         let mean =
             |drawn: &[usize]| drawn.iter().map(|&k| all[at][k]).sum::<f64>() / drawn.len() as f64;
-        Cell::estimate(bootstrap().interval(known.len(), mean), digits)
+        Cell::estimate(Bootstrap::default().interval(known.len(), mean), digits)
     };
     let step = |from: usize| {
-        let gain = bootstrap().paired(&all[from], &all[from + 1]);
+        let gain = Bootstrap::default().paired(&all[from], &all[from + 1]);
         Cell::estimate(gain.map(|gain| gain.difference), digits)
     };
     vec![mean(0), mean(1), mean(2), step(0), step(1)]

@@ -7,8 +7,6 @@ mod turntable;
 mod verifier;
 mod walk;
 
-use tagalong_eval::Bootstrap;
-
 use crate::{Experiment, System};
 
 /// P1.
@@ -82,11 +80,3 @@ const STEREO: (&str, &str) = ("camera.kind", "stereo");
 
 /// As printed, corrected, and the best.
 const PIPELINES: [&str; 3] = ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-best"];
-
-/// Confidence of intervals.
-const CONFIDENCE: f64 = 0.95;
-
-/// Draws scenes with replacement: enough for two digits.
-fn bootstrap() -> Bootstrap {
-    Bootstrap { samples: 2_000, confidence: CONFIDENCE, seed: 1 }
-}

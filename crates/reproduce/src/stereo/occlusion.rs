@@ -1,9 +1,8 @@
 //! P4, Fig. 7: who is fully hidden is known again.
 
-use tagalong_eval::wilson;
 use tagalong_trials::{Occlusion, Outcome, Trial, TrialError, occlusions, outcome};
 
-use super::{CONFIDENCE, PIPELINES, STEREO};
+use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Ends of the bins of time hidden, s.
@@ -69,7 +68,7 @@ fn row(cases: &[&Case]) -> Vec<Cell> {
     let share = |at: usize| {
         let tracked = || cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);
         let kept = tracked().filter(|outcome| *outcome == Outcome::Kept).count() as u64;
-        Cell::estimate(wilson(kept, tracked().count() as u64, CONFIDENCE), 2).percent()
+        Cell::share(kept, tracked().count() as u64, 0)
     };
     (0..PIPELINES.len()).map(share).collect()
 }

@@ -2,11 +2,10 @@
 //! how well its depth is known.
 
 use tagalong_core::{Camera, Detection};
-use tagalong_eval::wilson;
 use tagalong_pipeline::{Candidate, Fate};
 use tagalong_trials::{Contender, Moment, Trial, TrialError};
 
-use super::{CONFIDENCE, STEREO};
+use super::STEREO;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Templates that a detector has: a frontal silhouette equals one from behind.
@@ -38,7 +37,7 @@ pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
         let share = |distance: usize| {
             let at = || looks.iter().filter(move |look| look.distance == distance);
             let hits = at().filter(|look| look.errors_m[which].is_some()).count() as u64;
-            Cell::estimate(wilson(hits, at().count() as u64, CONFIDENCE), 2).percent()
+            Cell::share(hits, at().count() as u64, 0)
         };
         let name = SUBSETS[which].join(", ");
         Row::ours(name, (0..DISTANCES_M.len()).map(share).collect())
@@ -66,17 +65,18 @@ pub fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
         let at = looks.iter().filter(move |look| look.distance == distance);
         at.filter_map(|look| Some((look.errors_m[0]?, look.range_m))).collect::<Vec<_>>()
     };
-    let cells = |figure: fn(&[(f64, f64)]) -> f64, digits: usize| {
-        let of = |distance| Cell::number(figure(&of_distance(distance)), digits);
+    let cells = |unit: fn(&(f64, f64)) -> f64, digits: usize| {
+        let of = |distance| {
+            let errors: Vec<f64> = of_distance(distance).iter().map(unit).collect();
+            Cell::mean(&errors, digits)
+        };
         (0..DISTANCES_M.len()).map(of).collect::<Vec<Cell>>()
     };
     let about_1 = |distance| Cell::number(if distance == 3.0 { 1.0 } else { f64::NAN }, 0);
     let rows = vec![
         Row::published("accuracy, about, % of the range", DISTANCES_M.map(about_1).to_vec()),
-        Row::ours("spread, % of the range", cells(|of| 100.0 * spread(&relative(of)), 2)),
-        Row::ours("bias, % of the range", cells(|of| 100.0 * mean(&relative(of)), 2)),
-        Row::ours("spread, mm", cells(|of| 1e3 * spread(&metres(of)), 0)),
-        Row::ours("bias, mm", cells(|of| 1e3 * mean(&metres(of)), 0)),
+        Row::ours("error, % of the range", cells(|(error, range)| 100.0 * error / range, 2)),
+        Row::ours("error, mm", cells(|(error, _)| 1e3 * error, 0)),
     ];
     Ok(Table {
         title: "Depth of the head of a turning body, single images (P4, section II-A)".into(),
@@ -84,7 +84,7 @@ pub fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
         rows,
         notes: vec![
             format!("{} images; the truth is the centre of the head", looks.len()),
-            "Spread: standard deviation over people, directions and light.".into(),
+            "Bias and standard deviation over people, directions and light.".into(),
         ],
     }
     .into())
@@ -142,34 +142,4 @@ fn sighting<'a>(candidates: &'a [Candidate], moment: &Moment) -> Option<&'a Dete
     let believed = candidates.iter().filter(|c| !matches!(c.fate, Fate::Dropped(_)));
     let nearest = believed.min_by(|a, b| off(a).total_cmp(&off(b)))?;
     (off(nearest) <= NEAR_M).then_some(&nearest.detection)
-}
-
-fn metres(of: &[(f64, f64)]) -> Vec<f64> {
-    of.iter().map(|(error, _)| *error).collect()
-}
-
-fn relative(of: &[(f64, f64)]) -> Vec<f64> {
-    of.iter().map(|(error, range)| error / range).collect()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn spread(values: &[f64]) -> f64 {
-    let mean = mean(values);
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bias_and_spread_are_told_apart() {
-        let errors = [(0.02, 2.0), (0.04, 2.0)];
-        assert!((mean(&metres(&errors)) - 0.03).abs() < 1e-12);
-        assert!((spread(&metres(&errors)) - 0.01).abs() < 1e-12);
-        assert!((mean(&relative(&errors)) - 0.015).abs() < 1e-12);
-    }
 }

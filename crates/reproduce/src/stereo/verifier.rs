@@ -3,12 +3,11 @@
 use std::collections::BTreeSet;
 
 use tagalong_core::{Detection, Track};
-use tagalong_eval::wilson;
 use tagalong_pipeline::{Fate, FrameReport};
 use tagalong_sim::Truth;
 use tagalong_trials::{Moment, Trial, TrialError};
 
-use super::{CONFIDENCE, STEREO};
+use super::STEREO;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// A name for people, a scene, and what is set in it.
@@ -204,7 +203,7 @@ impl Tally {
 
 /// The second number as a share of the first.
 fn share([of, count]: [u64; 2]) -> Cell {
-    Cell::estimate(wilson(count, of, CONFIDENCE), 3).percent()
+    Cell::share(count, of, 1)
 }
 
 enum Whose {

@@ -1,9 +1,9 @@
 //! P4, Fig. 11: where is a person who walks along two edges of a square?
 
-use tagalong_eval::{PositionError, percentile};
+use tagalong_eval::{Bootstrap, PositionError, percentile};
 use tagalong_trials::{Judge, Trial, TrialError};
 
-use super::{PIPELINES, STEREO, bootstrap};
+use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Errors of one contender on one walk, m.
@@ -76,7 +76,7 @@ fn cells(walks: &Walks<'_>) -> Vec<Cell> {
         walks.iter().filter_map(|walk| walk.iter().copied().reduce(f64::max)).collect();
     let error = PositionError::of(&all).unwrap_or_default();
     let millimetres = |metres: Option<f64>| Cell::number(1e3 * metres.unwrap_or(f64::NAN), 0);
-    let mean = bootstrap().interval(walks.len(), |drawn| 1e3 * mean(drawn));
+    let mean = Bootstrap::default().interval(walks.len(), |drawn| 1e3 * mean(drawn));
     vec![
         Cell::estimate(mean, 0),
         millimetres(Some(error.p95_m)),

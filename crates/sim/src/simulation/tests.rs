@@ -208,3 +208,16 @@ fn a_steered_robot_leaves_its_path() {
     }
     assert!(simulation.robot.pose.translation.vector.x > 1.5);
 }
+
+#[test]
+fn clearance_is_to_what_is_really_there() {
+    let scene = "[room]\nsize_m = [9.0, 6.0]\n[robot]\nstart = [2.0, 1.5]\n\
+        [[people]]\npath = [[3.5, 1.5]]\n[[furniture]]\nkind = \"pillar\"\nat = [2.0, 2.6]\n";
+    let simulation = Simulation::new(&Scene::parse(scene).unwrap(), 1);
+    let Clearance { people_m, things_m } = simulation.clearance(0.25);
+    assert!((people_m - (1.5 - 0.2 - 0.25)).abs() < 1e-9, "{people_m}");
+    assert!((0.4..0.85).contains(&things_m), "the pillar is thinner than 0.4 m: {things_m}");
+    let alone = Simulation::new(&Scene::parse("[robot]\nstart = [2.0, 1.5]\n").unwrap(), 1);
+    let Clearance { people_m, things_m } = alone.clearance(0.25);
+    assert!(people_m == f64::INFINITY && (things_m - 1.25).abs() < 0.02, "{things_m}");
+}

@@ -4,6 +4,7 @@ use tagalong_core::GreyImage;
 
 use crate::census::NEIGHBOURS;
 use crate::cost::{MOST_BRIGHTNESS, MOST_SLOPE, SLOPE_WEIGHT};
+use crate::winner::Winners;
 
 fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
     let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
@@ -187,18 +188,20 @@ fn sobel(image: &GreyImage, x: i64, y: i64) -> u32 {
     (sum.unsigned_abs() / 2) as u32
 }
 
-/// Drops the smooth pixels of row `y` that are nearer than a textured neighbour,
-/// or have none on a side.
+/// Drops the smooth pixels of row `y` that differ from their textured neighbours, or
+/// have none on a side.
 pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f32> {
     let is_anchor = |x: &usize| !row[*x].is_nan() && sobel(image, *x as i64, y as i64) >= least;
+    let tolerance = |d: f32| 0.75_f32.max(0.1 * d);
     let keeps = |x: usize| {
-        let sides = [(0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor)];
-        is_anchor(&x)
-            || sides
-                .iter()
-                .all(|at| at.is_some_and(|at| row[x] <= row[at] + 0.75_f32.max(0.1_f32 * row[at])))
+        let sides = ((0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor));
+        let (Some(a), Some(b)) = sides else { return false };
+        let (far, near) = (row[a].min(row[b]), row[a].max(row[b]));
+        let middle = if near - far <= tolerance(far) { 0.5 * (row[a] + row[b]) } else { far };
+        (row[x] - middle).abs() <= tolerance(middle)
     };
-    (0..row.len()).map(|x| if keeps(x) { row[x] } else { f32::NAN }).collect()
+    let kept = |x: usize| if is_anchor(&x) || keeps(x) { row[x] } else { f32::NAN };
+    (0..row.len()).map(kept).collect()
 }
 
 /// Brightness and slope of a smoothed row at `x`; its border goes on.
@@ -208,31 +211,34 @@ fn smoothed(image: &GreyImage, x: i64, y: i64) -> (f64, f64) {
     (level(x), 0.5 * (level(x + 1) - level(x - 1)))
 }
 
-/// Slope and weighted disparity of a pixel, as Lucas and Kanade have them.
-fn equation(pair: &[GreyImage], x: i64, y: i64, d: f64) -> (f64, f64) {
+/// Slope, and slope times disparity, of a pixel, as Lucas and Kanade have them, with
+/// less weight on strong slopes.
+fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64) -> (f64, f64) {
+    let (x, y) = (x as i64, y as i64);
     let (own, own_slope) = smoothed(&pair[0], x, y);
     let last = pair[1].width() as i64 - 1;
-    let at = (x as f64 - d).max(0.0);
+    let at = (x as f64 - d).clamp(0.0, last as f64);
     let (low, part) = (at.floor(), at.fract());
     let [(a, a_slope), (b, b_slope)] =
         [0, 1].map(|i| smoothed(&pair[1], (low as i64 + i).min(last), y));
     let g = 0.5 * (own_slope + a_slope + part * (b_slope - a_slope));
-    (g, g * d + a + part * (b - a) - own)
+    let weight = 1.0 / (1.0 + (g / 6.0).powi(2)).sqrt();
+    (weight * g, weight * (g * d + a + part * (b - a) - own))
 }
 
 /// Sums of squares and products around the means, over the window's part of a row
-/// that is of one surface with column `x`.
+/// that is of one surface with column `x`; each pixel's own disparity counts one.
 fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
-    let goes_on = |x: &usize| (row[*x] - row[x - 1]).abs() <= 1.0;
-    let (low, high) = (x.saturating_sub(radius), (x + radius + 1).min(row.len()));
-    let from = (low + 1..=x).rev().find(|x| !goes_on(x)).unwrap_or(low);
-    let to = (x + 1..high).find(|x| !goes_on(x)).unwrap_or(high);
-    let window = from..to;
-    let all: Vec<(f64, f64)> =
-        window.map(|x| equation(pair, x as i64, y as i64, row[x].into())).collect();
+    let near = x.saturating_sub(radius)..(x + radius + 1).min(row.len());
+    let same: Vec<usize> = near.filter(|near| (row[*near] - row[x]).abs() <= 1.0).collect();
+    let all: Vec<(f64, f64)> = same.iter().map(|x| equation(pair, *x, y, row[*x].into())).collect();
     let n = all.len() as f64;
     let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
-    all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q)))
+    let was = same.iter().map(|x| f64::from(row[*x])).sum::<f64>();
+    let add = |sum: (f64, f64), e: &(f64, f64)| {
+        (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q))
+    };
+    all.iter().fold((n, was), add)
 }
 
 /// Refines disparities pixel by pixel.
@@ -240,7 +246,7 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
     let (width, height) = (pair[0].width(), pair[0].height());
     let one = |at: usize| {
         let (x, y, was) = (at % width, at / width, disparities[at]);
-        let (mut squares, mut sum) = (20.0, 20.0 * f64::from(was));
+        let (mut squares, mut sum) = (0.0, 0.0);
         for y in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let row = &disparities[y * width..(y + 1) * width];
             if (row[x] - was).abs() <= 1.0 {
@@ -249,11 +255,37 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
             }
         }
         let was = f64::from(was);
-        (was + (sum / squares - was).clamp(-0.5, 0.5)).max(if was.is_nan() {
-            f64::NAN
-        } else {
-            0.0
-        })
+        let new = was + (sum / squares - was).clamp(-1.0, 1.0);
+        if new < 0.0 { 0.0 } else { new }
     };
     (0..disparities.len()).map(one).collect()
+}
+
+/// The disparities of winners that stand the tests, and how many fail: outside of the
+/// right image, not unique, contradicted from the right.
+pub fn judged(winners: &Winners, uniqueness: f32, tolerance: u8) -> (Vec<f32>, [u32; 3]) {
+    let d = |x: usize| usize::from(winners.disparity[x]);
+    let mut counts = [0; 3];
+    let mut one = |x: usize| {
+        let (cost, second) = (f32::from(winners.cost[x]), f32::from(winners.second[x]));
+        if d(x) > x {
+            counts[0] += 1;
+            return f32::NAN;
+        }
+        if (second - cost).max(0.0) < uniqueness * second {
+            counts[1] += 1;
+            return f32::NAN;
+        }
+        let rivals = (0..winners.cost.len()).filter(|other| *other + d(x) == x + d(*other));
+        let best = rivals.min_by_key(|other| winners.cost[*other]).unwrap();
+        if d(best).abs_diff(d(x)) > usize::from(tolerance) {
+            counts[2] += 1;
+            return f32::NAN;
+        }
+        let (below, above) = (f32::from(winners.below[x]), f32::from(winners.above[x]));
+        let rise = below + above - 2.0 * cost;
+        d(x) as f32 + if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 }
+    };
+    let all = (0..winners.cost.len()).map(&mut one).collect();
+    (all, counts)
 }

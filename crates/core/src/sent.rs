@@ -1,38 +1,41 @@
 use std::collections::VecDeque;
 
-use tagalong_core::{Motion, WheelSpeeds, Wheels};
+use crate::{Motion, WheelSpeeds, Wheels};
 
 /// No more commands are remembered, however quickly the frames come.
 const MOST: usize = 256;
 
-/// The commands that the wheels have not answered to yet.
+/// The commands that the wheels have not answered to yet, for controllers that
+/// steer for where the robot is going to be.
 #[derive(Clone, Debug)]
-pub(crate) struct Sent {
+pub struct Sent {
     latency_s: f64,
     /// Commands and for how long each is the newest, s; newest first.
     commands: VecDeque<(WheelSpeeds, f64)>,
 }
 
 impl Sent {
-    pub(crate) fn new(latency_s: f64) -> Self {
+    /// None yet; the wheels answer after `latency_s`.
+    pub fn new(latency_s: f64) -> Self {
         Self { latency_s, commands: VecDeque::new() }
     }
 
     /// The newest command is `dt` older than the next one will be.
-    pub(crate) fn grow_older(&mut self, dt: f64) {
+    pub fn grow_older(&mut self, dt: f64) {
         if let Some((_, held_s)) = self.commands.front_mut() {
             *held_s += dt;
         }
     }
 
-    pub(crate) fn add(&mut self, command: WheelSpeeds) {
+    /// The newest command.
+    pub fn add(&mut self, command: WheelSpeeds) {
         self.commands.push_front((command, 0.0));
         self.commands.truncate(MOST);
     }
 
     /// What the robot is going to do before it answers to the next command, and
     /// forgets what it has done.
-    pub(crate) fn forecast(&mut self, wheels: &Wheels) -> Motion {
+    pub fn forecast(&mut self, wheels: &Wheels) -> Motion {
         let mut to_come = Motion::at_rest(0.0);
         let mut known = 0;
         for (command, held_s) in &self.commands {

@@ -1,0 +1,61 @@
+//! A control loop around a pipeline, as on a robot: frames come when they come,
+//! the wheels are told something fifty times a second.
+//!
+//! Here both come from a drawn scene. On a robot `next` is the driver of the
+//! camera and the odometry, and `drive` is the one of the wheels.
+//!
+//! ```sh
+//! cargo run --release -p tagalong-cli --example control_loop
+//! ```
+#![allow(clippy::print_stdout, reason = "an example tells what it does")]
+
+use std::error::Error;
+use std::path::Path;
+
+use tagalong_core::{Command, Registry, Stamp};
+use tagalong_pipeline::Pipeline;
+use tagalong_sim::{Event, Scene, Variant};
+use tagalong_trials::Draw;
+
+/// Follows somebody for this long, s.
+const SECONDS: f64 = 8.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let config = std::fs::read_to_string("configs/follow-best.toml")?;
+    let (mut pipeline, _) = Pipeline::from_toml(&config, Path::new("configs"), &registry)
+        .map_err(|error| error.render("configs/follow-best.toml", &config))?;
+
+    let scene = std::fs::read_to_string("configs/scenes/follow-passing.toml")?;
+    let scene = Scene::parse_with(&scene, &Variant::default())
+        .map_err(|error| error.render("configs/scenes/follow-passing.toml", &scene))?;
+    let mut robot = Draw::live(&scene, 1);
+
+    loop {
+        // Until the next frame comes, the last command is asked for again and
+        // again. It expires by itself: if the camera stops, so does the robot.
+        let next = robot.next_frame_while(|_, event| {
+            let Event::Odometry(reading) = event else { return None };
+            let now = Stamp::from_nanos(reading.at_ns);
+            pipeline.command_at(now).map(|command| command.wheels)
+        });
+        let Some(drawn) = next else { break };
+        let frame = drawn.frame;
+        if frame.stamp.seconds_since(Stamp::default()) > SECONDS {
+            break;
+        }
+        // A pipeline that fails has stopped the robot already: `command_at` says
+        // zero from now on.
+        let report = pipeline.step(&frame)?;
+        if let (Some(command), Some(lock), 1) = (report.command, report.lock, frame.index % 10) {
+            tell(&frame.stamp, &command, lock.state.name(), lock.why);
+        }
+    }
+    Ok(())
+}
+
+fn tell(stamp: &Stamp, command: &Command, state: &str, why: &str) {
+    let Command { wheels, reason, .. } = command;
+    println!("{stamp} {:+.2} {:+.2} m/s: {reason}; {state}: {why}", wheels.left, wheels.right);
+}

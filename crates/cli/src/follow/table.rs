@@ -1,0 +1,189 @@
+use tagalong_eval::{Bootstrap, percentile, wilson};
+use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_trials::{Ridden, RideJudge};
+
+use super::Followed;
+
+/// Confidence of all intervals.
+const CONFIDENCE: f64 = 0.95;
+/// Samples of the bootstrap: enough for two digits.
+const SAMPLES: usize = 2_000;
+/// Steps of the reliability curve.
+const BINS: usize = 10;
+
+/// How the rides went, scene by scene and over all scenes; and, where there was
+/// a lock, how far its probabilities can be believed.
+pub fn tables(results: &[Followed]) -> Vec<Table> {
+    let judge = RideJudge::default();
+    let columns = [
+        "rides",
+        "kept %",
+        "wrong %",
+        "longest wrong s",
+        "refound %",
+        "in view %",
+        "distance %",
+        "contacts",
+        "to people m",
+        "to things m",
+        "jerk m/s3",
+        "ms/frame",
+    ];
+    let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
+    let mut suites = unique(results.iter().map(|result| result.suite.as_str()));
+    let mut rows: Vec<Row> = Vec::new();
+    if suites.len() > 1 {
+        suites.push("");
+    }
+    for suite in suites {
+        for pipeline in &pipelines {
+            let of =
+                |r: &&Followed| (suite.is_empty() || r.suite == suite) && r.pipeline == *pipeline;
+            let chosen: Vec<&Followed> = results.iter().filter(of).collect();
+            let name = if suite.is_empty() { "all scenes" } else { suite };
+            rows.push(Row::ours(format!("{name}: {pipeline}"), cells(&chosen, &judge)));
+        }
+    }
+    let following = Table {
+        title: "Following the first person of each scene".into(),
+        columns: columns.map(str::to_owned).to_vec(),
+        rows,
+        notes: notes(&judge),
+    };
+    std::iter::once(following)
+        .chain(pipelines.iter().filter_map(|pipeline| reliability(results, pipeline)))
+        .collect()
+}
+
+fn notes(judge: &RideJudge) -> Vec<String> {
+    vec![
+        "intervals: 95 %, Wilson for counts, bootstrapped over rides otherwise".into(),
+        format!(
+            "kept: the person was found, nobody else was followed for more than {} s in one go, and \
+             at the end the person was followed or not in view for {} s",
+            judge.most_wrong_s, judge.refind_s
+        ),
+        "wrong: part of the time with somebody that it was not the right one, or not somebody".into(),
+        format!(
+            "refound: times without the person that ended within {} s of their coming back into \
+             view (up to {} m away)",
+            judge.refind_s, judge.max_range_m
+        ),
+        format!(
+            "distance: within {} m of the stand-off while the person walked below {} m/s",
+            judge.off_m, judge.slow_mps
+        ),
+        "contacts: rides in which the robot touched somebody or something; beside it the least room"
+            .into(),
+        "ms/frame: 95th percentile of the pipeline's time".into(),
+    ]
+}
+
+fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
+    let rides: Vec<&Ridden> = results.iter().map(|result| &result.ridden).collect();
+    let count = rides.len() as u64;
+    let times = |a: fn(&Ridden) -> f64, b: fn(&Ridden) -> f64| {
+        let ratio = |drawn: &[usize]| {
+            let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(rides[i])).sum::<f64>();
+            sum(a) / sum(b)
+        };
+        bootstrap().interval(rides.len(), ratio)
+    };
+    let refound: Vec<bool> = rides
+        .iter()
+        .flat_map(|ride| ride.episodes.iter().map(|e| judge.refound(e, ride.time_s)))
+        .flatten()
+        .collect();
+    let good = refound.iter().filter(|good| **good).count() as u64;
+    let least = |of: fn(&Ridden) -> Option<f64>| {
+        let least = rides.iter().filter_map(|ride| of(ride)).min_by(f64::total_cmp);
+        least.map_or_else(Cell::default, |least| Cell::number(least, 2))
+    };
+    let touches = |ride: &&&Ridden| {
+        [ride.clearance_people_m, ride.clearance_things_m].into_iter().flatten().any(|m| m < 0.0)
+    };
+    let jerks: Vec<f64> = rides.iter().map(|ride| ride.jerk_mps3).collect();
+    let took: Vec<f64> = results.iter().flat_map(|result| &result.took_ms).copied().collect();
+    let kept = rides.iter().filter(|ride| ride.kept).count() as u64;
+    vec![
+        Cell::number(count as f64, 0),
+        Cell::estimate(wilson(kept, count, CONFIDENCE), 3).percent(),
+        Cell::estimate(times(|r| r.wrong_s, |r| r.right_s + r.wrong_s), 4).percent(),
+        Cell::number(rides.iter().map(|ride| ride.longest_wrong_s).fold(0.0, f64::max), 1),
+        Cell::estimate(wilson(good, refound.len() as u64, CONFIDENCE), 3).percent(),
+        Cell::estimate(times(|r| r.in_view_s, |r| r.time_s), 3).percent(),
+        Cell::estimate(times(|r| r.distance_kept_s, |r| r.slow_s), 3).percent(),
+        Cell::number(rides.iter().filter(touches).count() as f64, 0),
+        least(|ride| ride.clearance_people_m),
+        least(|ride| ride.clearance_things_m),
+        Cell::mean(&jerks, 1),
+        percentile(&took, 0.95).map_or_else(Cell::default, |ms| Cell::number(ms, 1)),
+    ]
+}
+
+/// Of those whom the lock thought to be the person with some probability, how
+/// many were.
+fn reliability(results: &[Followed], pipeline: &str) -> Option<Table> {
+    let of: Vec<&Ridden> =
+        results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
+    let bin = |(p, _): &(f64, bool)| ((p * BINS as f64) as usize).min(BINS - 1);
+    let all: Vec<(f64, bool)> = of
+        .iter()
+        .flat_map(|ride| ride.likeness.iter().map(|(like, same)| (like.probability, *same)))
+        .collect();
+    let row = |at: usize| {
+        let within: Vec<&(f64, bool)> = all.iter().filter(|one| bin(one) == at).collect();
+        let (count, same) =
+            (within.len() as u64, within.iter().filter(|(_, same)| *same).count() as u64);
+        let mean = within.iter().map(|(p, _)| p).sum::<f64>() / count as f64;
+        let low = at as f64 / BINS as f64;
+        let cells = vec![
+            Cell::number(count as f64, 0),
+            Cell::number(100.0 * mean, 1),
+            Cell::estimate(wilson(same, count, CONFIDENCE), 3).percent(),
+        ];
+        Row::ours(format!("{low:.1} to {:.1}", low + 1.0 / BINS as f64), cells)
+    };
+    let columns = ["sightings", "mean probability %", "were the person %"];
+    (!all.is_empty()).then(|| Table {
+        title: format!("How far the lock of {pipeline} can be believed"),
+        columns: columns.map(str::to_owned).to_vec(),
+        rows: (0..BINS).map(row).collect(),
+        notes: vec![
+            "sightings of one ride are not independent: the intervals are too narrow".into(),
+        ],
+    })
+}
+
+fn bootstrap() -> Bootstrap {
+    Bootstrap { samples: SAMPLES, confidence: CONFIDENCE, seed: 1 }
+}
+
+/// Each name once, in the order of its first place.
+fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut all = Vec::new();
+    for name in names {
+        if !all.contains(&name) {
+            all.push(name);
+        }
+    }
+    all
+}
+
+/// What the lock thought of each sighting, and whether it was the person, with
+/// the differences that it was made of; nothing stands for what is not known.
+pub fn likeness_csv(results: &[Followed]) -> String {
+    let mut out =
+        "suite,pipeline,seed,same,probability,torso,legs,texture,height_m,rivals\n".to_owned();
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
+    for Followed { suite, pipeline, ridden, .. } in results {
+        for (like, same) in &ridden.likeness {
+            let d = &like.differences;
+            let numbers =
+                [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals].map(number).join(",");
+            let (seed, p) = (ridden.seed, like.probability);
+            out += &format!("{suite},{pipeline},{seed},{},{p:.4},{numbers}\n", u8::from(*same));
+        }
+    }
+    out
+}

@@ -1,0 +1,75 @@
+//! `tagalong follow`: what it prints and writes, and what it refuses.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use common::{code, tagalong, text};
+use serde_json::Value;
+
+const SCENE: &str = "duration_s = 5.0\n[camera]\nwidth = 120\nheight = 90\ncolour = false\n\
+    [robot]\nstart = [1.0, 3.0]\n[[people]]\npath = [[3.2, 3.0], [8.0, 3.0]]\nspeed_mps = 0.6\n";
+
+fn configs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs")
+}
+
+fn follow(folder: &Path, config: &str, more: &[&str]) -> Output {
+    fs::write(folder.join("walk.toml"), SCENE).unwrap();
+    let mut command = tagalong();
+    command.current_dir(folder).arg("follow").arg(configs().join(config));
+    command.arg("walk.toml").args(more).output().unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    assert_eq!(code(output), 0, "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_person_who_walks_is_followed_the_same_way_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let rides = |jobs| {
+        let more = ["--seeds", "2", "--jobs", jobs, "--format", "json"];
+        json(&follow(folder.path(), "follow-best.toml", &more))["rides"].clone()
+    };
+    let first = rides("1");
+    assert_eq!(first, rides("2"));
+    assert_eq!(first.as_array().unwrap().len(), 2);
+    for ride in first.as_array().unwrap() {
+        assert_eq!(ride["kept"], true, "{ride}");
+        assert_eq!(ride["wrong_s"], 0.0, "{ride}");
+        assert!(ride["right_s"].as_f64().unwrap() > 3.0, "{ride}");
+    }
+}
+
+#[test]
+fn the_log_of_a_ride_has_commands_and_their_reasons() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = follow(folder.path(), "follow-as-printed.toml", &["-o", "rides"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let told = text(&output.stdout);
+    assert!(told.contains("(locked: chosen)"), "{told}");
+    let log = folder.path().join("rides/walk-follow-as-printed-2000000000.mcap");
+    let inspected = tagalong().arg("inspect").arg(log).output().unwrap();
+    let topics = text(&inspected.stdout);
+    for topic in ["/cmd_vel", "/follow/frames", "/truth/people", "/odom"] {
+        assert!(topics.contains(topic), "{topic}: {topics}");
+    }
+    let csv = fs::read_to_string(folder.path().join("rides/likeness.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1, "it remembers nobody");
+    assert!(folder.path().join("rides/follow.md").exists());
+}
+
+#[test]
+fn a_pipeline_that_steers_nothing_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = follow(folder.path(), "depth-ekf.toml", &[]);
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("has no [controller]"), "{}", text(&output.stderr));
+    let output = follow(folder.path(), "follow-best.toml", &["--drop", "1.5"]);
+    assert_eq!(code(&output), 2);
+}

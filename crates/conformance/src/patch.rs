@@ -1,0 +1,44 @@
+//! The smallest thing a verifier can be shown: one candidate in one grey image
+//! that holds a head above shoulders, or bars.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{
+    Camera, Detection, Distortion, Frame, GreyImage, Images, Motion, Pinhole, Rect, Stamp,
+};
+
+/// A dark head above dark shoulders before a bright wall, or bars: 64x64, with
+/// noise from a seed.
+pub fn picture(is_person: bool, seed: u32) -> GreyImage {
+    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+    GreyImage::from_fn(64, 64, |x, y| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let (dx, dy) = (x as f64 - 32.0, y as f64 - 22.0);
+        let dark = if is_person {
+            dx.hypot(dy) < 9.0 || (dy > 10.0 && dx.abs() < 20.0)
+        } else {
+            (x / 8 + seed as usize).is_multiple_of(2)
+        };
+        (if dark { 60 } else { 150 }) + (state >> 27) as u8
+    })
+}
+
+/// A frame of that picture, from a camera 1 m above the floor that looks ahead.
+pub fn frame(grey: GreyImage) -> Frame {
+    let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, grey.width(), grey.height(), 1.0, 0.0, 0.0));
+    let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
+    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+}
+
+/// The candidate of that picture: 2 m ahead, of score 1.
+pub fn candidate() -> Detection {
+    Detection {
+        region: Rect::new(8.0, 8.0, 48.0, 48.0),
+        position: Point3::new(2.0, 0.0, 1.6),
+        covariance: Matrix3::identity(),
+        score: 1.0,
+        source: "test",
+    }
+}

@@ -1,0 +1,403 @@
+use std::collections::BTreeMap;
+
+use nalgebra::{Point2, Vector2};
+use tagalong_core::{Frame, Motion, Track, TrackId};
+
+use super::looks::Looks;
+use super::memory::{Differences, Memory};
+use super::settings::TargetSettings;
+
+/// Log-odds are bounded by this: no single look is certain.
+const CERTAIN: f64 = 6.0;
+/// A track that is out of sight for longer may come back as somebody else, s.
+const UNSEEN_S: f64 = 0.25;
+/// Somebody may have moved by this much more than their speed says, m.
+const REACH_M: f64 = 0.6;
+
+/// How sure it is who is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum LockState {
+    /// Nobody was chosen yet.
+    Initial,
+    /// The person is followed, and what they look like is learned.
+    Training,
+    /// The person is followed.
+    Locked,
+    /// Somebody is followed slowly, perhaps not the person.
+    Suspect,
+    /// Nobody is followed; the person is looked for.
+    Lost,
+    /// Somebody who seems to be the person is followed slowly.
+    Refound,
+}
+
+impl LockState {
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Initial => "initial",
+            Self::Training => "training",
+            Self::Locked => "locked",
+            Self::Suspect => "suspect",
+            Self::Lost => "lost",
+            Self::Refound => "re-found",
+        }
+    }
+
+    /// True if somebody is followed.
+    pub fn follows(self) -> bool {
+        matches!(self, Self::Training | Self::Locked | Self::Suspect | Self::Refound)
+    }
+
+    /// True if whoever is followed may be somebody else.
+    pub fn doubts(self) -> bool {
+        matches!(self, Self::Suspect | Self::Refound)
+    }
+}
+
+/// Who is followed, and how sure that is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LockReport {
+    /// How sure.
+    pub state: LockState,
+    /// What led to the state.
+    pub why: &'static str,
+    /// For how long it is so, s.
+    pub since_s: f64,
+    /// Probability that the followed track is the person, all sightings
+    /// considered.
+    pub belief: Option<f64>,
+    /// How much each track that is seen looks like the person.
+    pub likeness: Vec<Likeness>,
+}
+
+/// How much a track looks like the person in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Likeness {
+    /// The track.
+    pub track: TrackId,
+    /// Probability that it is the person, by its looks in this frame alone.
+    pub probability: f64,
+    /// Why: the differences from what is remembered.
+    pub differences: Differences,
+}
+
+/// The person when seen last, moved along with the robot frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LastSeen {
+    /// Robot frame, m.
+    pub(crate) place: Point2<f64>,
+    /// Over ground, in robot axes, m/s.
+    pub(crate) velocity: Vector2<f64>,
+    /// How long ago, s.
+    pub(crate) ago_s: f64,
+}
+
+/// See the [module](super).
+pub(crate) struct Lock {
+    settings: TargetSettings,
+    state: LockState,
+    why: &'static str,
+    since_s: f64,
+    track: Option<TrackId>,
+    memory: Memory,
+    /// Log-odds that the followed track is the person.
+    belief: f64,
+    /// Somebody came near or the track was out of sight: it may have changed over.
+    doubtful: bool,
+    sightings: u32,
+    last: Option<LastSeen>,
+    /// Smoothed log-odds of others while the person is lost, and how often in a
+    /// row they were good.
+    candidates: BTreeMap<TrackId, (f64, u32)>,
+}
+
+impl Lock {
+    pub(crate) fn new(settings: TargetSettings) -> Self {
+        Self {
+            state: LockState::Initial,
+            why: "nobody was chosen yet",
+            since_s: 0.0,
+            track: None,
+            memory: Memory::default(),
+            belief: 0.0,
+            doubtful: false,
+            sightings: 0,
+            last: None,
+            candidates: BTreeMap::new(),
+            settings,
+        }
+    }
+
+    /// Chooses this track anew, and forgets whom it followed before.
+    pub(crate) fn choose(&mut self, track: TrackId) {
+        let settings = TargetSettings { track: Some(track.0), ..self.settings.clone() };
+        *self = Self::new(settings);
+    }
+
+    /// After a jump of the clock nobody knows where anybody is: who is remembered
+    /// is lost, who is not is chosen anew.
+    pub(crate) fn reset(&mut self) {
+        if !self.settings.remember {
+            *self = Self::new(self.settings.clone());
+        } else if self.state.follows() {
+            self.lose("the clock jumped");
+        }
+        self.last = None;
+        self.candidates.clear();
+    }
+
+    pub(crate) fn state(&self) -> LockState {
+        self.state
+    }
+
+    /// For how long it is so, s.
+    pub(crate) fn since_s(&self) -> f64 {
+        self.since_s
+    }
+
+    /// Where the person was seen last.
+    pub(crate) fn last_seen(&self) -> Option<&LastSeen> {
+        self.last.as_ref()
+    }
+
+    /// The track that is followed now.
+    pub(crate) fn followed(&self) -> Option<TrackId> {
+        self.track.filter(|_| self.state.follows())
+    }
+
+    /// Takes in a frame; `tracks` are near to far, `may_choose` says whether
+    /// somebody may be chosen yet.
+    pub(crate) fn update(
+        &mut self,
+        frame: &Frame,
+        motion: &Motion,
+        tracks: &[Track],
+        may_choose: bool,
+    ) -> LockReport {
+        self.move_along(motion);
+        let looks = self.looks(frame, tracks);
+        let likeness = self.likeness(&looks);
+        let log_odds = likeness.iter().map(|(like, odds)| (like.track, *odds)).collect();
+        match self.state {
+            LockState::Initial if may_choose => self.start(tracks),
+            LockState::Initial => {}
+            LockState::Lost => self.look_for(tracks, &log_odds),
+            _ => self.hold(tracks, &log_odds),
+        }
+        self.learn(tracks, looks);
+        LockReport {
+            state: self.state,
+            why: self.why,
+            since_s: self.since_s,
+            belief: self.followed().map(|_| probability(self.belief)),
+            likeness: likeness.into_iter().map(|(like, _)| like).collect(),
+        }
+    }
+
+    fn move_along(&mut self, motion: &Motion) {
+        self.since_s += motion.dt;
+        if let Some(last) = &mut self.last {
+            last.place = motion.apply_to_point(last.place);
+            last.velocity = motion.apply_to_velocity(last.velocity);
+            last.ago_s += motion.dt;
+        }
+    }
+
+    /// What everybody looks like who is seen whole.
+    fn looks(&self, frame: &Frame, tracks: &[Track]) -> BTreeMap<TrackId, Looks> {
+        let whole = |track: &&Track| track.confirmed && track.seen && !track.occluded;
+        let all = tracks.iter().filter(|track| self.settings.remember && whole(track));
+        all.map(|track| (track.id, Looks::of(track, frame))).collect()
+    }
+
+    /// How much everybody looks like the person, with the log-odds.
+    fn likeness(&self, looks: &BTreeMap<TrackId, Looks>) -> Vec<(Likeness, f64)> {
+        let of = |(track, looks): (&TrackId, &Looks)| {
+            let differences = self.memory.differences(looks)?;
+            let odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
+            let probability = probability(odds);
+            Some((Likeness { track: *track, probability, differences }, odds))
+        };
+        looks.iter().filter_map(of).collect()
+    }
+
+    /// Chooses somebody.
+    fn start(&mut self, tracks: &[Track]) {
+        let fits = |track: &&Track| {
+            let place = track.estimate.person.position.xy();
+            let bearing = place.y.atan2(place.x).abs().to_degrees();
+            let near = bearing <= self.settings.choose_within_deg
+                && place.coords.norm() <= self.settings.choose_within_m;
+            track.confirmed && self.settings.track.map_or(near, |id| id == track.id.0)
+        };
+        let Some(track) = tracks.iter().find(fits) else { return };
+        self.track = Some(track.id);
+        self.belief = CERTAIN;
+        self.see(track);
+        match self.settings.remember {
+            true => self.go(LockState::Training, "chosen"),
+            false => self.go(LockState::Locked, "chosen"),
+        }
+    }
+
+    /// Stays with the track, or has doubts.
+    fn hold(&mut self, tracks: &[Track], log_odds: &BTreeMap<TrackId, f64>) {
+        let Some(track) = tracks.iter().find(|track| Some(track.id) == self.track) else {
+            return self.lose("the track ended");
+        };
+        if !track.seen {
+            return self.miss();
+        }
+        self.see(track);
+        self.weigh(log_odds.get(&track.id).copied(), self.is_alone(track, tracks));
+        self.judge();
+    }
+
+    /// A track that nobody came near and that was always in sight is the same
+    /// person, whatever they look like from this side. Otherwise looks decide.
+    fn weigh(&mut self, odds: Option<f64>, alone: bool) {
+        self.doubtful |= !alone;
+        let evidence = if self.doubtful { odds } else { Some(CERTAIN) };
+        if let Some(odds) = evidence {
+            self.belief += self.settings.belief_weight * (odds - self.belief);
+        }
+        let sure = self.belief >= logit(self.settings.again_from)
+            && self.sightings >= self.settings.again_sightings;
+        self.doubtful &= !(alone && sure && !self.state.doubts());
+    }
+
+    /// Nobody else is near a track.
+    fn is_alone(&self, track: &Track, tracks: &[Track]) -> bool {
+        let place = |track: &Track| track.estimate.person.position.xy();
+        let off_m = |other: &Track| nalgebra::distance(&place(track), &place(other));
+        tracks.iter().all(|other| other.id == track.id || off_m(other) >= self.settings.alone_m)
+    }
+
+    /// The track is not seen.
+    fn miss(&mut self) {
+        let ago_s = self.last.map_or(f64::INFINITY, |last| last.ago_s);
+        if !self.settings.remember {
+            return;
+        }
+        self.sightings = 0;
+        self.doubtful |= ago_s > UNSEEN_S;
+        if ago_s > self.settings.lose_after_s {
+            self.lose("out of sight");
+        } else if ago_s > self.settings.doubt_after_s && self.state != LockState::Suspect {
+            // Whoever comes back has to look like the person first.
+            self.belief = self.belief.min(logit(self.settings.doubt_below));
+            self.go(LockState::Suspect, "out of sight");
+        }
+    }
+
+    /// What the belief says about somebody who is seen.
+    fn judge(&mut self) {
+        let TargetSettings { refuse_below, doubt_below, training_sightings, .. } = self.settings;
+        let sure = self.sightings >= self.settings.again_sightings;
+        match self.state {
+            _ if self.belief < logit(refuse_below) => self.lose("looks like somebody else"),
+            LockState::Refound if self.belief < 0.0 => self.lose("was somebody else after all"),
+            LockState::Refound if self.since_s > 2.0 && sure => {
+                self.go(LockState::Locked, "looks right for long enough");
+            }
+            LockState::Suspect if self.belief > 0.0 && sure => {
+                self.go(LockState::Locked, "looks right");
+            }
+            LockState::Training if self.sightings >= training_sightings => {
+                self.go(LockState::Locked, "known well");
+            }
+            LockState::Locked if self.belief < logit(doubt_below) => {
+                self.go(LockState::Suspect, "looks different");
+            }
+            _ => {}
+        }
+    }
+
+    /// Looks for the person among those who are seen.
+    fn look_for(&mut self, tracks: &[Track], log_odds: &BTreeMap<TrackId, f64>) {
+        if !self.settings.remember {
+            return;
+        }
+        let weight = self.settings.belief_weight;
+        let enough = logit(self.settings.again_from);
+        let mut seen = BTreeMap::new();
+        for track in tracks.iter().filter(|track| self.is_in_reach(track)) {
+            let Some(odds) = log_odds.get(&track.id) else { continue };
+            let (before, times) = self.candidates.get(&track.id).copied().unwrap_or((*odds, 0));
+            let belief = before + weight * (odds - before);
+            seen.insert(track.id, (belief, if belief >= enough { times + 1 } else { 0 }));
+        }
+        self.candidates = seen;
+        let best = self.candidates.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let Some((id, (belief, times))) = best.map(|(id, candidate)| (*id, *candidate)) else {
+            return;
+        };
+        let Some(track) = tracks.iter().find(|track| track.id == id) else { return };
+        if times >= self.settings.again_sightings {
+            self.track = Some(id);
+            self.belief = belief;
+            self.doubtful = true;
+            self.sightings = 0;
+            self.candidates.clear();
+            self.see(track);
+            self.go(LockState::Refound, "somebody looks like the person");
+        }
+    }
+
+    /// Whether the person can have got to where a track is.
+    fn is_in_reach(&self, track: &Track) -> bool {
+        let Some(last) = &self.last else { return true };
+        let covariance = &track.estimate.covariance;
+        let sigma = (covariance[(0, 0)] + covariance[(1, 1)]).max(0.0).sqrt();
+        let reach_m = REACH_M + self.settings.reach_mps * last.ago_s + 3.0 * sigma;
+        nalgebra::distance(&track.estimate.person.position.xy(), &last.place) <= reach_m
+    }
+
+    /// The person was seen there.
+    fn see(&mut self, track: &Track) {
+        let person = &track.estimate.person;
+        let place = person.position.xy();
+        self.last = Some(LastSeen { place, velocity: person.velocity, ago_s: 0.0 });
+        self.sightings = self.sightings.saturating_add(1);
+    }
+
+    fn lose(&mut self, why: &'static str) {
+        self.candidates.clear();
+        self.go(LockState::Lost, why);
+    }
+
+    fn go(&mut self, state: LockState, why: &'static str) {
+        self.state = state;
+        self.why = why;
+        self.since_s = 0.0;
+        if state == LockState::Suspect {
+            self.sightings = 0;
+        }
+    }
+
+    /// Learns what the person looks like, and others, while that is certain.
+    fn learn(&mut self, tracks: &[Track], mut looks: BTreeMap<TrackId, Looks>) {
+        let certain = matches!(self.state, LockState::Training | LockState::Locked);
+        if !certain || self.doubtful {
+            return;
+        }
+        let alone: Vec<&Track> = tracks.iter().filter(|t| self.is_alone(t, tracks)).collect();
+        for track in alone {
+            match looks.remove(&track.id) {
+                Some(looks) if Some(track.id) == self.track => self.memory.learn(looks),
+                Some(looks) => self.memory.learn_other(looks),
+                None => {}
+            }
+        }
+    }
+}
+
+fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
+fn logit(probability: f64) -> f64 {
+    (probability / (1.0 - probability)).ln()
+}

@@ -1,0 +1,115 @@
+use nalgebra::Point2;
+use tagalong_core::{WheelSpeeds, Wheels};
+
+use super::lock::LastSeen;
+use super::settings::SearchSettings;
+
+/// Turning for each radian of bearing, 1/s.
+const TURN_GAIN: f64 = 1.5;
+/// Drives ahead only within this bearing, rad.
+const AHEAD_RAD: f64 = 0.35;
+/// Somebody goes on the way they went for this long, s.
+const GOES_ON_S: f64 = 1.5;
+/// Something blocks the way if the robot cannot move for this long, s.
+const BLOCKED_S: f64 = 1.0;
+
+/// Looks for a person who is lost: waits, drives to where they were last, turns
+/// to where they went, and on round; at last it gives up.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Search {
+    arrived: bool,
+    blocked_s: f64,
+    /// Which way it looks round, 1 to the left.
+    way: Option<f64>,
+}
+
+impl Search {
+    /// The wheel speeds to wish for; `lost_s` after the person was lost.
+    pub(crate) fn wish(
+        &mut self,
+        settings: &SearchSettings,
+        last: &LastSeen,
+        lost_s: f64,
+        wheels: &Wheels,
+    ) -> Option<WheelSpeeds> {
+        if !settings.enabled || lost_s < settings.wait_s || lost_s > settings.give_up_s {
+            return None;
+        }
+        self.arrived |= last.place.coords.norm() < settings.arrive_m
+            || self.blocked_s > BLOCKED_S
+            || lost_s > settings.wait_s + settings.drive_s;
+        let (speed_mps, turn) = match self.arrived {
+            false => drive_to(settings, &last.place),
+            true => (0.0, self.look_round(settings, last)),
+        };
+        let rim = turn * wheels.half_separation_m;
+        Some(WheelSpeeds { left: speed_mps - rim, right: speed_mps + rim })
+    }
+
+    /// Hears what became of the wish.
+    pub(crate) fn hear(&mut self, blocked: bool, dt_s: f64) {
+        self.blocked_s = if blocked { self.blocked_s + dt_s } else { 0.0 };
+    }
+
+    /// Turns to the side on which the person went, and on.
+    fn look_round(&mut self, settings: &SearchSettings, last: &LastSeen) -> f64 {
+        let went = last.place + GOES_ON_S * last.velocity;
+        let way = *self.way.get_or_insert_with(|| went.y.atan2(went.x).signum());
+        way * settings.turn_radps
+    }
+}
+
+/// Forward speed, m/s, and turn rate, rad/s, to a place.
+fn drive_to(settings: &SearchSettings, place: &Point2<f64>) -> (f64, f64) {
+    let bearing = place.y.atan2(place.x);
+    let turn = (TURN_GAIN * bearing).clamp(-settings.turn_radps, settings.turn_radps);
+    let ahead = bearing.abs() < AHEAD_RAD;
+    (if ahead { settings.speed_mps } else { 0.0 }, turn)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+
+    use super::*;
+
+    const WHEELS: Wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+
+    fn settings() -> SearchSettings {
+        SearchSettings { enabled: true, ..SearchSettings::default() }
+    }
+
+    fn last(x: f64, y: f64) -> LastSeen {
+        LastSeen { place: Point2::new(x, y), velocity: Vector2::new(0.0, -0.8), ago_s: 1.0 }
+    }
+
+    fn wish(last: &LastSeen, lost_s: f64) -> Option<WheelSpeeds> {
+        Search::default().wish(&settings(), last, lost_s, &WHEELS)
+    }
+
+    #[test]
+    fn it_waits_drives_looks_round_and_gives_up() {
+        assert_eq!(wish(&last(3.0, 0.0), 0.5), None);
+        let ahead = wish(&last(3.0, 0.0), 1.5).unwrap();
+        assert!(ahead.left > 0.3 && ahead.left == ahead.right, "{ahead:?}");
+        let aside = wish(&last(0.0, 3.0), 1.5).unwrap();
+        assert!(aside.left == -aside.right && aside.right > 0.0, "turns first: {aside:?}");
+        let there = wish(&last(0.3, 0.0), 1.5).unwrap();
+        assert!(there.left > 0.0 && there.right == -there.left, "to the right: {there:?}");
+        assert_eq!(wish(&last(3.0, 0.0), 20.5), None);
+    }
+
+    #[test]
+    fn something_in_the_way_makes_it_look_round_instead() {
+        let mut search = Search::default();
+        (0..12).for_each(|_| search.hear(true, 0.1));
+        let there = search.wish(&settings(), &last(3.0, 0.0), 3.0, &WHEELS).unwrap();
+        assert_eq!(there.left, -there.right);
+    }
+
+    #[test]
+    fn only_where_it_is_allowed() {
+        let settings = SearchSettings::default();
+        assert_eq!(Search::default().wish(&settings, &last(3.0, 0.0), 1.5, &WHEELS), None);
+    }
+}

@@ -1,0 +1,128 @@
+//! Faults on the way to the wheels: each leads to zero within the frame in which
+//! it is seen, or, where no frame comes, within a command's validity.
+
+use tagalong_core::{Command, Frame, Images, Motion, Reason, Stamp, WheelSpeeds};
+
+use super::doubles::{PLAIN, World, camera, frame, person, scored};
+use crate::{LockState, Pipeline};
+
+/// A pipeline that has driven after somebody for two seconds.
+fn driving(how: &str) -> (World, Pipeline) {
+    let world = World::of((0..60).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
+    let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\nconfig = {{ how = '{how}' }}\n");
+    let mut pipeline = world.pipeline(&config);
+    for index in 1..=20 {
+        pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+    }
+    assert!(is_moving(&pipeline.command_at(frame(20, 2.0).stamp).unwrap()));
+    (world, pipeline)
+}
+
+fn is_moving(command: &Command) -> bool {
+    command.wheels != WheelSpeeds::STOP
+}
+
+fn after(index: u64, t_s: f64, motion: Motion) -> Frame {
+    let stamp = frame(index, t_s).stamp;
+    Frame::new(index, stamp, std::sync::Arc::new(camera()), motion, Images::default())
+}
+
+/// The command for a frame that comes that much later.
+fn paused(pause_s: f64) -> (Pipeline, Command) {
+    let (_, mut pipeline) = driving("");
+    let report = pipeline.step(&after(21, 2.0 + pause_s, Motion::at_rest(pause_s))).unwrap();
+    (pipeline, report.command.unwrap())
+}
+
+#[test]
+fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
+    let (_, mut pipeline) = driving("");
+    let jump = Motion { forward: 2.0, ..Motion::at_rest(0.1) };
+    let command = pipeline.step(&after(21, 2.1, jump)).unwrap().command.unwrap();
+    assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
+    assert_eq!(pipeline.fault(), Some("odometry jumped"));
+    let later = pipeline.step(&frame(22, 2.2)).unwrap().command.unwrap();
+    assert_eq!(later.reason, Reason::Fault, "it lasts");
+    pipeline.arm();
+    assert!(is_moving(&pipeline.step(&frame(23, 2.3)).unwrap().command.unwrap()));
+    assert!(!is_moving(&paused(1.0).1));
+}
+
+#[test]
+fn t8_a_stall_halves_the_speed_then_stops_then_loses_the_person() {
+    let (_, slow) = paused(0.3);
+    assert_eq!(slow.reason, Reason::Slow);
+    assert!(slow.wheels.left + slow.wheels.right <= 0.9 + 1e-9, "half speed: {slow:?}");
+    let (_, stopped) = paused(0.6);
+    assert_eq!((stopped.wheels, stopped.reason), (WheelSpeeds::STOP, Reason::Stalled));
+    let (world, mut pipeline) = driving("");
+    world.show(0, 21, vec![]);
+    let lost = pipeline.step(&after(21, 4.2, Motion::at_rest(2.2))).unwrap();
+    assert_eq!(lost.lock.unwrap().state, LockState::Lost);
+}
+
+#[test]
+fn t8_without_frames_commands_expire_by_themselves() {
+    let (_, pipeline) = driving("");
+    let at = |t_s| pipeline.command_at(frame(20, t_s).stamp).unwrap();
+    assert!(is_moving(&at(2.2)));
+    let expired = at(2.3);
+    assert_eq!((expired.wheels, expired.reason), (WheelSpeeds::STOP, Reason::Expired));
+}
+
+#[test]
+fn s5_a_person_who_is_replaced_while_hidden_is_not_silently_swapped() {
+    let (world, mut pipeline) = driving("");
+    let mut other = scored(5.0, person(3.0, 0.0));
+    other.position.z = 1.9;
+    for index in 21..=30 {
+        world.show(0, index, vec![]);
+    }
+    for index in 31..=60 {
+        world.show(0, index, vec![other.clone()]);
+    }
+    for index in 21..=60 {
+        let report = pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        if index > 45 {
+            assert_eq!((report.target, report.lock.unwrap().state), (None, LockState::Lost));
+        }
+    }
+}
+
+#[test]
+fn s6_whoever_jumps_or_stands_anywhere_gets_commands_within_the_limits() {
+    for (x, y) in [(0.0, 0.0), (-3.0, 0.0), (0.3, 0.0), (20.0, 0.0), (3.0, 5.0), (-0.01, 1e-9)] {
+        let (world, mut pipeline) = driving("");
+        for index in 21..=40 {
+            world.show(0, index, vec![scored(5.0, person(x, y))]);
+            let command =
+                pipeline.step(&frame(index, index as f64 * 0.1)).unwrap().command.unwrap();
+            let WheelSpeeds { left, right } = command.wheels;
+            assert!(left.abs() <= 0.9 && right.abs() <= 0.9, "{x} {y} {command:?}");
+            assert!(left + right >= -1e-9, "backwards: {x} {y} {command:?}");
+        }
+    }
+}
+
+#[test]
+fn p1_a_plugin_that_panics_stops_the_robot_in_the_same_tick() {
+    let world = World::of((0..30).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
+    for (of, config) in [
+        ("drive", "[controller]\nplugin = 'drive'\nconfig = { how = 'panic at 21' }"),
+        (
+            "choosy",
+            "[controller]\nplugin = 'drive'\n[[verifiers]]\nplugin = 'choosy'\nconfig = { how = 'panic at 21' }",
+        ),
+    ] {
+        let mut pipeline = world.pipeline(&format!("{PLAIN}\n{config}\n"));
+        (1..=20).for_each(|i| drop(pipeline.step(&frame(i, i as f64 * 0.1)).unwrap()));
+        let now: Stamp = frame(21, 2.1).stamp;
+        assert!(is_moving(&pipeline.command_at(now).unwrap()));
+        let error = pipeline.step(&frame(21, 2.1)).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("frame 21: `{of}` panicked")), "{error}");
+        let command = pipeline.command_at(now).unwrap();
+        assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
+        pipeline.arm();
+        assert!(!is_moving(&pipeline.command_at(now).unwrap()), "no restart of a broken pipeline");
+    }
+}

@@ -1,0 +1,140 @@
+use tagalong_core::{Detection, Reason, TrackId};
+
+use super::doubles::{PLAIN, World, person, scored};
+use crate::{FrameReport, LockState};
+
+/// Somebody who is confirmed at once, with the head at this height, m.
+fn tall(height_m: f64, x: f64, y: f64) -> Detection {
+    let mut somebody = scored(5.0, person(x, y));
+    somebody.position.z = height_m;
+    somebody
+}
+
+/// There are no images: people are told apart by their height.
+fn config(target: &str) -> String {
+    format!(
+        "{PLAIN}\n[controller]\nplugin = 'drive'\n[target]\n{target}\n\
+         [target.looks]\nheight = [0.06, 60.0]\n"
+    )
+}
+
+fn ride(target: &str, frames: i32, people: impl Fn(i32) -> Vec<Detection>) -> Vec<FrameReport> {
+    World::of((0..frames).map(people)).run(&config(target), frames as u64, 0.1)
+}
+
+fn states(reports: &[FrameReport]) -> Vec<LockState> {
+    let mut states: Vec<_> =
+        reports.iter().filter_map(|r| r.lock.as_ref()).map(|lock| lock.state).collect();
+    states.dedup();
+    states
+}
+
+fn followed(report: &FrameReport) -> Option<u32> {
+    report.target.map(|TrackId(id)| id)
+}
+
+#[test]
+fn the_nearest_in_front_is_chosen_and_known_well_after_some_sightings() {
+    let people = |_| vec![tall(1.6, 4.0, 0.0), tall(1.6, 2.0, 0.3), tall(1.6, 0.5, 1.5)];
+    let reports = ride("", 30, people);
+    let last = &reports[29];
+    let target = last.tracks.iter().find(|t| Some(t.id) == last.target).unwrap();
+    assert_eq!(target.estimate.person.position.x, 2.0, "the nearest is not in front");
+    assert_eq!(states(&reports), [LockState::Training, LockState::Locked]);
+}
+
+#[test]
+fn somebody_can_be_chosen_by_number() {
+    let people = |_| vec![tall(1.6, 2.0, 0.0), tall(1.6, 4.0, 0.0)];
+    let far = ride("", 3, people)[2].tracks.iter().map(|t| t.id.0).max().unwrap();
+    let reports = ride(&format!("track = {far}"), 5, people);
+    assert_eq!(followed(&reports[4]), Some(far));
+}
+
+#[test]
+fn a_person_who_is_gone_is_lost_and_nobody_else_is_taken() {
+    let people = |i| match i {
+        0..20 => vec![tall(1.6, 2.0, 0.0)],
+        20..35 => vec![],
+        _ => vec![tall(1.85, 2.0, 0.0)],
+    };
+    let reports = ride("", 120, people);
+    assert_eq!(reports[119].target, None);
+    assert!(reports[119].tracks[0].confirmed, "somebody is there");
+    assert_eq!(reports[119].command.unwrap().reason, Reason::NoTarget);
+    let ends = [LockState::Suspect, LockState::Lost];
+    assert!(states(&reports).ends_with(&ends), "{:?}", states(&reports));
+}
+
+#[test]
+fn a_person_who_comes_back_is_known_again_after_several_sightings() {
+    let people = |i| match i {
+        0..20 => vec![tall(1.6, 2.0, 0.0)],
+        20..40 => vec![tall(1.85, 4.0, 2.0)],
+        _ => vec![tall(1.6, 2.5, 0.5), tall(1.85, 4.0, 2.0)],
+    };
+    let reports = ride("", 90, people);
+    let found = reports.iter().position(|r| r.lock.as_ref().unwrap().state == LockState::Refound);
+    assert!((44..50).contains(&found.unwrap()), "{found:?}");
+    let last = &reports[89];
+    let target = last.tracks.iter().find(|t| Some(t.id) == last.target).unwrap();
+    assert_eq!(target.estimate.person.position.z, 1.6);
+    assert_eq!(last.lock.as_ref().unwrap().state, LockState::Locked);
+    assert_eq!(reports[found.unwrap() + 19].command.unwrap().reason, Reason::Unsure);
+}
+
+#[test]
+fn nobody_comes_back_from_farther_than_they_can_have_got() {
+    let people = |i| match i {
+        0..20 => vec![tall(1.6, 1.5, 0.0)],
+        20..33 => vec![],
+        _ => vec![tall(1.6, 9.5, 0.0)],
+    };
+    let reports = ride("", 45, people);
+    assert_eq!(reports[44].target, None, "8 m in less than three seconds");
+    let reports = ride("reach_mps = 9.0", 45, people);
+    assert!(reports[44].target.is_some());
+}
+
+#[test]
+fn a_track_that_changes_over_to_somebody_else_is_doubted_and_left() {
+    // The other one comes near, and the person is gone.
+    let people = |i| match i {
+        0..20 => vec![tall(1.6, 3.0, 0.0)],
+        20..24 => vec![tall(1.6, 3.0, 0.0), tall(1.9, 3.0, 0.5)],
+        _ => vec![tall(1.9, 3.0, 0.1)],
+    };
+    let reports = ride("", 60, people);
+    assert!(reports[30..].iter().all(|r| r.target.is_none()), "{:?}", states(&reports));
+}
+
+#[test]
+fn nobody_came_near_so_it_is_the_same_person_whatever_they_look_like() {
+    let people = |i| vec![tall(if i < 20 { 1.6 } else { 1.3 }, 3.0, 0.0)];
+    let reports = ride("", 60, people);
+    assert_eq!(followed(&reports[59]), followed(&reports[0]));
+    assert_eq!(states(&reports), [LockState::Training, LockState::Locked]);
+}
+
+#[test]
+fn without_a_memory_a_track_is_followed_while_it_lives() {
+    let people = |i| match i {
+        0..20 => vec![tall(1.6, 2.0, 0.0)],
+        20..40 => vec![],
+        _ => vec![tall(1.6, 2.0, 0.0)],
+    };
+    let reports = ride("remember = false", 80, people);
+    assert_eq!(followed(&reports[10]), Some(1));
+    assert!(reports[40..].iter().all(|r| r.target.is_none()));
+}
+
+#[test]
+fn the_robot_looks_for_whoever_is_lost_where_it_may_and_gives_up() {
+    let people = |i| if i < 20 { vec![tall(1.6, 3.0, 0.0)] } else { vec![] };
+    let search = "search = { enabled = true, give_up_s = 4.0 }";
+    let reports = ride(search, 120, people);
+    let moves = |r: &FrameReport| r.command.unwrap().wheels != tagalong_core::WheelSpeeds::STOP;
+    assert!(reports[55..65].iter().all(moves), "looks for them");
+    assert!(reports[100..].iter().all(|r| !moves(r)), "has given up");
+    assert!(ride("", 120, people)[45..].iter().all(|r| !moves(r)), "not allowed to");
+}

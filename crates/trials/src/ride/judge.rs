@@ -1,0 +1,368 @@
+use nalgebra::{Point2, Vector2};
+use serde::Serialize;
+use tagalong_core::Track;
+use tagalong_pipeline::{FrameReport, Likeness};
+use tagalong_sim::Truth;
+
+use super::{Ride, Tick};
+use crate::Moment;
+
+/// Number of the person who is to be followed: the first of the scene.
+const WHOM: u16 = 1;
+/// A longer pause between frames counts as this one, s.
+const LONGEST_PAUSE_S: f64 = 0.5;
+/// A slower robot does not touch anybody: they touch it, m/s.
+const MOVES_MPS: f64 = 0.05;
+/// Jerk is that between accelerations over this time, s.
+const JERK_S: f64 = 0.1;
+/// A person's speed is that over about this time, s.
+const SPEED_S: f64 = 0.6;
+
+/// When following counts as good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RideJudge {
+    /// A track within this distance of a person's head is on that person, m.
+    pub same_m: f64,
+    /// Somebody is in view from this visible fraction of the upper body on ...
+    pub min_visible: f64,
+    /// ... up to this range, m.
+    pub max_range_m: f64,
+    /// Whoever comes back into view is to be found within this time, s.
+    pub refind_s: f64,
+    /// Following the wrong one for longer in one go spoils the ride, s.
+    pub most_wrong_s: f64,
+    /// The distance is kept within this of the stand-off, m ...
+    pub off_m: f64,
+    /// ... while the person is slower than this, m/s.
+    pub slow_mps: f64,
+}
+
+impl Default for RideJudge {
+    fn default() -> Self {
+        Self {
+            same_m: 0.6,
+            min_visible: 0.5,
+            max_range_m: 5.0,
+            refind_s: 3.0,
+            most_wrong_s: 2.0,
+            off_m: 0.5,
+            slow_mps: 0.8,
+        }
+    }
+}
+
+/// A time in which the person was not followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Episode {
+    /// When the person was lost, s since the start.
+    pub lost_s: f64,
+    /// Since when the person was in view at the end of the episode, s.
+    pub in_view_s: Option<f64>,
+    /// When the person was followed again, s.
+    pub found_s: Option<f64>,
+}
+
+/// How a ride went.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Ridden {
+    /// Seed of the scene.
+    pub seed: u64,
+    /// The person was followed, or rightly given up, and nobody else for long.
+    pub kept: bool,
+    /// Length of the ride, s.
+    pub time_s: f64,
+    /// The person was in view, s.
+    pub in_view_s: f64,
+    /// The right person was followed, s.
+    pub right_s: f64,
+    /// Somebody or something else was followed, s.
+    pub wrong_s: f64,
+    /// The same in one go, s.
+    pub longest_wrong_s: f64,
+    /// The person was followed and walked slowly, s ...
+    pub slow_s: f64,
+    /// ... and the distance was kept, s.
+    pub distance_kept_s: f64,
+    /// Times without the person after the first with them.
+    pub episodes: Vec<Episode>,
+    /// Least room to people while the robot moved, m; none where nobody is.
+    pub clearance_people_m: Option<f64>,
+    /// Least room to furniture and walls while the robot moved, m.
+    pub clearance_things_m: Option<f64>,
+    /// Root of the mean square of the forward jerk, m/s³.
+    pub jerk_mps3: f64,
+    /// What the lock thought of each sighting, and whether it was the person.
+    #[serde(skip)]
+    pub likeness: Vec<(Likeness, bool)>,
+}
+
+/// Who is followed in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Whom {
+    Nobody,
+    Right,
+    Wrong,
+}
+
+/// One frame, judged.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    at_s: f64,
+    dt_s: f64,
+    whom: Whom,
+    in_view: bool,
+    range_m: Option<f64>,
+    speed_mps: Option<f64>,
+}
+
+impl RideJudge {
+    /// Judges a ride after the first person of the scene.
+    pub fn judge(&self, ride: &Ride) -> Ridden {
+        let looks = self.looks(ride);
+        let sum = |counts: &dyn Fn(&Look) -> bool| -> f64 {
+            looks.iter().filter(|look| counts(look)).fold(0.0, |sum, look| sum + look.dt_s)
+        };
+        let slow =
+            |l: &Look| l.whom == Whom::Right && l.speed_mps.is_some_and(|mps| mps < self.slow_mps);
+        let near = |l: &Look| match (l.range_m, ride.stand_off_m) {
+            (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
+            _ => false,
+        };
+        let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
+        let episodes = episodes(&looks);
+        let longest_wrong_s = longest(&looks, |look| look.whom == Whom::Wrong);
+        Ridden {
+            seed: ride.seed,
+            kept: longest_wrong_s <= self.most_wrong_s && self.ends_well(&looks, &episodes),
+            time_s: sum(&|_| true),
+            in_view_s: sum(&|look| look.in_view),
+            right_s: sum(&|look| look.whom == Whom::Right),
+            wrong_s: sum(&|look| look.whom == Whom::Wrong),
+            longest_wrong_s,
+            slow_s: sum(&slow),
+            distance_kept_s: sum(&|look| slow(look) && near(look)),
+            episodes,
+            clearance_people_m: least(moving().map(|tick| tick.clearance.people_m)),
+            clearance_things_m: least(moving().map(|tick| tick.clearance.things_m)),
+            jerk_mps3: jerk(&ride.ticks),
+            likeness: self.likeness(ride),
+        }
+    }
+
+    /// Whether somebody who came back into view was found in time; `None` if the
+    /// person never came back, or only just before the end.
+    pub fn refound(&self, episode: &Episode, end_s: f64) -> Option<bool> {
+        let in_view_s = episode.in_view_s?;
+        match episode.found_s {
+            Some(found_s) => Some(found_s - in_view_s <= self.refind_s),
+            None => (end_s - in_view_s > self.refind_s).then_some(false),
+        }
+    }
+
+    fn ends_well(&self, looks: &[Look], episodes: &[Episode]) -> bool {
+        let found = looks.iter().any(|look| look.whom == Whom::Right);
+        let end_s = looks.last().map_or(0.0, |look| look.at_s);
+        let last = episodes.last().filter(|episode| episode.found_s.is_none());
+        found && last.and_then(|episode| self.refound(episode, end_s)).unwrap_or(true)
+    }
+
+    fn looks(&self, ride: &Ride) -> Vec<Look> {
+        let mut before = Whom::Nobody;
+        let places: Vec<_> = ride.moments.iter().map(place).collect();
+        let seconds: Vec<f64> =
+            ride.moments.iter().map(|m| m.stamp.nanos() as f64 * 1e-9).collect();
+        let look = |(at, (moment, report)): (usize, (&Moment, &FrameReport))| {
+            before = self.whom(moment, report, before);
+            let truth = person(moment);
+            let next_s = seconds.get(at + 1).copied().unwrap_or(seconds[at]);
+            Look {
+                at_s: seconds[at],
+                dt_s: (next_s - seconds[at]).clamp(0.0, LONGEST_PAUSE_S),
+                whom: before,
+                in_view: truth.is_some_and(|truth| self.is_in_view(truth)),
+                range_m: truth.map(|truth| truth.head_in_robot.xy().coords.norm()),
+                speed_mps: speed(&places, &seconds, at),
+            }
+        };
+        ride.moments.iter().zip(&ride.reports).enumerate().map(look).collect()
+    }
+
+    fn is_in_view(&self, truth: &Truth) -> bool {
+        let range_m = truth.head_in_robot.xy().coords.norm();
+        truth.visible_fraction >= self.min_visible && range_m <= self.max_range_m
+    }
+
+    /// Who is followed; a track that is not seen is on whom it was before.
+    fn whom(&self, moment: &Moment, report: &FrameReport, before: Whom) -> Whom {
+        if !report.outcome.is_processed() {
+            return before;
+        }
+        let target = report.tracks.iter().find(|track| Some(track.id) == report.target);
+        match target {
+            None => Whom::Nobody,
+            Some(track) if track.seen => match self.is_of(track, moment) {
+                true => Whom::Right,
+                false => Whom::Wrong,
+            },
+            Some(_) if before == Whom::Nobody => Whom::Wrong,
+            Some(_) => before,
+        }
+    }
+
+    /// Whether a track is on the person who is to be followed.
+    fn is_of(&self, track: &Track, moment: &Moment) -> bool {
+        let place = track.estimate.person.position.xy();
+        let off = |truth: &&Truth| (truth.head_in_robot.xy() - place).norm();
+        let nearest = moment.truth.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.is_some_and(|truth| truth.id == WHOM && off(&truth) <= self.same_m)
+    }
+
+    fn likeness(&self, ride: &Ride) -> Vec<(Likeness, bool)> {
+        let frames = ride.moments.iter().zip(&ride.reports);
+        let of_frame = |(moment, report): (&Moment, &FrameReport)| -> Vec<(Likeness, bool)> {
+            let track = |id| report.tracks.iter().find(|track| track.id == id);
+            let likeness = report.lock.iter().flat_map(|lock| &lock.likeness);
+            likeness.filter_map(|l| Some((*l, self.is_of(track(l.track)?, moment)))).collect()
+        };
+        frames.flat_map(of_frame).collect()
+    }
+}
+
+fn person(moment: &Moment) -> Option<&Truth> {
+    moment.truth.iter().find(|truth| truth.id == WHOM)
+}
+
+/// The person in the world, m.
+fn place(moment: &Moment) -> Option<Point2<f64>> {
+    person(moment).map(|truth| moment.world_from_robot * truth.head_in_robot.xy())
+}
+
+/// Speed over ground around a frame, m/s.
+fn speed(places: &[Option<Point2<f64>>], seconds: &[f64], at: usize) -> Option<f64> {
+    let near = |other: &usize| (seconds[*other] - seconds[at]).abs() <= 0.5 * SPEED_S;
+    let first = (0..=at).rev().take_while(near).last()?;
+    let last = (at..seconds.len()).take_while(near).last()?;
+    let way: Vector2<f64> = places[last]? - places[first]?;
+    let time_s = seconds[last] - seconds[first];
+    (time_s > 0.0).then(|| way.norm() / time_s)
+}
+
+/// Times without the person, from the first time with them on.
+fn episodes(looks: &[Look]) -> Vec<Episode> {
+    let mut all: Vec<Episode> = Vec::new();
+    let mut followed = None;
+    for look in looks {
+        let right = look.whom == Whom::Right;
+        match (followed, right) {
+            (Some(true), false) => {
+                all.push(Episode { lost_s: look.at_s, ..Episode::default() });
+            }
+            (Some(false), true) => {
+                if let Some(open) = all.last_mut() {
+                    open.found_s = Some(look.at_s);
+                    open.in_view_s.get_or_insert(look.at_s);
+                }
+            }
+            _ => {}
+        }
+        if let Some(open) = all.last_mut().filter(|_| !right) {
+            open.in_view_s = look.in_view.then(|| open.in_view_s.unwrap_or(look.at_s));
+        }
+        if right || followed.is_some() {
+            followed = Some(right);
+        }
+    }
+    all
+}
+
+/// The longest time in one go, s.
+fn longest(looks: &[Look], counts: impl Fn(&Look) -> bool) -> f64 {
+    let (mut now, mut most) = (0.0_f64, 0.0_f64);
+    for look in looks {
+        now = if counts(look) { now + look.dt_s } else { 0.0 };
+        most = most.max(now);
+    }
+    most
+}
+
+fn least(values: impl Iterator<Item = f64>) -> Option<f64> {
+    values.filter(|value| value.is_finite()).min_by(f64::total_cmp)
+}
+
+/// Root of the mean square jerk over speeds a tenth of a second apart, m/s³.
+fn jerk(ticks: &[Tick]) -> f64 {
+    let mut samples: Vec<(f64, f64)> = Vec::new();
+    for tick in ticks {
+        if samples.last().is_none_or(|(at_s, _)| tick.at_s - at_s >= JERK_S - 1e-6) {
+            samples.push((tick.at_s, tick.speed_mps));
+        }
+    }
+    let squares: Vec<f64> = samples
+        .windows(3)
+        .map(|w| ((w[2].1 - 2.0 * w[1].1 + w[0].1) / (JERK_S * JERK_S)).powi(2))
+        .collect();
+    if squares.is_empty() {
+        0.0
+    } else {
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn looks(whom: &[(Whom, bool)]) -> Vec<Look> {
+        let look = |(at, (whom, in_view)): (usize, &(Whom, bool))| Look {
+            at_s: at as f64 * 0.5,
+            dt_s: 0.5,
+            whom: *whom,
+            in_view: *in_view,
+            range_m: Some(1.8),
+            speed_mps: Some(0.0),
+        };
+        whom.iter().enumerate().map(look).collect()
+    }
+
+    #[test]
+    fn an_episode_counts_from_when_the_person_is_in_view_again() {
+        use Whom::{Nobody, Right, Wrong};
+        let all = episodes(&looks(&[
+            (Nobody, true),
+            (Right, true),
+            (Wrong, true),
+            (Nobody, false),
+            (Nobody, true),
+            (Nobody, true),
+            (Right, true),
+            (Nobody, false),
+        ]));
+        let first = Episode { lost_s: 1.0, in_view_s: Some(2.0), found_s: Some(3.0) };
+        let second = Episode { lost_s: 3.5, in_view_s: None, found_s: None };
+        assert_eq!(all, [first, second]);
+        let judge = RideJudge::default();
+        assert_eq!(judge.refound(&first, 9.0), Some(true));
+        assert_eq!(judge.refound(&second, 9.0), None);
+        let late = Episode { in_view_s: Some(4.0), ..second };
+        assert_eq!((judge.refound(&late, 6.0), judge.refound(&late, 8.0)), (None, Some(false)));
+    }
+
+    #[test]
+    fn the_longest_time_is_in_one_go() {
+        use Whom::{Right, Wrong};
+        let all = looks(&[(Wrong, true), (Right, true), (Wrong, true), (Wrong, true)]);
+        assert_eq!(longest(&all, |look| look.whom == Wrong), 1.0);
+    }
+
+    #[test]
+    fn a_steady_speed_has_no_jerk_and_a_sudden_stop_has() {
+        let clearance = tagalong_sim::Clearance { people_m: 1.0, things_m: 1.0 };
+        let ride = |speed: &dyn Fn(usize) -> f64| -> Vec<Tick> {
+            let tick = |i: usize| Tick { at_s: i as f64 * 0.02, speed_mps: speed(i), clearance };
+            (0..200).map(tick).collect()
+        };
+        assert!(jerk(&ride(&|_| 0.5)) < 1e-9);
+        assert!(jerk(&ride(&|i| 0.002 * i as f64)) < 1e-6);
+        assert!(jerk(&ride(&|i| if i < 100 { 0.5 } else { 0.0 })) > 5.0);
+    }
+}

@@ -1,0 +1,130 @@
+use std::f64::consts::TAU;
+
+use nalgebra::Point2;
+use tagalong_core::{Camera, DepthImage, Motion};
+
+/// Directions around the robot.
+const DIRECTIONS: usize = 90;
+/// Columns and rows of the image that are looked at.
+const COLUMNS: usize = 90;
+const ROWS: usize = 60;
+/// Nothing farther away is remembered, m.
+const RANGE_M: f64 = 4.0;
+
+/// The nearest thing in each direction around the robot, seen or remembered.
+#[derive(Clone, Debug)]
+pub(crate) struct Around {
+    things: Vec<Option<Thing>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Thing {
+    /// Robot frame, m.
+    at: Point2<f64>,
+    age_s: f64,
+}
+
+impl Around {
+    pub(crate) fn new() -> Self {
+        Self { things: vec![None; DIRECTIONS] }
+    }
+
+    /// The places of all things, robot frame, m.
+    pub(crate) fn places(&self) -> impl Iterator<Item = Point2<f64>> {
+        self.things.iter().flatten().map(|thing| thing.at)
+    }
+
+    /// The robot has moved; what is older than `memory_s` is forgotten.
+    pub(crate) fn move_along(&mut self, motion: &Motion, memory_s: f64) {
+        let before = std::mem::replace(&mut self.things, vec![None; DIRECTIONS]);
+        for thing in before.into_iter().flatten() {
+            let age_s = thing.age_s + motion.dt;
+            if age_s <= memory_s {
+                self.add(Thing { at: motion.apply_to_point(thing.at), age_s });
+            }
+        }
+    }
+
+    /// Takes in a depth image: what it shows replaces what was remembered there.
+    /// Points between the `heights`, m, count that `is_thing` says yes to.
+    pub(crate) fn look(
+        &mut self,
+        camera: &Camera,
+        depth: &DepthImage,
+        heights: [f64; 2],
+        is_thing: impl Fn(&Point2<f64>) -> bool,
+    ) {
+        let across = depth.width().div_ceil(COLUMNS).max(1);
+        let down = depth.height().div_ceil(ROWS).max(1);
+        let mut seen = vec![None; DIRECTIONS];
+        let mut looked = vec![false; DIRECTIONS];
+        for y in (0..depth.height()).step_by(down) {
+            let row = depth.row(y);
+            for x in (0..depth.width()).step_by(across) {
+                let z = f64::from(row[x]);
+                if !(z > 0.0 && z.is_finite()) {
+                    continue;
+                }
+                let point = camera.back_project(Point2::new(x as f64, y as f64), z);
+                let at = point.xy();
+                let Some(direction) = direction(&at) else { continue };
+                looked[direction] = true;
+                if (heights[0]..heights[1]).contains(&point.z) && is_thing(&at) {
+                    keep_nearer(&mut seen[direction], Thing { at, age_s: 0.0 });
+                }
+            }
+        }
+        for (direction, thing) in seen.into_iter().enumerate().filter(|(d, _)| looked[*d]) {
+            self.things[direction] = thing;
+        }
+    }
+
+    fn add(&mut self, thing: Thing) {
+        if let Some(direction) = direction(&thing.at) {
+            keep_nearer(&mut self.things[direction], thing);
+        }
+    }
+}
+
+fn keep_nearer(place: &mut Option<Thing>, thing: Thing) {
+    let range = |thing: &Thing| thing.at.coords.norm_squared();
+    if place.is_none_or(|known| range(&thing) < range(&known)) {
+        *place = Some(thing);
+    }
+}
+
+/// The direction of a place; `None` for what is far away or not a number.
+fn direction(at: &Point2<f64>) -> Option<usize> {
+    if !(at.coords.norm() < RANGE_M) {
+        return None;
+    }
+    let part = at.y.atan2(at.x).rem_euclid(TAU) / TAU;
+    Some((part * DIRECTIONS as f64) as usize % DIRECTIONS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn things_stay_where_they_are_while_the_robot_moves_and_are_forgotten() {
+        let mut around = Around::new();
+        around.add(Thing { at: Point2::new(1.0, 0.5), age_s: 0.0 });
+        let step = Motion { forward: 0.5, ..Motion::at_rest(1.0) };
+        around.move_along(&step, 2.5);
+        let places: Vec<_> = around.places().collect();
+        assert_eq!(places, [Point2::new(0.5, 0.5)]);
+        around.move_along(&step, 2.5);
+        around.move_along(&step, 2.5);
+        assert_eq!(around.places().count(), 0);
+    }
+
+    #[test]
+    fn the_nearer_of_two_things_in_a_direction_counts() {
+        let mut around = Around::new();
+        for x in [2.0, 1.0, 3.0, f64::NAN, 9.0] {
+            around.add(Thing { at: Point2::new(x, 0.01 * x), age_s: 0.0 });
+        }
+        assert_eq!(around.places().map(|p| p.x).collect::<Vec<_>>(), [1.0]);
+    }
+}

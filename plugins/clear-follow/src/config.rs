@@ -1,0 +1,106 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// Settings of the controller `clear-follow`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Distance kept from the person, m, on the floor.
+    pub stand_off_m: f64,
+    /// Speed for each metre beyond the stand-off, 1/s.
+    pub range_gain_per_s: f64,
+    /// Turning for each radian of bearing, 1/s, beside as much as the person
+    /// walks around the robot.
+    pub bearing_gain_per_s: f64,
+    /// Turns no faster than this, rad/s.
+    pub max_turn_rate: f64,
+    /// Speeds up by at most this much, m/s².
+    pub max_acceleration: f64,
+    /// Slows down by at most this much, m/s².
+    pub max_deceleration: f64,
+    /// Drives after a person who is not seen for half of this time, then slows
+    /// down, and stands still at the end of it, s.
+    pub max_unseen_s: f64,
+    /// From the capture of an image until the wheels answer to it, s.
+    pub latency_s: f64,
+    /// Looks ahead for this long, s.
+    pub horizon_s: f64,
+    /// Radius of the robot, m.
+    pub radius_m: f64,
+    /// Wants this much room around itself, m.
+    pub room_m: f64,
+    /// Things lower than this are floor, and higher ones are passed below, m.
+    pub heights_m: [f64; 2],
+    /// Remembers things out of sight for this long, s.
+    pub memory_s: f64,
+    /// What it costs to have no room at all; a change of the speed by its whole
+    /// limit costs one.
+    pub room_weight: f64,
+    /// What it costs to have somebody right before the person.
+    pub sight_weight: f64,
+    /// What it costs to turn differently, for each rad/s.
+    pub turn_weight: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            stand_off_m: 1.4,
+            range_gain_per_s: 1.0,
+            bearing_gain_per_s: 1.5,
+            max_turn_rate: 1.2,
+            max_acceleration: 0.5,
+            max_deceleration: 1.0,
+            max_unseen_s: 1.0,
+            latency_s: 0.2,
+            horizon_s: 1.5,
+            radius_m: 0.25,
+            room_m: 0.3,
+            heights_m: [0.1, 1.5],
+            memory_s: 5.0,
+            room_weight: 4.0,
+            sight_weight: 0.3,
+            turn_weight: 0.25,
+        }
+    }
+}
+
+/// Above this nothing on the floor makes sense, whatever the unit.
+pub(crate) const MOST: f64 = 1e6;
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let numbers = [
+            ("stand_off_m", self.stand_off_m, true),
+            ("range_gain_per_s", self.range_gain_per_s, false),
+            ("bearing_gain_per_s", self.bearing_gain_per_s, false),
+            ("max_turn_rate", self.max_turn_rate, false),
+            ("max_acceleration", self.max_acceleration, false),
+            ("max_deceleration", self.max_deceleration, false),
+            ("max_unseen_s", self.max_unseen_s, false),
+            ("latency_s", self.latency_s, true),
+            ("horizon_s", self.horizon_s, false),
+            ("radius_m", self.radius_m, false),
+            ("room_m", self.room_m, false),
+            ("memory_s", self.memory_s, true),
+            ("room_weight", self.room_weight, true),
+            ("sight_weight", self.sight_weight, true),
+            ("turn_weight", self.turn_weight, true),
+        ];
+        for (key, value, may_be_zero) in numbers {
+            let least = if may_be_zero { 0.0 } else { 1.0 / MOST };
+            if !(least..=MOST).contains(&value) {
+                let bound = if may_be_zero { "at least 0" } else { "positive" };
+                let message = format!("`{key}` must be {bound} and below {MOST:e}, not {value}");
+                return Err(Error::Settings(message));
+            }
+        }
+        let [low, high] = self.heights_m;
+        if !(0.0 <= low && low < high && high <= MOST) {
+            return Err(Error::Settings("`heights_m` must be two rising heights".into()));
+        }
+        Ok(())
+    }
+}

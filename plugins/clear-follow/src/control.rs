@@ -1,0 +1,142 @@
+use nalgebra::{Point2, Vector2};
+use tagalong_core::{Controller, Motion, Scene, Sent, Track, WheelSpeeds};
+
+use crate::around::Around;
+use crate::config::{Config, MOST};
+use crate::plan::{Surroundings, Twist, Walker, plan};
+
+/// A longer pause between frames counts as this one, s.
+const LONGEST_STEP_S: f64 = 0.5;
+/// Points this near to somebody are that person, m.
+const PERSON_M: f64 = 0.45;
+/// The person is never nearer than this to the law that turns, m.
+const LEAST_RANGE_M: f64 = 0.5;
+
+/// Follows a person and keeps clear of everything else.
+#[derive(Clone, Debug)]
+pub struct ClearFollow {
+    config: Config,
+    around: Around,
+    /// The forward speed of the last command, m/s.
+    speed_mps: f64,
+    sent: Sent,
+}
+
+impl Controller for ClearFollow {
+    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
+        let motion = &scene.frame.motion;
+        let dt = if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 };
+        self.sent.grow_older(dt);
+        self.look(scene);
+        let command = self.steer(scene, dt).unwrap_or_else(|| {
+            self.speed_mps = 0.0;
+            WheelSpeeds::STOP
+        });
+        self.sent.add(command);
+        command
+    }
+
+    fn stand_off_m(&self) -> Option<f64> {
+        Some(self.config.stand_off_m)
+    }
+}
+
+impl ClearFollow {
+    /// A controller of a robot at rest.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] if a number cannot work.
+    pub fn new(config: Config) -> tagalong_core::Result<Self> {
+        config.check()?;
+        let sent = Sent::new(config.latency_s);
+        Ok(Self { config, around: Around::new(), speed_mps: 0.0, sent })
+    }
+
+    /// What stands around; people walk and are told apart.
+    fn look(&mut self, scene: &Scene<'_>) {
+        let people: Vec<Point2<f64>> = scene
+            .tracks
+            .iter()
+            .chain(scene.target)
+            .map(|t| t.estimate.person.position.xy())
+            .collect();
+        let is_thing =
+            |at: &Point2<f64>| people.iter().all(|p| nalgebra::distance(p, at) > PERSON_M);
+        self.around.move_along(&scene.frame.motion, self.config.memory_s);
+        if let Ok(depth) = scene.frame.depth() {
+            self.around.look(&scene.frame.camera, depth, self.config.heights_m, is_thing);
+        }
+    }
+
+    fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<WheelSpeeds> {
+        let (wheels, max_mps) = (&scene.wheels, scene.max_speed_mps);
+        let is_sensible = |number: f64| number > 0.0 && number <= MOST;
+        if !is_sensible(wheels.half_separation_m) || !is_sensible(max_mps) {
+            return None;
+        }
+        let target = scene.target?;
+        let to_come = self.sent.forecast(wheels);
+        let person = walker(target, &to_come)?;
+        let nominal = self.nominal(&person, self.trust(target), max_mps);
+        let others = scene.tracks.iter().filter(|track| track.id != target.id);
+        let others: Vec<Walker> = others.filter_map(|track| walker(track, &to_come)).collect();
+        let things: Vec<_> = self.around.places().map(|at| to_come.apply_to_point(at)).collect();
+        let around = Surroundings { things: &things, others: &others, person, max_mps };
+        let planned = plan(&self.config, nominal, &around);
+        let twist = self.ramped(nominal, planned, dt);
+        self.speed_mps = twist.speed_mps;
+        Some(of_wheels(twist, wheels.half_separation_m, max_mps))
+    }
+
+    /// What would be right in an empty room: to face the person, and to keep the
+    /// distance.
+    fn nominal(&self, person: &Walker, trust: f64, max_mps: f64) -> Twist {
+        let config = &self.config;
+        let range_m = person.at.coords.norm();
+        let bearing = person.at.y.atan2(person.at.x);
+        let towards = person.at.coords.try_normalize(1e-6).unwrap_or_else(Vector2::x);
+        let around = towards.perp(&person.velocity) / range_m.max(LEAST_RANGE_M);
+        let turn = config.bearing_gain_per_s * bearing + around;
+        let turn_rate = trust * turn.clamp(-config.max_turn_rate, config.max_turn_rate);
+        let recedes = person.velocity.dot(&towards).max(0.0);
+        let wanted = config.range_gain_per_s * (range_m - config.stand_off_m) + recedes;
+        let ahead = bearing.cos().max(0.0).powi(2);
+        let speed_mps = (wanted.clamp(0.0, max_mps) * ahead).min(trust * max_mps);
+        Twist { speed_mps, turn_rate }
+    }
+
+    /// On the way from the last speed to the planned one. The detour keeps its
+    /// curvature meanwhile, so that it stays the detour that was planned.
+    fn ramped(&self, nominal: Twist, planned: Twist, dt: f64) -> Twist {
+        let least = self.speed_mps - self.config.max_deceleration * dt;
+        let most = self.speed_mps + self.config.max_acceleration * dt;
+        let speed_mps = planned.speed_mps.clamp(least, most).max(0.0);
+        let detour = planned.turn_rate - nominal.turn_rate;
+        let share = if planned.speed_mps > 0.0 { speed_mps / planned.speed_mps } else { 1.0 };
+        Twist { speed_mps, turn_rate: nominal.turn_rate + detour * share.min(1.0) }
+    }
+
+    /// How far to believe in somebody who is coasting: 1, then less, then 0.
+    fn trust(&self, target: &Track) -> f64 {
+        let left = 2.0 * (1.0 - target.unseen_s / self.config.max_unseen_s);
+        if left > 0.0 { left.min(1.0) } else { 0.0 }
+    }
+}
+
+/// Somebody as the robot will see them after its motion to come; `None` if they
+/// are nowhere.
+fn walker(track: &Track, to_come: &Motion) -> Option<Walker> {
+    let person = &track.estimate.person;
+    let is_known = person.velocity.iter().all(|v| v.abs() < MOST);
+    let velocity = if is_known { person.velocity } else { Vector2::zeros() };
+    let at = to_come.apply_to_point(person.position.xy() + velocity * to_come.dt);
+    let velocity = to_come.apply_to_velocity(velocity);
+    at.iter().all(|v| v.abs() < MOST).then_some(Walker { at, velocity })
+}
+
+/// Slower where the wheels cannot do it, on the same arc.
+fn of_wheels(twist: Twist, half_separation_m: f64, max_mps: f64) -> WheelSpeeds {
+    let rim = twist.turn_rate * half_separation_m;
+    let scale = (max_mps / (twist.speed_mps.abs() + rim.abs()).max(max_mps)).min(1.0);
+    WheelSpeeds { left: (twist.speed_mps - rim) * scale, right: (twist.speed_mps + rim) * scale }
+}

@@ -1,0 +1,164 @@
+use nalgebra::{Isometry2, Point2, Vector2};
+
+use crate::config::Config;
+
+/// The horizon is looked at in so many steps.
+const STEPS: u32 = 6;
+/// What is left of the speed.
+const SPEEDS: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.0];
+/// What is added to the turn rate, rad/s, to the side to which it turns.
+const TURNS: [f64; 9] = [0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9];
+/// Radius of a person, m.
+const PERSON_M: f64 = 0.25;
+/// Somebody nearer than this to the line of sight hides the person, m.
+const SIGHT_M: f64 = 0.35;
+
+/// Forward speed, m/s, and turn rate, rad/s, to the left positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Twist {
+    pub(crate) speed_mps: f64,
+    pub(crate) turn_rate: f64,
+}
+
+impl Twist {
+    /// Where the robot is after some time.
+    fn after(self, seconds: f64) -> Isometry2<f64> {
+        let turn = self.turn_rate * seconds;
+        let half = 0.5 * turn;
+        let chord =
+            self.speed_mps * seconds * if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
+        Isometry2::new(Vector2::new(half.cos(), half.sin()) * chord, turn)
+    }
+}
+
+/// Somebody who walks, as the robot will see it when the wheels answer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Walker {
+    pub(crate) at: Point2<f64>,
+    pub(crate) velocity: Vector2<f64>,
+}
+
+impl Walker {
+    fn after(&self, seconds: f64) -> Point2<f64> {
+        self.at + self.velocity * seconds
+    }
+}
+
+/// What a plan has to mind, as the robot will see it when the wheels answer.
+pub(crate) struct Surroundings<'a> {
+    pub(crate) things: &'a [Point2<f64>],
+    pub(crate) others: &'a [Walker],
+    pub(crate) person: Walker,
+    pub(crate) max_mps: f64,
+}
+
+/// The cheapest change of a twist.
+pub(crate) fn plan(config: &Config, nominal: Twist, around: &Surroundings<'_>) -> Twist {
+    let side = if nominal.turn_rate < 0.0 { -1.0 } else { 1.0 };
+    let limit = config.max_turn_rate;
+    let candidates = SPEEDS.iter().flat_map(|part| {
+        TURNS.iter().map(move |change| Twist {
+            speed_mps: part * nominal.speed_mps,
+            turn_rate: (nominal.turn_rate + side * change).clamp(-limit, limit),
+        })
+    });
+    let cost = |twist: &Twist| cost(config, nominal, *twist, around);
+    candidates.min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(nominal)
+}
+
+fn cost(config: &Config, nominal: Twist, twist: Twist, around: &Surroundings<'_>) -> f64 {
+    let slower = (nominal.speed_mps - twist.speed_mps).abs() / around.max_mps;
+    let turned = (nominal.turn_rate - twist.turn_rate).abs();
+    let room = clearance(config, twist, around) / config.room_m;
+    let tight = (1.0 - room).clamp(0.0, 2.0);
+    slower
+        + config.turn_weight * turned
+        + config.room_weight * tight * tight
+        + config.sight_weight * hidden(config, twist, around)
+}
+
+/// The least room to things and people on the way, m. A robot that does not drive
+/// comes nearer to nothing.
+fn clearance(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
+    if twist.speed_mps <= 0.0 {
+        return f64::INFINITY;
+    }
+    let step_s = config.horizon_s / f64::from(STEPS);
+    let mut least = f64::INFINITY;
+    for step in 1..=STEPS {
+        let seconds = step_s * f64::from(step);
+        let robot = Point2::from(twist.after(seconds).translation.vector);
+        let gap = |at: Point2<f64>, its_m: f64| (at - robot).norm() - its_m - config.radius_m;
+        let things = around.things.iter().map(|at| gap(*at, 0.0));
+        let people = around.others.iter().map(|other| gap(other.after(seconds), PERSON_M));
+        least = things.chain(people).fold(least, f64::min);
+    }
+    least
+}
+
+/// How far somebody else is before the person at the end of the horizon, 0 to 1.
+fn hidden(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
+    let pose = twist.after(config.horizon_s);
+    let seen =
+        |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
+    let person = seen(&around.person);
+    let Some(sight) = person.try_normalize(1e-6) else { return 0.0 };
+    let before = |other: &Walker| {
+        let at = seen(other);
+        let (along, aside) = (at.dot(&sight), at.perp(&sight).abs());
+        let between = along > 0.0 && along < person.norm() - PERSON_M;
+        if between { (1.0 - aside / SIGHT_M).max(0.0) } else { 0.0 }
+    };
+    around.others.iter().map(before).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AHEAD: Twist = Twist { speed_mps: 0.8, turn_rate: 0.0 };
+
+    fn planned(things: &[Point2<f64>], others: &[Walker]) -> Twist {
+        let person = Walker { at: Point2::new(3.0, 0.0), velocity: Vector2::new(0.8, 0.0) };
+        plan(&Config::default(), AHEAD, &Surroundings { things, others, person, max_mps: 0.9 })
+    }
+
+    #[test]
+    fn an_empty_room_changes_nothing() {
+        assert_eq!(planned(&[], &[]), AHEAD);
+        assert_eq!(planned(&[Point2::new(1.0, 1.5)], &[]), AHEAD);
+    }
+
+    #[test]
+    fn it_goes_round_things_on_the_free_side() {
+        let left = planned(&[Point2::new(1.1, -0.2)], &[]);
+        assert!(left.turn_rate > 0.0 && left.speed_mps > 0.0, "{left:?}");
+        let right = planned(&[Point2::new(1.1, 0.2)], &[]);
+        assert!(right.turn_rate < 0.0 && right.speed_mps > 0.0, "{right:?}");
+    }
+
+    #[test]
+    fn a_wall_stops_it() {
+        let wall: Vec<_> = (-20..=20).map(|i| Point2::new(0.5, 0.1 * f64::from(i))).collect();
+        assert_eq!(planned(&wall, &[]).speed_mps, 0.0);
+    }
+
+    #[test]
+    fn it_minds_where_people_walk_to_and_not_where_they_are() {
+        let leaves = Walker { at: Point2::new(1.0, 0.1), velocity: Vector2::new(0.0, 1.4) };
+        let comes = Walker { at: Point2::new(0.9, -1.2), velocity: Vector2::new(0.0, 1.0) };
+        let stays = Walker { velocity: Vector2::zeros(), ..leaves };
+        let speed = |walker| planned(&[], &[walker]).speed_mps;
+        assert!(speed(comes) < 0.8 || planned(&[], &[comes]).turn_rate != 0.0);
+        assert!(speed(stays) < 0.8 || planned(&[], &[stays]).turn_rate != 0.0);
+    }
+
+    #[test]
+    fn arcs_end_where_small_steps_lead() {
+        let twist = Twist { speed_mps: 0.7, turn_rate: -0.9 };
+        let step = twist.after(0.001);
+        let steps = (0..1500).fold(Isometry2::identity(), |pose, _| pose * step);
+        let whole = twist.after(1.5);
+        assert!((steps.translation.vector - whole.translation.vector).norm() < 1e-6);
+    }
+}

@@ -1,0 +1,181 @@
+//! What the README says of the controller.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry2, Matrix5, Point2, Point3, Vector2};
+use proptest::prelude::*;
+use tagalong_core::{
+    Camera, Controller, DepthImage, Distortion, Estimate, Frame, Images, Motion, Person, Pinhole,
+    Rect, Registry, Scene, Stamp, Track, TrackId, WheelSpeeds, Wheels,
+};
+
+use crate::{ClearFollow, Config};
+
+const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
+const MAX_MPS: f64 = 0.9;
+
+fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
+    let person = Person { position: Point3::new(x, y, 1.6), velocity };
+    let covariance = Matrix5::identity();
+    let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 1.0, 1.0) };
+    Track {
+        id: TrackId(1),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 9,
+        unseen_s: 0.0,
+        score: 3.0,
+    }
+}
+
+fn camera() -> Arc<Camera> {
+    let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
+    Arc::new(Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0))
+}
+
+fn command(
+    controller: &mut ClearFollow,
+    motion: Motion,
+    depth: Option<DepthImage>,
+    target: Option<&Track>,
+) -> WheelSpeeds {
+    let images = Images { depth: depth.map(Arc::new), ..Images::default() };
+    let frame = Frame::new(1, Stamp::default(), camera(), motion, images);
+    let tracks = target.map_or(&[][..], std::slice::from_ref);
+    let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+    controller.command(&scene)
+}
+
+/// Follows somebody whose place in the world is given for each time, for some
+/// seconds; hands out range and bearing at the end.
+fn ride(config: Config, seconds: f64, person: impl Fn(f64) -> Point2<f64>) -> (f64, f64) {
+    let mut controller = ClearFollow::new(config).unwrap();
+    let (mut pose, mut motion, dt) = (Isometry2::identity(), Motion::at_rest(0.1), 0.1);
+    let mut seen = Point2::origin();
+    for step in 0..(seconds / dt) as u32 {
+        let now = f64::from(step) * dt;
+        let velocity = (person(now + dt) - person(now)) / dt;
+        seen = pose.inverse_transform_point(&person(now));
+        let velocity = pose.inverse_transform_vector(&velocity);
+        let WheelSpeeds { left, right } =
+            command(&mut controller, motion, None, Some(&target(seen.x, seen.y, velocity)));
+        motion = Motion::from_wheels(left, right, &WHEELS, dt);
+        pose *= motion.isometry();
+    }
+    (seen.coords.norm(), seen.y.atan2(seen.x))
+}
+
+fn prompt() -> Config {
+    Config { latency_s: 0.0, ..Config::default() }
+}
+
+#[test]
+fn it_keeps_the_promises_of_controllers() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    tagalong_conformance::check_all(&registry);
+}
+
+#[test]
+fn it_keeps_the_distance_to_a_person_who_walks() {
+    let (range_m, bearing) = ride(prompt(), 20.0, |t| Point2::new(2.0 + 0.6 * t, 0.0));
+    assert!((range_m - 1.4).abs() < 0.15 && bearing.abs() < 0.02, "{range_m} {bearing}");
+}
+
+#[test]
+fn it_turns_with_a_person_who_walks_around_it() {
+    let around = |t: f64| Point2::new(1.4 * (0.4 * t).cos(), 1.4 * (0.4 * t).sin());
+    let (_, bearing) = ride(prompt(), 12.0, around);
+    assert!(bearing.abs() < 0.1, "{bearing}");
+    let behind = ride(prompt(), 8.0, |_| Point2::new(-2.0, 0.3));
+    assert!(behind.1.abs() < 0.05, "{behind:?}");
+}
+
+#[test]
+fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
+    let person = target(4.0, 0.0, Vector2::zeros());
+    let settled = |depth: &DepthImage| {
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let still = Motion::at_rest(0.1);
+        (0..30).map(|_| command(&mut controller, still, Some(depth.clone()), Some(&person))).last()
+    };
+    let free = settled(&DepthImage::filled(40, 30, 6.0)).unwrap();
+    assert!(free.left == free.right && free.left > 0.8, "{free:?}");
+    let wall = settled(&DepthImage::filled(40, 30, 0.45)).unwrap();
+    assert!(wall.left + wall.right < 0.05, "{wall:?}");
+    let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
+    let round = settled(&DepthImage::from_fn(40, 30, post)).unwrap();
+    assert!((round.left - round.right).abs() > 0.05 && round.left + round.right > 0.1, "{round:?}");
+}
+
+#[test]
+fn wrong_settings_are_refused_by_name() {
+    for (config, key) in [
+        (Config { horizon_s: f64::NAN, ..Config::default() }, "horizon_s"),
+        (Config { heights_m: [1.0, 0.5], ..Config::default() }, "heights_m"),
+        (Config { radius_m: 0.0, ..Config::default() }, "radius_m"),
+    ] {
+        let error = ClearFollow::new(config).err().unwrap().to_string();
+        assert!(error.contains(key), "{error}");
+    }
+}
+
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        8 => -5.0..5.0_f64,
+        1 => proptest::num::f64::ANY,
+        1 => Just(0.0),
+        1 => Just(f64::INFINITY),
+    ]
+}
+
+fn any_target() -> impl Strategy<Value = Track> {
+    let velocity = (any_number(), any_number());
+    (any_number(), any_number(), velocity, any_number()).prop_map(|(x, y, (vx, vy), unseen_s)| {
+        Track { unseen_s, ..target(x, y, Vector2::new(vx, vy)) }
+    })
+}
+
+fn any_motion() -> impl Strategy<Value = Motion> {
+    (any_number(), any_number(), any_number(), any_number())
+        .prop_map(|(dt, forward, left, turn)| Motion { forward, left, turn, ..Motion::at_rest(dt) })
+}
+
+/// A million states in release, fewer where the compiler helps less.
+const CASES: u32 = if cfg!(debug_assertions) { 2_000 } else { 50_000 };
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: CASES, ..ProptestConfig::default() })]
+
+    #[test]
+    fn commands_are_finite_and_limited_and_zero_without_a_target(
+        steps in prop::collection::vec((any_motion(), prop::option::weighted(0.9, any_target())), 20)
+    ) {
+        let mut controller = ClearFollow::new(Config::default()).unwrap();
+        for (motion, target) in steps {
+            let WheelSpeeds { left, right } = command(&mut controller, motion, None, target.as_ref());
+            prop_assert!(left.abs() <= MAX_MPS + 1e-9 && right.abs() <= MAX_MPS + 1e-9, "{left} {right}");
+            if target.is_none() {
+                prop_assert_eq!((left, right), (0.0, 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn mirrored_input_gives_mirrored_wheels(
+        x in -3.0..4.0f64, y in 0.01..3.0f64, vx in -1.0..1.0f64, vy in -1.0..1.0f64
+    ) {
+        let (mut one, mut other) = (
+            ClearFollow::new(Config::default()).unwrap(),
+            ClearFollow::new(Config::default()).unwrap(),
+        );
+        for _ in 0..5 {
+            let still = Motion::at_rest(0.1);
+            let a = command(&mut one, still, None, Some(&target(x, y, Vector2::new(vx, vy))));
+            let b = command(&mut other, still, None, Some(&target(x, -y, Vector2::new(vx, -vy))));
+            prop_assert!((a.left - b.right).abs() < 1e-9 && (a.right - b.left).abs() < 1e-9, "{a:?} {b:?}");
+        }
+    }
+}
