@@ -93,7 +93,7 @@ impl Steering {
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         let wheels = self.ask(frame, tracks, target)?;
-        let (wheels, aim) = self.aim(wheels);
+        let (wheels, aim) = self.aim(wheels, tracks);
         let wish = Wish {
             wheels,
             stamp: frame.stamp,
@@ -127,10 +127,10 @@ impl Steering {
 
     /// What the wheels turn for: the controller's wish while somebody is followed,
     /// the search's while the person is lost.
-    fn aim(&mut self, wheels: WheelSpeeds) -> (WheelSpeeds, Aim) {
+    fn aim(&mut self, wheels: WheelSpeeds, tracks: &[Track]) -> (WheelSpeeds, Aim) {
         match self.lock.state() {
             LockState::Initial => (WheelSpeeds::STOP, Aim::Nobody),
-            LockState::Lost => match self.look_for() {
+            LockState::Lost => match self.look_for(tracks) {
                 Some(wheels) => (wheels, Aim::Search),
                 None => (WheelSpeeds::STOP, Aim::Nobody),
             },
@@ -141,10 +141,11 @@ impl Steering {
         }
     }
 
-    fn look_for(&mut self) -> Option<WheelSpeeds> {
+    fn look_for(&mut self, tracks: &[Track]) -> Option<WheelSpeeds> {
         let last = self.lock.last_seen()?;
         let (lost_s, wheels) = (self.lock.since_s(), self.robot.wheels());
-        self.search.wish(&self.search_settings, last, lost_s, &wheels)
+        let candidate = self.lock.candidate(tracks);
+        self.search.wish(&self.search_settings, last, candidate, lost_s, &wheels)
     }
 
     /// True once enough frames were processed since the last reset; counts one.

@@ -88,6 +88,7 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
         funnel: Funnel::default(),
         tracks: tracks.iter().filter_map(track).collect(),
         target: None,
+        lock: None,
         command: None,
         nis: Vec::new(),
         weighing: Weighing::default(),

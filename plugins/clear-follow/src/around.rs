@@ -57,7 +57,7 @@ impl Around {
         let across = depth.width().div_ceil(COLUMNS).max(1);
         let down = depth.height().div_ceil(ROWS).max(1);
         let mut seen = vec![None; DIRECTIONS];
-        let mut looked = vec![false; DIRECTIONS];
+        let mut looked = [false; DIRECTIONS];
         for y in (0..depth.height()).step_by(down) {
             let row = depth.row(y);
             for x in (0..depth.width()).step_by(across) {
@@ -95,11 +95,9 @@ fn keep_nearer(place: &mut Option<Thing>, thing: Thing) {
 
 /// The direction of a place; `None` for what is far away or not a number.
 fn direction(at: &Point2<f64>) -> Option<usize> {
-    if !(at.coords.norm() < RANGE_M) {
-        return None;
-    }
     let part = at.y.atan2(at.x).rem_euclid(TAU) / TAU;
-    Some((part * DIRECTIONS as f64) as usize % DIRECTIONS)
+    let direction = (part * DIRECTIONS as f64) as usize % DIRECTIONS;
+    (at.coords.norm() < RANGE_M).then_some(direction)
 }
 
 #[cfg(test)]

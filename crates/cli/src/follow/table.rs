@@ -23,6 +23,7 @@ pub fn tables(results: &[Followed]) -> Vec<Table> {
         "refound %",
         "in view %",
         "distance %",
+        "farther m",
         "contacts",
         "to people m",
         "to things m",
@@ -70,7 +71,8 @@ fn notes(judge: &RideJudge) -> Vec<String> {
             judge.refind_s, judge.max_range_m
         ),
         format!(
-            "distance: within {} m of the stand-off while the person walked below {} m/s",
+            "distance: within {} m of the stand-off while the person walked below {} m/s, and how \
+             much farther away on the mean",
             judge.off_m, judge.slow_mps
         ),
         "contacts: rides in which the robot touched somebody or something; beside it the least room"
@@ -102,6 +104,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let touches = |ride: &&&Ridden| {
         [ride.clearance_people_m, ride.clearance_things_m].into_iter().flatten().any(|m| m < 0.0)
     };
+    let farther: Vec<f64> = rides.iter().filter_map(|ride| ride.farther_m).collect();
     let jerks: Vec<f64> = rides.iter().map(|ride| ride.jerk_mps3).collect();
     let took: Vec<f64> = results.iter().flat_map(|result| &result.took_ms).copied().collect();
     let kept = rides.iter().filter(|ride| ride.kept).count() as u64;
@@ -113,6 +116,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
         Cell::estimate(wilson(good, refound.len() as u64, CONFIDENCE), 3).percent(),
         Cell::estimate(times(|r| r.in_view_s, |r| r.time_s), 3).percent(),
         Cell::estimate(times(|r| r.distance_kept_s, |r| r.slow_s), 3).percent(),
+        Cell::mean(&farther, 2),
         Cell::number(rides.iter().filter(touches).count() as f64, 0),
         least(|ride| ride.clearance_people_m),
         least(|ride| ride.clearance_things_m),

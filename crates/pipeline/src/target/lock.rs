@@ -11,6 +11,11 @@ use super::settings::TargetSettings;
 const CERTAIN: f64 = 6.0;
 /// A track that is out of sight for longer may come back as somebody else, s.
 const UNSEEN_S: f64 = 0.25;
+/// Of the evidence for somebody who may be the person, so much is left in the next
+/// frame, and so much of what that says comes on top: two seconds of evidence count
+/// five times that of a frame.
+const KEPT: f64 = 0.9;
+const NEW: f64 = 0.5;
 /// Somebody may have moved by this much more than their speed says, m.
 const REACH_M: f64 = 0.6;
 
@@ -108,8 +113,8 @@ pub(crate) struct Lock {
     doubtful: bool,
     sightings: u32,
     last: Option<LastSeen>,
-    /// Smoothed log-odds of others while the person is lost, and how often in a
-    /// row they were good.
+    /// Log-odds of others while the person is lost, their sightings added up, and
+    /// how often in a row that was enough.
     candidates: BTreeMap<TrackId, (f64, u32)>,
 }
 
@@ -160,6 +165,14 @@ impl Lock {
     /// Where the person was seen last.
     pub(crate) fn last_seen(&self) -> Option<&LastSeen> {
         self.last.as_ref()
+    }
+
+    /// Somebody who may turn out to be the person who is lost, robot frame, m.
+    pub(crate) fn candidate(&self, tracks: &[Track]) -> Option<Point2<f64>> {
+        let hopeful = self.candidates.iter().filter(|(_, (belief, _))| *belief > 0.0);
+        let (id, _) = hopeful.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+        let track = tracks.iter().find(|track| track.id == *id)?;
+        Some(track.estimate.person.position.xy())
     }
 
     /// The track that is followed now.
@@ -263,8 +276,7 @@ impl Lock {
         if let Some(odds) = evidence {
             self.belief += self.settings.belief_weight * (odds - self.belief);
         }
-        let sure = self.belief >= logit(self.settings.again_from)
-            && self.sightings >= self.settings.again_sightings;
+        let sure = self.belief > 0.0 && self.sightings >= self.settings.again_sightings;
         self.doubtful &= !(alone && sure && !self.state.doubts());
     }
 
@@ -320,13 +332,13 @@ impl Lock {
         if !self.settings.remember {
             return;
         }
-        let weight = self.settings.belief_weight;
         let enough = logit(self.settings.again_from);
         let mut seen = BTreeMap::new();
         for track in tracks.iter().filter(|track| self.is_in_reach(track)) {
             let Some(odds) = log_odds.get(&track.id) else { continue };
-            let (before, times) = self.candidates.get(&track.id).copied().unwrap_or((*odds, 0));
-            let belief = before + weight * (odds - before);
+            let (before, times) = self.candidates.get(&track.id).copied().unwrap_or_default();
+            // Evidence adds up, but looks of one moment to the next are much the same.
+            let belief = (KEPT * before + NEW * odds).clamp(-CERTAIN, CERTAIN);
             seen.insert(track.id, (belief, if belief >= enough { times + 1 } else { 0 }));
         }
         self.candidates = seen;

@@ -14,7 +14,8 @@ const GOES_ON_S: f64 = 1.5;
 const BLOCKED_S: f64 = 1.0;
 
 /// Looks for a person who is lost: waits, drives to where they were last, turns
-/// to where they went, and on round; at last it gives up.
+/// to where they went, and on round; whoever may be the person is looked at; at last
+/// it gives up.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Search {
     arrived: bool,
@@ -29,6 +30,7 @@ impl Search {
         &mut self,
         settings: &SearchSettings,
         last: &LastSeen,
+        candidate: Option<Point2<f64>>,
         lost_s: f64,
         wheels: &Wheels,
     ) -> Option<WheelSpeeds> {
@@ -38,9 +40,10 @@ impl Search {
         self.arrived |= last.place.coords.norm() < settings.arrive_m
             || self.blocked_s > BLOCKED_S
             || lost_s > settings.wait_s + settings.drive_s;
-        let (speed_mps, turn) = match self.arrived {
-            false => drive_to(settings, &last.place),
-            true => (0.0, self.look_round(settings, last)),
+        let (speed_mps, turn) = match candidate {
+            Some(somebody) => (0.0, turn_to(settings, &somebody)),
+            None if self.arrived => (0.0, self.look_round(settings, last)),
+            None => drive_to(settings, &last.place),
         };
         let rim = turn * wheels.half_separation_m;
         Some(WheelSpeeds { left: speed_mps - rim, right: speed_mps + rim })
@@ -61,10 +64,14 @@ impl Search {
 
 /// Forward speed, m/s, and turn rate, rad/s, to a place.
 fn drive_to(settings: &SearchSettings, place: &Point2<f64>) -> (f64, f64) {
-    let bearing = place.y.atan2(place.x);
-    let turn = (TURN_GAIN * bearing).clamp(-settings.turn_radps, settings.turn_radps);
-    let ahead = bearing.abs() < AHEAD_RAD;
-    (if ahead { settings.speed_mps } else { 0.0 }, turn)
+    let ahead = place.y.atan2(place.x).abs() < AHEAD_RAD;
+    (if ahead { settings.speed_mps } else { 0.0 }, turn_to(settings, place))
+}
+
+/// Turn rate, rad/s, to a place.
+fn turn_to(settings: &SearchSettings, place: &Point2<f64>) -> f64 {
+    let turn = TURN_GAIN * place.y.atan2(place.x);
+    turn.clamp(-settings.turn_radps, settings.turn_radps)
 }
 
 #[cfg(test)]
@@ -84,7 +91,7 @@ mod tests {
     }
 
     fn wish(last: &LastSeen, lost_s: f64) -> Option<WheelSpeeds> {
-        Search::default().wish(&settings(), last, lost_s, &WHEELS)
+        Search::default().wish(&settings(), last, None, lost_s, &WHEELS)
     }
 
     #[test]
@@ -103,13 +110,21 @@ mod tests {
     fn something_in_the_way_makes_it_look_round_instead() {
         let mut search = Search::default();
         (0..12).for_each(|_| search.hear(true, 0.1));
-        let there = search.wish(&settings(), &last(3.0, 0.0), 3.0, &WHEELS).unwrap();
+        let there = search.wish(&settings(), &last(3.0, 0.0), None, 3.0, &WHEELS).unwrap();
         assert_eq!(there.left, -there.right);
+    }
+
+    #[test]
+    fn whoever_may_be_the_person_is_looked_at() {
+        let mut search = Search::default();
+        let left = Some(Point2::new(1.0, 2.0));
+        let turns = search.wish(&settings(), &last(3.0, 0.0), left, 3.0, &WHEELS).unwrap();
+        assert!(turns.right > 0.0 && turns.left == -turns.right, "{turns:?}");
     }
 
     #[test]
     fn only_where_it_is_allowed() {
         let settings = SearchSettings::default();
-        assert_eq!(Search::default().wish(&settings, &last(3.0, 0.0), 1.5, &WHEELS), None);
+        assert_eq!(Search::default().wish(&settings, &last(3.0, 0.0), None, 1.5, &WHEELS), None);
     }
 }

@@ -29,7 +29,7 @@ pub struct TargetSettings {
     pub doubt_after_s: f64,
     /// Out of sight for longer than this, s, the person is lost.
     pub lose_after_s: f64,
-    /// Somebody is known again from this probability on ...
+    /// Somebody is known again from this probability on, sightings added up, ...
     pub again_from: f64,
     /// ... in so many sightings in a row.
     pub again_sightings: u32,
@@ -57,7 +57,7 @@ impl Default for TargetSettings {
             refuse_below: 0.15,
             doubt_after_s: 0.5,
             lose_after_s: 2.0,
-            again_from: 0.7,
+            again_from: 0.85,
             again_sightings: 5,
             reach_mps: 2.0,
             alone_m: 0.8,
@@ -128,7 +128,7 @@ impl Default for SearchSettings {
         Self {
             enabled: false,
             wait_s: 1.0,
-            turn_radps: 0.6,
+            turn_radps: 0.5,
             speed_mps: 0.4,
             arrive_m: 0.6,
             drive_s: 8.0,

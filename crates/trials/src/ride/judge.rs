@@ -83,6 +83,8 @@ pub struct Ridden {
     pub slow_s: f64,
     /// ... and the distance was kept, s.
     pub distance_kept_s: f64,
+    /// Mean of how much farther away than the stand-off the person was meanwhile, m.
+    pub farther_m: Option<f64>,
     /// Times without the person after the first with them.
     pub episodes: Vec<Episode>,
     /// Least room to people while the robot moved, m; none where nobody is.
@@ -128,6 +130,9 @@ impl RideJudge {
             (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
             _ => false,
         };
+        let farther = |l: &Look| Some(l.dt_s * (l.range_m? - ride.stand_off_m?));
+        let slow_s = sum(&slow);
+        let farther_ms: f64 = looks.iter().filter(|l| slow(l)).filter_map(farther).sum();
         let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
         let episodes = episodes(&looks);
         let longest_wrong_s = longest(&looks, |look| look.whom == Whom::Wrong);
@@ -139,8 +144,9 @@ impl RideJudge {
             right_s: sum(&|look| look.whom == Whom::Right),
             wrong_s: sum(&|look| look.whom == Whom::Wrong),
             longest_wrong_s,
-            slow_s: sum(&slow),
+            slow_s,
             distance_kept_s: sum(&|look| slow(look) && near(look)),
+            farther_m: (slow_s > 0.0).then(|| farther_ms / slow_s),
             episodes,
             clearance_people_m: least(moving().map(|tick| tick.clearance.people_m)),
             clearance_things_m: least(moving().map(|tick| tick.clearance.things_m)),
