@@ -1,5 +1,5 @@
 //! The shipped `depth-ekf` config, unchanged, on every real log with depth, and
-//! `particle-best` where people hide each other.
+//! `particle-best` and `rgbd-best` where people hide each other.
 //! Without `../shared/data/logs` each test says that it skips.
 #![allow(
     clippy::unwrap_used,
@@ -40,7 +40,7 @@ fn run(path: &Path, config: &str) -> Run {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
-    let needs = Needs { depth: true, colour: config == "particle-best", ..Needs::default() };
+    let needs = Needs { depth: true, colour: config != "depth-ekf", ..Needs::default() };
     let mut source =
         FrameSource::open(path, &InputSettings::default(), &Limits::default(), needs).unwrap();
     let mut run = Run {
@@ -126,6 +126,16 @@ fn particles_find_as_many_people_in_filinha_as_the_ekf_with_few_false_boxes() {
     assert!(particles.covered >= ekf.covered, "{particles:?} {ekf:?}");
     assert!(particles.false_boxes <= ekf.false_boxes + 5, "{particles:?}");
     assert!(surplus(&particles) <= surplus(&ekf) + 4, "{particles:?} {ekf:?}");
+}
+
+#[test]
+fn gradients_beside_silhouettes_find_no_fewer_people_of_filinha() {
+    let Some((_, ekf)) = scored("filinha") else { return };
+    let Some((_, best)) = scored_with("filinha", "rgbd-best") else { return };
+    println!("depth-ekf: {} of {} covered", ekf.covered, ekf.rows);
+    println!("rgbd-best: {} of {} covered, {} false", best.covered, best.rows, best.false_boxes);
+    assert!(best.covered >= ekf.covered, "{best:?} {ekf:?}");
+    assert!(best.false_boxes <= ekf.false_boxes + 2, "{best:?} {ekf:?}");
 }
 
 #[test]

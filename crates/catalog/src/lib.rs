@@ -15,6 +15,7 @@ pub fn register(registry: &mut Registry) {
     tagalong_compressive::register(registry);
     tagalong_depth_template::register(registry);
     tagalong_ekf::register(registry);
+    tagalong_face_rgbd::register(registry);
     tagalong_floor_kalman::register(registry);
     tagalong_hog_upper_body::register(registry);
     tagalong_image_kalman::register(registry);

@@ -1,9 +1,11 @@
 //! What trainers of plugins share, so that their cards can be compared: groups
 //! are dealt out to folds and never split ([`parts`]), held-out values become
-//! figures ([`area`], [`accepted`]), and log-odds ([`platt`]).
+//! figures ([`area`], [`accepted`]), and log-odds ([`platt`]). Boosted trees are
+//! grown here, too ([`boost`]).
 //!
-//! The machines themselves are the business of the plugins.
+//! What machines look at is the business of the plugins.
 
+pub mod boost;
 mod calibrate;
 mod folds;
 mod held_out;

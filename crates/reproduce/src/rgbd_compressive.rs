@@ -26,12 +26,13 @@ pub const SYSTEM: System = System {
 };
 
 /// The parts, then the whole, then what it is to be compared with.
-const PIPELINES: [&str; 6] = [
+const PIPELINES: [&str; 7] = [
     "rgbd-detector",
     "rgbd-kalman",
     "rgbd-follow",
     "rgbd-compressive",
     "rgbd-compressive-as-printed",
+    "rgbd-best",
     "depth-ekf",
 ];
 /// Logs of each kind in the paper.

@@ -17,7 +17,7 @@ pub struct Scatter<'a> {
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 420.0;
 /// Left, top, right, bottom.
-const MARGIN: [f64; 4] = [70.0, 44.0, 130.0, 56.0];
+const MARGIN: [f64; 4] = [70.0, 60.0, 130.0, 56.0];
 
 impl Scatter<'_> {
     /// The chart; points without a place are left out.
@@ -39,10 +39,12 @@ impl Scatter<'_> {
         if !points.is_empty() {
             frame.grid(&mut svg);
         }
+        let mut labels = Vec::new();
         for (name, x, y) in points {
             let (x, y) = (frame.x(x.log10()), frame.y(*y));
             let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"#1f6fb2\"/>");
-            text(&mut svg, x + 9.0, y + 4.0, "start", name);
+            let label = free_place(&mut labels, (x + 9.0, y + 4.0));
+            text(&mut svg, label.0, label.1, "start", name);
         }
         svg + "</svg>\n"
     }
@@ -80,6 +82,22 @@ impl Frame {
     }
 }
 
+/// A place for a label, at or below the wanted one, that no earlier label covers.
+fn free_place(labels: &mut Vec<(f64, f64)>, wanted: (f64, f64)) -> (f64, f64) {
+    let mut place = wanted;
+    let covers = |at: &(f64, f64), by: &(f64, f64)| {
+        (at.0 - by.0).abs() < LABEL_PX.0 && (at.1 - by.1).abs() < LABEL_PX.1
+    };
+    while labels.iter().any(|label| covers(&place, label)) {
+        place.1 += LABEL_PX.1 / 4.0;
+    }
+    labels.push(place);
+    place
+}
+
+/// Width and height of a label.
+const LABEL_PX: (f64, f64) = (160.0, 14.0);
+
 fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
     let _ = writeln!(
         svg,
@@ -99,6 +117,13 @@ fn text(svg: &mut String, x: f64, y: f64, anchor: &str, words: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn labels_of_points_that_meet_lie_below_each_other() {
+        let mut labels = Vec::new();
+        let places = [10.0, 11.0, 60.0].map(|y| free_place(&mut labels, (5.0, y)).1);
+        assert!(places[1] >= places[0] + LABEL_PX.1 && places[2] == 60.0, "{places:?}");
+    }
 
     #[test]
     fn points_are_named_and_lie_in_the_picture() {

@@ -16,6 +16,8 @@ const BLACK: u8 = 8;
 const SATURATED: u8 = 250;
 /// Part of an image that may be saturated.
 const MAX_SATURATED: f64 = 0.9;
+/// Greatest ratio of the mean brightness of two cameras that are set alike.
+const MAX_RATIO: f64 = 1.2;
 /// Least difference between the brightest and the darkest pixel.
 const MIN_CONTRAST: u8 = 8;
 
@@ -55,7 +57,7 @@ impl StereoDepth {
     /// # Errors
     /// [`Error::MissingImage`] without a right or a left image;
     /// [`Error::Other`] if they differ in size, the camera is no pinhole, or
-    /// the baseline is none.
+    /// its focal length or the baseline is none.
     pub fn depth(&mut self, frame: &Frame, funnel: &mut Funnel) -> Result<Arc<DepthImage>> {
         let right = frame.right()?;
         let left = frame.grey()?;
@@ -88,6 +90,8 @@ impl StereoDepth {
         }
         let off = self.rectification.vertical_px.abs() > self.settings.max_vertical_px;
         funnel.drop_many("stereo: images vertically off", u64::from(off));
+        let unequal = are_unequal(left, right_image);
+        funnel.drop_many("stereo: cameras differ in brightness", u64::from(unequal));
         let disparities = self.matcher.disparities(left, right_image, max_disparity)?;
         count(&disparities.dropped, funnel);
         let range = self.settings.min_depth_m as f32..=self.settings.max_depth_m as f32;
@@ -104,7 +108,11 @@ impl StereoDepth {
 
 fn focal_px(frame: &Frame) -> Result<f64> {
     match &frame.camera.lens {
-        Lens::Pinhole(lens) => Ok(lens.fx),
+        Lens::Pinhole(lens) if lens.fx.is_finite() && lens.fx > 0.0 => Ok(lens.fx),
+        Lens::Pinhole(lens) => {
+            let message = format!("the focal length of a stereo camera is not {} px", lens.fx);
+            Err(Error::Other(message))
+        }
         _ => Err(Error::Other("a stereo pair needs pinhole cameras".into())),
     }
 }
@@ -140,6 +148,14 @@ fn unshared(depth: &mut Arc<DepthImage>, width: usize, height: usize) -> &mut De
         *depth = Arc::new(DepthImage::filled(width, height, f32::NAN));
     }
     Arc::make_mut(depth)
+}
+
+/// True if one image is so much brighter that semi-global matching, which compares
+/// brightness, too, does worse.
+fn are_unequal(left: &GreyImage, right: &GreyImage) -> bool {
+    let sum = |image: &GreyImage| image.pixels().iter().map(|p| u64::from(*p)).sum::<u64>();
+    let (left, right) = (sum(left) as f64, sum(right) as f64);
+    left.max(right) > MAX_RATIO * left.min(right)
 }
 
 /// Why nothing can be seen in a pair.

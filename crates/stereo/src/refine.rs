@@ -4,9 +4,11 @@
 //!
 //! B. Lucas and T. Kanade, *An iterative image registration technique with an
 //! application to stereo vision*, IJCAI 1981, section 4, one step, along the row.
-//! The brightness of each row of the window may differ by a constant, and what the
-//! pixels of the window had for disparities counts a little: where brightness says
-//! nothing, that leaves their mean.
+//! The right camera may be more sensitive, by a factor that the contrast of each row
+//! tells; the brightness of each row of the window may differ by a constant. Where
+//! brightness says nothing, a disparity stays what it was: a mean over the window
+//! would blur the step between a person and the wall behind, which is less than a
+//! pixel beyond 4 m.
 //!
 //! The outline of a round thing lies behind its front, by the radius of a head for a
 //! head, and has the strongest slopes. They count less than their square, so that a
@@ -18,11 +20,15 @@ use tagalong_core::GreyImage;
 const SAME_PX: f32 = 1.0;
 /// Weight of a disparity as it was: the variance of the noise of a pixel, in grey
 /// levels, over that of the disparity, in pixels.
-const PRIOR: f32 = 1.0;
+const PRIOR: f32 = 20.0;
 /// A slope beyond this many grey levels counts little more than one of it.
 const STRONG: f32 = 6.0;
+/// Variance of brightness to which the noise of a row is nothing.
+const FAINT: f32 = 4.0;
+/// Mean brightness.
+const MIDDLE: f32 = 128.0;
 /// A disparity changes by at most this, px: brightness is no straight line for long.
-const MOST_PX: f32 = 1.0;
+const MOST_PX: f32 = 0.5;
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 16;
 /// Pixels that are worked on at once.
@@ -126,9 +132,9 @@ impl Equations {
         for (own, d) in self.d[from..to].iter_mut().zip(disparities) {
             *own = if d.is_nan() { UNKNOWN } else { *d };
         }
-        let (g, q) = (&mut self.g[from..to], &mut self.q[from..to]);
-        between(right, &self.d[from..to], g, q);
-        solve_for(left, &self.d[from..to], g, q);
+        let (d, g, q) = (&self.d[from..to], &mut self.g[from..to], &mut self.q[from..to]);
+        between(right, d, g, q);
+        solve_for(left, d, gain(left, d, q), g, q);
     }
 }
 
@@ -148,13 +154,31 @@ fn between(right: &[[f32; 2]], disparities: &[f32], slope: &mut [f32], level: &m
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn solve_for(left: &[[f32; 2]], disparities: &[f32], g: &mut [f32], q: &mut [f32]) {
+fn solve_for(left: &[[f32; 2]], disparities: &[f32], gain: f32, g: &mut [f32], q: &mut [f32]) {
     for (((own, d), g), q) in left.iter().zip(disparities).zip(g).zip(q) {
+        let own = own.map(|left| gain * left);
         let slope = 0.5 * (own[1] + *g);
         let weight = 1.0 / (1.0 + slope * slope * (1.0 / (STRONG * STRONG))).sqrt();
         *q = weight * (slope * d + *q - own[0]);
         *g = weight * slope;
     }
+}
+
+/// By how much the contrast of a row is greater in the right image, where there are
+/// matches.
+fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
+    let [mut n, mut l, mut r, mut ll, mut rr] = [0.0_f32; 5];
+    for ((own, d), other) in left.iter().zip(disparities).zip(right) {
+        let known = if *d < UNKNOWN { 1.0 } else { 0.0 };
+        let (own, other) = (own[0] - MIDDLE, *other - MIDDLE);
+        n += known;
+        l += known * own;
+        r += known * other;
+        ll += known * own * own;
+        rr += known * other * other;
+    }
+    let contrast = |sum: f32, squares: f32| squares - sum * sum / n.max(1.0) + FAINT * n.max(1.0);
+    (contrast(r, rr) / contrast(l, ll)).sqrt().clamp(0.5, 2.0)
 }
 
 /// Sums up over the windows' part of a row that is of one surface, around the means.
@@ -163,14 +187,13 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
     for (i, at) in place.step_by(LANES).enumerate() {
         let from = MAX_RADIUS + i * LANES;
         let own = lanes(&row.d, from);
-        let [mut n, mut d, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 6];
+        let [mut n, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 5];
         for near in from - radius..from + radius + 1 {
             let (ds, gs, qs) = (lanes(&row.d, near), lanes(&row.g, near), lanes(&row.q, near));
             for lane in 0..LANES {
                 let same = same(own[lane], ds[lane]);
                 let slope = same * gs[lane];
                 n[lane] += same;
-                d[lane] += same * ds[lane];
                 g[lane] += slope;
                 q[lane] += same * qs[lane];
                 gg[lane] += slope * gs[lane];
@@ -181,8 +204,8 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
         let products = &mut out.products[at..].as_chunks_mut::<LANES>().0[0];
         for lane in 0..LANES {
             let mean = g[lane] / n[lane];
-            squares[lane] = gg[lane] - mean * g[lane] + PRIOR * n[lane];
-            products[lane] = gq[lane] - mean * q[lane] + PRIOR * d[lane];
+            squares[lane] = (gg[lane] - mean * g[lane]).max(0.0);
+            products[lane] = gq[lane] - mean * q[lane];
         }
     }
 }
@@ -193,7 +216,10 @@ fn down(was: &[f32], sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), ro
     let width = row.len();
     for (i, new) in row.chunks_mut(LANES).enumerate() {
         let own = lanes(was, y * width + i * LANES);
-        let (mut squares, mut products) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        let (mut squares, mut products) = ([PRIOR; LANES], [0.0_f32; LANES]);
+        for lane in 0..LANES {
+            products[lane] = PRIOR * own[lane];
+        }
         for near in rows.clone() {
             let at = near * width + i * LANES;
             let (ds, ss) = (lanes(was, at), lanes(&sums.squares, at));

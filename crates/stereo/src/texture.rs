@@ -49,12 +49,13 @@ impl TextureTest {
         self.textured.resize(row.len(), 0);
         find_textured(rows, least, &mut self.textured);
         let mut last = f32::NAN.to_bits();
-        for x in 0..row.len() {
-            self.before[x] = carried(&mut last, row[x], self.textured[x]);
+        let own = row.iter().zip(&self.textured);
+        for ((own, textured), before) in own.clone().zip(&mut self.before) {
+            *before = carried(&mut last, *own, *textured);
         }
         last = f32::NAN.to_bits();
-        for x in (0..row.len()).rev() {
-            self.behind[x] = carried(&mut last, row[x], self.textured[x]);
+        for ((own, textured), behind) in own.zip(&mut self.behind).rev() {
+            *behind = carried(&mut last, *own, *textured);
         }
         u64::from(limit(row, &self.before, &self.behind))
     }

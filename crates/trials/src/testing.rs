@@ -93,6 +93,7 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
         nis: Vec::new(),
         weighing: Weighing::default(),
         sketch: Sketch::default(),
+        lock: None,
         timings: Vec::new(),
         ended: Vec::new(),
     }

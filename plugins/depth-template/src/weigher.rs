@@ -603,6 +603,35 @@ mod tests {
         assert_eq!(of(2.0, 0.0, 0.0, 0.1), Direction::Along, "too slow to tell");
     }
 
+    /// Somebody with something at the same depth beside the body, on the left,
+    /// the right or both sides.
+    fn laden(near: Person, left: bool, right: bool) -> Frame {
+        let bare = painted(&[near]);
+        let depth_m = near.position.x as f32 - 0.08;
+        let depth = DepthImage::from_fn(80, 60, |x, y| {
+            let [on_left, on_right] = [30..35, 45..50].map(|columns| columns.contains(&x));
+            let is_load = (8..24).contains(&y) && (left && on_left || right && on_right);
+            let seen_m = bare.depth().unwrap().get(x as i64, y as i64).unwrap_or(f32::NAN);
+            if is_load { seen_m.min(depth_m) } else { seen_m }
+        });
+        frame(depth.pixels().to_vec())
+    }
+
+    #[test]
+    fn a_rucksack_costs_less_than_furniture_on_both_sides() {
+        let near = standing(1.8, 0.0);
+        let of = |left, right| weight(&laden(near, left, right), &[near]);
+        let (bare, one, both) = (of(false, false), of(true, false), of(true, true));
+        assert!(one < bare && (bare - one) * 3.0 < bare - both, "{bare} {one} {both}");
+    }
+
+    #[test]
+    fn who_is_behind_does_not_explain_what_is_seen_in_front() {
+        let (near, frame) = (standing(1.8, 0.0), laden(standing(1.8, 0.0), true, true));
+        let gain = |y| weight(&frame, &[near, standing(3.2, y)]) - weight(&frame, &[near]);
+        assert!((-8..=8).all(|i| gain(0.05 * f64::from(i)) < 0.05), "{} {}", gain(0.2), gain(0.3));
+    }
+
     #[test]
     fn what_is_shown_of_somebody_is_what_nobody_hides() {
         assert_eq!(outside((2, 12), vec![(8, 9), (1, 3), (2, 6)]), [(6, 8), (9, 12)]);
@@ -624,6 +653,7 @@ mod tests {
         let mut masks = Vec::new();
         union_of(&mut masks, [(5, 9), (1, 3), (2, 6)].into_iter());
         assert_eq!(masks, [(1, 9)]);
-        assert_eq!(masked(&masks, (2, 12), |(a, b)| b - a), 7);
+        let length = |(from, to): Span| i32::try_from(to - from).unwrap();
+        assert_eq!(masked(&masks, (2, 12), length), 7);
     }
 }

@@ -2,11 +2,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result};
 
+use crate::Kind;
+
 /// Settings of `hog-upper-body`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Model file, relative to the config; empty: the model that is built in.
+    /// What judges windows: `trees`, or `linear` as P2 has it.
+    pub machine: Kind,
+    /// Model file, relative to the config; it says by itself what machine it has.
+    /// Empty: the model of that machine that is built in.
     pub model: String,
     /// Windows with lower log-odds are dropped.
     pub min_score: f64,
@@ -51,6 +56,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
+            machine: Kind::default(),
             model: String::new(),
             min_score: 0.0,
             max_score: 6.0,
@@ -78,12 +84,17 @@ impl Default for Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
-    /// Penalty of a training error, of windows with people ...
+    /// Linear: penalty of a training error, of windows with people ...
     pub person_penalty: f64,
     /// ... and of others.
     pub other_penalty: f64,
-    /// Passes over all windows at most.
+    /// Linear: passes over all windows at most.
     pub epochs: usize,
+    /// Trees of the last round; each round before has a quarter of those of the
+    /// next.
+    pub trees: usize,
+    /// Numbers of a window that a tree chooses from, drawn anew for each.
+    pub numbers: usize,
     /// Windows by chance from each picture without anybody, at first.
     pub random_windows: usize,
     /// How often pictures without anybody are searched for false alarms.
@@ -100,10 +111,12 @@ impl Default for Training {
             person_penalty: 0.02,
             other_penalty: 0.01,
             epochs: 40,
+            trees: 1536,
+            numbers: 128,
             random_windows: 10,
-            mining_rounds: 2,
+            mining_rounds: 3,
             mined_per_picture: 40,
-            mined_per_round: 8000,
+            mined_per_round: 6000,
         }
     }
 }

@@ -4,10 +4,11 @@ use tagalong_core::{
     Search, UPPER_BODY_SIDE_M,
 };
 
-use crate::{Config, Model, NAME, Scanner, Window, merge};
+use crate::{Config, Kind, Model, NAME, Scanner, Window, merge};
 
-/// The model that is part of the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/hog-upper-body.toml");
+/// The models that are part of the program.
+const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
+const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
 
 /// Places a side at which the depth of a window is read.
 const TAPS: usize = 5;
@@ -25,12 +26,13 @@ impl HogUpperBody {
     /// A detector; reads its model.
     ///
     /// # Errors
-    /// [`Error::Model`] for a file that cannot be read or is no model,
-    /// [`Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
-        let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { config, model, scanner: Scanner::default() })
+        let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
+        let model = context.model(&config.model, built_in, Model::from_text)?;
+        Ok(Self { config, scanner: Scanner::new(model.kind()), model })
     }
 
     /// The sizes that are looked for, pixels.

@@ -1,6 +1,7 @@
 //! Cells and blocks.
 
-use std::f32::consts::PI;
+use crate::gradients::Gradients;
+use crate::model::dot;
 
 /// Side of a cell, pixels.
 pub(crate) const CELL: usize = 8;
@@ -19,6 +20,10 @@ pub struct Blocks {
     values: Vec<f32>,
     /// Histograms of the cells.
     cells: Vec<f32>,
+    /// Scratch: a row of pixels, its votes, and square roots of all pixels.
+    gradients: Gradients,
+    votes: Vec<f32>,
+    roots: Vec<f32>,
 }
 
 impl Blocks {
@@ -36,44 +41,23 @@ impl Blocks {
         if self.values.is_empty() {
             return;
         }
-        let roots: Vec<f32> = pixels.iter().map(|grey| grey.max(0.0).sqrt()).collect();
-        let places: Vec<(usize, f32)> = (0..inner).map(|x| place(x, across)).collect();
+        self.roots.clear();
+        self.roots.extend(pixels.iter().map(|grey| grey.max(0.0).sqrt()));
         for y in 0..height - 2 {
-            let rows = [0, 1, 2].map(|row| &roots[(y + row) * width..(y + row + 1) * width]);
-            self.vote(rows, place(y, down), &places, (across, down));
-        }
-        self.normalise(across);
-    }
-
-    /// Each gradient of a row votes for the two directions and the four cells
-    /// that are nearest, by its length.
-    fn vote(
-        &mut self,
-        [above, row, below]: [&[f32]; 3],
-        (cell_y, next_y): (usize, f32),
-        places: &[(usize, f32)],
-        (across, down): (usize, usize),
-    ) {
-        for (x, &(cell_x, next_x)) in places.iter().enumerate() {
-            let (gx, gy) = (row[x + 2] - row[x], below[x + 1] - above[x + 1]);
-            let length = (gx * gx + gy * gy).sqrt();
-            if length < 1e-6 {
-                continue;
-            }
-            let (bins, shares) = directions(gx, gy);
-            for (cy, wy) in [(cell_y, 1.0 - next_y), (cell_y + 1, next_y)] {
-                for (cx, wx) in [(cell_x, 1.0 - next_x), (cell_x + 1, next_x)] {
-                    // Cells are numbered from 1: outside ones get no votes.
-                    if cx == 0 || cy == 0 || cx > across || cy > down {
-                        continue;
-                    }
-                    let cell = ((cy - 1) * across + cx - 1) * BINS;
-                    let vote = length * wx * wy;
-                    self.cells[cell + bins.0] += vote * shares.0;
-                    self.cells[cell + bins.1] += vote * shares.1;
+            let rows = [0, 1, 2].map(|row| &self.roots[(y + row) * width..(y + row + 1) * width]);
+            self.gradients.fill(rows);
+            vote(&self.gradients, &mut self.votes, across);
+            let (cell, share) = place(y);
+            for (row, weight) in [(cell, 1.0 - share), (cell + 1, share)] {
+                // Cells are numbered from 1: outside ones get no votes.
+                if (1..=down).contains(&row) {
+                    let cells = &mut self.cells[(row - 1) * across * BINS..row * across * BINS];
+                    let votes = &self.votes[BINS..];
+                    cells.iter_mut().zip(votes).for_each(|(cell, vote)| *cell += weight * vote);
                 }
             }
         }
+        self.normalise(across);
     }
 
     /// L2-Hys: divided by the length, clipped, divided again.
@@ -109,25 +93,36 @@ impl Blocks {
 }
 
 /// The cell before a pixel, numbered from 1, and the share of the next one.
-fn place(pixel: usize, cells: usize) -> (usize, f32) {
+fn place(pixel: usize) -> (usize, f32) {
     let at = (pixel as f32 + 0.5) / CELL as f32 + 0.5;
     let cell = at as usize;
-    (cell.min(cells + 1), at - cell as f32)
+    (cell, at - cell as f32)
 }
 
-/// The two nearest directions and their shares; opposite ones are the same.
-fn directions(gx: f32, gy: f32) -> ((usize, usize), (f32, f32)) {
-    let mut angle = gy.atan2(gx);
-    if angle < 0.0 {
-        angle += PI;
+/// The votes of a row for its cells and for one outside at either end: each
+/// gradient votes for the two directions and the two cells that are nearest, by
+/// its length.
+fn vote(gradients: &Gradients, votes: &mut Vec<f32>, across: usize) {
+    votes.clear();
+    votes.resize((across + 2) * BINS, 0.0);
+    let pixels = gradients.length.iter().zip(&gradients.turn).take(across * CELL);
+    for (x, (length, turn)) in pixels.enumerate() {
+        let (cell, next) = place(x);
+        // One more than the direction below, so that it is never negative.
+        let at = turn * BINS as f32 + 0.5;
+        let bin = at as usize;
+        let share = at - bin as f32;
+        let (below, above) = ((bin + BINS - 1) % BINS, bin % BINS);
+        let here = length * (1.0 - next);
+        let there = length * next;
+        let start = cell * BINS;
+        votes[start + below] += here * (1.0 - share);
+        votes[start + above] += here * share;
+        votes[start + BINS + below] += there * (1.0 - share);
+        votes[start + BINS + above] += there * share;
     }
-    let at = angle * (BINS as f32 / PI) - 0.5;
-    let below = at.floor();
-    let share = at - below;
-    let bin = (below as i32).rem_euclid(BINS as i32) as usize;
-    ((bin, (bin + 1) % BINS), (1.0 - share, share))
 }
 
 fn norm(values: &[f32]) -> f32 {
-    values.iter().map(|v| v * v).sum::<f32>().sqrt()
+    dot(values, values).sqrt()
 }

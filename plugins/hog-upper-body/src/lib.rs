@@ -1,11 +1,13 @@
-//! `hog-upper-body`: heads and shoulders by histograms of oriented gradients
-//! and a linear support vector machine (P2, section III-B; N. Dalal and B.
-//! Triggs, *Histograms of oriented gradients for human detection*, CVPR 2005).
+//! `hog-upper-body`: upper bodies by histograms of oriented gradients and a
+//! linear support vector machine (P2, section III-B; N. Dalal and B. Triggs,
+//! *Histograms of oriented gradients for human detection*, CVPR 2005), or, with
+//! fewer mistakes, by boosted trees over finer cells.
 //!
-//! The image is looked at in several sizes. In each, cells of 8x8 pixels are
-//! made once, and blocks of 2x2 cells are normalised once; a window is then a
-//! dot product of 7x7 blocks with the weights of a [`Model`], which reads them
-//! where they lie.
+//! The image is looked at in several sizes. In each, what machines look at is
+//! made once: cells of 8x8 pixels and normalised blocks of them ([`Blocks`]), or
+//! cells of 4x4 pixels ([`Channels`]). A window is then a dot product of 7x7
+//! blocks with the weights of a [`Model`], or what its trees say of 16x16 cells,
+//! both read where they lie.
 //!
 //! With depth, a window is looked at only if a person who is as far as its
 //! middle shows would be as large as it is, and would have their head at a
@@ -13,8 +15,10 @@
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 
+mod channels;
 mod config;
 mod detect;
+mod gradients;
 mod hog;
 mod model;
 mod resample;
@@ -23,14 +27,17 @@ mod scan;
 mod tests;
 #[cfg(feature = "train")]
 pub mod train;
+mod trees;
 
+pub use channels::Channels;
 pub use config::{Config, Training};
 pub use detect::HogUpperBody;
 pub use hog::Blocks;
-pub use model::{Model, NUMBERS};
+pub use model::{Field, Kind, Machine, Model, NUMBERS};
 pub use resample::resampled;
-pub use scan::{Scanner, Window, merge, window_numbers};
+pub use scan::{Scanner, Window, merge, window_numbers, window_of};
 use tagalong_core::Registry;
+pub use trees::{Tree, Trees};
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "hog-upper-body";
@@ -44,6 +51,6 @@ pub fn register(registry: &mut Registry) {
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
-        train::HogTrainer::new(config.training, context.seed)
+        train::HogTrainer::new(config.machine, config.training, context.seed)
     });
 }

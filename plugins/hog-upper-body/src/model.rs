@@ -1,23 +1,89 @@
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::channels::Channels;
 use crate::hog::{BLOCK, Blocks};
+use crate::trees::{self, Trees};
 
 /// Blocks along a side of a window: 64 pixels.
 pub(crate) const SIDE: usize = 7;
-/// Numbers of a window.
+/// Numbers of a window for a linear machine.
 pub const NUMBERS: usize = SIDE * SIDE * BLOCK;
 
-const FORMAT: &str = "hog-upper-body 1";
+const FORMAT: &str = "hog-upper-body 2";
 
-/// A linear machine over the blocks of a window, with its calibration.
+/// What judges windows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Normalised blocks of cells and a linear machine, as P2 has it.
+    Linear,
+    /// Finer cells and boosted trees: fewer mistakes.
+    #[default]
+    Trees,
+}
+
+/// A machine that judges windows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Machine {
+    /// A weighted sum of the numbers of all blocks.
+    Linear {
+        /// A weight for each number of a window, block row by block row.
+        weights: Vec<f32>,
+        /// Added to the weighted sum.
+        bias: f32,
+    },
+    /// A sum of what trees say of cells.
+    Trees(Trees),
+}
+
+/// What a machine looks at, for all windows of an image in one size.
+#[derive(Clone, Debug)]
+pub enum Field {
+    /// For linear machines.
+    Blocks(Blocks),
+    /// For trees.
+    Channels(Channels),
+}
+
+impl Field {
+    /// Nothing yet, for a machine of some kind.
+    pub fn new(kind: Kind) -> Self {
+        match kind {
+            Kind::Linear => Self::Blocks(Blocks::default()),
+            Kind::Trees => Self::Channels(Channels::default()),
+        }
+    }
+
+    /// Takes the place of another image (see [`Blocks::fill`]).
+    pub fn fill(&mut self, pixels: &[f32], width: usize) {
+        match self {
+            Self::Blocks(blocks) => blocks.fill(pixels, width),
+            Self::Channels(channels) => channels.fill(pixels, width),
+        }
+    }
+
+    /// The numbers of the window that begins at cell (x, y), of 8 pixels.
+    pub fn numbers(&self, x: usize, y: usize) -> Vec<f32> {
+        match self {
+            Self::Blocks(blocks) => {
+                (y..y + SIDE).flat_map(|y| blocks.run(x, y, SIDE).iter().copied()).collect()
+            }
+            Self::Channels(channels) => (2 * y..2 * y + trees::CELLS)
+                .flat_map(|y| &channels.from(2 * x, y)[..trees::CELLS * crate::channels::DEPTH])
+                .copied()
+                .collect(),
+        }
+    }
+}
+
+/// A machine with its calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// A weight for each number of a window, block row by block row.
-    pub weights: Vec<f32>,
-    /// Added to the weighted sum.
-    pub bias: f32,
+    /// The machine.
+    pub machine: Machine,
     /// Log-odds per unit of the sum.
     pub slope: f64,
     /// Log-odds of the sum 0.
@@ -29,27 +95,48 @@ pub struct Model {
 #[serde(deny_unknown_fields)]
 struct Kept {
     format: String,
-    bias: f32,
+    machine: Kind,
+    /// The bias of a linear machine; where trees give a window up.
+    level: f32,
     slope: f64,
     offset: f64,
-    /// Little-endian 32-bit numbers in base64.
-    weights: String,
+    /// Little-endian numbers in base64: weights, or trees.
+    numbers: String,
 }
 
 impl Model {
-    /// The weighted sum of a window whose first block is at (x, y).
-    pub fn sum(&self, blocks: &Blocks, x: usize, y: usize) -> f32 {
-        let rows = self.weights.chunks_exact(SIDE * BLOCK).enumerate();
-        rows.map(|(row, weights)| dot(weights, blocks.run(x, y + row, SIDE))).sum::<f32>()
-            + self.bias
+    /// What kind of machine it has.
+    pub fn kind(&self) -> Kind {
+        match self.machine {
+            Machine::Linear { .. } => Kind::Linear,
+            Machine::Trees(_) => Kind::Trees,
+        }
     }
 
-    /// The weighted sum of a window's numbers.
+    /// The sum of the window that begins at cell (x, y), of 8 pixels.
+    pub fn sum(&self, field: &Field, x: usize, y: usize) -> f32 {
+        match (&self.machine, field) {
+            (Machine::Linear { weights, bias }, Field::Blocks(blocks)) => {
+                let rows = weights.chunks_exact(SIDE * BLOCK).enumerate();
+                let of = |(row, weights)| dot(weights, blocks.run(x, y + row, SIDE));
+                rows.map(of).sum::<f32>() + bias
+            }
+            (Machine::Trees(trees), Field::Channels(channels)) => {
+                trees.sum_in(channels, 2 * x, 2 * y)
+            }
+            _ => f32::MIN,
+        }
+    }
+
+    /// The sum of a window's numbers.
     pub fn sum_of(&self, numbers: &[f32]) -> f32 {
-        dot(&self.weights, numbers) + self.bias
+        match &self.machine {
+            Machine::Linear { weights, bias } => dot(weights, numbers) + bias,
+            Machine::Trees(trees) => trees.sum_of(numbers),
+        }
     }
 
-    /// Log-odds of a weighted sum.
+    /// Log-odds of a sum.
     pub fn log_odds(&self, sum: f32) -> f64 {
         self.slope * f64::from(sum) + self.offset
     }
@@ -61,13 +148,19 @@ impl Model {
 
     /// The content of a model file.
     pub fn to_text(&self) -> String {
-        let bytes: Vec<u8> = self.weights.iter().flat_map(|w| w.to_le_bytes()).collect();
+        let (level, bytes) = match &self.machine {
+            Machine::Linear { weights, bias } => {
+                (*bias, weights.iter().flat_map(|w| w.to_le_bytes()).collect())
+            }
+            Machine::Trees(all) => (all.hopeless, trees::to_bytes(&all.trees)),
+        };
         let kept = Kept {
             format: FORMAT.into(),
-            bias: self.bias,
+            machine: self.kind(),
+            level,
             slope: self.slope,
             offset: self.offset,
-            weights: BASE64_STANDARD.encode(bytes),
+            numbers: BASE64_STANDARD.encode(bytes),
         };
         toml::to_string(&kept).unwrap_or_default()
     }
@@ -81,24 +174,38 @@ impl Model {
         if kept.format != FORMAT {
             return Err(format!("its format is `{}`, expected `{FORMAT}`", kept.format));
         }
-        let bytes = BASE64_STANDARD.decode(&kept.weights).map_err(|error| error.to_string())?;
-        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-        let weights: Vec<f32> = bytes.chunks_exact(4).map(number).collect();
-        let Kept { bias, slope, offset, .. } = kept;
-        if weights.len() != NUMBERS {
-            return Err(format!("it has {} weights, expected {NUMBERS}", weights.len()));
-        }
-        let finite = bias.is_finite() && slope.is_finite() && offset.is_finite();
-        if !finite || slope <= 0.0 || weights.iter().any(|w| !w.is_finite()) {
+        let bytes = BASE64_STANDARD.decode(&kept.numbers).map_err(|error| error.to_string())?;
+        let Kept { machine, level, slope, offset, .. } = kept;
+        let finite = level.is_finite() && slope.is_finite() && offset.is_finite();
+        if !finite || slope <= 0.0 {
             return Err(
                 "it has numbers that are no numbers, or a slope that is not positive".into()
             );
         }
-        Ok(Self { weights, bias, slope, offset })
+        let machine = match machine {
+            Kind::Linear => Machine::Linear { weights: weights(&bytes)?, bias: level },
+            Kind::Trees => {
+                Machine::Trees(Trees { trees: trees::from_bytes(&bytes)?, hopeless: level })
+            }
+        };
+        Ok(Self { machine, slope, offset })
     }
 }
 
+fn weights(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+    let weights: Vec<f32> = bytes.chunks_exact(4).map(number).collect();
+    if weights.len() != NUMBERS {
+        return Err(format!("it has {} weights, expected {NUMBERS}", weights.len()));
+    }
+    if weights.iter().any(|w| !w.is_finite()) {
+        return Err("it has weights that are no numbers".into());
+    }
+    Ok(weights)
+}
+
 /// Sums in eight lanes of a fixed order: fast, and the same on every machine.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut lanes = [0.0_f32; 8];
     let (heads, tails) = (a.chunks_exact(8), b.chunks_exact(8));

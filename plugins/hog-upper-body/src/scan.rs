@@ -1,20 +1,27 @@
 //! Windows over an image in many sizes.
 
+use std::ops::RangeInclusive;
+
 use tagalong_core::{GreyImage, Rect};
 
-use crate::Model;
-use crate::hog::{Blocks, CELL};
-use crate::model::SIDE;
-use crate::resample::resampled;
+use crate::hog::CELL;
+use crate::model::{Field, Kind, Model, SIDE};
+use crate::resample::{Resampler, resampled};
 
 /// Side of a window, pixels of the resampled image.
 pub(crate) const WINDOW_PX: usize = (SIDE + 1) * CELL;
-/// The upper-body square fills this much of a window.
-pub(crate) const FILLED: f64 = 0.8;
+/// The upper-body square fills this much of the width of a window: arms, hips and
+/// what is around a person tell more than the outline of head and shoulders alone.
+pub(crate) const FILLED: f64 = 0.5;
+/// The square is in the middle of the columns, and this part of a window is above
+/// it.
+const ABOVE: f64 = 0.1;
 
-/// What is resampled around windows: a cell, because its gradients vote for the
-/// outermost cells of the window, too, and a pixel for their gradients.
-const AROUND_PX: usize = CELL + 1;
+/// Cells that are resampled around windows: they have a share in the outermost
+/// cells of a window, and say what is usual there.
+const AROUND: usize = 2;
+/// The same in pixels, with one more for the gradients.
+const AROUND_PX: usize = AROUND * CELL + 1;
 
 /// A window that was looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,13 +35,25 @@ pub struct Window {
 }
 
 /// Looks at the windows of images; keeps its memory from one to the next.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Scanner {
-    blocks: Blocks,
+    field: Field,
+    resampler: Resampler,
+    pixels: Vec<f32>,
     looked_at: u64,
 }
 
 impl Scanner {
+    /// For models of one kind.
+    pub fn new(kind: Kind) -> Self {
+        Self {
+            field: Field::new(kind),
+            resampler: Resampler::default(),
+            pixels: Vec::new(),
+            looked_at: 0,
+        }
+    }
+
     /// How many windows were looked at so far.
     pub fn looked_at(&self) -> u64 {
         self.looked_at
@@ -68,29 +87,28 @@ impl Scanner {
         found: &mut Vec<Window>,
     ) {
         let step = side / (FILLED * WINDOW_PX as f64);
-        let cells = |pixels: usize| (pixels as f64 / (step * CELL as f64)) as usize;
-        let (across, down) = (cells(image.width()), cells(image.height()));
-        if across <= SIDE || down <= SIDE {
-            return;
-        }
-        let margin = 0.5 * (1.0 - FILLED) * WINDOW_PX as f64;
-        let square = |x: usize, y: usize| {
-            let at = |cell: usize| ((cell * CELL) as f64 + margin) * step;
-            Rect::new(at(x), at(y), side, side)
+        let (left_px, above_px) = margins();
+        let square = |x: i64, y: i64| {
+            let at = |cell: i64, margin: f64| ((cell * CELL as i64) as f64 + margin) * step;
+            Rect::new(at(x, left_px), at(y, above_px), side, side)
         };
-        let mut wanted: Vec<(usize, usize, Option<f64>)> = Vec::new();
-        for y in 0..down - SIDE {
-            wanted.extend((0..across - SIDE).filter_map(|x| Some((x, y, propose(&square(x, y))?))));
+        let columns = inside(image.width() as f64 / step, left_px);
+        let mut wanted: Vec<(i64, i64, Option<f64>)> = Vec::new();
+        for y in inside(image.height() as f64 / step, above_px) {
+            let row = columns.clone();
+            wanted.extend(row.filter_map(|x| Some((x, y, propose(&square(x, y))?))));
         }
         let Some((left, top, right, bottom)) = bounds(&wanted) else { return };
         self.looked_at += wanted.len() as u64;
-        let long = |from: usize, to: usize| (to - from + SIDE + 1) * CELL + 2 * AROUND_PX;
+        let long = |from: i64, to: i64| ((to - from) as usize + SIDE + 1) * CELL + 2 * AROUND_PX;
         let (width, height) = (long(left, right), long(top, bottom));
-        let start = |cell: usize| ((cell * CELL) as f64 - AROUND_PX as f64) * step;
-        let pixels = resampled(image, (start(left), start(top)), step, width, height);
-        self.blocks.fill(&pixels, width);
+        let start = |cell: i64| ((cell * CELL as i64) as f64 - AROUND_PX as f64) * step;
+        let origin = (start(left), start(top));
+        self.resampler.fill(image, origin, step, (width, height), &mut self.pixels);
+        self.field.fill(&self.pixels, width);
         for (x, y, depth_m) in wanted {
-            let sum = model.sum(&self.blocks, x - left + 1, y - top + 1);
+            let at = |cell: i64, first: i64| (cell - first) as usize + AROUND;
+            let sum = model.sum(&self.field, at(x, left), at(y, top));
             if sum >= least {
                 found.push(Window { region: square(x, y), depth_m, sum });
             }
@@ -98,21 +116,44 @@ impl Scanner {
     }
 }
 
+/// What a window shows left of and above the upper-body square, pixels of the
+/// resampled image.
+fn margins() -> (f64, f64) {
+    (0.5 * (1.0 - FILLED) * WINDOW_PX as f64, ABOVE * WINDOW_PX as f64)
+}
+
+/// The first cells of the windows whose square lies in an image of `length`
+/// pixels; the rest of a window may hang over, where the border goes on.
+fn inside(length: f64, margin: f64) -> RangeInclusive<i64> {
+    let cell = CELL as f64;
+    let last = (length - margin - FILLED * WINDOW_PX as f64) / cell;
+    (-margin / cell).ceil() as i64..=last.floor() as i64
+}
+
+/// The window of an upper-body square, pixels of the image.
+pub fn window_of(square: &Rect) -> Rect {
+    let step = square.width / (FILLED * WINDOW_PX as f64);
+    let (left, above) = margins();
+    let side = WINDOW_PX as f64 * step;
+    Rect::new(square.x - left * step, square.y - above * step, side, side)
+}
+
 /// Smallest and largest column and row.
-fn bounds(wanted: &[(usize, usize, Option<f64>)]) -> Option<(usize, usize, usize, usize)> {
+fn bounds(wanted: &[(i64, i64, Option<f64>)]) -> Option<(i64, i64, i64, i64)> {
     let (x, y) = (|| wanted.iter().map(|w| w.0), || wanted.iter().map(|w| w.1));
     Some((x().min()?, y().min()?, x().max()?, y().max()?))
 }
 
-/// The numbers of the window whose upper-body square is `square`.
-pub fn window_numbers(image: &GreyImage, square: &Rect) -> Vec<f32> {
+/// The numbers of the window whose upper-body square is `square`, for machines of
+/// one kind.
+pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> {
     let step = square.width.max(1.0) / (FILLED * WINDOW_PX as f64);
-    let margin = (0.5 * (1.0 - FILLED) * WINDOW_PX as f64 + AROUND_PX as f64) * step;
-    let (origin, side) = ((square.x - margin, square.y - margin), WINDOW_PX + 2 * AROUND_PX);
+    let (window, around) = (window_of(square), AROUND_PX as f64 * step);
+    let (origin, side) = ((window.x - around, window.y - around), WINDOW_PX + 2 * AROUND_PX);
     let pixels = resampled(image, origin, step, side, side);
-    let mut blocks = Blocks::default();
-    blocks.fill(&pixels, side);
-    (1..=SIDE).flat_map(|y| blocks.run(1, y, SIDE).iter().copied()).collect()
+    let mut field = Field::new(kind);
+    field.fill(&pixels, side);
+    field.numbers(AROUND, AROUND)
 }
 
 /// The best of each group of windows: greedily, best first, those that overlap

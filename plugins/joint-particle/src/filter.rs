@@ -325,6 +325,28 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_shows_every_particle_and_a_map_of_two_people_who_overlap() {
+        let config = Config { method: Method::Kde, ..Config::default() };
+        let (mut filter, frame) = (JointParticle::new(config.clone(), 1).unwrap(), frame());
+        let farther = Detection { position: Point3::new(3.0, 0.1, 1.6), ..detection() };
+        filter.start(TrackId(1), &detection());
+        filter.start(TrackId(2), &farther);
+        filter.predict(&frame.motion);
+        let likelihood: Option<&dyn Likelihood> = Some(&Flattering(3.0));
+        let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+        filter.update(&evidence).unwrap();
+        let before = filter.estimates(&frame.camera);
+        let sketch = filter.sketch(&evidence).unwrap();
+        assert_eq!(filter.estimates(&frame.camera), before, "looking changes nothing");
+        let of = |id| sketch.points.iter().filter(|point| point.id == TrackId(id)).count();
+        let rows = config.joint_side * config.joint_side;
+        assert_eq!([of(1), of(2)], [rows, rows]);
+        let titles: Vec<&str> = sketch.maps.iter().map(|map| map.title.as_str()).collect();
+        assert_eq!(titles, ["1 before 2: table", "1 before 2: approximated"]);
+        assert!(sketch.maps.iter().all(|map| (map.columns, map.values.len()) == (61, 1281)));
+    }
+
+    #[test]
     fn a_silhouette_that_no_detector_finds_is_not_believed_for_long() {
         let (seen, again) = seen(5.0);
         assert!(seen[..9].iter().all(|seen| *seen) && !seen[10] && !seen[11], "{seen:?}");

@@ -1,7 +1,7 @@
-use nalgebra::{Point3, SMatrix, Vector2};
+use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Distortion, Estimate, Funnel, Person, Pinhole, Rect, Sketch, Stamp,
-    Track, TrackId,
+    DepthImage, Detection, Distortion, Estimate, Funnel, Person, Pinhole, Rect, Silhouette, Sketch,
+    SketchMap, SketchPoint, Stamp, Track, TrackId,
 };
 use tagalong_pipeline::{Candidate, Fate, Outcome, Weighing};
 
@@ -55,6 +55,22 @@ fn changed(a: &RgbImage, b: &RgbImage, columns: std::ops::Range<usize>) -> usize
     rows.flat_map(|y| columns.clone().map(move |x| (x, y)))
         .filter(|(x, y)| a.row(*y)[*x] != b.row(*y)[*x])
         .count()
+}
+
+#[test]
+fn what_the_filter_imagines_shows_in_the_image() {
+    let without = picture(&scene(&[], Vec::new()), &Trails::default());
+    let mut scene = scene(&[], Vec::new());
+    let run = Rect::new(100.0, 60.0, 30.0, 2.0);
+    scene.report.sketch = Sketch {
+        points: vec![SketchPoint { id: TrackId(1), pixel: Point2::new(200.5, 90.5), weight: 1.0 }],
+        silhouettes: vec![Silhouette { id: TrackId(1), runs: vec![run] }],
+        maps: vec![SketchMap { title: String::new(), columns: 10, values: vec![0.5; 50] }],
+    };
+    let with = picture(&scene, &Trails::default());
+    assert_eq!(changed(&without, &with, 100..130), 60, "a run");
+    assert!(changed(&without, &with, 195..206) > 0, "a particle");
+    assert_eq!(changed(&without, &with, 0..40), 200, "a map of 20 x 10 pixels");
 }
 
 #[test]

@@ -99,21 +99,20 @@ pub struct WindowCard {
     /// What it was trained on.
     trained_on: Vec<String>,
     /// Photographs altogether; a fifth of their groups is held out for the
-    /// figures, and a fifth for the calibration.
+    /// figures, and a tenth for the calibration.
     photographs: usize,
     /// What the trainer says.
     fit: toml::Table,
 }
 
 impl WindowCard {
-    /// A card.
-    pub fn new(args: &TrainArgs, photographs: usize, fit: toml::Table) -> Self {
-        let folders = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
+    /// A card; `folders` are those of the data that were read.
+    pub fn new(args: &TrainArgs, folders: &[&str], photographs: usize, fit: toml::Table) -> Self {
         Self {
             plugin: args.plugin.clone(),
             quick: args.quick,
             seed: args.seed,
-            trained_on: folders.map(String::from).to_vec(),
+            trained_on: folders.iter().map(ToString::to_string).collect(),
             photographs,
             fit,
         }

@@ -7,6 +7,7 @@
 //! gets wrong there, or is unsure of, is added before the next fit.
 
 mod card;
+mod faces;
 mod held_out;
 mod panorama;
 mod photos;
@@ -52,7 +53,7 @@ const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 #[derive(Args, Debug)]
 pub struct TrainArgs {
     /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
-    /// of the detector `omni-appearance`.
+    /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`.
     pub plugin: String,
     /// Where the model goes; its card is written beside it
     /// [default: configs/models/<plugin>.toml].
@@ -128,7 +129,8 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
         return panorama::train(&session, args);
     }
     let mut trainer = session.trainer()?;
-    if registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector) {
+    let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
+    if is_detector || args.plugin == faces::NAME {
         return windows::train(&session, trainer.as_mut());
     }
     let mut card = Card::new(args, session.sources());
@@ -158,7 +160,9 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
 impl<'a> Session<'a> {
     fn new(args: &'a TrainArgs, registry: &'a Registry) -> Result<Self, Failure> {
         let model = args.output.clone().unwrap_or_else(|| {
-            Path::new("configs/models").join(&args.plugin).with_extension("toml")
+            // A cascade is a file of OpenCV's kind.
+            let kind = if args.plugin == faces::NAME { "xml" } else { "toml" };
+            Path::new("configs/models").join(&args.plugin).with_extension(kind)
         });
         let bar = ProgressBar::new(1);
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3}% {msg} {eta}") {
@@ -341,6 +345,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
         "color-texture" => "[training]\ntrees = [25, 50]",
         "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
+        "cascade" => "[training]\nstages = 4\nfeatures = 200",
         _ => "",
     };
     text.parse().unwrap_or_default()

@@ -135,7 +135,11 @@ fn alike(a: &[u64; 2], b: &[u64; 2]) -> bool {
     [b[0], b[1]].iter().any(|other| (a[0] ^ other).count_ones() <= DIFFERENT_BITS)
 }
 
-fn read(path: &Path) -> Result<GreyImage, Failure> {
+/// A picture as grey values.
+///
+/// # Errors
+/// A file that is no picture.
+pub fn read(path: &Path) -> Result<GreyImage, Failure> {
     let image = image::open(path)
         .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?
         .into_luma8();
@@ -190,7 +194,8 @@ impl Photo {
     }
 }
 
-fn frame(grey: GreyImage) -> Frame {
+/// A picture as a frame of some camera.
+pub fn frame(grey: GreyImage) -> Frame {
     let (width, height) = (grey.width(), grey.height());
     let (cx, cy) = (0.5 * width as f64, 0.5 * height as f64);
     let lens = Pinhole { fx: 500.0, fy: 500.0, cx, cy, distortion: Distortion::None };
@@ -200,7 +205,7 @@ fn frame(grey: GreyImage) -> Frame {
 }
 
 /// A candidate of which only the region is known.
-fn candidate(region: Rect) -> Detection {
+pub fn candidate(region: Rect) -> Detection {
     let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), Matrix3::identity());
     Detection { region, position, covariance, score: 0.0, source: "photograph" }
 }

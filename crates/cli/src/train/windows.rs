@@ -1,11 +1,16 @@
 //! Detectors that look at windows: they are trained on photographs of people,
 //! and search pictures without anybody for their own mistakes.
 
+use std::path::Path;
+
 use super::card::WindowCard;
-use super::photos::photos;
-use super::{Session, write};
+use super::photos::{Take, photos};
+use super::{Session, faces, write};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_core::{Detection, Example, Frame, Trainer};
+
+/// What is read of a folder of data.
+const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
 
 /// Shows the trainer all photographs; it keeps some of them apart by itself.
 pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
@@ -14,18 +19,14 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
         return Err(Failure::usage(format!("`{}` {why}", session.args.plugin)));
     };
     let share = if session.args.quick { 8 } else { 1 };
-    let mut all = photos(data, false);
-    all.extend(photos(data, true));
-    all.retain(|photo| photo.group / 5 % share == 0);
     session.bar.set_message("reading photographs");
-    session.bar.set_length(all.len() as u64);
     let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
         trainer.add(frame, candidate, example).map_err(Failure::failed)
     };
-    for photo in &all {
-        photo.visit(0, &mut show)?;
-        session.bar.inc(1);
-    }
+    let (folders, shown) = match session.args.plugin.as_str() {
+        faces::NAME => (&faces::FOLDERS[..], faces::visit(data, share, &mut show)?),
+        _ => (&FOLDERS[..], visit(data, share, &mut show)?),
+    };
     session.bar.set_message("fitting");
     session.bar.set_position(0);
     session.bar.set_length(1000);
@@ -34,9 +35,18 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     session.bar.finish_and_clear();
     write(&session.model, &fitted.model)?;
     let path = session.model.with_extension("card.toml");
-    let card = WindowCard::new(session.args, all.len(), fitted.figures);
+    let card = WindowCard::new(session.args, folders, shown, fitted.figures);
     write(&path, &card.to_text())?;
     print(&card.to_text())?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)
+}
+
+/// Shows all photographs of people and of nobody, or one in `share`.
+fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
+    let mut all = photos(data, false);
+    all.extend(photos(data, true));
+    all.retain(|photo| photo.group / 5 % share == 0);
+    all.iter().try_for_each(|photo| photo.visit(0, take))?;
+    Ok(all.len())
 }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use tagalong_core::{
-    Camera, DepthImage, Distortion, Frame, Funnel, GreyImage, Images, Motion, Pinhole, RightImage,
-    Stamp,
+    Camera, DepthImage, Distortion, Frame, Funnel, GreyImage, Images, Lens, Motion, Pinhole,
+    RightImage, Stamp,
 };
 
 use super::kernels::noise_pair;
@@ -83,6 +83,53 @@ fn bad_pairs_have_no_depth_and_the_reason_is_counted() {
     }
     let (_, funnel) = depth(StereoSettings::default(), &frame(left, right));
     assert!(funnel.entries().iter().all(|e| !e.test.starts_with("stereo:")), "{funnel:?}");
+}
+
+/// Two cameras seldom agree about exposure. Census strings do not mind at all;
+/// differences of brightness mind much of it, which is told.
+#[test]
+fn cameras_of_unequal_gain_see_the_same_depth() {
+    let (left, right) = noise_pair(160, 120, 10);
+    let brighter = |gain: f32| {
+        GreyImage::from_fn(160, 120, |x, y| (f32::from(right.row(y)[x]) * gain).round() as u8)
+    };
+    let wanted = (FX * BASELINE_M / 10.0) as f32;
+    for (method, gain, told) in
+        [(Method::Block, 1.3, 1), (Method::Block, 0.7, 1), (Method::SemiGlobal, 1.1, 0)]
+    {
+        let settings = StereoSettings { method, ..StereoSettings::default() };
+        let (depth, funnel) = depth(settings, &frame(left.clone(), brighter(gain)));
+        let close = depth.pixels().iter().filter(|d| (**d - wanted).abs() < 0.05).count();
+        assert!(close > 130 * 120, "{method:?} {gain}: {close}");
+        assert_eq!(funnel.count("stereo: cameras differ in brightness"), told, "{gain}");
+    }
+}
+
+#[test]
+fn images_too_small_for_a_window_are_no_trouble() {
+    for (width, height) in [(1, 1), (2, 1), (1, 7), (5, 3)] {
+        let (left, right) = noise_pair(width, height, 1);
+        for method in [Method::Block, Method::SemiGlobal] {
+            let settings = StereoSettings { method, ..StereoSettings::default() };
+            let (depth, _) = depth(settings, &frame(left.clone(), right.clone()));
+            assert_eq!((depth.width(), depth.height()), (width, height));
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_is_not_calibrated_is_an_error() {
+    let (left, right) = noise_pair(64, 48, 3);
+    let whole = frame(left, right);
+    for fx in [0.0, -200.0, f64::NAN, f64::INFINITY] {
+        let lens = Pinhole { fx, fy: FX, cx: 0.0, cy: 0.0, distortion: Distortion::None };
+        let camera = Arc::new(Camera { lens: Lens::Pinhole(lens), ..Camera::clone(&whole.camera) });
+        let images = whole.images().clone();
+        let bad = Frame::new(1, whole.stamp, camera, whole.motion, images);
+        let mut stereo = StereoDepth::new(StereoSettings::default()).unwrap();
+        let error = stereo.depth(&bad, &mut Funnel::default()).unwrap_err().to_string();
+        assert!(error.contains("focal length"), "{error}");
+    }
 }
 
 #[test]

@@ -213,32 +213,51 @@ fn smoothed(image: &GreyImage, x: i64, y: i64) -> (f64, f64) {
 
 /// Slope, and slope times disparity, of a pixel, as Lucas and Kanade have them, with
 /// less weight on strong slopes.
-fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64) -> (f64, f64) {
-    let (x, y) = (x as i64, y as i64);
-    let (own, own_slope) = smoothed(&pair[0], x, y);
-    let last = pair[1].width() as i64 - 1;
+fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64, gain: f64) -> (f64, f64) {
+    let (own, own_slope) = smoothed(&pair[0], x as i64, y as i64);
+    let (other, slope) = matched(&pair[1], x, y, d);
+    let g = 0.5 * (gain * own_slope + slope);
+    let weight = 1.0 / (1.0 + (g / 6.0).powi(2)).sqrt();
+    (weight * g, weight * (g * d + other - gain * own))
+}
+
+/// Brightness and slope of the right image where pixel `x` of the left one is.
+fn matched(right: &GreyImage, x: usize, y: usize, d: f64) -> (f64, f64) {
+    let last = right.width() as i64 - 1;
     let at = (x as f64 - d).clamp(0.0, last as f64);
     let (low, part) = (at.floor(), at.fract());
     let [(a, a_slope), (b, b_slope)] =
-        [0, 1].map(|i| smoothed(&pair[1], (low as i64 + i).min(last), y));
-    let g = 0.5 * (own_slope + a_slope + part * (b_slope - a_slope));
-    let weight = 1.0 / (1.0 + (g / 6.0).powi(2)).sqrt();
-    (weight * g, weight * (g * d + a + part * (b - a) - own))
+        [0, 1].map(|i| smoothed(right, (low as i64 + i).min(last), y as i64));
+    (a + part * (b - a), a_slope + part * (b_slope - a_slope))
+}
+
+/// The ratio of the deviations of a row's brightness in the two images.
+fn gain(pair: &[GreyImage], row: &[f32], y: usize) -> f64 {
+    let known: Vec<usize> = (0..row.len()).filter(|x| !row[*x].is_nan()).collect();
+    let variance = |level: &dyn Fn(usize) -> f64| {
+        let n = known.len().max(1) as f64;
+        let mean = known.iter().map(|x| level(*x)).sum::<f64>() / n;
+        4.0 + known.iter().map(|x| (level(*x) - mean).powi(2)).sum::<f64>() / n
+    };
+    let left = variance(&|x| smoothed(&pair[0], x as i64, y as i64).0);
+    let right = variance(&|x| matched(&pair[1], x, y, row[x].into()).0);
+    (right / left).sqrt().clamp(0.5, 2.0)
 }
 
 /// Sums of squares and products around the means, over the window's part of a row
-/// that is of one surface with column `x`; each pixel's own disparity counts one.
+/// that is of one surface with column `x`.
 fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
     let near = x.saturating_sub(radius)..(x + radius + 1).min(row.len());
     let same: Vec<usize> = near.filter(|near| (row[*near] - row[x]).abs() <= 1.0).collect();
-    let all: Vec<(f64, f64)> = same.iter().map(|x| equation(pair, *x, y, row[*x].into())).collect();
+    let gain = gain(pair, row, y);
+    let all: Vec<(f64, f64)> =
+        same.iter().map(|x| equation(pair, *x, y, row[*x].into(), gain)).collect();
     let n = all.len() as f64;
     let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
-    let was = same.iter().map(|x| f64::from(row[*x])).sum::<f64>();
     let add = |sum: (f64, f64), e: &(f64, f64)| {
         (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q))
     };
-    all.iter().fold((n, was), add)
+    all.iter().fold((0.0, 0.0), add)
 }
 
 /// Refines disparities pixel by pixel.
@@ -246,7 +265,7 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
     let (width, height) = (pair[0].width(), pair[0].height());
     let one = |at: usize| {
         let (x, y, was) = (at % width, at / width, disparities[at]);
-        let (mut squares, mut sum) = (0.0, 0.0);
+        let (mut squares, mut sum) = (20.0, 20.0 * f64::from(was));
         for y in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let row = &disparities[y * width..(y + 1) * width];
             if (row[x] - was).abs() <= 1.0 {
@@ -255,7 +274,7 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
             }
         }
         let was = f64::from(was);
-        let new = was + (sum / squares - was).clamp(-1.0, 1.0);
+        let new = was + (sum / squares - was).clamp(-0.5, 0.5);
         if new < 0.0 { 0.0 } else { new }
     };
     (0..disparities.len()).map(one).collect()

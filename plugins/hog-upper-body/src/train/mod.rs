@@ -1,31 +1,43 @@
-//! Fits a [`Model`]: people in several small shifts and mirrored, others by
+//! Fits a [`Model`], linear or of trees: people in several small shifts and mirrored, others by
 //! chance at first, and after that whatever the machine takes for people in
 //! pictures without anybody.
 //!
-//! A fifth of the groups is kept for the calibration and another fifth for the
-//! figures of the card; the machine sees neither.
+//! A tenth of the groups is kept for the calibration and a fifth for the figures
+//! of the card; the machine sees neither.
 
+mod boosted;
 mod svm;
 
 use std::sync::Arc;
 
+use boosted::boosted;
 use svm::{Windows, separate};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
 use tagalong_learn::{Line, accepted, area, mix, platt};
 
-use crate::{Model, NUMBERS, Scanner, Training, merge, window_numbers};
+use crate::scan::FILLED;
+use crate::{Kind, Machine, Model, Scanner, Training, Trees, merge, window_numbers, window_of};
 
 /// Sizes at which pictures without anybody are searched, pixels of the
 /// upper-body square, and the factor between them.
-const SMALLEST_PX: f64 = 48.0;
+const SMALLEST_PX: f64 = 32.0;
 const SCALE_STEP: f64 = 1.15;
 /// Windows of a picture overlap by less than this to be mined.
 const MINED_OVERLAP: f64 = 0.5;
-/// Sums below this are not near enough to matter for the calibration.
-const NEAR_MISS: f32 = -1.0;
+/// Windows with lower sums are no near misses: they are neither mined nor matter
+/// for the calibration. A linear machine wants people above 1; sums of trees spread
+/// more.
+const NEAR_MISS: [f32; 2] = [-1.0, -6.0];
+/// While others are mined, trees give a window up below this.
+const HOPELESS: f32 = -8.0;
+/// In use, they may give up this part of the people that they were not grown with.
+const GIVEN_UP: f64 = 0.01;
 /// Small shifts of a person, as fractions of the square, and its growth.
 const SHIFTS: [(f64, f64, f64); 4] =
     [(0.0, 0.0, 1.0), (0.05, -0.04, 1.05), (-0.05, 0.03, 0.95), (0.02, 0.05, 1.02)];
+/// A person is shown if no more than this part of their window is outside the
+/// picture: a portrait does not show what a window shows.
+const OUTSIDE: f64 = 0.2;
 /// The miss rate is told at this many false alarms a window.
 const FALSE_ALARMS: [f64; 3] = [1e-3, 1e-4, 1e-5];
 
@@ -38,22 +50,24 @@ enum Use {
 }
 
 fn use_of(group: u64) -> Use {
-    match mix(group) % 5 {
-        0 => Use::Figures,
-        1 => Use::Calibration,
+    match mix(group) % 10 {
+        0 | 1 => Use::Figures,
+        2 => Use::Calibration,
         _ => Use::Fit,
     }
 }
 
 /// Collects windows and pictures, and fits models to them.
 pub struct HogTrainer {
+    kind: Kind,
     training: Training,
     seed: u64,
     windows: Windows,
     /// Windows of people that are kept apart, as they are.
     people: Vec<(Use, Vec<f32>)>,
     pictures: Vec<(Use, Arc<GreyImage>)>,
-    others: usize,
+    /// People whose windows the pictures do not show.
+    cut_off: usize,
 }
 
 impl HogTrainer {
@@ -61,31 +75,40 @@ impl HogTrainer {
     ///
     /// # Errors
     /// [`Error::Settings`] for numbers that cannot work.
-    pub fn new(training: Training, seed: u64) -> Result<Self> {
+    pub fn new(kind: Kind, training: Training, seed: u64) -> Result<Self> {
         let penalties = [training.person_penalty, training.other_penalty];
-        if !penalties.iter().all(|p| *p > 0.0 && p.is_finite()) || training.epochs == 0 {
-            return Err(Error::Settings("penalties and `epochs` must be positive".into()));
+        if !penalties.iter().all(|p| *p > 0.0 && p.is_finite())
+            || training.epochs * training.trees == 0
+        {
+            return Err(Error::Settings("penalties, `epochs` and `trees` must be positive".into()));
         }
         Ok(Self {
+            kind,
             training,
             seed,
             windows: Windows::default(),
             people: Vec::new(),
             pictures: Vec::new(),
-            others: 0,
+            cut_off: 0,
         })
     }
 
     fn add_person(&mut self, grey: &GreyImage, square: &Rect, use_: Use) {
+        let window = window_of(square);
+        let seen = window.clipped(grey.width(), grey.height());
+        if seen.area() < (1.0 - OUTSIDE) * window.area() {
+            self.cut_off += 1;
+            return;
+        }
         if use_ != Use::Fit {
-            self.people.push((use_, window_numbers(grey, square)));
+            self.people.push((use_, window_numbers(grey, square, self.kind)));
             return;
         }
         let mirror = mirrored(grey);
         let flipped = Rect { x: grey.width() as f64 - square.right(), ..*square };
         for shift in SHIFTS {
-            self.windows.add(&window_numbers(grey, &shifted(square, shift)), true);
-            self.windows.add(&window_numbers(&mirror, &shifted(&flipped, shift)), true);
+            self.windows.add(&window_numbers(grey, &shifted(square, shift), self.kind), true);
+            self.windows.add(&window_numbers(&mirror, &shifted(&flipped, shift), self.kind), true);
         }
     }
 
@@ -95,7 +118,7 @@ impl HogTrainer {
             if *use_ != Use::Fit {
                 continue;
             }
-            let small = picture.width().min(picture.height()) as f64 * 0.8;
+            let small = FILLED * picture.width().min(picture.height()) as f64;
             let count = if small < 2.0 * SMALLEST_PX { 1 } else { self.training.random_windows };
             for window in 0..count {
                 let part = |k: u64| {
@@ -106,26 +129,42 @@ impl HogTrainer {
                 let x = part(1) * (picture.width() as f64 - side);
                 let y = part(2) * (picture.height() as f64 - side);
                 let square = Rect::new(x, y, side, side);
-                self.windows.add(&window_numbers(picture, &square), false);
+                self.windows.add(&window_numbers(picture, &square, self.kind), false);
             }
         }
     }
 
-    fn machine(&self) -> Model {
-        let Training { person_penalty, other_penalty, epochs, .. } = self.training;
-        let penalty = [other_penalty, person_penalty];
-        let (weights, bias) = separate(&self.windows, NUMBERS, penalty, epochs, self.seed);
-        Model { weights, bias, slope: 1.0, offset: 0.0 }
+    /// The machine of a round; the last one is the best that there can be.
+    fn machine(&self, round: usize) -> Model {
+        let Training { person_penalty, other_penalty, epochs, trees, numbers, .. } = self.training;
+        let rounds_left = self.training.mining_rounds.saturating_sub(round) as u32;
+        let machine = match self.kind {
+            Kind::Linear => {
+                let penalty = [other_penalty, person_penalty];
+                let (weights, bias) = separate(&self.windows, penalty, epochs, self.seed);
+                Machine::Linear { weights, bias }
+            }
+            Kind::Trees => {
+                let count = (trees >> (2 * rounds_left).min(31)).max(16);
+                let trees = boosted(&self.windows, count, numbers, self.seed);
+                Machine::Trees(Trees { trees, hopeless: HOPELESS })
+            }
+        };
+        Model { machine, slope: 1.0, offset: 0.0 }
     }
 
     /// Adds what the machine takes for people; returns how many that are.
     fn mine(&mut self, model: &Model) -> usize {
         let Training { mined_per_picture, mined_per_round, .. } = self.training;
-        let mut scanner = Scanner::default();
+        let mut scanner = Scanner::new(self.kind);
         let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
         for (index, (use_, picture)) in self.pictures.iter().enumerate() {
             if *use_ == Use::Fit {
-                let windows = merge(search(&mut scanner, picture, model, -0.9), MINED_OVERLAP, 1.0);
+                let windows = merge(
+                    search(&mut scanner, picture, model, self.near_miss()),
+                    MINED_OVERLAP,
+                    1.0,
+                );
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
             }
@@ -133,7 +172,7 @@ impl HogTrainer {
         mined.sort_by(|a, b| b.0.total_cmp(&a.0));
         mined.truncate(mined_per_round);
         for (_, index, square) in &mined {
-            self.windows.add(&window_numbers(&self.pictures[*index].1, square), false);
+            self.windows.add(&window_numbers(&self.pictures[*index].1, square, self.kind), false);
         }
         mined.len()
     }
@@ -145,9 +184,9 @@ impl HogTrainer {
         let people = self.people.iter().filter(|(use_, _)| *use_ == wanted);
         let mut sums: Vec<(f64, bool)> =
             people.map(|(_, numbers)| (f64::from(model.sum_of(numbers)), true)).collect();
-        let mut scanner = Scanner::default();
+        let mut scanner = Scanner::new(self.kind);
         for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
-            let mut windows = search(&mut scanner, picture, model, NEAR_MISS);
+            let mut windows = search(&mut scanner, picture, model, self.near_miss());
             if merged {
                 windows = merge(windows, MINED_OVERLAP, 1.0);
             }
@@ -167,16 +206,31 @@ impl HogTrainer {
             ("windows_of_others".to_owned(), integer(self.count(false))),
             ("pictures_without_people".to_owned(), integer(self.pictures.len())),
             ("mined".to_owned(), mined.iter().map(|n| *n as i64).collect::<Vec<_>>().into()),
+            ("people_cut_off".to_owned(), integer(self.cut_off)),
             ("held_out_people".to_owned(), integer(people)),
             ("held_out_windows_of_others".to_owned(), integer(windows as usize)),
             ("held_out_people_accepted".to_owned(), rounded(accepted(&log_odds, true))),
             ("area_under_roc_of_near_misses".to_owned(), rounded(area(&log_odds))),
         ]);
         for rate in FALSE_ALARMS {
-            let missed = miss_rate(&sums, windows, rate);
+            let missed = miss_rate(&sums, windows, rate, self.near_miss());
             table.insert(format!("miss_rate_at_{rate:e}_false_alarms_a_window"), rounded(missed));
         }
         table
+    }
+
+    fn near_miss(&self) -> f32 {
+        NEAR_MISS[usize::from(self.kind == Kind::Trees)]
+    }
+
+    /// Lets trees give windows up, as early as people allow who are kept apart.
+    fn hurry(&self, model: &mut Model) {
+        let Machine::Trees(trees) = &mut model.machine else { return };
+        let apart = self.people.iter().filter(|(use_, _)| *use_ == Use::Calibration);
+        let mut least: Vec<f32> = apart.map(|(_, n)| trees.least_on_the_way(n)).collect();
+        least.sort_by(f32::total_cmp);
+        let given_up = (GIVEN_UP * least.len() as f64) as usize;
+        trees.hopeless = least.get(given_up).copied().unwrap_or(HOPELESS).min(0.0);
     }
 
     fn count(&self, people: bool) -> usize {
@@ -192,7 +246,6 @@ impl Trainer for HogTrainer {
             self.add_person(grey, &candidate.region, use_);
             return Ok(());
         }
-        self.others += 1;
         let is_known = self.pictures.last().is_some_and(|(_, last)| **last == *grey);
         if !is_known {
             self.pictures.push((use_, Arc::new(grey.clone())));
@@ -206,13 +259,14 @@ impl Trainer for HogTrainer {
             return Err(Error::Other("people and pictures without people: both are needed".into()));
         }
         let rounds = self.training.mining_rounds;
-        let mut model = self.machine();
+        let mut model = self.machine(0);
         let mut mined = Vec::new();
         for round in 0..rounds {
             progress((round + 1) as f64 / (rounds + 2) as f64);
             mined.push(self.mine(&model));
-            model = self.machine();
+            model = self.machine(round + 1);
         }
+        self.hurry(&mut model);
         let (sums, _) = self.apart(&model, Use::Calibration, true);
         let Line { slope, offset } = platt(&sums);
         model = Model { slope: slope.max(1e-3), offset, ..model };
@@ -236,11 +290,11 @@ fn search(
 
 /// The share of people below the sum that so many of the `windows` of others
 /// exceed.
-fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64) -> f64 {
+fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f32) -> f64 {
     let mut others: Vec<f64> = sums.iter().filter(|(_, is)| !is).map(|(sum, _)| *sum).collect();
     others.sort_by(|a, b| b.total_cmp(a));
     let allowed = (false_alarms * windows as f64) as usize;
-    let limit = others.get(allowed).copied().unwrap_or(f64::from(NEAR_MISS));
+    let limit = others.get(allowed).copied().unwrap_or(f64::from(near_miss));
     let people: Vec<f64> = sums.iter().filter(|(_, is)| *is).map(|(sum, _)| *sum).collect();
     let missed = people.iter().filter(|sum| **sum <= limit).count();
     missed as f64 / people.len().max(1) as f64

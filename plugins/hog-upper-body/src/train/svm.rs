@@ -23,17 +23,22 @@ impl Windows {
     pub(crate) fn len(&self) -> usize {
         self.is_person.len()
     }
+
+    /// Numbers of a window.
+    pub(crate) fn width(&self) -> usize {
+        self.numbers.len() / self.len().max(1)
+    }
 }
 
 /// The weights and the bias that separate the windows best; `penalty` is that of
 /// an error with others and with people.
 pub(crate) fn separate(
     windows: &Windows,
-    width: usize,
     penalty: [f64; 2],
     epochs: usize,
     seed: u64,
 ) -> (Vec<f32>, f32) {
+    let width = windows.width();
     let (mut weights, mut bias) = (vec![0.0_f32; width], 0.0_f32);
     let mut alphas = vec![0.0_f32; windows.len()];
     let row = |i: usize| &windows.numbers[i * width..(i + 1) * width];
@@ -103,7 +108,7 @@ mod tests {
             windows.add(&numbers, i % 2 == 0);
         }
         let penalty = [0.5, 1.0];
-        let (weights, bias) = separate(&windows, 6, penalty, 2000, 1);
+        let (weights, bias) = separate(&windows, penalty, 2000, 1);
         let best = primal(&windows, 6, penalty, &weights, bias);
         for k in 0..6 {
             for step in [-0.01, 0.01] {

@@ -1,0 +1,25 @@
+//! Scans a picture with a cascade, again and again: `time_cascade CASCADE.xml
+//! PICTURE RUNS`. For the comparison with OpenCV in `benches/peers/`.
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
+
+use tagalong_core::{GreyImage, Rect};
+use tagalong_face_rgbd::{Cascade, Scanner, grouped, scales};
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let mut next = || arguments.next().expect("CASCADE.xml PICTURE RUNS");
+    let (cascade, picture, runs) = (next(), next(), next().parse::<usize>().expect("a number"));
+    let text = std::fs::read_to_string(cascade).expect("the cascade can be read");
+    let cascade = Cascade::from_xml(&text).expect("it is a cascade");
+    let image = image::open(picture).expect("the picture can be read").into_luma8();
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
+    let (mut scanner, mut found): (_, Vec<Rect>) = (Scanner::default(), Vec::new());
+    for _ in 0..runs {
+        let mut hits = Vec::new();
+        let sizes = scales(&cascade, 0.0, width.min(height) as f64, 1.1);
+        scanner.scan(&image, &cascade, sizes, |_| true, &mut hits);
+        found = grouped(&hits, 3).iter().map(|group| group.region).collect();
+    }
+    println!("{} faces, {} windows a run", found.len(), scanner.looked_at() / runs.max(1) as u64);
+}

@@ -1,0 +1,146 @@
+//! What a cascade is made of.
+
+/// A rectangle of a window, in its pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Left edge.
+    pub x: usize,
+    /// Upper edge.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// What a node of a tree looks at.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Feature {
+    /// Two or three rectangles and their weights: the weighted sum of their grey
+    /// values, divided by the contrast of the window (Viola and Jones 2001).
+    Haar(Vec<(Part, f32)>),
+    /// Which of eight neighbours of a block, all of the same size, are at least
+    /// as bright as it: bits from the upper left clockwise, highest first. The
+    /// part is the upper left block.
+    Binary(Part),
+}
+
+/// The question of a node: yes is left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Split {
+    /// Is the value of the feature below this?
+    Below(f32),
+    /// Is the pattern of bits one of these? One bit for each of 256.
+    Among([u32; 8]),
+}
+
+/// Where a node leads to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Another node of the tree.
+    Node(usize),
+    /// The end, with this to add to the sum of the stage.
+    Leaf(f32),
+}
+
+/// A node of a tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// Number of the feature.
+    pub feature: usize,
+    /// What is asked.
+    pub split: Split,
+    /// If yes, if no.
+    pub next: [Next; 2],
+}
+
+/// A small decision tree; the first node is its root.
+pub type Tree = Vec<Node>;
+
+/// Trees whose sum a window has to reach.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// The least sum.
+    pub threshold: f32,
+    /// The trees.
+    pub trees: Vec<Tree>,
+}
+
+/// Stages that a window has to pass, one after the other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cascade {
+    /// Columns of a window.
+    pub width: usize,
+    /// Rows of a window.
+    pub height: usize,
+    /// What nodes look at.
+    pub features: Vec<Feature>,
+    /// The stages.
+    pub stages: Vec<Stage>,
+    /// Log-odds that a group of windows is a face, as a line of the logarithm of
+    /// its strength: slope and offset. Files of OpenCV have none.
+    pub calibration: Option<(f64, f64)>,
+}
+
+impl Cascade {
+    /// True if windows are judged relative to their contrast.
+    pub fn is_normalised(&self) -> bool {
+        self.features.iter().any(|feature| matches!(feature, Feature::Haar(_)))
+    }
+
+    /// The part of a window whose contrast counts: all but a border of a pixel.
+    pub fn middle(&self) -> Part {
+        Part { x: 1, y: 1, width: self.width - 2, height: self.height - 2 }
+    }
+
+    /// Says what is wrong with a cascade that cannot be run: parts outside of the
+    /// window, unknown features, trees that never end.
+    ///
+    /// # Errors
+    /// In a sentence.
+    pub fn check(&self) -> Result<(), String> {
+        if !(8..=256).contains(&self.width) || !(8..=256).contains(&self.height) {
+            return Err(format!("its windows are {} x {} pixels", self.width, self.height));
+        }
+        if self.stages.is_empty() {
+            return Err("it has no stages".into());
+        }
+        let fits = |part: &Part, times: usize| {
+            let right = part.width.checked_mul(times).and_then(|w| w.checked_add(part.x));
+            let bottom = part.height.checked_mul(times).and_then(|h| h.checked_add(part.y));
+            right.is_some_and(|x| x <= self.width) && bottom.is_some_and(|y| y <= self.height)
+        };
+        let is_right = |feature: &Feature| match feature {
+            Feature::Haar(parts) => {
+                (2..=3).contains(&parts.len())
+                    && parts.iter().all(|(part, weight)| fits(part, 1) && weight.is_finite())
+            }
+            Feature::Binary(part) => fits(part, 3),
+        };
+        if let Some(bad) = self.features.iter().position(|feature| !is_right(feature)) {
+            return Err(format!("its feature {bad} does not lie in the window"));
+        }
+        let trees = self.stages.iter().flat_map(|stage| &stage.trees);
+        match trees.flat_map(|tree| tree.iter().enumerate().map(move |n| (n, tree.len()))).find(
+            |((at, node), nodes)| {
+                let ends = |next: &Next| match next {
+                    Next::Node(to) => to > at && to < nodes,
+                    Next::Leaf(value) => value.is_finite(),
+                };
+                !node.next.iter().all(ends) || !self.is_asked(node)
+            },
+        ) {
+            Some(_) => Err("one of its trees is broken".into()),
+            None => Ok(()),
+        }
+    }
+
+    /// True if the node asks what can be asked of its feature.
+    fn is_asked(&self, node: &Node) -> bool {
+        match (self.features.get(node.feature), node.split) {
+            (Some(Feature::Haar(_)), Split::Below(value)) => value.is_finite(),
+            (Some(Feature::Binary(_)), Split::Among(_)) => true,
+            _ => false,
+        }
+    }
+}

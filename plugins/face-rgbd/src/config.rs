@@ -1,0 +1,178 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
+
+/// Settings of `face-rgbd`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Cascade in OpenCV's XML, relative to the config; empty: the one that is
+    /// built in.
+    pub model: String,
+    /// Faces with lower log-odds are dropped.
+    pub min_score: f64,
+    /// Log-odds are limited to this.
+    pub max_score: f64,
+    /// A face is a group of more windows than this.
+    pub min_neighbours: usize,
+    /// Narrowest window that is looked for, pixels.
+    pub min_side_px: f64,
+    /// Widest, as a fraction of the shorter side of the image.
+    pub max_side: f64,
+    /// Each size is so many times the one before.
+    pub scale_step: f64,
+    /// Looks where depth and geometry allow a face only; off: everywhere.
+    pub depth_proposals: bool,
+    /// With depth: windows are as wide as this at least, m.
+    pub min_face_m: f64,
+    /// With depth: windows are as wide as this at most, m.
+    pub max_face_m: f64,
+    /// Distances at which faces are looked for, m.
+    pub min_depth_m: f64,
+    /// See `min_depth_m`.
+    pub max_depth_m: f64,
+    /// Heights of faces above the floor, m.
+    pub min_height_m: f64,
+    /// See `min_height_m`.
+    pub max_height_m: f64,
+    /// Sampling points (one in 8 x 8 pixels) that are searched at most; regions
+    /// with much skin come first.
+    pub max_points: usize,
+    /// The window of a face is so wide, m: tells the distance where there is no
+    /// depth.
+    pub face_m: f64,
+    /// The centre of the head is so far above that of the window, as a fraction
+    /// of the window's side.
+    pub head_above: f64,
+    /// Standard deviation of a window's place, as a fraction of its side.
+    pub sigma_place: f64,
+    /// Standard deviation of a distance from the depth image, m.
+    pub sigma_depth_m: f64,
+    /// Standard deviation of a distance that only the size tells, as a fraction.
+    pub sigma_distance: f64,
+    /// How a cascade is trained; only `tagalong train cascade` reads it.
+    pub training: Training,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            model: String::new(),
+            min_score: 0.0,
+            max_score: 6.0,
+            min_neighbours: 2,
+            min_side_px: 24.0,
+            max_side: 0.9,
+            scale_step: 1.05,
+            depth_proposals: true,
+            min_face_m: 0.10,
+            max_face_m: 0.19,
+            min_depth_m: 0.5,
+            max_depth_m: 6.0,
+            min_height_m: 0.8,
+            max_height_m: 2.1,
+            max_points: 5000,
+            face_m: 0.135,
+            head_above: 0.1,
+            sigma_place: 0.15,
+            sigma_depth_m: 0.1,
+            sigma_distance: 0.2,
+            training: Training::default(),
+        }
+    }
+}
+
+/// How a cascade is trained: Gentle AdaBoost, stage by stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Training {
+    /// Side of a window, pixels.
+    pub side: usize,
+    /// Stages at most.
+    pub stages: usize,
+    /// Part of the faces that every stage has to pass.
+    pub min_hit_rate: f64,
+    /// Part of the other windows that a stage may pass.
+    pub max_false_alarm: f64,
+    /// Trees of a stage at most.
+    pub max_trees: usize,
+    /// Questions from the root of a tree to a leaf.
+    pub depth: usize,
+    /// Features that a stage chooses from, drawn anew for each.
+    pub features: usize,
+    /// Other windows that a stage is trained with, and that all stages before it
+    /// pass.
+    pub others: usize,
+    /// Where fewer than this are to be found, a stage would know them by heart: it
+    /// is done.
+    pub fewest_others: usize,
+}
+
+impl Default for Training {
+    fn default() -> Self {
+        Self {
+            side: 20,
+            stages: 16,
+            min_hit_rate: 0.995,
+            max_false_alarm: 0.4,
+            max_trees: 100,
+            depth: 2,
+            features: 2500,
+            others: 5000,
+            fewest_others: 2000,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let wrong = |key: &str, must: &str| Err(Error::Settings(format!("`{key}` must {must}")));
+        let positive = [
+            ("max_score", self.max_score),
+            ("min_side_px", self.min_side_px),
+            ("max_side", self.max_side),
+            ("min_face_m", self.min_face_m),
+            ("max_face_m", self.max_face_m),
+            ("max_depth_m", self.max_depth_m),
+            ("face_m", self.face_m),
+            ("sigma_place", self.sigma_place),
+            ("sigma_depth_m", self.sigma_depth_m),
+            ("sigma_distance", self.sigma_distance),
+        ];
+        if let Some((key, _)) = positive.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
+            return wrong(key, "be positive");
+        }
+        let others = [
+            self.min_score,
+            self.min_depth_m,
+            self.min_height_m,
+            self.max_height_m,
+            self.head_above,
+        ];
+        if others.iter().any(|v| !v.is_finite()) {
+            return wrong("min_score and others", "be finite");
+        }
+        match self.scale_step {
+            step if (1.02..=4.0).contains(&step) => Ok(()),
+            _ => wrong("scale_step", "lie between 1.02 and 4"),
+        }
+    }
+}
+
+impl Training {
+    /// Refuses numbers that cannot work.
+    #[cfg(feature = "train")]
+    pub(crate) fn check(&self) -> Result<()> {
+        let is_part = |v: f64| v > 0.0 && v < 1.0;
+        let counts = [self.stages, self.max_trees, self.depth, self.features, self.others];
+        let fine = is_part(self.min_hit_rate)
+            && is_part(self.max_false_alarm)
+            && (12..=64).contains(&self.side)
+            && counts.iter().all(|count| *count > 0)
+            && self.depth <= 4;
+        let why = "`training`: rates lie between 0 and 1, `side` between 12 and 64, `depth` is at \
+                   most 4, and counts are positive";
+        if fine { Ok(()) } else { Err(Error::Settings(why.into())) }
+    }
+}

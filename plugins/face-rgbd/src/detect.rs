@@ -1,0 +1,152 @@
+use nalgebra::Point2;
+use tagalong_core::{
+    Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
+    Search,
+};
+
+use crate::{Cascade, Config, Group, Hit, NAME, Proposals, Scanner, grouped, scales};
+
+/// The cascade that is part of the program.
+const BUILT_IN: &str = include_str!("../../../configs/models/cascade.xml");
+
+/// Places a side at which the depth of a face is read.
+const TAPS: usize = 5;
+/// Depth readings that a face needs.
+const LEAST_READINGS: usize = 8;
+
+/// Finds faces, and says whose upper bodies they belong to.
+pub struct FaceRgbd {
+    config: Config,
+    cascade: Cascade,
+    /// Log-odds of a group as a line of the logarithm of its strength.
+    line: (f64, f64),
+    scanner: Scanner,
+    proposals: Proposals,
+    hits: Vec<Hit>,
+}
+
+impl FaceRgbd {
+    /// A detector; reads its cascade.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no cascade,
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config, context: &Context) -> Result<Self> {
+        config.check()?;
+        let cascade = context.model(&config.model, BUILT_IN, Cascade::from_xml)?;
+        Ok(Self {
+            config,
+            line: cascade.calibration.unwrap_or((1.0, 0.0)),
+            cascade,
+            scanner: Scanner::default(),
+            proposals: Proposals::default(),
+            hits: Vec::new(),
+        })
+    }
+
+    /// All windows that pass, of all sizes.
+    fn search(&mut self, frame: &Frame, near: Option<Rect>, funnel: &mut Funnel) -> Result<()> {
+        let (camera, config) = (&*frame.camera, &self.config);
+        let depth = frame.images().depth.as_deref().filter(|_| config.depth_proposals);
+        let image = frame.grey()?;
+        if let Some(depth) = depth {
+            let [points, possible, searched] = self.proposals.sample(frame, depth, config);
+            funnel.drop_many("point: depth and height", points - possible);
+            funnel.drop_many("point: less like skin", possible - searched);
+        }
+        let most = config.max_side * image.width().min(image.height()) as f64;
+        let before = self.scanner.looked_at();
+        self.hits.clear();
+        for scale in scales(&self.cascade, config.min_side_px, most, config.scale_step) {
+            let side = scale * self.cascade.width as f64;
+            if depth.is_some() {
+                self.proposals.for_side(camera, side, config);
+            }
+            let proposals = &self.proposals;
+            let propose = |window: &Rect| {
+                near.is_none_or(|upper_body| upper_body.contains(window.centre()))
+                    && (depth.is_none() || proposals.allows(window))
+            };
+            let one = std::iter::once(scale);
+            self.scanner.scan(image, &self.cascade, one, propose, &mut self.hits);
+        }
+        let looked_at = self.scanner.looked_at() - before;
+        funnel.drop_many("window: no face", looked_at - self.hits.len() as u64);
+        Ok(())
+    }
+
+    /// The person whose face the windows show.
+    fn detection(
+        &self,
+        camera: &Camera,
+        depth: Option<&DepthImage>,
+        group: &Group,
+    ) -> Option<Detection> {
+        let (config, side) = (&self.config, group.region.width);
+        let by_size = camera.focal_px() * config.face_m / side;
+        let (face_m, sigma_m) = match depth.and_then(|depth| surface_m(depth, &group.region)) {
+            Some(metres) => (metres, config.sigma_depth_m),
+            None => (by_size, by_size * config.sigma_distance),
+        };
+        let centre = group.region.centre();
+        let head_px = Point2::new(centre.x, centre.y - config.head_above * side);
+        let depth_m = face_m + HEAD_RADIUS_M;
+        let position = camera.back_project(head_px, depth_m);
+        let (slope, offset) = self.line;
+        let detection = Detection {
+            region: camera.upper_body(&position),
+            position,
+            covariance: camera.covariance(head_px, depth_m, config.sigma_place * side, sigma_m),
+            score: (slope * group.strength.max(1e-3).ln() + offset).min(config.max_score),
+            source: NAME,
+        };
+        detection.is_sane().then_some(detection)
+    }
+}
+
+/// The median depth in the middle of a window, m.
+fn surface_m(depth: &DepthImage, window: &Rect) -> Option<f64> {
+    let mut readings = [0.0_f32; TAPS * TAPS];
+    let mut count = 0;
+    let tap = |from: f64, size: f64, i: usize| (from + size * (0.3 + 0.1 * i as f64)) as i64;
+    for place in 0..TAPS * TAPS {
+        let x = tap(window.x, window.width, place % TAPS);
+        let y = tap(window.y, window.height, place / TAPS);
+        if let Some(metres) = depth.get(x, y).filter(|m| m.is_finite() && *m > 0.0) {
+            readings[count] = metres;
+            count += 1;
+        }
+    }
+    let readings = &mut readings[..count];
+    (count >= LEAST_READINGS).then(|| {
+        let (_, median, _) = readings.select_nth_unstable_by(count / 2, f32::total_cmp);
+        f64::from(*median)
+    })
+}
+
+impl Detector for FaceRgbd {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        let near = match search {
+            Search::Near(track) => Some(track.estimate.region),
+            Search::Everywhere { .. } => None,
+        };
+        self.search(frame, near, funnel)?;
+        let groups = grouped(&self.hits, self.config.min_neighbours);
+        let depth = frame.images().depth.as_deref();
+        let mut found: Vec<Detection> =
+            groups.iter().filter_map(|g| self.detection(&frame.camera, depth, g)).collect();
+        let all = found.len();
+        found.retain(|detection| detection.score >= self.config.min_score);
+        funnel.drop_many("face: log-odds", (all - found.len()) as u64);
+        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        if near.is_some() {
+            found.truncate(1);
+        }
+        Ok(found)
+    }
+}

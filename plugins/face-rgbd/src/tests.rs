@@ -1,0 +1,235 @@
+use proptest::prelude::*;
+use tagalong_core::{GreyImage, Rect, Registry};
+
+use crate::{Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Split, Stage, grouped};
+
+fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
+    let mut state = seed | 1;
+    GreyImage::from_fn(width, height, |_, _| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as u8
+    })
+}
+
+fn part(x: usize, y: usize, width: usize, height: usize) -> Part {
+    Part { x, y, width, height }
+}
+
+/// Two stages: a stump and a tree, with numbers that pass some of the noise.
+fn small() -> Cascade {
+    let pair = |at: Part, half: Part| Feature::Haar(vec![(at, -1.0), (half, 2.0)]);
+    let features = vec![
+        pair(part(1, 1, 8, 6), part(1, 1, 4, 6)),
+        pair(part(2, 3, 5, 8), part(2, 3, 5, 4)),
+        Feature::Haar(vec![
+            (part(0, 0, 12, 12), -1.0),
+            (part(0, 0, 6, 6), 2.0),
+            (part(6, 6, 6, 6), 2.0),
+        ]),
+    ];
+    let leaf = Next::Leaf;
+    let node = |feature, limit, next| Node { feature, split: Split::Below(limit), next };
+    let stump = vec![node(0, 0.01, [leaf(-1.0), leaf(0.6)])];
+    let tree =
+        vec![node(1, 0.0, [Next::Node(1), leaf(-0.5)]), node(2, 0.02, [leaf(0.75), leaf(-0.25)])];
+    let stage = |threshold, trees| Stage { threshold, trees };
+    let stages = vec![stage(0.5, vec![stump]), stage(0.3, vec![tree])];
+    Cascade { width: 12, height: 12, features, stages, calibration: Some((1.5, -2.0)) }
+}
+
+fn binary() -> Cascade {
+    let split = Split::Among([0x5A5A_F00F, 1, 0xFFFF_0000, 0x1234_5678, 9, 0x8000_0001, 3, 77]);
+    let node = Node { feature: 0, split, next: [Next::Leaf(1.0), Next::Leaf(-1.0)] };
+    let stages = vec![Stage { threshold: 0.0, trees: vec![vec![node]] }];
+    let features = vec![Feature::Binary(part(1, 2, 3, 2))];
+    Cascade { width: 12, height: 12, features, stages, calibration: None }
+}
+
+/// The sum of the values in a part of a window, pixel by pixel.
+fn slow_sum(image: &GreyImage, (x, y): (usize, usize), part: &Part, value: fn(f64) -> f64) -> f64 {
+    let rows = y + part.y..y + part.y + part.height;
+    let columns = x + part.x..x + part.x + part.width;
+    rows.flat_map(|y| columns.clone().map(move |x| (x, y)))
+        .map(|(x, y)| value(f64::from(image.row(y)[x])))
+        .sum()
+}
+
+fn slow_answer(image: &GreyImage, at: (usize, usize), cascade: &Cascade, node: &Node) -> bool {
+    match (&cascade.features[node.feature], node.split) {
+        (Feature::Haar(parts), Split::Below(limit)) => {
+            let middle = cascade.middle();
+            let area = (middle.width * middle.height) as f64;
+            let sum = slow_sum(image, at, &middle, |v| v);
+            let squares = slow_sum(image, at, &middle, |v| v * v);
+            let contrast = (area * squares - sum * sum).sqrt();
+            let value: f64 =
+                parts.iter().map(|(p, w)| f64::from(*w) * slow_sum(image, at, p, |v| v)).sum();
+            value / contrast < f64::from(limit)
+        }
+        (Feature::Binary(first), Split::Among(bits)) => {
+            let block = |x: usize, y: usize| {
+                let (left, top) = (first.x + x * first.width, first.y + y * first.height);
+                slow_sum(image, at, &Part { x: left, y: top, ..*first }, |v| v)
+            };
+            let around = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
+            let pattern = around.iter().fold(0_usize, |pattern, (x, y)| {
+                2 * pattern + usize::from(block(*x, *y) >= block(1, 1))
+            });
+            bits[pattern / 32] & (1 << (pattern % 32)) != 0
+        }
+        _ => panic!("a feature and a question that do not go together"),
+    }
+}
+
+/// How many stages a window passes.
+fn slow_stages(image: &GreyImage, at: (usize, usize), cascade: &Cascade) -> usize {
+    let leaf = |tree: &Vec<Node>| {
+        let mut node = &tree[0];
+        loop {
+            match node.next[usize::from(!slow_answer(image, at, cascade, node))] {
+                Next::Leaf(value) => return value,
+                Next::Node(to) => node = &tree[to],
+            }
+        }
+    };
+    let passes = |stage: &&Stage| stage.trees.iter().map(leaf).sum::<f32>() >= stage.threshold;
+    cascade.stages.iter().take_while(passes).count()
+}
+
+/// The windows that pass, in OpenCV's order: every second one in x and y, and the
+/// one after a window that fails the first stage is not looked at.
+fn slow_scan(image: &GreyImage, cascade: &Cascade) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    for y in (0..=image.height() - cascade.height).step_by(2) {
+        let mut x = 0;
+        while x <= image.width() - cascade.width {
+            let passed = slow_stages(image, (x, y), cascade);
+            if passed == cascade.stages.len() {
+                found.push((x, y));
+            }
+            x += if passed == 0 { 4 } else { 2 };
+        }
+    }
+    found
+}
+
+#[test]
+fn it_conforms() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+proptest! {
+    #[test]
+    fn a_scan_finds_what_the_slow_reference_finds(seed: u64, width in 12..60usize, height in 12..30usize) {
+        let image = noise(width, height, seed);
+        for cascade in [small(), binary()] {
+            let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+            scanner.scan(&image, &cascade, [1.0].into_iter(), |_| true, &mut hits);
+            let found: Vec<(usize, usize)> =
+                hits.iter().map(|hit| (hit.region.x as usize, hit.region.y as usize)).collect();
+            prop_assert_eq!(found, slow_scan(&image, &cascade));
+        }
+    }
+
+    #[test]
+    fn a_size_of_its_own_is_the_image_itself(seed: u64, width in 1..40usize, height in 1..40usize) {
+        let image = noise(width, height, seed);
+        let mut level = Level::default();
+        level.fill(&image, width, height);
+        prop_assert_eq!(level.pixels(), image.pixels());
+        let all: u32 = image.pixels().iter().map(|v| u32::from(*v)).sum();
+        prop_assert_eq!(level.sums()[height * level.stride() + width], all);
+    }
+}
+
+#[test]
+fn the_small_cascades_pass_some_windows_and_not_all() {
+    for cascade in [small(), binary()] {
+        let found = slow_scan(&noise(60, 60, 3), &cascade).len();
+        assert!((5..300).contains(&found), "{found}");
+    }
+}
+
+#[test]
+fn a_part_of_the_image_gives_the_same_windows() {
+    let (image, cascade) = (noise(90, 70, 8), small());
+    let inside = |window: &Rect| window.x >= 20.0 && window.right() <= 70.0;
+    let scan = |propose: &dyn Fn(&Rect) -> bool| {
+        let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+        scanner.scan(&image, &cascade, [2.5].into_iter(), propose, &mut hits);
+        hits
+    };
+    let all: Vec<Hit> = scan(&|_| true).into_iter().filter(|hit| inside(&hit.region)).collect();
+    let some = scan(&inside);
+    // The skipped neighbours are not the same ones.
+    assert!(!all.is_empty() && some.iter().filter(|hit| all.contains(hit)).count() * 2 > all.len());
+    assert!(some.iter().all(|hit| inside(&hit.region)));
+}
+
+#[test]
+fn windows_without_contrast_are_left_out() {
+    let mut cascade = small();
+    cascade.stages.iter_mut().for_each(|stage| stage.threshold = -9.0);
+    let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+    let flat = GreyImage::from_fn(40, 40, |x, _| 100 + (x % 2) as u8);
+    scanner.scan(&flat, &cascade, [1.0].into_iter(), |_| true, &mut hits);
+    assert!(hits.is_empty() && scanner.looked_at() > 100);
+}
+
+#[test]
+fn a_cascade_survives_its_file() {
+    for cascade in [small(), binary()] {
+        let read = Cascade::from_xml(&cascade.to_xml()).unwrap();
+        let without = |cascade: &Cascade| Cascade {
+            stages: cascade.stages.iter().map(|s| Stage { threshold: 0.0, ..s.clone() }).collect(),
+            ..cascade.clone()
+        };
+        assert_eq!(without(&read), without(&cascade));
+        for (a, b) in read.stages.iter().zip(&cascade.stages) {
+            assert!((a.threshold - b.threshold).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn broken_files_are_refused() {
+    let text = small().to_xml();
+    let why = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        Cascade::from_xml(&text.replace(from, to)).unwrap_err()
+    };
+    assert!(why("<width>12", "<width>11").contains("feature"));
+    assert!(why("<tilted>0", "<tilted>1").contains("tilted"));
+    assert!(why("<_>1 1 8 6 -1.0</_>", "<_>1 1 8</_>").contains("rectangle"));
+    assert!(!why("<stages>", "<stage>").is_empty());
+    assert!(why("<width>12", "<width>twelve").contains("twelve"));
+    assert!(Cascade::from_xml("<a/>").is_err() && Cascade::from_xml("nonsense").is_err());
+}
+
+#[test]
+fn like_windows_are_one_face_and_single_ones_none() {
+    let hit = |x: f64, y: f64, side: f64| Hit { region: Rect::new(x, y, side, side), margin: 0.5 };
+    let near = [hit(10.0, 10.0, 30.0), hit(11.0, 12.0, 30.0), hit(12.0, 11.0, 31.0)];
+    let hits = [&near[..], &[hit(80.0, 10.0, 30.0)]].concat();
+    let groups = grouped(&hits, 2);
+    assert_eq!(groups.len(), 1);
+    assert_eq!((groups[0].count, groups[0].strength), (3, 1.5));
+    assert_eq!(groups[0].region, Rect::new(11.0, 11.0, 30.0, 30.0));
+    // A chain holds together though its ends do not overlap enough.
+    let chain: Vec<Hit> = (0..8).map(|k| hit(f64::from(k) * 5.0, 0.0, 30.0)).collect();
+    assert_eq!(grouped(&chain, 2).len(), 1);
+}
+
+#[test]
+fn a_smaller_group_inside_a_stronger_one_goes() {
+    let hit = |x: f64, side: f64| Hit { region: Rect::new(x, x, side, side), margin: 0.1 };
+    let large = [hit(0.0, 60.0); 5];
+    let small = [hit(20.0, 20.0); 3];
+    assert_eq!(grouped(&[&large[..], &small].concat(), 2).len(), 1);
+    assert_eq!(grouped(&[&large[..3], &[small[0]; 5]].concat(), 2).len(), 2);
+}

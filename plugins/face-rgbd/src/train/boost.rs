@@ -1,0 +1,119 @@
+//! One stage: boosted trees that ask about features by chance.
+
+use tagalong_learn::boost::{self, Boosting, Levels, Question};
+use tagalong_learn::mix;
+
+use super::patch::Patch;
+use crate::compiled::{haar, rectangles};
+use crate::{Cascade, Feature, Next, Node, Part, Split, Stage, Training, Tree};
+
+/// Columns and rows of the kinds of features: pairs, triples, chequered.
+const KINDS: [(usize, usize); 5] = [(2, 1), (1, 2), (3, 1), (1, 3), (2, 2)];
+/// Smaller blocks are noise, pixels.
+const LEAST_BLOCK: usize = 4;
+
+/// What a stage is trained with.
+pub(super) struct Samples<'a> {
+    pub(super) faces: &'a [Patch],
+    pub(super) others: &'a [Patch],
+}
+
+impl<'a> Samples<'a> {
+    fn all(&self) -> impl Iterator<Item = &'a Patch> + use<'a> {
+        self.faces.iter().chain(self.others)
+    }
+}
+
+/// Features by chance, and their values in all samples.
+fn drawn_features(samples: &Samples<'_>, training: &Training, seed: u64) -> (Vec<Feature>, Levels) {
+    let Training { side, features, .. } = *training;
+    let drawn: Vec<Feature> = (0..features as u64).map(|i| drawn(side, mix(seed ^ i))).collect();
+    let patches: Vec<&Patch> = samples.all().collect();
+    let mut table = Levels::new(patches.len());
+    for feature in &drawn {
+        if let Feature::Haar(parts) = feature {
+            let parts = rectangles(parts, side + 1);
+            table.push(patches.iter().map(|p| haar(&parts, p.level.sums()) * p.contrast));
+        }
+    }
+    (drawn, table)
+}
+
+/// A feature by chance.
+fn drawn(side: usize, seed: u64) -> Feature {
+    let mut state = seed;
+    let mut below = |n: usize| {
+        state = mix(state);
+        (state % n as u64) as usize
+    };
+    loop {
+        let (columns, rows) = KINDS[below(KINDS.len())];
+        let (width, height) = (1 + below(side / columns), 1 + below(side / rows));
+        if width * height < LEAST_BLOCK {
+            continue;
+        }
+        let x = below(side - columns * width + 1);
+        let y = below(side - rows * height + 1);
+        return haar_feature((columns, rows), Part { x, y, width, height });
+    }
+}
+
+/// All blocks with weight -1, and the inner ones, or two of them crosswise, so
+/// much more that they weigh the same.
+fn haar_feature((columns, rows): (usize, usize), first: Part) -> Feature {
+    let block = |x: usize, y: usize| Part {
+        x: first.x + x * first.width,
+        y: first.y + y * first.height,
+        ..first
+    };
+    let whole = Part { width: columns * first.width, height: rows * first.height, ..first };
+    let weight = (columns * rows) as f32;
+    Feature::Haar(match (columns, rows) {
+        (2, 2) => vec![(whole, -1.0), (block(0, 0), 2.0), (block(1, 1), 2.0)],
+        (1, _) => vec![(whole, -1.0), (block(0, 1), weight)],
+        _ => vec![(whole, -1.0), (block(1, 0), weight)],
+    })
+}
+
+/// Adds a stage to a cascade.
+pub(super) fn stage(cascade: &mut Cascade, samples: &Samples<'_>, training: &Training, seed: u64) {
+    let (features, table) = drawn_features(samples, training, seed);
+    let faces = samples.faces.len();
+    let mut boosting = Boosting::new(&table, (0..table.samples()).map(|i| i < faces));
+    let all: Vec<usize> = (0..table.features()).collect();
+    let mut built = Stage { threshold: 0.0, trees: Vec::new() };
+    while built.trees.len() < training.max_trees {
+        let tree = boosting.grow(&all, training.depth);
+        built.trees.push(kept(&tree, &features, cascade));
+        let (of_faces, of_others) = boosting.sums().split_at(faces);
+        built.threshold = passed_by(of_faces, training.min_hit_rate);
+        let passed = of_others.iter().filter(|sum| **sum >= built.threshold).count();
+        if passed as f64 <= training.max_false_alarm * of_others.len() as f64 {
+            break;
+        }
+    }
+    cascade.stages.push(built);
+}
+
+/// A tree of the cascade, and its features with it.
+fn kept(tree: &[Question], features: &[Feature], cascade: &mut Cascade) -> Tree {
+    let next = |next: boost::Next| match next {
+        boost::Next::Question(to) => Next::Node(to),
+        boost::Next::Leaf(value) => Next::Leaf(value),
+    };
+    let node = |question: &Question| {
+        cascade.features.push(features[question.feature].clone());
+        let split = Split::Below(question.below);
+        Node { feature: cascade.features.len() - 1, split, next: question.next.map(next) }
+    };
+    tree.iter().map(node).collect()
+}
+
+/// The largest threshold that so many of the sums reach.
+fn passed_by(sums: &[f32], part: f64) -> f32 {
+    let mut sorted = sums.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    let may_fail = ((1.0 - part) * sorted.len() as f64) as usize;
+    // Sums are added in another order elsewhere.
+    sorted[may_fail.min(sorted.len() - 1)] - 1e-4
+}

@@ -1,0 +1,104 @@
+//! What a cascade is worth on pictures that it was not trained with.
+
+use tagalong_core::Rect;
+use tagalong_learn::{Line, platt};
+
+use super::{Picture, Use};
+use crate::{Cascade, Scanner, grouped, scales};
+
+/// As in use: see [`crate::Config`].
+const SCALE_STEP: f64 = 1.05;
+const MIN_NEIGHBOURS: usize = 2;
+/// A window is of a face if they overlap by this (IoU).
+const SAME: f64 = 0.5;
+/// Windows of faces that count: those of faces that are 40 pixels wide.
+const LEAST_PX: f64 = 34.0;
+/// False alarms a picture at which the found part is told.
+const FALSE_ALARMS: [f64; 3] = [1.0, 0.3, 0.1];
+
+/// What was found in pictures for one purpose.
+#[derive(Default)]
+struct Found {
+    /// Logarithm of the strength; whether it is a face. Small faces are neither.
+    groups: Vec<(f64, bool)>,
+    faces: usize,
+    /// Pictures with faces.
+    pictures: usize,
+}
+
+impl Found {
+    fn add(&mut self, scanner: &mut Scanner, cascade: &Cascade, picture: &Picture) {
+        let grey = &*picture.grey;
+        let (most, mut hits) = (grey.width().min(grey.height()) as f64, Vec::new());
+        let sizes = scales(cascade, 0.0, most, SCALE_STEP);
+        scanner.scan(grey, cascade, sizes, |_| true, &mut hits);
+        let mut groups = grouped(&hits, MIN_NEIGHBOURS);
+        groups.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+        let mut free: Vec<&Rect> = picture.faces.iter().collect();
+        self.faces += free.iter().filter(|face| face.width >= LEAST_PX).count();
+        self.pictures += 1;
+        for group in groups {
+            let iou = |face: &&Rect| face.iou(&group.region);
+            let best = (0..free.len()).max_by(|a, b| iou(&free[*a]).total_cmp(&iou(&free[*b])));
+            let face = best.filter(|i| iou(&free[*i]) >= SAME).map(|i| free.remove(i));
+            if face.is_none_or(|face| face.width >= LEAST_PX) {
+                self.groups.push((group.strength.max(1e-3).ln(), face.is_some()));
+            }
+        }
+    }
+
+    /// The part of the faces that is found with so many false alarms a picture.
+    fn found_at(&self, false_alarms: f64) -> f64 {
+        let allowed = (false_alarms * self.pictures as f64) as usize;
+        let mut sorted = self.groups.clone();
+        sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut found, mut wrong) = (0, 0);
+        for (_, is_face) in sorted {
+            if is_face {
+                found += 1;
+            } else {
+                wrong += 1;
+            }
+            if wrong > allowed {
+                break;
+            }
+        }
+        found as f64 / self.faces.max(1) as f64
+    }
+}
+
+fn search(cascade: &Cascade, pictures: &[Picture], wanted: impl Fn(&Picture) -> bool) -> Found {
+    let (mut found, mut scanner) = (Found::default(), Scanner::default());
+    let least = cascade.width.min(cascade.height);
+    let is_large = |p: &&Picture| p.grey.width() > least && p.grey.height() > least;
+    for picture in pictures.iter().filter(|p| wanted(p)).filter(is_large) {
+        found.add(&mut scanner, cascade, picture);
+    }
+    found
+}
+
+/// Slope and offset of the log-odds.
+pub(super) fn calibration(cascade: &Cascade, pictures: &[Picture]) -> (f64, f64) {
+    let found = search(cascade, pictures, |p| p.use_ == Use::Calibration);
+    let Line { slope, offset } = platt(&found.groups);
+    (slope.max(1e-3), offset)
+}
+
+/// The figures of the card.
+pub(super) fn figures(cascade: &Cascade, pictures: &[Picture]) -> toml::Table {
+    let wanted = |p: &Picture| p.use_ == Use::Figures;
+    let found = search(cascade, pictures, |p| wanted(p) && !p.faces.is_empty());
+    let empty = search(cascade, pictures, |p| wanted(p) && p.faces.is_empty());
+    let integer = |n: usize| toml::Value::Integer(n as i64);
+    let mut table = toml::Table::from_iter([
+        ("held_out_pictures_with_faces".to_owned(), integer(found.pictures)),
+        ("held_out_faces".to_owned(), integer(found.faces)),
+        ("held_out_pictures_without".to_owned(), integer(empty.pictures)),
+        ("false_alarms_in_those".to_owned(), integer(empty.groups.len())),
+    ]);
+    for rate in FALSE_ALARMS {
+        let part = (found.found_at(rate) * 1e4).round() / 1e4;
+        table.insert(format!("found_at_{rate}_false_alarms_a_picture"), part.into());
+    }
+    table
+}

@@ -1,0 +1,235 @@
+//! Trains a [`Cascade`]: stage after stage by Gentle AdaBoost, each with windows
+//! of others that all stages before it take for faces (Viola and Jones 2001; J.
+//! Friedman, T. Hastie and R. Tibshirani, *Additive logistic regression*, Annals
+//! of Statistics 28, 2000).
+//!
+//! A tenth of the groups is kept for the calibration and a fifth for the figures
+//! of the card; the stages see neither.
+
+mod boost;
+mod figures;
+mod patch;
+
+use std::sync::Arc;
+
+use boost::{Samples, stage};
+use figures::{calibration, figures};
+use patch::{Patch, mirrored, shifted, window};
+use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
+use tagalong_learn::mix;
+
+use crate::{Cascade, Scanner, Training, scales};
+
+/// Small shifts of a face with surroundings, as parts of its window, and its
+/// growth.
+const SHIFTS: [(f64, f64, f64); 4] =
+    [(0.0, 0.0, 1.0), (0.05, -0.04, 1.06), (-0.05, 0.04, 0.94), (0.02, 0.06, 1.1)];
+/// Windows that overlap a face by less than this (IoU) are of others.
+const BESIDE: f64 = 0.3;
+/// The factor between the sizes that are searched for others.
+const SCALE_STEP: f64 = 1.25;
+/// A picture gives this part of what a stage needs at most.
+const PICTURES: usize = 25;
+
+/// What a group is for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Use {
+    Figures,
+    Calibration,
+    Fit,
+}
+
+fn use_of(group: u64) -> Use {
+    match mix(group) % 10 {
+        0 | 1 => Use::Figures,
+        2 => Use::Calibration,
+        _ => Use::Fit,
+    }
+}
+
+/// A picture, and the windows of the faces in it.
+struct Picture {
+    use_: Use,
+    grey: Arc<GreyImage>,
+    faces: Vec<Rect>,
+}
+
+/// Collects windows and pictures, and trains cascades with them.
+///
+/// A face is a candidate whose region is its window. A picture without a face is
+/// shown by candidates somewhere in it.
+pub struct CascadeTrainer {
+    training: Training,
+    seed: u64,
+    faces: Vec<Patch>,
+    others: Vec<Patch>,
+    pictures: Vec<Picture>,
+}
+
+impl CascadeTrainer {
+    /// A trainer without examples.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for numbers that cannot work.
+    pub fn new(training: Training, seed: u64) -> Result<Self> {
+        training.check()?;
+        let (faces, others) = (Vec::new(), Vec::new());
+        Ok(Self { training, seed, faces, others, pictures: Vec::new() })
+    }
+
+    /// A face, as it is and mirrored; with small shifts if the picture shows
+    /// what is around it.
+    fn add_face(&mut self, grey: &GreyImage, face: &Rect) {
+        let side = self.training.side;
+        let around = face.inflated(0.2);
+        let is_inside = around.clipped(grey.width(), grey.height()) == around;
+        let shifts = if is_inside { &SHIFTS[..] } else { &SHIFTS[..1] };
+        let mirror = mirrored(grey);
+        let flipped = Rect { x: grey.width() as f64 - face.right(), ..*face };
+        for shift in shifts {
+            let both = [(grey, face), (&mirror, &flipped)];
+            let cut = both.map(|(image, face)| window(image, &shifted(face, *shift), side));
+            self.faces.extend(cut.iter().filter_map(|pixels| Patch::new(pixels, side)));
+        }
+    }
+
+    /// Windows that the cascade takes for faces, from pictures in an order by
+    /// chance, until there are enough.
+    fn mine(&self, cascade: &Cascade, others: &mut Vec<Patch>, progress: &mut Mined) {
+        let wanted = self.training.others;
+        let mut order: Vec<usize> =
+            (0..self.pictures.len()).filter(|i| self.pictures[*i].use_ == Use::Fit).collect();
+        let salt = mix(self.seed ^ cascade.stages.len() as u64);
+        order.sort_by_key(|index| mix(salt ^ *index as u64));
+        let mut scanner = Scanner::default();
+        for index in order {
+            if others.len() >= wanted {
+                break;
+            }
+            let most = (wanted - others.len()).min(wanted.div_ceil(PICTURES));
+            let found = self.mistakes(&mut scanner, cascade, index, most, salt);
+            progress.found += found.len();
+            others.extend(found);
+        }
+        progress.looked_at += scanner.looked_at();
+    }
+
+    /// Up to `most` of the windows of one picture that the cascade takes for
+    /// faces, chosen by chance.
+    fn mistakes(
+        &self,
+        scanner: &mut Scanner,
+        cascade: &Cascade,
+        index: usize,
+        most: usize,
+        salt: u64,
+    ) -> Vec<Patch> {
+        let Picture { grey, faces, .. } = &self.pictures[index];
+        let side = self.training.side;
+        let (mut found, mut seen) = (Vec::new(), 0_u64);
+        let longest = grey.width().min(grey.height()) as f64;
+        for scale in scales(cascade, 0.0, longest, SCALE_STEP) {
+            let is_other = |x: usize, y: usize| {
+                let [x, y, side] = [x, y, side].map(|v| v as f64 * scale);
+                let window = Rect::new(x, y, side, side);
+                faces.iter().all(|face| face.iou(&window) < BESIDE)
+            };
+            scanner.size(grey, cascade, scale, &mut |x, y| is_other(x, y), &mut |window| {
+                seen += 1;
+                let place = mix(salt ^ mix(index as u64) ^ seen) % seen;
+                let place = if found.len() < most { found.len() } else { place as usize };
+                if place < most
+                    && let Some(patch) = Patch::of(&window, side)
+                {
+                    match found.get_mut(place) {
+                        Some(old) => *old = patch,
+                        None => found.push(patch),
+                    }
+                }
+            });
+        }
+        found
+    }
+
+    fn train(&self, progress: &mut dyn FnMut(f64)) -> (Cascade, Vec<Mined>) {
+        let Training { side, stages, others: wanted, fewest_others, .. } = self.training;
+        let mut cascade = Cascade {
+            width: side,
+            height: side,
+            features: Vec::new(),
+            stages: Vec::new(),
+            calibration: None,
+        };
+        let (mut faces, mut others) = (self.faces.clone(), self.others.clone());
+        others.truncate(wanted);
+        let mut log = Vec::new();
+        for number in 0..stages {
+            progress(number as f64 / (stages + 1) as f64);
+            let mut mined = Mined::default();
+            if number > 0 {
+                self.mine(&cascade, &mut others, &mut mined);
+            }
+            if others.len() < fewest_others {
+                break;
+            }
+            let samples = Samples { faces: &faces, others: &others };
+            stage(&mut cascade, &samples, &self.training, mix(self.seed ^ number as u64));
+            mined.trees = cascade.stages[number].trees.len();
+            log.push(mined);
+            faces.retain(|patch| patch.passes_last(&cascade));
+            others.retain(|patch| patch.passes_last(&cascade));
+        }
+        (cascade, log)
+    }
+}
+
+/// How the others of a stage were found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Mined {
+    found: usize,
+    looked_at: u64,
+    trees: usize,
+}
+
+impl Trainer for CascadeTrainer {
+    fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
+        let grey = frame.grey()?;
+        let use_ = use_of(example.group);
+        if self.pictures.last().is_none_or(|last| *last.grey != *grey) {
+            let faces = Vec::new();
+            self.pictures.push(Picture { use_, grey: Arc::new(grey.clone()), faces });
+        }
+        if example.is_person {
+            self.pictures.last_mut().into_iter().for_each(|p| p.faces.push(candidate.region));
+        }
+        if use_ != Use::Fit {
+            return Ok(());
+        }
+        if example.is_person {
+            self.add_face(grey, &candidate.region);
+        } else {
+            let pixels = window(grey, &candidate.region, self.training.side);
+            self.others.extend(Patch::new(&pixels, self.training.side));
+        }
+        Ok(())
+    }
+
+    fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        if self.faces.is_empty() || self.others.is_empty() {
+            return Err(Error::Other("faces and windows of others: both are needed".into()));
+        }
+        let (mut cascade, log) = self.train(progress);
+        if cascade.stages.is_empty() {
+            return Err(Error::Other("there are too few windows of others".into()));
+        }
+        cascade.calibration = Some(calibration(&cascade, &self.pictures));
+        let mut table = figures(&cascade, &self.pictures);
+        let list = |of: fn(&Mined) -> i64| log.iter().map(of).collect::<Vec<i64>>().into();
+        table.insert("windows_of_faces".into(), (self.faces.len() as i64).into());
+        table.insert("trees".into(), list(|m| m.trees as i64));
+        table.insert("mined".into(), list(|m| m.found as i64));
+        table.insert("searched".into(), list(|m| m.looked_at as i64));
+        progress(1.0);
+        Ok(Fitted { model: cascade.to_xml(), figures: table })
+    }
+}

@@ -1,0 +1,74 @@
+//! Windows, cut out.
+
+use tagalong_core::{GreyImage, Rect};
+
+use crate::compiled::{Compiled, Row};
+use crate::{Cascade, Level, Seen};
+
+/// A window as its sums, and one through its contrast.
+#[derive(Clone)]
+pub(super) struct Patch {
+    pub(super) level: Level,
+    pub(super) contrast: f32,
+}
+
+impl Patch {
+    /// `None` for a window without contrast.
+    pub(super) fn new(pixels: &GreyImage, side: usize) -> Option<Self> {
+        let mut level = Level::default();
+        level.fill(pixels, side, side);
+        let values =
+            || (1..side - 1).flat_map(|y| pixels.row(y)[1..side - 1].iter().map(|v| f64::from(*v)));
+        let area = ((side - 2) * (side - 2)) as f64;
+        let (sum, squares) = (values().sum::<f64>(), values().map(|v| v * v).sum::<f64>());
+        let root = (area * squares - sum * sum).max(0.0).sqrt();
+        (root > 10.0 * area).then(|| Self { level, contrast: (1.0 / root) as f32 })
+    }
+
+    /// A window that a scan took for a face.
+    pub(super) fn of(seen: &Seen<'_>, side: usize) -> Option<Self> {
+        let (pixels, width) = (seen.level.pixels(), seen.level.width());
+        let cut = GreyImage::from_fn(side, side, |x, y| pixels[(seen.y + y) * width + seen.x + x]);
+        Self::new(&cut, side)
+    }
+
+    /// True if the last stage of the cascade takes it for a face.
+    pub(super) fn passes_last(&self, cascade: &Cascade) -> bool {
+        let last = cascade.stages.last().into_iter().cloned().collect();
+        let only = Cascade { stages: last, features: cascade.features.clone(), ..*cascade };
+        let compiled = Compiled::new(&only, self.level.stride());
+        let mut row = Row::default();
+        compiled.start(&self.level, (0, 0), 1, &mut row, 1);
+        compiled.all(0, &self.level, (0, 0), 1, &mut row);
+        compiled.passes(0, row.sums[0])
+    }
+}
+
+/// A window, `side` pixels wide, as a scan would see it: interpolated, without
+/// means over what is skipped. Outside the picture its border goes on.
+pub(super) fn window(grey: &GreyImage, region: &Rect, side: usize) -> GreyImage {
+    let scale = region.width / side as f64;
+    let clamp = |v: i64, length: usize| v.clamp(0, length.max(1) as i64 - 1);
+    let at = |x: i64, y: i64| {
+        f64::from(grey.get(clamp(x, grey.width()), clamp(y, grey.height())).unwrap_or_default())
+    };
+    GreyImage::from_fn(side, side, |i, j| {
+        let x = region.x + (i as f64 + 0.5) * scale - 0.5;
+        let y = region.y + (j as f64 + 0.5) * scale - 0.5;
+        let (left, top) = (x.floor(), y.floor());
+        let (right, down) = (x - left, y - top);
+        let (left, top) = (left as i64, top as i64);
+        let across = |y: i64| at(left, y) * (1.0 - right) + at(left + 1, y) * right;
+        (across(top) * (1.0 - down) + across(top + 1) * down).round() as u8
+    })
+}
+
+pub(super) fn mirrored(grey: &GreyImage) -> GreyImage {
+    let width = grey.width();
+    GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
+}
+
+pub(super) fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
+    let (x, y) = (square.x + right * square.width, square.y + down * square.width);
+    Rect { x, y, ..*square }.inflated(growth - 1.0)
+}

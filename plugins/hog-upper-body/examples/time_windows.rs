@@ -1,0 +1,28 @@
+//! Scans a picture with a model, again and again: `time_windows MODEL.toml PICTURE
+//! RUNS`. For the comparison with OpenCV in `benches/peers/`.
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
+
+use tagalong_core::GreyImage;
+use tagalong_hog_upper_body::{Model, Scanner, merge};
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let mut next = || arguments.next().expect("MODEL.toml PICTURE RUNS");
+    let (model, picture, runs) = (next(), next(), next().parse::<usize>().expect("a number"));
+    let text = std::fs::read_to_string(model).expect("the model can be read");
+    let model = Model::from_text(&text).expect("it is a model");
+    let image = image::open(picture).expect("the picture can be read").into_luma8();
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
+    let (mut scanner, mut found) = (Scanner::new(model.kind()), 0);
+    for _ in 0..runs {
+        // Windows are 64 pixels and more, and twice as wide as the upper body.
+        let most = 0.5 * width.min(height) as f64;
+        let sides = std::iter::successors(Some(32.0), |side| Some(side * 1.15));
+        let least = model.sum_at(0.0);
+        let sides = sides.take_while(|side| *side <= most);
+        let windows = scanner.scan(&image, &model, sides, least, |_| Some(None));
+        found = merge(windows, 0.4, 0.4).len();
+    }
+    println!("{found} people, {} windows a run", scanner.looked_at() / runs.max(1) as u64);
+}

@@ -1,0 +1,149 @@
+//! Aggregated channels: brightness, gradients and their directions, averaged over
+//! small cells and compared with what is around (after P. Dollar et al., *Fast
+//! feature pyramids for object detection*, PAMI 36, 2014).
+
+use crate::gradients::Gradients;
+use crate::hog::CELL as HOG_CELL;
+
+/// Side of a cell, pixels.
+pub(crate) const CELL: usize = HOG_CELL / 2;
+/// Directions, over half a turn.
+const BINS: usize = 6;
+/// Numbers of a cell: brightness, length of gradients, and length by direction.
+pub(crate) const DEPTH: usize = 2 + BINS;
+/// Gradients that are no longer than this, of grey values from 0 to 1, are
+/// compared with this and not with those around.
+const FAINT: f32 = 0.005;
+
+/// The channels of an image, cell by cell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Channels {
+    columns: usize,
+    rows: usize,
+    values: Vec<f32>,
+    /// Scratch: the lengths of gradients around a cell, and what a pass reads.
+    around: Vec<f32>,
+    before: Vec<f32>,
+    gradients: Gradients,
+}
+
+impl Channels {
+    /// Takes the place of the channels of another image: `pixels` of grey values,
+    /// `width` to a row. The outermost pixels belong to no cell; they are there
+    /// for the gradients of their neighbours.
+    pub fn fill(&mut self, pixels: &[f32], width: usize) {
+        let height = pixels.len() / width.max(1);
+        self.columns = width.saturating_sub(2) / CELL;
+        self.rows = height.saturating_sub(2) / CELL;
+        self.values.clear();
+        self.values.resize(self.columns * self.rows * DEPTH, 0.0);
+        if self.values.is_empty() {
+            return;
+        }
+        for y in 0..self.rows * CELL {
+            let rows = [0, 1, 2].map(|row| &pixels[(y + row) * width..(y + row + 1) * width]);
+            self.add(rows, y / CELL);
+        }
+        self.compare();
+        self.before.resize(self.values.len(), 0.0);
+        let size = (self.columns, self.rows);
+        smooth(&mut self.values, &mut self.before, size, DEPTH, &[0.25, 0.5, 0.25]);
+    }
+
+    /// Adds a row of pixels to its cells.
+    fn add(&mut self, rows: [&[f32]; 3], cell_row: usize) {
+        let start = cell_row * self.columns * DEPTH;
+        let share = 1.0 / (255.0 * (CELL * CELL) as f32);
+        self.gradients.fill(rows);
+        let Gradients { length, turn } = &self.gradients;
+        let cells = self.values[start..].chunks_exact_mut(DEPTH).take(self.columns);
+        let pixels = length.chunks_exact(CELL).zip(turn.chunks_exact(CELL));
+        let pixels = pixels.zip(rows[1][1..].chunks_exact(CELL));
+        for (values, ((length, turn), grey)) in cells.zip(pixels) {
+            values[0] += share * grey.iter().sum::<f32>();
+            for (length, turn) in length.iter().zip(turn) {
+                let length = 0.5 * share * length;
+                let at = turn * BINS as f32;
+                let bin = at as usize;
+                let part = at - bin as f32;
+                values[1] += length;
+                values[2 + bin % BINS] += length * (1.0 - part);
+                values[2 + (bin + 1) % BINS] += length * part;
+            }
+        }
+    }
+
+    /// Divides gradients by what is usual around their cell.
+    fn compare(&mut self) {
+        self.around.clear();
+        self.around.extend(self.values.chunks_exact(DEPTH).map(|cell| cell[1]));
+        self.before.resize(self.values.len(), 0.0);
+        let weights = [1.0, 2.0, 3.0, 2.0, 1.0].map(|w: f32| w / 9.0);
+        smooth(&mut self.around, &mut self.before, (self.columns, self.rows), 1, &weights);
+        for (cell, around) in self.values.chunks_exact_mut(DEPTH).zip(&self.around) {
+            let scale = 1.0 / (around + FAINT);
+            cell[1..].iter_mut().for_each(|value| *value *= scale);
+        }
+    }
+
+    /// Numbers in a row of cells.
+    pub fn stride(&self) -> usize {
+        self.columns * DEPTH
+    }
+
+    /// The numbers from cell (x, y) on.
+    pub fn from(&self, x: usize, y: usize) -> &[f32] {
+        &self.values[(y * self.columns + x) * DEPTH..]
+    }
+}
+
+/// Weighted means over neighbours in columns and then in rows; at the border what
+/// is there counts more. `scratch` is as long as the values, at least.
+fn smooth(
+    values: &mut [f32],
+    scratch: &mut [f32],
+    (columns, rows): (usize, usize),
+    depth: usize,
+    weights: &[f32],
+) {
+    let row = columns * depth;
+    for y in 0..rows {
+        let (first, used, scale) = present(y, rows, weights);
+        let out = &mut scratch[y * row..(y + 1) * row];
+        out.fill(0.0);
+        for (from, weight) in (first..).zip(used) {
+            add_scaled(out, &values[from * row..(from + 1) * row], scale * weight);
+        }
+    }
+    let reach = weights.len() / 2;
+    for (from, to) in scratch.chunks_exact(row).zip(values.chunks_exact_mut(row)).take(rows) {
+        to.fill(0.0);
+        let whole = reach.min(columns)..columns.saturating_sub(reach).max(reach.min(columns));
+        for (k, weight) in weights.iter().enumerate().filter(|_| !whole.is_empty()) {
+            let begin = (whole.start + k - reach) * depth;
+            let inner = &mut to[whole.start * depth..whole.end * depth];
+            let length = inner.len();
+            add_scaled(inner, &from[begin..begin + length], *weight);
+        }
+        for x in (0..whole.start).chain(whole.end..columns) {
+            let (first, used, scale) = present(x, columns, weights);
+            for (neighbour, weight) in (first..).zip(used) {
+                let from = &from[neighbour * depth..(neighbour + 1) * depth];
+                add_scaled(&mut to[x * depth..(x + 1) * depth], from, scale * weight);
+            }
+        }
+    }
+}
+
+/// The first neighbour that is there, the weights of those that are, and what
+/// makes them sum to 1.
+fn present(at: usize, length: usize, weights: &[f32]) -> (usize, &[f32], f32) {
+    let reach = weights.len() / 2;
+    let (first, last) = (at.saturating_sub(reach), (at + reach).min(length - 1));
+    let used = &weights[first + reach - at..=last + reach - at];
+    (first, used, 1.0 / used.iter().sum::<f32>())
+}
+
+fn add_scaled(to: &mut [f32], from: &[f32], scale: f32) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * from);
+}

@@ -1,0 +1,47 @@
+//! Boosted trees over the numbers of windows.
+
+use tagalong_learn::boost::{Boosting, Levels, Next, Question};
+use tagalong_learn::mix;
+
+use super::svm::Windows;
+use crate::Tree;
+
+/// `count` trees, each of two questions about some of `numbers` numbers that are
+/// drawn by chance.
+pub(crate) fn boosted(windows: &Windows, count: usize, numbers: usize, seed: u64) -> Vec<Tree> {
+    let width = windows.width();
+    let mut table = Levels::new(windows.len());
+    for number in 0..width {
+        table.push(windows.numbers.iter().skip(number).step_by(width).copied());
+    }
+    let mut boosting = Boosting::new(&table, windows.is_person.iter().copied());
+    let drawn = |tree: usize| -> Vec<usize> {
+        let number = |k: usize| mix(mix(seed ^ tree as u64) ^ k as u64) % width as u64;
+        (0..numbers).map(|k| number(k) as usize).collect()
+    };
+    (0..count).map(|tree| flat(&boosting.grow(&drawn(tree), 2))).collect()
+}
+
+/// A tree in the form that is run; a leaf where a question could be asks one that
+/// does not matter.
+fn flat(questions: &[Question]) -> Tree {
+    let mut tree = Tree::default();
+    let mut set = |at: usize, question: &Question| {
+        (tree.numbers[at], tree.below[at]) = (question.feature as u16, question.below);
+    };
+    set(0, &questions[0]);
+    for (side, next) in questions[0].next.iter().enumerate() {
+        if let Next::Question(to) = next {
+            set(1 + side, &questions[*to]);
+        }
+    }
+    let leaf = |next: &Next| if let Next::Leaf(value) = next { *value } else { 0.0 };
+    for (side, next) in questions[0].next.iter().enumerate() {
+        let pair = match next {
+            Next::Question(to) => questions[*to].next.map(|next| leaf(&next)),
+            end => [leaf(end); 2],
+        };
+        tree.values[2 * side..2 * side + 2].copy_from_slice(&pair);
+    }
+    tree
+}

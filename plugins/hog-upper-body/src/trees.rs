@@ -1,0 +1,122 @@
+//! Boosted trees of two questions each.
+
+use crate::channels::{Channels, DEPTH};
+use crate::model::SIDE;
+
+/// Cells along a side of a window.
+pub(crate) const CELLS: usize = 2 * (SIDE + 1);
+/// Numbers of a window.
+pub(crate) const CHANNEL_NUMBERS: usize = CELLS * CELLS * DEPTH;
+/// A window is given up after this many trees at the earliest.
+const PATIENCE: usize = 32;
+/// Bytes of a tree in a file.
+const BYTES: usize = 3 * 6 + 4 * 4;
+
+/// A question, and one more on either side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tree {
+    /// Which numbers of a window are looked at: first, if below, if not.
+    pub numbers: [u16; 3],
+    /// What each of them is compared with.
+    pub below: [f32; 3],
+    /// What is added: yes and yes, yes and no, no and yes, no and no.
+    pub values: [f32; 4],
+}
+
+impl Tree {
+    fn value(&self, number: impl Fn(u16) -> f32) -> f32 {
+        let side = usize::from(number(self.numbers[0]) >= self.below[0]);
+        let other = usize::from(number(self.numbers[1 + side]) >= self.below[1 + side]);
+        self.values[2 * side + other]
+    }
+
+    fn to_bytes(self) -> impl Iterator<Item = u8> {
+        let numbers = self.numbers.into_iter().flat_map(u16::to_le_bytes);
+        numbers.chain(self.below.into_iter().chain(self.values).flat_map(f32::to_le_bytes))
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Self {
+        let short = |k: usize| u16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]]);
+        let long = |k: usize| {
+            let at = 6 + 4 * k;
+            f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+        };
+        Self {
+            numbers: [0, 1, 2].map(short),
+            below: [0, 1, 2].map(long),
+            values: [3, 4, 5, 6].map(long),
+        }
+    }
+}
+
+/// Trees one after the other; a window whose sum falls below `hopeless` is given up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trees {
+    /// The trees.
+    pub trees: Vec<Tree>,
+    /// The least sum on the way.
+    pub hopeless: f32,
+}
+
+impl Trees {
+    /// The sum over the numbers that `number` gives, or that at which the window
+    /// was given up.
+    fn sum(&self, number: impl Fn(u16) -> f32) -> f32 {
+        let mut sum = 0.0;
+        for (count, tree) in self.trees.iter().enumerate() {
+            sum += tree.value(&number);
+            if sum < self.hopeless && count >= PATIENCE {
+                break;
+            }
+        }
+        sum
+    }
+
+    /// The sum of the window whose first cell is at (x, y).
+    pub(crate) fn sum_in(&self, channels: &Channels, x: usize, y: usize) -> f32 {
+        const ROW: usize = CELLS * DEPTH;
+        let (cells, stride) = (channels.from(x, y), channels.stride());
+        self.sum(|number| {
+            let number = usize::from(number);
+            cells[number / ROW * stride + number % ROW]
+        })
+    }
+
+    /// The sum of a window's numbers.
+    pub fn sum_of(&self, numbers: &[f32]) -> f32 {
+        self.sum(|number| numbers[usize::from(number)])
+    }
+
+    /// The least sum on the way to the end, once windows may be given up.
+    #[cfg(feature = "train")]
+    pub(crate) fn least_on_the_way(&self, numbers: &[f32]) -> f32 {
+        let (mut sum, mut least) = (0.0, f32::MAX);
+        for (count, tree) in self.trees.iter().enumerate() {
+            sum += tree.value(|number| numbers[usize::from(number)]);
+            if count >= PATIENCE {
+                least = least.min(sum);
+            }
+        }
+        least
+    }
+}
+
+pub(crate) fn to_bytes(trees: &[Tree]) -> Vec<u8> {
+    trees.iter().flat_map(|tree| tree.to_bytes()).collect()
+}
+
+/// Trees of a file.
+///
+/// # Errors
+/// In a sentence, what is wrong with the bytes.
+pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Vec<Tree>, String> {
+    let trees: Vec<Tree> = bytes.chunks_exact(BYTES).map(Tree::from_bytes).collect();
+    let is_right = |tree: &Tree| {
+        let known = tree.numbers.iter().all(|n| usize::from(*n) < CHANNEL_NUMBERS);
+        known && !tree.below.iter().any(|v| v.is_nan()) && tree.values.iter().all(|v| v.is_finite())
+    };
+    if trees.is_empty() || !bytes.len().is_multiple_of(BYTES) || !trees.iter().all(is_right) {
+        return Err("its trees are broken".into());
+    }
+    Ok(trees)
+}
