@@ -93,10 +93,10 @@ pub struct LooksSettings {
 impl Default for LooksSettings {
     fn default() -> Self {
         Self {
-            torso: [0.26, 7.0],
+            torso: [0.34, 7.0],
             legs: [0.3, 1.0],
             texture: [0.12, 8.0],
-            height: [0.06, 14.0],
+            height: [0.02, 14.0],
             rivals: 4.0,
         }
     }
