@@ -112,14 +112,14 @@ impl Default for Training {
     fn default() -> Self {
         Self {
             side: 20,
-            stages: 16,
+            stages: 12,
             min_hit_rate: 0.995,
             max_false_alarm: 0.4,
             max_trees: 100,
             depth: 2,
             features: 2500,
             others: 5000,
-            fewest_others: 2000,
+            fewest_others: 300,
         }
     }
 }

@@ -72,7 +72,7 @@ fn fddb(folder: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     for of_picture in faces.chunk_by(|a, b| a.0 == b.0) {
         let file = of_picture[0].0;
         let group = fingerprint(file);
-        if group / 5 % share != 0 {
+        if !(group / 5).is_multiple_of(share) {
             continue;
         }
         let frame = frame(read(&folder.join("fddb").join(file))?);
@@ -93,7 +93,7 @@ fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let mut count = 0;
     for (name, content) in members(&bytes) {
         let group = fingerprint(name);
-        if !name.ends_with(".png") || group / 5 % share != 0 {
+        if !name.ends_with(".png") || !(group / 5).is_multiple_of(share) {
             continue;
         }
         let image = image::load_from_memory(content)
