@@ -96,20 +96,19 @@ fn columns() -> Vec<String> {
 
 fn looks(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Look>, ReproduceError> {
     let scenes = lab.scenes("turntable", &ONE_TURN, lab.seeds(60))?;
-    let contenders: Vec<Contender> = subsets.iter().map(|subset| detector(subset)).collect();
+    let contenders: Vec<Contender> =
+        subsets.iter().map(|subset| detector(lab, subset)).collect::<Result<_, _>>()?;
     let looks = lab.trials("turns on the spot", &scenes, &contenders, of_trial)?;
     Ok(looks.into_iter().flatten().collect())
 }
 
-/// The detector of `stereo-ekf` with some of its templates, which looks at every
-/// image anew.
-fn detector(directions: &[&str]) -> Contender {
-    let config = format!(
-        "[stereo]\nmethod = \"semi-global\"\nwidth = 512\n[[detectors]]\n\
-         plugin = \"depth-template\"\nconfig = {{ directions = {directions:?} }}\n\
-         [filter]\nplugin = \"ekf\"\n"
-    );
-    Contender::new(directions.join(", "), config)
+/// `stereo-ekf` with some of its templates; at one image a second it looks at
+/// every image anew.
+fn detector(lab: &Lab, directions: &[&str]) -> Result<Contender, ReproduceError> {
+    let whole = lab.contender("stereo-ekf")?;
+    let table = "[detectors.config]\n";
+    let config = whole.config.replace(table, &format!("{table}directions = {directions:?}\n"));
+    Ok(Contender { name: directions.join(", "), config, ..whole })
 }
 
 fn of_trial(trial: Trial) -> Result<Vec<Look>, TrialError> {
