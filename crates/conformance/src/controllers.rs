@@ -31,7 +31,9 @@ fn bounded(speeds: WheelSpeeds, scene: &str) -> Verdict {
     })
 }
 
-fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
+/// A person to follow whose head is at this place of the robot frame, m, 1.6 m
+/// above the floor, and who walks with this velocity, m/s.
+pub fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
     let mut target = track(1, Point3::new(x, y, 1.6), 0.1, &level());
     target.estimate.person.velocity = velocity;
     target

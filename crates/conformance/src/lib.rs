@@ -40,6 +40,7 @@ use std::slice;
 
 use tagalong_core::{Context, Kind, Registry};
 
+pub use controllers::target;
 use subject::{Subject, WHEELS};
 
 /// One promise that one plugin broke.

@@ -5,32 +5,17 @@ mod states;
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Matrix5, Point2, Point3, Vector2};
+use nalgebra::{Isometry2, Point2, Vector2};
+use tagalong_conformance::target;
 use tagalong_core::{
-    Camera, Controller, Distortion, Estimate, Frame, Images, Motion, Person, Pinhole, Rect,
-    Registry, Scene, Stamp, Track, TrackId, WheelSpeeds, Wheels,
+    Camera, Controller, Distortion, Frame, Images, Motion, Pinhole, Registry, Scene, Stamp, Track,
+    WheelSpeeds, Wheels,
 };
 
 use crate::{ArcFollow, Config, Path};
 
 const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
-
-fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
-    let person = Person { position: Point3::new(x, y, 1.6), velocity };
-    let covariance = Matrix5::identity();
-    let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 1.0, 1.0) };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 9,
-        unseen_s: 0.0,
-        score: 3.0,
-    }
-}
 
 fn frame(motion: Motion) -> Frame {
     let lens = Pinhole { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5, distortion: Distortion::None };

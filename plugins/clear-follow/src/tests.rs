@@ -2,33 +2,18 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Matrix5, Point2, Point3, Vector2};
+use nalgebra::{Isometry2, Point2, Vector2};
 use proptest::prelude::*;
+use tagalong_conformance::target;
 use tagalong_core::{
-    Camera, Controller, DepthImage, Distortion, Estimate, Frame, Images, Motion, Person, Pinhole,
-    Rect, Registry, Scene, Stamp, Track, TrackId, WheelSpeeds, Wheels,
+    Camera, Controller, DepthImage, Distortion, Frame, Images, Motion, Pinhole, Registry, Scene,
+    Stamp, Track, WheelSpeeds, Wheels,
 };
 
 use crate::{ClearFollow, Config};
 
 const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
-
-fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
-    let person = Person { position: Point3::new(x, y, 1.6), velocity };
-    let covariance = Matrix5::identity();
-    let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 1.0, 1.0) };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 9,
-        unseen_s: 0.0,
-        score: 3.0,
-    }
-}
 
 fn camera() -> Arc<Camera> {
     let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
