@@ -25,7 +25,6 @@
 
 mod contender;
 mod crossing;
-mod depth;
 mod draw;
 mod judge;
 mod occlusion;
@@ -37,7 +36,6 @@ mod trial;
 
 pub use contender::Contender;
 pub use crossing::{Crossing, Failing, Span, crossing};
-pub use depth::{HeadDepth, head_depths};
 pub use draw::{Draw, Drawn, ODOMETRY_SIGMA};
 pub use judge::{Judge, Judged};
 pub use occlusion::{Occlusion, Outcome, occlusions, outcome};

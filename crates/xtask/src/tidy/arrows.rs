@@ -18,7 +18,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("triangulate", &["core"]),
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
-    ("trials", &["core", "vision", "pipeline", "stereo", "sim", "eval"]),
+    ("trials", &["core", "vision", "pipeline", "sim", "eval"]),
     // What is reproduced may be the learning of a plugin.
     (
         "reproduce",
