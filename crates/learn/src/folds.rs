@@ -34,6 +34,27 @@ pub fn mix(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// What a group of examples is for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Use {
+    /// The figures of the card; no machine sees it.
+    Figures,
+    /// The calibration of a machine that has not seen it.
+    Calibration,
+    /// Fitting the machine.
+    Fit,
+}
+
+/// What a group is for, by chance: two tenths for the figures, one for the
+/// calibration.
+pub fn use_of(group: u64) -> Use {
+    match mix(group) % 10 {
+        0 | 1 => Use::Figures,
+        2 => Use::Calibration,
+        _ => Use::Fit,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

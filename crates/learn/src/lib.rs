@@ -11,5 +11,5 @@ mod folds;
 mod held_out;
 
 pub use calibrate::{Line, platt};
-pub use folds::{mix, parts};
+pub use folds::{Use, mix, parts, use_of};
 pub use held_out::{accepted, area};

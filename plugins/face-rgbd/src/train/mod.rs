@@ -16,7 +16,7 @@ use boost::{Samples, stage};
 use figures::{calibration, figures};
 use patch::{Patch, mirrored, shifted, window};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
-use tagalong_learn::mix;
+use tagalong_learn::{Use, mix, use_of};
 
 use crate::{Cascade, Scanner, Training, scales};
 
@@ -30,22 +30,6 @@ const BESIDE: f64 = 0.3;
 const SCALE_STEP: f64 = 1.25;
 /// A picture gives this part of what a stage needs at most.
 const PICTURES: usize = 25;
-
-/// What a group is for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Use {
-    Figures,
-    Calibration,
-    Fit,
-}
-
-fn use_of(group: u64) -> Use {
-    match mix(group) % 10 {
-        0 | 1 => Use::Figures,
-        2 => Use::Calibration,
-        _ => Use::Fit,
-    }
-}
 
 /// A picture, and the windows of the faces in it.
 struct Picture {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use boosted::boosted;
 use svm::{Windows, separate};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
-use tagalong_learn::{Line, accepted, area, mix, platt};
+use tagalong_learn::{Line, Use, accepted, area, mix, platt, use_of};
 
 use crate::scan::FILLED;
 use crate::{Kind, Machine, Model, Scanner, Training, Trees, merge, window_numbers, window_of};
@@ -40,22 +40,6 @@ const SHIFTS: [(f64, f64, f64); 4] =
 const OUTSIDE: f64 = 0.2;
 /// The miss rate is told at this many false alarms a window.
 const FALSE_ALARMS: [f64; 3] = [1e-3, 1e-4, 1e-5];
-
-/// What a group is for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Use {
-    Figures,
-    Calibration,
-    Fit,
-}
-
-fn use_of(group: u64) -> Use {
-    match mix(group) % 10 {
-        0 | 1 => Use::Figures,
-        2 => Use::Calibration,
-        _ => Use::Fit,
-    }
-}
 
 /// Collects windows and pictures, and fits models to them.
 pub struct HogTrainer {
