@@ -96,7 +96,7 @@ fn add_scaled(to: &mut [f32], from: &[u8], scale: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * f32::from(*from));
 }
 
-/// As [`Resampler::fill`], once.
+/// As `Resampler::fill`, once.
 pub fn resampled(
     image: &GreyImage,
     origin: (f64, f64),
