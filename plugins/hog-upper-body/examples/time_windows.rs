@@ -14,15 +14,20 @@ fn main() {
     let image = image::open(picture).expect("the picture can be read").into_luma8();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
-    let (mut scanner, mut found) = (Scanner::new(model.kind()), 0);
+    let (mut scanner, mut windows) = (Scanner::new(model.kind()), Vec::new());
     for _ in 0..runs {
         // Windows are 64 pixels and more, and twice as wide as the upper body.
         let most = 0.5 * width.min(height) as f64;
         let sides = std::iter::successors(Some(32.0), |side| Some(side * 1.15));
         let least = model.sum_at(0.0);
         let sides = sides.take_while(|side| *side <= most);
-        let windows = scanner.scan(&image, &model, sides, least, |_| Some(None));
-        found = merge(windows, 0.4, 0.4).len();
+        windows.clear();
+        scanner.scan(&image, &model, sides, least, |_| Some(None), &mut windows);
+        merge(&mut windows, 0.4, 0.4);
     }
-    println!("{found} people, {} windows a run", scanner.looked_at() / runs.max(1) as u64);
+    println!(
+        "{} people, {} windows a run",
+        windows.len(),
+        scanner.looked_at() / runs.max(1) as u64
+    );
 }

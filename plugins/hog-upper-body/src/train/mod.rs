@@ -144,11 +144,8 @@ impl HogTrainer {
         let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
         for (index, (use_, picture)) in self.pictures.iter().enumerate() {
             if *use_ == Use::Fit {
-                let windows = merge(
-                    search(&mut scanner, picture, model, self.near_miss()),
-                    MINED_OVERLAP,
-                    1.0,
-                );
+                let mut windows = search(&mut scanner, picture, model, self.near_miss());
+                merge(&mut windows, MINED_OVERLAP, 1.0);
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
             }
@@ -172,7 +169,7 @@ impl HogTrainer {
         for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
             let mut windows = search(&mut scanner, picture, model, self.near_miss());
             if merged {
-                windows = merge(windows, MINED_OVERLAP, 1.0);
+                merge(&mut windows, MINED_OVERLAP, 1.0);
             }
             sums.extend(windows.iter().map(|w| (f64::from(w.sum), false)));
         }
@@ -269,7 +266,9 @@ fn search(
 ) -> Vec<crate::Window> {
     let most = picture.width().min(picture.height()) as f64;
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
-    scanner.scan(picture, model, sides.take_while(|side| *side <= most), least, |_| Some(None))
+    let (sides, mut found) = (sides.take_while(|side| *side <= most), Vec::new());
+    scanner.scan(picture, model, sides, least, |_| Some(None), &mut found);
+    found
 }
 
 /// The share of people below the sum that so many of the `windows` of others
