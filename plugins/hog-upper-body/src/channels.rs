@@ -82,14 +82,50 @@ impl Channels {
         }
     }
 
-    /// Numbers in a row of cells.
-    pub fn stride(&self) -> usize {
-        self.columns * DEPTH
-    }
-
     /// The numbers from cell (x, y) on.
     pub fn from(&self, x: usize, y: usize) -> &[f32] {
         &self.values[(y * self.columns + x) * DEPTH..]
+    }
+
+    /// The same numbers in another order.
+    pub(crate) fn planes(&self, planes: &mut Planes) {
+        let half = (self.columns.div_ceil(2) + LANES).max(planes.half);
+        planes.half = half;
+        let rows = self.values.chunks_exact((self.columns * DEPTH).max(1)).take(self.rows);
+        planes.values.resize((self.rows * 2 * DEPTH * half).max(planes.values.len()), 0.0);
+        for (row, planes) in rows.zip(planes.values.chunks_exact_mut(2 * DEPTH * half)) {
+            for (x, pair) in row.chunks(2 * DEPTH).enumerate() {
+                for (number, value) in pair.iter().enumerate() {
+                    planes[number * half + x] = *value;
+                }
+            }
+        }
+    }
+}
+
+/// The numbers of cells, row by row: those of one kind of all even columns, and those
+/// of all odd ones. Windows begin at even columns, so what windows side by side look at
+/// lies side by side. Planes are as long as those of the largest image so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Planes {
+    half: usize,
+    values: Vec<f32>,
+}
+
+impl Planes {
+    /// What the places of numbers depend on.
+    pub(crate) fn layout(&self) -> usize {
+        self.half
+    }
+
+    /// Where number `k` of cell (x, y) is. Places in a window add up with that of its
+    /// first cell.
+    pub(crate) fn place(&self, x: usize, y: usize, k: usize) -> usize {
+        ((y * 2 + x % 2) * DEPTH + k) * self.half + x / 2
+    }
+
+    pub(crate) fn values(&self) -> &[f32] {
+        &self.values
     }
 }
 

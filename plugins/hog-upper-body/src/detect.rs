@@ -28,7 +28,7 @@ impl HogUpperBody {
         config.check()?;
         let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
         let model = context.model(&config.model, built_in, Model::from_text)?;
-        Ok(Self { config, scanner: Scanner::new(model.kind()), windows: Vec::new(), model })
+        Ok(Self { config, scanner: Scanner::new(&model), windows: Vec::new(), model })
     }
 
     fn detection(&self, camera: &Camera, window: &Window) -> Option<Detection> {
@@ -124,7 +124,7 @@ impl Detector for HogUpperBody {
         let (sides, least) = (sides(config, camera), model.sum_at(config.min_score));
         let before = scanner.looked_at();
         windows.clear();
-        scanner.scan(grey, model, sides, least, |square| proposer.propose(square), windows);
+        scanner.scan(grey, sides, least, |square| proposer.propose(square), windows);
         let looked_at = scanner.looked_at() - before;
         funnel.drop_many("window: size and depth", proposer.unfit);
         funnel.drop_many("window: head height", proposer.out_of_place);

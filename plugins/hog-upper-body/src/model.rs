@@ -114,32 +114,6 @@ impl Model {
         }
     }
 
-    /// The sums of as many windows side by side as there are `sums`; the first one
-    /// begins at cell (x, y), of 8 pixels.
-    pub fn sums(&self, field: &Field, (x, y): (usize, usize), sums: &mut [f32]) {
-        match (&self.machine, field) {
-            (Machine::Linear { weights, bias }, Field::Blocks(blocks)) => {
-                let weights = padded(weights);
-                let rows = |x: usize| std::array::from_fn(|row| blocks.from(x, y + row));
-                let (fours, rest) = sums.as_chunks_mut::<4>();
-                for (sums, x) in fours.iter_mut().zip((x..).step_by(4)) {
-                    *sums = [*bias; 4];
-                    side_by_side(&weights, rows(x), sums);
-                }
-                for (sum, x) in rest.iter_mut().zip(x + 4 * fours.len()..) {
-                    let mut alone = [*bias];
-                    side_by_side(&weights, rows(x), &mut alone);
-                    *sum = alone[0];
-                }
-            }
-            (Machine::Trees(trees), Field::Channels(channels)) => {
-                let windows = (x..).zip(sums);
-                windows.for_each(|(x, sum)| *sum = trees.sum_in(channels, 2 * x, 2 * y));
-            }
-            _ => sums.fill(f32::MIN),
-        }
-    }
-
     /// The sum of a window's numbers.
     pub fn sum_of(&self, numbers: &[f32]) -> f32 {
         match &self.machine {
@@ -214,47 +188,6 @@ fn weights(bytes: &[u8]) -> Result<Vec<f32>, String> {
         return Err("it has weights that are no numbers".into());
     }
     Ok(weights)
-}
-
-/// Numbers that are multiplied at once.
-const LANES: usize = 8;
-/// Numbers of a row of blocks in a window, in lanes that are full.
-const ROW: usize = (SIDE * BLOCK).next_multiple_of(LANES);
-
-/// The weights, with zeros for the numbers that fill the last lanes of a row: those
-/// are of the block behind the window.
-fn padded(weights: &[f32]) -> [[f32; ROW]; SIDE] {
-    let mut padded = [[0.0; ROW]; SIDE];
-    for (padded, weights) in padded.iter_mut().zip(weights.chunks_exact(SIDE * BLOCK)) {
-        padded[..SIDE * BLOCK].copy_from_slice(weights);
-    }
-    padded
-}
-
-/// Adds the products of the weights with windows that begin at the first block of the
-/// rows, at the next one, and so on: what is read of the weights is read once.
-#[multiversion::multiversion(targets("x86_64+avx2"))]
-fn side_by_side<const WINDOWS: usize>(
-    weights: &[[f32; ROW]; SIDE],
-    rows: [&[f32]; SIDE],
-    sums: &mut [f32; WINDOWS],
-) {
-    let mut lanes = [[0.0_f32; LANES]; WINDOWS];
-    for (weights, row) in weights.iter().zip(rows) {
-        let row = &row[..(WINDOWS - 1) * BLOCK + ROW];
-        for at in (0..ROW).step_by(LANES) {
-            for (window, lanes) in lanes.iter_mut().enumerate() {
-                let numbers = &row[window * BLOCK + at..][..LANES];
-                let weights = &weights[at..at + LANES];
-                for lane in 0..LANES {
-                    lanes[lane] += weights[lane] * numbers[lane];
-                }
-            }
-        }
-    }
-    for (sum, lanes) in sums.iter_mut().zip(&lanes) {
-        *sum += lanes.iter().sum::<f32>();
-    }
 }
 
 /// Sums in eight lanes of a fixed order: fast, and the same on every machine.

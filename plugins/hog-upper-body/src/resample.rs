@@ -63,9 +63,9 @@ impl Resampler {
         (width, height): (usize, usize),
         out: &mut Vec<f32>,
     ) {
-        out.clear();
         out.resize(width * height, 0.0);
         if image.width() * image.height() * width * height == 0 {
+            out.fill(0.0);
             return;
         }
         self.columns.fill(origin.0, step, width);
@@ -73,7 +73,6 @@ impl Resampler {
         let first = self.columns.each().map(|(start, _)| start).min().unwrap_or(0);
         let ends = self.columns.each().map(|(start, weights)| start + weights.len() as i64);
         let end = ends.max().unwrap_or(0).max(first + 1);
-        self.beside.clear();
         self.beside.resize((end - first) as usize, [0.0; LANES]);
         let Self { columns, rows, tall, beside } = self;
         let mut rows = rows.each();

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use tagalong_core::{GreyImage, Rect};
 
 use crate::hog::CELL;
+use crate::judge::Judge;
 use crate::model::{Field, Kind, Model, SIDE};
 use crate::resample::{Resampler, resampled};
 
@@ -37,7 +38,7 @@ pub struct Window {
 /// Looks at the windows of images; keeps its memory from one to the next.
 #[derive(Clone, Debug)]
 pub struct Scanner {
-    field: Field,
+    judge: Judge,
     resampler: Resampler,
     pixels: Vec<f32>,
     wanted: Vec<Wanted>,
@@ -55,10 +56,10 @@ struct Wanted {
 }
 
 impl Scanner {
-    /// For models of one kind.
-    pub fn new(kind: Kind) -> Self {
+    /// For one model.
+    pub fn new(model: &Model) -> Self {
         Self {
-            field: Field::new(kind),
+            judge: Judge::new(model),
             resampler: Resampler::default(),
             pixels: Vec::new(),
             wanted: Vec::new(),
@@ -78,7 +79,6 @@ impl Scanner {
     pub fn scan(
         &mut self,
         image: &GreyImage,
-        model: &Model,
         sides: impl Iterator<Item = f64>,
         least: f32,
         mut propose: impl FnMut(&Rect) -> Option<Option<f64>>,
@@ -90,7 +90,7 @@ impl Scanner {
             let Some((left, top, right, bottom)) = bounds(&self.wanted) else { continue };
             self.looked_at += self.wanted.len() as u64;
             self.fill(image, size.step, (left, top, right, bottom));
-            self.judge(model, &size, (left, top), least, found);
+            self.judge(&size, (left, top), least, found);
         }
     }
 
@@ -121,23 +121,16 @@ impl Scanner {
         let start = |cell: i64| ((cell * CELL as i64) as f64 - AROUND_PX as f64) * step;
         let (origin, size) = ((start(left), start(top)), (long(left, right), long(top, bottom)));
         self.resampler.fill(image, origin, step, size, &mut self.pixels);
-        self.field.fill(&self.pixels, size.0);
+        self.judge.fill(&self.pixels, size.0);
     }
 
     /// Adds the wanted windows that reach `least`; neighbours are judged together.
-    fn judge(
-        &mut self,
-        model: &Model,
-        size: &Size,
-        (left, top): (i64, i64),
-        least: f32,
-        found: &mut Vec<Window>,
-    ) {
+    fn judge(&mut self, size: &Size, (left, top): (i64, i64), least: f32, found: &mut Vec<Window>) {
         let at = |cell: i64, first: i64| (cell - first) as usize + AROUND;
         for run in self.wanted.chunk_by(|a, b| (a.x + 1, a.y) == (b.x, b.y)) {
             self.sums.clear();
             self.sums.resize(run.len(), 0.0);
-            model.sums(&self.field, (at(run[0].x, left), at(run[0].y, top)), &mut self.sums);
+            self.judge.sums((at(run[0].x, left), at(run[0].y, top)), &mut self.sums);
             let good = run.iter().zip(&self.sums).filter(|(_, sum)| **sum >= least);
             found.extend(good.map(|(window, sum)| Window {
                 region: size.square(window.x, window.y),

@@ -7,8 +7,8 @@ use crate::model::SIDE;
 use crate::scan::WINDOW_PX;
 use crate::trees::CHANNEL_NUMBERS;
 use crate::{
-    Blocks, Channels, Kind, Machine, Model, NUMBERS, Scanner, Tree, Trees, Window, merge,
-    resampled, window_numbers,
+    Blocks, Channels, Machine, Model, NUMBERS, Scanner, Tree, Trees, Window, merge, resampled,
+    window_numbers,
 };
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
@@ -78,13 +78,12 @@ fn blocks_are_those_of_the_slow_reference() {
 fn scan(
     scanner: &mut Scanner,
     image: &GreyImage,
-    model: &Model,
     sides: &[f64],
     part: impl Fn(&Rect) -> bool,
 ) -> Vec<Window> {
     let (sides, mut found) = (sides.iter().copied(), Vec::new());
     let propose = |square: &Rect| part(square).then_some(None);
-    scanner.scan(image, model, sides, f32::MIN, propose, &mut found);
+    scanner.scan(image, sides, f32::MIN, propose, &mut found);
     found
 }
 
@@ -108,8 +107,8 @@ fn trees() -> Model {
 fn a_scan_gives_each_window_the_sum_of_its_numbers() {
     let image = noise(160, 130, 4);
     for model in [linear(), trees()] {
-        let mut scanner = Scanner::new(model.kind());
-        let windows = scan(&mut scanner, &image, &model, &[32.0, 45.0], |_| true);
+        let mut scanner = Scanner::new(&model);
+        let windows = scan(&mut scanner, &image, &[32.0, 45.0], |_| true);
         assert_eq!(scanner.looked_at(), windows.len() as u64);
         assert!(windows.len() > 100, "{}", windows.len());
         // What is at the edge of what was resampled has other neighbours.
@@ -194,9 +193,8 @@ fn a_part_of_the_image_gives_the_same_windows() {
     let image = noise(200, 150, 4);
     let model = linear();
     let part = |square: &Rect| square.x > 60.0 && square.y > 40.0;
-    let scan = |part: &dyn Fn(&Rect) -> bool| {
-        scan(&mut Scanner::new(Kind::Linear), &image, &model, &[52.0], part)
-    };
+    let scan =
+        |part: &dyn Fn(&Rect) -> bool| scan(&mut Scanner::new(&model), &image, &[52.0], part);
     let all: Vec<Window> = scan(&|_| true).into_iter().filter(|w| part(&w.region)).collect();
     let some = scan(&part);
     assert_eq!(all.len(), some.len());

@@ -140,11 +140,11 @@ impl HogTrainer {
     /// Adds what the machine takes for people; returns how many that are.
     fn mine(&mut self, model: &Model) -> usize {
         let Training { mined_per_picture, mined_per_round, .. } = self.training;
-        let mut scanner = Scanner::new(self.kind);
+        let mut scanner = Scanner::new(model);
         let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
         for (index, (use_, picture)) in self.pictures.iter().enumerate() {
             if *use_ == Use::Fit {
-                let mut windows = search(&mut scanner, picture, model, self.near_miss());
+                let mut windows = search(&mut scanner, picture, self.near_miss());
                 merge(&mut windows, MINED_OVERLAP, 1.0);
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
@@ -165,9 +165,9 @@ impl HogTrainer {
         let people = self.people.iter().filter(|(use_, _)| *use_ == wanted);
         let mut sums: Vec<(f64, bool)> =
             people.map(|(_, numbers)| (f64::from(model.sum_of(numbers)), true)).collect();
-        let mut scanner = Scanner::new(self.kind);
+        let mut scanner = Scanner::new(model);
         for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
-            let mut windows = search(&mut scanner, picture, model, self.near_miss());
+            let mut windows = search(&mut scanner, picture, self.near_miss());
             if merged {
                 merge(&mut windows, MINED_OVERLAP, 1.0);
             }
@@ -258,16 +258,11 @@ impl Trainer for HogTrainer {
 }
 
 /// All windows of a picture above `least`.
-fn search(
-    scanner: &mut Scanner,
-    picture: &GreyImage,
-    model: &Model,
-    least: f32,
-) -> Vec<crate::Window> {
+fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::Window> {
     let most = picture.width().min(picture.height()) as f64;
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
     let (sides, mut found) = (sides.take_while(|side| *side <= most), Vec::new());
-    scanner.scan(picture, model, sides, least, |_| Some(None), &mut found);
+    scanner.scan(picture, sides, least, |_| Some(None), &mut found);
     found
 }
 
