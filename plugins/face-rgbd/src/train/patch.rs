@@ -59,13 +59,3 @@ pub(super) fn window(grey: &GreyImage, region: &Rect, side: usize) -> GreyImage 
         (across(top) * (1.0 - down) + across(top + 1) * down).round() as u8
     })
 }
-
-pub(super) fn mirrored(grey: &GreyImage) -> GreyImage {
-    let width = grey.width();
-    GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
-}
-
-pub(super) fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
-    let (x, y) = (square.x + right * square.width, square.y + down * square.width);
-    Rect { x, y, ..*square }.inflated(growth - 1.0)
-}

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use boosted::boosted;
 use svm::{Windows, separate};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
-use tagalong_learn::{Line, Use, accepted, area, mix, platt, use_of};
+use tagalong_learn::{Line, Use, accepted, area, mirrored, mix, platt, shifted, use_of};
 
 use crate::scan::FILLED;
 use crate::{Kind, Machine, Model, Scanner, Training, Trees, merge, window_numbers, window_of};
@@ -276,17 +276,6 @@ fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f
     let people: Vec<f64> = sums.iter().filter(|(_, is)| *is).map(|(sum, _)| *sum).collect();
     let missed = people.iter().filter(|sum| **sum <= limit).count();
     missed as f64 / people.len().max(1) as f64
-}
-
-fn mirrored(grey: &GreyImage) -> GreyImage {
-    let width = grey.width();
-    GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
-}
-
-fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
-    let moved =
-        Rect { x: square.x + right * square.width, y: square.y + down * square.width, ..*square };
-    moved.inflated(growth - 1.0)
 }
 
 fn rounded(value: f64) -> toml::Value {
