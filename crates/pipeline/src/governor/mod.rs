@@ -7,9 +7,11 @@
 
 mod corridor;
 mod settings;
+mod surroundings;
 
-pub(crate) use corridor::{Ahead, ahead};
+pub(crate) use corridor::Ahead;
 pub use settings::{CorridorSettings, GovernorSettings};
+pub(crate) use surroundings::Surroundings;
 
 use tagalong_core::{Command, Motion, Reason, Stamp, WheelSpeeds, Wheels};
 
@@ -167,6 +169,11 @@ impl Governor {
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
             self.latch("odometry jumped");
         }
+    }
+
+    /// What counts as something in the way.
+    pub(crate) fn corridor(&self) -> &CorridorSettings {
+        &self.settings.corridor
     }
 
     /// Stops until armed again.
