@@ -20,7 +20,6 @@ mod commands;
 mod config_file;
 mod demo;
 mod follow;
-mod needs;
 mod outcome;
 mod overlay;
 mod realism;

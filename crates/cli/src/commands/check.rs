@@ -3,10 +3,9 @@ use std::path::Path;
 
 use tagalong_core::Registry;
 use tagalong_log::{FrameSource, Needs};
-use tagalong_pipeline::Pipeline;
+use tagalong_pipeline::{Pipeline, needs};
 
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::needs::needs;
 use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::suggest::check_log_path;
 
@@ -21,7 +20,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>) -> Outcome 
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let wanted = needs(|| Ok(file.pipeline(registry, None)?.0))?;
+    let wanted = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
     print(&format!("{}: right; needs {}\n", config.display(), in_words(wanted)))?;
     match log {
         None => Ok(Ended::Well),
