@@ -25,13 +25,15 @@ pub mod register;
 mod scan;
 mod source;
 pub mod tf;
+mod timing;
 mod topics;
 mod truth;
 pub mod write;
 
 pub use error::LogError;
 pub use input::{InputSettings, MountSettings, Needs};
-pub use inspect::{ImageFacts, Inspection, TopicFacts, inspect};
+pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use limits::Limits;
 pub use source::{FrameSource, LogFacts, LogFrame};
+pub use timing::{Skew, Timing};
 pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth};

@@ -151,7 +151,7 @@ mod tests {
             let found = seen.topics.iter().find(|t| t.topic == topic).unwrap();
             assert_eq!((found.schema.as_str(), found.count, found.undecodable), (schema, 150, 0));
         }
-        assert!((seen.skew_s.unwrap() - 0.015).abs() < 1e-6, "{:?}", seen.skew_s);
+        assert!((seen.skew.unwrap().median_s - 0.015).abs() < 1e-6, "{:?}", seen.skew);
     }
 
     /// Trials skip the log; they must see what a pipeline sees that reads it.

@@ -21,7 +21,7 @@ use tagalong_core::{Camera, ConicalMirror, DepthImage, Frame, Lens};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tally::Tally;
 
-use crate::camera_info::{Intrinsics, Mirrored, intrinsics};
+use crate::camera_info::{Intrinsics, Mirrored, check_size, intrinsics};
 use crate::mcap_walk::Walker;
 use crate::scan::{Scan, open_file};
 use crate::topics::{Chosen, choose, missing};
@@ -122,9 +122,11 @@ impl Plan {
             && close(a.cy, b.cy, 2.0)
     }
 
-    /// The camera that took a depth image, without its pose.
+    /// The camera that took a depth image, without its pose; `None` without a
+    /// calibration for images of that size.
     fn depth_camera(&self, depth: &DepthImage) -> Option<Camera> {
         let known = self.depth_lens?;
+        check_size(&known, depth.width(), depth.height()).ok()?;
         Some(Camera {
             lens: Lens::Pinhole(known.lens),
             width: depth.width(),
