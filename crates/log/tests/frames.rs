@@ -331,8 +331,7 @@ fn the_given_pose_of_the_camera_goes_before_that_of_tf() {
     let height = |camera| {
         let input = InputSettings { camera, ..InputSettings::default() };
         let needs = Needs::default();
-        let mut source =
-            FrameSource::open(&saved.path, &input, &Limits::default(), needs).unwrap();
+        let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), needs).unwrap();
         source.next_frame().unwrap().frame.camera.height_m()
     };
     assert!((height(Some(mount)) - 0.7).abs() < 1e-12);

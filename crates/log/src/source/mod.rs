@@ -55,6 +55,8 @@ pub struct LogFacts {
     pub right_topic: Option<String>,
     /// Topic of the odometry.
     pub odometry_topic: Option<String>,
+    /// Topic of the calibration that the frames have.
+    pub calibration_topic: Option<String>,
     /// Frame id of the images.
     pub camera_frame: Option<String>,
     /// The robot's frame in tf.
@@ -96,6 +98,13 @@ impl Plan {
     /// The topic whose images make the frames.
     fn primary(&self) -> &str {
         primary(&self.chosen)
+    }
+
+    /// The topic of the calibration that the frames have.
+    fn calibration_topic(&self) -> Option<&String> {
+        self.lens?;
+        let own = if self.chosen.colour.is_some() { &self.chosen.colour_info } else { &None };
+        own.as_ref().or(self.chosen.depth_info.as_ref())
     }
 
     /// True if depth comes beside another image.
@@ -295,6 +304,7 @@ impl FrameSource {
             depth_topic: chosen.depth.clone(),
             right_topic: chosen.right.clone(),
             odometry_topic: chosen.odometry.clone(),
+            calibration_topic: self.plan.calibration_topic().cloned(),
             camera_frame: scan.frame_of(self.plan.primary()).map(str::to_owned),
             robot_frame: robot_frame(scan, &self.plan.input).to_owned(),
             width: camera.map_or(0, |camera| camera.width),
