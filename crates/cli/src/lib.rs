@@ -23,7 +23,6 @@ mod doctor;
 mod follow;
 mod import;
 mod keys;
-mod needs;
 mod outcome;
 mod overlay;
 mod realism;

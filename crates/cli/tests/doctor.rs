@@ -237,16 +237,19 @@ const FIRST_NS: u64 = common::FIRST_NS;
 fn what_was_broken_is_found() {
     let home = tempfile::tempdir().unwrap();
     let log = home.path().join("broken.mcap");
+    let mut missed = Vec::new();
     for Case { name, changes, id, severity, remedy } in cases() {
         broken::write(good(), &log, &changes);
         let (code, said) = doctor(&config(), &log, &["--frames", "24"]);
         let found = finding(&said, id);
-        assert_eq!(found["severity"], severity, "{name}: {said:#}");
         let told = found["remedy"].as_str().unwrap_or_default();
-        assert!(told.contains(remedy), "{name}: {found:#}");
+        if found["severity"] != severity || !told.contains(remedy) {
+            missed.push(format!("{name}: not `{severity}` with `{remedy}`, but {found:#}"));
+        }
         let is_bad = said["findings"].as_array().unwrap().iter().any(|f| f["severity"] == "bad");
         assert_eq!(code, if is_bad { 3 } else { 0 }, "{name}");
     }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
 #[test]

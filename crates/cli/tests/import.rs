@@ -11,14 +11,16 @@ use common::{code, tagalong, text};
 use image::{ImageBuffer, Luma, Rgb};
 use tagalong_log::{FrameSource, InputSettings, Limits, LogFrame, Needs};
 
-fn colour(path: &Path, level: u8) {
+const SMALL: (u32, u32) = (64, 48);
+
+fn colour(path: &Path, size: (u32, u32), level: u8) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    ImageBuffer::from_pixel(64, 48, Rgb([level, 90, 20])).save(path).unwrap();
+    ImageBuffer::from_pixel(size.0, size.1, Rgb([level, 90, 20])).save(path).unwrap();
 }
 
-fn depth(path: &Path, units: u16) {
+fn depth(path: &Path, size: (u32, u32), units: u16) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    ImageBuffer::from_pixel(64, 48, Luma([units])).save(path).unwrap();
+    ImageBuffer::from_pixel(size.0, size.1, Luma([units])).save(path).unwrap();
 }
 
 fn import(home: &Path, args: &[&str]) -> (i32, String) {
@@ -39,8 +41,8 @@ fn a_tum_folder_has_depth_and_a_camera_that_moves() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("rgbd_dataset_freiburg3_tiny");
     for i in 0..3u8 {
-        colour(&folder.join(format!("rgb/{i}.png")), 10 * i);
-        depth(&folder.join(format!("depth/{i}.png")), 10_000);
+        colour(&folder.join(format!("rgb/{i}.png")), (640, 480), 10 * i);
+        depth(&folder.join(format!("depth/{i}.png")), (640, 480), 10_000);
     }
     let list = |name: &str, offset: u32| {
         let line = |i: u32| format!("100.{:06} {name}/{i}.png\n", 100_000 * i + offset);
@@ -73,8 +75,8 @@ fn a_kitti_sequence_is_a_pair_with_boxes_and_a_drive() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("training");
     for i in 0..2u8 {
-        colour(&folder.join(format!("image_02/0007/{i:06}.png")), 50);
-        colour(&folder.join(format!("image_03/0007/{i:06}.png")), 60);
+        colour(&folder.join(format!("image_02/0007/{i:06}.png")), SMALL, 50);
+        colour(&folder.join(format!("image_03/0007/{i:06}.png")), SMALL, 60);
     }
     for sub in ["calib", "label_02", "oxts"] {
         fs::create_dir_all(folder.join(sub)).unwrap();
@@ -109,8 +111,8 @@ fn a_kitti_sequence_is_a_pair_with_boxes_and_a_drive() {
 fn a_folder_of_images_has_the_camera_of_the_options() {
     let home = tempfile::tempdir().unwrap();
     for i in 0..4u8 {
-        colour(&home.path().join(format!("photos/{i}.png")), i);
-        depth(&home.path().join(format!("z/{i}.png")), 250);
+        colour(&home.path().join(format!("photos/{i}.png")), SMALL, i);
+        depth(&home.path().join(format!("z/{i}.png")), SMALL, 250);
     }
     fs::write(home.path().join("photos/readme.txt"), "no image").unwrap();
     let args = "images photos -o p.mcap --fps 20 --view 90 --height 1.1 --tilt 5 --depth z --depth-unit 0.01";
@@ -134,8 +136,8 @@ fn a_folder_of_images_has_the_camera_of_the_options() {
 fn a_mot_sequence_brings_its_truth() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("MOT17-99");
-    colour(&folder.join("img1/000001.jpg"), 3);
-    colour(&folder.join("img1/000002.jpg"), 4);
+    colour(&folder.join("img1/000001.jpg"), SMALL, 3);
+    colour(&folder.join("img1/000002.jpg"), SMALL, 4);
     let ini = "[Sequence]\nname=MOT17-99\nimDir=img1\nframeRate=25\nseqLength=2\n";
     fs::write(folder.join("seqinfo.ini"), ini).unwrap();
     fs::create_dir_all(folder.join("gt")).unwrap();

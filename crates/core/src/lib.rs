@@ -36,6 +36,7 @@ mod funnel;
 mod image;
 mod motion;
 mod names;
+mod needs;
 mod panorama;
 mod recorded;
 mod rect;
@@ -58,12 +59,16 @@ pub use funnel::{Dropped, Funnel};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use motion::{Motion, Wheels, planar_pose};
 pub use names::nearest;
+pub use needs::Needs;
 pub use panorama::{ConicalMirror, Panorama};
 pub use recorded::Recorded;
 pub use rect::Rect;
 pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use sent::Sent;
-pub use settings::{ConfigError, Settings, Value, commented_defaults, parse_settings};
+pub use settings::{
+    ANY, ConfigError, NOT_NEGATIVE, POSITIVE, Settings, Value, check_ranges, commented_defaults,
+    parse_settings,
+};
 pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

@@ -8,6 +8,9 @@
 //! out one [`LogFrame`] after the other. Memory holds a few frames, however long
 //! the log is.
 //!
+//! Messages that arrive now, over a network, take the same way: [`Listening`] is
+//! the first pass, [`LiveSource`] the second.
+//!
 //! Nothing in a file is trusted: see [`mcap_walk`] for the container,
 //! [`msgs`] for messages, [`images`] for pictures and [`Limits`] for sizes. What
 //! is whole is used; what is lost is counted under a name.
@@ -31,9 +34,10 @@ mod truth;
 pub mod write;
 
 pub use error::LogError;
-pub use input::{InputSettings, MountSettings, Needs};
+pub use input::{InputSettings, MountSettings};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use limits::Limits;
-pub use source::{FrameSource, LogFacts, LogFrame};
+pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
+pub use tagalong_core::Needs;
 pub use timing::{Skew, Timing};
 pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth};

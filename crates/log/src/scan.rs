@@ -160,7 +160,7 @@ impl Scan {
         let mut walker = Walker::new(file, limits)
             .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?
             .knowing(known.iter().cloned());
-        let mut gathering = Gathering { depth_unit_m, ..Gathering::default() };
+        let mut gathering = Gathering::new(depth_unit_m);
         while let Some(message) = walker.next() {
             gathering.take(&message);
         }
@@ -202,8 +202,9 @@ impl Scan {
     }
 }
 
+/// What is learnt of messages one after the other.
 #[derive(Default)]
-struct Gathering {
+pub(crate) struct Gathering {
     topics: BTreeMap<String, Topic>,
     infos: BTreeMap<String, CameraInfo>,
     tf: TfBuffer,
@@ -212,7 +213,33 @@ struct Gathering {
 }
 
 impl Gathering {
-    fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
+    pub(crate) fn new(depth_unit_m: Option<f64>) -> Self {
+        Self { depth_unit_m, ..Self::default() }
+    }
+
+    /// What was gathered so far of a source that is no file.
+    pub(crate) fn scan(&self, name: &str) -> Scan {
+        Scan {
+            path: name.into(),
+            bytes: 0,
+            sha256: String::new(),
+            channels: Vec::new(),
+            topics: self.topics.clone(),
+            infos: self.infos.clone(),
+            tf: self.tf.clone(),
+            counters: Counters::new(),
+            notes: Vec::new(),
+            data_lost: false,
+        }
+    }
+
+    /// True once an image was seen.
+    pub(crate) fn has_image(&self) -> bool {
+        self.topics.values().any(|topic| topic.pixels.is_some())
+    }
+
+    /// A topic, entered if it is new.
+    pub(crate) fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
         self.topics.entry(name.to_owned()).or_insert_with(|| Topic {
             kind: if encoding == "cdr" { Type::of(schema) } else { Type::Other },
             schema: schema.to_owned(),
@@ -229,7 +256,7 @@ impl Gathering {
         })
     }
 
-    fn take(&mut self, message: &Message<'_>) {
+    pub(crate) fn take(&mut self, message: &Message<'_>) {
         let channel = message.channel;
         let unit = self.depth_unit_m;
         let topic = self.topic(&channel.topic, &channel.schema_name, &channel.encoding);

@@ -19,6 +19,17 @@ pub(crate) struct Chosen {
     pub(crate) detections: Option<String>,
 }
 
+impl Chosen {
+    /// True for a topic that is read.
+    pub(crate) fn has(&self, topic: &str) -> bool {
+        let Self { colour, depth, right, colour_info, depth_info, right_info, .. } = self;
+        [colour, depth, right, colour_info, depth_info, right_info]
+            .into_iter()
+            .chain([&self.odometry, &self.detections])
+            .any(|chosen| chosen.as_deref() == Some(topic))
+    }
+}
+
 /// Chooses topics as named in the settings, else by type, encoding and name.
 ///
 /// # Errors

@@ -3,11 +3,9 @@ use tagalong_core::{
 };
 
 use crate::boundary::{StepError, contain};
-use crate::governor::{Ahead, Aim, Governor, Wish, ahead};
+use crate::governor::{Aim, Governor, Surroundings, Wish};
 use crate::target::{Lock, Search};
-use crate::{
-    CorridorSettings, LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings,
-};
+use crate::{LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
@@ -19,6 +17,7 @@ pub(crate) struct Steering {
     lock: Lock,
     search: Search,
     search_settings: SearchSettings,
+    surroundings: Surroundings,
     governor: Governor,
     robot: RobotSettings,
     fresh: u32,
@@ -45,6 +44,7 @@ impl Steering {
             lock: Lock::new(target.clone()),
             search: Search::default(),
             search_settings: target.search.clone(),
+            surroundings: Surroundings::default(),
             governor: Governor::new(governor.clone(), robot.wheels(), robot.max_speed_mps),
             robot: robot.clone(),
             fresh: FRESH_FRAMES,
@@ -55,6 +55,7 @@ impl Steering {
     /// After a jump of the clock nobody is where they were: wait.
     pub(crate) fn reset(&mut self) {
         self.lock.reset();
+        self.surroundings.clear();
         self.fresh = 0;
     }
 
@@ -102,7 +103,13 @@ impl Steering {
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };
         self.last = Some(frame.stamp);
-        let look = |corridor: &_, curvature| look(corridor, frame, curvature, target);
+        let place = |track: &Track| track.estimate.person.position.xy();
+        let (corridor, people) = (self.governor.corridor(), tracks.iter().map(place));
+        let (camera, depth) = (&frame.camera, frame.depth().ok());
+        self.surroundings.look(corridor, camera, depth, motion, people);
+        let look = |corridor: &_, curvature| {
+            self.surroundings.ahead(corridor, curvature, target.map(place))
+        };
         let command = self.governor.govern(&wish, look);
         self.search.hear(command.reason == Reason::Blocked, motion.dt);
         Ok(Steered { command, target: target.map(|track| track.id), lock })
@@ -153,16 +160,4 @@ impl Steering {
         self.fresh = self.fresh.saturating_add(1);
         self.fresh > FRESH_FRAMES
     }
-}
-
-/// What the depth image shows ahead; nothing to say without one.
-fn look(
-    corridor: &CorridorSettings,
-    frame: &Frame,
-    curvature: f64,
-    target: Option<&Track>,
-) -> Option<Ahead> {
-    let depth = frame.depth().ok()?;
-    let target = target.map(|track| track.estimate.person.position.xy());
-    Some(ahead(corridor, &frame.camera, depth, curvature, target))
 }

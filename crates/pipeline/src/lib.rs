@@ -48,6 +48,7 @@ mod config;
 mod control;
 mod governor;
 mod lifecycle;
+mod needs;
 mod now;
 mod occlusion;
 mod pipeline;
@@ -62,7 +63,8 @@ mod weighing;
 pub use assignment::assign;
 pub use boundary::StepError;
 pub use config::{Options, RunSettings};
-pub use governor::{CorridorSettings, GovernorSettings};
+pub use governor::{CorridorSettings, GovernorSettings, Orders};
+pub use needs::needs;
 pub use pipeline::Pipeline;
 pub use report::{Candidate, Fate, FrameReport, Outcome};
 pub use settings::{

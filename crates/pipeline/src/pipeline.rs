@@ -15,7 +15,9 @@ use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
 use crate::sightings::{Rules, Sighting};
 use crate::weighing::Metered;
-use crate::{DetectorSettings, Fate, FrameReport, Outcome, PipelineSettings, Role, StepError};
+use crate::{
+    DetectorSettings, Fate, FrameReport, Orders, Outcome, PipelineSettings, Role, StepError,
+};
 
 /// Plugins and the rules by which they work together.
 pub struct Pipeline {
@@ -84,9 +86,7 @@ impl Pipeline {
         let report = self.process(frame);
         if report.is_err() {
             self.failed = Some(frame.index);
-            if let Some(steering) = &mut self.steering {
-                steering.governor_mut().latch("a plugin failed");
-            }
+            self.disarm("a plugin failed");
         }
         report
     }
@@ -96,7 +96,12 @@ impl Pipeline {
     /// the first frame. A control loop asks at its own rate. `None` without a
     /// controller.
     pub fn command_at(&self, now: Stamp) -> Option<Command> {
-        self.steering.as_ref().map(|steering| steering.governor().at(now))
+        Some(self.orders()?.at(now))
+    }
+
+    /// A copy of what [`Pipeline::command_at`] answers from, for a thread of its own.
+    pub fn orders(&self) -> Option<Orders> {
+        Some(self.steering.as_ref()?.governor().orders())
     }
 
     /// Follows the person of this track from the next frame on, and forgets whom
@@ -121,6 +126,14 @@ impl Pipeline {
     /// Why nothing moves until [`Pipeline::arm`], if so.
     pub fn fault(&self) -> Option<&'static str> {
         self.steering.as_ref()?.governor().fault()
+    }
+
+    /// Stops the robot until [`Pipeline::arm`]: somebody pressed a button, or
+    /// whoever makes the frames found a fault that no frame shows.
+    pub fn disarm(&mut self, why: &'static str) {
+        if let Some(steering) = &mut self.steering {
+            steering.governor_mut().latch(why);
+        }
     }
 
     /// Lets the robot move again after a fault, once a person has looked. A

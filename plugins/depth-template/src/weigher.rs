@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Rect, Result};
@@ -28,7 +28,7 @@ struct Tools {
     view: Option<Arc<View>>,
     scores: Scores,
     cast: Vec<Placed>,
-    alone: BTreeMap<Spot, Found>,
+    alone: HashMap<Spot, Found>,
     masks: Vec<Span>,
 }
 
@@ -59,6 +59,8 @@ struct Silhouette {
     half_width: i64,
     /// Distance of the rows that are looked at.
     step: i64,
+    /// Every `step`-th row, from each of the first ones on.
+    thinned: Vec<Vec<TemplateRow>>,
     /// Pixels of the person in the rows that are looked at.
     area: f64,
 }
@@ -85,7 +87,7 @@ impl Weigher {
             view: None,
             scores: Scores::new(config),
             cast: Vec::new(),
-            alone: BTreeMap::new(),
+            alone: HashMap::new(),
             masks: Vec::new(),
         };
         Self { nats: config.likelihood_nats, tools: Mutex::new(tools) }
@@ -213,8 +215,9 @@ impl Tools {
             let mut found = Found::default();
             for (line, row) in person.rows(scores.height()) {
                 let pixels = scores.row(line as usize, person.levels.behind(row.relief_m));
-                let [left, right] = person.beside(row).map(|side| pixels.of(side).beside);
-                found.add(pixels.of(person.inside(row)).covered, left, right);
+                let [left, right] = person.beside(row);
+                let covered = pixels.of(person.inside(row)).covered;
+                found.add(covered, pixels.of(left).beside, pixels.of(right).beside);
             }
             found
         })
@@ -259,12 +262,13 @@ impl Tools {
                 continue;
             }
             let pixels = self.scores.row(line as usize, person.levels.behind(row.relief_m));
-            let [left, right] = person.beside(row).map(|side| pixels.of(common(side, body)).beside);
+            let beside = |side| pixels.of(common(side, body)).beside;
+            let [left, right] = person.beside(row);
             let covered = match is_nearer {
                 true => pixels.of(common(person.inside(row), body)).covered,
                 false => 0,
             };
-            taken.add(covered, left, right);
+            taken.add(covered, beside(left), beside(right));
         }
         taken
     }
@@ -327,12 +331,13 @@ fn rivals(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
 impl Placed {
     /// The rows of the silhouette that are looked at, with their lines.
     fn rows(&self, height: i64) -> impl Iterator<Item = (i64, &TemplateRow)> {
-        let Silhouette { rows, step, .. } = &*self.silhouette;
+        let Silhouette { rows, thinned, step, .. } = &*self.silhouette;
         let first = self.y + rows.first().map_or(0, |row| row.dy);
-        let start = (first + (-first).rem_euclid(*step)).max(0);
-        let end = height.min(first + rows.len() as i64).max(start);
-        let rows = rows.get((start - first) as usize..(end - first) as usize).unwrap_or_default();
-        (start..).step_by(*step as usize).zip(rows.iter().step_by(*step as usize))
+        let phase = (-first).rem_euclid(*step);
+        let above = (-first - phase).max(0) / step;
+        let rows = thinned[phase as usize].get(above as usize..).unwrap_or_default();
+        let lines = (first + phase + above * step..height).step_by(*step as usize);
+        lines.zip(rows)
     }
 
     fn spot(&self) -> Spot {
@@ -379,7 +384,10 @@ impl Silhouette {
         let Template { rows, half_width } = template.clone();
         let pixels: i64 = rows.iter().map(|row| (row.to - row.from).max(0)).sum();
         let step = ROW_STEPS[usize::from(rows.len() >= MANY_ROWS)];
-        Self { number, half_width, step, area: (pixels as f64 / step as f64).max(1.0), rows }
+        let every = |from| rows.iter().skip(from).step_by(step as usize).copied().collect();
+        let thinned = (0..step as usize).map(every).collect();
+        let area = (pixels as f64 / step as f64).max(1.0);
+        Self { number, half_width, step, thinned, area, rows }
     }
 }
 

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_core::Registry;
 use tagalong_log::{FrameSource, Limits, LogError, Needs, read_truth};
+use tagalong_pipeline::needs;
 
 use super::args::PlanArgs;
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::needs::needs;
 use crate::outcome::{Failure, say};
 use crate::suggest::{self, check_log_path, toml_files};
 
@@ -207,7 +207,7 @@ fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
     let file = ConfigFile::read(path)?;
     let (_, settings) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let needs = needs(|| Ok(file.pipeline(registry, None)?.0))?;
+    let needs = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
     Ok(Candidate { file, path: path.to_owned(), first_seed: settings.seed, outer, needs })
 }
 

@@ -3,11 +3,10 @@ use std::path::Path;
 
 use tagalong_core::Registry;
 use tagalong_log::{FrameSource, Needs};
-use tagalong_pipeline::Pipeline;
+use tagalong_pipeline::{Pipeline, needs};
 
 use crate::args::Format;
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::needs::needs;
 use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::suggest::check_log_path;
 
@@ -22,7 +21,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let wanted = needs(|| Ok(file.pipeline(registry, None)?.0))?;
+    let wanted = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
     let notes = log.map(|log| fits(pipeline, &outer, log, wanted)).transpose()?;
     let config = config.display();
     print(&match format {

@@ -15,14 +15,13 @@ use serde::Serialize;
 use tagalong_core::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_log::{FrameSource, examine};
-use tagalong_pipeline::Pipeline;
+use tagalong_pipeline::{Pipeline, needs};
 
 use self::evidence::{Evidence, Samples};
 use self::finding::{Finding, Severity};
 use self::trial::Trial;
 use crate::args::Format;
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::needs::needs;
 use crate::outcome::{Ended, Failure, Outcome, make_folder, print};
 use crate::run::progress::Progress;
 use crate::suggest::check_log_path;
@@ -85,7 +84,7 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     if let Some(folder) = &args.output {
         RunDir::check(folder, args.overwrite, &args.log).map_err(Failure::usage)?;
     }
-    let wanted = needs(|| Ok(config.pipeline(registry, None)?.0))?;
+    let wanted = needs(|| config.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
     let found = examine(&args.log, &outer.input, &outer.limits, wanted)?;
     let mut evidence = Evidence {
         samples: Samples::of(expected_frames(&found.inspection).min(args.frames)),

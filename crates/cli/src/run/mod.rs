@@ -18,12 +18,11 @@ use report::{FileFacts, RunReport, Tally};
 use tagalong_core::Registry;
 use tagalong_log::FrameSource;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
-use tagalong_pipeline::{FrameReport, Pipeline, StepError};
+use tagalong_pipeline::{FrameReport, Pipeline, StepError, needs};
 use timings::Timings;
 
 use crate::args::{Format, RunArgs};
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::needs::needs;
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::overlay::{Overlay, Scene};
 use crate::sample;
@@ -79,7 +78,7 @@ impl Job {
         check_log_path(args.log())?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
-        let needs = needs(|| Ok(config.pipeline(registry, args.seed)?.0))?;
+        let needs = needs(|| config.pipeline(registry, args.seed).map(|(pipeline, _)| pipeline))?;
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, needs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };

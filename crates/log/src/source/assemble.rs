@@ -9,11 +9,12 @@ use tagalong_core::{
 };
 use tagalong_vision::Unwrapping;
 
+use super::LogFrame;
 use super::intake::Intake;
 use super::pairing::Payload;
+use super::plan::Plan;
 use super::recorded::recorded;
 use super::tally::Tally;
-use super::{LogFrame, Plan};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
 use crate::images::{ImageError, Pixels, decode_compressed, decode_raw};
 use crate::msgs::{CompressedImage, Image, decode};
@@ -231,13 +232,15 @@ impl Assembler {
         tally: &mut Tally,
     ) -> LogFrame {
         let here = self.pose_at(plan, stamp, intake);
-        let (motion, known) = self.motion(plan, stamp, here, intake, tally);
+        let odom_jumped = self.has_jumped(plan, stamp, intake, tally);
+        let (motion, known) = self.motion(plan, stamp, here, odom_jumped, tally);
         self.previous = Some((stamp, here));
         tally.count("frames");
         LogFrame {
             frame: Frame::new(self.index, stamp, camera, motion, images),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
+            odom_jumped,
         }
     }
 
@@ -254,13 +257,25 @@ impl Assembler {
         found.unwrap_or(PoseAt { pose: last, stale: true })
     }
 
+    /// True if odometry jumps between the previous frame and this one.
+    fn has_jumped(&self, plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) -> bool {
+        let from_topic = matches!(plan.odom_frames, Some(None));
+        let jumped = from_topic
+            && self.previous.is_some_and(|(then, _)| intake.poses.jumped_between(then, stamp));
+        if jumped {
+            tally.count("odometry_jump_frames");
+            tally.note("odometry jumps by more than a metre at some frames");
+        }
+        jumped
+    }
+
     /// The motion since the previous frame, and whether it is known.
     fn motion(
         &self,
         plan: &Plan,
         stamp: Stamp,
         here: PoseAt,
-        intake: &Intake,
+        jumped: bool,
         tally: &mut Tally,
     ) -> (Motion, bool) {
         if here.stale {
@@ -271,12 +286,6 @@ impl Assembler {
             return (Motion::at_rest(0.0), true);
         };
         let dt = stamp.seconds_since(then);
-        let from_topic = matches!(plan.odom_frames, Some(None));
-        let jumped = from_topic && intake.poses.jumped_between(then, stamp);
-        if jumped {
-            tally.count("odometry_jump_frames");
-            tally.note("odometry jumps by more than a metre at some frames");
-        }
         if here.stale || before.stale || jumped {
             return (unknown_motion(dt), false);
         }

@@ -2,7 +2,8 @@
 
 use tagalong_core::planar_pose;
 
-use super::pairing::{Arrival, Payload, Reorder, Waiting};
+use super::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
+use super::plan::Plan;
 use super::tally::Tally;
 use crate::InputSettings;
 use crate::mcap_walk::Message;
@@ -118,6 +119,18 @@ impl Intake {
             tally.count("camera_info_changes");
             tally.note("the calibration changes within the log; the first one is used throughout");
         }
+    }
+
+    /// The newest image that has all its partners, and how many older ones were
+    /// skipped for it.
+    pub(super) fn pop_newest(&mut self, plan: &Plan) -> (Option<Popped>, u64) {
+        let near = plan.input.pair_tolerance_s;
+        let Self { frames, depth, right, detections, chosen, .. } = self;
+        frames.pop_newest(|stamp| {
+            (!plan.has_second_depth() || depth.has(stamp, near))
+                && (!plan.needs.right || right.has(stamp, near))
+                && (chosen.detections.is_none() || detections.has(stamp, near))
+        })
     }
 
     /// At the end of the log and after a jump of the clock.

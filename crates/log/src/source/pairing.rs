@@ -65,6 +65,12 @@ impl Waiting {
         taken
     }
 
+    /// True if an image is there that [`Waiting::take`] would find for the newest
+    /// image of the other stream.
+    pub(super) fn has(&self, stamp: Stamp, tolerance_s: f64) -> bool {
+        self.images.iter().any(|image| image.stamp.seconds_since(stamp).abs() <= tolerance_s)
+    }
+
     fn drop_before(&mut self, stamp: Stamp) {
         while self.images.front().is_some_and(|image| image.stamp < stamp) {
             self.images.pop_front();
@@ -96,6 +102,9 @@ impl Waiting {
         std::mem::take(&mut self.unpaired) + left as u64
     }
 }
+
+/// An image, and the stamp of the one after it.
+pub(super) type Popped = (Payload, Option<Stamp>);
 
 /// What became of an image that arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,7 +178,7 @@ impl Reorder {
 
     /// The next image in order, if no earlier one can come any more (or the log
     /// has ended), with the stamp of the one after it.
-    pub(super) fn pop(&mut self, ended: bool) -> Option<(Payload, Option<Stamp>)> {
+    pub(super) fn pop(&mut self, ended: bool) -> Option<Popped> {
         if let Some(payload) = self.ready.pop_front() {
             return Some((payload, self.ready.front().map(|next| next.stamp)));
         }
@@ -179,6 +188,19 @@ impl Reorder {
         let payload = self.queue.pop_front()?;
         self.last = Some(payload.stamp);
         Some((payload, self.queue.front().map(|next| next.stamp)))
+    }
+
+    /// The newest image that is complete, without waiting for those it might have
+    /// overtaken; where none is, the one that has waited longest, once more than
+    /// the window wait. Also says how many older images were dropped.
+    pub(super) fn pop_newest(
+        &mut self,
+        is_complete: impl Fn(Stamp) -> bool,
+    ) -> (Option<Popped>, u64) {
+        let outdated = self.ready.drain(..).count();
+        let newest = self.queue.iter().rposition(|image| is_complete(image.stamp));
+        let older = self.queue.drain(..newest.unwrap_or(0)).count();
+        (self.pop(newest.is_some()), (outdated + older) as u64)
     }
 
     /// True if no images of the time before a jump are left.
@@ -269,6 +291,30 @@ mod tests {
         assert_eq!(waiting.unpaired, 36);
         assert_eq!(waiting.take(at(500).stamp, None, 0.03), None);
         assert_eq!(waiting.unpaired, 100);
+    }
+
+    #[test]
+    fn live_the_newest_complete_image_comes_at_once_and_older_ones_are_skipped() {
+        let mut reorder = Reorder::new(2);
+        let _ = [10, 20, 30].map(|t| reorder.push(at(t)));
+        let upto = |t| move |stamp: Stamp| millis(stamp) <= t;
+        let (popped, skipped) = reorder.pop_newest(upto(20));
+        assert_eq!((popped.map(|(image, _)| millis(image.stamp)), skipped), (Some(20), 1));
+        assert_eq!(reorder.pop_newest(upto(20)), (None, 0));
+        assert_eq!(reorder.push(at(15)), Arrival::Suspect);
+        let _ = [40, 50].map(|t| reorder.push(at(t)));
+        let (waited, skipped) = reorder.pop_newest(upto(20));
+        assert_eq!((waited, skipped), (Some((at(30), Some(at(40).stamp))), 0));
+    }
+
+    #[test]
+    fn live_images_of_the_time_before_a_jump_are_skipped() {
+        let mut reorder = Reorder::new(3);
+        let _ = [100, 110].map(|t| reorder.push(at(t)));
+        assert_eq!(reorder.pop_newest(|_| true).1, 1);
+        let _ = [120, 10, 20].map(|t| reorder.push(at(t)));
+        let (popped, skipped) = reorder.pop_newest(|_| true);
+        assert_eq!((popped.map(|(image, _)| millis(image.stamp)), skipped), (Some(20), 2));
     }
 
     proptest! {

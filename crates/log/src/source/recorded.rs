@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Point3};
 use tagalong_core::{Recorded, Rect};
 
-use super::Plan;
 use super::intake::Intake;
 use super::mount::robot_frame;
 use super::pairing::Payload;
+use super::plan::Plan;
 use super::tally::Tally;
 use crate::msgs::{Detection2DArray, Detection3DArray, ObjectHypothesisWithPose, decode};
 use crate::scan::Type;

@@ -27,7 +27,7 @@ const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
 /// Confirmed tracks in the robot frame, most certain first, as
 /// `vision_msgs/Detection3DArray` asks.
-pub(super) fn detections(record: &FrameRecord<'_>, base_frame: &str) -> Detection3DArray {
+pub fn detections(record: &FrameRecord<'_>, base_frame: &str) -> Detection3DArray {
     let header = Header::new(record.stamp, base_frame);
     let mut tracks: Vec<&Track> = record.confirmed().collect();
     tracks.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.id.cmp(&b.id)));
@@ -77,7 +77,7 @@ fn pose_covariance(state: &SMatrix<f64, 5, 5>) -> [[f64; 6]; 6] {
 }
 
 /// A person in the odometry frame, facing where they walk.
-pub(super) fn pose(record: &FrameRecord<'_>, track: &Track, odom_frame: &str) -> PoseStamped {
+pub fn pose(record: &FrameRecord<'_>, track: &Track, odom_frame: &str) -> PoseStamped {
     PoseStamped {
         header: Header::new(record.stamp, odom_frame),
         pose: Pose::from(&odom_from_person(record, track)),

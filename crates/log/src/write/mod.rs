@@ -29,6 +29,7 @@ pub use error::WriteError;
 pub use mcap_tracks::FrameNames;
 use mcap_tracks::McapTracks;
 pub use message_log::MessageLog;
+pub use messages::{detections, pose};
 pub use record::{FrameRecord, OutputSettings};
 pub use run_dir::RunDir;
 use tagalong_core::Stamp;

@@ -166,6 +166,7 @@ fn governor_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
         ("corridor.target_radius_m", corridor.target_radius_m, Must::NotNegative),
         ("corridor.min_points", f64::from(corridor.min_points), Must::Positive),
         ("corridor.min_seen", corridor.min_seen, Must::NotNegative),
+        ("corridor.memory_s", corridor.memory_s, Must::NotNegative),
     ]
     .into_iter()
     .map(|(key, value, must)| ("governor", key, value, must))

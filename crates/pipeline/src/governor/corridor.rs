@@ -1,10 +1,7 @@
 use nalgebra::{Point2, Point3};
-use tagalong_core::{Camera, DepthImage};
 
 use super::CorridorSettings;
 
-/// Columns of the image that are looked at.
-const COLUMNS: usize = 160;
 /// Obstacles are told apart to this, m.
 const BIN_M: f64 = 0.05;
 /// The floor's roughness grows by this, m for each metre.
@@ -23,38 +20,29 @@ pub(crate) enum Ahead {
     Something(f64),
 }
 
-/// Looks for the nearest thing in the corridor that the robot sweeps on an arc
-/// of this curvature, 1/m, to the left positive. Points around `target`, robot
-/// frame, m, are the person who is followed.
-pub(crate) fn ahead(
+/// The nearest thing in the corridor that the robot sweeps on an arc of this
+/// curvature, 1/m, to the left positive. Each of the points, robot frame, m, counts
+/// as many times as is said with it; those around `target` are the person who is
+/// followed.
+pub(super) fn ahead(
     settings: &CorridorSettings,
-    camera: &Camera,
-    depth: &DepthImage,
+    points: impl Iterator<Item = (Point3<f64>, u32)>,
     curvature: f64,
     target: Option<Point2<f64>>,
 ) -> Ahead {
-    let step = depth.width().div_ceil(COLUMNS).max(1);
     let mut bins = vec![0_u32; (settings.range_m / BIN_M).ceil() as usize + 1];
-    let (mut looked, mut seen) = (0_u32, 0_u32);
-    for y in (0..depth.height()).step_by(step) {
-        let row = depth.row(y);
-        for x in (0..depth.width()).step_by(step) {
-            looked += 1;
-            let z = f64::from(row[x]);
-            if !(z > 0.0 && z.is_finite()) {
-                continue;
-            }
-            seen += 1;
-            let point = camera.back_project(Point2::new(x as f64, y as f64), z);
-            if let Some(along_m) = in_the_way(settings, &point, curvature, target) {
-                bins[(along_m / BIN_M) as usize] += 1;
-            }
+    for (point, count) in points {
+        if let Some(along_m) = in_the_way(settings, &point, curvature, target) {
+            bins[(along_m / BIN_M) as usize] += count;
         }
     }
-    if f64::from(seen) < settings.min_seen * f64::from(looked) {
-        return Ahead::Blind;
-    }
     nearest(settings, &bins)
+}
+
+/// True for what stands on the floor, or hangs so low that the robot would hit it.
+pub(super) fn is_thing(settings: &CorridorSettings, point: &Point3<f64>) -> bool {
+    let floor = settings.floor_m + FLOOR_SLOPE * point.xy().coords.norm();
+    floor < point.z && point.z < settings.top_m
 }
 
 /// The first bin with which enough points are nearer.
@@ -76,10 +64,6 @@ fn in_the_way(
     target: Option<Point2<f64>>,
 ) -> Option<f64> {
     let flat = point.xy();
-    let floor = settings.floor_m + FLOOR_SLOPE * flat.coords.norm();
-    if !(floor < point.z && point.z < settings.top_m) {
-        return None;
-    }
     let of_target = |t| nalgebra::distance(&flat, &t) < settings.target_radius_m;
     if target.is_some_and(of_target) {
         return None;
@@ -129,7 +113,8 @@ mod tests {
     fn floor_target_and_what_is_aside_or_overhead_are_not_in_the_way() {
         let settings = CorridorSettings::default();
         let way = |x: f64, y: f64, z: f64, target: Option<Point2<f64>>| {
-            in_the_way(&settings, &Point3::new(x, y, z), 0.0, target)
+            let point = Point3::new(x, y, z);
+            is_thing(&settings, &point).then(|| in_the_way(&settings, &point, 0.0, target))?
         };
         assert_eq!(way(1.2, 0.0, 0.5, None), Some(1.0));
         assert_eq!(way(1.2, 0.0, 0.05, None), None);

@@ -7,9 +7,11 @@
 
 mod corridor;
 mod settings;
+mod surroundings;
 
-pub(crate) use corridor::{Ahead, ahead};
+pub(crate) use corridor::Ahead;
 pub use settings::{CorridorSettings, GovernorSettings};
+pub(crate) use surroundings::Surroundings;
 
 use tagalong_core::{Command, Motion, Reason, Stamp, WheelSpeeds, Wheels};
 
@@ -56,6 +58,42 @@ impl Aim {
             Self::Perhaps => Reason::Unsure,
             Self::Search => Reason::Search,
         }
+    }
+}
+
+/// What the wheels may do until the next frame: the last command until it expires,
+/// zero after that, after a fault and before the first frame.
+///
+/// A copy, so that a thread which drives the wheels need not wait for one that is
+/// still at work on a frame, and stops them if that one never ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orders {
+    last: Option<Command>,
+    fault: Option<&'static str>,
+    valid_s: f64,
+}
+
+impl Orders {
+    /// What the wheels may do at a time, by the clock of the frames' stamps. A command
+    /// from further ahead than commands last is none: clocks that disagree must not
+    /// make it last longer.
+    pub fn at(&self, now: Stamp) -> Command {
+        let stop = |reason| Command {
+            wheels: WheelSpeeds::STOP,
+            stamp: now,
+            valid_until: now.plus_seconds(self.valid_s),
+            reason,
+        };
+        match self.last {
+            _ if self.fault.is_some() => stop(Reason::Fault),
+            None => stop(Reason::Settling),
+            Some(last) if self.is_near(last.stamp, now) && now <= last.valid_until => last,
+            Some(_) => stop(Reason::Expired),
+        }
+    }
+
+    fn is_near(&self, stamp: Stamp, now: Stamp) -> bool {
+        stamp <= now.plus_seconds(self.valid_s)
     }
 }
 
@@ -120,20 +158,9 @@ impl Governor {
         command
     }
 
-    /// What the wheels may do at this time, whatever became of the frames.
-    pub(crate) fn at(&self, now: Stamp) -> Command {
-        let stop = |reason| Command {
-            wheels: WheelSpeeds::STOP,
-            stamp: now,
-            valid_until: now.plus_seconds(self.settings.valid_s),
-            reason,
-        };
-        match self.last {
-            _ if self.fault.is_some() => stop(Reason::Fault),
-            None => stop(Reason::Settling),
-            Some(last) if now <= last.valid_until => last,
-            Some(_) => stop(Reason::Expired),
-        }
+    /// What holds until the next frame.
+    pub(crate) fn orders(&self) -> Orders {
+        Orders { last: self.last, fault: self.fault, valid_s: self.settings.valid_s }
     }
 
     /// Odometry cannot have moved like this: nothing more until armed again.
@@ -142,6 +169,11 @@ impl Governor {
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
             self.latch("odometry jumped");
         }
+    }
+
+    /// What counts as something in the way.
+    pub(crate) fn corridor(&self) -> &CorridorSettings {
+        &self.settings.corridor
     }
 
     /// Stops until armed again.

@@ -83,6 +83,9 @@ pub struct CorridorSettings {
     pub min_points: u32,
     /// Less than this part of the image with depth is a blind camera.
     pub min_seen: f64,
+    /// What was seen and is out of view now, beside the robot or below the image,
+    /// is believed to be there for this long, s.
+    pub memory_s: f64,
 }
 
 impl Default for CorridorSettings {
@@ -97,6 +100,7 @@ impl Default for CorridorSettings {
             target_radius_m: 0.45,
             min_points: 6,
             min_seen: 0.02,
+            memory_s: 8.0,
         }
     }
 }

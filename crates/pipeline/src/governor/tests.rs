@@ -142,10 +142,11 @@ fn backwards_only_where_it_is_allowed() {
 #[test]
 fn commands_expire() {
     let (moving, command) = at_speed(0.5, 0.5);
-    let later = |seconds| moving.at(command.stamp.plus_seconds(seconds));
+    let later = |seconds| moving.orders().at(command.stamp.plus_seconds(seconds));
     assert_eq!(later(0.2), command);
     assert_eq!((later(0.3).wheels, later(0.3).reason), (WheelSpeeds::STOP, Reason::Expired));
-    let nothing_yet = governor().at(Stamp::from_nanos(5));
+    assert_eq!((later(-0.2), later(-0.3).reason), (command, Reason::Expired));
+    let nothing_yet = governor().orders().at(Stamp::from_nanos(5));
     assert_eq!(nothing_yet.wheels, WheelSpeeds::STOP);
 }
 
@@ -153,7 +154,7 @@ fn commands_expire() {
 fn a_jump_of_odometry_lasts_until_armed() {
     let (mut governor, command) = at_speed(0.5, 0.5);
     governor.check_odometry(&Motion { forward: 2.0, ..Motion::at_rest(0.1) });
-    assert_eq!(governor.at(command.stamp).reason, Reason::Fault);
+    assert_eq!(governor.orders().at(command.stamp).reason, Reason::Fault);
     for frame in 40..60 {
         let command = governor.govern(&wish(frame, 0.5, 0.5), free);
         assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));

@@ -105,6 +105,22 @@ fn s6_whoever_jumps_or_stands_anywhere_gets_commands_within_the_limits() {
 }
 
 #[test]
+fn a_robot_that_is_disarmed_stands_until_it_is_armed() {
+    let world = World::of((0..60).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
+    let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\n");
+    let mut pipeline = world.pipeline(&config);
+    let moves_at = |pipeline: &mut Pipeline, i: u64| {
+        is_moving(&pipeline.step(&frame(i, i as f64 * 0.1)).unwrap().command.unwrap())
+    };
+    assert!((1..=20).any(|i| moves_at(&mut pipeline, i)));
+    pipeline.disarm("a button");
+    assert_eq!(pipeline.fault(), Some("a button"));
+    assert!(!(21..=40).any(|i| moves_at(&mut pipeline, i)));
+    pipeline.arm();
+    assert!((41..=60).any(|i| moves_at(&mut pipeline, i)));
+}
+
+#[test]
 fn p1_a_plugin_that_panics_stops_the_robot_in_the_same_tick() {
     let world = World::of((0..30).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
     for (of, config) in [

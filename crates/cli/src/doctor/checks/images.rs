@@ -43,7 +43,7 @@ pub fn exposure(evidence: &Evidence) -> Option<Finding> {
 }
 
 /// Where the median of the depth readings of a robot's camera lies, m.
-const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.35..=15.0;
+const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.6..=15.0;
 
 /// Unit, scale, holes and steps of depth.
 pub fn depth(evidence: &Evidence) -> Option<Finding> {

@@ -1,20 +1,13 @@
-//! What a pipeline needs of a log.
-//!
-//! A plugin says what it cannot do without when it is given a frame that lacks
-//! it. So the pipeline is shown blank frames, with one more image each time it
-//! asks for one, before the log is opened: the reader can then say which topic
-//! is missing, and knows which frames are of no use.
+//! What a pipeline needs of whoever makes its frames.
 
 use std::sync::Arc;
 
 use tagalong_core::{
-    Camera, DepthImage, Distortion, Error, Frame, GreyImage, Images, Motion, Pinhole, RgbImage,
-    RightImage, Stamp,
+    Camera, DepthImage, Distortion, Error, Frame, GreyImage, Images, Motion, Needs, Pinhole,
+    RgbImage, RightImage, Stamp,
 };
-use tagalong_log::Needs;
-use tagalong_pipeline::{Pipeline, StepError};
 
-use crate::outcome::Failure;
+use crate::{Pipeline, StepError};
 
 /// Frames shown to a pipeline, so that detectors with `every` have their turn.
 const FRAMES: u64 = 8;
@@ -22,11 +15,16 @@ const FRAMES: u64 = 8;
 /// Size of the blank frames, pixels.
 const SIZE: (usize, usize) = (64, 48);
 
-/// Asks the pipelines that `build` makes what they need.
+/// Asks the pipelines that `build` makes which images they need.
+///
+/// A plugin says what it cannot do without when it is given a frame that lacks
+/// it. So pipelines are shown blank frames, with one more image each time one asks
+/// for it, before there is a real one: whoever makes frames can then say which
+/// images are missing, and knows which frames are of no use.
 ///
 /// # Errors
 /// What `build` returns.
-pub fn needs(mut build: impl FnMut() -> Result<Pipeline, Failure>) -> Result<Needs, Failure> {
+pub fn needs<E>(mut build: impl FnMut() -> Result<Pipeline, E>) -> Result<Needs, E> {
     let mut needs = Needs::default();
     while let Some(what) = lacking(&mut build()?, needs) {
         let before = needs;

@@ -1,0 +1,345 @@
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use ros2_client::Publisher;
+use tagalong_core::{Stamp, WheelSpeeds};
+use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped, decode};
+use tagalong_log::write::{self, FrameRecord};
+use tagalong_log::{Listening, LiveSource, LogFrame};
+use tagalong_pipeline::{FrameReport, Pipeline};
+
+use crate::inbox::{Inbox, Traffic};
+use crate::messages::Bool;
+use crate::network::{Ear, Network};
+use crate::options::Setup;
+use crate::stamps::StampClock;
+use crate::wheels::{Told, Wheels};
+use crate::{BridgeError, Options};
+
+/// How long to wait for messages before looking whether to stop.
+const TURN: Duration = Duration::from_millis(50);
+/// Between two attempts to start.
+const ATTEMPT: Duration = Duration::from_millis(500);
+/// After the first image, others are waited for this long: odometry and transforms
+/// are not asked for by every pipeline, and better than none.
+const GATHER: Duration = Duration::from_secs(2);
+/// Without a frame for so long, that is told.
+const SILENCE: Duration = Duration::from_secs(2);
+/// Frames that are older than this on arrival speak for clocks that disagree, s.
+const OLD_S: f64 = 0.5;
+
+/// What came of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Frames that went through the pipeline.
+    pub frames: u64,
+    /// Messages, by topic.
+    pub traffic: BTreeMap<String, Traffic>,
+    /// What was skipped and lost where frames are made, by name.
+    pub counters: BTreeMap<&'static str, u64>,
+    /// What the wheels were told.
+    pub told: Told,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{} frames, {} commands", self.frames, self.told.commands)?;
+        for (topic, Traffic { received, dropped }) in &self.traffic {
+            writeln!(f, "  {topic}: {received} received, {dropped} dropped unread")?;
+        }
+        self.counters.iter().try_for_each(|(name, count)| writeln!(f, "  {name}: {count}"))
+    }
+}
+
+/// Bridges until `stop` is set. `tell` is given sentences for whoever started it.
+///
+/// # Errors
+/// [`BridgeError`]. The robot was told to stop in any case.
+pub fn run(
+    options: &Options,
+    stop: &AtomicBool,
+    tell: &dyn Fn(&str),
+) -> Result<Summary, BridgeError> {
+    let setup = options.setup()?;
+    let mut network = Network::join(options.domain, &options.namespace)?;
+    let inbox = Arc::new(Inbox::default());
+    let clock = Arc::new(StampClock::new(options.clock));
+    let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
+    let Some((source, ears)) = started else { return Ok(Summary::default()) };
+    source.notes().iter().for_each(|note| tell(note));
+    let switch = network.listen_to_switch(&options.enable, &inbox)?;
+    let mut bridge = Bridge::new(options, setup, source, &mut network, inbox, clock)?;
+    bridge.tell_topics(tell);
+    let ended = bridge.work(stop, tell);
+    // The robot stands before the network is left.
+    let summary = bridge.finish();
+    drop((ears, switch));
+    ended.map(|()| summary)
+}
+
+/// Listens until everything is there that the pipeline needs; `None` if told to
+/// stop before.
+fn start(
+    options: &Options,
+    setup: &Setup,
+    network: &mut Network,
+    inbox: &Arc<Inbox>,
+    clock: &Arc<StampClock>,
+    stop: &AtomicBool,
+    tell: &dyn Fn(&str),
+) -> Result<Option<(LiveSource, Vec<Ear>)>, BridgeError> {
+    let name = format!("ROS domain {}", options.domain);
+    let mut listening = Listening::new(&name, &setup.input, &setup.limits, setup.needs)?;
+    let mut ears: Vec<Ear> = Vec::new();
+    let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
+    let mut attempt = Instant::now() + ATTEMPT;
+    let mut first: Option<Instant> = None;
+    tell(&format!("listening to {name}"));
+    while !stop.load(Ordering::Relaxed) {
+        for (topic, kind) in network.topics() {
+            if listening.announce(&topic, &kind) && listening.wants(&topic) {
+                ears.extend(network.listen(&topic, &kind, inbox, clock)?);
+            }
+        }
+        let messages = inbox.take(TURN);
+        messages.iter().for_each(|(topic, data)| listening.take(topic, data));
+        if first.is_none() && listening.has_image() {
+            first = Some(Instant::now());
+        }
+        if Instant::now() < attempt {
+            continue;
+        }
+        attempt = Instant::now() + ATTEMPT;
+        let is_late = Instant::now() > deadline;
+        let gathered = first.is_some_and(|first| first.elapsed() > GATHER);
+        match listening.start() {
+            Ok(source) if gathered || is_late => {
+                ears.retain(|ear| source.topics().any(|topic| topic == ear.topic()));
+                return Ok(Some((source, ears)));
+            }
+            Err(missing) if is_late => return Err(missing.into()),
+            _ => {}
+        }
+    }
+    Ok(None)
+}
+
+/// A pipeline between topics.
+struct Bridge {
+    pipeline: Pipeline,
+    source: LiveSource,
+    inbox: Arc<Inbox>,
+    clock: Arc<StampClock>,
+    wheels: Option<Wheels>,
+    out: Out,
+    switch: String,
+    base_frame: String,
+    odom_frame: String,
+    frames: u64,
+    heard: Instant,
+    quiet: bool,
+}
+
+/// Where results go.
+struct Out {
+    tracks: Publisher<Detection3DArray>,
+    target: Publisher<PoseStamped>,
+    state: Publisher<StringMsg>,
+}
+
+impl Bridge {
+    fn new(
+        options: &Options,
+        setup: Setup,
+        source: LiveSource,
+        network: &mut Network,
+        inbox: Arc<Inbox>,
+        clock: Arc<StampClock>,
+    ) -> Result<Self, BridgeError> {
+        let base_frame = source.facts().robot_frame;
+        let out = Out {
+            tracks: network.publisher(&options.tracks)?,
+            target: network.publisher(&options.target)?,
+            state: network.publisher(&options.state)?,
+        };
+        let wheels = match setup.pipeline.has_controller() {
+            true => Some(drive(options, &setup, &base_frame, network, &clock)?),
+            false => None,
+        };
+        Ok(Self {
+            pipeline: setup.pipeline,
+            source,
+            inbox,
+            clock,
+            wheels,
+            out,
+            switch: options.enable.clone(),
+            base_frame,
+            odom_frame: setup.input.odom_frame,
+            frames: 0,
+            heard: Instant::now(),
+            quiet: false,
+        })
+    }
+
+    fn tell_topics(&self, tell: &dyn Fn(&str)) {
+        let topics: Vec<_> = self.source.topics().collect();
+        tell(&format!("reads {}", topics.join(", ")));
+        if self.wheels.is_none() {
+            tell("the config has no controller: no commands");
+        }
+    }
+
+    fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+        while !stop.load(Ordering::Relaxed) {
+            for (topic, data) in self.inbox.take(TURN) {
+                match topic == self.switch {
+                    true => self.switch(&data, tell),
+                    false => self.source.take(&topic, &data),
+                }
+            }
+            match self.source.newest_frame() {
+                Some(found) => self.step(&found, tell)?,
+                None => self.look_for_silence(tell)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a frame through the pipeline and tells everybody.
+    fn step(&mut self, found: &LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+        (self.heard, self.quiet) = (Instant::now(), false);
+        if self.frames == 0 {
+            self.compare_clocks(found.frame.stamp, tell);
+        }
+        if found.odom_jumped {
+            self.disarm("odometry jumped", tell);
+        }
+        let report = self.pipeline.step(&found.frame);
+        // Where the robot is a guess it must not move, but may again afterwards.
+        self.obey(!found.odom_stale);
+        let report = report?;
+        self.frames += 1;
+        self.publish(found, &report);
+        Ok(())
+    }
+
+    fn obey(&self, may_move: bool) {
+        if let Some(wheels) = &self.wheels {
+            wheels.obey(self.pipeline.orders().filter(|_| may_move));
+        }
+    }
+
+    /// Who listens is not waited for, so that what is not sent is lost.
+    fn publish(&self, found: &LogFrame, report: &FrameReport) {
+        let record = FrameRecord {
+            index: report.index,
+            stamp: report.stamp,
+            camera: &found.frame.camera,
+            odom_from_robot: &found.odom_from_robot,
+            tracks: &report.tracks,
+            target: report.target,
+            command: report.command.map(|command| command.wheels),
+        };
+        let _lost = self.out.tracks.publish(write::detections(&record, &self.base_frame));
+        let target = report.tracks.iter().find(|track| Some(track.id) == report.target);
+        if let Some(track) = target {
+            let _lost = self.out.target.publish(write::pose(&record, track, &self.odom_frame));
+        }
+        if let (Some(command), Some(lock)) = (&report.command, &report.lock) {
+            let (reason, state, why) = (command.reason.name(), lock.state.name(), lock.why);
+            let data = format!("{reason}; {state}: {why}");
+            let _lost = self.out.state.publish(StringMsg { data });
+        }
+    }
+
+    fn switch(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
+        match decode::<Bool>(data) {
+            Ok(Bool { data: true }) => {
+                self.pipeline.arm();
+                self.obey(true);
+                tell("armed");
+            }
+            _ => self.disarm("somebody said stop", tell),
+        }
+    }
+
+    fn disarm(&mut self, why: &'static str, tell: &dyn Fn(&str)) {
+        self.pipeline.disarm(why);
+        self.obey(false);
+        tell(&format!("{why}: the robot stands until `true` comes on {}", self.switch));
+    }
+
+    fn compare_clocks(&self, stamp: Stamp, tell: &dyn Fn(&str)) {
+        let old_s = self.clock.now().seconds_since(stamp);
+        if !(-OLD_S..=OLD_S).contains(&old_s) {
+            tell(&format!(
+                "the first frame is {old_s:.1} s old by this machine's clock: commands will \
+                 have expired before they are given; synchronise the clocks, or use \
+                 `--clock arrival` for simulated time and replayed logs"
+            ));
+        }
+    }
+
+    /// Says once why there are no frames.
+    fn look_for_silence(&mut self, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+        if let Some(misfit) = self.source.misfit().filter(|_| self.frames == 0) {
+            return Err(misfit.into());
+        }
+        if self.heard.elapsed() > SILENCE && !self.quiet {
+            self.quiet = true;
+            let so_far = self.summary();
+            tell(&format!("no frame for {} s; until now: {so_far}", SILENCE.as_secs()));
+            self.source.notes().iter().for_each(|note| tell(note));
+        }
+        Ok(())
+    }
+
+    fn summary(&self) -> Summary {
+        Summary {
+            frames: self.frames,
+            traffic: self.inbox.traffic(),
+            counters: self.source.counters().clone(),
+            told: Told::default(),
+        }
+    }
+
+    fn finish(self) -> Summary {
+        let summary = self.summary();
+        Summary { told: self.wheels.map(Wheels::finish).unwrap_or_default(), ..summary }
+    }
+}
+
+/// Starts the thread of the wheels, which turns their speeds into messages.
+fn drive(
+    options: &Options,
+    setup: &Setup,
+    base_frame: &str,
+    network: &mut Network,
+    clock: &Arc<StampClock>,
+) -> Result<Wheels, BridgeError> {
+    let publisher: Publisher<TwistStamped> = network.publisher(&options.command)?;
+    let half_m = setup.robot.wheels().half_separation_m;
+    let (base_frame, clock) = (base_frame.to_owned(), Arc::clone(clock));
+    let now = {
+        let clock = Arc::clone(&clock);
+        move || clock.now()
+    };
+    let tell = move |wheels| {
+        let header = Header::new(clock.now(), base_frame.as_str());
+        // A full queue means that nobody has read the command before this one.
+        let _lost = publisher.publish(twist(header, wheels, half_m));
+    };
+    Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), now, tell))
+}
+
+/// Wheel speeds as the motion of the robot's middle.
+fn twist(header: Header, WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistStamped {
+    let mut twist = TwistStamped { header, ..TwistStamped::default() };
+    twist.twist.linear.x = 0.5 * (left + right);
+    twist.twist.angular.z = 0.5 * (right - left) / half_m;
+    twist
+}

@@ -1,0 +1,105 @@
+//! Messages on their way from DDS to where frames are made.
+//!
+//! DDS hands out messages that own their bytes; the reader of logs takes them as
+//! they lie on the wire. So images, which it borrows, have a twin here that owns
+//! its pixels, and what was received is written down once more: a copy of an
+//! image, a tenth of a millisecond.
+
+use serde::{Deserialize, Serialize};
+use serde_bytes::ByteBuf;
+use tagalong_log::msgs::{CompressedImage, Header, Image, encode};
+
+/// `sensor_msgs/Image` that owns its pixels; field by field as [`Image`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OwnedImage {
+    pub(crate) header: Header,
+    height: u32,
+    width: u32,
+    encoding: String,
+    is_bigendian: u8,
+    step: u32,
+    data: ByteBuf,
+}
+
+/// `sensor_msgs/CompressedImage` that owns its bytes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OwnedCompressedImage {
+    pub(crate) header: Header,
+    format: String,
+    data: ByteBuf,
+}
+
+/// `std_msgs/Bool`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Bool {
+    pub(crate) data: bool,
+}
+
+impl OwnedImage {
+    pub(crate) fn encode(&self) -> Vec<u8> {
+        encode(&Image {
+            header: self.header.clone(),
+            height: self.height,
+            width: self.width,
+            encoding: self.encoding.clone(),
+            is_bigendian: self.is_bigendian,
+            step: self.step,
+            data: &self.data,
+        })
+    }
+}
+
+impl OwnedCompressedImage {
+    pub(crate) fn encode(&self) -> Vec<u8> {
+        let (header, format) = (self.header.clone(), self.format.clone());
+        encode(&CompressedImage { header, format, data: &self.data })
+    }
+}
+
+/// `sensor_msgs::msg::dds_::Image_`, as DDS names types, to `sensor_msgs/msg/Image`.
+pub(crate) fn ros_type(dds: &str) -> Option<String> {
+    let (package, name) = dds.split_once("::msg::dds_::")?;
+    Some(format!("{package}/msg/{}", name.strip_suffix('_')?))
+}
+
+/// `rt/odom`, as DDS names topics, to `/odom`.
+pub(crate) fn ros_topic(dds: &str) -> Option<&str> {
+    dds.strip_prefix("rt").filter(|name| name.starts_with('/'))
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::Stamp;
+    use tagalong_log::msgs::decode;
+
+    use super::*;
+
+    #[test]
+    fn what_owns_its_pixels_lies_on_the_wire_as_what_borrows_them() {
+        let header = Header::new(Stamp::from_nanos(7), "camera");
+        let image = OwnedImage {
+            header: header.clone(),
+            height: 1,
+            width: 3,
+            encoding: "mono8".into(),
+            is_bigendian: 0,
+            step: 3,
+            data: ByteBuf::from([1, 2, 3]),
+        };
+        let bytes = image.encode();
+        assert_eq!(bytes, encode(&image));
+        assert_eq!(decode::<Image<'_>>(&bytes).unwrap().data, [1, 2, 3]);
+        let data = ByteBuf::from([9; 5]);
+        let compressed = OwnedCompressedImage { header, format: "jpeg".into(), data };
+        assert_eq!(compressed.encode(), encode(&compressed));
+    }
+
+    #[test]
+    fn names_of_dds_are_those_of_ros_in_disguise() {
+        let image = "sensor_msgs::msg::dds_::Image_";
+        assert_eq!(ros_type(image).as_deref(), Some("sensor_msgs/msg/Image"));
+        assert_eq!(ros_type("rcl_interfaces::srv::dds_::GetParameters_Request_"), None);
+        assert_eq!((ros_topic("rt/odom"), ros_topic("rq/odom")), (Some("/odom"), None));
+        assert_eq!(ros_topic("ros_discovery_info"), None);
+    }
+}

@@ -1,0 +1,215 @@
+//! DDS: who is there, what they say, and what is said to them.
+
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+use futures::StreamExt;
+use futures::executor::block_on;
+use futures::future::{AbortHandle, abortable};
+use ros2_client::qos::{History, WhenFull};
+use ros2_client::{
+    Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
+    QosProfile, Subscription,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use tagalong_core::Stamp;
+use tagalong_log::msgs::{
+    CameraInfo, Detection2DArray, Detection3DArray, Message, Odometry, TFMessage, encode,
+};
+
+use crate::BridgeError;
+use crate::inbox::Inbox;
+use crate::messages::{Bool, OwnedCompressedImage, OwnedImage, ros_topic, ros_type};
+use crate::stamps::StampClock;
+
+/// Images that wait for the thread that makes frames.
+const IMAGES: usize = 2;
+/// Other messages that wait.
+const OTHERS: usize = 64;
+
+/// Our node.
+pub(crate) struct Network {
+    node: Node,
+    context: Context,
+    spinner: Option<JoinHandle<()>>,
+}
+
+/// A topic that is listened to until this is dropped.
+pub(crate) struct Ear {
+    topic: String,
+    abort: AbortHandle,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Ear {
+    pub(crate) fn topic(&self) -> &str {
+        &self.topic
+    }
+}
+
+impl Drop for Ear {
+    fn drop(&mut self) {
+        self.abort.abort();
+        self.thread.take().map(JoinHandle::join);
+    }
+}
+
+fn failed(error: impl std::fmt::Debug) -> BridgeError {
+    BridgeError::Network(format!("{error:?}"))
+}
+
+/// The newest only, lost is lost: what sensors send, and what fits all who send.
+fn sensor(depth: usize) -> QosProfile {
+    QosProfile::subscription_default()
+        .reliability_best_effort()
+        .history(History::KeepLast { depth })
+}
+
+/// What was said before we came is told, too.
+fn latched() -> QosProfile {
+    sensor(OTHERS)
+        .reliability_reliable(WhenFull::DEFAULT)
+        .durability(ros2_client::qos::Durability::TransientLocal)
+}
+
+/// Everything arrives; nobody is waited for.
+fn reliable() -> QosProfile {
+    QosProfile::publisher_default()
+        .reliability_reliable(WhenFull::Fail)
+        .history(History::KeepLast { depth: 1 })
+}
+
+impl Network {
+    pub(crate) fn join(domain: u16, namespace: &str) -> Result<Self, BridgeError> {
+        let context = Context::with_options(ContextOptions::new().domain_id(domain));
+        let context = context.map_err(failed)?;
+        let name = NodeName::new(namespace, "tagalong")
+            .map_err(|error| BridgeError::Config(format!("namespace `{namespace}`: {error:?}")))?;
+        let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
+        let mut node = context.new_node(name, options).map_err(failed)?;
+        let spinner = node.spinner().map_err(failed)?;
+        // It ends when the node is dropped.
+        let spinner = thread::spawn(move || drop(block_on(spinner.spin())));
+        Ok(Self { node, context, spinner: Some(spinner) })
+    }
+
+    /// All topics that somebody has, and their message types.
+    pub(crate) fn topics(&self) -> Vec<(String, String)> {
+        let found = self.context.discovered_topics();
+        let named = found.iter().filter_map(|topic| {
+            Some((ros_topic(&topic.name)?.to_owned(), ros_type(&topic.type_name)?))
+        });
+        named.collect()
+    }
+
+    /// Puts the messages of a topic into the inbox; `None` for a type of no use.
+    pub(crate) fn listen(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        inbox: &Arc<Inbox>,
+        clock: &Arc<StampClock>,
+    ) -> Result<Option<Ear>, BridgeError> {
+        let clock = Arc::clone(clock);
+        let hear = move |stamp: Stamp| clock.hear(stamp);
+        let ear = match message_type {
+            "sensor_msgs/msg/Image" => {
+                let encode = move |image: OwnedImage| {
+                    hear(image.header.stamp());
+                    image.encode()
+                };
+                self.ear(topic, message_type, sensor(IMAGES), IMAGES, inbox, encode)
+            }
+            "sensor_msgs/msg/CompressedImage" => {
+                let encode = move |image: OwnedCompressedImage| {
+                    hear(image.header.stamp());
+                    image.encode()
+                };
+                self.ear(topic, message_type, sensor(IMAGES), IMAGES, inbox, encode)
+            }
+            CameraInfo::TYPE => self.plain::<CameraInfo>(topic, sensor(OTHERS), inbox),
+            Odometry::TYPE => self.plain::<Odometry>(topic, sensor(OTHERS), inbox),
+            TFMessage::TYPE if topic.ends_with("tf_static") => {
+                self.plain::<TFMessage>(topic, latched(), inbox)
+            }
+            TFMessage::TYPE => self.plain::<TFMessage>(topic, sensor(OTHERS), inbox),
+            Detection2DArray::TYPE => self.plain::<Detection2DArray>(topic, sensor(OTHERS), inbox),
+            Detection3DArray::TYPE => self.plain::<Detection3DArray>(topic, sensor(OTHERS), inbox),
+            _ => return Ok(None),
+        };
+        ear.map(Some)
+    }
+
+    /// Puts messages of the topic that stops and arms into the inbox.
+    pub(crate) fn listen_to_switch(
+        &mut self,
+        topic: &str,
+        inbox: &Arc<Inbox>,
+    ) -> Result<Ear, BridgeError> {
+        let encode = |switch: Bool| encode(&switch);
+        self.ear(topic, "std_msgs/msg/Bool", sensor(OTHERS), OTHERS, inbox, encode)
+    }
+
+    fn plain<M: Message + Serialize + DeserializeOwned + 'static>(
+        &mut self,
+        topic: &str,
+        qos: QosProfile,
+        inbox: &Arc<Inbox>,
+    ) -> Result<Ear, BridgeError> {
+        self.ear(topic, M::TYPE, qos, OTHERS, inbox, |message: M| encode(&message))
+    }
+
+    fn ear<M: DeserializeOwned + 'static>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        qos: QosProfile,
+        room: usize,
+        inbox: &Arc<Inbox>,
+        encode: impl Fn(M) -> Vec<u8> + Send + 'static,
+    ) -> Result<Ear, BridgeError> {
+        let handle = self.topic(topic, message_type, &qos)?;
+        let subscription: Subscription<M> =
+            self.node.create_subscription(&handle, Some(qos)).map_err(failed)?;
+        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        // What does not decode is of another type than its topic says.
+        let put = async move {
+            let stream = subscription.async_stream();
+            let whole = stream.filter_map(|message| async { message.ok() });
+            whole.for_each(|(message, _)| async { inbox.push(&name, encode(message), room) }).await;
+        };
+        let (put, abort) = abortable(put);
+        let thread = Some(thread::spawn(move || drop(block_on(put))));
+        Ok(Ear { topic: topic.to_owned(), abort, thread })
+    }
+
+    /// A publisher of this type.
+    pub(crate) fn publisher<M: Message + Serialize>(
+        &mut self,
+        topic: &str,
+    ) -> Result<Publisher<M>, BridgeError> {
+        let handle = self.topic(topic, M::TYPE, &reliable())?;
+        self.node.create_publisher(&handle, Some(reliable())).map_err(failed)
+    }
+
+    fn topic(
+        &self,
+        topic: &str,
+        message_type: &str,
+        qos: &QosProfile,
+    ) -> Result<ros2_client::Topic, BridgeError> {
+        let name = Name::parse(topic)
+            .map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))?;
+        let (package, kind) = message_type.split_once("/msg/").unwrap_or(("", message_type));
+        let kind = MessageTypeName::new(package, kind);
+        self.node.create_topic(&name, kind, qos).map_err(failed)
+    }
+}
+
+impl Drop for Network {
+    fn drop(&mut self) {
+        self.node.stop_spinner();
+        self.spinner.take().map(JoinHandle::join);
+    }
+}

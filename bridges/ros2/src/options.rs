@@ -1,0 +1,134 @@
+use std::path::PathBuf;
+
+use tagalong_core::Registry;
+use tagalong_log::{InputSettings, Limits, Needs};
+use tagalong_pipeline::{Pipeline, RobotSettings, needs};
+
+use crate::{BridgeError, ClockSource};
+
+/// Follows people live: ROS 2 images and odometry in, tracks and commands out.
+///
+/// Needs no ROS on this machine. The config is one that `tagalong run` takes;
+/// topics that neither it nor the command line names are found by their types.
+/// Ends with Ctrl-C; the last command is zero. This is no safety function: the
+/// robot needs its own bumper, scanner or emergency stop.
+#[derive(Clone, Debug, clap::Parser)]
+#[command(
+    name = "tagalong-ros2",
+    version,
+    after_help = "Examples:
+  tagalong-ros2 configs/depth-ekf.toml
+        tracks people, moves nothing (the config has no controller)
+  tagalong-ros2 configs/follow-best.toml --namespace /robot1 --domain 7
+        follows somebody; commands go to /robot1/cmd_vel
+  tagalong-ros2 configs/follow-best.toml --command cmd_vel_nav
+        lets another node (a collision monitor, say) pass commands on
+
+Exit codes: 0 ok, 1 failed or a topic is missing, 2 wrong usage or config,
+130 and 143 after SIGINT and SIGTERM."
+)]
+pub struct Options {
+    /// The config of the pipeline.
+    pub config: PathBuf,
+    /// ROS domain.
+    #[arg(long, env = "ROS_DOMAIN_ID", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=232))]
+    pub domain: u16,
+    /// Namespace of the node; relative topic names are inside it.
+    #[arg(long, default_value = "/")]
+    pub namespace: String,
+    /// Topic of the colour images; over `[input] colour_topic`.
+    #[arg(long, value_name = "TOPIC")]
+    pub colour: Option<String>,
+    /// Topic of the depth images; over `[input] depth_topic`.
+    #[arg(long, value_name = "TOPIC")]
+    pub depth: Option<String>,
+    /// Topic of the odometry; over `[input] odometry_topic`.
+    #[arg(long, value_name = "TOPIC")]
+    pub odometry: Option<String>,
+    /// Where confirmed tracks go (vision_msgs/Detection3DArray).
+    #[arg(long, value_name = "TOPIC", default_value = "people/tracks")]
+    pub tracks: String,
+    /// Where the pose of the person to follow goes (geometry_msgs/PoseStamped).
+    #[arg(long, value_name = "TOPIC", default_value = "people/target_pose")]
+    pub target: String,
+    /// Where states and reasons go, in words (std_msgs/String).
+    #[arg(long, value_name = "TOPIC", default_value = "people/state")]
+    pub state: String,
+    /// What stops the robot (false) and lets it move again after a fault (true)
+    /// (std_msgs/Bool).
+    #[arg(long, value_name = "TOPIC", default_value = "people/enable")]
+    pub enable: String,
+    /// Where commands go (geometry_msgs/TwistStamped).
+    #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
+    pub command: String,
+    /// Commands a second.
+    #[arg(long, value_name = "HZ", default_value_t = 25.0, value_parser = rate)]
+    pub rate: f64,
+    /// How long to wait for topics and their first messages, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 15.0, value_parser = seconds)]
+    pub wait: f64,
+    /// What tells the age of a frame.
+    #[arg(long, value_enum, default_value_t)]
+    pub clock: ClockSource,
+}
+
+/// Commands must come at 20 Hz or more.
+fn rate(text: &str) -> Result<f64, String> {
+    within(text, 20.0, 200.0)
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    within(text, 1.0, 3600.0)
+}
+
+fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match (least..=most).contains(&value) {
+        true => Ok(value),
+        false => Err(format!("must lie between {least} and {most}")),
+    }
+}
+
+/// What the config says.
+pub(crate) struct Setup {
+    pub(crate) pipeline: Pipeline,
+    pub(crate) robot: RobotSettings,
+    pub(crate) needs: Needs,
+    pub(crate) input: InputSettings,
+    pub(crate) limits: Limits,
+}
+
+impl Options {
+    /// Reads the config and builds the pipeline.
+    ///
+    /// # Errors
+    /// [`BridgeError::Config`], with file, line and remedy.
+    pub(crate) fn setup(&self) -> Result<Setup, BridgeError> {
+        let shown = self.config.display().to_string();
+        let text = std::fs::read_to_string(&self.config)
+            .map_err(|error| BridgeError::Config(format!("cannot read config {shown}: {error}")))?;
+        let mut registry = Registry::default();
+        tagalong_catalog::register(&mut registry);
+        let folder = self.config.parent().unwrap_or("".as_ref());
+        let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
+        let pipelines = tagalong_pipeline::Options { foreign, seed: None };
+        let build = || Pipeline::from_toml_with(&text, folder, &registry, &pipelines);
+        let mistake =
+            |error: tagalong_core::ConfigError| BridgeError::Config(error.render(&shown, &text));
+        let needs = needs(|| build().map(|(pipeline, _)| pipeline)).map_err(mistake)?;
+        let (pipeline, run) = build().map_err(mistake)?;
+        let input = run.table("input").map_err(mistake)?;
+        let limits = run.table("limits").map_err(mistake)?;
+        Ok(Setup { pipeline, robot: run.robot, needs, input: self.named(input), limits })
+    }
+
+    /// The settings with the topics of the command line.
+    fn named(&self, input: InputSettings) -> InputSettings {
+        InputSettings {
+            colour_topic: self.colour.clone().or(input.colour_topic),
+            depth_topic: self.depth.clone().or(input.depth_topic),
+            odometry_topic: self.odometry.clone().or(input.odometry_topic),
+            ..input
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Frames from messages, wherever these come from.
+
+use tagalong_core::Camera;
+
+use super::assemble::Assembler;
+use super::intake::Intake;
+use super::mount::robot_frame;
+use super::plan::Plan;
+use super::tally::Tally;
+use super::{LogFacts, LogFrame};
+use crate::camera_info::CalibrationError;
+use crate::mcap_walk::{Channel, Message};
+use crate::scan::Type;
+
+/// Messages one after the other.
+pub(super) trait Messages {
+    /// The next one; `None` at the end.
+    fn next_message(&mut self) -> Option<Message<'_>>;
+}
+
+/// Takes in messages and gives out frames.
+pub(super) struct Assembly {
+    pub(super) plan: Plan,
+    pub(super) tally: Tally,
+    intake: Intake,
+    assembler: Assembler,
+    ended: bool,
+}
+
+impl Assembly {
+    pub(super) fn new(plan: Plan, tally: Tally) -> Self {
+        let intake = Intake::new(&plan.scan, &plan.chosen, plan.primary(), &plan.input);
+        Self { intake, assembler: Assembler::new(), plan, tally, ended: false }
+    }
+
+    /// True for topics whose messages are not ignored.
+    pub(super) fn reads(&self, channel: &Channel) -> bool {
+        Type::of(&channel.schema_name) == Type::Tf || self.plan.chosen.has(&channel.topic)
+    }
+
+    pub(super) fn take(&mut self, message: &Message<'_>) {
+        self.intake.take(message, &mut self.tally);
+    }
+
+    /// Reads on to the next frame; `None` when the messages have ended.
+    pub(super) fn read(&mut self, messages: &mut dyn Messages) -> Option<LogFrame> {
+        loop {
+            let frame = self.next_frame();
+            if frame.is_some() || self.ended {
+                return frame;
+            }
+            match messages.next_message() {
+                Some(message) => self.take(&message),
+                None => self.end(),
+            }
+        }
+    }
+
+    /// The next frame that no message to come can change any more.
+    fn next_frame(&mut self) -> Option<LogFrame> {
+        while let Some((image, next)) = self.intake.frames.pop(self.ended) {
+            let (plan, intake) = (&self.plan, &mut self.intake);
+            let frame = self.assembler.assemble(plan, &image, next, intake, &mut self.tally);
+            self.intake.settle();
+            if frame.is_some() {
+                return frame;
+            }
+        }
+        if self.ended {
+            self.tally.add("depth_without_colour", self.intake.depth.leave());
+            self.tally.add("right_without_left", self.intake.right.leave());
+        }
+        None
+    }
+
+    /// The newest frame whose images are all there; older ones are skipped and
+    /// counted.
+    pub(super) fn newest_frame(&mut self) -> Option<LogFrame> {
+        loop {
+            let (plan, intake) = (&self.plan, &mut self.intake);
+            let (popped, skipped) = intake.pop_newest(plan);
+            self.tally.add("frames_skipped", skipped);
+            let (image, next) = popped?;
+            let frame = self.assembler.assemble(plan, &image, next, intake, &mut self.tally);
+            self.intake.settle();
+            if frame.is_some() {
+                return frame;
+            }
+        }
+    }
+
+    fn end(&mut self) {
+        self.ended = true;
+        if self.intake.frames.drop_suspect() {
+            self.tally.count("late_frames");
+        }
+    }
+
+    /// True if there are no more messages.
+    pub(super) fn has_ended(&self) -> bool {
+        self.ended
+    }
+
+    /// The first calibration that did not fit its images.
+    pub(super) fn misfit(&self) -> Option<&CalibrationError> {
+        self.assembler.misfit.as_ref()
+    }
+
+    /// What is known of the source once it has given a frame.
+    pub(super) fn facts(&self) -> LogFacts {
+        let (scan, chosen) = (&self.plan.scan, &self.plan.chosen);
+        let camera = self.assembler.camera();
+        let of_camera = |value: fn(&Camera) -> f64| camera.map_or(0.0, |camera| value(camera));
+        LogFacts {
+            path: scan.path.clone(),
+            bytes: scan.bytes,
+            sha256: scan.sha256.clone(),
+            colour_topic: chosen.colour.clone(),
+            depth_topic: chosen.depth.clone(),
+            right_topic: chosen.right.clone(),
+            odometry_topic: chosen.odometry.clone(),
+            calibration_topic: self.plan.calibration_topic().cloned(),
+            camera_frame: scan.frame_of(self.plan.primary()).map(str::to_owned),
+            robot_frame: robot_frame(scan, &self.plan.input).to_owned(),
+            width: camera.map_or(0, |camera| camera.width),
+            height: camera.map_or(0, |camera| camera.height),
+            focal_px: of_camera(Camera::focal_px),
+            baseline_m: self.plan.baseline_m,
+            camera_height_m: of_camera(Camera::height_m),
+            camera_pitch_down_deg: of_camera(Camera::pitch_down_rad).to_degrees(),
+            camera_roll_deg: of_camera(Camera::roll_rad).to_degrees(),
+            camera_source: self.plan.mount.source(),
+        }
+    }
+}

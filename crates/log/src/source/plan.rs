@@ -1,0 +1,255 @@
+//! What is settled before the first frame.
+
+use std::sync::Arc;
+
+use tagalong_core::{Camera, ConicalMirror, DepthImage, Lens};
+use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
+
+use super::assembly::{Assembly, Messages};
+use super::mount::{Mount, robot_frame};
+use super::tally::Tally;
+use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
+use crate::scan::Scan;
+use crate::topics::{Chosen, choose, missing};
+use crate::{InputSettings, Limits, LogError, MountSettings, Needs};
+
+/// Begins to read the same messages once more.
+pub(super) type Reread<'a> = &'a dyn Fn() -> Result<Box<dyn Messages + 'a>, LogError>;
+
+/// Everything about a log that is settled before its first frame.
+pub(super) struct Plan {
+    pub(super) scan: Arc<Scan>,
+    pub(super) chosen: Chosen,
+    pub(super) input: InputSettings,
+    pub(super) limits: Limits,
+    pub(super) needs: Needs,
+    pub(super) mount: Mount,
+    pub(super) lens: Option<Intrinsics>,
+    depth_lens: Option<Intrinsics>,
+    pub(super) baseline_m: Option<f64>,
+    /// `None`: no odometry. `Some(None)`: from its topic. Else the two frames of tf.
+    pub(super) odom_frames: Option<Option<(String, String)>>,
+}
+
+impl Plan {
+    /// The topic whose images make the frames.
+    pub(super) fn primary(&self) -> &str {
+        primary(&self.chosen)
+    }
+
+    /// The error of a calibration that does not fit the images.
+    pub(super) fn misfit(&self, source: CalibrationError) -> LogError {
+        let topic = self.chosen.colour_info.clone().unwrap_or_default();
+        LogError::Calibration { path: self.scan.path.clone(), topic, source }
+    }
+
+    /// The topic of the calibration that the frames have.
+    pub(super) fn calibration_topic(&self) -> Option<&String> {
+        self.lens?;
+        let own = if self.chosen.colour.is_some() { &self.chosen.colour_info } else { &None };
+        own.as_ref().or(self.chosen.depth_info.as_ref())
+    }
+
+    /// True if depth comes beside another image.
+    pub(super) fn has_second_depth(&self) -> bool {
+        self.chosen.colour.is_some() && self.chosen.depth.is_some()
+    }
+
+    /// The mirror whose images are still circular.
+    pub(super) fn raw_mirror(&self) -> Option<ConicalMirror> {
+        match self.lens?.mirror? {
+            Mirrored::Raw(mirror) => Some(mirror),
+            Mirrored::Unwrapped(_) => None,
+        }
+    }
+
+    /// True unless both calibrations are known and differ.
+    pub(super) fn same_lens(&self) -> bool {
+        let (Some(colour), Some(depth)) = (self.lens, self.depth_lens) else { return true };
+        let (a, b) = (colour.lens, depth.lens);
+        let close = |a: f64, b: f64, off: f64| (a - b).abs() <= off;
+        close(a.fx, b.fx, 0.01 * a.fx)
+            && close(a.fy, b.fy, 0.01 * a.fy)
+            && close(a.cx, b.cx, 2.0)
+            && close(a.cy, b.cy, 2.0)
+    }
+
+    /// The camera that took a depth image, without its pose; `None` without a
+    /// calibration for images of that size.
+    pub(super) fn depth_camera(&self, depth: &DepthImage) -> Option<Camera> {
+        let known = self.depth_lens?;
+        check_size(&known, depth.width(), depth.height()).ok()?;
+        Some(Camera {
+            lens: Lens::Pinhole(known.lens),
+            width: depth.width(),
+            height: depth.height(),
+            robot_from_camera: nalgebra::Isometry3::identity(),
+        })
+    }
+}
+
+fn primary(chosen: &Chosen) -> &str {
+    chosen.colour.as_ref().or(chosen.depth.as_ref()).map_or("", String::as_str)
+}
+
+/// What the scan has to say, before anything else.
+pub(super) fn tally_of(scan: &Scan) -> Tally {
+    let mut tally =
+        Tally { counters: scan.counters.clone(), lost: scan.data_lost, ..Tally::default() };
+    scan.notes.iter().for_each(|note| tally.note(note.clone()));
+    if scan.counters.contains_key("chunks_without_crc") {
+        tally.note("crc: absent; damage inside the chunks of this file may go unnoticed");
+    }
+    tally
+}
+
+/// Chooses topics, and settles calibration and the pose of the camera.
+///
+/// # Errors
+/// A calibration that cannot be used, and what `needs` or `input` name and the
+/// scan lacks.
+pub(super) fn plan(
+    scan: Arc<Scan>,
+    input: &InputSettings,
+    limits: &Limits,
+    needs: Needs,
+    tally: &mut Tally,
+    reread: Reread<'_>,
+) -> Result<Plan, LogError> {
+    let chosen = choose(&scan, input, needs)?;
+    let depth_lens = lens_of(&scan, chosen.depth.as_deref(), chosen.depth_info.as_deref())?;
+    let lens = match chosen.colour {
+        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref())?,
+        None => depth_lens,
+    };
+    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref())?;
+    let mut plan = Plan {
+        mount: Mount::assumed(),
+        lens: lens.or_else(|| depth_lens.filter(|_| same_frame(&scan, &chosen))),
+        depth_lens,
+        baseline_m: right.and_then(|right| right.baseline_m),
+        odom_frames: odom_frames(&scan, &chosen, input),
+        scan,
+        chosen,
+        input: input.clone(),
+        limits: limits.clone(),
+        needs,
+    };
+    check_calibration(&plan, tally)?;
+    plan.mount = find_mount(&plan, reread)?;
+    tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
+    if plan.odom_frames.is_none() {
+        tally.note("no odometry: the robot is taken to be at rest");
+    }
+    Ok(plan)
+}
+
+fn same_frame(scan: &Scan, chosen: &Chosen) -> bool {
+    let frame = |topic: &Option<String>| scan.frame_of(topic.as_deref()?);
+    frame(&chosen.colour).is_some() && frame(&chosen.colour) == frame(&chosen.depth)
+}
+
+/// The calibration of an image topic, if there is one.
+fn lens_of(
+    scan: &Scan,
+    image: Option<&str>,
+    info: Option<&str>,
+) -> Result<Option<Intrinsics>, LogError> {
+    let (Some(image), Some(topic)) = (image, info) else { return Ok(None) };
+    let Some(info) = scan.infos.get(topic) else { return Ok(None) };
+    intrinsics(info, image.contains("rect")).map(Some).map_err(|source| LogError::Calibration {
+        path: scan.path.clone(),
+        topic: topic.to_owned(),
+        source,
+    })
+}
+
+/// Positions in metres need a calibration; a mono pipeline may do without.
+fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
+    let metric = plan.needs.depth || plan.needs.right;
+    if plan.needs.right && plan.baseline_m.is_none_or(|baseline| baseline <= 0.0) {
+        let wanted = "calibration of the right camera with a positive baseline (P[3] = -fx B)";
+        let hint = "; name its camera_info as `right_info_topic` under [input]".to_owned();
+        return Err(missing(&plan.scan, wanted.into(), hint));
+    }
+    if plan.lens.is_none() && metric {
+        let wanted = format!("calibration (sensor_msgs/CameraInfo) of {}", plan.primary());
+        let hint = "; name it as `colour_info_topic` under [input]".to_owned();
+        return Err(missing(&plan.scan, wanted, hint));
+    }
+    if plan.lens.is_none() {
+        tally.note("no calibration: a lens with a view of 53 degrees is assumed");
+    }
+    Ok(())
+}
+
+/// From the odometry topic, else from tf if it connects the two frames.
+fn odom_frames(
+    scan: &Scan,
+    chosen: &Chosen,
+    input: &InputSettings,
+) -> Option<Option<(String, String)>> {
+    if chosen.odometry.is_some() {
+        return Some(None);
+    }
+    let robot = robot_frame(scan, input);
+    let connected = scan.tf.knows(&input.odom_frame) && scan.tf.connects(&input.odom_frame, robot);
+    connected.then(|| Some((input.odom_frame.clone(), robot.to_owned())))
+}
+
+/// From tf, the settings, or the floor in the first depth images.
+fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
+    let camera = plan.scan.frame_of(plan.primary());
+    let mirror = plan.lens.is_some_and(|lens| lens.mirror.is_some());
+    if let Some(mount) = Mount::find(&plan.scan, camera, &plan.input, mirror) {
+        return Ok(mount);
+    }
+    match floor(plan, reread)? {
+        Some(mount) => Ok(mount),
+        None if plan.needs.depth => {
+            let wanted = "camera pose: tf does not connect the camera with the robot, and no \
+                          floor is visible in the first depth images";
+            let hint = "; give height and tilt in [input.camera]".to_owned();
+            Err(missing(&plan.scan, wanted.into(), hint))
+        }
+        None => Ok(Mount::assumed()),
+    }
+}
+
+/// Depth images that are tried for a floor.
+const FLOOR_FRAMES: usize = 9;
+
+/// The pose of the camera above the floor: the median of the first images.
+fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
+    if plan.chosen.depth.is_none() || plan.lens.is_none() {
+        return Ok(None);
+    }
+    let probe = Plan {
+        scan: Arc::clone(&plan.scan),
+        chosen: plan.chosen.clone(),
+        input: plan.input.clone(),
+        limits: plan.limits.clone(),
+        needs: Needs { depth: true, ..Needs::default() },
+        mount: Mount::assumed(),
+        odom_frames: None,
+        ..*plan
+    };
+    let (mut probe, mut messages) = (Assembly::new(probe, Tally::default()), reread()?);
+    let mut floors: Vec<Ground> = Vec::new();
+    for _ in 0..FLOOR_FRAMES {
+        let Some(found) = probe.read(messages.as_mut()) else { break };
+        let depth = found.frame.depth().ok();
+        let settings = GroundSettings::default();
+        floors.extend(depth.and_then(|d| ground_of_depth(d, &found.frame.camera, &settings)));
+    }
+    floors.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+    Ok(floors.get(floors.len() / 2).map(|ground| {
+        let mount = MountSettings {
+            height_m: ground.height_m,
+            pitch_down_deg: ground.pitch_down_rad().to_degrees(),
+            roll_deg: ground.roll_rad().to_degrees(),
+        };
+        let source = format!("the floor fitted to the depth of {} images", floors.len());
+        Mount::fixed(&mount, source)
+    }))
+}

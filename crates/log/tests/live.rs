@@ -1,0 +1,174 @@
+//! Frames of messages that arrive, against those of the same messages in a log.
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
+
+mod common;
+
+use std::io::Cursor;
+
+use common::{LogWriter, SavedLog, at, camera, level_pose};
+use tagalong_log::mcap_walk::Walker;
+use tagalong_log::{
+    FrameSource, InputSettings, Limits, Listening, LiveSource, LogError, LogFrame, Needs,
+};
+
+const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
+
+/// A log with a calibration and a fixed camera.
+fn started() -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    log
+}
+
+/// Colour and depth ten times a second, odometry five times as often.
+fn drive(log: &mut LogWriter, frames: i32) {
+    for i in 0..5 * frames {
+        let t = f64::from(i) * 0.02;
+        log.odometry(at(t), 0.4 * t, 0.2 * t);
+        if i % 5 == 3 {
+            log.colour(at(t - 0.01));
+            log.depth(at(t - 0.005), "colour", 2.0 + i as f32);
+        }
+    }
+}
+
+/// Calls `hear` with topic, type and bytes of all messages of a log.
+fn replay(log: &[u8], mut hear: impl FnMut(&str, &str, &[u8])) {
+    let mut walker = Walker::new(Cursor::new(log), &Limits::default()).unwrap();
+    while let Some(message) = walker.next() {
+        hear(&message.channel.topic, &message.channel.schema_name, message.data);
+    }
+}
+
+fn listen(log: &[u8], input: &InputSettings, needs: Needs) -> Listening {
+    let mut listening = Listening::new("the robot", input, &Limits::default(), needs).unwrap();
+    replay(log, |topic, kind, data| {
+        listening.announce(topic, kind);
+        listening.take(topic, data);
+    });
+    listening
+}
+
+/// Hears the log once to start, and then once more for the frames.
+fn live(log: &[u8], needs: Needs) -> (Vec<LogFrame>, LiveSource) {
+    let mut source = listen(log, &InputSettings::default(), needs).start().unwrap();
+    let mut frames = Vec::new();
+    replay(log, |topic, _, data| {
+        source.take(topic, data);
+        frames.extend(source.newest_frame());
+    });
+    (frames, source)
+}
+
+fn count(source: &LiveSource, name: &str) -> u64 {
+    source.counters().get(name).copied().unwrap_or(0)
+}
+
+#[test]
+fn whoever_keeps_up_gets_the_frames_of_the_log() {
+    let mut log = started();
+    drive(&mut log, 12);
+    let log = log.finish();
+    let saved = SavedLog::new(&log);
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
+    let (found, live) = live(&log, DEPTH);
+    assert_eq!(found.len(), 12);
+    for frame in &found {
+        let recorded = source.next_frame().unwrap();
+        assert_eq!(frame.frame.index, recorded.frame.index);
+        assert_eq!(frame.frame.stamp, recorded.frame.stamp);
+        assert_eq!(frame.frame.camera, recorded.frame.camera);
+        assert_eq!(frame.frame.motion, recorded.frame.motion);
+        assert_eq!(frame.frame.colour().unwrap(), recorded.frame.colour().unwrap());
+        assert_eq!(frame.frame.depth().unwrap(), recorded.frame.depth().unwrap());
+        assert!(!frame.odom_stale && !frame.odom_jumped);
+    }
+    assert_eq!(count(&live, "frames_skipped"), 0);
+    let facts = live.facts();
+    assert_eq!((facts.colour_topic.as_deref(), facts.width), (Some("/camera/color/image_raw"), 16));
+}
+
+#[test]
+fn whoever_is_slow_gets_the_newest_frame() {
+    let mut log = started();
+    drive(&mut log, 12);
+    let log = log.finish();
+    let mut source = listen(&log, &InputSettings::default(), DEPTH).start().unwrap();
+    replay(&log, |topic, _, data| source.take(topic, data));
+    let newest = source.newest_frame().unwrap();
+    assert!((newest.frame.stamp.seconds_since(at(0.0)) - 1.15).abs() < 1e-6);
+    assert_eq!(count(&source, "frames_skipped"), 11);
+    assert!(source.newest_frame().is_none());
+}
+
+#[test]
+fn an_image_whose_depth_does_not_come_holds_nobody_up() {
+    let mut log = started();
+    for i in 0..12 {
+        log.colour(at(f64::from(i) * 0.1));
+        if i % 2 == 0 {
+            log.depth(at(f64::from(i) * 0.1 + 0.01), "colour", 2.0);
+        }
+    }
+    let (found, live) = live(&log.finish(), DEPTH);
+    assert_eq!(found.len(), 6);
+    assert_eq!(count(&live, "frames_skipped"), 5);
+}
+
+#[test]
+fn a_jump_of_odometry_is_told_with_its_frame() {
+    let mut log = started();
+    for i in 0..20 {
+        log.odometry(at(f64::from(i) * 0.1), if i < 10 { 0.0 } else { 5.0 }, 0.0);
+        log.colour(at(f64::from(i) * 0.1));
+        log.depth(at(f64::from(i) * 0.1), "colour", 2.0);
+    }
+    let (found, _) = live(&log.finish(), DEPTH);
+    let jumped: Vec<u64> = found.iter().filter(|f| f.odom_jumped).map(|f| f.frame.index).collect();
+    assert_eq!((found.len(), jumped), (20, vec![11]));
+}
+
+#[test]
+fn what_is_missing_is_named_until_it_comes() {
+    let mut log = started();
+    drive(&mut log, 3);
+    let log = log.finish();
+    let input = InputSettings::default();
+    let mut listening = Listening::new("the robot", &input, &Limits::default(), DEPTH).unwrap();
+    let missing = |listening: &Listening| match listening.start().err() {
+        Some(error @ LogError::Missing { .. }) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    let text = missing(&listening);
+    assert!(text.starts_with("`the robot` has no colour images"), "{text}");
+    let depth = "/camera/depth/image_raw";
+    replay(&log, |topic, kind, data| {
+        listening.announce(topic, kind);
+        if topic != depth {
+            listening.take(topic, data);
+        }
+    });
+    let text = missing(&listening);
+    assert!(text.contains("has no depth images"), "{text}");
+    assert!(text.contains("/camera/depth/image_raw (sensor_msgs/msg/Image; 0 messages)"), "{text}");
+    replay(&log, |topic, _, data| listening.take(topic, data));
+    assert!(listening.start().is_ok());
+    let named = InputSettings { odometry_topic: Some("/odometry".into()), ..input };
+    let text = missing(&listen(&log, &named, DEPTH));
+    assert!(text.contains("did you mean `/odom`?"), "{text}");
+}
+
+#[test]
+fn our_own_tracks_are_nobodys_detections_unless_named() {
+    let named = Some("/people/tracks".to_owned());
+    for (detections_topic, wanted) in [(None, false), (named, true)] {
+        let input = InputSettings { detections_topic, ..InputSettings::default() };
+        let mut listening = Listening::new("x", &input, &Limits::default(), DEPTH).unwrap();
+        assert!(!listening.wants("/people/tracks"));
+        assert!(listening.announce("/people/tracks", "vision_msgs/msg/Detection3DArray"));
+        assert!(!listening.announce("/people/tracks", "vision_msgs/msg/Detection3DArray"));
+        assert_eq!(listening.wants("/people/tracks"), wanted);
+    }
+}

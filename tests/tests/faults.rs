@@ -1,0 +1,243 @@
+//! Faults of sensors and clocks, from the log or the frame to the tracks and the
+//! wheels. The names of the tests begin with the fault's: T5, time stamps that
+//! disagree; S1, a depth camera that shows nothing.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tagalong_core::{
+    Camera, DepthImage, Frame, Images, Lens, Motion, Registry, Stamp, Track, WheelSpeeds,
+};
+use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
+use tagalong_log::write::MessageLog;
+use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_pipeline::{FrameReport, LockState, Pipeline};
+use tagalong_sim::{Event, Scene, Shot, Simulation};
+
+/// Somebody stands before a robot that stands. Small images are enough.
+const SCENE: &str = "
+seed = 3
+duration_s = 3.0
+
+[room]
+size_m = [12.0, 8.0]
+
+[camera]
+width = 160
+height = 120
+rate_hz = 10.0
+
+[faults]
+late = 0.0
+
+[robot]
+start = [0.8, 2.0]
+
+[[people]]
+path = [[3.0, 2.0], [3.6, 2.0]]
+speed_mps = 0.2
+";
+
+const PERIOD_S: f64 = 0.1;
+
+fn shots() -> (Camera, Vec<Shot>) {
+    let mut simulation = Simulation::new(&Scene::parse(SCENE).unwrap(), 2);
+    let camera = simulation.camera().clone();
+    let events = std::iter::from_fn(|| simulation.next_event());
+    let shots = events.filter_map(|event| match event {
+        Event::Shot(shot) => Some(*shot),
+        _ => None,
+    });
+    (camera, shots.collect())
+}
+
+fn pipeline(config: &str) -> Pipeline {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let text = std::fs::read_to_string(folder.join(config)).unwrap();
+    Pipeline::from_toml(&text, &folder, &registry).unwrap().0
+}
+
+fn at(index: usize) -> Stamp {
+    Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(index as f64 * PERIOD_S)
+}
+
+/// How the messages of a recording are out of step.
+#[derive(Clone, Copy, Default)]
+struct Fault {
+    /// The stamps of depth images are this much later than those of colour, s.
+    skew_s: f64,
+    /// Only each second depth image is there.
+    half_depth: bool,
+    /// Messages are recorded up to this long after their stamps, in another order, s.
+    delay_s: f64,
+}
+
+/// A log with a fault, in a folder that goes with it.
+struct Recorded {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+}
+
+fn record(camera: &Camera, shots: &[Shot], fault: Fault) -> Recorded {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fault.mcap");
+    let mut log = MessageLog::create(&path).unwrap();
+    let fixed = TransformStamped {
+        header: Header::new(at(0), "base_link"),
+        child_frame_id: "camera".into(),
+        transform: (&camera.robot_from_camera).into(),
+    };
+    log.send("/tf_static", at(0), &TFMessage { transforms: vec![fixed] }).unwrap();
+    log.send("/camera/camera_info", at(0), &info(camera)).unwrap();
+    // Whatever: a sequence that is not in order.
+    let delay = |index: usize| fault.delay_s * ((index * 7) % 5) as f64 / 4.0;
+    let mut images = Vec::new();
+    for (index, shot) in shots.iter().enumerate() {
+        let (stamp, later) = (at(index), at(index).plus_seconds(fault.skew_s));
+        images.push((stamp.plus_seconds(delay(2 * index)), stamp, shot, false));
+        if !fault.half_depth || index % 2 == 0 {
+            images.push((later.plus_seconds(delay(2 * index + 1)), later, shot, true));
+        }
+    }
+    images.sort_by_key(|(recorded, ..)| *recorded);
+    for (recorded, stamp, shot, is_depth) in images {
+        send(&mut log, recorded, stamp, &shot.images, is_depth);
+    }
+    log.finish().unwrap();
+    Recorded { _folder: folder, path }
+}
+
+fn send(log: &mut MessageLog, recorded: Stamp, stamp: Stamp, images: &Images, is_depth: bool) {
+    let (colour, depth) = (images.colour.as_ref().unwrap(), images.depth.as_ref().unwrap());
+    let (width, height) = (colour.width() as u32, colour.height() as u32);
+    let floats: Vec<u8> = depth.pixels().iter().flat_map(|z| z.to_le_bytes()).collect();
+    let (topic, encoding, step, data) = match is_depth {
+        true => ("/camera/depth", "32FC1", 4 * width, &floats[..]),
+        false => ("/camera/color", "rgb8", 3 * width, colour.pixels().as_flattened()),
+    };
+    let header = Header::new(stamp, "camera");
+    let encoding = encoding.into();
+    let image = Image { header, height, width, encoding, is_bigendian: 0, step, data };
+    log.send(topic, recorded, &image).unwrap();
+}
+
+fn info(camera: &Camera) -> CameraInfo {
+    let Lens::Pinhole(lens) = camera.lens else { panic!("a pinhole camera") };
+    let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
+    CameraInfo {
+        header: Header::new(at(0), "camera"),
+        height: camera.height as u32,
+        width: camera.width as u32,
+        distortion_model: "plumb_bob".into(),
+        d: vec![0.0; 5],
+        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        ..CameraInfo::default()
+    }
+}
+
+/// What a run over a log gave: stamps with tracks, and how many images found no
+/// partner, colour and depth.
+#[derive(Debug, PartialEq)]
+struct Run {
+    tracks: Vec<(Stamp, Vec<Track>)>,
+    colour_alone: u64,
+    depth_alone: u64,
+}
+
+fn run(recorded: &Recorded) -> Run {
+    let needs = Needs { colour: true, depth: true, right: false };
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let mut source = FrameSource::open(&recorded.path, &input, &limits, needs).unwrap();
+    let mut pipeline = pipeline("depth-ekf.toml");
+    let mut tracks = Vec::new();
+    while let Some(found) = source.next_frame() {
+        tracks.push((found.frame.stamp, pipeline.step(&found.frame).unwrap().tracks));
+    }
+    let count = |name| source.counters().get(name).copied().unwrap_or(0);
+    let (colour_alone, depth_alone) =
+        (count("colour_without_depth"), count("depth_without_colour"));
+    Run { tracks, colour_alone, depth_alone }
+}
+
+#[test]
+fn t5_when_a_message_was_recorded_does_not_matter() {
+    let (camera, shots) = shots();
+    let prompt = run(&record(&camera, &shots, Fault::default()));
+    let late = run(&record(&camera, &shots, Fault { delay_s: 0.25, ..Fault::default() }));
+    assert_eq!(prompt.tracks.len(), shots.len());
+    assert!(prompt.tracks.iter().any(|(_, tracks)| tracks.iter().any(|track| track.confirmed)));
+    assert_eq!(prompt, late);
+    assert_eq!((prompt.colour_alone, prompt.depth_alone), (0, 0));
+}
+
+#[test]
+fn t5_images_are_paired_within_the_tolerance_and_others_are_counted() {
+    let (camera, shots) = shots();
+    let all = shots.len();
+    // The tolerance is 30 ms, and depth that is 80 ms late is 20 ms from the next image.
+    for (skew_ms, frames) in [(0, all), (20, all), (-20, all), (40, 0), (60, 0), (80, all - 1)] {
+        let skew_s = f64::from(skew_ms) * 1e-3;
+        let run = run(&record(&camera, &shots, Fault { skew_s, ..Fault::default() }));
+        let alone = (all - frames) as u64;
+        assert_eq!(run.tracks.len(), frames, "{skew_ms} ms");
+        assert_eq!((run.colour_alone, run.depth_alone), (alone, alone), "{skew_ms} ms");
+    }
+}
+
+#[test]
+fn t5_depth_at_half_rate_halves_the_frames_and_nothing_else() {
+    let (camera, shots) = shots();
+    let run = run(&record(&camera, &shots, Fault { half_depth: true, ..Fault::default() }));
+    assert_eq!(run.tracks.len(), shots.len().div_ceil(2));
+    assert_eq!((run.colour_alone, run.depth_alone), (shots.len() as u64 / 2, 0));
+    let confirmed = |tracks: &[Track]| tracks.iter().filter(|t| t.confirmed && t.seen).count();
+    assert_eq!(confirmed(&run.tracks.last().unwrap().1), 1);
+}
+
+fn frame(camera: &Arc<Camera>, index: usize, images: Images) -> Frame {
+    let motion = Motion::at_rest(if index == 0 { 0.0 } else { PERIOD_S });
+    Frame::new(index as u64 + 1, at(index), Arc::clone(camera), motion, images)
+}
+
+/// First the drawn images, then for six seconds the last one with this depth
+/// everywhere.
+fn go_blind(camera: &Arc<Camera>, shots: &[Shot], depth_m: f32) -> Vec<FrameReport> {
+    let mut pipeline = pipeline("depth-ekf-follow.toml");
+    let blind = DepthImage::filled(camera.width, camera.height, depth_m);
+    let last = Images { depth: Some(Arc::new(blind)), ..shots[shots.len() - 1].images.clone() };
+    let images = shots.iter().map(|shot| &shot.images).chain(std::iter::repeat_n(&last, 60));
+    let frames = images.enumerate().map(|(index, images)| frame(camera, index, images.clone()));
+    frames.map(|frame| pipeline.step(&frame).unwrap()).collect()
+}
+
+#[test]
+fn s1_depth_that_shows_nothing_ends_tracks_and_starts_none() {
+    let (camera, shots) = shots();
+    let camera = Arc::new(camera);
+    for depth_m in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 65.535] {
+        let reports = go_blind(&camera, &shots, depth_m);
+        let (seeing, blind) = reports.split_at(shots.len());
+        let before = seeing.last().unwrap();
+        let followed = before.target.expect("somebody is followed");
+        assert_eq!(before.lock.unwrap().state, LockState::Locked, "{depth_m}");
+        let known: Vec<_> = before.tracks.iter().map(|track| track.id).collect();
+        for report in blind {
+            assert!(report.candidates.is_empty(), "{depth_m}: {:?}", report.candidates);
+            assert!(report.tracks.iter().all(|track| known.contains(&track.id) && !track.seen));
+            let WheelSpeeds { left, right } = report.command.unwrap().wheels;
+            assert!(left.abs() <= 0.9 && right.abs() <= 0.9, "{depth_m}: {left} {right}");
+        }
+        assert!(blind[0].tracks.iter().any(|track| track.id == followed), "{depth_m}: it coasts");
+        let last = blind.last().unwrap();
+        assert!(last.tracks.is_empty(), "{depth_m}: {:?}", last.tracks);
+        assert_eq!((last.lock.unwrap().state, last.target), (LockState::Lost, None), "{depth_m}");
+        let lost = blind.iter().filter(|report| report.lock.unwrap().state == LockState::Lost);
+        let commands: Vec<_> = lost.map(|report| report.command.unwrap().wheels).collect();
+        assert!(commands.iter().all(|wheels| *wheels == WheelSpeeds::STOP), "{depth_m}");
+    }
+}
