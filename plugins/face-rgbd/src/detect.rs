@@ -116,7 +116,7 @@ impl Detector for FaceRgbd {
         self.grouping.group(&self.hits, self.config.min_neighbours);
         let depth = frame.images().depth.as_deref();
         let of = |group| self.detection(&frame.camera, depth, group);
-        let mut found: Vec<Detection> = self.grouping.groups().iter().filter_map(of).collect();
+        let mut found: Vec<Detection> = self.grouping.kept().iter().filter_map(of).collect();
         let all = found.len();
         found.retain(|detection| detection.score >= self.config.min_score);
         funnel.drop_many("face: log-odds", (all - found.len()) as u64);

@@ -54,8 +54,8 @@ impl Grouping {
         kept.extend(groups.iter().filter(|group| !groups.iter().any(|o| outvotes(o, group))));
     }
 
-    /// The groups.
-    pub fn groups(&self) -> &[Group] {
+    /// The groups that were not outvoted.
+    pub fn kept(&self) -> &[Group] {
         &self.kept
     }
 
