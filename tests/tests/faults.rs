@@ -142,7 +142,7 @@ fn info(camera: &Camera) -> CameraInfo {
 
 /// What a run over a log gave: stamps with tracks, and how many images found no
 /// partner, colour and depth.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 struct Run {
     tracks: Vec<(Stamp, Vec<Track>)>,
     colour_alone: u64,
@@ -171,7 +171,7 @@ fn t5_when_a_message_was_recorded_does_not_matter() {
     let late = run(&record(&camera, &shots, Fault { delay_s: 0.25, ..Fault::default() }));
     assert_eq!(prompt.tracks.len(), shots.len());
     assert!(prompt.tracks.iter().any(|(_, tracks)| tracks.iter().any(|track| track.confirmed)));
-    assert_eq!(prompt, late);
+    assert_eq!(format!("{prompt:?}"), format!("{late:?}"));
     assert_eq!((prompt.colour_alone, prompt.depth_alone), (0, 0));
 }
 
@@ -224,7 +224,7 @@ fn s1_depth_that_shows_nothing_ends_tracks_and_starts_none() {
         let (seeing, blind) = reports.split_at(shots.len());
         let before = seeing.last().unwrap();
         let followed = before.target.expect("somebody is followed");
-        assert_eq!(before.lock.unwrap().state, LockState::Locked, "{depth_m}");
+        assert_eq!(before.lock.as_ref().unwrap().state, LockState::Locked, "{depth_m}");
         let known: Vec<_> = before.tracks.iter().map(|track| track.id).collect();
         for report in blind {
             assert!(report.candidates.is_empty(), "{depth_m}: {:?}", report.candidates);
@@ -235,8 +235,13 @@ fn s1_depth_that_shows_nothing_ends_tracks_and_starts_none() {
         assert!(blind[0].tracks.iter().any(|track| track.id == followed), "{depth_m}: it coasts");
         let last = blind.last().unwrap();
         assert!(last.tracks.is_empty(), "{depth_m}: {:?}", last.tracks);
-        assert_eq!((last.lock.unwrap().state, last.target), (LockState::Lost, None), "{depth_m}");
-        let lost = blind.iter().filter(|report| report.lock.unwrap().state == LockState::Lost);
+        assert_eq!(
+            (last.lock.as_ref().unwrap().state, last.target),
+            (LockState::Lost, None),
+            "{depth_m}"
+        );
+        let lost =
+            blind.iter().filter(|report| report.lock.as_ref().unwrap().state == LockState::Lost);
         let commands: Vec<_> = lost.map(|report| report.command.unwrap().wheels).collect();
         assert!(commands.iter().all(|wheels| *wheels == WheelSpeeds::STOP), "{depth_m}");
     }

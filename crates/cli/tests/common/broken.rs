@@ -10,11 +10,14 @@ use mcap::{MessageStream, WriteOptions, Writer};
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{CameraInfo, CompressedImage, Header, Image, TFMessage, decode, encode};
 
+/// A depth reading by column and row, from the readings of the log and their width.
+pub type Readings = Box<dyn Fn(&[u16], usize, i64, i64) -> u16>;
+
 /// What is changed in a log; what is `None` stays.
 #[derive(Default)]
 pub struct Changes {
-    /// Depth readings, by column and row, from the readings of the log.
-    pub depth: Option<Box<dyn Fn(&[u16], usize, i64, i64) -> u16>>,
+    /// Depth readings.
+    pub depth: Option<Readings>,
     /// Colour images are replaced by JPEG images of this grey level.
     pub grey_level: Option<u8>,
     /// Every calibration.
