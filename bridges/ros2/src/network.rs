@@ -5,7 +5,7 @@ use std::thread::{self, JoinHandle};
 
 use futures::StreamExt;
 use futures::executor::block_on;
-use futures::future::{AbortHandle, abortable};
+use futures::future::{AbortHandle, Abortable, ready};
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
@@ -151,7 +151,7 @@ impl Network {
         self.ear(topic, "std_msgs/msg/Bool", sensor(OTHERS), OTHERS, inbox, encode)
     }
 
-    fn plain<M: Message + Serialize + DeserializeOwned + 'static>(
+    fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
         qos: QosProfile,
@@ -160,7 +160,7 @@ impl Network {
         self.ear(topic, M::TYPE, qos, OTHERS, inbox, |message: M| encode(&message))
     }
 
-    fn ear<M: DeserializeOwned + 'static>(
+    fn ear<M: DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
         message_type: &str,
@@ -169,19 +169,23 @@ impl Network {
         inbox: &Arc<Inbox>,
         encode: impl Fn(M) -> Vec<u8> + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let handle = self.topic(topic, message_type, &qos)?;
+        let node = &mut self.node;
+        let handle = node.create_topic(&name(topic)?, kind(message_type), &qos).map_err(failed)?;
         let subscription: Subscription<M> =
-            self.node.create_subscription(&handle, Some(qos)).map_err(failed)?;
+            node.create_subscription(&handle, Some(qos)).map_err(failed)?;
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
-        // What does not decode is of another type than its topic says.
-        let put = async move {
-            let stream = subscription.async_stream();
-            let whole = stream.filter_map(|message| async { message.ok() });
-            whole.for_each(|(message, _)| async { inbox.push(&name, encode(message), room) }).await;
-        };
-        let (put, abort) = abortable(put);
-        let thread = Some(thread::spawn(move || drop(block_on(put))));
-        Ok(Ear { topic: topic.to_owned(), abort, thread })
+        let (abort, registration) = AbortHandle::new_pair();
+        let thread = thread::spawn(move || {
+            // What does not decode is of another type than its topic says.
+            let whole = subscription.async_stream().filter_map(|message| ready(message.ok()));
+            let put = whole.for_each(|(message, _)| {
+                inbox.push(&name, encode(message), room);
+                ready(())
+            });
+            // It ends by being aborted.
+            let _aborted = block_on(Abortable::new(put, registration));
+        });
+        Ok(Ear { topic: topic.to_owned(), abort, thread: Some(thread) })
     }
 
     /// A publisher of this type.
@@ -189,22 +193,19 @@ impl Network {
         &mut self,
         topic: &str,
     ) -> Result<Publisher<M>, BridgeError> {
-        let handle = self.topic(topic, M::TYPE, &reliable())?;
-        self.node.create_publisher(&handle, Some(reliable())).map_err(failed)
+        let (node, qos) = (&mut self.node, reliable());
+        let handle = node.create_topic(&name(topic)?, kind(M::TYPE), &qos).map_err(failed)?;
+        node.create_publisher(&handle, Some(qos)).map_err(failed)
     }
+}
 
-    fn topic(
-        &self,
-        topic: &str,
-        message_type: &str,
-        qos: &QosProfile,
-    ) -> Result<ros2_client::Topic, BridgeError> {
-        let name = Name::parse(topic)
-            .map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))?;
-        let (package, kind) = message_type.split_once("/msg/").unwrap_or(("", message_type));
-        let kind = MessageTypeName::new(package, kind);
-        self.node.create_topic(&name, kind, qos).map_err(failed)
-    }
+fn name(topic: &str) -> Result<Name, BridgeError> {
+    Name::parse(topic).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))
+}
+
+fn kind(message_type: &str) -> MessageTypeName {
+    let (package, name) = message_type.split_once("/msg/").unwrap_or(("", message_type));
+    MessageTypeName::new(package, name)
 }
 
 impl Drop for Network {
