@@ -170,7 +170,8 @@ impl Network {
         encode: impl Fn(M) -> Vec<u8> + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let node = &mut self.node;
-        let handle = node.create_topic(&name(topic)?, kind(message_type), &qos).map_err(failed)?;
+        let full = name(node.namespace(), topic)?;
+        let handle = node.create_topic(&full, kind(message_type), &qos).map_err(failed)?;
         let subscription: Subscription<M> =
             node.create_subscription(&handle, Some(qos)).map_err(failed)?;
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
@@ -194,13 +195,20 @@ impl Network {
         topic: &str,
     ) -> Result<Publisher<M>, BridgeError> {
         let (node, qos) = (&mut self.node, reliable());
-        let handle = node.create_topic(&name(topic)?, kind(M::TYPE), &qos).map_err(failed)?;
+        let name = name(node.namespace(), topic)?;
+        let handle = node.create_topic(&name, kind(M::TYPE), &qos).map_err(failed)?;
         node.create_publisher(&handle, Some(qos)).map_err(failed)
     }
 }
 
-fn name(topic: &str) -> Result<Name, BridgeError> {
-    Name::parse(topic).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))
+/// The name of a topic, which lies in the namespace unless it begins with a slash.
+/// (What ros2-client does by itself doubles the slash in the namespace `/`.)
+fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
+    let full = match topic.starts_with('/') {
+        true => topic.to_owned(),
+        false => format!("{}/{topic}", namespace.trim_end_matches('/')),
+    };
+    Name::parse(&full).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))
 }
 
 fn kind(message_type: &str) -> MessageTypeName {
@@ -212,5 +220,22 @@ impl Drop for Network {
     fn drop(&mut self) {
         self.node.stop_spinner();
         self.spinner.take().map(JoinHandle::join);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_without_a_slash_lie_in_the_namespace() {
+        for (namespace, topic, full) in [
+            ("/", "people/tracks", "/people/tracks"),
+            ("/robot1", "cmd_vel", "/robot1/cmd_vel"),
+            ("/robot1", "/cmd_vel", "/cmd_vel"),
+        ] {
+            assert_eq!(name(namespace, topic).unwrap(), Name::parse(full).unwrap());
+        }
+        assert!(matches!(name("/", "no spaces"), Err(BridgeError::Config(_))));
     }
 }

@@ -72,7 +72,6 @@ fn kind(message_type: &str) -> MessageTypeName {
 /// A participant that is not the bridge.
 struct Peer {
     node: Node,
-    context: Context,
 }
 
 fn reliable() -> QosProfile {
@@ -90,7 +89,7 @@ impl Peer {
         let context = Context::with_options(ContextOptions::new().domain_id(domain)).unwrap();
         let name = NodeName::new("/", name).unwrap();
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-        Self { node: context.new_node(name, options).unwrap(), context }
+        Self { node: context.new_node(name, options).unwrap() }
     }
 
     fn publisher<M: Message + Serialize>(&mut self, topic: &str, qos: QosProfile) -> Publisher<M> {
