@@ -3,6 +3,9 @@
 //! that it skips.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a broken test may stop loudly")]
 
+use std::time::Instant;
+
+use tagalong_core::Frame;
 use tagalong_eval::{Comparison, SetDistance, Similarity, Tally};
 use tagalong_pipeline::FrameReport;
 use tagalong_tests::mot::{Given, mot15};
@@ -18,14 +21,17 @@ const VALIDATION: [&str; 6] =
 
 fn tracked(given: &Given) -> Tally {
     let mut pipeline = given.pipeline(CONFIG);
+    let frames: Vec<Frame> = given.frames().collect();
+    let start = Instant::now();
     let reports: Vec<FrameReport> =
-        given.frames().map(|frame| pipeline.step(&frame).unwrap()).collect();
+        frames.iter().map(|frame| pipeline.step(frame).unwrap()).collect();
+    let hz = frames.len() as f64 / start.elapsed().as_secs_f64();
     let sequence = given.against_truth(&reports);
     let comparison = Comparison::from(Similarity::Iou);
     let tally = Tally::measure(&sequence, &comparison, &SetDistance::default()).unwrap();
     let (scores, name) = (tally.scores(), &given.info.name);
     println!(
-        "{name:16} MOTA {:5.1} IDF1 {:5.1} HOTA {:5.1} IDSW {:4} FP {:5} FN {:5}",
+        "{name:16} MOTA {:5.1} IDF1 {:5.1} HOTA {:5.1} IDSW {:4} FP {:5} FN {:5}, {hz:6.0} frames/s",
         100.0 * scores.mota.unwrap(),
         100.0 * scores.idf1.unwrap(),
         100.0 * scores.hota.unwrap(),

@@ -5,8 +5,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
+use crate::doctor::DoctorArgs;
 use crate::follow::FollowArgs;
-use crate::reproduce::ReproduceArgs;
+use crate::import::ImportArgs;
+use crate::reproduce::{ReproduceArgs, TableFormat};
 use crate::simulate::SimulateArgs;
 use crate::train::TrainArgs;
 use crate::trials::TrialsArgs;
@@ -28,7 +30,7 @@ Examples:
   tagalong run configs/depth-ekf.toml robot.mcap --overlay
 
 Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3
-finished but part of the log was lost, 130 and 143 stopped by a signal (the files are valid).";
+finished but part of the log was lost or the doctor found something bad, 130 and 143 stopped by a signal (the files are valid).";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
@@ -49,9 +51,16 @@ pub enum Command {
     /// Prints the default settings of a plugin, each with its explanation
     #[command(after_help = CONFIG_HELP)]
     Config {
-        /// Name of the plugin, or `pipeline` for everything around the plugins.
+        /// Name of the plugin, `pipeline` for everything around the plugins, `all`, or
+        /// `funnel` for which setting belongs to which test.
         plugin: String,
+        /// As TOML, as a table, or as a JSON schema.
+        #[arg(long, value_enum, default_value_t)]
+        format: TableFormat,
     },
+    /// Prints a JSON schema of configs, for editors
+    #[command(after_help = SCHEMA_HELP)]
+    Schema,
     /// Says whether a config is right, and whether it fits a log
     #[command(after_help = CHECK_HELP)]
     Check {
@@ -59,7 +68,16 @@ pub enum Command {
         config: PathBuf,
         /// A log that the config should work on.
         log: Option<PathBuf>,
+        /// How to print.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
     },
+    /// Says why nobody, or the wrong thing, is detected in a log
+    #[command(after_help = DOCTOR_HELP)]
+    Doctor(DoctorArgs),
+    /// Makes a log of a data set or a folder of images
+    #[command(after_help = IMPORT_HELP)]
+    Import(ImportArgs),
     /// Compares pipelines on the same logs
     #[command(after_help = BENCH_HELP)]
     Bench(BenchArgs),
@@ -104,6 +122,28 @@ Needs no file, and half a minute.
 Examples:
   tagalong demo
   tagalong demo -o another-demo --seed 3";
+
+const DOCTOR_HELP: &str = "\
+Measures intrinsics, stamps, frames, light, depth, its registration to colour, floor and mount; then
+runs the pipeline for a while and shows what each of its tests dropped. Each finding says what to
+change in the config. Exit code 3: something is bad.
+
+Examples:
+  tagalong doctor configs/depth-ekf.toml robot.mcap
+  tagalong doctor configs/depth-ekf.toml robot.mcap -o checkup --frames 1000
+  tagalong doctor configs/depth-ekf.toml robot.mcap --format json | jq '.findings[] | select(.severity == \"bad\")'";
+
+const IMPORT_HELP: &str = "\
+Images are taken as they are; truth, where the data set has it, goes beside the log, where `eval` and
+`bench` find it.
+
+Examples:
+  tagalong import tum rgbd_dataset_freiburg3_walking_xyz
+  tagalong import kitti training --sequence 0013 -o runs/kitti-0013.mcap
+  tagalong import mot MOT17-04-FRCNN
+  tagalong import images photos --fps 15 --view 69 --height 1.2 --tilt 5
+  tagalong import images colour --depth depth --depth-unit 0.001 --focal 525
+  tagalong import bag old.bag";
 
 const FOLLOW_HELP: &str = "\
 Prints how long the right person was followed, and the wrong one, how soon somebody who came back was
@@ -157,7 +197,15 @@ Examples:
 const CONFIG_HELP: &str = "\
 Examples:
   tagalong config ekf
-  tagalong config pipeline > my-pipeline.toml";
+  tagalong config pipeline > my-pipeline.toml
+  tagalong config all --format markdown";
+
+const SCHEMA_HELP: &str = "\
+A config whose first line is `#:schema tagalong.json` is checked and completed while it is written, by
+editors that know Taplo.
+
+Example:
+  tagalong schema > tagalong.json";
 
 const CHECK_HELP: &str = "\
 Examples:

@@ -10,7 +10,7 @@ use tagalong_sim::{Scene, Simulation};
 
 use crate::args::{Format, RunArgs};
 use crate::bench::{self, BenchArgs};
-use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 use crate::simulate::{record, threads};
 use crate::{run, signals::Signals};
 
@@ -68,8 +68,7 @@ fn draw(folder: &Path, seed: Option<u64>) -> Result<PathBuf, Failure> {
     let mut scene = Scene::parse(SCENE).expect("the built-in scene is right");
     scene.seed = seed.unwrap_or(scene.seed);
     let log = folder.join("demo.mcap");
-    fs::create_dir_all(folder)
-        .map_err(|error| Failure::failed(format!("cannot make {}: {error}", folder.display())))?;
+    make_folder(folder)?;
     put(&folder.join("demo-scene.toml"), SCENE)?;
     record(Simulation::new(&scene, threads(None)), &scene, &log).map_err(Failure::failed)?;
     Ok(log)

@@ -19,7 +19,10 @@ mod bench;
 mod commands;
 mod config_file;
 mod demo;
+mod doctor;
 mod follow;
+mod import;
+mod keys;
 mod outcome;
 mod overlay;
 mod realism;
@@ -72,10 +75,15 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
     match command {
         Command::Run(args) => run::run(args, registry),
         Command::List { format } => commands::list(registry, *format),
-        Command::Config { plugin } => commands::config(registry, plugin),
-        Command::Check { config, log } => commands::check(registry, config, log.as_deref()),
+        Command::Config { plugin, format } => commands::config(registry, plugin, *format),
+        Command::Schema => commands::schema(registry),
+        Command::Check { config, log, format } => {
+            commands::check(registry, config, log.as_deref(), *format)
+        }
         Command::Bench(args) => bench::bench(args, registry),
         Command::Demo(args) => demo::demo(args, registry),
+        Command::Doctor(args) => doctor::doctor(args, registry),
+        Command::Import(args) => import::import(args),
         Command::Follow(args) => follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => simulate::simulate(args, registry),

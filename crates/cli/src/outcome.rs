@@ -1,5 +1,6 @@
 use std::fmt::Display;
 use std::io;
+use std::path::Path;
 
 use tagalong_log::LogError;
 
@@ -10,6 +11,8 @@ pub enum Ended {
     Well,
     /// Finished, but part of the log was lost or could not be used.
     WithLoss,
+    /// Finished, and found something bad.
+    WithFindings,
     /// Stopped by this signal; what was written until then is valid.
     BySignal(u8),
 }
@@ -19,7 +22,7 @@ impl Ended {
     pub fn code(self) -> u8 {
         match self {
             Self::Well => 0,
-            Self::WithLoss => 3,
+            Self::WithLoss | Self::WithFindings => 3,
             Self::BySignal(signal) => 128u8.saturating_add(signal),
         }
     }
@@ -63,6 +66,25 @@ impl From<LogError> for Failure {
 
 /// The result of a command.
 pub type Outcome = Result<Ended, Failure>;
+
+/// Makes a folder for results, and those above it.
+///
+/// # Errors
+/// A place where that cannot be is the user's to change: exit code 2.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let shown = folder.display();
+        Failure::usage(format!("cannot make the folder {shown}: {error}; choose another with -o"))
+    })
+}
+
+/// Makes the folder in which a file will lie.
+///
+/// # Errors
+/// As [`make_folder`].
+pub fn make_room_for(file: &Path) -> Result<(), Failure> {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).map_or(Ok(()), make_folder)
+}
 
 /// Prints to stdout. A closed pipe is a quiet end.
 pub fn print(text: &str) -> Result<(), Failure> {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use tagalong_core::Registry;
 use tagalong_reproduce::{Experiment, Findings, Lab, Progress, SYSTEMS, System, Table, system};
 
-use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 use crate::simulate;
 
 /// The arguments of `tagalong reproduce`.
@@ -73,6 +73,8 @@ pub fn reproduce(args: &ReproduceArgs, registry: &Registry) -> Outcome {
     let Some(name) = &args.system else { return list(args.format) };
     let system = system(name).ok_or_else(|| unknown(name, SYSTEMS.iter().map(|s| s.name)))?;
     let experiments = chosen(system, &args.only)?;
+    // Before the work of an hour, not after it.
+    args.output.as_deref().map_or(Ok(()), make_folder)?;
     let bar = Bar::new();
     let lab = lab(args, registry, &bar);
     let mut all = Vec::new();
@@ -155,8 +157,6 @@ fn write(folder: &Path, all: &[Found]) -> Result<(), Failure> {
         fs::write(&path, text)
             .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
     };
-    fs::create_dir_all(folder)
-        .map_err(|error| Failure::failed(format!("cannot make {}: {error}", folder.display())))?;
     let tables = all.iter().flat_map(|found| &found.findings.tables);
     let pages: Vec<String> = tables.map(Table::markdown).collect();
     save("tables.json", &json(all))?;

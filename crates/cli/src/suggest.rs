@@ -60,20 +60,26 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
 }
 
 fn conversion(path: &Path, extension: &str) -> String {
+    let kind = if extension == "bag" { "ROS 1 bag" } else { "ROS 2 bag in SQLite" };
     let shown = path.display();
+    format!("{shown} is a {kind}, and only MCAP is read; convert it:\n{}", converter(path))
+}
+
+/// The commands that make an MCAP log of a bag, one a line: `rosbags-convert` is
+/// installed by `pip install rosbags`, the others come with ROS 2 and MCAP.
+pub fn converter(path: &Path) -> String {
     let stem = path.with_extension("");
-    let stem = stem.display();
-    if extension == "bag" {
+    let (shown, stem) = (path.display(), stem.display());
+    if path.extension().is_some_and(|extension| extension == "bag") {
         return format!(
-            "{shown} is a ROS 1 bag, and only MCAP is read; convert it:\n  rosbags-convert --src \
-             {shown} --dst {stem} --dst-storage mcap --dst-typestore ros2_humble"
+            "  rosbags-convert --src {shown} --dst {stem} --dst-storage mcap --dst-typestore \
+             ros2_humble"
         );
     }
     let folder = path.parent().filter(|folder| folder.join("metadata.yaml").exists());
     let source = folder.unwrap_or(path).display();
     format!(
-        "{shown} is a ROS 2 bag in SQLite, and only MCAP is read; convert it with one of:\n  \
-         rosbags-convert --src {source} --dst {stem}-mcap --dst-storage mcap\n  mcap convert \
+        "  rosbags-convert --src {source} --dst {stem}-mcap --dst-storage mcap\n  mcap convert \
          {shown} {stem}.mcap"
     )
 }

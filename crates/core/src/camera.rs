@@ -1,6 +1,9 @@
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector2, Vector3};
+
+/// Nearer to each other, two pixels are the same.
+const SAME_PIXEL_PX: f64 = 1e-3;
 
 use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Panorama, Rect, UPPER_BODY_SIDE_M};
 
@@ -264,8 +267,11 @@ impl Camera {
         let mut pixel = upper_body.centre();
         for _ in 0..8 {
             let shown = self.upper_body(&self.back_project(pixel, depth));
-            pixel.x += upper_body.x - shown.x;
-            pixel.y += upper_body.y - shown.y;
+            let off = Vector2::new(upper_body.x - shown.x, upper_body.y - shown.y);
+            pixel += off;
+            if off.amax() < SAME_PIXEL_PX {
+                break;
+            }
         }
         self.back_project(pixel, depth)
     }

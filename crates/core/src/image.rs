@@ -1,3 +1,12 @@
+use std::ops::RangeInclusive;
+
+use crate::Rect;
+
+/// Places a side of a region at which its depth is read.
+const TAPS: usize = 5;
+/// Readings that a region needs to show anything.
+const LEAST_READINGS: usize = 8;
+
 /// A dense image, row by row, without padding.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Image<P> {
@@ -80,5 +89,86 @@ impl RgbImage {
         self.map(|[r, g, b]| {
             ((299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b) + 500) / 1000) as u8
         })
+    }
+}
+
+impl DepthImage {
+    /// The depth of what fills the middle of a region, m: the median of what 5x5
+    /// places in its central half show, of which a third have to show something.
+    pub fn surface_m(&self, of: &Rect) -> Option<f64> {
+        self.surface_within(of, 0.0..=f64::MAX)
+    }
+
+    /// The same, where it lies within a range of depths; most regions that show
+    /// something else are told by counting.
+    pub fn surface_within(&self, of: &Rect, range_m: RangeInclusive<f64>) -> Option<f64> {
+        let (mut readings, count) = self.readings(of);
+        let readings = &mut readings[..count];
+        let (least, most) = (*range_m.start() as f32, *range_m.end() as f32);
+        let nearer = readings.iter().filter(|m| **m < least).count();
+        let farther = readings.iter().filter(|m| **m > most).count();
+        let middle = count / 2;
+        if count < LEAST_READINGS || nearer > middle || farther >= count - middle {
+            return None;
+        }
+        let (_, median, _) = readings.select_nth_unstable_by(middle, f32::total_cmp);
+        Some(f64::from(*median))
+    }
+
+    /// What the places of a region show, and how many show something.
+    fn readings(&self, of: &Rect) -> ([f32; TAPS * TAPS], usize) {
+        let (mut readings, mut count) = ([0.0; TAPS * TAPS], 0);
+        let tap = |from: f64, size: f64, i: usize| (from + size * (2 + i) as f64 / 8.0) as i64;
+        let columns: [i64; TAPS] = std::array::from_fn(|i| tap(of.x, of.width, i));
+        let rows = (0..TAPS).map(|i| tap(of.y, of.height, i));
+        for y in rows.filter_map(|y| usize::try_from(y).ok().filter(|y| *y < self.height)) {
+            let row = self.row(y);
+            for x in columns {
+                let metres = usize::try_from(x).ok().and_then(|x| row.get(x)).unwrap_or(&f32::NAN);
+                readings[count] = *metres;
+                count += usize::from(*metres > 0.0 && metres.is_finite());
+            }
+        }
+        (readings, count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// All readings, one after the other, sorted.
+    fn slow_surface_m(depth: &DepthImage, of: &Rect) -> Option<f64> {
+        let mut seen: Vec<f32> = Vec::new();
+        for j in 2..7 {
+            for i in 2..7 {
+                let x = of.x + of.width * f64::from(i) / 8.0;
+                let y = of.y + of.height * f64::from(j) / 8.0;
+                seen.extend(depth.get(x as i64, y as i64).filter(|m| m.is_finite() && *m > 0.0));
+            }
+        }
+        seen.sort_by(f32::total_cmp);
+        (seen.len() >= 8).then(|| f64::from(seen[seen.len() / 2]))
+    }
+
+    proptest! {
+        #[test]
+        fn the_surface_is_the_median_of_what_the_middle_shows(
+            x in -20.0..50.0f64, y in -20.0..40.0f64, width in 2.0..40.0f64, height in 2.0..40.0f64,
+            holes in 2..9usize, near in 0.0..6.0f64, long in 0.0..3.0f64,
+        ) {
+            let depth = DepthImage::from_fn(48, 32, |x, y| match (x * 7 + y * 13) % holes {
+                0 => f32::NAN,
+                1 => 0.0,
+                _ => ((x * 31 + y * 17) % 50) as f32 * 0.1,
+            });
+            let of = Rect::new(x, y, width, height);
+            let slow = slow_surface_m(&depth, &of);
+            prop_assert_eq!(depth.surface_m(&of), slow);
+            let range = f64::from(near as f32)..=f64::from((near + long) as f32);
+            let within = slow.filter(|m| range.contains(m));
+            prop_assert_eq!(depth.surface_within(&of, range), within);
+        }
     }
 }

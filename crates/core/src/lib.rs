@@ -65,7 +65,10 @@ pub use recorded::Recorded;
 pub use rect::Rect;
 pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use sent::Sent;
-pub use settings::{ConfigError, Settings, Value, commented_defaults, parse_settings};
+pub use settings::{
+    ANY, ConfigError, NOT_NEGATIVE, POSITIVE, Settings, Value, check_ranges, commented_defaults,
+    parse_settings,
+};
 pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

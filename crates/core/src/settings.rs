@@ -1,11 +1,11 @@
 use std::fmt::Write as _;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use toml::{Spanned, de::DeValue};
 
-use crate::nearest;
+use crate::{Error, nearest};
 
 /// A TOML value that remembers where in the file it stood.
 pub type Value<'a> = Spanned<DeValue<'a>>;
@@ -65,6 +65,30 @@ impl From<toml::de::Error> for ConfigError {
     fn from(error: toml::de::Error) -> Self {
         let message = error.message().trim_end();
         Self { message: with_suggestion(message), span: error.span() }
+    }
+}
+
+/// Numbers that are neither endless nor far beyond anything that is measured.
+pub const ANY: RangeInclusive<f64> = -1e6..=1e6;
+/// The same without negative ones.
+pub const NOT_NEGATIVE: RangeInclusive<f64> = 0.0..=1e6;
+/// The same without nothing.
+pub const POSITIVE: RangeInclusive<f64> = 1e-6..=1e6;
+
+/// Refuses settings that are no numbers or out of their range.
+///
+/// # Errors
+/// [`Error::Settings`] names the first such setting, and the range.
+pub fn check_ranges(settings: &[(&str, f64, RangeInclusive<f64>)]) -> crate::Result<()> {
+    match settings.iter().find(|(_, value, range)| !range.contains(value)) {
+        None => Ok(()),
+        Some((key, value, range)) => {
+            let bound = match range {
+                range if *range == POSITIVE => "be positive and at most 1e6".to_owned(),
+                range => format!("lie between {:?} and {:?}", range.start(), range.end()),
+            };
+            Err(Error::Settings(format!("`{key}` must {bound}, not {value}")))
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! What trainers of plugins share, so that their cards can be compared: groups
 //! are dealt out to folds and never split ([`parts`]), held-out values become
-//! figures ([`area`], [`accepted`]), and log-odds ([`platt`]). Boosted trees are
+//! figures ([`area`], [`accepted`]), and log-odds ([`platt`]), and pictures become more
+//! of them ([`mirrored`], [`shifted`]). Boosted trees are
 //! grown here, too ([`boost`]).
 //!
 //! What machines look at is the business of the plugins.
@@ -9,7 +10,9 @@ pub mod boost;
 mod calibrate;
 mod folds;
 mod held_out;
+mod variants;
 
 pub use calibrate::{Line, platt};
 pub use folds::{Use, mix, parts, use_of};
 pub use held_out::{accepted, area};
+pub use variants::{mirrored, shifted};

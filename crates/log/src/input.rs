@@ -35,7 +35,10 @@ pub struct InputSettings {
     /// Metres per unit of depth, where the log departs from the convention
     /// (millimetres for 16UC1, metres for 32FC1); makes mono16 images depth.
     pub depth_unit_m: Option<f64>,
-    /// The pose of the camera, for logs whose tf does not give it.
+    /// Columns and rows by which depth images are moved to lie on colour, where the
+    /// log's are not registered well (`tagalong doctor` measures it).
+    pub depth_offset_px: [i32; 2],
+    /// The pose of the camera, for logs whose tf does not give it, or gives it wrong.
     pub camera: Option<MountSettings>,
     /// Columns and rows to which the circular image of a conical mirror is unwrapped.
     pub panorama: [usize; 2],
@@ -60,6 +63,7 @@ impl Default for InputSettings {
             base_frame: "base_link".into(),
             odom_frame: "odom".into(),
             depth_unit_m: None,
+            depth_offset_px: [0, 0],
             camera: None,
             panorama: [480, 120],
             reorder_frames: 3,
@@ -83,6 +87,9 @@ impl InputSettings {
         }
         if self.depth_unit_m.is_some_and(|unit| !(1e-6..=1e3).contains(&unit)) {
             return refuse("depth_unit_m must lie between 1e-6 and 1000");
+        }
+        if !self.depth_offset_px.iter().all(|offset| (-1000..=1000).contains(offset)) {
+            return refuse("depth_offset_px must lie between -1000 and 1000");
         }
         if !self.panorama.iter().all(|side| (8..=8192).contains(side)) {
             return refuse("panorama must be 8 to 8192 columns and rows");

@@ -6,10 +6,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::Serialize;
-use tagalong_core::Stamp;
 
 use crate::images::Content;
 use crate::scan::{Scan, Topic};
+use crate::timing::{Skew, Timing};
 use crate::{FrameSource, InputSettings, Limits, LogError, LogFacts, Needs};
 
 /// One topic.
@@ -32,6 +32,8 @@ pub struct TopicFacts {
     pub image: Option<ImageFacts>,
     /// Frame id of the first message.
     pub frame_id: Option<String>,
+    /// When its images were captured; `None` with fewer than two.
+    pub timing: Option<Timing>,
 }
 
 /// The images of a topic.
@@ -54,8 +56,10 @@ pub struct Inspection {
     pub duration_s: f64,
     /// All topics.
     pub topics: Vec<TopicFacts>,
-    /// Median of depth stamp minus colour stamp over neighbouring images, s.
-    pub skew_s: Option<f64>,
+    /// How depth lies in time beside colour.
+    pub skew: Option<Skew>,
+    /// The transforms: each frame with its parent.
+    pub transforms: BTreeMap<String, String>,
     /// What a pipeline could use: `colour`, `depth`, `right`, `odometry`.
     pub usable: Vec<&'static str>,
     /// Why no frames can be made, if so.
@@ -68,6 +72,17 @@ pub struct Inspection {
     pub data_lost: bool,
 }
 
+/// A log that was looked into, ready to be read.
+pub struct Examination {
+    /// What is in it.
+    pub inspection: Inspection,
+    /// Its frames: with all that was asked for, else with what there is; `None` if
+    /// no frames can be made.
+    pub frames: Option<FrameSource>,
+    /// Why the frames are not those that were asked for.
+    pub refusal: Option<LogError>,
+}
+
 /// Looks into a log. A log without usable images is described all the same.
 ///
 /// # Errors
@@ -77,37 +92,60 @@ pub fn inspect(
     input: &InputSettings,
     limits: &Limits,
 ) -> Result<Inspection, LogError> {
+    examine(path, input, limits, Needs::default()).map(|examined| examined.inspection)
+}
+
+/// Looks into a log, and opens it for a pipeline that needs those images.
+///
+/// # Errors
+/// As [`inspect`]; what the log lacks is no error but
+/// [`Examination::refusal`].
+pub fn examine(
+    path: &Path,
+    input: &InputSettings,
+    limits: &Limits,
+    needs: Needs,
+) -> Result<Examination, LogError> {
     input.check()?;
     let scan = Arc::new(Scan::read(path, input.depth_unit_m, limits)?);
-    let source = FrameSource::of_scan(Arc::clone(&scan), input, limits, Needs::default());
-    let topics = scan.topics.iter().map(|(name, topic)| topic_facts(name, topic)).collect();
-    let first = scan.topics.values().map(|topic| topic.first_log_time).min().unwrap_or(0);
-    let last = scan.topics.values().map(|topic| topic.last_log_time).max().unwrap_or(0);
-    let mut found = Inspection {
-        facts: LogFacts {
-            path: scan.path.clone(),
-            bytes: scan.bytes,
-            sha256: scan.sha256.clone(),
-            ..LogFacts::default()
-        },
-        duration_s: last.saturating_sub(first) as f64 * 1e-9,
-        topics,
-        skew_s: None,
-        usable: Vec::new(),
-        unusable: None,
-        counters: scan.counters.clone(),
-        notes: scan.notes.clone(),
-        data_lost: scan.data_lost,
+    let open = |needs| FrameSource::of_scan(Arc::clone(&scan), input, limits, needs);
+    let (frames, refusal) = match open(needs) {
+        Ok(frames) => (Some(frames), None),
+        Err(refusal) => (open(Needs::default()).ok(), Some(refusal)),
     };
-    match source {
-        Ok(source) => found.describe(&scan, &source),
-        Err(error) => found.unusable = Some(error.to_string()),
+    let mut inspection = Inspection::of_scan(&scan);
+    match &frames {
+        Some(frames) => inspection.describe(&scan, frames, input.pair_tolerance_s),
+        None => inspection.unusable = refusal.as_ref().map(ToString::to_string),
     }
-    Ok(found)
+    Ok(Examination { inspection, frames, refusal })
 }
 
 impl Inspection {
-    fn describe(&mut self, scan: &Scan, source: &FrameSource) {
+    /// What shows without frames.
+    fn of_scan(scan: &Scan) -> Self {
+        let first = scan.topics.values().map(|topic| topic.first_log_time).min().unwrap_or(0);
+        let last = scan.topics.values().map(|topic| topic.last_log_time).max().unwrap_or(0);
+        Self {
+            facts: LogFacts {
+                path: scan.path.clone(),
+                bytes: scan.bytes,
+                sha256: scan.sha256.clone(),
+                ..LogFacts::default()
+            },
+            duration_s: last.saturating_sub(first) as f64 * 1e-9,
+            topics: scan.topics.iter().map(|(name, topic)| topic_facts(name, topic)).collect(),
+            skew: None,
+            transforms: scan.tf.parents(),
+            usable: Vec::new(),
+            unusable: None,
+            counters: scan.counters.clone(),
+            notes: scan.notes.clone(),
+            data_lost: scan.data_lost,
+        }
+    }
+
+    fn describe(&mut self, scan: &Scan, source: &FrameSource, tolerance_s: f64) {
         self.facts = source.facts().clone();
         self.notes = source.notes().to_vec();
         let facts = &self.facts;
@@ -121,11 +159,13 @@ impl Inspection {
         let stamps = |topic: &Option<String>| {
             topic.as_ref().and_then(|topic| scan.topics.get(topic)).map(|topic| &topic.stamps[..])
         };
-        if let (Some(colour), Some(depth)) =
-            (stamps(&facts.colour_topic), stamps(&facts.depth_topic))
-        {
-            self.skew_s = median_skew(colour, depth);
-        }
+        let both = stamps(&facts.colour_topic).zip(stamps(&facts.depth_topic));
+        self.skew = both.and_then(|(colour, depth)| Skew::between(colour, depth, tolerance_s));
+    }
+
+    /// The topic of that name.
+    pub fn topic(&self, name: &str) -> Option<&TopicFacts> {
+        self.topics.iter().find(|topic| topic.topic == name)
     }
 }
 
@@ -145,21 +185,8 @@ fn topic_facts(name: &str, topic: &Topic) -> TopicFacts {
         rate_hz: (topic.count > 1 && span > 0.0).then(|| (topic.count - 1) as f64 / span),
         image: topic.pixels.clone().map(|pixels| ImageFacts { pixels, size: topic.size, content }),
         frame_id: topic.frame_id.clone(),
+        timing: Timing::of(&topic.stamps),
     }
-}
-
-/// Median over the colour images of the offset to the nearest depth image.
-fn median_skew(colour: &[Stamp], depth: &[Stamp]) -> Option<f64> {
-    let mut depth = depth.to_vec();
-    depth.sort();
-    let nearest = |stamp: &Stamp| {
-        let after = depth.partition_point(|d| d < stamp);
-        let around = &depth[after.saturating_sub(1)..(after + 1).min(depth.len())];
-        around.iter().map(|d| d.seconds_since(*stamp)).min_by(|a, b| a.abs().total_cmp(&b.abs()))
-    };
-    let mut offsets: Vec<f64> = colour.iter().filter_map(nearest).collect();
-    offsets.sort_by(f64::total_cmp);
-    offsets.get(offsets.len() / 2).copied()
 }
 
 impl fmt::Display for Inspection {
@@ -203,8 +230,8 @@ impl Inspection {
         if let Some(baseline) = facts.baseline_m {
             writeln!(f, "  stereo baseline {baseline:.4} m")?;
         }
-        if let Some(skew) = self.skew_s {
-            writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew)?;
+        if let Some(skew) = self.skew {
+            writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew.median_s)?;
         }
         writeln!(f, "\na pipeline can use: {}", self.usable.join(", "))
     }

@@ -28,14 +28,16 @@ pub mod register;
 mod scan;
 mod source;
 pub mod tf;
+mod timing;
 mod topics;
 mod truth;
 pub mod write;
 
 pub use error::LogError;
 pub use input::{InputSettings, MountSettings};
-pub use inspect::{ImageFacts, Inspection, TopicFacts, inspect};
+pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use limits::Limits;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::Needs;
+pub use timing::{Skew, Timing};
 pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth};

@@ -69,6 +69,11 @@ impl TfBuffer {
         self.links.values_mut().for_each(|link| link.moving.clear());
     }
 
+    /// Each frame that has a parent, with it.
+    pub fn parents(&self) -> BTreeMap<String, String> {
+        self.links.iter().map(|(child, link)| (child.clone(), link.parent.clone())).collect()
+    }
+
     /// True if the frame is a child or a parent of something.
     pub fn knows(&self, frame: &str) -> bool {
         let frame = plain(frame);

@@ -320,6 +320,42 @@ fn the_pose_of_the_camera_can_be_given() {
     assert!(error.to_string().contains("[input.camera]"), "{error}");
 }
 
+#[test]
+fn the_given_pose_of_the_camera_goes_before_that_of_tf() {
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    log.colour(at(0.1));
+    let saved = log.save();
+    let mount = MountSettings { height_m: 0.7, ..MountSettings::default() };
+    let height = |camera| {
+        let input = InputSettings { camera, ..InputSettings::default() };
+        let needs = Needs::default();
+        let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), needs).unwrap();
+        source.next_frame().unwrap().frame.camera.height_m()
+    };
+    assert!((height(Some(mount)) - 0.7).abs() < 1e-12);
+    assert!((height(None) - 1.2).abs() < 1e-12);
+}
+
+#[test]
+fn depth_is_moved_onto_colour_as_the_settings_say() {
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    log.colour(at(0.1));
+    let values: Vec<f32> = (0..16 * 12).map(|i| 1.0 + i as f32).collect();
+    log.depth_of(at(0.1), "colour", 16, 12, &values);
+    let saved = log.save();
+    let input = InputSettings { depth_offset_px: [3, -2], ..InputSettings::default() };
+    let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), DEPTH).unwrap();
+    let frame = source.next_frame().unwrap().frame;
+    let depth = frame.depth().unwrap();
+    assert_eq!(depth.get(3, 0), Some(1.0 + 2.0 * 16.0));
+    assert_eq!(depth.get(15, 9), Some(1.0 + 11.0 * 16.0 + 12.0));
+    assert!(depth.get(2, 5).unwrap().is_nan() && depth.get(5, 10).unwrap().is_nan());
+}
+
 /// A floor 1.2 m below and a wall 4 m ahead of the colour camera, seen from a
 /// camera whose pose in the colour camera is given.
 fn room(from: &Camera, colour_from_camera: &Isometry3<f64>) -> DepthImage {

@@ -161,7 +161,7 @@ fn inspection_tells_skew_rates_and_poses() {
     let Some(folder) = logs() else { return };
     let found =
         inspect(&folder.join("um.mcap"), &InputSettings::default(), &Limits::default()).unwrap();
-    assert!((found.skew_s.unwrap() - 0.008).abs() < 1e-6);
+    assert!((found.skew.unwrap().median_s - 0.008).abs() < 1e-6);
     assert_eq!(found.usable, ["colour", "depth"]);
     let colour = found.topics.iter().find(|t| t.topic.ends_with("color/image_raw/compressed"));
     assert!((colour.unwrap().rate_hz.unwrap() - 4.0).abs() < 0.01);

@@ -23,7 +23,11 @@ pub(crate) fn fit(
         Cost::Mahalanobis => mahalanobis(track, detection, dt_s, settings),
         Cost::Overlap => {
             let overlap = overlap(&track.estimate.region, &detection.region, settings.overlap);
-            (overlap >= settings.min_overlap).then(|| Fit { cost: -overlap.ln(), log_volume: 0.0 })
+            let cost = match overlap >= settings.min_overlap {
+                true => Some(-overlap.ln()),
+                false => settings.compat_printed_cost.then_some(0.0),
+            };
+            cost.map(|cost| Fit { cost, log_volume: 0.0 })
         }
     }
 }
@@ -154,6 +158,31 @@ mod tests {
         let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
         let given = associate(&[&vague, &certain], &[&detection], fit, &settings);
         assert_eq!(given, [None, Some(0)]);
+    }
+
+    /// P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
+    #[test]
+    fn who_overlaps_is_given_what_overlaps_but_in_print_whatever_does_not() {
+        let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
+        let at = |x: f64| {
+            let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
+            track.estimate.region = boxed(x);
+            track
+        };
+        let tracks = [at(0.0), at(50.0)];
+        let seen = [2.0, 51.0].map(|x| Detection { region: boxed(x), ..person(3.0, 0.0) });
+        let given = |compat_printed_cost: bool| {
+            let settings = AssociationSettings {
+                cost: Cost::Overlap,
+                compat_printed_cost,
+                ..AssociationSettings::default()
+            };
+            let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+            let (tracks, seen) = ([&tracks[0], &tracks[1]], [&seen[0], &seen[1]]);
+            associate(&tracks, &seen, fit, &settings)
+        };
+        assert_eq!(given(false), [Some(0), Some(1)]);
+        assert_eq!(given(true), [Some(1), Some(0)]);
     }
 
     #[test]

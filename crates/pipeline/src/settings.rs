@@ -121,6 +121,9 @@ pub struct AssociationSettings {
     pub min_overlap: f64,
     /// Overlap: `iou` or `dice`.
     pub overlap: Overlap,
+    /// Overlap, as P2 prints it (eq. 10): a pair that overlaps less costs nothing, and
+    /// so comes first.
+    pub compat_printed_cost: bool,
     /// What it costs to leave a track without a detection, as a multiple of
     /// the cost at the gate.
     pub miss_factor: f64,
@@ -143,6 +146,7 @@ impl Default for AssociationSettings {
             gate_speed_mps: 1.5,
             min_overlap: 0.3,
             overlap: Overlap::Iou,
+            compat_printed_cost: false,
             miss_factor: 1.0,
             same_person_m: 0.25,
             same_person_iou: 0.5,

@@ -128,7 +128,7 @@ impl Lab<'_> {
     }
 }
 
-fn read(path: &Path) -> Result<String, ReproduceError> {
+pub(crate) fn read(path: &Path) -> Result<String, ReproduceError> {
     let unreadable = |error: std::io::Error| ReproduceError::Unreadable {
         path: path.display().to_string(),
         why: error.to_string(),

@@ -16,6 +16,7 @@ mod findings;
 mod joint_particle;
 mod lab;
 mod omni_appearance;
+mod recorded;
 mod rgbd_compressive;
 mod scatter;
 mod stereo;

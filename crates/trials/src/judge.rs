@@ -62,15 +62,21 @@ impl Judge {
     fn frame(&self, trial: &Trial, moment: &Moment, report: &FrameReport) -> Frame {
         let by_box = self.similarity == Similarity::Iou;
         let truths = moment.truth.iter().map(|person| self.truth(person));
-        let tracks = report.tracks.iter().filter(|t| t.confirmed && (t.seen || self.coasting));
-        let size = (trial.camera.width, trial.camera.height);
-        let reports = tracks.map(|track| reported(track, size));
         Frame {
             stamp_ns: moment.stamp.nanos() as i64,
             truths: truths.filter(|t| !by_box || t.region.is_some()).collect(),
-            reports: reports.filter(|r| !by_box || r.region.is_some()).collect(),
+            reports: self.reports(report, (trial.camera.width, trial.camera.height)),
             ignore_regions: Vec::new(),
         }
+    }
+
+    /// What counts of what a pipeline said of a frame, of an image with so many columns
+    /// and rows.
+    pub fn reports(&self, report: &FrameReport, size: (usize, usize)) -> Vec<Report> {
+        let by_box = self.similarity == Similarity::Iou;
+        let tracks = report.tracks.iter().filter(|t| t.confirmed && (t.seen || self.coasting));
+        let reports = tracks.map(|track| reported(track, size));
+        reports.filter(|r| !by_box || r.region.is_some()).collect()
     }
 
     fn truth(&self, person: &tagalong_sim::Truth) -> Truth {

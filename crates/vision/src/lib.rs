@@ -5,6 +5,8 @@
 pub mod ground;
 mod integral;
 mod panorama;
+pub mod quality;
+pub mod registration;
 mod row_sums;
 
 pub use integral::Integral;

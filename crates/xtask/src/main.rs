@@ -1,10 +1,12 @@
 //! Commands for those who work on Tagalong: `cargo xtask --help`.
 
 mod ci;
+mod docs;
 mod metadata;
 mod new_plugin;
 mod tidy;
 mod try_out;
+mod walk_through;
 mod workspace;
 
 use std::process::ExitCode;
@@ -29,6 +31,13 @@ enum Command {
     NewPlugin(NewPlugin),
     /// Fails on wrong dependency arrows, unlisted plugins, stale paths and the like
     Tidy,
+    /// Fills the parts of documents that commands print
+    Docs {
+        /// Fill the slow parts whose command contains this, for example `stereo-svm-ekf`,
+        /// instead of the fast ones.
+        #[arg(long, value_name = "PART")]
+        slow: Option<String>,
+    },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -66,6 +75,7 @@ fn run(command: Command) -> Result<()> {
             Ok(())
         }
         Command::NewPlugin(_) => try_out::try_out(&workspace),
+        Command::Docs { slow } => docs::fill(&workspace, slow.as_deref()),
         Command::Tidy => tidy::tidy(&workspace),
         Command::Ci => ci::ci(&workspace),
     }

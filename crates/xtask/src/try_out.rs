@@ -1,5 +1,5 @@
-//! Generates one plugin of each kind in a copy of the workspace and demands of
-//! them what is demanded of every plugin.
+//! Generates one plugin of each kind in a copy of the workspace, and the one of
+//! the walk-through, and demands of them what is demanded of every plugin.
 
 use std::fs;
 use std::process::Command;
@@ -9,6 +9,7 @@ use clap::ValueEnum as _;
 
 use crate::metadata::Metadata;
 use crate::new_plugin::{Kind, create, format};
+use crate::walk_through;
 use crate::workspace::{Workspace, succeed};
 
 /// Where the copy lives: where `cargo clean` removes it.
@@ -32,6 +33,9 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
         format(&copy, &name)?;
         names.push(name);
     }
+    walk_through::walk(&copy)?;
+    format(&copy, walk_through::NAME)?;
+    names.push(walk_through::NAME.to_owned());
     let packages: Vec<String> =
         names.iter().flat_map(|name| ["-p".to_owned(), format!("tagalong-{name}")]).collect();
     let cargo = |step: &str, args: &[&str], packages: &[String]| -> Result<()> {
@@ -59,7 +63,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
             cargo(&format!("{config} is a valid config"), &run, &[])?;
         }
     }
-    eprintln!("new-plugin --try: all four kinds work");
+    eprintln!("new-plugin --try: all four kinds work, and so does the walk-through");
     Ok(())
 }
 

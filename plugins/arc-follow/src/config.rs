@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
 
 /// The way to the target (P1, Figure 7; P4, Figure 8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -102,28 +102,19 @@ impl Config {
     }
 
     fn check_numbers(&self) -> Result<()> {
-        let numbers = [
-            ("path_gain", self.path_gain, false),
-            ("stand_off_m", self.stand_off_m, true),
-            ("range_gain_per_s", self.range_gain_per_s, false),
-            ("max_acceleration", self.max_acceleration, false),
-            ("max_deceleration", self.max_deceleration, false),
-            ("bearing_gain_per_s", self.bearing_gain_per_s, true),
-            ("max_turn_rate", self.max_turn_rate, false),
-            ("max_curvature", self.max_curvature, true),
-            ("min_range_m", self.min_range_m, false),
-            ("max_unseen_s", self.max_unseen_s, false),
-            ("latency_s", self.latency_s, true),
-        ];
-        for (key, value, may_be_zero) in numbers {
-            let least = if may_be_zero { 0.0 } else { 1.0 / MOST };
-            if !(least..=MOST).contains(&value) {
-                let bound = if may_be_zero { "at least 0" } else { "positive" };
-                let message = format!("`{key}` must be {bound} and below {MOST:e}, not {value}");
-                return Err(Error::Settings(message));
-            }
-        }
-        Ok(())
+        check_ranges(&[
+            ("path_gain", self.path_gain, POSITIVE),
+            ("stand_off_m", self.stand_off_m, NOT_NEGATIVE),
+            ("range_gain_per_s", self.range_gain_per_s, POSITIVE),
+            ("max_acceleration", self.max_acceleration, POSITIVE),
+            ("max_deceleration", self.max_deceleration, POSITIVE),
+            ("bearing_gain_per_s", self.bearing_gain_per_s, NOT_NEGATIVE),
+            ("max_turn_rate", self.max_turn_rate, POSITIVE),
+            ("max_curvature", self.max_curvature, NOT_NEGATIVE),
+            ("min_range_m", self.min_range_m, POSITIVE),
+            ("max_unseen_s", self.max_unseen_s, POSITIVE),
+            ("latency_s", self.latency_s, NOT_NEGATIVE),
+        ])
     }
 
     /// k of P1, section 3: path A is path C with a gain of one; path B drives

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
 
 /// Settings of the controller `clear-follow`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -72,31 +72,23 @@ pub(crate) const MOST: f64 = 1e6;
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let numbers = [
-            ("stand_off_m", self.stand_off_m, true),
-            ("range_gain_per_s", self.range_gain_per_s, false),
-            ("bearing_gain_per_s", self.bearing_gain_per_s, false),
-            ("max_turn_rate", self.max_turn_rate, false),
-            ("max_acceleration", self.max_acceleration, false),
-            ("max_deceleration", self.max_deceleration, false),
-            ("max_unseen_s", self.max_unseen_s, false),
-            ("latency_s", self.latency_s, true),
-            ("horizon_s", self.horizon_s, false),
-            ("radius_m", self.radius_m, false),
-            ("room_m", self.room_m, false),
-            ("memory_s", self.memory_s, true),
-            ("room_weight", self.room_weight, true),
-            ("sight_weight", self.sight_weight, true),
-            ("turn_weight", self.turn_weight, true),
-        ];
-        for (key, value, may_be_zero) in numbers {
-            let least = if may_be_zero { 0.0 } else { 1.0 / MOST };
-            if !(least..=MOST).contains(&value) {
-                let bound = if may_be_zero { "at least 0" } else { "positive" };
-                let message = format!("`{key}` must be {bound} and below {MOST:e}, not {value}");
-                return Err(Error::Settings(message));
-            }
-        }
+        check_ranges(&[
+            ("stand_off_m", self.stand_off_m, NOT_NEGATIVE),
+            ("range_gain_per_s", self.range_gain_per_s, POSITIVE),
+            ("bearing_gain_per_s", self.bearing_gain_per_s, POSITIVE),
+            ("max_turn_rate", self.max_turn_rate, POSITIVE),
+            ("max_acceleration", self.max_acceleration, POSITIVE),
+            ("max_deceleration", self.max_deceleration, POSITIVE),
+            ("max_unseen_s", self.max_unseen_s, POSITIVE),
+            ("latency_s", self.latency_s, NOT_NEGATIVE),
+            ("horizon_s", self.horizon_s, POSITIVE),
+            ("radius_m", self.radius_m, POSITIVE),
+            ("room_m", self.room_m, POSITIVE),
+            ("memory_s", self.memory_s, NOT_NEGATIVE),
+            ("room_weight", self.room_weight, NOT_NEGATIVE),
+            ("sight_weight", self.sight_weight, NOT_NEGATIVE),
+            ("turn_weight", self.turn_weight, NOT_NEGATIVE),
+        ])?;
         let [low, high] = self.heights_m;
         if !(0.0 <= low && low < high && high <= MOST) {
             return Err(Error::Settings("`heights_m` must be two rising heights".into()));

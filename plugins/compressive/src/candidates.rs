@@ -1,11 +1,6 @@
 //! Which boxes are looked at.
 
-use tagalong_core::DepthImage;
-
-/// Places a side at which the depth of a box is read.
-const TAPS: usize = 5;
-/// Readings that a box needs to show anything.
-const LEAST_READINGS: usize = 5;
+use tagalong_core::Rect;
 
 /// A box in whole pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,27 +11,10 @@ pub(crate) struct Pixels {
     pub(crate) height: usize,
 }
 
-/// The depth of what fills the middle of a box, m: the median of the readings
-/// in its central half; `None` without enough of them.
-pub(crate) fn surface_m(depth: &DepthImage, of: Pixels) -> Option<f64> {
-    let mut readings = [0.0_f32; TAPS * TAPS];
-    let mut count = 0;
-    let tap = |from: i64, size: usize, i: usize| from + (size * (2 + i) / (TAPS + 3)) as i64;
-    for row in 0..TAPS {
-        for column in 0..TAPS {
-            let (x, y) = (tap(of.x, of.width, column), tap(of.y, of.height, row));
-            if let Some(metres) = depth.get(x, y).filter(|m| m.is_finite() && *m > 0.0) {
-                readings[count] = metres;
-                count += 1;
-            }
-        }
+impl Pixels {
+    pub(crate) fn rect(self) -> Rect {
+        Rect::new(self.x as f64, self.y as f64, self.width as f64, self.height as f64)
     }
-    let readings = &mut readings[..count];
-    if count < LEAST_READINGS {
-        return None;
-    }
-    let (_, median, _) = readings.select_nth_unstable_by(count / 2, f32::total_cmp);
-    Some(f64::from(*median))
 }
 
 /// Offsets in a disc, nearest rows first come first, every `step` pixels.

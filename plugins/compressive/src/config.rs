@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{ANY, Result, check_ranges};
 
 /// Settings of `compressive`. Distances in the image are in widths of the box:
 /// a pixel of the papers, whose boxes are some 64 pixels wide, is 0.016.
@@ -102,52 +102,28 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let positive = [
-            ("min_sigma", self.min_sigma),
-            ("search_radius", self.search_radius),
-            ("coarse_step", self.coarse_step),
-            ("positive_radius", self.positive_radius),
-            ("negative_from", self.negative_from),
-            ("depth_tolerance_m", self.depth_tolerance_m),
-            ("sigma_box", self.sigma_box),
-            ("sigma_depth_m", self.sigma_depth_m),
-        ];
-        let wrong = |key: &str, must: &str| Err(Error::Settings(format!("`{key}` must {must}")));
-        if let Some((key, _)) = positive.into_iter().find(|(_, v)| !(*v > 0.0 && *v <= 100.0)) {
-            return wrong(key, "be positive");
-        }
-        let fractions = [
-            ("memory", self.memory),
-            ("anchored_memory", self.anchored_memory),
-            ("max_scale_change", self.max_scale_change),
-        ];
-        if let Some((key, _)) = fractions.into_iter().find(|(_, v)| !(0.0..1.0).contains(v)) {
-            return wrong(key, "lie between 0 and 1");
-        }
-        let finite = [self.hidden_by_m, self.min_confidence, self.learn_confidence, self.min_lead];
-        match self {
-            Self { features, .. } if !(1..=1000).contains(features) => {
-                wrong("features", "lie between 1 and 1000")
-            }
-            Self { most_rectangles, .. } if !(2..=16).contains(most_rectangles) => {
-                wrong("most_rectangles", "lie between 2 and 16")
-            }
-            Self { negatives, .. } if !(2..=1000).contains(negatives) => {
-                wrong("negatives", "lie between 2 and 1000")
-            }
-            _ if self.search_radius / self.coarse_step > 100.0 => {
-                wrong("coarse_step", "be at least a hundredth of `search_radius`")
-            }
-            _ if !(0.0..=1.0).contains(&self.fine_radius) => {
-                wrong("fine_radius", "lie between 0 and 1")
-            }
-            _ if !(self.negative_to > self.negative_from && self.negative_to <= 10.0) => {
-                wrong("negative_to", "be larger than `negative_from`, and at most 10")
-            }
-            _ if !finite.iter().all(|v| v.is_finite()) || !self.score.is_finite() => {
-                wrong("hidden_by_m, min_confidence, learn_confidence, min_lead, score", "be finite")
-            }
-            _ => Ok(()),
-        }
+        check_ranges(&[
+            ("features", self.features as f64, 1.0..=1000.0),
+            ("most_rectangles", self.most_rectangles as f64, 2.0..=16.0),
+            ("memory", self.memory, 0.0..=0.999),
+            ("anchored_memory", self.anchored_memory, 0.0..=0.999),
+            ("min_sigma", self.min_sigma, 1e-6..=100.0),
+            ("search_radius", self.search_radius, 1e-6..=100.0),
+            ("coarse_step", self.coarse_step, 0.01 * self.search_radius..=100.0),
+            ("fine_radius", self.fine_radius, 0.0..=1.0),
+            ("positive_radius", self.positive_radius, 1e-6..=100.0),
+            ("negatives", self.negatives as f64, 2.0..=1000.0),
+            ("negative_from", self.negative_from, 1e-6..=10.0),
+            ("negative_to", self.negative_to, self.negative_from..=10.0),
+            ("depth_tolerance_m", self.depth_tolerance_m, 1e-6..=100.0),
+            ("hidden_by_m", self.hidden_by_m, ANY),
+            ("max_scale_change", self.max_scale_change, 0.0..=0.999),
+            ("min_confidence", self.min_confidence, ANY),
+            ("learn_confidence", self.learn_confidence, ANY),
+            ("min_lead", self.min_lead, ANY),
+            ("score", self.score, ANY),
+            ("sigma_box", self.sigma_box, 1e-6..=100.0),
+            ("sigma_depth_m", self.sigma_depth_m, 1e-6..=100.0),
+        ])
     }
 }

@@ -9,7 +9,7 @@ use tagalong_core::{
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
-use crate::candidates::{Pixels, disc, ring, surface_m};
+use crate::candidates::{Pixels, disc, ring};
 use crate::{Appearance, Config, Features, NAME, Scaled};
 
 /// Boxes are at least and at most so wide and high, pixels.
@@ -125,6 +125,7 @@ impl Compressive {
             Some(_) => None,
         };
         dropped.count(funnel);
+        funnel.drop_many("box: another is surer", scratch.coarse.len().saturating_sub(1) as u64);
         if let Some(test) = test {
             funnel.drop_at(test, expected);
             return None;
@@ -132,9 +133,9 @@ impl Compressive {
         let best = best?;
         let (width, height) = target.scaled.size();
         let of = Pixels { x: best.x, y: best.y, width, height };
-        let region = Rect::new(best.x as f64, best.y as f64, width as f64, height as f64);
+        let region = of.rect();
         target.found = Some((region, best.confidence));
-        let face_m = view.depth.and_then(|depth| surface_m(depth, of));
+        let face_m = view.depth.and_then(|depth| depth.surface_m(&of.rect()));
         Some(sighting(config, view.camera, track, region, face_m))
     }
 
@@ -146,7 +147,7 @@ impl Compressive {
         let Some(memory) = memory(config, track, found, !target.is_taught) else { return };
         let Some(of) = target.fit_to(features, view, &track.estimate.region) else { return };
         let expected_m = view.expected_m(track);
-        let shown = view.depth.and_then(|depth| surface_m(depth, of));
+        let shown = view.depth.and_then(|depth| depth.surface_m(&of.rect()));
         let is_there = match (expected_m, shown) {
             (Some(expected), Some(shown)) => (shown - expected).abs() < config.depth_tolerance_m,
             (Some(_), None) => false,
@@ -338,7 +339,7 @@ impl Hunt<'_> {
             return true;
         }
         let (width, height) = self.target.scaled.size();
-        match surface_m(depth, Pixels { x, y, width, height }) {
+        match depth.surface_m(&Pixels { x, y, width, height }.rect()) {
             Some(m) if (m - expected).abs() < self.config.depth_tolerance_m => return true,
             Some(m) if expected - m > self.config.hidden_by_m => dropped.nearer += 1,
             _ => dropped.farther += 1,

@@ -1,35 +1,33 @@
-//! A cascade for rows of windows: features are offsets into sums.
+//! A cascade for windows side by side: features are offsets into sums.
 
 use crate::cascade::{Cascade, Feature, Next, Node, Part, Split, Tree};
 use crate::level::Level;
 
+/// Windows side by side that are judged together.
+pub(crate) const LANES: usize = 16;
+/// So many windows of those are judged one by one.
+const FEW: u32 = 2;
 /// Less contrast than this, grey values, and a window is empty.
 const LEAST_CONTRAST: f64 = 10.0;
 
 /// The four corners of a rectangle, as offsets from a window's first sum.
-pub(crate) type Corners = [usize; 4];
+pub(crate) type Corners = [u32; 4];
+/// The rectangles of a feature and their weights; the last weight may be 0.
+pub(crate) type Haar = [(Corners, f32); 3];
 
 /// A feature of windows anywhere in an image.
 #[derive(Clone, Debug)]
 enum Look {
-    /// Rectangles and weights; the last weight may be 0.
-    Haar([(Corners, f32); 3]),
+    Haar(Haar),
     /// 4x4 corners of 3x3 blocks.
-    Binary([usize; 16]),
-}
-
-#[derive(Clone, Debug)]
-struct Stump {
-    parts: [(Corners, f32); 3],
-    threshold: f32,
-    values: [f32; 2],
+    Binary([u32; 16]),
 }
 
 /// A question about rectangles, and one more on either side.
 #[derive(Clone, Debug)]
 struct Pair {
     /// The first question, the one if yes, and the one if not.
-    parts: [[(Corners, f32); 3]; 3],
+    parts: [Haar; 3],
     thresholds: [f32; 3],
     /// Yes and yes, yes and no, no and yes, no and no.
     values: [f32; 4],
@@ -38,7 +36,11 @@ struct Pair {
 #[derive(Clone, Debug)]
 enum Weak {
     /// One question about rectangles.
-    Stump(Stump),
+    Stump {
+        parts: Haar,
+        threshold: f32,
+        values: [f32; 2],
+    },
     /// Two of them.
     Pair(Box<Pair>),
     Tree(Tree),
@@ -51,7 +53,7 @@ impl Weak {
 }
 
 /// The rectangles and the threshold of a node.
-fn asked(node: &Node, looks: &[Look]) -> Option<([(Corners, f32); 3], f32)> {
+fn asked(node: &Node, looks: &[Look]) -> Option<(Haar, f32)> {
     match (looks.get(node.feature)?, node.split) {
         (Look::Haar(parts), Split::Below(threshold)) => Some((*parts, threshold)),
         _ => None,
@@ -61,7 +63,7 @@ fn asked(node: &Node, looks: &[Look]) -> Option<([(Corners, f32); 3], f32)> {
 fn stump(tree: &Tree, looks: &[Look]) -> Option<Weak> {
     let [Node { next: [Next::Leaf(yes), Next::Leaf(no)], .. }] = tree[..] else { return None };
     let (parts, threshold) = asked(&tree[0], looks)?;
-    Some(Weak::Stump(Stump { parts, threshold, values: [yes, no] }))
+    Some(Weak::Stump { parts, threshold, values: [yes, no] })
 }
 
 /// A leaf where a question could be asks one that everybody answers with yes.
@@ -93,23 +95,10 @@ struct Stage {
     weak: Vec<Weak>,
 }
 
-/// The windows of a row that are still in question.
-#[derive(Clone, Debug, Default)]
-pub struct Row {
-    /// Columns, ascending.
-    pub columns: Vec<u32>,
-    /// One through the contrast of each window.
-    contrast: Vec<f32>,
-    /// Sums of the current stage.
-    pub sums: Vec<f32>,
-    /// Scratch: values of features.
-    values: [Vec<f32>; 3],
-}
-
-/// A cascade whose features are offsets for one length of rows.
-#[derive(Clone, Debug, Default)]
+/// A cascade whose features are offsets for one layout of sums.
+#[derive(Clone, Debug)]
 pub struct Compiled {
-    stride: usize,
+    layout: (usize, usize),
     looks: Vec<Look>,
     stages: Vec<Stage>,
     middle: Corners,
@@ -117,14 +106,28 @@ pub struct Compiled {
     is_normalised: bool,
 }
 
+/// Neighbouring windows, and which of them are still in question.
+#[derive(Clone, Copy, Debug)]
+pub struct Block {
+    /// Where the sums of the first one begin.
+    start: usize,
+    /// One through the contrast of each window; 0 for empty ones.
+    contrast: [f32; LANES],
+    /// Sums of the current stage.
+    sums: [f32; LANES],
+    /// A bit for each window.
+    pub alive: u32,
+}
+
 impl Compiled {
-    /// Offsets for rows of `stride` sums; `cascade` was checked.
-    pub fn new(cascade: &Cascade, stride: usize) -> Self {
+    /// Offsets for the sums of a level; `cascade` was checked.
+    pub fn new(cascade: &Cascade, level: &Level) -> Self {
         let look = |feature: &Feature| match feature {
-            Feature::Haar(parts) => Look::Haar(rectangles(parts, stride)),
+            Feature::Haar(parts) => Look::Haar(rectangles(parts, level)),
             Feature::Binary(part) => {
                 let at = |k: usize| {
-                    (part.y + k / 4 * part.height) * stride + part.x + k % 4 * part.width
+                    let (x, y) = (part.x + k % 4 * part.width, part.y + k / 4 * part.height);
+                    level.offset(x, y) as u32
                 };
                 Look::Binary(std::array::from_fn(at))
             }
@@ -138,144 +141,114 @@ impl Compiled {
         let stages = stages.collect();
         let middle = cascade.middle();
         Self {
-            stride,
+            layout: level.layout(),
             stages,
             looks,
-            middle: corners(&middle, stride),
+            middle: corners(&middle, level),
             area: (middle.width * middle.height) as f64,
             is_normalised: cascade.is_normalised(),
         }
     }
 
-    /// Sums in a row that the offsets are for.
-    pub fn stride(&self) -> usize {
-        self.stride
+    /// True if the offsets are those of a level's sums.
+    pub fn fits(&self, level: &Level) -> bool {
+        self.layout == level.layout()
     }
 
-    /// Takes `count` windows of row `y`, `step` columns apart from `first` on, and
-    /// measures their contrast.
-    pub fn start(
-        &self,
-        level: &Level,
-        (first, y): (usize, usize),
-        step: usize,
-        row: &mut Row,
-        count: usize,
-    ) {
-        let start = y * self.stride + first;
-        row.columns.clear();
-        row.columns.extend((0..count).map(|i| (first + i * step) as u32));
-        row.contrast.clear();
-        row.contrast.resize(count, 1.0);
+    /// The windows from (x, y) on, after the first stage; all of them are in question,
+    /// whatever it says. `x` is a column that a window can begin at.
+    pub fn start(&self, level: &Level, (x, y): (usize, usize)) -> Block {
+        let start = level.offset(x, y);
+        let mut block = Block {
+            start,
+            contrast: [1.0; LANES],
+            sums: [0.0; LANES],
+            alive: u32::MAX >> (32 - LANES),
+        };
         if self.is_normalised {
             let (sums, squares) = (&level.sums()[start..], &level.squares()[start..]);
-            contrasts(sums, squares, &self.middle, self.area, step, &mut row.contrast);
+            contrasts(sums, squares, &self.middle, self.area, &mut block.contrast);
+        }
+        self.judge(0, level, &mut block);
+        block
+    }
+
+    /// True if a window is not empty.
+    pub fn is_worth_it(block: &Block, lane: usize) -> bool {
+        block.contrast[lane] != 0.0
+    }
+
+    /// True if a window's sum reaches what the stage wants.
+    pub fn passes(&self, stage: usize, block: &Block, lane: usize) -> bool {
+        block.sums[lane] >= self.stages[stage].threshold
+    }
+
+    /// By how much a window's sum of the last stage is larger than it has to be.
+    pub fn margin(&self, block: &Block, lane: usize) -> f32 {
+        self.stages.last().map_or(0.0, |stage| block.sums[lane] - stage.threshold)
+    }
+
+    /// Drops the windows in question that do not pass all stages but the first.
+    pub fn finish(&self, level: &Level, block: &mut Block) {
+        let mut stage = 1;
+        while stage < self.stages.len() && block.alive.count_ones() > FEW {
+            self.judge(stage, level, block);
+            block.keep(|block, lane| self.passes(stage, block, lane));
+            stage += 1;
+        }
+        if stage < self.stages.len() {
+            let sums = &level.sums()[block.start..];
+            block.keep(|block, lane| {
+                let sum = self.alone(stage, &sums[lane..], block.contrast[lane]);
+                sum.map(|sum| block.sums[lane] = sum).is_some()
+            });
         }
     }
 
-    /// The sums of a stage for all windows of [`Compiled::start`].
-    pub fn all(
-        &self,
-        stage: usize,
-        level: &Level,
-        (first, y): (usize, usize),
-        step: usize,
-        row: &mut Row,
-    ) {
-        let sums = &level.sums()[y * self.stride + first..];
-        let count = row.columns.len();
-        row.sums.clear();
-        row.sums.resize(count, 0.0);
+    /// The sums of a stage for all windows of a block.
+    fn judge(&self, stage: usize, level: &Level, block: &mut Block) {
+        let sums = &level.sums()[block.start..];
+        block.sums = [0.0; LANES];
         for weak in &self.stages[stage].weak {
             match weak {
-                Weak::Stump(stump) => {
-                    let [values, ..] = &mut row.values;
-                    fill(values, &stump.parts, sums, step, count);
-                    decide(values, &row.contrast, stump, &mut row.sums);
+                Weak::Stump { parts, threshold, values } => {
+                    add_stump(parts, *threshold, *values, sums, &block.contrast, &mut block.sums);
                 }
-                Weak::Pair(pair) => {
-                    for (values, parts) in row.values.iter_mut().zip(&pair.parts) {
-                        fill(values, parts, sums, step, count);
-                    }
-                    decide_pair(&row.values, &row.contrast, pair, &mut row.sums);
-                }
+                Weak::Pair(pair) => add_pair(pair, sums, &block.contrast, &mut block.sums),
                 Weak::Tree(tree) => {
-                    let windows = row.contrast.iter().zip(&mut row.sums).enumerate();
-                    for (i, (contrast, sum)) in windows {
-                        *sum += self.leaf(tree, &sums[i * step..], *contrast);
+                    for (lane, sum) in block.sums.iter_mut().enumerate() {
+                        *sum += self.leaf(tree, &sums[lane..], block.contrast[lane]);
                     }
                 }
             }
         }
     }
 
-    /// True if it pays to judge all windows of a row by a stage, so that neighbours
-    /// are judged at once, though only `alive` of `count` are still in question.
-    pub fn pays(&self, stage: usize, alive: usize, count: usize) -> bool {
-        let is_flat = |weak: &Weak| !matches!(weak, Weak::Tree(_));
-        self.stages.get(stage).is_some_and(|s| s.weak.iter().all(is_flat)) && 6 * alive > count
-    }
-
-    /// True if a window of [`Compiled::start`] is not empty.
-    pub fn is_worth_it(row: &Row, window: usize) -> bool {
-        row.contrast[window] != 0.0
-    }
-
-    /// True if the sum of a window reaches what the stage wants.
-    pub fn passes(&self, stage: usize, sum: f32) -> bool {
-        sum >= self.stages[stage].threshold
-    }
-
-    /// By how much a sum of the last stage is larger than it has to be.
-    pub fn margin(&self, sum: f32) -> f32 {
-        self.stages.last().map_or(0.0, |stage| sum - stage.threshold)
-    }
-
-    /// Keeps the `chosen` windows, and of those the ones that pass all stages from
-    /// `stage` on.
-    pub fn rest(&self, stage: usize, level: &Level, y: usize, row: &mut Row, chosen: &[usize]) {
-        for (to, from) in chosen.iter().enumerate() {
-            row.columns[to] = row.columns[*from];
-            row.contrast[to] = row.contrast[*from];
-            row.sums[to] = row.sums[*from];
-        }
-        row.truncate(chosen.len());
-        let sums = &level.sums()[y * self.stride..];
-        for stage in self.stages.iter().skip(stage) {
-            if row.columns.is_empty() {
-                return;
+    /// The sum of the last stage for one window; `None` if it fails a stage from
+    /// `first` on.
+    fn alone(&self, first: usize, sums: &[u32], contrast: f32) -> Option<f32> {
+        let mut last = 0.0;
+        for stage in &self.stages[first..] {
+            last = stage.weak.iter().map(|weak| self.value(weak, sums, contrast)).sum();
+            if last < stage.threshold {
+                return None;
             }
-            row.sums.fill(0.0);
-            for weak in &stage.weak {
-                self.add_weak(weak, sums, row);
-            }
-            row.keep(stage.threshold);
         }
+        Some(last)
     }
 
-    fn add_weak(&self, weak: &Weak, sums: &[u32], row: &mut Row) {
-        let windows = row.columns.iter().zip(&row.contrast).zip(&mut row.sums);
+    fn value(&self, weak: &Weak, sums: &[u32], contrast: f32) -> f32 {
         match weak {
-            Weak::Stump(Stump { parts, threshold, values }) => {
-                for ((column, contrast), sum) in windows {
-                    let value = haar(parts, &sums[*column as usize..]) * contrast;
-                    *sum += if value < *threshold { values[0] } else { values[1] };
-                }
+            Weak::Stump { parts, threshold, values } => {
+                values[usize::from(haar(parts, sums) * contrast >= *threshold)]
             }
             Weak::Pair(pair) => {
                 let Pair { parts, thresholds, values } = &**pair;
-                for ((column, contrast), sum) in windows {
-                    let sums = &sums[*column as usize..];
-                    let is_no = |k: usize| haar(&parts[k], sums) * contrast >= thresholds[k];
-                    let side = usize::from(is_no(0));
-                    *sum += values[2 * side + usize::from(is_no(1 + side))];
-                }
+                let is_no = |k: usize| haar(&parts[k], sums) * contrast >= thresholds[k];
+                let side = usize::from(is_no(0));
+                values[2 * side + usize::from(is_no(1 + side))]
             }
-            Weak::Tree(tree) => {
-                for ((column, contrast), sum) in windows {
-                    *sum += self.leaf(tree, &sums[*column as usize..], *contrast);
-                }
-            }
+            Weak::Tree(tree) => self.leaf(tree, sums, contrast),
         }
     }
 
@@ -302,45 +275,43 @@ impl Compiled {
     }
 }
 
-impl Row {
-    fn truncate(&mut self, count: usize) {
-        self.columns.truncate(count);
-        self.contrast.truncate(count);
-        self.sums.truncate(count);
+impl Block {
+    /// The windows in question, from left to right.
+    pub fn lanes(&self) -> impl Iterator<Item = usize> + use<> {
+        let alive = self.alive;
+        (0..LANES).filter(move |lane| alive >> lane & 1 == 1)
     }
 
-    /// Drops the windows whose sums are below the threshold.
-    fn keep(&mut self, threshold: f32) {
-        let mut kept = 0;
-        for i in 0..self.columns.len() {
-            self.columns[kept] = self.columns[i];
-            self.contrast[kept] = self.contrast[i];
-            self.sums[kept] = self.sums[i];
-            kept += usize::from(self.sums[i] >= threshold);
+    /// Drops windows that are in question.
+    pub fn keep(&mut self, mut is_good: impl FnMut(&mut Self, usize) -> bool) {
+        for lane in self.lanes() {
+            if !is_good(self, lane) {
+                self.alive &= !(1 << lane);
+            }
         }
-        self.truncate(kept);
     }
 }
 
-fn corners(part: &Part, stride: usize) -> Corners {
-    let at = |x: usize, y: usize| y * stride + x;
+fn corners(part: &Part, level: &Level) -> Corners {
     let (right, bottom) = (part.x + part.width, part.y + part.height);
-    [at(part.x, part.y), at(right, part.y), at(part.x, bottom), at(right, bottom)]
+    [(part.x, part.y), (right, part.y), (part.x, bottom), (right, bottom)]
+        .map(|(x, y)| level.offset(x, y) as u32)
 }
 
-pub(crate) fn rectangles(parts: &[(Part, f32)], stride: usize) -> [(Corners, f32); 3] {
+pub(crate) fn rectangles(parts: &[(Part, f32)], level: &Level) -> Haar {
     let mut out = [([0; 4], 0.0); 3];
     for (out, (part, weight)) in out.iter_mut().zip(parts) {
-        *out = (corners(part, stride), *weight);
+        *out = (corners(part, level), *weight);
     }
     out
 }
 
-fn sum(sums: &[u32], [a, b, c, d]: &Corners) -> u32 {
-    sums[*a].wrapping_sub(sums[*b]).wrapping_sub(sums[*c]).wrapping_add(sums[*d])
+fn sum(sums: &[u32], corners: &Corners) -> u32 {
+    let [a, b, c, d] = corners.map(|corner| sums[corner as usize]);
+    a.wrapping_sub(b).wrapping_sub(c).wrapping_add(d)
 }
 
-pub(crate) fn haar(parts: &[(Corners, f32); 3], sums: &[u32]) -> f32 {
+pub(crate) fn haar(parts: &Haar, sums: &[u32]) -> f32 {
     let [first, second, third] = parts;
     let of = |(corners, weight): &(Corners, f32)| weight * sum(sums, corners) as i32 as f32;
     let two = of(first) + of(second);
@@ -352,90 +323,81 @@ pub(crate) fn haar(parts: &[(Corners, f32); 3], sums: &[u32]) -> f32 {
 const AROUND: [usize; 8] = [0, 1, 2, 6, 10, 9, 8, 4];
 const MIDDLE: usize = 5;
 
-fn pattern(corners: &[usize; 16], sums: &[u32]) -> usize {
+fn pattern(corners: &[u32; 16], sums: &[u32]) -> usize {
     let block = |k: usize| sum(sums, &[corners[k], corners[k + 1], corners[k + 4], corners[k + 5]]);
     let middle = block(MIDDLE);
     AROUND.iter().fold(0, |bits, k| bits << 1 | usize::from(block(*k) >= middle))
 }
 
-/// Four rows of sums, one for each corner, as many columns as are needed.
-fn rows<'a>(sums: &'a [u32], corners: &Corners, columns: usize) -> [&'a [u32]; 4] {
-    corners.map(|corner| &sums[corner..corner + columns])
+/// Sums over a rectangle of windows side by side. Loops, since what is handed to
+/// `map` and its like is not compiled for the instructions of the caller.
+#[inline(always)]
+fn sums_beside(sums: &[u32], corners: &Corners) -> [u32; LANES] {
+    let [a, b, c, d] = corners;
+    let a = &sums[*a as usize..][..LANES];
+    let b = &sums[*b as usize..][..LANES];
+    let c = &sums[*c as usize..][..LANES];
+    let d = &sums[*d as usize..][..LANES];
+    let mut out = [0; LANES];
+    for i in 0..LANES {
+        out[i] = a[i].wrapping_sub(b[i]).wrapping_sub(c[i]).wrapping_add(d[i]);
+    }
+    out
+}
+
+/// As [`haar`], for windows side by side.
+#[inline(always)]
+fn haar_beside(parts: &Haar, sums: &[u32]) -> [f32; LANES] {
+    let mut values = [0.0; LANES];
+    for (corners, weight) in parts {
+        if *weight != 0.0 {
+            let sums = sums_beside(sums, corners);
+            for lane in 0..LANES {
+                values[lane] += weight * sums[lane] as i32 as f32;
+            }
+        }
+    }
+    values
 }
 
 #[multiversion::multiversion(targets("x86_64+avx2"))]
-fn add_part(sums: &[u32], corners: &Corners, weight: f32, step: usize, values: &mut [f32]) {
-    let Some(last) = values.len().checked_sub(1) else { return };
-    let [a, b, c, d] = rows(sums, corners, last * step + 1);
-    let mut add = |i: usize, x: usize| {
-        let sum = a[x].wrapping_sub(b[x]).wrapping_sub(c[x]).wrapping_add(d[x]);
-        values[i] += weight * sum as i32 as f32;
-    };
-    match step {
-        1 => (0..=last).for_each(|i| add(i, i)),
-        2 => (0..=last).for_each(|i| add(i, 2 * i)),
-        _ => (0..=last).for_each(|i| add(i, step * i)),
+fn add_pair(pair: &Pair, sums: &[u32], contrast: &[f32; LANES], to: &mut [f32; LANES]) {
+    let [first, yes, no] = pair.thresholds;
+    let [yes_yes, yes_no, no_yes, no_no] = pair.values;
+    let a = haar_beside(&pair.parts[0], sums);
+    let b = haar_beside(&pair.parts[1], sums);
+    let c = haar_beside(&pair.parts[2], sums);
+    for lane in 0..LANES {
+        let if_yes = if b[lane] * contrast[lane] < yes { yes_yes } else { yes_no };
+        let if_no = if c[lane] * contrast[lane] < no { no_yes } else { no_no };
+        to[lane] += if a[lane] * contrast[lane] < first { if_yes } else { if_no };
     }
 }
 
-/// The values of a feature for a row of windows, before their contrast.
-fn fill(
-    values: &mut Vec<f32>,
-    parts: &[(Corners, f32); 3],
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn add_stump(
+    parts: &Haar,
+    threshold: f32,
+    [yes, no]: [f32; 2],
     sums: &[u32],
-    step: usize,
-    count: usize,
+    contrast: &[f32; LANES],
+    to: &mut [f32; LANES],
 ) {
-    values.clear();
-    values.resize(count, 0.0);
-    for (corners, weight) in parts.iter().filter(|(_, weight)| *weight != 0.0) {
-        add_part(sums, corners, *weight, step, values);
-    }
-}
-
-#[multiversion::multiversion(targets("x86_64+avx2"))]
-fn decide_pair(values: &[Vec<f32>; 3], contrast: &[f32], pair: &Pair, sums: &mut [f32]) {
-    let Pair { thresholds: [first, yes, no], values: leaves, .. } = pair;
-    let [a, b, c] = values;
-    let windows = a.iter().zip(b).zip(c).zip(contrast).zip(sums);
-    for ((((a, b), c), contrast), sum) in windows {
-        let if_yes = if b * contrast < *yes { leaves[0] } else { leaves[1] };
-        let if_no = if c * contrast < *no { leaves[2] } else { leaves[3] };
-        *sum += if a * contrast < *first { if_yes } else { if_no };
-    }
-}
-
-#[multiversion::multiversion(targets("x86_64+avx2"))]
-fn decide(values: &[f32], contrast: &[f32], stump: &Stump, sums: &mut [f32]) {
-    for ((value, contrast), sum) in values.iter().zip(contrast).zip(sums) {
-        let is_below = value * contrast < stump.threshold;
-        *sum += if is_below { stump.values[0] } else { stump.values[1] };
+    let values = haar_beside(parts, sums);
+    for lane in 0..LANES {
+        to[lane] += if values[lane] * contrast[lane] < threshold { yes } else { no };
     }
 }
 
 /// One through the area times the standard deviation of the windows; 0 for empty
 /// ones.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
-fn contrasts(
-    sums: &[u32],
-    squares: &[u32],
-    corners: &Corners,
-    area: f64,
-    step: usize,
-    out: &mut [f32],
-) {
-    let Some(last) = out.len().checked_sub(1) else { return };
-    let [a, b, c, d] = rows(sums, corners, last * step + 1);
-    let [e, f, g, h] = rows(squares, corners, last * step + 1);
-    let difference = |a: u32, b: u32, c: u32, d: u32| {
-        f64::from(a.wrapping_sub(b).wrapping_sub(c).wrapping_add(d))
-    };
-    for (i, out) in out.iter_mut().enumerate() {
-        let x = i * step;
-        let sum = difference(a[x], b[x], c[x], d[x]);
-        let square = difference(e[x], f[x], g[x], h[x]);
+fn contrasts(sums: &[u32], squares: &[u32], corners: &Corners, area: f64, out: &mut [f32; LANES]) {
+    let (sums, squares) = (sums_beside(sums, corners), sums_beside(squares, corners));
+    for lane in 0..LANES {
+        let (sum, square) = (f64::from(sums[lane]), f64::from(squares[lane]));
         let root = (area * square - sum * sum).max(0.0).sqrt();
         let is_empty = root <= LEAST_CONTRAST * area;
-        *out = if is_empty { 0.0 } else { (1.0 / root) as f32 };
+        out[lane] = if is_empty { 0.0 } else { (1.0 / root) as f32 };
     }
 }

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{ANY, POSITIVE, Result, check_ranges};
 
 /// Settings of `face-rgbd`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -127,36 +127,24 @@ impl Default for Training {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let wrong = |key: &str, must: &str| Err(Error::Settings(format!("`{key}` must {must}")));
-        let positive = [
-            ("max_score", self.max_score),
-            ("min_side_px", self.min_side_px),
-            ("max_side", self.max_side),
-            ("min_face_m", self.min_face_m),
-            ("max_face_m", self.max_face_m),
-            ("max_depth_m", self.max_depth_m),
-            ("face_m", self.face_m),
-            ("sigma_place", self.sigma_place),
-            ("sigma_depth_m", self.sigma_depth_m),
-            ("sigma_distance", self.sigma_distance),
-        ];
-        if let Some((key, _)) = positive.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
-            return wrong(key, "be positive");
-        }
-        let others = [
-            self.min_score,
-            self.min_depth_m,
-            self.min_height_m,
-            self.max_height_m,
-            self.head_above,
-        ];
-        if others.iter().any(|v| !v.is_finite()) {
-            return wrong("min_score and others", "be finite");
-        }
-        match self.scale_step {
-            step if (1.02..=4.0).contains(&step) => Ok(()),
-            _ => wrong("scale_step", "lie between 1.02 and 4"),
-        }
+        check_ranges(&[
+            ("min_score", self.min_score, ANY),
+            ("max_score", self.max_score, POSITIVE),
+            ("min_side_px", self.min_side_px, POSITIVE),
+            ("max_side", self.max_side, POSITIVE),
+            ("scale_step", self.scale_step, 1.02..=4.0),
+            ("min_face_m", self.min_face_m, POSITIVE),
+            ("max_face_m", self.max_face_m, POSITIVE),
+            ("min_depth_m", self.min_depth_m, ANY),
+            ("max_depth_m", self.max_depth_m, POSITIVE),
+            ("min_height_m", self.min_height_m, ANY),
+            ("max_height_m", self.max_height_m, ANY),
+            ("face_m", self.face_m, POSITIVE),
+            ("head_above", self.head_above, ANY),
+            ("sigma_place", self.sigma_place, POSITIVE),
+            ("sigma_depth_m", self.sigma_depth_m, POSITIVE),
+            ("sigma_distance", self.sigma_distance, POSITIVE),
+        ])
     }
 }
 
@@ -173,6 +161,6 @@ impl Training {
             && self.depth <= 4;
         let why = "`training`: rates lie between 0 and 1, `side` between 12 and 64, `depth` is at \
                    most 4, and counts are positive";
-        if fine { Ok(()) } else { Err(Error::Settings(why.into())) }
+        if fine { Ok(()) } else { Err(tagalong_core::Error::Settings(why.into())) }
     }
 }

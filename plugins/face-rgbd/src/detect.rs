@@ -4,15 +4,10 @@ use tagalong_core::{
     Search,
 };
 
-use crate::{Cascade, Config, Group, Hit, NAME, Proposals, Scanner, grouped, scales};
+use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales};
 
 /// The cascade that is part of the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/cascade.xml");
-
-/// Places a side at which the depth of a face is read.
-const TAPS: usize = 5;
-/// Depth readings that a face needs.
-const LEAST_READINGS: usize = 8;
 
 /// Finds faces, and says whose upper bodies they belong to.
 pub struct FaceRgbd {
@@ -23,6 +18,7 @@ pub struct FaceRgbd {
     scanner: Scanner,
     proposals: Proposals,
     hits: Vec<Hit>,
+    grouping: Grouping,
 }
 
 impl FaceRgbd {
@@ -41,6 +37,7 @@ impl FaceRgbd {
             scanner: Scanner::default(),
             proposals: Proposals::default(),
             hits: Vec::new(),
+            grouping: Grouping::default(),
         })
     }
 
@@ -84,7 +81,7 @@ impl FaceRgbd {
     ) -> Option<Detection> {
         let (config, side) = (&self.config, group.region.width);
         let by_size = camera.focal_px() * config.face_m / side;
-        let (face_m, sigma_m) = match depth.and_then(|depth| surface_m(depth, &group.region)) {
+        let (face_m, sigma_m) = match depth.and_then(|depth| depth.surface_m(&group.region)) {
             Some(metres) => (metres, config.sigma_depth_m),
             None => (by_size, by_size * config.sigma_distance),
         };
@@ -104,26 +101,6 @@ impl FaceRgbd {
     }
 }
 
-/// The median depth in the middle of a window, m.
-fn surface_m(depth: &DepthImage, window: &Rect) -> Option<f64> {
-    let mut readings = [0.0_f32; TAPS * TAPS];
-    let mut count = 0;
-    let tap = |from: f64, size: f64, i: usize| (from + size * (0.3 + 0.1 * i as f64)) as i64;
-    for place in 0..TAPS * TAPS {
-        let x = tap(window.x, window.width, place % TAPS);
-        let y = tap(window.y, window.height, place / TAPS);
-        if let Some(metres) = depth.get(x, y).filter(|m| m.is_finite() && *m > 0.0) {
-            readings[count] = metres;
-            count += 1;
-        }
-    }
-    let readings = &mut readings[..count];
-    (count >= LEAST_READINGS).then(|| {
-        let (_, median, _) = readings.select_nth_unstable_by(count / 2, f32::total_cmp);
-        f64::from(*median)
-    })
-}
-
 impl Detector for FaceRgbd {
     fn detect(
         &mut self,
@@ -136,10 +113,10 @@ impl Detector for FaceRgbd {
             Search::Everywhere { .. } => None,
         };
         self.search(frame, near, funnel)?;
-        let groups = grouped(&self.hits, self.config.min_neighbours);
+        self.grouping.group(&self.hits, self.config.min_neighbours);
         let depth = frame.images().depth.as_deref();
-        let mut found: Vec<Detection> =
-            groups.iter().filter_map(|g| self.detection(&frame.camera, depth, g)).collect();
+        let of = |group| self.detection(&frame.camera, depth, group);
+        let mut found: Vec<Detection> = self.grouping.kept().iter().filter_map(of).collect();
         let all = found.len();
         found.retain(|detection| detection.score >= self.config.min_score);
         funnel.drop_many("face: log-odds", (all - found.len()) as u64);

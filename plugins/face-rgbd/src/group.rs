@@ -27,57 +27,96 @@ pub struct Group {
     pub strength: f64,
 }
 
-/// Puts windows into groups: like ones, and those like them, belong together.
-/// Groups of `fewest` and less go, and those inside of stronger ones. Groups come
-/// in the order of their first windows.
-pub fn grouped(hits: &[Hit], fewest: usize) -> Vec<Group> {
-    let groups: Vec<Group> =
-        members(hits).iter().map(|m| mean(hits, m)).filter(|g| g.count > fewest).collect();
-    let is_inside = |inner: &Group| {
-        groups.iter().any(|outer| {
-            let (r, o) = (&inner.region, &outer.region);
-            let (dx, dy) = ((o.width * ALIKE).floor(), (o.height * ALIKE).floor());
-            let fits = r.x >= o.x - dx
-                && r.y >= o.y - dy
-                && r.right() <= o.right() + dx
-                && r.bottom() <= o.bottom() + dy;
-            let is_other = !std::ptr::eq(inner, outer);
-            is_other && fits && (outer.count > inner.count.max(FEW) || inner.count < FEW)
-        })
-    };
-    groups.iter().filter(|group| !is_inside(group)).copied().collect()
+/// Puts windows into groups; keeps its memory from one image to the next.
+#[derive(Clone, Debug, Default)]
+pub struct Grouping {
+    /// The group of each window.
+    labels: Vec<usize>,
+    /// Windows whose like have still to be looked for.
+    open: Vec<usize>,
+    groups: Vec<Group>,
+    kept: Vec<Group>,
 }
 
-/// The numbers of the windows of each group.
-fn members(hits: &[Hit]) -> Vec<Vec<usize>> {
-    let mut free: Vec<usize> = (0..hits.len()).collect();
-    let mut groups = Vec::new();
-    while !free.is_empty() {
-        let mut group = vec![free.remove(0)];
-        let mut at = 0;
-        while at < group.len() {
-            let region = hits[group[at]].region;
-            let (like, unlike) = free.iter().partition(|i| alike(&region, &hits[**i].region));
-            free = unlike;
-            let like: Vec<usize> = like;
-            group.extend(like);
-            at += 1;
-        }
-        group.sort_unstable();
-        groups.push(group);
+/// Belongs to no group yet.
+const FREE: usize = usize::MAX;
+
+impl Grouping {
+    /// Like windows, and those like them, belong together. Groups of `fewest` and less
+    /// go, and those inside of stronger ones. Groups come in the order of their first
+    /// windows.
+    pub fn group(&mut self, hits: &[Hit], fewest: usize) {
+        self.label(hits);
+        self.sum_up(hits);
+        self.groups.retain(|group| group.count > fewest);
+        let Self { groups, kept, .. } = self;
+        kept.clear();
+        kept.extend(groups.iter().filter(|group| !groups.iter().any(|o| outvotes(o, group))));
     }
-    groups
+
+    /// The groups that were not outvoted.
+    pub fn kept(&self) -> &[Group] {
+        &self.kept
+    }
+
+    fn label(&mut self, hits: &[Hit]) {
+        self.labels.clear();
+        self.labels.resize(hits.len(), FREE);
+        self.groups.clear();
+        for first in 0..hits.len() {
+            if self.labels[first] == FREE {
+                self.take(first);
+                while let Some(at) = self.open.pop() {
+                    for other in 0..hits.len() {
+                        let is_free = self.labels[other] == FREE;
+                        if is_free && alike(&hits[at].region, &hits[other].region) {
+                            self.take(other);
+                        }
+                    }
+                }
+                self.groups.push(Group { region: Rect::default(), count: 0, strength: 0.0 });
+            }
+        }
+    }
+
+    fn take(&mut self, window: usize) {
+        self.labels[window] = self.groups.len();
+        self.open.push(window);
+    }
+
+    fn sum_up(&mut self, hits: &[Hit]) {
+        for (hit, label) in hits.iter().zip(&self.labels) {
+            let Group { region: sum, count, strength } = &mut self.groups[*label];
+            let Rect { x, y, width, height } = hit.region;
+            *sum = Rect::new(sum.x + x, sum.y + y, sum.width + width, sum.height + height);
+            *count += 1;
+            *strength += f64::from(hit.margin);
+        }
+        for Group { region, count, .. } in &mut self.groups {
+            let mean = |sum: f64| (sum / *count as f64).round();
+            let Rect { x, y, width, height } = *region;
+            *region = Rect::new(mean(x), mean(y), mean(width), mean(height));
+        }
+    }
 }
 
-fn mean(hits: &[Hit], members: &[usize]) -> Group {
-    let count = members.len();
-    let of = |value: fn(&Rect) -> f64| {
-        let sum: f64 = members.iter().map(|i| value(&hits[*i].region)).sum();
-        (sum / count as f64).round()
-    };
-    let region = Rect::new(of(|r| r.x), of(|r| r.y), of(|r| r.width), of(|r| r.height));
-    let strength = members.iter().map(|i| f64::from(hits[*i].margin)).sum();
-    Group { region, count, strength }
+/// As [`Grouping::group`], once.
+pub fn grouped(hits: &[Hit], fewest: usize) -> Vec<Group> {
+    let mut grouping = Grouping::default();
+    grouping.group(hits, fewest);
+    grouping.kept
+}
+
+/// True if a group lies inside of a stronger one.
+fn outvotes(outer: &Group, inner: &Group) -> bool {
+    let (r, o) = (&inner.region, &outer.region);
+    let (dx, dy) = ((o.width * ALIKE).floor(), (o.height * ALIKE).floor());
+    let fits = r.x >= o.x - dx
+        && r.y >= o.y - dy
+        && r.right() <= o.right() + dx
+        && r.bottom() <= o.bottom() + dy;
+    let is_other = !std::ptr::eq(inner, outer);
+    is_other && fits && (outer.count > inner.count.max(FEW) || inner.count < FEW)
 }
 
 fn alike(a: &Rect, b: &Rect) -> bool {

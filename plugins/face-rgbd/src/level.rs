@@ -2,20 +2,28 @@
 
 use tagalong_core::GreyImage;
 
+use crate::compiled::LANES;
+
 /// An image in another size, with the sums of its values and of their squares.
+///
 /// Rows of sums are as long as those of the largest image so far, so that the
-/// offsets of features stay what they are from size to size.
+/// offsets of features stay what they are from size to size. Where windows begin at
+/// every second column, the sums of even columns come first in a row and those of odd
+/// columns after them: what windows side by side look at then lies side by side.
 #[derive(Clone, Debug, Default)]
 pub struct Level {
     width: usize,
     height: usize,
     stride: usize,
+    step: usize,
     pixels: Vec<u8>,
     sums: Vec<u32>,
     squares: Vec<u32>,
     /// For each column: where it begins in the source, and the share of the next
     /// pixel in 256ths.
     columns: Vec<(usize, u32)>,
+    /// A row between two rows of the source, in 256ths.
+    between: Vec<u32>,
 }
 
 impl Level {
@@ -29,9 +37,17 @@ impl Level {
         self.height
     }
 
-    /// Sums in a row.
-    pub fn stride(&self) -> usize {
-        self.stride
+    /// What offsets depend on: sums in a row, and columns from window to window.
+    pub fn layout(&self) -> (usize, usize) {
+        (self.stride, self.step)
+    }
+
+    /// Where the sum of what is above and left of the upper left corner of pixel
+    /// (x, y) is. Offsets of pixels in a window add up with that of its first pixel,
+    /// where a window can begin.
+    pub fn offset(&self, x: usize, y: usize) -> usize {
+        let step = self.step.max(1);
+        y * self.stride + x % step * (self.stride / step) + x / step
     }
 
     /// The values, row by row.
@@ -51,10 +67,11 @@ impl Level {
 
     /// Takes the place of another size: `width` by `height` pixels of an image,
     /// interpolated between four of its pixels; no mean over what is skipped, so
-    /// that windows look as those did that OpenCV's cascades were made for.
-    pub fn fill(&mut self, image: &GreyImage, width: usize, height: usize) {
-        (self.width, self.height) = (width, height);
-        self.stride = image.width().max(width) + 1;
+    /// that windows look as those did that OpenCV's cascades were made for. Windows
+    /// begin at each pixel (`step` 1) or at every second one (2).
+    pub fn fill(&mut self, image: &GreyImage, (width, height): (usize, usize), step: usize) {
+        (self.width, self.height, self.step) = (width, height, step.clamp(1, 2));
+        self.stride = (image.width().max(width) + 1).next_multiple_of(2);
         self.pixels.resize((width * height).max(self.pixels.len()), 0);
         if width * height == 0 || image.width() * image.height() == 0 {
             (self.width, self.height) = (0, 0);
@@ -65,38 +82,49 @@ impl Level {
     }
 
     fn resample(&mut self, image: &GreyImage) {
-        let Self { width, height, pixels, columns, .. } = self;
+        let Self { width, height, pixels, columns, between, .. } = self;
         columns.clear();
         columns.extend((0..*width).map(|x| place(x, *width, image.width())));
+        between.resize(image.width() + 1, 0);
         for (y, row) in pixels.chunks_exact_mut(*width).take(*height).enumerate() {
             let (above, share) = place(y, *height, image.height());
             let below = (above + 1).min(image.height() - 1);
-            blend(image.row(above), image.row(below), share, columns, row);
+            blend_rows(image.row(above), image.row(below), share, between);
+            between[image.width()] = between[image.width() - 1];
+            blend_columns(between, columns, row);
         }
     }
 
     fn sum_up(&mut self) {
-        let (width, stride) = (self.width, self.stride);
-        let length = stride * (self.height + 1);
-        self.sums.resize(length.max(self.sums.len()), 0);
-        self.squares.resize(length.max(self.squares.len()), 0);
-        self.sums[..stride].fill(0);
-        self.squares[..stride].fill(0);
-        for (y, row) in self.pixels.chunks_exact(width).take(self.height).enumerate() {
-            add_row(row, &mut self.sums[y * stride..], stride, u32::from);
-            add_row(row, &mut self.squares[y * stride..], stride, |v| u32::from(v).pow(2));
+        let Self { width, height, stride, step, pixels, sums, squares, .. } = self;
+        // Windows side by side may hang over behind the last one.
+        let length = *stride * (*height + 1) + LANES;
+        for sums in [&mut *sums, &mut *squares] {
+            sums.resize(length.max(sums.len()), 0);
+            sums[..*stride].fill(0);
+        }
+        let add = if *step == 1 { add_row::<1> } else { add_row::<2> };
+        for (y, row) in pixels.chunks_exact(*width).take(*height).enumerate() {
+            add(row, *stride, &mut sums[y * *stride..], &mut squares[y * *stride..]);
         }
     }
 }
 
-/// The sums below a row from those above it.
-fn add_row(row: &[u8], sums: &mut [u32], stride: usize, value: impl Fn(u8) -> u32) {
-    let (above, below) = sums.split_at_mut(stride);
-    let mut in_row = 0_u32;
-    below[0] = 0;
-    for ((below, above), pixel) in below[1..].iter_mut().zip(&above[1..]).zip(row) {
-        in_row = in_row.wrapping_add(value(*pixel));
-        *below = above.wrapping_add(in_row);
+/// The sums below a row, of values and of squares, from those above it.
+fn add_row<const STEP: usize>(row: &[u8], stride: usize, sums: &mut [u32], squares: &mut [u32]) {
+    let ((above, below), (squares_above, squares_below)) =
+        (sums.split_at_mut(stride), squares.split_at_mut(stride));
+    let (mut sum, mut square) = (0_u32, 0_u32);
+    (below[0], squares_below[0]) = (0, 0);
+    for (index, values) in row.chunks(STEP).enumerate() {
+        for (side, value) in values.iter().enumerate() {
+            let x = side + 1;
+            let at = x % STEP * (stride / STEP) + x / STEP + index;
+            sum = sum.wrapping_add(u32::from(*value));
+            square = square.wrapping_add(u32::from(*value).pow(2));
+            below[at] = above[at].wrapping_add(sum);
+            squares_below[at] = squares_above[at].wrapping_add(square);
+        }
     }
 }
 
@@ -109,12 +137,17 @@ fn place(x: usize, count: usize, of: usize) -> (usize, u32) {
     (before, ((at - before as f64) * 256.0).round() as u32)
 }
 
-/// A row between two rows.
-fn blend(above: &[u8], below: &[u8], share: u32, columns: &[(usize, u32)], out: &mut [u8]) {
-    let last = above.len() - 1;
+/// A row between two rows, in 256ths.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn blend_rows(above: &[u8], below: &[u8], share: u32, out: &mut [u32]) {
+    for ((out, above), below) in out.iter_mut().zip(above).zip(below) {
+        *out = u32::from(*above) * (256 - share) + u32::from(*below) * share;
+    }
+}
+
+/// Pixels between the columns of a row.
+fn blend_columns(row: &[u32], columns: &[(usize, u32)], out: &mut [u8]) {
     for (pixel, &(x, right)) in out.iter_mut().zip(columns) {
-        let next = (x + 1).min(last);
-        let across = |row: &[u8]| u32::from(row[x]) * (256 - right) + u32::from(row[next]) * right;
-        *pixel = ((across(above) * (256 - share) + across(below) * share + 32768) >> 16) as u8;
+        *pixel = ((row[x] * (256 - right) + row[x + 1] * right + 32768) >> 16) as u8;
     }
 }

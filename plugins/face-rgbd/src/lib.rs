@@ -31,7 +31,7 @@ mod xml;
 pub use cascade::{Cascade, Feature, Next, Node, Part, Split, Stage, Tree};
 pub use config::{Config, Training};
 pub use detect::FaceRgbd;
-pub use group::{Group, Hit, grouped};
+pub use group::{Group, Grouping, Hit, grouped};
 pub use level::Level;
 pub use propose::Proposals;
 pub use scan::{Scanner, Seen, scales};

@@ -4,7 +4,7 @@
 use tagalong_core::{GreyImage, Rect};
 
 use crate::cascade::Cascade;
-use crate::compiled::{Compiled, Row};
+use crate::compiled::{Block, Compiled, LANES};
 use crate::group::Hit;
 use crate::level::Level;
 
@@ -29,10 +29,9 @@ pub struct Seen<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct Scanner {
     level: Level,
-    compiled: Compiled,
-    row: Row,
+    /// The cascade for windows at each pixel, and at every second one.
+    compiled: [Option<Compiled>; 2],
     wanted: Vec<bool>,
-    chosen: Vec<usize>,
     looked_at: u64,
 }
 
@@ -44,7 +43,7 @@ impl Scanner {
 
     /// Forgets the cascade of before: the next scan may be with another one.
     pub fn forget(&mut self) {
-        self.compiled = Compiled::default();
+        self.compiled = [None, None];
     }
 
     /// Adds the windows of all `scales` that pass and that `propose` allows;
@@ -83,80 +82,73 @@ impl Scanner {
             return;
         }
         let step = if scale >= FINE_FROM { 1 } else { 2 };
+        let Self { level, compiled, wanted, looked_at } = self;
+        let compiled = &mut compiled[step - 1];
+        let last = width - cascade.width;
         let mut is_filled = false;
         for y in (0..=height - cascade.height).step_by(step) {
-            let Some((first, count)) = self.ask(width - cascade.width, y, step, propose) else {
+            wanted.clear();
+            wanted.extend((0..=last).step_by(step).map(|x| propose(x, y)));
+            if !wanted.contains(&true) {
                 continue;
-            };
+            }
             if !is_filled {
-                self.fill(image, cascade, (width, height));
+                level.fill(image, (width, height), step);
                 is_filled = true;
             }
-            self.row(y, first, count, step, take);
-        }
-    }
-
-    fn fill(&mut self, image: &GreyImage, cascade: &Cascade, (width, height): (usize, usize)) {
-        self.level.fill(image, width, height);
-        if self.compiled.stride() != self.level.stride() {
-            self.compiled = Compiled::new(cascade, self.level.stride());
-        }
-    }
-
-    /// Notes which windows of a row are wanted; the first one, and how many
-    /// there are up to the last one.
-    fn ask(
-        &mut self,
-        last: usize,
-        y: usize,
-        step: usize,
-        propose: &mut impl FnMut(usize, usize) -> bool,
-    ) -> Option<(usize, usize)> {
-        self.wanted.clear();
-        self.wanted.extend((0..=last).step_by(step).map(|x| propose(x, y)));
-        let first = self.wanted.iter().position(|wanted| *wanted)?;
-        let last = self.wanted.iter().rposition(|wanted| *wanted)?;
-        Some((first, last + 1 - first))
-    }
-
-    /// The windows of a row. As in OpenCV, the neighbour of one that fails the
-    /// first stage is not looked at.
-    fn row(
-        &mut self,
-        y: usize,
-        first: usize,
-        count: usize,
-        step: usize,
-        take: &mut impl FnMut(Seen<'_>),
-    ) {
-        let Self { level, compiled, row, wanted, chosen, looked_at } = self;
-        let place = (first * step, y);
-        compiled.start(level, place, step, row, count);
-        compiled.all(0, level, place, step, row);
-        chosen.clear();
-        let mut at = 0;
-        while at < count {
-            let is_wanted = wanted[first + at];
-            *looked_at += u64::from(is_wanted);
-            if is_wanted && Compiled::is_worth_it(row, at) {
-                if compiled.passes(0, row.sums[at]) {
-                    chosen.push(at);
-                } else {
-                    at += 1;
-                }
+            compiled.take_if(|compiled| !compiled.fits(level));
+            let compiled = compiled.get_or_insert_with(|| Compiled::new(cascade, level));
+            let mut row = Row { level, compiled, y, step, is_skipped: false };
+            for (wanted, first) in wanted.chunks(LANES).zip((0..).step_by(LANES)) {
+                *looked_at += row.look(wanted, first * step, take);
             }
-            at += 1;
         }
-        let mut stage = 1;
-        while compiled.pays(stage, chosen.len(), count) {
-            compiled.all(stage, level, place, step, row);
-            chosen.retain(|at| compiled.passes(stage, row.sums[*at]));
-            stage += 1;
+    }
+}
+
+/// A row of windows.
+struct Row<'a> {
+    level: &'a Level,
+    compiled: &'a Compiled,
+    y: usize,
+    step: usize,
+    /// The next window is the neighbour of one that failed the first stage.
+    is_skipped: bool,
+}
+
+impl Row<'_> {
+    /// Looks at the wanted windows from column `x` on; returns how many it looked at.
+    fn look(&mut self, wanted: &[bool], x: usize, take: &mut impl FnMut(Seen<'_>)) -> u64 {
+        if !wanted.contains(&true) {
+            self.is_skipped = false;
+            return 0;
         }
-        compiled.rest(stage, level, y, row, chosen);
-        for (x, sum) in row.columns.iter().zip(&row.sums) {
-            take(Seen { level, x: *x as usize, y, margin: compiled.margin(*sum) });
+        let mut block = self.compiled.start(self.level, (x, self.y));
+        let looked_at = self.choose(wanted, &mut block);
+        self.compiled.finish(self.level, &mut block);
+        for lane in block.lanes() {
+            let margin = self.compiled.margin(&block, lane);
+            take(Seen { level: self.level, x: x + lane * self.step, y: self.y, margin });
         }
+        looked_at
+    }
+
+    /// Keeps the wanted windows that pass the first stage. As in OpenCV, the neighbour
+    /// of one that fails is not looked at.
+    fn choose(&mut self, wanted: &[bool], block: &mut Block) -> u64 {
+        let mut looked_at = 0;
+        block.keep(|block, lane| {
+            let is_wanted = wanted.get(lane) == Some(&true);
+            if std::mem::take(&mut self.is_skipped) || !is_wanted {
+                return false;
+            }
+            looked_at += 1;
+            let is_worth_it = Compiled::is_worth_it(block, lane);
+            let passes = is_worth_it && self.compiled.passes(0, block, lane);
+            self.is_skipped = is_worth_it && !passes;
+            passes
+        });
+        looked_at
     }
 }
 

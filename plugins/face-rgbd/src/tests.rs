@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 use tagalong_core::{GreyImage, Rect, Registry};
 
-use crate::{Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Split, Stage, grouped};
+use crate::{Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Seen, Split, Stage, grouped};
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
     let mut state = seed | 1;
@@ -98,18 +98,18 @@ fn slow_stages(image: &GreyImage, at: (usize, usize), cascade: &Cascade) -> usiz
     cascade.stages.iter().take_while(passes).count()
 }
 
-/// The windows that pass, in OpenCV's order: every second one in x and y, and the
-/// one after a window that fails the first stage is not looked at.
-fn slow_scan(image: &GreyImage, cascade: &Cascade) -> Vec<(usize, usize)> {
+/// The windows that pass, in OpenCV's order: the one after a window that fails the
+/// first stage is not looked at.
+fn slow_scan(image: &GreyImage, cascade: &Cascade, step: usize) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
-    for y in (0..=image.height() - cascade.height).step_by(2) {
+    for y in (0..=image.height() - cascade.height).step_by(step) {
         let mut x = 0;
         while x <= image.width() - cascade.width {
             let passed = slow_stages(image, (x, y), cascade);
             if passed == cascade.stages.len() {
                 found.push((x, y));
             }
-            x += if passed == 0 { 4 } else { 2 };
+            x += if passed == 0 { 2 * step } else { step };
         }
     }
     found
@@ -125,32 +125,44 @@ fn it_conforms() {
 
 proptest! {
     #[test]
-    fn a_scan_finds_what_the_slow_reference_finds(seed: u64, width in 12..60usize, height in 12..30usize) {
-        let image = noise(width, height, seed);
+    fn a_scan_finds_what_the_slow_reference_finds(
+        seed: u64, width in 12..60usize, height in 12..30usize, step in 1..=2usize,
+    ) {
+        // From half of the size on, each pixel is looked at and not every second one.
+        let scale = [2.0, 1.0][step - 1];
+        let image = noise(width * (3 - step), height * (3 - step), seed);
+        let mut level = Level::default();
+        level.fill(&image, (width, height), step);
+        let shrunk = GreyImage::from_pixels(width, height, level.pixels().to_vec()).unwrap();
         for cascade in [small(), binary()] {
-            let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
-            scanner.scan(&image, &cascade, [1.0].into_iter(), |_| true, &mut hits);
-            let found: Vec<(usize, usize)> =
-                hits.iter().map(|hit| (hit.region.x as usize, hit.region.y as usize)).collect();
-            prop_assert_eq!(found, slow_scan(&image, &cascade));
+            let (mut scanner, mut found) = (Scanner::default(), Vec::new());
+            let mut take = |seen: Seen<'_>| found.push((seen.x, seen.y));
+            scanner.size(&image, &cascade, scale, &mut |_, _| true, &mut take);
+            prop_assert_eq!(found, slow_scan(&shrunk, &cascade, step));
         }
     }
 
     #[test]
-    fn a_size_of_its_own_is_the_image_itself(seed: u64, width in 1..40usize, height in 1..40usize) {
+    fn a_size_of_its_own_is_the_image_itself(
+        seed: u64, width in 1..40usize, height in 1..40usize, step in 1..=2usize,
+    ) {
         let image = noise(width, height, seed);
         let mut level = Level::default();
-        level.fill(&image, width, height);
+        level.fill(&image, (width, height), step);
         prop_assert_eq!(level.pixels(), image.pixels());
-        let all: u32 = image.pixels().iter().map(|v| u32::from(*v)).sum();
-        prop_assert_eq!(level.sums()[height * level.stride() + width], all);
+        for (x, y) in [(width, height), (width / 2, height), (width, height / 3), (0, 0)] {
+            let values = || (0..y).flat_map(|y| &image.row(y)[..x]).map(|v| u32::from(*v));
+            prop_assert_eq!(level.sums()[level.offset(x, y)], values().sum::<u32>());
+            let squares: u32 = values().map(|v| v * v).sum();
+            prop_assert_eq!(level.squares()[level.offset(x, y)], squares);
+        }
     }
 }
 
 #[test]
 fn the_small_cascades_pass_some_windows_and_not_all() {
     for cascade in [small(), binary()] {
-        let found = slow_scan(&noise(60, 60, 3), &cascade).len();
+        let found = slow_scan(&noise(60, 60, 3), &cascade, 2).len();
         assert!((5..300).contains(&found), "{found}");
     }
 }

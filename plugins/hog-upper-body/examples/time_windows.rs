@@ -2,8 +2,8 @@
 //! RUNS`. For the comparison with OpenCV in `benches/peers/`.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
-use tagalong_core::GreyImage;
-use tagalong_hog_upper_body::{Model, Scanner, merge};
+use tagalong_core::{GreyImage, Rect};
+use tagalong_hog_upper_body::{Model, Scanner, merge, window_of};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -14,15 +14,28 @@ fn main() {
     let image = image::open(picture).expect("the picture can be read").into_luma8();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
-    let (mut scanner, mut found) = (Scanner::new(model.kind()), 0);
+    let (mut scanner, mut windows) = (Scanner::new(&model), Vec::new());
+    // OpenCV looks at no windows that hang over.
+    let is_inside = |square: &Rect| {
+        let window = window_of(square);
+        let is_inside = window.x.min(window.y) >= 0.0
+            && window.right() <= width as f64
+            && window.bottom() <= height as f64;
+        is_inside.then_some(None)
+    };
     for _ in 0..runs {
         // Windows are 64 pixels and more, and twice as wide as the upper body.
         let most = 0.5 * width.min(height) as f64;
         let sides = std::iter::successors(Some(32.0), |side| Some(side * 1.15));
         let least = model.sum_at(0.0);
         let sides = sides.take_while(|side| *side <= most);
-        let windows = scanner.scan(&image, &model, sides, least, |_| Some(None));
-        found = merge(windows, 0.4, 0.4).len();
+        windows.clear();
+        scanner.scan(&image, sides, least, is_inside, &mut windows);
+        merge(&mut windows, 0.4, 0.4);
     }
-    println!("{found} people, {} windows a run", scanner.looked_at() / runs.max(1) as u64);
+    println!(
+        "{} people, {} windows a run",
+        windows.len(),
+        scanner.looked_at() / runs.max(1) as u64
+    );
 }

@@ -2,7 +2,7 @@
 //! small cells and compared with what is around (after P. Dollar et al., *Fast
 //! feature pyramids for object detection*, PAMI 36, 2014).
 
-use crate::gradients::Gradients;
+use crate::gradients::{Gradients, LANES, Votes, votes};
 use crate::hog::CELL as HOG_CELL;
 
 /// Side of a cell, pixels.
@@ -25,7 +25,13 @@ pub struct Channels {
     around: Vec<f32>,
     before: Vec<f32>,
     gradients: Gradients,
+    /// Scratch: the sums of each column in a row of cells.
+    columns_of: Vec<Columns>,
 }
+
+/// Sums of neighbouring columns of pixels: brightness, length of gradients, and
+/// length by direction.
+type Columns = Votes<DEPTH>;
 
 impl Channels {
     /// Takes the place of the channels of another image: `pixels` of grey values,
@@ -40,9 +46,8 @@ impl Channels {
         if self.values.is_empty() {
             return;
         }
-        for y in 0..self.rows * CELL {
-            let rows = [0, 1, 2].map(|row| &pixels[(y + row) * width..(y + row + 1) * width]);
-            self.add(rows, y / CELL);
+        for y in 0..self.rows {
+            self.add(&pixels[y * CELL * width..], width, y);
         }
         self.compare();
         self.before.resize(self.values.len(), 0.0);
@@ -50,27 +55,18 @@ impl Channels {
         smooth(&mut self.values, &mut self.before, size, DEPTH, &[0.25, 0.5, 0.25]);
     }
 
-    /// Adds a row of pixels to its cells.
-    fn add(&mut self, rows: [&[f32]; 3], cell_row: usize) {
-        let start = cell_row * self.columns * DEPTH;
-        let share = 1.0 / (255.0 * (CELL * CELL) as f32);
-        self.gradients.fill(rows);
-        let Gradients { length, turn } = &self.gradients;
-        let cells = self.values[start..].chunks_exact_mut(DEPTH).take(self.columns);
-        let pixels = length.chunks_exact(CELL).zip(turn.chunks_exact(CELL));
-        let pixels = pixels.zip(rows[1][1..].chunks_exact(CELL));
-        for (values, ((length, turn), grey)) in cells.zip(pixels) {
-            values[0] += share * grey.iter().sum::<f32>();
-            for (length, turn) in length.iter().zip(turn) {
-                let length = 0.5 * share * length;
-                let at = turn * BINS as f32;
-                let bin = at as usize;
-                let part = at - bin as f32;
-                values[1] += length;
-                values[2 + bin % BINS] += length * (1.0 - part);
-                values[2 + (bin + 1) % BINS] += length * part;
-            }
+    /// Makes row `y` of cells from the rows of pixels that begin above it.
+    fn add(&mut self, pixels: &[f32], width: usize, y: usize) {
+        let lanes = (self.columns * CELL).div_ceil(LANES);
+        self.columns_of.clear();
+        self.columns_of.resize(lanes, [[0.0; LANES]; DEPTH]);
+        for y in 0..CELL {
+            let rows = [0, 1, 2].map(|row| &pixels[(y + row) * width..(y + row + 1) * width]);
+            self.gradients.fill(rows, 0, lanes);
+            add_row(&self.gradients, &rows[1][1..], &mut self.columns_of);
         }
+        let row = &mut self.values[y * self.columns * DEPTH..(y + 1) * self.columns * DEPTH];
+        sum_columns(&self.columns_of, row);
     }
 
     /// Divides gradients by what is usual around their cell.
@@ -86,14 +82,50 @@ impl Channels {
         }
     }
 
-    /// Numbers in a row of cells.
-    pub fn stride(&self) -> usize {
-        self.columns * DEPTH
-    }
-
     /// The numbers from cell (x, y) on.
     pub fn from(&self, x: usize, y: usize) -> &[f32] {
         &self.values[(y * self.columns + x) * DEPTH..]
+    }
+
+    /// The same numbers in another order.
+    pub(crate) fn planes(&self, planes: &mut Planes) {
+        let half = (self.columns.div_ceil(2) + LANES).max(planes.half);
+        planes.half = half;
+        let rows = self.values.chunks_exact((self.columns * DEPTH).max(1)).take(self.rows);
+        planes.values.resize((self.rows * 2 * DEPTH * half).max(planes.values.len()), 0.0);
+        for (row, planes) in rows.zip(planes.values.chunks_exact_mut(2 * DEPTH * half)) {
+            for (x, pair) in row.chunks(2 * DEPTH).enumerate() {
+                for (number, value) in pair.iter().enumerate() {
+                    planes[number * half + x] = *value;
+                }
+            }
+        }
+    }
+}
+
+/// The numbers of cells, row by row: those of one kind of all even columns, and those
+/// of all odd ones. Windows begin at even columns, so what windows side by side look at
+/// lies side by side. Planes are as long as those of the largest image so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Planes {
+    half: usize,
+    values: Vec<f32>,
+}
+
+impl Planes {
+    /// What the places of numbers depend on.
+    pub(crate) fn layout(&self) -> usize {
+        self.half
+    }
+
+    /// Where number `k` of cell (x, y) is. Places in a window add up with that of its
+    /// first cell.
+    pub(crate) fn place(&self, x: usize, y: usize, k: usize) -> usize {
+        ((y * 2 + x % 2) * DEPTH + k) * self.half + x / 2
+    }
+
+    pub(crate) fn values(&self) -> &[f32] {
+        &self.values
     }
 }
 
@@ -144,6 +176,41 @@ fn present(at: usize, length: usize, weights: &[f32]) -> (usize, &[f32], f32) {
     (first, used, 1.0 / used.iter().sum::<f32>())
 }
 
+#[multiversion::multiversion(targets("x86_64+avx2"))]
 fn add_scaled(to: &mut [f32], from: &[f32], scale: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * from);
+}
+
+/// Adds a row of pixels to their columns.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn add_row(gradients: &Gradients, grey: &[f32], columns: &mut [Columns]) {
+    let grey = grey.chunks(LANES);
+    for (((length, turn), grey), columns) in gradients.lanes().zip(grey).zip(columns) {
+        let [brightness, lengths, directions @ ..] = columns;
+        brightness.iter_mut().zip(grey).for_each(|(sum, grey)| *sum += grey);
+        let votes: Votes<BINS> = votes(length, turn, 0.0);
+        for lane in 0..LANES {
+            lengths[lane] += length[lane];
+        }
+        for (sums, votes) in directions.iter_mut().zip(&votes) {
+            for lane in 0..LANES {
+                sums[lane] += votes[lane];
+            }
+        }
+    }
+}
+
+/// The numbers of cells from the sums of their columns: means of grey values from 0
+/// to 1 and of their gradients.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn sum_columns(columns: &[Columns], row: &mut [f32]) {
+    let share = 1.0 / (255.0 * (CELL * CELL) as f32);
+    for (cells, columns) in row.chunks_mut(DEPTH * LANES / CELL).zip(columns) {
+        for (side, cell) in cells.chunks_exact_mut(DEPTH).enumerate() {
+            for (number, lanes) in cell.iter_mut().zip(columns) {
+                *number = 0.5 * share * lanes[side * CELL..][..CELL].iter().sum::<f32>();
+            }
+            cell[0] *= 2.0; // Brightness is no difference of two pixels.
+        }
+    }
 }

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{ANY, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
 
 use crate::Kind;
 
@@ -124,39 +124,23 @@ impl Default for Training {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let wrong = |key: &str, must: &str| Err(Error::Settings(format!("`{key}` must {must}")));
-        let positive = [
-            ("max_score", self.max_score),
-            ("max_side", self.max_side),
-            ("max_depth_m", self.max_depth_m),
-            ("sigma_place", self.sigma_place),
-            ("sigma_depth_m", self.sigma_depth_m),
-            ("sigma_distance", self.sigma_distance),
-        ];
-        if let Some((key, _)) = positive.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
-            return wrong(key, "be positive");
-        }
-        let others = [
-            self.min_score,
-            self.min_depth_m,
-            self.min_head_height_m,
-            self.max_head_height_m,
-            self.overlap,
-            self.apart_m,
-            self.near,
-        ];
-        match self {
-            _ if others.iter().any(|v| !v.is_finite()) => {
-                wrong("min_score and others", "be finite")
-            }
-            _ if !(16.0..1e5).contains(&self.min_side_px) => wrong("min_side_px", "be at least 16"),
-            _ if !(1.02..=4.0).contains(&self.scale_step) => {
-                wrong("scale_step", "lie between 1.02 and 4")
-            }
-            _ if !(1.0..1e3).contains(&self.size_tolerance) => {
-                wrong("size_tolerance", "be at least 1")
-            }
-            _ => Ok(()),
-        }
+        check_ranges(&[
+            ("min_score", self.min_score, ANY),
+            ("max_score", self.max_score, POSITIVE),
+            ("min_side_px", self.min_side_px, 16.0..=1e5),
+            ("max_side", self.max_side, POSITIVE),
+            ("scale_step", self.scale_step, 1.02..=4.0),
+            ("size_tolerance", self.size_tolerance, 1.0..=1e3),
+            ("min_depth_m", self.min_depth_m, ANY),
+            ("max_depth_m", self.max_depth_m, POSITIVE),
+            ("min_head_height_m", self.min_head_height_m, ANY),
+            ("max_head_height_m", self.max_head_height_m, ANY),
+            ("overlap", self.overlap, NOT_NEGATIVE),
+            ("apart_m", self.apart_m, NOT_NEGATIVE),
+            ("near", self.near, NOT_NEGATIVE),
+            ("sigma_place", self.sigma_place, POSITIVE),
+            ("sigma_depth_m", self.sigma_depth_m, POSITIVE),
+            ("sigma_distance", self.sigma_distance, POSITIVE),
+        ])
     }
 }

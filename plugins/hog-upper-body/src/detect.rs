@@ -10,16 +10,12 @@ use crate::{Config, Kind, Model, NAME, Scanner, Window, merge};
 const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
 const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
 
-/// Places a side at which the depth of a window is read.
-const TAPS: usize = 5;
-/// Depth readings that a window needs.
-const LEAST_READINGS: usize = 8;
-
 /// Finds heads and shoulders.
 pub struct HogUpperBody {
     config: Config,
     model: Model,
     scanner: Scanner,
+    windows: Vec<Window>,
 }
 
 impl HogUpperBody {
@@ -32,15 +28,7 @@ impl HogUpperBody {
         config.check()?;
         let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
         let model = context.model(&config.model, built_in, Model::from_text)?;
-        Ok(Self { config, scanner: Scanner::new(model.kind()), model })
-    }
-
-    /// The sizes that are looked for, pixels.
-    fn sides(&self, camera: &Camera) -> impl Iterator<Item = f64> + use<> {
-        let most = self.config.max_side * camera.width.min(camera.height) as f64;
-        let step = self.config.scale_step;
-        std::iter::successors(Some(self.config.min_side_px), move |side| Some(side * step))
-            .take_while(move |side| *side <= most)
+        Ok(Self { config, scanner: Scanner::new(&model), windows: Vec::new(), model })
     }
 
     fn detection(&self, camera: &Camera, window: &Window) -> Option<Detection> {
@@ -65,26 +53,12 @@ impl HogUpperBody {
     }
 }
 
-/// The median depth in the middle of a square, m.
-fn surface_m(depth: &DepthImage, square: &Rect) -> Option<f64> {
-    let mut readings = [0.0_f32; TAPS * TAPS];
-    let mut count = 0;
-    let tap = |from: f64, size: f64, i: usize| (from + size * (0.3 + 0.1 * i as f64)) as i64;
-    for row in 0..TAPS {
-        for column in 0..TAPS {
-            let x = tap(square.x, square.width, column);
-            let y = tap(square.y, square.height, row);
-            if let Some(metres) = depth.get(x, y).filter(|m| m.is_finite() && *m > 0.0) {
-                readings[count] = metres;
-                count += 1;
-            }
-        }
-    }
-    let readings = &mut readings[..count];
-    (count >= LEAST_READINGS).then(|| {
-        let (_, median, _) = readings.select_nth_unstable_by(count / 2, f32::total_cmp);
-        f64::from(*median)
-    })
+/// The sizes that are looked for, pixels.
+fn sides(config: &Config, camera: &Camera) -> impl Iterator<Item = f64> + use<> {
+    let most = config.max_side * camera.width.min(camera.height) as f64;
+    let step = config.scale_step;
+    std::iter::successors(Some(config.min_side_px), move |side| Some(side * step))
+        .take_while(move |side| *side <= most)
 }
 
 /// Which windows are worth a look, and how many were not, by test.
@@ -106,13 +80,11 @@ impl Proposer<'_> {
             return None;
         }
         let Some(depth) = self.depth else { return Some(None) };
-        let (config, focal) = (self.config, self.camera.focal_px());
-        let face_m = surface_m(depth, square).filter(|m| {
-            let fits = focal * UPPER_BODY_SIDE_M / (m * square.width);
-            let is_fit = fits <= config.size_tolerance && fits >= 1.0 / config.size_tolerance;
-            is_fit && (config.min_depth_m..=config.max_depth_m).contains(m)
-        });
-        let Some(face_m) = face_m else {
+        let config = self.config;
+        let fits_m = self.camera.focal_px() * UPPER_BODY_SIDE_M / square.width;
+        let nearest_m = (fits_m / config.size_tolerance).max(config.min_depth_m);
+        let farthest_m = (fits_m * config.size_tolerance).min(config.max_depth_m);
+        let Some(face_m) = depth.surface_within(square, nearest_m..=farthest_m) else {
             self.unfit += 1;
             return None;
         };
@@ -147,23 +119,21 @@ impl Detector for HogUpperBody {
             Search::Near(track) => Some(track.estimate.region),
             Search::Everywhere { .. } => None,
         };
-        let config = self.config.clone();
-        let mut proposer =
-            Proposer { config: &config, camera, depth, near, unfit: 0, out_of_place: 0 };
-        let least = self.model.sum_at(config.min_score);
-        let sides = self.sides(camera);
-        let propose = |square: &Rect| proposer.propose(square);
-        let before = self.scanner.looked_at();
-        let windows = self.scanner.scan(grey, &self.model, sides, least, propose);
-        let looked_at = self.scanner.looked_at() - before;
+        let Self { config, model, scanner, windows } = self;
+        let mut proposer = Proposer { config, camera, depth, near, unfit: 0, out_of_place: 0 };
+        let (sides, least) = (sides(config, camera), model.sum_at(config.min_score));
+        let before = scanner.looked_at();
+        windows.clear();
+        scanner.scan(grey, sides, least, |square| proposer.propose(square), windows);
+        let looked_at = scanner.looked_at() - before;
         funnel.drop_many("window: size and depth", proposer.unfit);
         funnel.drop_many("window: head height", proposer.out_of_place);
         funnel.drop_many("window: gradients", looked_at - windows.len() as u64);
         let all = windows.len();
-        let best = merge(windows, config.overlap, config.apart_m);
-        funnel.drop_many("window: beside a better one", (all - best.len()) as u64);
+        merge(windows, config.overlap, config.apart_m);
+        funnel.drop_many("window: beside a better one", (all - windows.len()) as u64);
         let mut found: Vec<Detection> =
-            best.iter().filter_map(|window| self.detection(camera, window)).collect();
+            self.windows.iter().filter_map(|window| self.detection(camera, window)).collect();
         if near.is_some() {
             found.truncate(1);
         }

@@ -1,22 +1,60 @@
-//! Gradients of a row of pixels.
+//! Gradients of a row of pixels, and what they say of directions.
+
+/// Pixels that are dealt with at once.
+pub(crate) const LANES: usize = 8;
+
+/// The votes of as many pixels for each direction.
+pub(crate) type Votes<const BINS: usize> = [[f32; LANES]; BINS];
 
 /// Lengths and directions; keeps its memory from one row to the next.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Gradients {
-    /// Length of each gradient, of centred differences that are not halved.
-    pub(crate) length: Vec<f32>,
-    /// Its direction, in half turns from 0 to 1; opposite ones are the same.
-    pub(crate) turn: Vec<f32>,
+    length: Vec<f32>,
+    turn: Vec<f32>,
 }
 
 impl Gradients {
-    /// Those of the pixels of `row` but the first and the last.
-    pub(crate) fn fill(&mut self, [above, row, below]: [&[f32]; 3]) {
-        let inner = row.len().saturating_sub(2);
-        self.length.resize(inner, 0.0);
-        self.turn.resize(inner, 0.0);
-        of_row(above, row, below, &mut self.length, &mut self.turn);
+    /// Those of the pixels of a row but the first and the last, up to `lanes`
+    /// times [`LANES`]; as many as `before` that have no length come first, and
+    /// where the row is shorter, more of them at the end.
+    pub(crate) fn fill(&mut self, [above, row, below]: [&[f32]; 3], before: usize, lanes: usize) {
+        let whole = lanes * LANES;
+        self.length.resize(whole, 0.0);
+        self.turn.resize(whole, 0.0);
+        let end = whole.min(before + row.len().saturating_sub(2));
+        self.length[..before].fill(0.0);
+        self.length[end..].fill(0.0);
+        let (length, turn) = (&mut self.length[before..end], &mut self.turn[before..end]);
+        of_row(above, row, below, length, turn);
     }
+
+    /// Length of each gradient, of centred differences that are not halved, and its
+    /// direction, in half turns from 0 to 1; opposite ones are the same.
+    pub(crate) fn lanes(&self) -> impl Iterator<Item = (&[f32; LANES], &[f32; LANES])> {
+        self.length.as_chunks().0.iter().zip(self.turn.as_chunks().0)
+    }
+}
+
+/// Shares the length of each gradient between the two directions that are nearest
+/// to its own. The first direction is at `first` of a bin's width.
+#[inline(always)]
+pub(crate) fn votes<const BINS: usize>(
+    length: &[f32; LANES],
+    turn: &[f32; LANES],
+    first: f32,
+) -> Votes<BINS> {
+    let mut votes = [[0.0; LANES]; BINS];
+    let last = (BINS - 1) as f32;
+    for lane in 0..LANES {
+        let at = turn[lane] * BINS as f32 - first;
+        for (bin, votes) in votes.iter_mut().enumerate() {
+            votes[lane] = length[lane] * (1.0 - (at - bin as f32).abs()).max(0.0);
+        }
+        // Half a turn on, the first direction follows the last one.
+        votes[0][lane] += length[lane] * (at - last).max(0.0);
+        votes[BINS - 1][lane] += length[lane] * (-at).max(0.0);
+    }
+    votes
 }
 
 #[multiversion::multiversion(targets("x86_64+avx2"))]
@@ -59,13 +97,27 @@ mod tests {
             let off = (half_turns(x, y) - slow).abs();
             prop_assert!(off.min(1.0 - off) < 2e-5, "{off}");
         }
+
+        #[test]
+        fn a_gradient_is_shared_by_the_two_directions_that_are_nearest(
+            length in 0.0..30.0f32, turn in 0.0..=1.0f32, half: bool,
+        ) {
+            const BINS: usize = 9;
+            let first = if half { 0.5 } else { 0.0 };
+            let found: Votes<BINS> = votes(&[length; LANES], &[turn; LANES], first);
+            for (bin, votes) in found.iter().enumerate() {
+                let off = (turn * BINS as f32 - first - bin as f32).rem_euclid(BINS as f32);
+                let share = (1.0 - off.min(BINS as f32 - off)).max(0.0);
+                prop_assert!(votes.iter().all(|vote| (vote - length * share).abs() < 1e-4));
+            }
+        }
     }
 
     #[test]
     fn no_gradient_has_no_length_and_any_direction() {
         let mut gradients = Gradients::default();
-        gradients.fill([&[3.0; 5]; 3]);
-        assert_eq!(gradients.length, [0.0; 3]);
+        gradients.fill([&[3.0; 5]; 3], 2, 1);
+        assert_eq!(gradients.length, [0.0; LANES]);
         assert!(gradients.turn.iter().all(|turn| (0.0..=1.0).contains(turn)));
     }
 }

@@ -1,7 +1,6 @@
 //! Cells and blocks.
 
-use crate::gradients::Gradients;
-use crate::model::dot;
+use crate::gradients::{Gradients, LANES, Votes, votes};
 
 /// Side of a cell, pixels.
 pub(crate) const CELL: usize = 8;
@@ -11,19 +10,26 @@ pub(crate) const BINS: usize = 9;
 pub(crate) const BLOCK: usize = 4 * BINS;
 /// No number of a normalised block is larger (L2-Hys).
 const CLIP: f32 = 0.2;
+/// The middle of the first direction, in widths of a bin.
+const FIRST: f32 = 0.5;
+/// Pixels that are half a cell or less left of the first cell's middle: so many lie
+/// outside of it.
+const BEFORE: usize = CELL / 2;
 
 /// The normalised blocks of an image; neighbours share cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Blocks {
     columns: usize,
     rows: usize,
-    values: Vec<f32>,
+    values: Vec<[f32; BLOCK]>,
     /// Histograms of the cells.
-    cells: Vec<f32>,
-    /// Scratch: a row of pixels, its votes, and square roots of all pixels.
-    gradients: Gradients,
-    votes: Vec<f32>,
+    cells: Vec<[f32; BINS]>,
+    /// Scratch: square roots of all pixels, the gradients of a row, and their votes
+    /// for the row of cells above them and for the one below.
     roots: Vec<f32>,
+    gradients: Gradients,
+    above: Vec<Votes<BINS>>,
+    below: Vec<Votes<BINS>>,
 }
 
 impl Blocks {
@@ -31,48 +37,54 @@ impl Blocks {
     /// `width` to a row. The outermost pixels belong to no cell; they are there
     /// for the gradients of their neighbours.
     pub fn fill(&mut self, pixels: &[f32], width: usize) {
-        let (inner, height) = (width.max(2) - 2, pixels.len() / width.max(1));
-        let (across, down) = (inner / CELL, height.saturating_sub(2) / CELL);
-        self.cells.clear();
-        self.cells.resize(across * down * BINS, 0.0);
+        let height = pixels.len() / width.max(1);
+        let (across, down) = (width.max(2) - 2, height.max(2) - 2);
+        let (across, down) = (across / CELL, down / CELL);
         (self.columns, self.rows) = (across.saturating_sub(1), down.saturating_sub(1));
+        self.cells.clear();
         self.values.clear();
-        self.values.resize(self.columns * self.rows * BLOCK, 0.0);
-        if self.values.is_empty() {
+        if self.columns * self.rows == 0 {
             return;
         }
         self.roots.clear();
         self.roots.extend(pixels.iter().map(|grey| grey.max(0.0).sqrt()));
-        for y in 0..height - 2 {
-            let rows = [0, 1, 2].map(|row| &self.roots[(y + row) * width..(y + row + 1) * width]);
-            self.gradients.fill(rows);
-            vote(&self.gradients, &mut self.votes, across);
-            let (cell, share) = place(y);
-            for (row, weight) in [(cell, 1.0 - share), (cell + 1, share)] {
-                // Cells are numbered from 1: outside ones get no votes.
-                if (1..=down).contains(&row) {
-                    let cells = &mut self.cells[(row - 1) * across * BINS..row * across * BINS];
-                    let votes = &self.votes[BINS..];
-                    cells.iter_mut().zip(votes).for_each(|(cell, vote)| *cell += weight * vote);
-                }
-            }
+        self.vote(width, down, across);
+        for y in 0..self.rows {
+            let [above, below] = [y, y + 1].map(|y| &self.cells[y * across..(y + 1) * across]);
+            normalise(above, below, &mut self.values);
         }
-        self.normalise(across);
+        self.values.push([0.0; BLOCK]);
     }
 
-    /// L2-Hys: divided by the length, clipped, divided again.
-    fn normalise(&mut self, across: usize) {
-        for (index, block) in self.values.chunks_exact_mut(BLOCK).enumerate() {
-            let (x, y) = (index % self.columns, index / self.columns);
-            for (corner, part) in block.chunks_exact_mut(BINS).enumerate() {
-                let cell = (y + corner / 2) * across + x + corner % 2;
-                part.copy_from_slice(&self.cells[cell * BINS..(cell + 1) * BINS]);
-            }
-            let scale = 1.0 / (norm(block) + 0.1 * BLOCK as f32 / 255.0_f32.sqrt());
-            block.iter_mut().for_each(|v| *v = (*v * scale).min(CLIP));
-            let scale = 1.0 / (norm(block) + 1e-3);
-            block.iter_mut().for_each(|v| *v *= scale);
+    /// The histograms of all cells: each gradient votes for the two directions and
+    /// the four cells that are nearest.
+    fn vote(&mut self, width: usize, down: usize, across: usize) {
+        for votes in [&mut self.above, &mut self.below] {
+            votes.clear();
+            votes.resize(across + 1, [[0.0; LANES]; BINS]);
         }
+        for y in 0..down * CELL + CELL / 2 {
+            // Half a cell below a cell's first row its own middle is passed.
+            if y % CELL == CELL / 2 {
+                self.finish(y / CELL);
+            }
+            let rows =
+                [0, 1, 2].map(|row| (y + row) * width).map(|at| self.roots.get(at..at + width));
+            let [Some(above), Some(row), Some(below)] = rows else { break };
+            self.gradients.fill([above, row, below], BEFORE, across + 1);
+            let share = ramp((y + CELL / 2) % CELL);
+            add_votes(&self.gradients, share, &mut self.above, &mut self.below);
+        }
+        self.finish(down);
+    }
+
+    /// Row `y` of cells, numbered from 1, has all its votes. Row 0 lies outside.
+    fn finish(&mut self, y: usize) {
+        if y > 0 {
+            self.cells.extend(self.above.windows(2).map(histogram));
+        }
+        std::mem::swap(&mut self.above, &mut self.below);
+        self.below.fill([[0.0; LANES]; BINS]);
     }
 
     /// Blocks in a row.
@@ -85,44 +97,73 @@ impl Blocks {
         self.rows
     }
 
-    /// The numbers of `count` neighbouring blocks in a row.
-    pub fn run(&self, x: usize, y: usize, count: usize) -> &[f32] {
-        let start = (y * self.columns + x) * BLOCK;
-        &self.values[start..start + count * BLOCK]
+    /// The numbers from block (x, y) on; behind the last block there is one without
+    /// any.
+    pub fn from(&self, x: usize, y: usize) -> &[f32] {
+        self.values[y * self.columns + x..].as_flattened()
     }
 }
 
-/// The cell before a pixel, numbered from 1, and the share of the next one.
-fn place(pixel: usize) -> (usize, f32) {
-    let at = (pixel as f32 + 0.5) / CELL as f32 + 0.5;
-    let cell = at as usize;
-    (cell, at - cell as f32)
+/// The share of the next cell in a pixel that is so many pixels behind a cell's
+/// middle.
+const fn ramp(pixel: usize) -> f32 {
+    (pixel as f32 + 0.5) / CELL as f32
 }
 
-/// The votes of a row for its cells and for one outside at either end: each
-/// gradient votes for the two directions and the two cells that are nearest, by
-/// its length.
-fn vote(gradients: &Gradients, votes: &mut Vec<f32>, across: usize) {
-    votes.clear();
-    votes.resize((across + 2) * BINS, 0.0);
-    let pixels = gradients.length.iter().zip(&gradients.turn).take(across * CELL);
-    for (x, (length, turn)) in pixels.enumerate() {
-        let (cell, next) = place(x);
-        // One more than the direction below, so that it is never negative.
-        let at = turn * BINS as f32 + 0.5;
-        let bin = at as usize;
-        let share = at - bin as f32;
-        let (below, above) = ((bin + BINS - 1) % BINS, bin % BINS);
-        let here = length * (1.0 - next);
-        let there = length * next;
-        let start = cell * BINS;
-        votes[start + below] += here * (1.0 - share);
-        votes[start + above] += here * share;
-        votes[start + BINS + below] += there * (1.0 - share);
-        votes[start + BINS + above] += there * share;
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn add_votes(
+    gradients: &Gradients,
+    share: f32,
+    above: &mut [Votes<BINS>],
+    below: &mut [Votes<BINS>],
+) {
+    for (((length, turn), above), below) in gradients.lanes().zip(above).zip(below) {
+        let votes: Votes<BINS> = votes(length, turn, FIRST);
+        for (bin, votes) in votes.iter().enumerate() {
+            for lane in 0..LANES {
+                below[bin][lane] += share * votes[lane];
+                above[bin][lane] += (1.0 - share) * votes[lane];
+            }
+        }
     }
 }
 
-fn norm(values: &[f32]) -> f32 {
-    dot(values, values).sqrt()
+/// The histogram of a cell from the pixels left and right of its middle.
+fn histogram(sides: &[Votes<BINS>]) -> [f32; BINS] {
+    let mut cell = [0.0; BINS];
+    for (bin, sum) in cell.iter_mut().enumerate() {
+        let mut lanes = [0.0; LANES];
+        for (lane, sum) in lanes.iter_mut().enumerate() {
+            let share = ramp(lane);
+            *sum = share * sides[0][bin][lane] + (1.0 - share) * sides[1][bin][lane];
+        }
+        *sum = lanes.iter().sum();
+    }
+    cell
+}
+
+/// Adds the blocks of two rows of cells. L2-Hys: divided by the length, clipped,
+/// divided again.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn normalise(above: &[[f32; BINS]], below: &[[f32; BINS]], blocks: &mut Vec<[f32; BLOCK]>) {
+    for (above, below) in above.windows(2).zip(below.windows(2)) {
+        let mut block = [0.0; BLOCK];
+        for (corner, cell) in above.iter().chain(below).enumerate() {
+            block[corner * BINS..(corner + 1) * BINS].copy_from_slice(cell);
+        }
+        let scale = 1.0 / (norm(&block) + 0.1 * BLOCK as f32 / 255.0_f32.sqrt());
+        block.iter_mut().for_each(|v| *v = (*v * scale).min(CLIP));
+        let scale = 1.0 / (norm(&block) + 1e-3);
+        block.iter_mut().for_each(|v| *v *= scale);
+        blocks.push(block);
+    }
+}
+
+#[inline(always)]
+fn norm(block: &[f32; BLOCK]) -> f32 {
+    let mut lanes = [0.0_f32; 4];
+    for four in block.as_chunks::<4>().0 {
+        lanes.iter_mut().zip(four).for_each(|(lane, v)| *lane += v * v);
+    }
+    lanes.iter().sum::<f32>().sqrt()
 }

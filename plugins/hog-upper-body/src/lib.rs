@@ -20,6 +20,7 @@ mod config;
 mod detect;
 mod gradients;
 mod hog;
+mod judge;
 mod model;
 mod resample;
 mod scan;

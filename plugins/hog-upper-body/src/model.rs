@@ -69,7 +69,8 @@ impl Field {
     pub fn numbers(&self, x: usize, y: usize) -> Vec<f32> {
         match self {
             Self::Blocks(blocks) => {
-                (y..y + SIDE).flat_map(|y| blocks.run(x, y, SIDE).iter().copied()).collect()
+                let rows = (y..y + SIDE).map(|y| &blocks.from(x, y)[..SIDE * BLOCK]);
+                rows.flatten().copied().collect()
             }
             Self::Channels(channels) => (2 * y..2 * y + trees::CELLS)
                 .flat_map(|y| &channels.from(2 * x, y)[..trees::CELLS * crate::channels::DEPTH])
@@ -110,21 +111,6 @@ impl Model {
         match self.machine {
             Machine::Linear { .. } => Kind::Linear,
             Machine::Trees(_) => Kind::Trees,
-        }
-    }
-
-    /// The sum of the window that begins at cell (x, y), of 8 pixels.
-    pub fn sum(&self, field: &Field, x: usize, y: usize) -> f32 {
-        match (&self.machine, field) {
-            (Machine::Linear { weights, bias }, Field::Blocks(blocks)) => {
-                let rows = weights.chunks_exact(SIDE * BLOCK).enumerate();
-                let of = |(row, weights)| dot(weights, blocks.run(x, y + row, SIDE));
-                rows.map(of).sum::<f32>() + bias
-            }
-            (Machine::Trees(trees), Field::Channels(channels)) => {
-                trees.sum_in(channels, 2 * x, 2 * y)
-            }
-            _ => f32::MIN,
         }
     }
 

@@ -1,5 +1,7 @@
 //! Images in other sizes.
 
+use std::ops::Range;
+
 use tagalong_core::GreyImage;
 
 /// Weights of the source pixels that a sample is the mean of.
@@ -34,6 +36,9 @@ impl Taps {
     }
 }
 
+/// Rows of the result that are made at once.
+const LANES: usize = 8;
+
 /// Brings images to other sizes; keeps its memory from one to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Resampler {
@@ -41,6 +46,8 @@ pub struct Resampler {
     rows: Taps,
     /// A row of the result in all columns of the source that matter.
     tall: Vec<f32>,
+    /// The same of several rows, side by side for each column.
+    beside: Vec<[f32; LANES]>,
 }
 
 impl Resampler {
@@ -56,38 +63,72 @@ impl Resampler {
         (width, height): (usize, usize),
         out: &mut Vec<f32>,
     ) {
-        out.clear();
         out.resize(width * height, 0.0);
         if image.width() * image.height() * width * height == 0 {
+            out.fill(0.0);
             return;
         }
         self.columns.fill(origin.0, step, width);
         self.rows.fill(origin.1, step, height);
         let first = self.columns.each().map(|(start, _)| start).min().unwrap_or(0);
         let ends = self.columns.each().map(|(start, weights)| start + weights.len() as i64);
-        let end = ends.max().unwrap_or(0);
-        let (last_row, last_column) = (image.height() as i64 - 1, image.width() as i64 - 1);
-        let first = first.min(last_column);
-        let end = end.max(first + 1).max(1);
-        let inside = first.max(0)..end.min(last_column + 1);
-        for (line, (start, weights)) in out.chunks_exact_mut(width).zip(self.rows.each()) {
-            self.tall.clear();
-            self.tall.resize((end - first) as usize, 0.0);
-            let at = (inside.start - first) as usize;
-            let length = (inside.end - inside.start) as usize;
-            for (y, weight) in (start..).zip(weights) {
-                let source = &image.row(y.clamp(0, last_row) as usize)[inside.start as usize..];
-                add_scaled(&mut self.tall[at..at + length], source, *weight);
+        let end = ends.max().unwrap_or(0).max(first + 1);
+        self.beside.resize((end - first) as usize, [0.0; LANES]);
+        let Self { columns, rows, tall, beside } = self;
+        let mut rows = rows.each();
+        for lines in out.chunks_mut(width * LANES) {
+            for (lane, (start, weights)) in rows.by_ref().take(LANES).enumerate() {
+                add_rows(image, (start, weights), first..end, tall);
+                beside.iter_mut().zip(&*tall).for_each(|(lanes, value)| lanes[lane] = *value);
             }
-            // The border goes on to both sides.
-            let (left, right) = (self.tall[at], self.tall[at + length - 1]);
-            self.tall[..at].fill(left);
-            self.tall[at + length..].fill(right);
-            for (sample, (start, weights)) in line.iter_mut().zip(self.columns.each()) {
-                let source = &self.tall[(start - first) as usize..];
-                *sample = source.iter().zip(weights).map(|(v, w)| v * w).sum();
+            blend_columns(columns, first, beside, lines, width);
+        }
+    }
+}
+
+/// The weighted mean of rows from `start` on, in some columns; both may lie outside
+/// of the image.
+fn add_rows(
+    image: &GreyImage,
+    (start, weights): (i64, &[f32]),
+    columns: Range<i64>,
+    out: &mut Vec<f32>,
+) {
+    let (last_row, last_column) = (image.height() as i64 - 1, image.width() as i64 - 1);
+    let inside = columns.start.clamp(0, last_column)..columns.end.clamp(1, last_column + 1);
+    out.clear();
+    out.resize((columns.end - columns.start) as usize, 0.0);
+    // Where nothing of the image is wanted, its border is what goes on.
+    let at = (inside.start - columns.start).clamp(0, out.len() as i64 - 1) as usize;
+    let length = (inside.end - inside.start).max(1) as usize;
+    let middle = at..(at + length).min(out.len());
+    for (y, weight) in (start..).zip(weights) {
+        let source = &image.row(y.clamp(0, last_row) as usize)[inside.start as usize..];
+        add_scaled(&mut out[middle.clone()], source, *weight);
+    }
+    let (left, right) = (out[middle.start], out[middle.end - 1]);
+    out[..middle.start].fill(left);
+    out[middle.end..].fill(right);
+}
+
+/// Samples of several rows from the values of their columns.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn blend_columns(
+    columns: &Taps,
+    first: i64,
+    values: &[[f32; LANES]],
+    lines: &mut [f32],
+    width: usize,
+) {
+    for (x, (start, weights)) in columns.each().enumerate() {
+        let mut sums = [0.0_f32; LANES];
+        for (values, weight) in values[(start - first) as usize..].iter().zip(weights) {
+            for lane in 0..LANES {
+                sums[lane] += values[lane] * weight;
             }
         }
+        let samples = lines.iter_mut().skip(x).step_by(width);
+        samples.zip(sums).for_each(|(sample, sum)| *sample = sum);
     }
 }
 

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use tagalong_core::{GreyImage, Rect};
 
 use crate::hog::CELL;
+use crate::judge::Judge;
 use crate::model::{Field, Kind, Model, SIDE};
 use crate::resample::{Resampler, resampled};
 
@@ -37,19 +38,32 @@ pub struct Window {
 /// Looks at the windows of images; keeps its memory from one to the next.
 #[derive(Clone, Debug)]
 pub struct Scanner {
-    field: Field,
+    judge: Judge,
     resampler: Resampler,
     pixels: Vec<f32>,
+    wanted: Vec<Wanted>,
+    sums: Vec<f32>,
     looked_at: u64,
 }
 
+/// A window that is worth a look: the cell at which it begins, and the depth of what
+/// it shows.
+#[derive(Clone, Copy, Debug)]
+struct Wanted {
+    x: i64,
+    y: i64,
+    depth_m: Option<f64>,
+}
+
 impl Scanner {
-    /// For models of one kind.
-    pub fn new(kind: Kind) -> Self {
+    /// For one model.
+    pub fn new(model: &Model) -> Self {
         Self {
-            field: Field::new(kind),
+            judge: Judge::new(model),
             resampler: Resampler::default(),
             pixels: Vec::new(),
+            wanted: Vec::new(),
+            sums: Vec::new(),
             looked_at: 0,
         }
     }
@@ -59,60 +73,88 @@ impl Scanner {
         self.looked_at
     }
 
-    /// Looks at all windows whose upper-body square has one of `sides`, pixels,
-    /// and that `propose` allows; it is given the square and says the depth of
-    /// what it shows, if there is one to say. Windows below `least` are left out.
+    /// Adds all windows whose upper-body square has one of `sides`, pixels, and that
+    /// `propose` allows; it is given the square and says the depth of what it
+    /// shows, if there is one to say. Windows below `least` are left out.
     pub fn scan(
         &mut self,
         image: &GreyImage,
-        model: &Model,
         sides: impl Iterator<Item = f64>,
         least: f32,
         mut propose: impl FnMut(&Rect) -> Option<Option<f64>>,
-    ) -> Vec<Window> {
-        let mut found = Vec::new();
-        for side in sides {
-            self.size(image, model, side, least, &mut propose, &mut found);
-        }
-        found
-    }
-
-    fn size(
-        &mut self,
-        image: &GreyImage,
-        model: &Model,
-        side: f64,
-        least: f32,
-        propose: &mut impl FnMut(&Rect) -> Option<Option<f64>>,
         found: &mut Vec<Window>,
     ) {
-        let step = side / (FILLED * WINDOW_PX as f64);
+        for side in sides {
+            let size = Size { side, step: side / (FILLED * WINDOW_PX as f64) };
+            self.ask(image, &size, &mut propose);
+            let Some((left, top, right, bottom)) = bounds(&self.wanted) else { continue };
+            self.looked_at += self.wanted.len() as u64;
+            self.fill(image, size.step, (left, top, right, bottom));
+            self.judge(&size, (left, top), least, found);
+        }
+    }
+
+    /// Notes which windows of a size are wanted, row by row.
+    fn ask(
+        &mut self,
+        image: &GreyImage,
+        size: &Size,
+        propose: &mut impl FnMut(&Rect) -> Option<Option<f64>>,
+    ) {
         let (left_px, above_px) = margins();
-        let square = |x: i64, y: i64| {
-            let at = |cell: i64, margin: f64| ((cell * CELL as i64) as f64 + margin) * step;
-            Rect::new(at(x, left_px), at(y, above_px), side, side)
-        };
-        let columns = inside(image.width() as f64 / step, left_px);
-        let mut wanted: Vec<(i64, i64, Option<f64>)> = Vec::new();
-        for y in inside(image.height() as f64 / step, above_px) {
-            let row = columns.clone();
-            wanted.extend(row.filter_map(|x| Some((x, y, propose(&square(x, y))?))));
+        let columns = inside(image.width() as f64 / size.step, left_px);
+        self.wanted.clear();
+        for y in inside(image.height() as f64 / size.step, above_px) {
+            let of = |x| Some(Wanted { x, y, depth_m: propose(&size.square(x, y))? });
+            self.wanted.extend(columns.clone().filter_map(of));
         }
-        let Some((left, top, right, bottom)) = bounds(&wanted) else { return };
-        self.looked_at += wanted.len() as u64;
+    }
+
+    /// Makes what the machine looks at, from one cell to another.
+    fn fill(
+        &mut self,
+        image: &GreyImage,
+        step: f64,
+        (left, top, right, bottom): (i64, i64, i64, i64),
+    ) {
         let long = |from: i64, to: i64| ((to - from) as usize + SIDE + 1) * CELL + 2 * AROUND_PX;
-        let (width, height) = (long(left, right), long(top, bottom));
         let start = |cell: i64| ((cell * CELL as i64) as f64 - AROUND_PX as f64) * step;
-        let origin = (start(left), start(top));
-        self.resampler.fill(image, origin, step, (width, height), &mut self.pixels);
-        self.field.fill(&self.pixels, width);
-        for (x, y, depth_m) in wanted {
-            let at = |cell: i64, first: i64| (cell - first) as usize + AROUND;
-            let sum = model.sum(&self.field, at(x, left), at(y, top));
-            if sum >= least {
-                found.push(Window { region: square(x, y), depth_m, sum });
-            }
+        let (origin, size) = ((start(left), start(top)), (long(left, right), long(top, bottom)));
+        self.resampler.fill(image, origin, step, size, &mut self.pixels);
+        self.judge.fill(&self.pixels, size.0);
+    }
+
+    /// Adds the wanted windows that reach `least`; neighbours are judged together.
+    fn judge(&mut self, size: &Size, (left, top): (i64, i64), least: f32, found: &mut Vec<Window>) {
+        let at = |cell: i64, first: i64| (cell - first) as usize + AROUND;
+        for run in self.wanted.chunk_by(|a, b| (a.x + 1, a.y) == (b.x, b.y)) {
+            self.sums.clear();
+            self.sums.resize(run.len(), 0.0);
+            self.judge.sums((at(run[0].x, left), at(run[0].y, top)), &mut self.sums);
+            let good = run.iter().zip(&self.sums).filter(|(_, sum)| **sum >= least);
+            found.extend(good.map(|(window, sum)| Window {
+                region: size.square(window.x, window.y),
+                depth_m: window.depth_m,
+                sum: *sum,
+            }));
         }
+    }
+}
+
+/// Windows of one size: the side of their square, and that of a pixel of the
+/// resampled image, pixels.
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    side: f64,
+    step: f64,
+}
+
+impl Size {
+    /// The square of the window that begins at a cell.
+    fn square(&self, x: i64, y: i64) -> Rect {
+        let (left_px, above_px) = margins();
+        let at = |cell: i64, margin: f64| ((cell * CELL as i64) as f64 + margin) * self.step;
+        Rect::new(at(x, left_px), at(y, above_px), self.side, self.side)
     }
 }
 
@@ -139,8 +181,8 @@ pub fn window_of(square: &Rect) -> Rect {
 }
 
 /// Smallest and largest column and row.
-fn bounds(wanted: &[(i64, i64, Option<f64>)]) -> Option<(i64, i64, i64, i64)> {
-    let (x, y) = (|| wanted.iter().map(|w| w.0), || wanted.iter().map(|w| w.1));
+fn bounds(wanted: &[Wanted]) -> Option<(i64, i64, i64, i64)> {
+    let (x, y) = (|| wanted.iter().map(|w| w.x), || wanted.iter().map(|w| w.y));
     Some((x().min()?, y().min()?, x().max()?, y().max()?))
 }
 
@@ -156,13 +198,14 @@ pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> 
     field.numbers(AROUND, AROUND)
 }
 
-/// The best of each group of windows: greedily, best first, those that overlap
+/// Leaves the best of each group of windows, best first: greedily, best first, those that overlap
 /// a better one by more than `overlap` go, unless they are `apart_m` nearer or
 /// farther. Two people one behind the other both stay.
-pub fn merge(mut windows: Vec<Window>, overlap: f64, apart_m: f64) -> Vec<Window> {
+pub fn merge(windows: &mut Vec<Window>, overlap: f64, apart_m: f64) {
     windows.sort_by(|a, b| b.sum.total_cmp(&a.sum));
-    let mut kept: Vec<Window> = Vec::new();
-    for window in windows {
+    let mut kept = 0;
+    for at in 0..windows.len() {
+        let window = windows[at];
         let is_same = |better: &Window| {
             let apart = match (window.depth_m, better.depth_m) {
                 (Some(a), Some(b)) => (a - b).abs() >= apart_m,
@@ -170,9 +213,10 @@ pub fn merge(mut windows: Vec<Window>, overlap: f64, apart_m: f64) -> Vec<Window
             };
             !apart && window.region.iou(&better.region) > overlap
         };
-        if !kept.iter().any(is_same) {
-            kept.push(window);
+        if !windows[..kept].iter().any(is_same) {
+            windows[kept] = window;
+            kept += 1;
         }
     }
-    kept
+    windows.truncate(kept);
 }

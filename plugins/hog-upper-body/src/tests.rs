@@ -7,8 +7,8 @@ use crate::model::SIDE;
 use crate::scan::WINDOW_PX;
 use crate::trees::CHANNEL_NUMBERS;
 use crate::{
-    Blocks, Channels, Kind, Machine, Model, NUMBERS, Scanner, Tree, Trees, Window, merge,
-    resampled, window_numbers,
+    Blocks, Channels, Machine, Model, NUMBERS, Scanner, Tree, Trees, Window, merge, resampled,
+    window_numbers,
 };
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
@@ -68,10 +68,23 @@ fn blocks_are_those_of_the_slow_reference() {
         let length = norm(&slow) + 0.1 * BLOCK as f32 / 255.0_f32.sqrt();
         slow.iter_mut().for_each(|v| *v = (*v / length).min(0.2));
         let length = norm(&slow) + 1e-3;
-        for (fast, slow) in blocks.run(x, y, 1).iter().zip(&slow) {
+        for (fast, slow) in blocks.from(x, y).iter().zip(&slow) {
             assert!((fast - slow / length).abs() < 1e-3, "{fast} {}", slow / length);
         }
     }
+}
+
+/// All windows of some sizes that a closure allows.
+fn scan(
+    scanner: &mut Scanner,
+    image: &GreyImage,
+    sides: &[f64],
+    part: impl Fn(&Rect) -> bool,
+) -> Vec<Window> {
+    let (sides, mut found) = (sides.iter().copied(), Vec::new());
+    let propose = |square: &Rect| part(square).then_some(None);
+    scanner.scan(image, sides, f32::MIN, propose, &mut found);
+    found
 }
 
 fn linear() -> Model {
@@ -94,9 +107,8 @@ fn trees() -> Model {
 fn a_scan_gives_each_window_the_sum_of_its_numbers() {
     let image = noise(160, 130, 4);
     for model in [linear(), trees()] {
-        let mut scanner = Scanner::new(model.kind());
-        let sides = [32.0, 45.0].into_iter();
-        let windows = scanner.scan(&image, &model, sides, f32::MIN, |_| Some(None));
+        let mut scanner = Scanner::new(&model);
+        let windows = scan(&mut scanner, &image, &[32.0, 45.0], |_| true);
         assert_eq!(scanner.looked_at(), windows.len() as u64);
         assert!(windows.len() > 100, "{}", windows.len());
         // What is at the edge of what was resampled has other neighbours.
@@ -181,10 +193,8 @@ fn a_part_of_the_image_gives_the_same_windows() {
     let image = noise(200, 150, 4);
     let model = linear();
     let part = |square: &Rect| square.x > 60.0 && square.y > 40.0;
-    let scan = |part: &dyn Fn(&Rect) -> bool| {
-        let propose = |square: &Rect| part(square).then_some(None);
-        Scanner::new(Kind::Linear).scan(&image, &model, [52.0].into_iter(), f32::MIN, propose)
-    };
+    let scan =
+        |part: &dyn Fn(&Rect) -> bool| scan(&mut Scanner::new(&model), &image, &[52.0], part);
     let all: Vec<Window> = scan(&|_| true).into_iter().filter(|w| part(&w.region)).collect();
     let some = scan(&part);
     assert_eq!(all.len(), some.len());
@@ -201,13 +211,15 @@ fn two_people_one_behind_the_other_both_stay() {
         depth_m,
         sum,
     };
-    let count = |a: Option<f64>, b: Option<f64>| {
-        merge(vec![window(0.0, a, 1.0), window(5.0, b, 2.0)], 0.4, 0.4).len()
+    let merged = |a: Option<f64>, b: Option<f64>| {
+        let mut windows = vec![window(0.0, a, 1.0), window(5.0, b, 2.0)];
+        merge(&mut windows, 0.4, 0.4);
+        windows
     };
-    assert_eq!(count(Some(2.0), Some(2.1)), 1);
-    assert_eq!(count(Some(2.0), Some(2.6)), 2);
-    assert_eq!(count(None, Some(2.6)), 1);
-    assert_eq!(merge(vec![window(0.0, None, 1.0), window(5.0, None, 2.0)], 0.4, 0.4)[0].sum, 2.0);
+    assert_eq!(merged(Some(2.0), Some(2.1)).len(), 1);
+    assert_eq!(merged(Some(2.0), Some(2.6)).len(), 2);
+    assert_eq!(merged(None, Some(2.6)).len(), 1);
+    assert_eq!(merged(None, None)[0].sum, 2.0);
 }
 
 #[test]

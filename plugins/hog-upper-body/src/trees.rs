@@ -1,6 +1,6 @@
 //! Boosted trees of two questions each.
 
-use crate::channels::{Channels, DEPTH};
+use crate::channels::DEPTH;
 use crate::model::SIDE;
 
 /// Cells along a side of a window.
@@ -8,7 +8,7 @@ pub(crate) const CELLS: usize = 2 * (SIDE + 1);
 /// Numbers of a window.
 pub(crate) const CHANNEL_NUMBERS: usize = CELLS * CELLS * DEPTH;
 /// A window is given up after this many trees at the earliest.
-const PATIENCE: usize = 32;
+pub(crate) const PATIENCE: usize = 32;
 /// Bytes of a tree in a file.
 const BYTES: usize = 3 * 6 + 4 * 4;
 
@@ -24,10 +24,10 @@ pub struct Tree {
 }
 
 impl Tree {
-    fn value(&self, number: impl Fn(u16) -> f32) -> f32 {
-        let side = usize::from(number(self.numbers[0]) >= self.below[0]);
-        let other = usize::from(number(self.numbers[1 + side]) >= self.below[1 + side]);
-        self.values[2 * side + other]
+    fn value(&self, numbers: &[f32]) -> f32 {
+        let is_no = |k: usize| numbers[usize::from(self.numbers[k])] >= self.below[k];
+        let side = usize::from(is_no(0));
+        self.values[2 * side + usize::from(is_no(1 + side))]
     }
 
     fn to_bytes(self) -> impl Iterator<Item = u8> {
@@ -59,12 +59,11 @@ pub struct Trees {
 }
 
 impl Trees {
-    /// The sum over the numbers that `number` gives, or that at which the window
-    /// was given up.
-    fn sum(&self, number: impl Fn(u16) -> f32) -> f32 {
+    /// The sum of a window's numbers, or that at which the window was given up.
+    pub fn sum_of(&self, numbers: &[f32]) -> f32 {
         let mut sum = 0.0;
         for (count, tree) in self.trees.iter().enumerate() {
-            sum += tree.value(&number);
+            sum += tree.value(numbers);
             if sum < self.hopeless && count >= PATIENCE {
                 break;
             }
@@ -72,27 +71,12 @@ impl Trees {
         sum
     }
 
-    /// The sum of the window whose first cell is at (x, y).
-    pub(crate) fn sum_in(&self, channels: &Channels, x: usize, y: usize) -> f32 {
-        const ROW: usize = CELLS * DEPTH;
-        let (cells, stride) = (channels.from(x, y), channels.stride());
-        self.sum(|number| {
-            let number = usize::from(number);
-            cells[number / ROW * stride + number % ROW]
-        })
-    }
-
-    /// The sum of a window's numbers.
-    pub fn sum_of(&self, numbers: &[f32]) -> f32 {
-        self.sum(|number| numbers[usize::from(number)])
-    }
-
     /// The least sum on the way to the end, once windows may be given up.
     #[cfg(feature = "train")]
     pub(crate) fn least_on_the_way(&self, numbers: &[f32]) -> f32 {
         let (mut sum, mut least) = (0.0, f32::MAX);
         for (count, tree) in self.trees.iter().enumerate() {
-            sum += tree.value(|number| numbers[usize::from(number)]);
+            sum += tree.value(numbers);
             if count >= PATIENCE {
                 least = least.min(sum);
             }

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{POSITIVE, Result, check_ranges};
 
 /// Settings of `image-kalman`. Lengths in the image are given in widths of the
 /// box, so that near and far people are treated alike; the box of an upper body
@@ -57,22 +57,16 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let positive = [
-            ("acceleration_noise", self.acceleration_noise),
-            ("scale_noise", self.scale_noise),
-            ("range_noise", self.range_noise),
-            ("initial_speed", self.initial_speed),
-            ("initial_range_speed_mps", self.initial_range_speed_mps),
-            ("sigma_centre", self.sigma_centre),
-            ("sigma_scale", self.sigma_scale),
-            ("sigma_range_m", self.sigma_range_m),
-        ];
-        if let Some((key, value)) = positive.into_iter().find(|(_, v)| !(*v > 0.0 && *v < 1e6)) {
-            return Err(Error::Settings(format!("`{key}` must be positive, not {value}")));
-        }
-        match (0.0..=1.0).contains(&self.shape_weight) {
-            true => Ok(()),
-            false => Err(Error::Settings("`shape_weight` must lie between 0 and 1".into())),
-        }
+        check_ranges(&[
+            ("acceleration_noise", self.acceleration_noise, POSITIVE),
+            ("scale_noise", self.scale_noise, POSITIVE),
+            ("range_noise", self.range_noise, POSITIVE),
+            ("initial_speed", self.initial_speed, POSITIVE),
+            ("initial_range_speed_mps", self.initial_range_speed_mps, POSITIVE),
+            ("sigma_centre", self.sigma_centre, POSITIVE),
+            ("sigma_scale", self.sigma_scale, POSITIVE),
+            ("sigma_range_m", self.sigma_range_m, POSITIVE),
+            ("shape_weight", self.shape_weight, 0.0..=1.0),
+        ])
     }
 }

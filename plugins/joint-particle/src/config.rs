@@ -162,7 +162,7 @@ impl Default for Config {
             reach_near_m: 0.3,
             reach_far_m: 0.9,
             step_m: 0.03,
-            swap_margin: 0.15,
+            swap_margin: 0.3,
             compat_printed_kernel: false,
             compat_printed_axes: false,
             compat_shared_noise: false,

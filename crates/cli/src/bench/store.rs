@@ -9,7 +9,7 @@ use tagalong_eval::Sequence;
 use tagalong_report::{TaskResult, TaskTiming};
 
 use super::plan::Task;
-use crate::outcome::Failure;
+use crate::outcome::{Failure, make_room_for};
 
 /// The folder of a benchmark.
 #[derive(Clone, Debug)]
@@ -138,9 +138,7 @@ fn timing_name(hash: &str) -> String {
 /// A disk that fails.
 pub fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(failed)?;
-    }
+    make_room_for(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!("{name}.{}.partial", std::process::id()));
     fs::write(&partial, bytes).map_err(failed)?;

@@ -5,6 +5,7 @@ use tagalong_core::Registry;
 use tagalong_log::{FrameSource, Needs};
 use tagalong_pipeline::{Pipeline, needs};
 
+use crate::args::Format;
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::suggest::check_log_path;
@@ -16,20 +17,40 @@ const FRAMES: u64 = 3;
 ///
 /// # Errors
 /// What is wrong with the config, or why the log does not suit it.
-pub fn check(registry: &Registry, config: &Path, log: Option<&Path>) -> Outcome {
+pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: Format) -> Outcome {
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
     let wanted = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
-    print(&format!("{}: right; needs {}\n", config.display(), in_words(wanted)))?;
-    match log {
-        None => Ok(Ended::Well),
-        Some(log) => fits(pipeline, &outer, log, wanted),
-    }
+    let notes = log.map(|log| fits(pipeline, &outer, log, wanted)).transpose()?;
+    let config = config.display();
+    print(&match format {
+        Format::Text => {
+            let mut out = format!("{config}: right; needs {}\n", in_words(wanted));
+            if let (Some(log), Some(notes)) = (log, notes) {
+                let _ = writeln!(out, "{}: fits", log.display());
+                notes.iter().for_each(|note| out += &format!("  {note}\n"));
+            }
+            out
+        }
+        Format::Json => {
+            let needs = names(wanted);
+            let answer = serde_json::json!({
+                "config": config.to_string(), "needs": needs, "log": log, "notes": notes,
+            });
+            format!("{answer:#}\n")
+        }
+    })?;
+    Ok(Ended::Well)
 }
 
-/// Tries the first frames of the log.
-fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path, wanted: Needs) -> Outcome {
+/// Tries the first frames of the log; returns what the reader has to say.
+fn fits(
+    mut pipeline: Pipeline,
+    outer: &OuterSettings,
+    log: &Path,
+    wanted: Needs,
+) -> Result<Vec<String>, Failure> {
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, wanted)?;
     let mut tried = 0;
@@ -42,17 +63,16 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path, wanted: Needs
     if tried == 0 {
         return Err(Failure::failed(format!("{}: no frame that can be used", log.display())));
     }
-    let mut out = format!("{}: fits\n", log.display());
-    for note in source.notes() {
-        let _ = writeln!(out, "  {note}");
-    }
-    print(&out)?;
-    Ok(Ended::Well)
+    Ok(source.notes().to_vec())
+}
+
+fn names(needs: Needs) -> Vec<&'static str> {
+    let named = [(needs.colour, "colour"), (needs.depth, "depth"), (needs.right, "right stereo")];
+    named.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect()
 }
 
 fn in_words(needs: Needs) -> String {
-    let named = [(needs.colour, "colour"), (needs.depth, "depth"), (needs.right, "right stereo")];
-    let names: Vec<&str> = named.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect();
+    let names = names(needs);
     match names.is_empty() {
         true => "no particular image".to_owned(),
         false => format!("{} images", names.join(" and ")),

@@ -1,11 +1,21 @@
-use tagalong_core::{Registry, commented_defaults};
+use tagalong_core::{PluginInfo, Registry, commented_defaults};
 use tagalong_pipeline::PipelineSettings;
 
 use crate::config_file::OuterSettings;
+use crate::doctor::remedies;
+use crate::keys;
 use crate::outcome::{Ended, Failure, Outcome, print};
+use crate::reproduce::TableFormat;
 
 /// The name under which the keys around the plugins are printed.
 const PIPELINE: &str = "pipeline";
+
+/// The name under which all keys are printed.
+const ALL: &str = "all";
+
+/// The name under which the settings are printed that belong to the tests of the
+/// rejection funnel.
+const FUNNEL: &str = "funnel";
 
 /// How plugins are named in a config.
 const PLUGIN_SECTIONS: &str = "\
@@ -23,21 +33,79 @@ const PLUGIN_SECTIONS: &str = "\
 # config = {}
 ";
 
+/// Everything around the plugins, with its defaults.
+pub fn pipeline_defaults() -> String {
+    let own = commented_defaults::<PipelineSettings>();
+    let outer = commented_defaults::<OuterSettings>();
+    format!("{own}\n{PLUGIN_SECTIONS}{outer}")
+}
+
 /// `tagalong config PLUGIN`.
 ///
 /// # Errors
 /// If there is no such plugin: names the nearest one.
-pub fn config(registry: &Registry, plugin: &str) -> Outcome {
-    let text = if plugin == PIPELINE {
-        let own = commented_defaults::<PipelineSettings>();
-        let outer = commented_defaults::<OuterSettings>();
-        format!("{own}\n{PLUGIN_SECTIONS}{outer}")
-    } else {
-        let found = registry.find(plugin).map_err(|error| {
-            Failure::usage(format!("{error}; or `{PIPELINE}` for everything around the plugins"))
-        })?;
-        found.defaults()
+pub fn config(registry: &Registry, plugin: &str, format: TableFormat) -> Outcome {
+    let text = match plugin {
+        PIPELINE => around(format),
+        ALL => all(registry, format),
+        FUNNEL => funnel(format),
+        name => one(find(registry, name)?, format),
     };
     print(&text)?;
     Ok(Ended::Well)
+}
+
+/// `tagalong schema`.
+///
+/// # Errors
+/// If stdout cannot be written.
+pub fn schema(registry: &Registry) -> Outcome {
+    print(&pretty(&keys::schema(registry)))?;
+    Ok(Ended::Well)
+}
+
+fn find<'a>(registry: &'a Registry, name: &str) -> Result<&'a PluginInfo, Failure> {
+    registry.find(name).map_err(|error| {
+        Failure::usage(format!("{error}; or `{PIPELINE}` for everything around the plugins"))
+    })
+}
+
+fn around(format: TableFormat) -> String {
+    match format {
+        TableFormat::Text => pipeline_defaults(),
+        TableFormat::Markdown => keys::markdown_around(),
+        TableFormat::Json => pretty(&keys::around_schema()),
+    }
+}
+
+fn one(plugin: &PluginInfo, format: TableFormat) -> String {
+    match format {
+        TableFormat::Text => plugin.defaults(),
+        TableFormat::Markdown => keys::markdown_of(plugin),
+        TableFormat::Json => pretty(&plugin.schema()),
+    }
+}
+
+fn all(registry: &Registry, format: TableFormat) -> String {
+    match format {
+        TableFormat::Text => {
+            let plugins = registry.plugins();
+            let defaults = plugins.map(|p| format!("\n# ---- {}\n{}", p.name, p.defaults()));
+            pipeline_defaults() + &defaults.collect::<String>()
+        }
+        TableFormat::Markdown => keys::markdown(registry),
+        TableFormat::Json => pretty(&keys::schema(registry)),
+    }
+}
+
+fn funnel(format: TableFormat) -> String {
+    match format {
+        TableFormat::Text => remedies::TABLE.to_owned(),
+        TableFormat::Markdown => remedies::markdown(),
+        TableFormat::Json => pretty(&serde_json::json!(remedies::all())),
+    }
+}
+
+fn pretty(value: &serde_json::Value) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }

@@ -7,7 +7,9 @@ mod inspect;
 mod list;
 
 pub use check::check;
-pub use config::config;
+#[cfg(test)]
+pub use config::pipeline_defaults;
+pub use config::{config, schema};
 pub use eval::{EvalArgs, eval};
 pub use inspect::inspect;
 pub use list::list;

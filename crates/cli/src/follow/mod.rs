@@ -17,7 +17,7 @@ use tagalong_sim::{Scene, Split, Variant};
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
 use crate::config_file::ConfigFile;
-use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 use crate::reproduce::TableFormat;
 use crate::signals::Signals;
 use crate::simulate;
@@ -116,8 +116,7 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
         .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))?;
     let jobs = jobs(args, registry)?;
     if let Some(folder) = &args.output {
-        let why = |error| Failure::usage(format!("cannot make {}: {error}", folder.display()));
-        fs::create_dir_all(folder).map_err(why)?;
+        make_folder(folder)?;
     }
     let bar = bar(jobs.len());
     let threads = simulate::threads(args.jobs);

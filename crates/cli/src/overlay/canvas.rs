@@ -47,12 +47,12 @@ impl Canvas {
         self.image
     }
 
-    /// Copies `source` with its upper left corner at column `left`.
-    pub fn paste(&mut self, source: &RgbImage, left: usize) {
+    /// Copies `source` with its upper left corner at column `left` and row `top`.
+    pub fn paste(&mut self, source: &RgbImage, left: usize, top: usize) {
         let width = self.image.width();
         let columns = source.width().min(width.saturating_sub(left));
-        for y in 0..source.height().min(self.image.height()) {
-            let start = y * width + left;
+        for y in 0..source.height().min(self.image.height().saturating_sub(top)) {
+            let start = (y + top) * width + left;
             self.image.pixels_mut()[start..start + columns]
                 .copy_from_slice(&source.row(y)[..columns]);
         }

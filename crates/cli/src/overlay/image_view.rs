@@ -17,7 +17,7 @@ pub fn draw(scene: &Scene, trails: &Trails) -> Canvas {
     let (width, height) = (scene.camera.width, scene.camera.height);
     let mut canvas = Canvas::new(width, height, [0; 3]);
     if let Some(picture) = background(&scene.images) {
-        canvas.paste(&picture, 0);
+        canvas.paste(&picture, 0, 0);
     }
     draw_sketch(&mut canvas, &scene.report.sketch);
     draw_rejected(&mut canvas, scene);
@@ -31,7 +31,7 @@ pub fn draw(scene: &Scene, trails: &Trails) -> Canvas {
 }
 
 /// The best picture of the scene that the log carries.
-fn background(images: &Images) -> Option<RgbImage> {
+pub fn background(images: &Images) -> Option<RgbImage> {
     if let Some(colour) = &images.colour {
         return Some(RgbImage::clone(colour));
     }

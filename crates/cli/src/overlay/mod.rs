@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use self::canvas::{Canvas, Ink};
+pub use image_view::background;
 use nalgebra::Isometry2;
 use tagalong_core::{Camera, Images, RgbImage};
 use tagalong_pipeline::FrameReport;
@@ -62,7 +63,7 @@ fn picture(scene: &Scene, trails: &Trails) -> RgbImage {
     let mut canvas = Canvas::new(width + plan_width, height, [24, 24, 28]);
     plan_view::draw(&mut canvas, width, scene, trails);
     // The image comes second and covers what the plan view drew beyond its part.
-    canvas.paste(&image_view::draw(scene, trails).into_image(), 0);
+    canvas.paste(&image_view::draw(scene, trails).into_image(), 0, 0);
     canvas.into_image()
 }
 

@@ -2,7 +2,7 @@
 
 mod frames;
 mod pictures;
-mod progress;
+pub mod progress;
 mod report;
 mod summary;
 pub mod timings;

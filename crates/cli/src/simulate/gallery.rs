@@ -1,4 +1,3 @@
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -7,7 +6,7 @@ use tagalong_core::{DepthImage, Images, Rect, RgbImage};
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapper;
 
-use crate::outcome::{Failure, say};
+use crate::outcome::{Failure, make_folder, say};
 use crate::overlay::canvas::{Canvas, Ink};
 use crate::overlay::write_png;
 
@@ -21,8 +20,7 @@ const FAR_M: f32 = 8.0;
 /// unwrapped image and the raw one. What cameras in the room see is a picture of
 /// its own.
 pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder)
-        .map_err(|error| Failure::failed(format!("cannot make {}: {error}", folder.display())))?;
+    make_folder(folder)?;
     let mut unwrapping = Unwrapping::of(&simulation)?;
     let mut webcams: Vec<Arc<RgbImage>> = simulation.webcams().map(|_| Arc::default()).collect();
     let every_ns = (scene.duration_s * 1e9) as u64 / PICTURES;
@@ -88,7 +86,7 @@ fn beside(pictures: &[Arc<RgbImage>]) -> RgbImage {
     let mut canvas = Canvas::new(width, height, [0; 3]);
     let mut left = 0;
     for picture in pictures {
-        canvas.paste(picture, left);
+        canvas.paste(picture, left, 0);
         left += picture.width();
     }
     canvas.into_image()
@@ -97,7 +95,7 @@ fn beside(pictures: &[Arc<RgbImage>]) -> RgbImage {
 fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
     let width = image.width() as f64;
     let mut canvas = Canvas::new(image.width(), image.height(), [0; 3]);
-    canvas.paste(image, 0);
+    canvas.paste(image, 0, 0);
     for person in truth {
         let ink = Ink::solid(if person.ignore { [150; 3] } else { [255, 220, 0] });
         if let Some(whole) = &person.upper_body {

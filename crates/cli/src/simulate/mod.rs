@@ -15,7 +15,7 @@ use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
 use crate::args::Format;
-use crate::outcome::{Ended, Failure, Outcome, say};
+use crate::outcome::{Ended, Failure, Outcome, make_room_for, say};
 use crate::realism::realism;
 
 /// The arguments of `tagalong simulate`.
@@ -57,8 +57,8 @@ pub struct SimulateArgs {
 /// Draws the scene.
 ///
 /// # Errors
-/// A scene that cannot be read or is wrong is exit code 2; files that cannot be
-/// written are 1.
+/// A scene that cannot be read or is wrong, and a place where no log can be, are
+/// exit code 2; a disk that fails is 1.
 pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
     let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
     let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
@@ -68,6 +68,7 @@ pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
         Some(folder) => gallery::paint(simulation, &scene, folder)?,
         None => {
             let log = args.output.clone().unwrap_or_else(|| default_log(path));
+            make_room_for(&log)?;
             let images = record(simulation, &scene, &log).map_err(Failure::failed)?;
             say(&format!("{images} images and the truth are in {}", log.display()));
         }
@@ -151,7 +152,7 @@ mod tests {
             let found = seen.topics.iter().find(|t| t.topic == topic).unwrap();
             assert_eq!((found.schema.as_str(), found.count, found.undecodable), (schema, 150, 0));
         }
-        assert!((seen.skew_s.unwrap() - 0.015).abs() < 1e-6, "{:?}", seen.skew_s);
+        assert!((seen.skew.unwrap().median_s - 0.015).abs() < 1e-6, "{:?}", seen.skew);
     }
 
     /// Trials skip the log; they must see what a pipeline sees that reads it.

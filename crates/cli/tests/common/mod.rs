@@ -1,6 +1,8 @@
 //! A small drawn log, and the programs under test.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub mod broken;
+
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;

@@ -176,6 +176,7 @@ impl Assembler {
         else {
             return None;
         };
+        let seen = shifted(seen, plan.input.depth_offset_px);
         let same_size = (seen.width(), seen.height()) == (camera.width, camera.height);
         if same_size && image.frame_id == depth.frame_id && plan.same_lens() {
             return Some(Arc::new(seen));
@@ -290,6 +291,17 @@ impl Assembler {
         }
         (Motion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
     }
+}
+
+/// The image moved by columns and rows; nothing is known of what comes in.
+fn shifted(depth: DepthImage, offset: [i32; 2]) -> DepthImage {
+    let [right, down] = offset.map(i64::from);
+    if (right, down) == (0, 0) {
+        return depth;
+    }
+    DepthImage::from_fn(depth.width(), depth.height(), |x, y| {
+        depth.get(x as i64 - right, y as i64 - down).unwrap_or(f32::NAN)
+    })
 }
 
 fn size_of(images: &Images) -> Option<(usize, usize)> {

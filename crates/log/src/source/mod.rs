@@ -58,6 +58,8 @@ pub struct LogFacts {
     pub odometry_topic: Option<String>,
     /// Frame id of the images.
     pub camera_frame: Option<String>,
+    /// Topic of the calibration that the frames have.
+    pub calibration_topic: Option<String>,
     /// The robot's frame in tf.
     pub robot_frame: String,
     /// Columns of the images.

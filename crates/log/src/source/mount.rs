@@ -20,7 +20,7 @@ pub(super) enum Mount {
 const ASSUMED_HEIGHT_M: f64 = 1.2;
 
 impl Mount {
-    /// From tf, else from the settings; `None` if neither tells. A camera that
+    /// From the settings, else from tf; `None` if neither tells. A camera that
     /// looks into a mirror stands upright.
     pub(super) fn find(
         scan: &Scan,
@@ -28,11 +28,11 @@ impl Mount {
         input: &InputSettings,
         mirror: bool,
     ) -> Option<Self> {
-        let base = robot_frame(scan, input);
-        if let Some(camera) = camera.filter(|camera| scan.tf.connects(base, camera)) {
+        let Some(mount) = &input.camera else {
+            let base = robot_frame(scan, input);
+            let camera = camera.filter(|camera| scan.tf.connects(base, camera))?;
             return Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() });
-        }
-        let mount = input.camera.as_ref()?;
+        };
         let source = "[input.camera] of the config".into();
         if mirror {
             return Some(Self::Fixed { pose: ConicalMirror::upright(mount.height_m), source });

@@ -8,7 +8,7 @@ use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
 use super::tally::Tally;
-use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, intrinsics};
+use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::scan::Scan;
 use crate::topics::{Chosen, choose, missing};
 use crate::{InputSettings, Limits, LogError, MountSettings, Needs};
@@ -43,6 +43,13 @@ impl Plan {
         LogError::Calibration { path: self.scan.path.clone(), topic, source }
     }
 
+    /// The topic of the calibration that the frames have.
+    pub(super) fn calibration_topic(&self) -> Option<&String> {
+        self.lens?;
+        let own = if self.chosen.colour.is_some() { &self.chosen.colour_info } else { &None };
+        own.as_ref().or(self.chosen.depth_info.as_ref())
+    }
+
     /// True if depth comes beside another image.
     pub(super) fn has_second_depth(&self) -> bool {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
@@ -67,9 +74,11 @@ impl Plan {
             && close(a.cy, b.cy, 2.0)
     }
 
-    /// The camera that took a depth image, without its pose.
+    /// The camera that took a depth image, without its pose; `None` without a
+    /// calibration for images of that size.
     pub(super) fn depth_camera(&self, depth: &DepthImage) -> Option<Camera> {
         let known = self.depth_lens?;
+        check_size(&known, depth.width(), depth.height()).ok()?;
         Some(Camera {
             lens: Lens::Pinhole(known.lens),
             width: depth.width(),

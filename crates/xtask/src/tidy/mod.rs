@@ -24,6 +24,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     let documents = markdown::documents(workspace)?;
     complaints.extend(paths::check(workspace, &documents));
     complaints.extend(commands::check(workspace, &metadata, &documents)?);
+    complaints.extend(crate::docs::stale(workspace)?);
     for complaint in &complaints {
         eprintln!("tidy: {complaint}");
     }

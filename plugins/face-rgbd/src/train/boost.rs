@@ -31,8 +31,8 @@ fn drawn_features(samples: &Samples<'_>, training: &Training, seed: u64) -> (Vec
     let patches: Vec<&Patch> = samples.all().collect();
     let mut table = Levels::new(patches.len());
     for feature in &drawn {
-        if let Feature::Haar(parts) = feature {
-            let parts = rectangles(parts, side + 1);
+        if let (Feature::Haar(parts), Some(any)) = (feature, patches.first()) {
+            let parts = rectangles(parts, &any.level);
             table.push(patches.iter().map(|p| haar(&parts, p.level.sums()) * p.contrast));
         }
     }

@@ -14,9 +14,9 @@ use std::sync::Arc;
 
 use boost::{Samples, stage};
 use figures::{calibration, figures};
-use patch::{Patch, mirrored, shifted, window};
+use patch::{Patch, window};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
-use tagalong_learn::{Use, mix, use_of};
+use tagalong_learn::{Use, mirrored, mix, shifted, use_of};
 
 use crate::{Cascade, Scanner, Training, scales};
 

@@ -2,7 +2,7 @@
 
 use tagalong_core::{GreyImage, Rect};
 
-use crate::compiled::{Compiled, Row};
+use crate::compiled::Compiled;
 use crate::{Cascade, Level, Seen};
 
 /// A window as its sums, and one through its contrast.
@@ -16,7 +16,7 @@ impl Patch {
     /// `None` for a window without contrast.
     pub(super) fn new(pixels: &GreyImage, side: usize) -> Option<Self> {
         let mut level = Level::default();
-        level.fill(pixels, side, side);
+        level.fill(pixels, (side, side), 1);
         let values =
             || (1..side - 1).flat_map(|y| pixels.row(y)[1..side - 1].iter().map(|v| f64::from(*v)));
         let area = ((side - 2) * (side - 2)) as f64;
@@ -36,11 +36,8 @@ impl Patch {
     pub(super) fn passes_last(&self, cascade: &Cascade) -> bool {
         let last = cascade.stages.last().into_iter().cloned().collect();
         let only = Cascade { stages: last, features: cascade.features.clone(), ..*cascade };
-        let compiled = Compiled::new(&only, self.level.stride());
-        let mut row = Row::default();
-        compiled.start(&self.level, (0, 0), 1, &mut row, 1);
-        compiled.all(0, &self.level, (0, 0), 1, &mut row);
-        compiled.passes(0, row.sums[0])
+        let compiled = Compiled::new(&only, &self.level);
+        compiled.passes(0, &compiled.start(&self.level, (0, 0)), 0)
     }
 }
 
@@ -61,14 +58,4 @@ pub(super) fn window(grey: &GreyImage, region: &Rect, side: usize) -> GreyImage 
         let across = |y: i64| at(left, y) * (1.0 - right) + at(left + 1, y) * right;
         (across(top) * (1.0 - down) + across(top + 1) * down).round() as u8
     })
-}
-
-pub(super) fn mirrored(grey: &GreyImage) -> GreyImage {
-    let width = grey.width();
-    GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
-}
-
-pub(super) fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
-    let (x, y) = (square.x + right * square.width, square.y + down * square.width);
-    Rect { x, y, ..*square }.inflated(growth - 1.0)
 }

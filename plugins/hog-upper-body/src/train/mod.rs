@@ -13,7 +13,7 @@ use std::sync::Arc;
 use boosted::boosted;
 use svm::{Windows, separate};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
-use tagalong_learn::{Line, Use, accepted, area, mix, platt, use_of};
+use tagalong_learn::{Line, Use, accepted, area, mirrored, mix, platt, shifted, use_of};
 
 use crate::scan::FILLED;
 use crate::{Kind, Machine, Model, Scanner, Training, Trees, merge, window_numbers, window_of};
@@ -140,15 +140,12 @@ impl HogTrainer {
     /// Adds what the machine takes for people; returns how many that are.
     fn mine(&mut self, model: &Model) -> usize {
         let Training { mined_per_picture, mined_per_round, .. } = self.training;
-        let mut scanner = Scanner::new(self.kind);
+        let mut scanner = Scanner::new(model);
         let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
         for (index, (use_, picture)) in self.pictures.iter().enumerate() {
             if *use_ == Use::Fit {
-                let windows = merge(
-                    search(&mut scanner, picture, model, self.near_miss()),
-                    MINED_OVERLAP,
-                    1.0,
-                );
+                let mut windows = search(&mut scanner, picture, self.near_miss());
+                merge(&mut windows, MINED_OVERLAP, 1.0);
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
             }
@@ -168,11 +165,11 @@ impl HogTrainer {
         let people = self.people.iter().filter(|(use_, _)| *use_ == wanted);
         let mut sums: Vec<(f64, bool)> =
             people.map(|(_, numbers)| (f64::from(model.sum_of(numbers)), true)).collect();
-        let mut scanner = Scanner::new(self.kind);
+        let mut scanner = Scanner::new(model);
         for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
-            let mut windows = search(&mut scanner, picture, model, self.near_miss());
+            let mut windows = search(&mut scanner, picture, self.near_miss());
             if merged {
-                windows = merge(windows, MINED_OVERLAP, 1.0);
+                merge(&mut windows, MINED_OVERLAP, 1.0);
             }
             sums.extend(windows.iter().map(|w| (f64::from(w.sum), false)));
         }
@@ -261,15 +258,12 @@ impl Trainer for HogTrainer {
 }
 
 /// All windows of a picture above `least`.
-fn search(
-    scanner: &mut Scanner,
-    picture: &GreyImage,
-    model: &Model,
-    least: f32,
-) -> Vec<crate::Window> {
+fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::Window> {
     let most = picture.width().min(picture.height()) as f64;
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
-    scanner.scan(picture, model, sides.take_while(|side| *side <= most), least, |_| Some(None))
+    let (sides, mut found) = (sides.take_while(|side| *side <= most), Vec::new());
+    scanner.scan(picture, sides, least, |_| Some(None), &mut found);
+    found
 }
 
 /// The share of people below the sum that so many of the `windows` of others
@@ -282,17 +276,6 @@ fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f
     let people: Vec<f64> = sums.iter().filter(|(_, is)| *is).map(|(sum, _)| *sum).collect();
     let missed = people.iter().filter(|sum| **sum <= limit).count();
     missed as f64 / people.len().max(1) as f64
-}
-
-fn mirrored(grey: &GreyImage) -> GreyImage {
-    let width = grey.width();
-    GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
-}
-
-fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
-    let moved =
-        Rect { x: square.x + right * square.width, y: square.y + down * square.width, ..*square };
-    moved.inflated(growth - 1.0)
 }
 
 fn rounded(value: f64) -> toml::Value {

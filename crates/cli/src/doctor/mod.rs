@@ -1,0 +1,171 @@
+//! `tagalong doctor`: why is nobody detected, or the wrong thing?
+
+mod checks;
+mod evidence;
+mod finding;
+mod print;
+pub mod remedies;
+mod sheets;
+mod trial;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+use tagalong_core::Registry;
+use tagalong_log::write::RunDir;
+use tagalong_log::{FrameSource, examine};
+use tagalong_pipeline::{Pipeline, needs};
+
+use self::evidence::{Evidence, Samples};
+use self::finding::{Finding, Severity};
+use self::trial::Trial;
+use crate::args::Format;
+use crate::config_file::{ConfigFile, OuterSettings};
+use crate::outcome::{Ended, Failure, Outcome, make_folder, print};
+use crate::run::progress::Progress;
+use crate::suggest::check_log_path;
+
+/// The arguments of `tagalong doctor`.
+#[derive(Args, Debug)]
+pub struct DoctorArgs {
+    /// The pipeline, a TOML file.
+    pub config: PathBuf,
+    /// The log, an MCAP file with ROS 2 messages.
+    pub log: PathBuf,
+    /// Write pictures of what each test dropped into this folder.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Replace the pictures of an earlier visit in the same folder.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Frames that are looked at, from the first one on.
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: u64,
+    /// How to print.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Everything that the doctor says.
+#[derive(Debug, Serialize)]
+struct Diagnosis {
+    config: PathBuf,
+    log: PathBuf,
+    /// Frames that were looked at.
+    frames: u64,
+    findings: Vec<Finding>,
+    funnel: Vec<Drop>,
+}
+
+/// A line of the rejection funnel.
+#[derive(Debug, Serialize)]
+struct Drop {
+    test: &'static str,
+    count: u64,
+    /// What to look at.
+    look: Option<String>,
+    /// The settings that belong to it, with their present values.
+    settings: Vec<String>,
+    /// Pictures of what was dropped.
+    pictures: Option<PathBuf>,
+}
+
+/// Looks at a log through the eyes of a pipeline, and says what is wrong.
+///
+/// # Errors
+/// A config or a log that cannot be read; a folder that cannot be written. What is
+/// wrong with the log is no error, but exit code 3.
+pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
+    let config = ConfigFile::read(&args.config)?;
+    let (mut pipeline, _) = config.pipeline(registry, None)?;
+    let outer = config.outer()?;
+    check_log_path(&args.log)?;
+    if let Some(folder) = &args.output {
+        RunDir::check(folder, args.overwrite, &args.log).map_err(Failure::usage)?;
+    }
+    let wanted = needs(|| config.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
+    let found = examine(&args.log, &outer.input, &outer.limits, wanted)?;
+    let mut evidence = Evidence {
+        samples: Samples::of(expected_frames(&found.inspection).min(args.frames)),
+        inspection: found.inspection,
+        refusal: found.refusal,
+        input: outer.input.clone(),
+        needs: wanted,
+        trial: Trial::default(),
+    };
+    if let Some(frames) = found.frames {
+        look(frames, &mut pipeline, args, &mut evidence);
+    }
+    let diagnosis = Diagnosis {
+        config: args.config.clone(),
+        log: args.log.clone(),
+        frames: evidence.trial.frames,
+        findings: checks::ALL.iter().filter_map(|check| check(&evidence)).collect(),
+        funnel: funnel(&evidence.trial, &pipeline, &outer, args.output.as_deref())?,
+    };
+    print(&match args.format {
+        Format::Text => print::text(&diagnosis),
+        Format::Json => serde_json::to_string_pretty(&diagnosis).unwrap_or_default() + "\n",
+    })?;
+    let is_bad = diagnosis.findings.iter().any(|finding| finding.severity == Severity::Bad);
+    Ok(if is_bad { Ended::WithFindings } else { Ended::Well })
+}
+
+/// Images on the topic that makes the frames.
+fn expected_frames(inspection: &tagalong_log::Inspection) -> u64 {
+    let facts = &inspection.facts;
+    let topic = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref());
+    topic.and_then(|topic| inspection.topic(topic)).map_or(0, |topic| topic.count)
+}
+
+/// One pass over the frames.
+fn look(mut frames: FrameSource, pipeline: &mut Pipeline, args: &DoctorArgs, out: &mut Evidence) {
+    let progress = Progress::new();
+    for number in 0..args.frames {
+        let Some(item) = frames.next_frame() else { break };
+        out.samples.take(number, &item);
+        if out.refusal.is_none() {
+            out.trial.step(pipeline, &item.frame, args.output.is_some());
+        }
+        progress.show(frames.progress(), number, out.trial.people.len());
+    }
+    out.inspection.counters = frames.counters().clone();
+    out.inspection.notes = frames.notes().to_vec();
+    out.inspection.data_lost = frames.data_lost();
+}
+
+/// What the pipeline dropped, most first, with what can be done about it.
+fn funnel(
+    trial: &Trial,
+    pipeline: &Pipeline,
+    outer: &OuterSettings,
+    folder: Option<&Path>,
+) -> Result<Vec<Drop>, Failure> {
+    let mut pictures = match folder {
+        None => Default::default(),
+        Some(folder) => {
+            make_folder(folder)?;
+            sheets::write(trial, folder).map_err(Failure::failed)?
+        }
+    };
+    let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
+    let resolved: toml::Table = toml::from_str(&resolved).unwrap_or_default();
+    let mut drops: Vec<Drop> = trial
+        .funnel
+        .entries()
+        .iter()
+        .map(|entry| {
+            let remedy = remedies::of(entry.test);
+            Drop {
+                test: entry.test,
+                count: entry.count,
+                settings: remedy.as_ref().map_or_else(Vec::new, |remedy| remedy.lines(&resolved)),
+                look: remedy.map(|remedy| remedy.look),
+                pictures: pictures.remove(entry.test),
+            }
+        })
+        .collect();
+    drops.sort_by_key(|drop| std::cmp::Reverse(drop.count));
+    Ok(drops)
+}

@@ -1,0 +1,235 @@
+//! Every key of a config, from the code: as a table for people, and as one JSON
+//! schema for editors.
+
+use std::fmt::Write as _;
+
+use schemars::schema_for;
+use serde_json::{Map, Value, json};
+use tagalong_core::{PluginInfo, Registry};
+use tagalong_pipeline::PipelineSettings;
+
+use crate::config_file::OuterSettings;
+
+/// The schemas of everything around the plugins.
+fn around() -> [Value; 2] {
+    [schema_for!(PipelineSettings).to_value(), schema_for!(OuterSettings).to_value()]
+}
+
+/// The schema of everything around the plugins.
+pub fn around_schema() -> Value {
+    let mut definitions = Map::new();
+    let mut properties = Map::new();
+    for (name, part) in ["pipeline", "outer"].into_iter().zip(around()) {
+        let part = lifted(part, name, &mut definitions);
+        properties.extend(part["properties"].as_object().cloned().unwrap_or_default());
+    }
+    json!({ "type": "object", "properties": properties, "$defs": definitions })
+}
+
+/// The plugins, by kind and name.
+fn plugins(registry: &Registry) -> Vec<&PluginInfo> {
+    let mut plugins: Vec<_> = registry.plugins().collect();
+    plugins.sort_by_key(|plugin| (plugin.kind, plugin.name));
+    plugins
+}
+
+/// All keys as Markdown: a table for everything around the plugins, and one for
+/// each plugin.
+pub fn markdown(registry: &Registry) -> String {
+    let mut out = String::from("### Around the plugins\n\n");
+    table(&mut out, &around());
+    for plugin in plugins(registry) {
+        let _ = writeln!(out, "\n### `{}` ({})\n\n{}.\n", plugin.name, plugin.kind, plugin.summary);
+        table(&mut out, &[plugin.schema()]);
+    }
+    out
+}
+
+/// The keys of one plugin as Markdown.
+pub fn markdown_of(plugin: &PluginInfo) -> String {
+    let mut out = String::new();
+    table(&mut out, &[plugin.schema()]);
+    out
+}
+
+/// The keys around the plugins as Markdown.
+pub fn markdown_around() -> String {
+    let mut out = String::new();
+    table(&mut out, &around());
+    out
+}
+
+fn table(out: &mut String, schemas: &[Value]) {
+    out.push_str("| key | default | meaning |\n|---|---|---|\n");
+    schemas.iter().for_each(|schema| rows(out, "", schema, schema));
+}
+
+/// The keys of a table and of those in it.
+fn rows(out: &mut String, path: &str, table: &Value, root: &Value) {
+    for (key, property) in table["properties"].as_object().into_iter().flatten() {
+        let (text, target) = resolve(property, root);
+        if target["properties"].is_object() {
+            rows(out, &format!("{path}{key}."), target, root);
+            continue;
+        }
+        let default = match &property["default"] {
+            Value::Null => "none".to_owned(),
+            value => format!("`{value}`"),
+        };
+        let text = text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
+        let _ = writeln!(out, "| `{path}{key}` | {default} | {} |", text.replace('|', "\\|"));
+    }
+}
+
+/// The description of a property, and the schema that it refers to.
+fn resolve<'a>(property: &'a Value, root: &'a Value) -> (Option<&'a str>, &'a Value) {
+    let any = property["anyOf"].as_array().into_iter().flatten();
+    let mut references = std::iter::once(property).chain(any).map(|p| &p["$ref"]);
+    let target = references
+        .find_map(Value::as_str)
+        .and_then(|path| root.pointer(path.trim_start_matches('#')))
+        .unwrap_or(property);
+    (property["description"].as_str().or_else(|| target["description"].as_str()), target)
+}
+
+/// A JSON schema of a whole config: the sections, and in each the settings of the
+/// plugin that it names.
+pub fn schema(registry: &Registry) -> Value {
+    let mut around = around_schema();
+    let object = |value: &mut Value| value.as_object_mut().map(std::mem::take).unwrap_or_default();
+    let mut properties = object(&mut around["properties"]);
+    let mut definitions = object(&mut around["$defs"]);
+    for (section, kind, many) in SECTIONS {
+        let names: Vec<&PluginInfo> =
+            plugins(registry).into_iter().filter(|p| p.kind.to_string() == kind).collect();
+        let of_kind = plugin_section(&names, section, &mut definitions);
+        let whole = if many { json!({ "type": "array", "items": of_kind }) } else { of_kind };
+        properties.insert(section.to_owned(), whole);
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A pipeline of Tagalong",
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["filter"],
+        "properties": properties,
+        "$defs": definitions,
+    })
+}
+
+/// The sections that name plugins, their kind, and whether there may be several.
+const SECTIONS: [(&str, &str, bool); 4] = [
+    ("detectors", "detector", true),
+    ("verifiers", "verifier", true),
+    ("filter", "filter", false),
+    ("controller", "controller", false),
+];
+
+/// A section: which plugin decides what `config` may hold.
+fn plugin_section(plugins: &[&PluginInfo], section: &str, out: &mut Map<String, Value>) -> Value {
+    let names: Vec<&str> = plugins.iter().map(|plugin| plugin.name).collect();
+    let mut properties = Map::new();
+    if section == "detectors" {
+        let own = schema_for!(tagalong_pipeline::DetectorSettings).to_value();
+        let own = lifted(own, section, out);
+        properties.extend(own["properties"].as_object().cloned().unwrap_or_default());
+    }
+    properties.insert("plugin".into(), json!({ "enum": names }));
+    properties.insert("config".into(), json!({ "type": "object" }));
+    let choices: Vec<Value> = plugins
+        .iter()
+        .map(|plugin| {
+            let config = lifted(plugin.schema(), plugin.name, out);
+            json!({
+                "if": { "properties": { "plugin": { "const": plugin.name } } },
+                "then": { "properties": { "config": config } },
+            })
+        })
+        .collect();
+    json!({
+        "type": "object",
+        "required": ["plugin"],
+        "properties": properties,
+        "additionalProperties": false,
+        "allOf": choices,
+    })
+}
+
+/// A schema whose definitions are moved to `out`, under names that begin with
+/// `owner`.
+fn lifted(mut schema: Value, owner: &str, out: &mut Map<String, Value>) -> Value {
+    rename(&mut schema, owner);
+    if let Some(fields) = schema.as_object_mut() {
+        fields.remove("$schema");
+        let own = fields.remove("$defs");
+        for (name, definition) in own.as_ref().and_then(Value::as_object).into_iter().flatten() {
+            out.insert(format!("{owner}.{name}"), definition.clone());
+        }
+    }
+    schema
+}
+
+/// Lets references point to the moved definitions.
+fn rename(value: &mut Value, owner: &str) {
+    match value {
+        Value::Object(fields) => {
+            if let Some(Value::String(target)) = fields.get_mut("$ref") {
+                *target = target.replace("#/$defs/", &format!("#/$defs/{owner}."));
+            }
+            fields.values_mut().for_each(|inner| rename(inner, owner));
+        }
+        Value::Array(items) => items.iter_mut().for_each(|inner| rename(inner, owner)),
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn registry() -> Registry {
+        let mut registry = Registry::default();
+        tagalong_catalog::register(&mut registry);
+        registry
+    }
+
+    #[test]
+    fn the_table_has_every_key_of_every_plugin() {
+        let (registry, text) = (registry(), markdown(&registry()));
+        for plugin in registry.plugins() {
+            for key in plugin.schema()["properties"].as_object().into_iter().flatten() {
+                assert!(text.contains(&format!("| `{}", key.0)), "{} of {}", key.0, plugin.name);
+            }
+        }
+        for key in ["association.gate_m", "input.depth_offset_px", "input.camera.height_m"] {
+            assert!(text.contains(&format!("| `{key}` |")), "{key}");
+        }
+        assert!(!text.contains("|  |\n"), "a key without a meaning");
+    }
+
+    /// All references of the schema lead somewhere.
+    fn check_references(value: &Value, root: &Value) {
+        match value {
+            Value::Object(fields) => {
+                if let Some(target) = fields.get("$ref").and_then(Value::as_str) {
+                    assert!(root.pointer(target.trim_start_matches('#')).is_some(), "{target}");
+                }
+                fields.values().for_each(|inner| check_references(inner, root));
+            }
+            Value::Array(items) => items.iter().for_each(|inner| check_references(inner, root)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn the_schema_hangs_together_and_knows_the_sections() {
+        let schema = schema(&registry());
+        check_references(&schema, &schema);
+        let properties = schema["properties"].as_object().unwrap();
+        for section in ["detectors", "filter", "input", "lifecycle", "seed"] {
+            assert!(properties.contains_key(section), "{section}");
+        }
+        let ekf = schema["properties"]["filter"]["allOf"].as_array().unwrap();
+        assert!(ekf.iter().any(|choice| choice["if"]["properties"]["plugin"]["const"] == "ekf"));
+    }
+}

@@ -1,0 +1,216 @@
+//! Every command with every kind of bad input: one clear message that names the
+//! file, and the right exit code: 1 for data that cannot be used, 2 for settings
+//! and outputs that cannot.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+use common::{Drawn, code, config, own_plugin, people, text};
+
+/// What stands where a file is asked for.
+const BAD_FILES: [(&str, &str); 4] = [
+    ("a missing file", "missing.EXT"),
+    ("a file of words", "words.EXT"),
+    ("an empty file", "empty.EXT"),
+    ("a folder", "folder.EXT"),
+];
+
+/// Commands with a place for a file, its extension, and the exit code where the
+/// file is bad.
+const FILES: [(&str, &str, i32); 16] = [
+    ("run nearest.toml FILE -o out", "mcap", 1),
+    ("run FILE good.mcap -o out", "toml", 2),
+    ("check nearest.toml FILE", "mcap", 1),
+    ("check FILE", "toml", 2),
+    ("inspect FILE", "mcap", 1),
+    ("inspect good.mcap --config FILE", "toml", 2),
+    ("doctor nearest.toml FILE", "mcap", 1),
+    ("doctor FILE good.mcap", "toml", 2),
+    ("bench --configs nearest.toml --logs FILE -o out", "mcap", 1),
+    ("bench --configs FILE --logs good.mcap -o out", "toml", 2),
+    ("eval --truth good.boxes.csv --tracks FILE", "csv", 1),
+    ("eval --truth FILE --tracks good.boxes.csv", "csv", 1),
+    ("simulate FILE -o out.mcap", "toml", 2),
+    ("follow steered.toml FILE", "toml", 2),
+    ("trials FILE --seeds 1 --configs nearest.toml", "toml", 2),
+    ("triangulate FILE --cameras hat.toml", "mcap", 1),
+];
+
+/// What is empty and yet right: settings without a word are defaults, and whoever
+/// found nobody has no tracks.
+const FINE: [&str; 6] = [
+    "inspect good.mcap --config empty.toml",
+    "eval --truth good.boxes.csv --tracks empty.csv",
+    "eval --truth empty.csv --tracks good.boxes.csv",
+    "simulate empty.toml -o out.mcap",
+    "follow steered.toml empty.toml",
+    "trials empty.toml --seeds 1 --configs nearest.toml",
+];
+
+/// Other mistakes: what it is, the command, the exit code, and what is said.
+const OTHERS: [(&str, &str, i32, &str); 22] = [
+    ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
+    ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
+    ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
+    ("an unknown key", "check typo.toml", 2, "typo.toml:4"),
+    ("an unknown key", "doctor typo.toml good.mcap", 2, "typo.toml:4"),
+    ("an unknown key", "bench --configs typo.toml --logs good.mcap -o out", 2, "typo.toml:4"),
+    ("an unknown key", "simulate scene-typo.toml -o out.mcap", 2, "scene-typo.toml:"),
+    (
+        "an unknown key",
+        "trials scene-typo.toml --seeds 1 --configs nearest.toml",
+        2,
+        "scene-typo.toml:",
+    ),
+    ("an output below a file", "run nearest.toml good.mcap -o old.bag/x", 2, "old.bag"),
+    ("an output below a file", "doctor nearest.toml good.mcap -o old.bag/x", 2, "old.bag"),
+    ("an output below a file", "demo -o old.bag/x", 2, "old.bag"),
+    ("an output below a file", "simulate scene.toml -o old.bag/x.mcap", 2, "old.bag"),
+    ("an output below a file", "import images photos -o old.bag/x.mcap", 2, "old.bag"),
+    (
+        "an output below a file",
+        "bench --configs nearest.toml --logs good.mcap -o old.bag/x",
+        2,
+        "old.bag",
+    ),
+    ("an existing output", "run nearest.toml good.mcap -o full", 2, "--overwrite"),
+    ("an existing output", "doctor nearest.toml good.mcap -o full", 2, "--overwrite"),
+    ("an existing output", "demo -o full", 2, "--overwrite"),
+    ("an existing output", "import images photos -o good.mcap", 2, "--overwrite"),
+    ("an unknown plugin", "config nearest-thin", 2, "nearest-thing"),
+    ("an unknown plugin", "train svm-pitch", 2, "svm-patch"),
+    ("an unknown system", "reproduce stereo-smv-ekf", 2, "stereo-svm-ekf"),
+    ("an unknown layout", "import tmu folder.csv", 2, "tum"),
+];
+
+fn lay_out(home: &Path) {
+    let write = |name: &str, text: &str| fs::write(home.join(name), text).unwrap();
+    Drawn::of(3).write(&home.join("good.mcap"));
+    Drawn { depth: false, ..Drawn::of(3) }.write(&home.join("no-depth.mcap"));
+    config(home, "");
+    write("good.people.csv", &people(3));
+    write("good.boxes.csv", "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n");
+    for extension in ["mcap", "toml", "csv"] {
+        write(&format!("words.{extension}"), "these are only words, and a good lot of them\n");
+        write(&format!("empty.{extension}"), "");
+        fs::create_dir_all(home.join(format!("folder.{extension}"))).unwrap();
+    }
+    let fine = fs::read_to_string(home.join("nearest.toml")).unwrap();
+    write("steered.toml", &format!("{fine}\n[controller]\nplugin = \"arc-follow\"\n"));
+    write("typo.toml", &fine.replace("roles = ", "rolls = "));
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
+    write("hat.toml", &fs::read_to_string(scenes.join("omni-hat.toml")).unwrap());
+    let scene = fs::read_to_string(scenes.join("sample.toml")).unwrap();
+    write("scene.toml", &scene);
+    write("scene-typo.toml", &scene.replace("duration_s", "durations"));
+    write("old.bag", "#ROSBAG V2.0\n");
+    fs::create_dir_all(home.join("full")).unwrap();
+    write("full/precious.txt", "keep me");
+    fs::create_dir_all(home.join("photos")).unwrap();
+    image::RgbImage::new(8, 8).save(home.join("photos/1.png")).unwrap();
+}
+
+/// Runs a command; returns what is wrong with how it answers.
+fn complaint(home: &Path, line: &str, expected: i32, says: &str) -> Option<String> {
+    let output = own_plugin().args(line.split(' ')).current_dir(home).output().unwrap();
+    let told = text(&output.stderr);
+    let ended = output.status.code();
+    let wrong = if ended != Some(expected) {
+        format!("exit code {ended:?} instead of {expected}")
+    } else if !told.contains(says) {
+        format!("no `{says}`")
+    } else if told.contains("panicked") || told.contains("internal error") {
+        "a stack trace".into()
+    } else if told.lines().count() > 40 || !told.contains("error: ") {
+        "not one clear message".into()
+    } else {
+        return None;
+    };
+    Some(format!("tagalong {line}: {wrong}:\n{told}"))
+}
+
+#[test]
+fn every_command_answers_bad_input_with_a_clear_message() {
+    let home = tempfile::tempdir().unwrap();
+    lay_out(home.path());
+    let mut complaints = Vec::new();
+    for (template, extension, expected) in FILES {
+        for (_, file) in BAD_FILES {
+            let file = file.replace("EXT", extension);
+            let line = template.replace("FILE", &file);
+            if FINE.contains(&line.as_str()) {
+                continue;
+            }
+            complaints.extend(complaint(home.path(), &line, expected, &file));
+        }
+    }
+    for (_, line, expected, says) in OTHERS {
+        complaints.extend(complaint(home.path(), line, expected, says));
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+    assert_eq!(fs::read(home.path().join("full/precious.txt")).unwrap(), b"keep me");
+    let left: Vec<_> =
+        ["out", "out.mcap", "runs"].iter().filter(|n| home.path().join(n).exists()).collect();
+    assert!(left.is_empty(), "refused commands left {left:?}");
+}
+
+/// `| head -1` ends a command quietly, whatever it prints.
+#[test]
+fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
+    let home = tempfile::tempdir().unwrap();
+    lay_out(home.path());
+    let lines = [
+        "list",
+        "list --format json",
+        "config pipeline",
+        "inspect good.mcap",
+        "check nearest.toml",
+        "doctor nearest.toml good.mcap",
+        "reproduce",
+        "eval --truth good.people.csv --tracks good.people.csv",
+        "--help",
+        "import bag old.bag",
+    ];
+    for line in lines {
+        let mut child = own_plugin()
+            .args(line.split(' '))
+            .current_dir(home.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let told = text(&output.stderr);
+        assert!(!told.contains("roken pipe") && !told.contains("panic"), "{line}: {told}");
+        assert!([0, 3].contains(&code(&output)) || line.starts_with("eval"), "{line}: {told}");
+    }
+}
+
+/// What is printed for programs is JSON and nothing else.
+#[test]
+fn json_is_printed_by_every_command_that_prints_data() {
+    let home = tempfile::tempdir().unwrap();
+    lay_out(home.path());
+    let lines = [
+        "list",
+        "inspect good.mcap",
+        "check nearest.toml good.mcap",
+        "config ekf",
+        "doctor nearest.toml good.mcap",
+        "run nearest.toml good.mcap -o json-out",
+        "reproduce",
+        "import bag old.bag",
+    ];
+    for line in lines {
+        let mut command = own_plugin();
+        command.args(line.split(' ')).args(["--format", "json"]).current_dir(home.path());
+        let output = command.output().unwrap();
+        let read = serde_json::from_slice::<serde_json::Value>(&output.stdout);
+        assert!(read.is_ok(), "{line}: {}{}", text(&output.stdout), text(&output.stderr));
+    }
+}

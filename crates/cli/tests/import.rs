@@ -1,0 +1,173 @@
+//! Data sets become logs: tiny folders of each layout, written here, and read
+//! back as a pipeline reads them.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{code, tagalong, text};
+use image::{ImageBuffer, Luma, Rgb};
+use tagalong_log::{FrameSource, InputSettings, Limits, LogFrame, Needs};
+
+const SMALL: (u32, u32) = (64, 48);
+
+fn colour(path: &Path, size: (u32, u32), level: u8) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    ImageBuffer::from_pixel(size.0, size.1, Rgb([level, 90, 20])).save(path).unwrap();
+}
+
+fn depth(path: &Path, size: (u32, u32), units: u16) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    ImageBuffer::from_pixel(size.0, size.1, Luma([units])).save(path).unwrap();
+}
+
+fn import(home: &Path, args: &[&str]) -> (i32, String) {
+    let output = tagalong().arg("import").args(args).current_dir(home).output().unwrap();
+    (code(&output), text(&output.stderr) + &text(&output.stdout))
+}
+
+fn frames(log: &Path, needs: Needs) -> Vec<LogFrame> {
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let mut source = FrameSource::open(log, &input, &limits, needs).unwrap();
+    std::iter::from_fn(|| source.next_frame()).collect()
+}
+
+const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
+
+#[test]
+fn a_tum_folder_has_depth_and_a_camera_that_moves() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("rgbd_dataset_freiburg3_tiny");
+    for i in 0..3u8 {
+        colour(&folder.join(format!("rgb/{i}.png")), (640, 480), 10 * i);
+        depth(&folder.join(format!("depth/{i}.png")), (640, 480), 10_000);
+    }
+    let list = |name: &str, offset: u32| {
+        let line = |i: u32| format!("100.{:06} {name}/{i}.png\n", 100_000 * i + offset);
+        "# a comment\n".to_owned() + &(0..3).map(line).collect::<String>()
+    };
+    fs::write(folder.join("rgb.txt"), list("rgb", 0)).unwrap();
+    fs::write(folder.join("depth.txt"), list("depth", 8000)).unwrap();
+    // Upright, looking along Y, 1.4 m high, going ahead by 0.1 m an image.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let pose =
+        |i: u32| format!("100.{i} 1.0 {:.1} 1.4 {} 0 0 {half}\n", 2.0 + 0.1 * f64::from(i), -half);
+    fs::write(folder.join("groundtruth.txt"), (0..4).map(pose).collect::<String>()).unwrap();
+    let (code, said) = import(home.path(), &["tum", "rgbd_dataset_freiburg3_tiny"]);
+    assert_eq!(code, 0, "{said}");
+    let found = frames(&home.path().join("runs/rgbd_dataset_freiburg3_tiny.mcap"), DEPTH);
+    assert_eq!(found.len(), 3);
+    let frame = &found[1].frame;
+    assert_eq!(frame.depth().unwrap().get(5, 5), Some(2.0));
+    assert_eq!(frame.colour().unwrap().get(5, 5), Some([10, 90, 20]));
+    assert!((frame.camera.height_m() - 1.4).abs() < 1e-6);
+    assert!(frame.camera.pitch_down_rad().abs() < 1e-6);
+    assert!((frame.camera.focal_px() - 535.4).abs() < 1e-9);
+    let way =
+        found[2].odom_from_robot.translation.vector - found[0].odom_from_robot.translation.vector;
+    assert!((way.y - 0.2).abs() < 1e-6 && way.x.abs() < 1e-6, "{way}");
+}
+
+#[test]
+fn a_kitti_sequence_is_a_pair_with_boxes_and_a_drive() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("training");
+    for i in 0..2u8 {
+        colour(&folder.join(format!("image_02/0007/{i:06}.png")), SMALL, 50);
+        colour(&folder.join(format!("image_03/0007/{i:06}.png")), SMALL, 60);
+    }
+    for sub in ["calib", "label_02", "oxts"] {
+        fs::create_dir_all(folder.join(sub)).unwrap();
+    }
+    let calib = "P0: 0 0 0 0 0 0 0 0 0 0 0 0\nP2: 50 0 31.5 5.0 0 50 23.5 0 0 0 1 0\n\
+                 P3: 50 0 31.5 -20.0 0 50 23.5 0 0 0 1 0\n";
+    fs::write(folder.join("calib/0007.txt"), calib).unwrap();
+    let labels = "0 2 Pedestrian 0 0 -1.2 10 11 20 41 1.7 0.6 0.8 1 1.6 9 -1.1\n\
+                  0 3 Cyclist 0 0 -1.2 30 11 40 41 1.7 0.6 0.8 1 1.6 9 -1.1\n\
+                  1 -1 DontCare -1 -1 -10 0 0 5 5 -1 -1 -1 -1 -1 -1 -1\n";
+    fs::write(folder.join("label_02/0007.txt"), labels).unwrap();
+    // An image later 10 m north, at the same heading (north).
+    let north = 49.0 + (10.0 / 6_378_137.0_f64).to_degrees();
+    let oxts = |lat: f64| format!("{lat:.12} 8.4 100 0 0 1.5707963267948966 0 0\n");
+    fs::write(folder.join("oxts/0007.txt"), oxts(49.0) + &oxts(north)).unwrap();
+    let args = ["kitti", "training", "--sequence", "0007", "-o", "k.mcap"];
+    let (code, said) = import(home.path(), &args);
+    assert_eq!(code, 0, "{said}");
+    let needs = Needs { colour: true, depth: false, right: true };
+    let found = frames(&home.path().join("k.mcap"), needs);
+    assert_eq!(found.len(), 2);
+    let right = found[0].frame.right().unwrap();
+    assert!((right.baseline_m - 0.5).abs() < 1e-9);
+    assert!((found[0].frame.camera.height_m() - 1.65).abs() < 1e-6);
+    let way = found[1].odom_from_robot.translation.vector;
+    assert!((way.x - 10.0).abs() < 0.01 && way.y.abs() < 0.01, "ahead is X: {way}");
+    let boxes = fs::read_to_string(home.path().join("k.boxes.csv")).unwrap();
+    assert_eq!(boxes, "1,2,10,11,10.000,30.000,1,1,-1\n1,3,30,11,10.000,30.000,0,2,-1\n");
+}
+
+#[test]
+fn a_folder_of_images_has_the_camera_of_the_options() {
+    let home = tempfile::tempdir().unwrap();
+    for i in 0..4u8 {
+        colour(&home.path().join(format!("photos/{i}.png")), SMALL, i);
+        depth(&home.path().join(format!("z/{i}.png")), SMALL, 250);
+    }
+    fs::write(home.path().join("photos/readme.txt"), "no image").unwrap();
+    let args = "images photos -o p.mcap --fps 20 --view 90 --height 1.1 --tilt 5 --depth z --depth-unit 0.01";
+    let args: Vec<&str> = args.split(' ').collect();
+    let (code, said) = import(home.path(), &args);
+    assert_eq!(code, 0, "{said}");
+    let found = frames(&home.path().join("p.mcap"), DEPTH);
+    assert_eq!(found.len(), 4);
+    let frame = &found[3].frame;
+    assert!((frame.camera.focal_px() - 32.0).abs() < 1e-9);
+    assert!((frame.camera.height_m() - 1.1).abs() < 1e-9);
+    assert!((frame.camera.pitch_down_rad().to_degrees() - 5.0).abs() < 1e-6);
+    assert_eq!(frame.depth().unwrap().get(0, 0), Some(2.5));
+    assert!((frame.stamp.seconds_since(found[0].frame.stamp) - 0.15).abs() < 1e-9);
+    // What is there is not overwritten unasked.
+    let (code, said) = import(home.path(), &args);
+    assert!(code == 2 && said.contains("--overwrite"), "{said}");
+}
+
+#[test]
+fn a_mot_sequence_brings_its_truth() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("MOT17-99");
+    colour(&folder.join("img1/000001.jpg"), SMALL, 3);
+    colour(&folder.join("img1/000002.jpg"), SMALL, 4);
+    let ini = "[Sequence]\nname=MOT17-99\nimDir=img1\nframeRate=25\nseqLength=2\n";
+    fs::write(folder.join("seqinfo.ini"), ini).unwrap();
+    fs::create_dir_all(folder.join("gt")).unwrap();
+    fs::write(folder.join("gt/gt.txt"), "1,1,2,3,10,20,1,1,1\n").unwrap();
+    let (code, said) = import(home.path(), &["mot", "MOT17-99"]);
+    assert_eq!(code, 0, "{said}");
+    let found = frames(&home.path().join("runs/MOT17-99.mcap"), Needs::default());
+    assert!((found[1].frame.stamp.seconds_since(found[0].frame.stamp) - 0.04).abs() < 1e-9);
+    let truth = fs::read_to_string(home.path().join("runs/MOT17-99.boxes.csv")).unwrap();
+    assert_eq!(truth, "1,1,2,3,10,20,1,1,1\n");
+}
+
+#[test]
+fn what_is_not_of_the_layout_is_told() {
+    let home = tempfile::tempdir().unwrap();
+    fs::create_dir_all(home.path().join("empty")).unwrap();
+    fs::write(home.path().join("a.bag"), "#ROSBAG").unwrap();
+    let cases: [(&[&str], i32, &str); 7] = [
+        (&["tum", "empty"], 1, "TUM RGB-D"),
+        (&["kitti", "empty"], 1, "KITTI"),
+        (&["mot", "empty"], 1, "MOTChallenge"),
+        (&["images", "empty"], 1, "no images"),
+        (&["images", "nowhere"], 1, "no such file"),
+        (&["images", "a.bag"], 1, "is a file"),
+        (&["bag", "a.bag"], 0, "rosbags-convert --src a.bag --dst a --dst-storage mcap"),
+    ];
+    for (args, expected, says) in cases {
+        let (code, said) = import(home.path(), args);
+        assert_eq!(code, expected, "{args:?}: {said}");
+        assert!(said.contains(says), "{args:?}: {said}");
+    }
+    assert!(!home.path().join("runs").exists(), "what fails leaves nothing behind");
+}

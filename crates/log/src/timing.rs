@@ -1,0 +1,96 @@
+//! How regularly images come, and whether those of two topics belong together,
+//! by their stamps.
+
+use serde::Serialize;
+use tagalong_core::Stamp;
+
+/// The stamps of one topic, in the order of arrival.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Timing {
+    /// Median of the steps ahead, s.
+    pub median_period_s: f64,
+    /// Longest step ahead, s.
+    pub longest_gap_s: f64,
+    /// Steps back.
+    pub steps_back: usize,
+    /// Longest step back, s.
+    pub longest_step_back_s: f64,
+    /// Stamps equal to the one before.
+    pub repeated: usize,
+}
+
+impl Timing {
+    /// `None` if no stamp is later than the one before it.
+    pub fn of(stamps: &[Stamp]) -> Option<Self> {
+        let steps: Vec<f64> = stamps.windows(2).map(|w| w[1].seconds_since(w[0])).collect();
+        let mut ahead: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+        ahead.sort_by(f64::total_cmp);
+        Some(Self {
+            median_period_s: *ahead.get(ahead.len() / 2)?,
+            longest_gap_s: *ahead.last()?,
+            steps_back: steps.iter().filter(|step| **step < 0.0).count(),
+            longest_step_back_s: -steps.iter().copied().fold(0.0, f64::min) + 0.0,
+            repeated: steps.iter().filter(|step| **step == 0.0).count(),
+        })
+    }
+}
+
+/// How the images of a second topic lie in time beside those of the first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Skew {
+    /// Median of second minus first over neighbouring images, s.
+    pub median_s: f64,
+    /// Part of the first topic's images with a second one within the tolerance.
+    pub paired: f64,
+}
+
+impl Skew {
+    /// Between the images of two topics; `None` if either has none.
+    pub fn between(first: &[Stamp], second: &[Stamp], tolerance_s: f64) -> Option<Self> {
+        let mut second = second.to_vec();
+        second.sort();
+        let mut offsets: Vec<f64> = first.iter().filter_map(|at| nearest(&second, *at)).collect();
+        offsets.sort_by(f64::total_cmp);
+        let paired = offsets.iter().filter(|offset| offset.abs() <= tolerance_s).count();
+        Some(Self {
+            median_s: *offsets.get(offsets.len() / 2)?,
+            paired: paired as f64 / offsets.len() as f64,
+        })
+    }
+}
+
+/// From a moment to the nearest of sorted stamps, s.
+fn nearest(sorted: &[Stamp], at: Stamp) -> Option<f64> {
+    let after = sorted.partition_point(|stamp| *stamp < at);
+    let around = &sorted[after.saturating_sub(1)..(after + 1).min(sorted.len())];
+    around.iter().map(|s| s.seconds_since(at)).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: &[u64]) -> Vec<Stamp> {
+        millis.iter().map(|m| Stamp::from_nanos(m * 1_000_000)).collect()
+    }
+
+    #[test]
+    fn gaps_steps_back_and_repetitions_are_told() {
+        let timing = Timing::of(&at(&[0, 100, 200, 200, 1200, 700, 800])).unwrap();
+        assert!((timing.median_period_s - 0.1).abs() < 1e-9);
+        assert!((timing.longest_gap_s - 1.0).abs() < 1e-9);
+        assert!((timing.longest_step_back_s - 0.5).abs() < 1e-9);
+        assert_eq!((timing.steps_back, timing.repeated), (1, 1));
+        assert_eq!(Timing::of(&at(&[5])), None);
+        assert_eq!(Timing::of(&at(&[5, 5])), None);
+    }
+
+    #[test]
+    fn skew_is_that_of_the_nearest_image() {
+        let skew = Skew::between(&at(&[0, 100, 200, 300]), &at(&[308, 8, 108]), 0.03).unwrap();
+        assert!((skew.median_s - 0.008).abs() < 1e-9, "{skew:?}");
+        assert_eq!(skew.paired, 0.75);
+        assert_eq!(Skew::between(&[], &at(&[1]), 0.03), None);
+        assert_eq!(Skew::between(&at(&[1]), &[], 0.03), None);
+    }
+}

@@ -1,0 +1,127 @@
+//! Annotated logs of real people, beside drawn scenes.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+
+use tagalong_eval::formats::people;
+use tagalong_eval::{Comparison, Frame, Sequence, SetDistance, Similarity, Tally, Truth};
+use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_pipeline::{FrameReport, Pipeline};
+use tagalong_trials::{Contender, Judge};
+
+use crate::lab::read;
+use crate::{Lab, ReproduceError};
+
+/// What truth files are called, after the name of their log.
+const TRUTH: &str = ".people.csv";
+
+/// What one contender said about a log.
+pub(crate) struct Recorded {
+    /// One report a frame that the log delivered.
+    pub(crate) reports: Vec<FrameReport>,
+    /// How its boxes lie on those of the people.
+    pub(crate) tally: Tally,
+}
+
+/// Takes all contenders over each annotated log of colour and depth images; for each
+/// contender what it said about each log. Without real data there are no logs.
+pub(crate) fn recorded(
+    lab: &Lab<'_>,
+    contenders: &[Contender],
+    judge: &Judge,
+) -> Result<Vec<Vec<Recorded>>, ReproduceError> {
+    let logs = logs(lab)?;
+    lab.progress.begin(logs.len() * contenders.len(), "annotated logs");
+    let over_all = |contender: &Contender| {
+        logs.iter()
+            .map(|log| {
+                let recorded = log.take(lab, contender, judge);
+                lab.progress.step();
+                recorded
+            })
+            .collect()
+    };
+    contenders.iter().map(over_all).collect()
+}
+
+/// A log, and who is in which of its frames.
+struct Log {
+    name: String,
+    path: PathBuf,
+    people: BTreeMap<u32, Vec<Truth>>,
+}
+
+/// The annotated logs in the order of their names.
+fn logs(lab: &Lab<'_>) -> Result<Vec<Log>, ReproduceError> {
+    let Some(data) = &lab.data else { return Ok(Vec::new()) };
+    let Ok(entries) = fs::read_dir(data.join("logs")) else { return Ok(Vec::new()) };
+    let files = entries.flatten().map(|entry| entry.path());
+    let name = |path: PathBuf| path.file_name()?.to_str()?.strip_suffix(TRUTH).map(String::from);
+    let mut names: Vec<String> = files.filter_map(name).collect();
+    names.sort();
+    names.into_iter().map(|name| Log::read(data.join("logs"), name)).collect()
+}
+
+impl Log {
+    fn read(folder: PathBuf, name: String) -> Result<Self, ReproduceError> {
+        let path = folder.join(format!("{name}{TRUTH}"));
+        let rows = people::parse(&read(&path)?, &path.display().to_string());
+        let mut people: BTreeMap<u32, Vec<Truth>> = BTreeMap::new();
+        for row in rows.map_err(|error| ReproduceError::Other(error.to_string()))? {
+            let (frame, truth) = row.truth(|_| None);
+            people.entry(frame).or_default().push(truth);
+        }
+        Ok(Self { path: folder.join(format!("{name}.mcap")), name, people })
+    }
+
+    fn take(
+        &self,
+        lab: &Lab<'_>,
+        contender: &Contender,
+        judge: &Judge,
+    ) -> Result<Recorded, ReproduceError> {
+        let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
+        let mut pipeline: Pipeline = contender.pipeline(lab.registry, 1)?;
+        let needs = Needs { colour: true, depth: true, right: false };
+        let (input, limits) = (InputSettings::default(), Limits::default());
+        let mut source = FrameSource::open(&self.path, &input, &limits, needs)
+            .map_err(|error| failed(error.to_string()))?;
+        let (mut reports, mut frames) = (Vec::new(), BTreeMap::new());
+        while let Some(item) = source.next_frame() {
+            let camera = &item.frame.camera;
+            let size = (camera.width, camera.height);
+            let report = pipeline.step(&item.frame).map_err(|error| failed(error.to_string()))?;
+            let number = u32::try_from(item.frame.index).unwrap_or(u32::MAX);
+            frames.insert(
+                number,
+                self.frame(number, item.frame.stamp.nanos(), || judge.reports(&report, size)),
+            );
+            reports.push(report);
+        }
+        let tally = self.tally(frames)?;
+        Ok(Recorded { reports, tally })
+    }
+
+    fn frame(
+        &self,
+        number: u32,
+        stamp_ns: u64,
+        reports: impl FnOnce() -> Vec<tagalong_eval::Report>,
+    ) -> Frame {
+        let truths = self.people.get(&number).cloned().unwrap_or_default();
+        Frame { stamp_ns: stamp_ns as i64, truths, reports: reports(), ignore_regions: Vec::new() }
+    }
+
+    /// Whoever is in a frame that the log does not deliver was missed.
+    fn tally(&self, mut frames: BTreeMap<u32, Frame>) -> Result<Tally, ReproduceError> {
+        for number in self.people.keys() {
+            frames.entry(*number).or_insert_with(|| self.frame(*number, 0, Vec::new));
+        }
+        let frames = frames.into_values().collect();
+        let sequence = Sequence { name: self.name.clone(), frames };
+        let comparison = Comparison::from(Similarity::Iou);
+        Tally::measure(&sequence, &comparison, &SetDistance::default())
+            .map_err(|error| ReproduceError::Other(error.to_string()))
+    }
+}

@@ -1,0 +1,323 @@
+//! Does depth lie on colour? Measured by how the outlines of things in depth fall
+//! on edges of the intensity image.
+//!
+//! An outline in depth is a jump between neighbouring readings of a row (or of a
+//! column); what was not read between them, the shadow beside a near thing, is
+//! stepped over, and the outline belongs to the nearer side. Where depth is
+//! registered, the intensity changes across most outlines; moved by a few pixels
+//! it does not. So the mean change of intensity across all outlines, as a
+//! function of where the outlines are moved to, peaks at the offset.
+
+use tagalong_core::{DepthImage, GreyImage};
+
+/// How outlines are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OverlapSettings {
+    /// Offsets that are tried, to either side, pixels.
+    pub reach_px: usize,
+    /// Readings that differ by more than this fraction are on two things.
+    pub jump: f32,
+    /// Longest run without a reading between the two sides of an outline, pixels.
+    pub shadow_px: usize,
+    /// Readings farther than this are not used, m.
+    pub max_depth_m: f32,
+    /// Changes of intensity count up to this, grey levels.
+    pub ceiling: u8,
+}
+
+impl Default for OverlapSettings {
+    fn default() -> Self {
+        Self { reach_px: 16, jump: 0.1, shadow_px: 24, max_depth_m: 6.0, ceiling: 40 }
+    }
+}
+
+/// Where depth lies on colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset {
+    /// Columns and rows by which depth has to be moved to lie on colour.
+    pub px: [i32; 2],
+    /// Standard error of either, by leaving out one part of the images after the
+    /// other, pixels.
+    pub error_px: [f64; 2],
+    /// How much more the intensity changes across the outlines there than where
+    /// they are, as a fraction.
+    pub gain: f64,
+    /// How much more it changes there than on average over all offsets.
+    pub contrast: f64,
+    /// Outline pixels that were compared.
+    pub outlines: u64,
+}
+
+/// Parts of the images that are left out in turn: quarters, and every other frame.
+const PARTS: usize = 8;
+
+/// Sums over frames how outlines fall on edges.
+#[derive(Clone, Debug)]
+pub struct EdgeOverlap {
+    settings: OverlapSettings,
+    frames: usize,
+    /// For each part the sums over all offsets, row by row, and the outlines.
+    parts: [(Vec<u64>, u64); PARTS],
+}
+
+/// An outline pixel: its place, and true where it was crossed along a column.
+type Outline = (usize, usize, bool);
+
+impl EdgeOverlap {
+    /// Before the first frame.
+    pub fn new(settings: OverlapSettings) -> Self {
+        let side = 2 * settings.reach_px + 1;
+        Self { settings, frames: 0, parts: std::array::from_fn(|_| (vec![0; side * side], 0)) }
+    }
+
+    /// Takes in a frame; images of two sizes are left alone.
+    pub fn add(&mut self, grey: &GreyImage, depth: &DepthImage) {
+        let size = (grey.width(), grey.height());
+        if size != (depth.width(), depth.height()) {
+            return;
+        }
+        let changes = Changes::of(grey, self.settings.ceiling);
+        for outline in outlines(depth, &self.settings) {
+            let quarter =
+                usize::from(2 * outline.0 >= size.0) + 2 * usize::from(2 * outline.1 >= size.1);
+            let part = &mut self.parts[4 * (self.frames % 2) + quarter];
+            changes.collect(outline, self.settings.reach_px, part);
+        }
+        self.frames += 1;
+    }
+
+    /// The offset, if there are outlines enough to tell one.
+    pub fn offset(&self) -> Option<Offset> {
+        let all = self.without(None);
+        let outlines: u64 = self.parts.iter().map(|(_, count)| count).sum();
+        let best = self.peak(&all)?;
+        let (here, there) = (all[all.len() / 2], all[best]);
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        let px = self.offset_of(best);
+        let counted = (0..PARTS).filter(|part| self.parts[*part].1 > 0);
+        let peaks: Vec<[i32; 2]> = counted
+            .filter_map(|part| self.peak(&self.without(Some(part))))
+            .map(|at| self.offset_of(at))
+            .collect();
+        Some(Offset {
+            px,
+            error_px: [0, 1].map(|axis| jackknife(peaks.iter().map(|p| f64::from(p[axis])))),
+            gain: there / here.max(1e-9) - 1.0,
+            contrast: there / mean.max(1e-9) - 1.0,
+            outlines,
+        })
+    }
+
+    /// Mean change across the outlines for each offset, smoothed a little, without
+    /// one of the parts.
+    fn without(&self, left_out: Option<usize>) -> Vec<f64> {
+        let side = 2 * self.settings.reach_px + 1;
+        let kept = || self.parts.iter().enumerate().filter(|(i, _)| Some(*i) != left_out);
+        let count = kept().map(|(_, (_, count))| count).sum::<u64>().max(1) as f64;
+        let sum = |i: usize| kept().map(|(_, (sums, _))| sums[i]).sum::<u64>() as f64 / count;
+        let sums: Vec<f64> = (0..side * side).map(sum).collect();
+        smoothed(&sums, side)
+    }
+
+    fn peak(&self, scores: &[f64]) -> Option<usize> {
+        let best = (0..scores.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b]))?;
+        (scores[best] > 0.0).then_some(best)
+    }
+
+    fn offset_of(&self, index: usize) -> [i32; 2] {
+        let (reach, side) = (self.settings.reach_px as i32, 2 * self.settings.reach_px + 1);
+        [(index % side) as i32 - reach, (index / side) as i32 - reach]
+    }
+}
+
+/// Standard error of a figure from its values without one part each (Quenouille;
+/// Tukey).
+fn jackknife(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count.max(1.0);
+    let spread = values.map(|value| (value - mean).powi(2)).sum::<f64>();
+    ((count - 1.0).max(0.0) / count.max(1.0) * spread).sqrt()
+}
+
+/// Mean over three by three offsets, so that a jagged peak does not decide.
+fn smoothed(scores: &[f64], side: usize) -> Vec<f64> {
+    let near = |at: usize| at.saturating_sub(1)..(at + 2).min(side);
+    let mean = |x: usize, y: usize| {
+        let around = near(y).flat_map(|row| near(x).map(move |column| scores[row * side + column]));
+        around.clone().sum::<f64>() / around.count() as f64
+    };
+    (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect()
+}
+
+/// Changes of intensity from column to column and from row to row.
+struct Changes {
+    width: usize,
+    height: usize,
+    along_row: Vec<u8>,
+    along_column: Vec<u8>,
+}
+
+impl Changes {
+    fn of(grey: &GreyImage, ceiling: u8) -> Self {
+        let (width, height) = (grey.width(), grey.height());
+        let at = |x: usize, y: usize| grey.row(y)[x];
+        let change = |a: u8, b: u8| a.abs_diff(b).min(ceiling);
+        let next = |at: usize, size: usize| (at + 1).min(size - 1);
+        let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Self {
+            width,
+            height,
+            along_row: pixels()
+                .map(|(x, y)| change(at(x.saturating_sub(1), y), at(next(x, width), y)))
+                .collect(),
+            along_column: pixels()
+                .map(|(x, y)| change(at(x, y.saturating_sub(1)), at(x, next(y, height))))
+                .collect(),
+        }
+    }
+
+    /// Adds the changes at all offsets of an outline that keeps inside the image
+    /// at all of them.
+    fn collect(&self, (x, y, down): Outline, reach: usize, (sums, count): &mut (Vec<u64>, u64)) {
+        let inside = |at: usize, size: usize| at >= reach && at + reach < size;
+        if !(inside(x, self.width) && inside(y, self.height)) {
+            return;
+        }
+        let (changes, side) =
+            (if down { &self.along_column } else { &self.along_row }, 2 * reach + 1);
+        *count += 1;
+        for (row, sums) in sums.chunks_exact_mut(side).enumerate() {
+            let start = (y + row - reach) * self.width + x - reach;
+            for (sum, change) in sums.iter_mut().zip(&changes[start..start + side]) {
+                *sum += u64::from(*change);
+            }
+        }
+    }
+}
+
+/// The outline pixels of a depth image.
+fn outlines(depth: &DepthImage, settings: &OverlapSettings) -> Vec<Outline> {
+    let (width, height) = (depth.width(), depth.height());
+    let mut found = Vec::new();
+    for y in 0..height {
+        jumps(width, settings, |x| depth.row(y)[x], |x| found.push((x, y, false)));
+    }
+    for x in 0..width {
+        jumps(height, settings, |y| depth.row(y)[x], |y| found.push((x, y, true)));
+    }
+    found
+}
+
+/// Walks along a line of readings and tells the nearer side of each jump.
+fn jumps(
+    length: usize,
+    settings: &OverlapSettings,
+    reading: impl Fn(usize) -> f32,
+    mut tell: impl FnMut(usize),
+) {
+    let mut last: Option<(usize, f32)> = None;
+    for at in 0..length {
+        let here = reading(at);
+        if !(here > 0.0 && here.is_finite()) {
+            continue;
+        }
+        if let Some((before, there)) = last {
+            let near = here.min(there);
+            let jumps = (here - there).abs() > settings.jump * near && near < settings.max_depth_m;
+            if jumps && at - before <= settings.shadow_px + 1 {
+                tell(if here < there { at } else { before });
+            }
+        }
+        last = Some((at, here));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A dark board and a bright one before a wall of texture, with depth moved by
+    /// an offset.
+    fn scene(offset: [i64; 2], boards: &[(i64, i64, i64)]) -> (GreyImage, DepthImage) {
+        let board = |x: i64, y: i64| {
+            boards.iter().position(|(left, top, side)| {
+                (*left..left + side).contains(&x) && (*top..top + side + 10).contains(&y)
+            })
+        };
+        let grey = GreyImage::from_fn(160, 120, |x, y| match board(x as i64, y as i64) {
+            Some(which) => [30, 220, 60][which % 3],
+            None => 120 + ((x * 7 + y * 13) % 11) as u8,
+        });
+        let depth = DepthImage::from_fn(160, 120, |x, y| {
+            match board(x as i64 - offset[0], y as i64 - offset[1]) {
+                Some(which) => 1.5 + 0.5 * which as f32,
+                None => 4.0,
+            }
+        });
+        (grey, depth)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn the_offset_is_found(dx in -12..=12i64, dy in -12..=12i64, left in 30..50i64) {
+            let mut overlap = EdgeOverlap::new(OverlapSettings::default());
+            let (grey, depth) = scene([-dx, -dy], &[(left, 30, 24), (left + 45, 45, 30)]);
+            overlap.add(&grey, &depth);
+            let found = overlap.offset().unwrap();
+            prop_assert!((i64::from(found.px[0]) - dx).abs() <= 1, "{found:?} {dx} {dy}");
+            prop_assert!((i64::from(found.px[1]) - dy).abs() <= 1, "{found:?} {dx} {dy}");
+            prop_assert!(found.contrast > 0.5, "{found:?}");
+        }
+    }
+
+    /// The same sums as [`EdgeOverlap`] makes, offset by offset.
+    fn slowly(grey: &GreyImage, depth: &DepthImage, dx: i64, dy: i64) -> u64 {
+        let settings = OverlapSettings::default();
+        let reach = settings.reach_px as i64;
+        let within =
+            |x: i64, y: i64| x >= reach && y >= reach && x < 160 - reach && y < 120 - reach;
+        let kept = outlines(depth, &settings).into_iter();
+        let kept = kept.filter(|(x, y, _)| within(*x as i64, *y as i64));
+        kept.map(|(x, y, down)| {
+            let (x, y) = (x as i64 + dx, y as i64 + dy);
+            let (sx, sy) = if down { (0, 1) } else { (1, 0) };
+            let at = |x: i64, y: i64| grey.get(x.clamp(0, 159), y.clamp(0, 119)).unwrap();
+            u64::from(at(x - sx, y - sy).abs_diff(at(x + sx, y + sy)).min(settings.ceiling))
+        })
+        .sum()
+    }
+
+    #[test]
+    fn the_sums_are_those_of_the_slow_way() {
+        let (grey, depth) = scene([3, -2], &[(40, 30, 24), (85, 45, 30)]);
+        let mut overlap = EdgeOverlap::new(OverlapSettings::default());
+        overlap.add(&grey, &depth);
+        for (dx, dy) in [(0, 0), (-3, 2), (16, -16), (-16, 5)] {
+            let index = ((dy + 16) * 33 + dx + 16) as usize;
+            let sum: u64 = overlap.parts.iter().map(|(sums, _)| sums[index]).sum();
+            assert_eq!(sum, slowly(&grey, &depth, dx, dy), "{dx} {dy}");
+        }
+    }
+
+    #[test]
+    fn an_outline_is_on_the_nearer_side_of_a_shadow() {
+        let nan = f32::NAN;
+        let row = [4.0, 4.0, nan, nan, 1.5, 1.5, nan, 4.0, 4.1];
+        let mut found = Vec::new();
+        jumps(row.len(), &OverlapSettings::default(), |at| row[at], |at| found.push(at));
+        assert_eq!(found, [4, 5]);
+    }
+
+    #[test]
+    fn without_outlines_nothing_is_said() {
+        let mut overlap = EdgeOverlap::new(OverlapSettings::default());
+        assert_eq!(overlap.offset(), None);
+        overlap.add(&GreyImage::filled(64, 48, 9), &DepthImage::filled(64, 48, 2.0));
+        overlap.add(&GreyImage::filled(64, 48, 9), &DepthImage::filled(32, 48, 2.0));
+        overlap.add(&GreyImage::filled(0, 0, 9), &DepthImage::filled(0, 0, 2.0));
+        assert_eq!(overlap.offset(), None);
+    }
+}

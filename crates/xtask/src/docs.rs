@@ -1,0 +1,133 @@
+//! Parts of the documents that a command prints.
+//!
+//! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands what that
+//! command prints. `cargo xtask docs` fills these parts, and `cargo xtask tidy`
+//! complains about those that have become stale. What takes long, the tables of
+//! `reproduce`, is filled only when it is asked for.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::workspace::{Workspace, output};
+
+const BEGIN: &str = "<!-- begin: ";
+const END: &str = "<!-- end -->";
+
+/// Commands that take minutes to hours.
+const SLOW: &[&str] = &["tagalong reproduce"];
+
+/// A document with parts to fill.
+struct Document {
+    path: PathBuf,
+    text: String,
+}
+
+/// Fills the parts whose command contains `slow`, or those that are fast.
+pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
+    let wanted = |command: &str| match slow {
+        Some(part) => command.contains(part),
+        None => !is_slow(command),
+    };
+    for document in documents(workspace)? {
+        let filled = filled(&document.text, wanted, |command| printed(workspace, command))
+            .with_context(|| format!("in {}", document.path.display()))?;
+        if filled != document.text {
+            workspace.write(&document.path, &filled)?;
+            eprintln!("docs: {} is filled anew", document.path.display());
+        }
+    }
+    Ok(())
+}
+
+/// Complains about fast parts that are stale.
+pub fn stale(workspace: &Workspace) -> Result<Vec<String>> {
+    let mut complaints = Vec::new();
+    for document in documents(workspace)? {
+        let wanted = |command: &str| !is_slow(command);
+        let filled = filled(&document.text, wanted, |command| printed(workspace, command))
+            .with_context(|| format!("in {}", document.path.display()))?;
+        if filled != document.text {
+            let name = document.path.display();
+            complaints.push(format!(
+                "{name} is not what the commands in it print: run `cargo xtask docs`"
+            ));
+        }
+    }
+    Ok(complaints)
+}
+
+fn is_slow(command: &str) -> bool {
+    SLOW.iter().any(|slow| command.starts_with(slow))
+}
+
+fn documents(workspace: &Workspace) -> Result<Vec<Document>> {
+    let files = workspace.files()?.into_iter();
+    let markdown = files.filter(|path| path.extension().is_some_and(|e| e == "md"));
+    let read = markdown.map(|path| Ok(Document { text: workspace.read(&path)?, path }));
+    let all: Vec<Document> = read.collect::<Result<_>>()?;
+    Ok(all.into_iter().filter(|document| document.text.contains(BEGIN)).collect())
+}
+
+/// The text with the wanted parts filled.
+fn filled(
+    text: &str,
+    wanted: impl Fn(&str) -> bool,
+    print: impl Fn(&str) -> Result<String>,
+) -> Result<String> {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once(BEGIN) {
+        let (command, body) = after.split_once(" -->").context("a part has no `-->`")?;
+        let (old, next) =
+            body.split_once(END).with_context(|| format!("`{command}` has no `{END}`"))?;
+        out += &format!("{before}{BEGIN}{command} -->");
+        out += &match wanted(command) {
+            true => format!("\n\n{}\n\n", print(command)?.trim()),
+            false => old.to_owned(),
+        };
+        out += END;
+        rest = next;
+    }
+    Ok(out + rest)
+}
+
+/// What the command prints, with the program of this workspace.
+fn printed(workspace: &Workspace, command: &str) -> Result<String> {
+    let mut words = command.split_whitespace();
+    if words.next() != Some("tagalong") {
+        bail!("`{command}` is no command of tagalong");
+    }
+    let mut cargo = Command::new("cargo");
+    cargo.args(["run", "--quiet", "--package", "tagalong-cli"]);
+    if is_slow(command) {
+        cargo.arg("--release");
+    }
+    output(cargo.arg("--").args(words).current_dir(workspace.root()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "a\n<!-- begin: tagalong list -->\nold\n<!-- end -->\nb\n\
+                        <!-- begin: tagalong reproduce x -->\ntable\n<!-- end -->\nc\n";
+
+    #[test]
+    fn fast_parts_are_filled_and_slow_ones_left() {
+        let print = |command: &str| Ok(format!("[{command}]\n"));
+        let out = filled(TEXT, |command| !is_slow(command), print).unwrap();
+        assert!(
+            out.contains("<!-- begin: tagalong list -->\n\n[tagalong list]\n\n<!-- end -->\nb")
+        );
+        assert!(out.contains("\ntable\n") && out.ends_with("c\n"), "{out}");
+        assert_eq!(filled(&out, |command| !is_slow(command), print).unwrap(), out);
+    }
+
+    #[test]
+    fn a_part_without_an_end_is_an_error() {
+        let print = |_: &str| Ok(String::new());
+        assert!(filled("<!-- begin: tagalong list -->\nold\n", |_| true, print).is_err());
+    }
+}

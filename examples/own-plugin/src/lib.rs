@@ -1,0 +1,52 @@
+//! A verifier that trusts people by the contrast of their picture: a person has
+//! some, a blank wall has none.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Detection, Frame, Registry, Result, Verifier};
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "own-contrast";
+
+/// Registers the plugin.
+pub fn register(registry: &mut Registry) {
+    let summary = "people have more contrast than walls";
+    registry.verifier(NAME, summary, |config: Config, _| Ok(OwnContrast { config }));
+}
+
+/// Settings of `own-contrast`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Standard deviation of the grey values at which person and no person are
+    /// equally likely.
+    pub even_contrast: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { even_contrast: 25.0 }
+    }
+}
+
+/// Log-odds by the contrast inside of the region.
+pub struct OwnContrast {
+    config: Config,
+}
+
+impl Verifier for OwnContrast {
+    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+        let grey = frame.grey()?;
+        let inside = candidate.region.clipped(grey.width(), grey.height());
+        let (left, right) = (inside.x as usize, inside.right() as usize);
+        let (top, bottom) = (inside.y as usize, inside.bottom() as usize);
+        if right <= left || bottom <= top {
+            return Ok(0.0);
+        }
+        let values = || (top..bottom).flat_map(|y| &grey.row(y)[left..right]).map(|v| f64::from(*v));
+        let count = ((right - left) * (bottom - top)) as f64;
+        let mean = values().sum::<f64>() / count;
+        let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+        Ok((variance.sqrt() / self.config.even_contrast).ln().clamp(-3.0, 3.0))
+    }
+}

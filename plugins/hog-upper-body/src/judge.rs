@@ -1,0 +1,167 @@
+//! Machines as they are run: windows side by side, of an image in one size.
+
+use crate::channels::{Channels, DEPTH, Planes};
+use crate::hog::{BLOCK, Blocks};
+use crate::model::{Machine, Model, SIDE};
+use crate::trees::{CELLS, PATIENCE, Tree, Trees};
+
+/// Windows or numbers that are dealt with at once.
+pub(crate) const LANES: usize = 8;
+/// Products that are summed up apart from each other, so that none waits for another.
+const MANY: usize = 4 * LANES;
+/// Numbers of a row of blocks in a window, in lanes that are full.
+const ROW: usize = (SIDE * BLOCK).next_multiple_of(MANY);
+
+/// A machine, and what it looks at.
+#[derive(Clone, Debug)]
+pub(crate) enum Judge {
+    Linear(Linear),
+    Trees(Forest),
+}
+
+impl Judge {
+    pub(crate) fn new(model: &Model) -> Self {
+        match &model.machine {
+            Machine::Linear { weights, bias } => Self::Linear(Linear::new(weights, *bias)),
+            Machine::Trees(trees) => Self::Trees(Forest::new(trees)),
+        }
+    }
+
+    /// Takes the place of another image (see [`Blocks::fill`]).
+    pub(crate) fn fill(&mut self, pixels: &[f32], width: usize) {
+        match self {
+            Self::Linear(linear) => linear.blocks.fill(pixels, width),
+            Self::Trees(forest) => forest.fill(pixels, width),
+        }
+    }
+
+    /// The sums of as many windows side by side as there are `sums`; the first one
+    /// begins at cell (x, y), of 8 pixels.
+    pub(crate) fn sums(&self, (x, y): (usize, usize), sums: &mut [f32]) {
+        match self {
+            Self::Linear(linear) => linear.sums((x, y), sums),
+            Self::Trees(forest) => forest.sums((x, y), sums),
+        }
+    }
+}
+
+/// A weighted sum of blocks.
+#[derive(Clone, Debug)]
+pub(crate) struct Linear {
+    blocks: Blocks,
+    /// With zeros for the numbers that fill the last lanes of a row: those are of the
+    /// block behind the window.
+    weights: Vec<[f32; ROW]>,
+    bias: f32,
+}
+
+impl Linear {
+    fn new(weights: &[f32], bias: f32) -> Self {
+        let padded = |row: &[f32]| {
+            let mut padded = [0.0; ROW];
+            padded[..SIDE * BLOCK].copy_from_slice(row);
+            padded
+        };
+        let weights = weights.chunks_exact(SIDE * BLOCK).map(padded).collect();
+        Self { blocks: Blocks::default(), weights, bias }
+    }
+
+    fn sums(&self, (x, y): (usize, usize), sums: &mut [f32]) {
+        for (sum, x) in sums.iter_mut().zip(x..) {
+            let rows = std::array::from_fn(|row| self.blocks.from(x, y + row));
+            *sum = product(&self.weights, rows) + self.bias;
+        }
+    }
+}
+
+/// The product of the weights with a window that begins with the first block of each
+/// row.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn product(weights: &[[f32; ROW]], rows: [&[f32]; SIDE]) -> f32 {
+    let mut lanes = [0.0_f32; MANY];
+    for (weights, row) in weights.iter().zip(rows) {
+        let row = &row[..ROW];
+        for at in (0..ROW).step_by(MANY) {
+            for lane in 0..MANY {
+                lanes[lane] += weights[at + lane] * row[at + lane];
+            }
+        }
+    }
+    lanes.iter().sum()
+}
+
+/// Trees whose numbers are places in planes.
+#[derive(Clone, Debug)]
+pub(crate) struct Forest {
+    trees: Trees,
+    channels: Channels,
+    planes: Planes,
+    /// For the layout of the planes: where each tree's numbers are, from a window's
+    /// first cell on.
+    places: Vec<[u32; 3]>,
+    layout: usize,
+}
+
+impl Forest {
+    fn new(trees: &Trees) -> Self {
+        let (trees, places) = (trees.clone(), Vec::new());
+        Self { trees, channels: Channels::default(), planes: Planes::default(), places, layout: 0 }
+    }
+
+    fn fill(&mut self, pixels: &[f32], width: usize) {
+        self.channels.fill(pixels, width);
+        self.channels.planes(&mut self.planes);
+        if self.layout != self.planes.layout() {
+            let place = |number: u16| {
+                let (cell, k) = (usize::from(number) / DEPTH, usize::from(number) % DEPTH);
+                self.planes.place(cell % CELLS, cell / CELLS, k) as u32
+            };
+            self.places.clear();
+            self.places.extend(self.trees.trees.iter().map(|tree| tree.numbers.map(place)));
+            self.layout = self.planes.layout();
+        }
+    }
+
+    fn sums(&self, (x, y): (usize, usize), sums: &mut [f32]) {
+        for (sums, x) in sums.chunks_mut(LANES).zip((x..).step_by(LANES)) {
+            let mut lanes = [0.0; LANES];
+            let cells = &self.planes.values()[self.planes.place(2 * x, 2 * y, 0)..];
+            add_trees(&self.trees, &self.places, cells, &mut lanes);
+            sums.copy_from_slice(&lanes[..sums.len()]);
+        }
+    }
+}
+
+/// The sums of windows side by side; each stays what it was when it became hopeless.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn add_trees(trees: &Trees, places: &[[u32; 3]], cells: &[f32], sums: &mut [f32; LANES]) {
+    let mut hopeless = f32::NEG_INFINITY;
+    for (index, (tree, [a, b, c])) in trees.trees.iter().zip(places).enumerate() {
+        if index > PATIENCE {
+            hopeless = trees.hopeless;
+            if index % LANES == 0 && most(sums) < hopeless {
+                break;
+            }
+        }
+        let Tree { below: [first, yes, no], values, .. } = *tree;
+        let [yes_yes, yes_no, no_yes, no_no] = values;
+        let a = &cells[*a as usize..][..LANES];
+        let b = &cells[*b as usize..][..LANES];
+        let c = &cells[*c as usize..][..LANES];
+        for lane in 0..LANES {
+            let if_yes = if b[lane] < yes { yes_yes } else { yes_no };
+            let if_no = if c[lane] < no { no_yes } else { no_no };
+            let value = if a[lane] < first { if_yes } else { if_no };
+            sums[lane] += if sums[lane] < hopeless { 0.0 } else { value };
+        }
+    }
+}
+
+#[inline(always)]
+fn most(sums: &[f32; LANES]) -> f32 {
+    let mut most = sums[0];
+    for sum in sums {
+        most = most.max(*sum);
+    }
+    most
+}
