@@ -46,7 +46,12 @@ pub struct Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{} frames, {} commands", self.frames, self.told.commands)?;
+        writeln!(f, "{} frames", self.frames)?;
+        if let Told { commands, zeros } = self.told
+            && commands > 0
+        {
+            writeln!(f, "{commands} commands, {zeros} of them zero")?;
+        }
         for (topic, Traffic { received, dropped }) in &self.traffic {
             writeln!(f, "  {topic}: {received} received, {dropped} dropped unread")?;
         }

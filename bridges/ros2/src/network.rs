@@ -5,7 +5,7 @@ use std::thread::{self, JoinHandle};
 
 use futures::StreamExt;
 use futures::executor::block_on;
-use futures::future::{AbortHandle, abortable};
+use futures::future::{AbortHandle, Abortable, ready};
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
@@ -151,7 +151,7 @@ impl Network {
         self.ear(topic, "std_msgs/msg/Bool", sensor(OTHERS), OTHERS, inbox, encode)
     }
 
-    fn plain<M: Message + Serialize + DeserializeOwned + 'static>(
+    fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
         qos: QosProfile,
@@ -160,7 +160,7 @@ impl Network {
         self.ear(topic, M::TYPE, qos, OTHERS, inbox, |message: M| encode(&message))
     }
 
-    fn ear<M: DeserializeOwned + 'static>(
+    fn ear<M: DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
         message_type: &str,
@@ -169,19 +169,24 @@ impl Network {
         inbox: &Arc<Inbox>,
         encode: impl Fn(M) -> Vec<u8> + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let handle = self.topic(topic, message_type, &qos)?;
+        let node = &mut self.node;
+        let full = name(node.namespace(), topic)?;
+        let handle = node.create_topic(&full, kind(message_type), &qos).map_err(failed)?;
         let subscription: Subscription<M> =
-            self.node.create_subscription(&handle, Some(qos)).map_err(failed)?;
+            node.create_subscription(&handle, Some(qos)).map_err(failed)?;
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
-        // What does not decode is of another type than its topic says.
-        let put = async move {
-            let stream = subscription.async_stream();
-            let whole = stream.filter_map(|message| async { message.ok() });
-            whole.for_each(|(message, _)| async { inbox.push(&name, encode(message), room) }).await;
-        };
-        let (put, abort) = abortable(put);
-        let thread = Some(thread::spawn(move || drop(block_on(put))));
-        Ok(Ear { topic: topic.to_owned(), abort, thread })
+        let (abort, registration) = AbortHandle::new_pair();
+        let thread = thread::spawn(move || {
+            // What does not decode is of another type than its topic says.
+            let whole = subscription.async_stream().filter_map(|message| ready(message.ok()));
+            let put = whole.for_each(|(message, _)| {
+                inbox.push(&name, encode(message), room);
+                ready(())
+            });
+            // It ends by being aborted.
+            let _aborted = block_on(Abortable::new(put, registration));
+        });
+        Ok(Ear { topic: topic.to_owned(), abort, thread: Some(thread) })
     }
 
     /// A publisher of this type.
@@ -189,27 +194,48 @@ impl Network {
         &mut self,
         topic: &str,
     ) -> Result<Publisher<M>, BridgeError> {
-        let handle = self.topic(topic, M::TYPE, &reliable())?;
-        self.node.create_publisher(&handle, Some(reliable())).map_err(failed)
+        let (node, qos) = (&mut self.node, reliable());
+        let name = name(node.namespace(), topic)?;
+        let handle = node.create_topic(&name, kind(M::TYPE), &qos).map_err(failed)?;
+        node.create_publisher(&handle, Some(qos)).map_err(failed)
     }
+}
 
-    fn topic(
-        &self,
-        topic: &str,
-        message_type: &str,
-        qos: &QosProfile,
-    ) -> Result<ros2_client::Topic, BridgeError> {
-        let name = Name::parse(topic)
-            .map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))?;
-        let (package, kind) = message_type.split_once("/msg/").unwrap_or(("", message_type));
-        let kind = MessageTypeName::new(package, kind);
-        self.node.create_topic(&name, kind, qos).map_err(failed)
-    }
+/// The name of a topic, which lies in the namespace unless it begins with a slash.
+/// (What ros2-client does by itself doubles the slash in the namespace `/`.)
+fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
+    let full = match topic.starts_with('/') {
+        true => topic.to_owned(),
+        false => format!("{}/{topic}", namespace.trim_end_matches('/')),
+    };
+    Name::parse(&full).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))
+}
+
+fn kind(message_type: &str) -> MessageTypeName {
+    let (package, name) = message_type.split_once("/msg/").unwrap_or(("", message_type));
+    MessageTypeName::new(package, name)
 }
 
 impl Drop for Network {
     fn drop(&mut self) {
         self.node.stop_spinner();
         self.spinner.take().map(JoinHandle::join);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_without_a_slash_lie_in_the_namespace() {
+        for (namespace, topic, full) in [
+            ("/", "people/tracks", "/people/tracks"),
+            ("/robot1", "cmd_vel", "/robot1/cmd_vel"),
+            ("/robot1", "/cmd_vel", "/cmd_vel"),
+        ] {
+            assert_eq!(name(namespace, topic).unwrap(), Name::parse(full).unwrap());
+        }
+        assert!(matches!(name("/", "no spaces"), Err(BridgeError::Config(_))));
     }
 }

@@ -60,10 +60,18 @@ fn domain(offset: u32) -> u16 {
     (100 + 3 * (std::process::id() % 40) + offset) as u16
 }
 
+fn name(topic: &str) -> Name {
+    Name::parse(topic).unwrap()
+}
+
+fn kind(message_type: &str) -> MessageTypeName {
+    let (package, name) = message_type.split_once("/msg/").unwrap();
+    MessageTypeName::new(package, name)
+}
+
 /// A participant that is not the bridge.
 struct Peer {
     node: Node,
-    context: Context,
 }
 
 fn reliable() -> QosProfile {
@@ -81,17 +89,11 @@ impl Peer {
         let context = Context::with_options(ContextOptions::new().domain_id(domain)).unwrap();
         let name = NodeName::new("/", name).unwrap();
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-        Self { node: context.new_node(name, options).unwrap(), context }
-    }
-
-    fn topic<M: Message>(&self, topic: &str, qos: &QosProfile) -> ros2_client::Topic {
-        let (package, name) = M::TYPE.split_once("/msg/").unwrap();
-        let (topic, kind) = (Name::parse(topic).unwrap(), MessageTypeName::new(package, name));
-        self.node.create_topic(&topic, kind, qos).unwrap()
+        Self { node: context.new_node(name, options).unwrap() }
     }
 
     fn publisher<M: Message + Serialize>(&mut self, topic: &str, qos: QosProfile) -> Publisher<M> {
-        let topic = self.topic::<M>(topic, &qos);
+        let topic = self.node.create_topic(&name(topic), kind(M::TYPE), &qos).unwrap();
         self.node.create_publisher(&topic, Some(qos)).unwrap()
     }
 
@@ -100,7 +102,7 @@ impl Peer {
     where
         M: Message + DeserializeOwned + Send + 'static,
     {
-        let topic = self.topic::<M>(topic, &reliable());
+        let topic = self.node.create_topic(&name(topic), kind(M::TYPE), &reliable()).unwrap();
         let subscription = self.node.create_subscription::<M>(&topic, Some(reliable())).unwrap();
         let (stop, heard) = (Arc::clone(stop), Arc::new(Mutex::new(Vec::new())));
         let theirs = Arc::clone(&heard);
