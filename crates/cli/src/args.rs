@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
@@ -61,6 +62,21 @@ pub enum Command {
     /// Prints a JSON schema of configs, for editors
     #[command(after_help = SCHEMA_HELP)]
     Schema,
+    /// Prints what a shell needs to complete our commands
+    #[command(after_help = COMPLETIONS_HELP)]
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+    /// Writes manual pages, one a command
+    #[command(
+        after_help = "Example:\n  tagalong man -o ~/.local/share/man/man1 && man tagalong-run"
+    )]
+    Man {
+        /// The folder to write to.
+        #[arg(short, long, value_name = "DIR")]
+        output: PathBuf,
+    },
     /// Says whether a config is right, and whether it fits a log
     #[command(after_help = CHECK_HELP)]
     Check {
@@ -206,6 +222,12 @@ editors that know Taplo.
 
 Example:
   tagalong schema > tagalong.json";
+
+const COMPLETIONS_HELP: &str = "\
+Examples:
+  tagalong completions bash > ~/.local/share/bash-completion/completions/tagalong
+  tagalong completions zsh > ~/.zfunc/_tagalong
+  tagalong completions fish > ~/.config/fish/completions/tagalong.fish";
 
 const CHECK_HELP: &str = "\
 Examples:

@@ -77,6 +77,8 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin, format } => commands::config(registry, plugin, *format),
         Command::Schema => commands::schema(registry),
+        Command::Completions { shell } => commands::completions(*shell),
+        Command::Man { output } => commands::man(output),
         Command::Check { config, log, format } => {
             commands::check(registry, config, log.as_deref(), *format)
         }

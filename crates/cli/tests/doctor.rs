@@ -164,7 +164,7 @@ fn cases() -> Vec<Case> {
         ),
         case(
             "depth stamped late",
-            Changes { depth_stamp: Some(|_, at| at + 13_000_000), ..Changes::default() },
+            Changes { depth_stamp: Some(|_, at| at + 28_000_000), ..Changes::default() },
             "skew",
             "warn",
             "capture",

@@ -5,6 +5,7 @@ mod config;
 mod eval;
 mod inspect;
 mod list;
+mod shell;
 
 pub use check::check;
 #[cfg(test)]
@@ -13,3 +14,4 @@ pub use config::{config, schema};
 pub use eval::{EvalArgs, eval};
 pub use inspect::inspect;
 pub use list::list;
+pub use shell::{completions, man};

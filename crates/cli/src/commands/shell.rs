@@ -1,0 +1,31 @@
+use std::path::Path;
+
+use clap::CommandFactory as _;
+use clap_complete::Shell;
+
+use crate::args::Cli;
+use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+
+/// `tagalong completions`.
+///
+/// # Errors
+/// If stdout cannot be written.
+pub fn completions(shell: Shell) -> Outcome {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "tagalong", &mut script);
+    print(&String::from_utf8_lossy(&script))?;
+    Ok(Ended::Well)
+}
+
+/// `tagalong man`.
+///
+/// # Errors
+/// A folder that cannot be made or written.
+pub fn man(folder: &Path) -> Outcome {
+    make_folder(folder)?;
+    let shown = folder.display();
+    clap_mangen::generate_to(Cli::command(), folder)
+        .map_err(|error| Failure::usage(format!("cannot write to {shown}: {error}")))?;
+    say(&format!("the pages are in {shown}; `man {shown}/tagalong.1` shows the first"));
+    Ok(Ended::Well)
+}
