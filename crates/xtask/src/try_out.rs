@@ -1,8 +1,9 @@
 //! Generates one plugin of each kind in a copy of the workspace, and the one of
 //! the walk-through, and demands of them what is demanded of every plugin.
 
-use std::fs;
+use std::path::Path;
 use std::process::Command;
+use std::{fs, io};
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum as _;
@@ -20,8 +21,8 @@ const COPY: &str = "target/try-new-plugin";
 /// for those of the other.
 const BUILD: &str = "target/try-new-plugin-build";
 
-/// Nobody waits for these programs, so that the dependencies need not be fast.
-const QUICK_BUILD: &str = r#"profile.dev.package."*".opt-level = 1"#;
+/// The workspace's own build, whose outside crates are as good for the copy.
+const BUILT: &str = "target/debug";
 
 /// Runs the whole trial.
 pub fn try_out(workspace: &Workspace) -> Result<()> {
@@ -36,12 +37,12 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     walk_through::walk(&copy)?;
     format(&copy, walk_through::NAME)?;
     names.push(walk_through::NAME.to_owned());
+    lend(&workspace.root().join(BUILT), &workspace.root().join(BUILD).join("debug"))?;
     let packages: Vec<String> =
         names.iter().flat_map(|name| ["-p".to_owned(), format!("tagalong-{name}")]).collect();
     let cargo = |step: &str, args: &[&str], packages: &[String]| -> Result<()> {
         eprintln!("new-plugin --try: {step}");
         let mut cargo = Command::new("cargo");
-        cargo.args(["--config", QUICK_BUILD]);
         let (before, after) = match args.iter().position(|arg| *arg == "--") {
             Some(at) => args.split_at(at),
             None => (args, &[][..]),
@@ -64,6 +65,43 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
         }
     }
     eprintln!("new-plugin --try: all four kinds work, and so does the walk-through");
+    Ok(())
+}
+
+/// Copies what cargo made of crates from outside, so that nobody waits for them a
+/// second time. Without a build, or with one of an earlier trial, there is nothing
+/// to do.
+fn lend(from: &Path, to: &Path) -> Result<()> {
+    if to.exists() || !from.exists() {
+        return Ok(());
+    }
+    eprintln!("new-plugin --try: crates from outside are taken from {}", from.display());
+    for part in ["deps", "build", ".fingerprint"] {
+        copy_outside(&from.join(part), &to.join(part))
+            .with_context(|| format!("cannot copy from {}", from.join(part).display()))?;
+    }
+    Ok(())
+}
+
+/// Copies a folder without what is ours, tests and other programs included. Cargo trusts what has the times that it
+/// gave it.
+fn copy_outside(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (path, name) = (entry.path(), entry.file_name());
+        let is_program = from.ends_with("deps") && path.extension().is_none();
+        if is_program || name.to_string_lossy().contains("tagalong") {
+            continue;
+        }
+        if entry.file_type()?.is_dir() {
+            copy_outside(&path, &to.join(&name))?;
+        } else {
+            fs::copy(&path, to.join(&name))?;
+            let copied = fs::File::options().write(true).open(to.join(&name))?;
+            copied.set_modified(entry.metadata()?.modified()?)?;
+        }
+    }
     Ok(())
 }
 
