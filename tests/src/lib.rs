@@ -2,5 +2,4 @@
 //! the shipped configs on real logs, and the messages that mistakes in a config
 //! get.
 
-pub mod mot;
 pub mod people;

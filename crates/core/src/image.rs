@@ -99,37 +99,32 @@ impl DepthImage {
         self.surface_within(of, 0.0..=f64::MAX)
     }
 
-    /// The same, where it lies within a range of depths; most regions that show
-    /// something else are told by counting.
+    /// The same, where it lies within a range of depths. Most regions show something
+    /// else; they are given up as soon as most of their places do.
     pub fn surface_within(&self, of: &Rect, range_m: RangeInclusive<f64>) -> Option<f64> {
-        let (mut readings, count) = self.readings(of);
-        let readings = &mut readings[..count];
         let (least, most) = (*range_m.start() as f32, *range_m.end() as f32);
-        let nearer = readings.iter().filter(|m| **m < least).count();
-        let farther = readings.iter().filter(|m| **m > most).count();
+        let tap = |from: f64, size: f64, i: usize| (from + size * (2 + i) as f64 / 8.0) as i64;
+        let columns: [i64; TAPS] = std::array::from_fn(|i| tap(of.x, of.width, i));
+        let (mut readings, mut count) = ([0.0; TAPS * TAPS], 0);
+        let (mut nearer, mut farther) = (0, 0);
+        for y in (0..TAPS).map(|i| tap(of.y, of.height, i)) {
+            for metres in columns.iter().filter_map(|x| self.get(*x, y)) {
+                let is_reading = metres > 0.0 && metres.is_finite();
+                readings[count] = metres;
+                count += usize::from(is_reading);
+                nearer += usize::from(is_reading && metres < least);
+                farther += usize::from(is_reading && metres > most);
+            }
+            if nearer.max(farther) > TAPS * TAPS / 2 {
+                return None;
+            }
+        }
         let middle = count / 2;
         if count < LEAST_READINGS || nearer > middle || farther >= count - middle {
             return None;
         }
-        let (_, median, _) = readings.select_nth_unstable_by(middle, f32::total_cmp);
+        let (_, median, _) = readings[..count].select_nth_unstable_by(middle, f32::total_cmp);
         Some(f64::from(*median))
-    }
-
-    /// What the places of a region show, and how many show something.
-    fn readings(&self, of: &Rect) -> ([f32; TAPS * TAPS], usize) {
-        let (mut readings, mut count) = ([0.0; TAPS * TAPS], 0);
-        let tap = |from: f64, size: f64, i: usize| (from + size * (2 + i) as f64 / 8.0) as i64;
-        let columns: [i64; TAPS] = std::array::from_fn(|i| tap(of.x, of.width, i));
-        let rows = (0..TAPS).map(|i| tap(of.y, of.height, i));
-        for y in rows.filter_map(|y| usize::try_from(y).ok().filter(|y| *y < self.height)) {
-            let row = self.row(y);
-            for x in columns {
-                let metres = usize::try_from(x).ok().and_then(|x| row.get(x)).unwrap_or(&f32::NAN);
-                readings[count] = *metres;
-                count += usize::from(*metres > 0.0 && metres.is_finite());
-            }
-        }
-        (readings, count)
     }
 }
 

@@ -13,6 +13,7 @@
 //! in the file of its system and name it in the system's list.
 
 mod findings;
+mod given;
 mod joint_particle;
 mod lab;
 mod omni_appearance;

@@ -25,18 +25,20 @@ pub(crate) struct Recorded {
 }
 
 /// Takes all contenders over each annotated log of colour and depth images; for each
-/// contender what it said about each log. Without real data there are no logs.
+/// contender what it said about each log. Without real data there are no logs. Without
+/// `depth` its images are left out.
 pub(crate) fn recorded(
     lab: &Lab<'_>,
     contenders: &[Contender],
     judge: &Judge,
+    depth: bool,
 ) -> Result<Vec<Vec<Recorded>>, ReproduceError> {
     let logs = logs(lab)?;
     lab.progress.begin(logs.len() * contenders.len(), "annotated logs");
     let over_all = |contender: &Contender| {
         logs.iter()
             .map(|log| {
-                let recorded = log.take(lab, contender, judge);
+                let recorded = log.take(lab, contender, judge, depth);
                 lab.progress.step();
                 recorded
             })
@@ -80,10 +82,11 @@ impl Log {
         lab: &Lab<'_>,
         contender: &Contender,
         judge: &Judge,
+        depth: bool,
     ) -> Result<Recorded, ReproduceError> {
         let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline: Pipeline = contender.pipeline(lab.registry, 1)?;
-        let needs = Needs { colour: true, depth: true, right: false };
+        let needs = Needs { colour: true, depth, right: false };
         let (input, limits) = (InputSettings::default(), Limits::default());
         let mut source = FrameSource::open(&self.path, &input, &limits, needs)
             .map_err(|error| failed(error.to_string()))?;

@@ -6,6 +6,7 @@ use tagalong_pipeline::FrameReport;
 use tagalong_sim::Scene;
 use tagalong_trials::{Judge, Run, Trial, TrialError};
 
+use crate::given::given;
 use crate::recorded::{Recorded, recorded};
 use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
 
@@ -29,6 +30,16 @@ pub const SYSTEM: System = System {
             about: "Table I: frames a second, with one to eight people",
             run: speed,
         },
+        Experiment {
+            name: "colour",
+            about: "the real logs without their depth images",
+            run: colour,
+        },
+        Experiment {
+            name: "given",
+            about: "boxes that others detected, MOT15: filter and association beside SORT",
+            run: given,
+        },
     ],
 };
 
@@ -42,6 +53,8 @@ const PIPELINES: [&str; 7] = [
     "rgbd-best",
     "depth-ekf",
 ];
+/// What works on colour alone.
+const WITHOUT_DEPTH: [&str; 2] = ["mono", "rgbd-compressive"];
 /// Logs of each kind in the paper.
 const STATIC_LOGS: u64 = 17;
 /// See `STATIC_LOGS`; they come from three kinds of rooms.
@@ -137,7 +150,7 @@ fn table(
     published_hz: f64,
 ) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&PIPELINES)?;
-    let real = recorded(lab, &contenders, &JUDGE)?;
+    let real = recorded(lab, &contenders, &JUDGE, true)?;
     let trials = lab.trials(title, scenes, &contenders, done)?;
     let mut rows = vec![published("P2", published_hz, 6), published("RJ-MCMC, on a GPU", 4.0, 6)];
     for (at, (name, real)) in PIPELINES.iter().zip(&real).enumerate() {
@@ -187,6 +200,20 @@ fn describe(real: &[Vec<Recorded>]) -> String {
     let frames: usize = first.iter().map(|log| log.reports.len()).sum();
     let logs = first.len();
     format!("{logs} real logs with {frames} frames, annotated by hand; cameras at rest")
+}
+
+fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
+    let contenders = lab.contenders(&WITHOUT_DEPTH)?;
+    let real = recorded(lab, &contenders, &JUDGE, false)?;
+    let row = |(name, logs): (&&str, &Vec<Recorded>)| {
+        let mut cells = scores(logs.iter().map(|log| &log.tally)).to_vec();
+        cells.push(Work::sum(logs.iter().map(|log| Work::of(&log.reports))).cells()[0].clone());
+        Row::ours(*name, cells)
+    };
+    let rows = WITHOUT_DEPTH.iter().zip(&real).map(row).collect();
+    let columns = ["LAMR, real", "IDF1, real", "MOTA, real", WORK[0]].map(String::from).to_vec();
+    let notes = vec![describe(&real), "Boxes, IoU 0.5; people within 6 m".into(), TIMES.into()];
+    Ok(Table { title: "Without depth".into(), columns, rows, notes }.into())
 }
 
 fn done(trial: Trial) -> Result<Vec<Done>, TrialError> {

@@ -4,11 +4,13 @@
 
 pub mod ground;
 mod integral;
+mod islands;
 mod panorama;
 pub mod quality;
 pub mod registration;
 mod row_sums;
 
 pub use integral::Integral;
+pub use islands::islands;
 pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};

@@ -18,7 +18,7 @@ fn main() {
     for _ in 0..runs {
         let mut hits = Vec::new();
         let sizes = scales(&cascade, 0.0, width.min(height) as f64, 1.1);
-        scanner.scan(&image, &cascade, sizes, |_| true, &mut hits);
+        scanner.scan(&image, &cascade, sizes, &mut hits);
         found = grouped(&hits, 3).iter().map(|group| group.region).collect();
     }
     println!("{} faces, {} windows a run", found.len(), scanner.looked_at() / runs.max(1) as u64);

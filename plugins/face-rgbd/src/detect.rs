@@ -4,7 +4,7 @@ use tagalong_core::{
     Search,
 };
 
-use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales};
+use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
 /// The cascade that is part of the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/cascade.xml");
@@ -43,32 +43,31 @@ impl FaceRgbd {
 
     /// All windows that pass, of all sizes.
     fn search(&mut self, frame: &Frame, near: Option<Rect>, funnel: &mut Funnel) -> Result<()> {
-        let (camera, config) = (&*frame.camera, &self.config);
+        let Self { config, cascade, scanner, proposals, hits, .. } = self;
+        let camera = &*frame.camera;
         let depth = frame.images().depth.as_deref().filter(|_| config.depth_proposals);
         let image = frame.grey()?;
         if let Some(depth) = depth {
-            let [points, possible, searched] = self.proposals.sample(frame, depth, config);
+            let [points, possible, searched] = proposals.sample(frame, depth, config);
             funnel.drop_many("point: depth and height", points - possible);
             funnel.drop_many("point: less like skin", possible - searched);
         }
         let most = config.max_side * image.width().min(image.height()) as f64;
-        let before = self.scanner.looked_at();
-        self.hits.clear();
-        for scale in scales(&self.cascade, config.min_side_px, most, config.scale_step) {
-            let side = scale * self.cascade.width as f64;
+        let (before, everywhere) = (scanner.looked_at(), [near.unwrap_or(whole(image))]);
+        hits.clear();
+        for scale in scales(cascade, config.min_side_px, most, config.scale_step) {
             if depth.is_some() {
-                self.proposals.for_side(camera, side, config);
+                proposals.for_side(camera, scale * cascade.width as f64, config);
             }
-            let proposals = &self.proposals;
             let propose = |window: &Rect| {
                 near.is_none_or(|upper_body| upper_body.contains(window.centre()))
                     && (depth.is_none() || proposals.allows(window))
             };
-            let one = std::iter::once(scale);
-            self.scanner.scan(image, &self.cascade, one, propose, &mut self.hits);
+            let areas = if depth.is_some() { proposals.areas() } else { &everywhere };
+            scanner.scan_within(image, cascade, scale, areas, propose, hits);
         }
-        let looked_at = self.scanner.looked_at() - before;
-        funnel.drop_many("window: no face", looked_at - self.hits.len() as u64);
+        let looked_at = scanner.looked_at() - before;
+        funnel.drop_many("window: no face", looked_at - hits.len() as u64);
         Ok(())
     }
 

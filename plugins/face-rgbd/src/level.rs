@@ -2,9 +2,10 @@
 
 use tagalong_core::GreyImage;
 
+use crate::cascade::Part;
 use crate::compiled::LANES;
 
-/// An image in another size, with the sums of its values and of their squares.
+/// A part of an image in another size, with the sums of its values and of their squares.
 ///
 /// Rows of sums are as long as those of the largest image so far, so that the
 /// offsets of features stay what they are from size to size. Where windows begin at
@@ -65,32 +66,45 @@ impl Level {
         &self.squares
     }
 
-    /// Takes the place of another size: `width` by `height` pixels of an image,
+    /// Takes the place of another size: all of an image, `width` by `height` pixels of it
+    /// (see [`Level::fill_part`]).
+    pub fn fill(&mut self, image: &GreyImage, (width, height): (usize, usize), step: usize) {
+        let whole = Part { x: 0, y: 0, width, height };
+        self.fill_part(image, (width, height), whole, step);
+    }
+
+    /// Takes the place of another size: a part of an image that would have `size`,
     /// interpolated between four of its pixels; no mean over what is skipped, so
     /// that windows look as those did that OpenCV's cascades were made for. Windows
     /// begin at each pixel (`step` 1) or at every second one (2).
-    pub fn fill(&mut self, image: &GreyImage, (width, height): (usize, usize), step: usize) {
-        (self.width, self.height, self.step) = (width, height, step.clamp(1, 2));
-        self.stride = (image.width().max(width) + 1).next_multiple_of(2);
-        self.pixels.resize((width * height).max(self.pixels.len()), 0);
-        if width * height == 0 || image.width() * image.height() == 0 {
+    pub fn fill_part(&mut self, image: &GreyImage, size: (usize, usize), part: Part, step: usize) {
+        (self.width, self.height, self.step) = (part.width, part.height, step.clamp(1, 2));
+        self.stride = (image.width().max(size.0) + 1).next_multiple_of(2);
+        self.pixels.resize((part.width * part.height).max(self.pixels.len()), 0);
+        if part.width * part.height == 0 || image.width() * image.height() == 0 {
             (self.width, self.height) = (0, 0);
             return;
         }
-        self.resample(image);
+        self.resample(image, size, part);
         self.sum_up();
     }
 
-    fn resample(&mut self, image: &GreyImage) {
-        let Self { width, height, pixels, columns, between, .. } = self;
+    fn resample(&mut self, image: &GreyImage, size: (usize, usize), part: Part) {
+        let Self { width, pixels, columns, between, .. } = self;
         columns.clear();
-        columns.extend((0..*width).map(|x| place(x, *width, image.width())));
-        between.resize(image.width() + 1, 0);
-        for (y, row) in pixels.chunks_exact_mut(*width).take(*height).enumerate() {
-            let (above, share) = place(y, *height, image.height());
+        columns.extend((part.x..part.x + part.width).map(|x| place(x, size.0, image.width())));
+        let (first, last) = (columns[0].0, columns[*width - 1].0);
+        columns.iter_mut().for_each(|(x, _)| *x -= first);
+        let end = (last + 2).min(image.width());
+        between.resize(last + 2 - first, 0);
+        for (y, row) in (part.y..).zip(pixels.chunks_exact_mut(*width).take(part.height)) {
+            let (above, share) = place(y, size.1, image.height());
             let below = (above + 1).min(image.height() - 1);
-            blend_rows(image.row(above), image.row(below), share, between);
-            between[image.width()] = between[image.width() - 1];
+            let rows = [above, below].map(|y| &image.row(y)[first..end]);
+            blend_rows(rows, share, between);
+            if end < last + 2 {
+                between[end - first] = between[end - first - 1];
+            }
             blend_columns(between, columns, row);
         }
     }
@@ -139,7 +153,7 @@ fn place(x: usize, count: usize, of: usize) -> (usize, u32) {
 
 /// A row between two rows, in 256ths.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
-fn blend_rows(above: &[u8], below: &[u8], share: u32, out: &mut [u32]) {
+fn blend_rows([above, below]: [&[u8]; 2], share: u32, out: &mut [u32]) {
     for ((out, above), below) in out.iter_mut().zip(above).zip(below) {
         *out = u32::from(*above) * (256 - share) + u32::from(*below) * share;
     }

@@ -34,7 +34,7 @@ pub use detect::FaceRgbd;
 pub use group::{Group, Grouping, Hit, grouped};
 pub use level::Level;
 pub use propose::Proposals;
-pub use scan::{Scanner, Seen, scales};
+pub use scan::{Scanner, Seen, scales, whole};
 use tagalong_core::Registry;
 
 /// The name of this plugin in configs.

@@ -4,6 +4,7 @@
 
 use nalgebra::Point2;
 use tagalong_core::{Camera, DepthImage, Frame, Rect, RgbImage};
+use tagalong_vision::islands;
 
 use crate::Config;
 
@@ -20,14 +21,20 @@ pub struct Proposals {
     /// Depth of the points that are kept; NaN for the others.
     depth: Vec<f32>,
     skin: Vec<bool>,
+    /// Points that belong to a region.
+    is_taken: Vec<bool>,
     /// The points of the regions, one after the other.
     members: Vec<usize>,
     /// Where each begins, and how many of its points look like skin.
     regions: Vec<Region>,
-    /// The points that are searched: the best regions.
-    kept: Vec<bool>,
-    /// Windows of the size in question may have their centre near these.
+    /// The points that are searched, those of the best regions, by depth.
+    searched: Vec<usize>,
+    /// Windows of the size in question may have their centre near these points, ...
+    fitting: Vec<usize>,
+    /// ... that is, in these cells, ...
     allowed: Vec<bool>,
+    /// ... which are in these areas, pixels.
+    areas: Vec<Rect>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -71,10 +78,10 @@ impl Proposals {
     fn connect(&mut self) {
         self.members.clear();
         self.regions.clear();
-        self.kept.clear();
-        self.kept.resize(self.depth.len(), false);
+        self.is_taken.clear();
+        self.is_taken.resize(self.depth.len(), false);
         for seed in 0..self.depth.len() {
-            if self.kept[seed] || self.depth[seed].is_nan() {
+            if self.is_taken[seed] || self.depth[seed].is_nan() {
                 continue;
             }
             let start = self.members.len();
@@ -90,7 +97,7 @@ impl Proposals {
     }
 
     fn take(&mut self, at: usize) {
-        self.kept[at] = true;
+        self.is_taken[at] = true;
         self.members.push(at);
     }
 
@@ -104,7 +111,7 @@ impl Proposals {
         ];
         for to in beside.into_iter().flatten() {
             let is_near = (self.depth[to] - self.depth[at]).abs() < SAME_SURFACE_M;
-            if !self.kept[to] && is_near {
+            if !self.is_taken[to] && is_near {
                 self.take(to);
             }
         }
@@ -114,35 +121,48 @@ impl Proposals {
     /// that may be searched allow, and always one.
     fn rank(&mut self, max_points: usize) -> u64 {
         self.regions.sort_by(|a, b| b.share().total_cmp(&a.share()).then(a.start.cmp(&b.start)));
-        self.kept.fill(false);
-        let mut searched = 0;
+        self.searched.clear();
         for region in &self.regions {
-            if searched > 0 && searched + region.points() > max_points {
+            let points = &self.members[region.start..region.end];
+            if !self.searched.is_empty() && self.searched.len() + points.len() > max_points {
                 break;
             }
-            searched += region.points();
-            self.members[region.start..region.end].iter().for_each(|at| self.kept[*at] = true);
+            self.searched.extend(points);
         }
-        searched as u64
+        let depth = &self.depth;
+        self.searched.sort_unstable_by(|a, b| depth[*a].total_cmp(&depth[*b]).then(a.cmp(b)));
+        self.searched.len() as u64
     }
 
     /// Prepares for windows of `side` pixels: they may be where a face that is as
     /// large would be as far away as a sampling point, or beside that.
     pub fn for_side(&mut self, camera: &Camera, side: f64, config: &Config) {
-        let metres = |m: f32| side * f64::from(m) / camera.focal_px();
-        let fits = |m: f32| (config.min_face_m..=config.max_face_m).contains(&metres(m));
-        self.allowed.clear();
-        self.allowed.resize(self.depth.len(), false);
-        for at in 0..self.depth.len() {
-            if self.kept[at] && fits(self.depth[at]) {
-                let (x, y) = (at % self.columns, at / self.columns);
-                for row in y.saturating_sub(1)..(y + 2).min(self.rows) {
-                    let from = row * self.columns + x.saturating_sub(1);
-                    let to = row * self.columns + (x + 2).min(self.columns);
-                    self.allowed[from..to].fill(true);
-                }
+        let Self { columns, rows, depth, searched, fitting, allowed, areas, .. } = self;
+        let metres = |at: &usize| side * f64::from(depth[*at]) / camera.focal_px();
+        let first = searched.partition_point(|at| metres(at) < config.min_face_m);
+        let end = searched.partition_point(|at| metres(at) <= config.max_face_m);
+        fitting.clear();
+        fitting.extend(searched.get(first..end).unwrap_or_default());
+        allowed.clear();
+        allowed.resize(depth.len(), false);
+        for at in &*fitting {
+            let (x, y) = (at % *columns, at / *columns);
+            for row in y.saturating_sub(1)..(y + 2).min(*rows) {
+                let start = row * *columns;
+                allowed[start + x.saturating_sub(1)..start + (x + 2).min(*columns)].fill(true);
             }
         }
+        areas.clear();
+        let place = |at: &usize| [(at % *columns) as i64, (at / *columns) as i64];
+        // Windows of islands that are this far apart share no pixels.
+        let gap = (side / GRID_PX as f64).ceil() as i64 + 3;
+        islands(fitting, place, gap, &mut |island| areas.push(around(island.iter().map(place))));
+    }
+
+    /// Where the centres of all windows are that [`Proposals::allows`], pixels; the areas
+    /// do not overlap.
+    pub fn areas(&self) -> &[Rect] {
+        &self.areas
     }
 
     /// True if a window of the size of [`Proposals::for_side`] is worth a look.
@@ -151,6 +171,17 @@ impl Proposals {
         let (x, y) = (coords.x as usize / GRID_PX, coords.y as usize / GRID_PX);
         x < self.columns && y < self.rows && self.allowed[y * self.columns + x]
     }
+}
+
+/// The cells of sampling points and of their neighbours.
+fn around(points: impl Iterator<Item = [i64; 2]>) -> Rect {
+    let none = [i64::MAX, i64::MAX, i64::MIN, i64::MIN];
+    let [left, top, right, bottom] = points.fold(none, |[left, top, right, bottom], [x, y]| {
+        [left.min(x - 1), top.min(y - 1), right.max(x + 2), bottom.max(y + 2)]
+    });
+    let [x, y, width, height] =
+        [left, top, right - left, bottom - top].map(|cells| (cells * GRID_PX as i64) as f64);
+    Rect::new(x, y, width, height)
 }
 
 /// The pixel of a sampling point: the middle of its cell.

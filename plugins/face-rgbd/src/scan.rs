@@ -3,7 +3,7 @@
 
 use tagalong_core::{GreyImage, Rect};
 
-use crate::cascade::Cascade;
+use crate::cascade::{Cascade, Part};
 use crate::compiled::{Block, Compiled, LANES};
 use crate::group::Hit;
 use crate::level::Level;
@@ -15,11 +15,13 @@ const FINE_FROM: f64 = 2.0;
 /// A window that passed all stages, as the cascade saw it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
-    /// The image in the size in question.
+    /// What there is of the image in the size in question.
     pub level: &'a Level,
-    /// Left edge in it.
+    /// Which part of it that is.
+    pub part: Part,
+    /// Left edge in the level.
     pub x: usize,
-    /// Upper edge in it.
+    /// Upper edge in the level.
     pub y: usize,
     /// By how much the last stage was passed.
     pub margin: f32,
@@ -46,59 +48,84 @@ impl Scanner {
         self.compiled = [None, None];
     }
 
-    /// Adds the windows of all `scales` that pass and that `propose` allows;
-    /// it is given the window in pixels of the image.
+    /// Adds all windows of all `scales` that pass, in pixels of the image.
     pub fn scan(
         &mut self,
         image: &GreyImage,
         cascade: &Cascade,
         scales: impl Iterator<Item = f64>,
-        mut propose: impl FnMut(&Rect) -> bool,
         hits: &mut Vec<Hit>,
     ) {
+        let everywhere = [whole(image)];
         for scale in scales {
-            let size = |length: usize| (length as f64 * scale).round();
-            let (width, height) = (size(cascade.width), size(cascade.height));
-            let region = |x: usize, y: usize| Rect::new(size(x), size(y), width, height);
-            let mut take = |seen: Seen<'_>| {
-                hits.push(Hit { region: region(seen.x, seen.y), margin: seen.margin });
-            };
-            self.size(image, cascade, scale, &mut |x, y| propose(&region(x, y)), &mut take);
+            self.scan_within(image, cascade, scale, &everywhere, |_| true, hits);
         }
     }
 
-    /// One size: the image shrunk by `scale`.
+    /// Adds the windows of one size that pass, whose middle is in one of some `areas` and
+    /// that `propose` allows; all in pixels of the image. A window in two areas comes
+    /// twice.
+    pub fn scan_within(
+        &mut self,
+        image: &GreyImage,
+        cascade: &Cascade,
+        scale: f64,
+        areas: &[Rect],
+        propose: impl Fn(&Rect) -> bool,
+        hits: &mut Vec<Hit>,
+    ) {
+        let size = |length: usize| (length as f64 * scale).round();
+        let (width, height) = (size(cascade.width), size(cascade.height));
+        let region = |x: usize, y: usize| Rect::new(size(x), size(y), width, height);
+        for area in areas {
+            let wanted = |x, y| propose(&region(x, y));
+            self.size(image, cascade, scale, area, &wanted, &mut |seen| {
+                let region = region(seen.part.x + seen.x, seen.part.y + seen.y);
+                hits.push(Hit { region, margin: seen.margin });
+            });
+        }
+    }
+
+    /// The windows of one size, in the image shrunk by `scale`, whose middle is in an area
+    /// of the image. `propose` is given the upper left corner in the shrunk image.
     pub fn size(
         &mut self,
         image: &GreyImage,
         cascade: &Cascade,
         scale: f64,
-        propose: &mut impl FnMut(usize, usize) -> bool,
+        area: &Rect,
+        propose: &impl Fn(usize, usize) -> bool,
         take: &mut impl FnMut(Seen<'_>),
     ) {
-        let shrunk = |length: usize| (length as f64 / scale).round() as usize;
-        let (width, height) = (shrunk(image.width()), shrunk(image.height()));
-        if width < cascade.width || height < cascade.height {
-            return;
-        }
         let step = if scale >= FINE_FROM { 1 } else { 2 };
+        let size = [image.width(), image.height()].map(|length| (length as f64 / scale).round());
+        let size = size.map(|length| length as usize);
+        let starts = |from: f64, to: f64, length: usize, window: usize| {
+            let half = 0.5 * (window as f64 * scale).round();
+            let middle = |x: usize| (x as f64 * scale).round() + half;
+            let all = (0..=length.checked_sub(window)?).step_by(step);
+            let mut inside = all.filter(|x| (from..to).contains(&middle(*x)));
+            let first = inside.next()?;
+            Some((first, inside.last().unwrap_or(first)))
+        };
+        let columns = starts(area.x, area.right(), size[0], cascade.width);
+        let rows = starts(area.y, area.bottom(), size[1], cascade.height);
+        let (Some((left, right)), Some((top, bottom))) = (columns, rows) else { return };
+        let part = Part {
+            x: left,
+            y: top,
+            width: right - left + cascade.width,
+            height: bottom - top + cascade.height,
+        };
         let Self { level, compiled, wanted, looked_at } = self;
+        level.fill_part(image, size.into(), part, step);
         let compiled = &mut compiled[step - 1];
-        let last = width - cascade.width;
-        let mut is_filled = false;
-        for y in (0..=height - cascade.height).step_by(step) {
+        compiled.take_if(|compiled| !compiled.fits(level));
+        let compiled = compiled.get_or_insert_with(|| Compiled::new(cascade, level));
+        for y in (top..=bottom).step_by(step) {
             wanted.clear();
-            wanted.extend((0..=last).step_by(step).map(|x| propose(x, y)));
-            if !wanted.contains(&true) {
-                continue;
-            }
-            if !is_filled {
-                level.fill(image, (width, height), step);
-                is_filled = true;
-            }
-            compiled.take_if(|compiled| !compiled.fits(level));
-            let compiled = compiled.get_or_insert_with(|| Compiled::new(cascade, level));
-            let mut row = Row { level, compiled, y, step, is_skipped: false };
+            wanted.extend((left..=right).step_by(step).map(|x| propose(x, y)));
+            let mut row = Row { level, compiled, part, y: y - top, step, is_skipped: false };
             for (wanted, first) in wanted.chunks(LANES).zip((0..).step_by(LANES)) {
                 *looked_at += row.look(wanted, first * step, take);
             }
@@ -106,10 +133,16 @@ impl Scanner {
     }
 }
 
+/// All of an image.
+pub fn whole(image: &GreyImage) -> Rect {
+    Rect::new(0.0, 0.0, image.width() as f64, image.height() as f64)
+}
+
 /// A row of windows.
 struct Row<'a> {
     level: &'a Level,
     compiled: &'a Compiled,
+    part: Part,
     y: usize,
     step: usize,
     /// The next window is the neighbour of one that failed the first stage.
@@ -128,7 +161,8 @@ impl Row<'_> {
         self.compiled.finish(self.level, &mut block);
         for lane in block.lanes() {
             let margin = self.compiled.margin(&block, lane);
-            take(Seen { level: self.level, x: x + lane * self.step, y: self.y, margin });
+            let (x, part) = (x + lane * self.step, self.part);
+            take(Seen { level: self.level, part, x, y: self.y, margin });
         }
         looked_at
     }

@@ -1,7 +1,9 @@
 use proptest::prelude::*;
 use tagalong_core::{GreyImage, Rect, Registry};
 
-use crate::{Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Seen, Split, Stage, grouped};
+use crate::{
+    Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Seen, Split, Stage, grouped, whole,
+};
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
     let mut state = seed | 1;
@@ -137,7 +139,7 @@ proptest! {
         for cascade in [small(), binary()] {
             let (mut scanner, mut found) = (Scanner::default(), Vec::new());
             let mut take = |seen: Seen<'_>| found.push((seen.x, seen.y));
-            scanner.size(&image, &cascade, scale, &mut |_, _| true, &mut take);
+            scanner.size(&image, &cascade, scale, &whole(&image), &|_, _| true, &mut take);
             prop_assert_eq!(found, slow_scan(&shrunk, &cascade, step));
         }
     }
@@ -167,20 +169,54 @@ fn the_small_cascades_pass_some_windows_and_not_all() {
     }
 }
 
+proptest! {
+    #[test]
+    fn areas_give_the_windows_that_the_whole_image_gives(
+        seed: u64, scale in 1.0..3.5f64, at in prop::array::uniform4(0.0..0.8f64),
+        long in prop::array::uniform4(0.05..0.3f64),
+    ) {
+        let (image, cascade) = (noise(90, 70, seed), small());
+        let area = |k: usize| Rect::new(90.0 * at[k], 70.0 * at[k + 1], 90.0 * long[k], 70.0 * long[k + 1]);
+        let areas = [area(0), area(2)];
+        // The neighbour of the last window of one is not in the other.
+        let Rect { x, y, width, height } = areas[0];
+        let beside = Rect::new(x - 8.0, y - 8.0, width + 16.0, height + 16.0);
+        prop_assume!(beside.iou(&areas[1]) == 0.0);
+        let wanted = |window: &Rect| areas.iter().any(|area| area.contains(window.centre()));
+        let scan = |areas: &[Rect]| {
+            let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+            scanner.scan_within(&image, &cascade, scale, areas, wanted, &mut hits);
+            hits.sort_by(|a, b| {
+                (a.region.y, a.region.x).partial_cmp(&(b.region.y, b.region.x)).unwrap()
+            });
+            (hits, scanner.looked_at())
+        };
+        let all = [whole(&image)];
+        prop_assert_eq!(scan(&areas), scan(&all));
+    }
+
+    #[test]
+    fn a_part_of_a_size_is_cut_out_of_the_whole(
+        seed: u64, width in 13..70usize, height in 13..60usize, x in 0..12usize, y in 0..12usize,
+    ) {
+        let image = noise(64, 48, seed);
+        let (mut level, mut cut) = (Level::default(), Level::default());
+        level.fill(&image, (width, height), 1);
+        let part = part(x, y, (width - x).min(20), (height - y).min(20));
+        cut.fill_part(&image, (width, height), part, 1);
+        for (j, row) in cut.pixels().chunks(part.width).enumerate() {
+            prop_assert_eq!(row, &level.pixels()[(y + j) * width + x..][..part.width]);
+        }
+    }
+}
+
 #[test]
-fn a_part_of_the_image_gives_the_same_windows() {
+fn areas_hold_windows_that_pass() {
     let (image, cascade) = (noise(90, 70, 8), small());
-    let inside = |window: &Rect| window.x >= 20.0 && window.right() <= 70.0;
-    let scan = |propose: &dyn Fn(&Rect) -> bool| {
-        let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
-        scanner.scan(&image, &cascade, [2.5].into_iter(), propose, &mut hits);
-        hits
-    };
-    let all: Vec<Hit> = scan(&|_| true).into_iter().filter(|hit| inside(&hit.region)).collect();
-    let some = scan(&inside);
-    // The skipped neighbours are not the same ones.
-    assert!(!all.is_empty() && some.iter().filter(|hit| all.contains(hit)).count() * 2 > all.len());
-    assert!(some.iter().all(|hit| inside(&hit.region)));
+    let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+    let area = Rect::new(30.0, 20.0, 30.0, 30.0);
+    scanner.scan_within(&image, &cascade, 2.5, &[area], |_| true, &mut hits);
+    assert!(!hits.is_empty() && hits.iter().all(|hit| area.contains(hit.region.centre())));
 }
 
 #[test]
@@ -189,7 +225,7 @@ fn windows_without_contrast_are_left_out() {
     cascade.stages.iter_mut().for_each(|stage| stage.threshold = -9.0);
     let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
     let flat = GreyImage::from_fn(40, 40, |x, _| 100 + (x % 2) as u8);
-    scanner.scan(&flat, &cascade, [1.0].into_iter(), |_| true, &mut hits);
+    scanner.scan(&flat, &cascade, [1.0].into_iter(), &mut hits);
     assert!(hits.is_empty() && scanner.looked_at() > 100);
 }
 

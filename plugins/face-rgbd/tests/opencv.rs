@@ -74,7 +74,7 @@ fn found(cascade: &Cascade, image: &GreyImage) -> Vec<Rect> {
     let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
     let fitting = scales(cascade, 0.0, image.width() as f64, 1.1)
         .take_while(|scale| (cascade.height as f64 * scale).round() <= image.height() as f64);
-    scanner.scan(image, cascade, fitting, |_| true, &mut hits);
+    scanner.scan(image, cascade, fitting, &mut hits);
     grouped(&hits, 3).iter().map(|group| group.region).collect()
 }
 

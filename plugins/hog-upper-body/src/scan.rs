@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use tagalong_core::{GreyImage, Rect};
+use tagalong_vision::islands;
 
 use crate::hog::CELL;
 use crate::judge::Judge;
@@ -19,10 +20,18 @@ pub(crate) const FILLED: f64 = 0.5;
 const ABOVE: f64 = 0.1;
 
 /// Cells that are resampled around windows: they have a share in the outermost
-/// cells of a window, and say what is usual there.
-const AROUND: usize = 2;
+/// cells of a window, and for trees they say what is usual there.
+const fn around(kind: Kind) -> usize {
+    match kind {
+        Kind::Linear => 1,
+        Kind::Trees => 2,
+    }
+}
+
 /// The same in pixels, with one more for the gradients.
-const AROUND_PX: usize = AROUND * CELL + 1;
+const fn around_px(kind: Kind) -> usize {
+    around(kind) * CELL + 1
+}
 
 /// A window that was looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +48,8 @@ pub struct Window {
 #[derive(Clone, Debug)]
 pub struct Scanner {
     judge: Judge,
+    /// Of the model.
+    kind: Kind,
     resampler: Resampler,
     pixels: Vec<f32>,
     wanted: Vec<Wanted>,
@@ -60,6 +71,7 @@ impl Scanner {
     pub fn new(model: &Model) -> Self {
         Self {
             judge: Judge::new(model),
+            kind: model.kind(),
             resampler: Resampler::default(),
             pixels: Vec::new(),
             wanted: Vec::new(),
@@ -87,10 +99,16 @@ impl Scanner {
         for side in sides {
             let size = Size { side, step: side / (FILLED * WINDOW_PX as f64) };
             self.ask(image, &size, &mut propose);
-            let Some((left, top, right, bottom)) = bounds(&self.wanted) else { continue };
             self.looked_at += self.wanted.len() as u64;
-            self.fill(image, size.step, (left, top, right, bottom));
-            self.judge(&size, (left, top), least, found);
+            let mut wanted = std::mem::take(&mut self.wanted);
+            // Islands that are this far apart share no pixels.
+            let gap = (SIDE + 1 + 2 * around(self.kind)) as i64;
+            islands(&mut wanted, |w| [w.x, w.y], gap, &mut |island| {
+                let bounds = bounds(island);
+                self.fill(image, size.step, bounds);
+                self.judge(island, &size, bounds, least, found);
+            });
+            self.wanted = wanted;
         }
     }
 
@@ -110,24 +128,27 @@ impl Scanner {
         }
     }
 
-    /// Makes what the machine looks at, from one cell to another.
-    fn fill(
-        &mut self,
-        image: &GreyImage,
-        step: f64,
-        (left, top, right, bottom): (i64, i64, i64, i64),
-    ) {
-        let long = |from: i64, to: i64| ((to - from) as usize + SIDE + 1) * CELL + 2 * AROUND_PX;
-        let start = |cell: i64| ((cell * CELL as i64) as f64 - AROUND_PX as f64) * step;
+    /// Makes what the machine looks at, for windows within bounds.
+    fn fill(&mut self, image: &GreyImage, step: f64, [left, top, right, bottom]: Bounds) {
+        let around_px = around_px(self.kind);
+        let long = |from: i64, to: i64| ((to - from) as usize + SIDE + 1) * CELL + 2 * around_px;
+        let start = |cell: i64| ((cell * CELL as i64) as f64 - around_px as f64) * step;
         let (origin, size) = ((start(left), start(top)), (long(left, right), long(top, bottom)));
         self.resampler.fill(image, origin, step, size, &mut self.pixels);
         self.judge.fill(&self.pixels, size.0);
     }
 
     /// Adds the wanted windows that reach `least`; neighbours are judged together.
-    fn judge(&mut self, size: &Size, (left, top): (i64, i64), least: f32, found: &mut Vec<Window>) {
-        let at = |cell: i64, first: i64| (cell - first) as usize + AROUND;
-        for run in self.wanted.chunk_by(|a, b| (a.x + 1, a.y) == (b.x, b.y)) {
+    fn judge(
+        &mut self,
+        wanted: &[Wanted],
+        size: &Size,
+        [left, top, ..]: Bounds,
+        least: f32,
+        found: &mut Vec<Window>,
+    ) {
+        let at = |cell: i64, first: i64| (cell - first) as usize + around(self.kind);
+        for run in wanted.chunk_by(|a, b| (a.x + 1, a.y) == (b.x, b.y)) {
             self.sums.clear();
             self.sums.resize(run.len(), 0.0);
             self.judge.sums((at(run[0].x, left), at(run[0].y, top)), &mut self.sums);
@@ -180,22 +201,26 @@ pub fn window_of(square: &Rect) -> Rect {
     Rect::new(square.x - left * step, square.y - above * step, side, side)
 }
 
-/// Smallest and largest column and row.
-fn bounds(wanted: &[Wanted]) -> Option<(i64, i64, i64, i64)> {
-    let (x, y) = (|| wanted.iter().map(|w| w.x), || wanted.iter().map(|w| w.y));
-    Some((x().min()?, y().min()?, x().max()?, y().max()?))
+/// Smallest column and row of windows, and largest ones.
+type Bounds = [i64; 4];
+
+fn bounds(wanted: &[Wanted]) -> Bounds {
+    let none = [i64::MAX, i64::MAX, i64::MIN, i64::MIN];
+    wanted.iter().fold(none, |[left, top, right, bottom], w| {
+        [left.min(w.x), top.min(w.y), right.max(w.x), bottom.max(w.y)]
+    })
 }
 
 /// The numbers of the window whose upper-body square is `square`, for machines of
 /// one kind.
 pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> {
     let step = square.width.max(1.0) / (FILLED * WINDOW_PX as f64);
-    let (window, around) = (window_of(square), AROUND_PX as f64 * step);
-    let (origin, side) = ((window.x - around, window.y - around), WINDOW_PX + 2 * AROUND_PX);
+    let (window, margin) = (window_of(square), around_px(kind) as f64 * step);
+    let (origin, side) = ((window.x - margin, window.y - margin), WINDOW_PX + 2 * around_px(kind));
     let pixels = resampled(image, origin, step, side, side);
     let mut field = Field::new(kind);
     field.fill(&pixels, side);
-    field.numbers(AROUND, AROUND)
+    field.numbers(around(kind), around(kind))
 }
 
 /// Leaves the best of each group of windows, best first: greedily, best first, those that overlap

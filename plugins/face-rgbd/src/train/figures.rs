@@ -31,7 +31,7 @@ impl Found {
         let grey = &*picture.grey;
         let (most, mut hits) = (grey.width().min(grey.height()) as f64, Vec::new());
         let sizes = scales(cascade, 0.0, most, SCALE_STEP);
-        scanner.scan(grey, cascade, sizes, |_| true, &mut hits);
+        scanner.scan(grey, cascade, sizes, &mut hits);
         let mut groups = grouped(&hits, MIN_NEIGHBOURS);
         groups.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let mut free: Vec<&Rect> = picture.faces.iter().collect();

@@ -18,7 +18,7 @@ use patch::{Patch, window};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
 use tagalong_learn::{Use, mirrored, mix, shifted, use_of};
 
-use crate::{Cascade, Scanner, Training, scales};
+use crate::{Cascade, Scanner, Training, scales, whole};
 
 /// Small shifts of a face with surroundings, as parts of its window, and its
 /// growth.
@@ -118,7 +118,7 @@ impl CascadeTrainer {
                 let window = Rect::new(x, y, side, side);
                 faces.iter().all(|face| face.iou(&window) < BESIDE)
             };
-            scanner.size(grey, cascade, scale, &mut |x, y| is_other(x, y), &mut |window| {
+            scanner.size(grey, cascade, scale, &whole(grey), &is_other, &mut |window| {
                 seen += 1;
                 let place = mix(salt ^ mix(index as u64) ^ seen) % seen;
                 let place = if found.len() < most { found.len() } else { place as usize };

@@ -1,0 +1,96 @@
+/// Axes of a point: columns, and rows.
+const AXES: usize = 2;
+
+/// Cuts points of a grid into islands and hands out one after the other, row by row.
+/// Whole columns or rows of at least `gap - 1` places without a point lie between two
+/// islands; within one no such cut is left.
+///
+/// What has to be done around each of a few points is thus done around islands, and not
+/// over the rectangle of all of them.
+pub fn islands<T>(
+    points: &mut [T],
+    at: impl Fn(&T) -> [i64; AXES] + Copy,
+    gap: i64,
+    take: &mut impl FnMut(&[T]),
+) {
+    cut(points, at, gap, 1, 0, take);
+}
+
+/// Cuts along one axis and then along the other, until `failed` on both.
+fn cut<T>(
+    points: &mut [T],
+    at: impl Fn(&T) -> [i64; AXES] + Copy,
+    gap: i64,
+    axis: usize,
+    failed: usize,
+    take: &mut impl FnMut(&[T]),
+) {
+    if failed == AXES {
+        points.sort_unstable_by_key(|point| (at(point)[1], at(point)[0]));
+        return take(points);
+    }
+    points.sort_unstable_by_key(|point| at(point)[axis]);
+    let count = points.len();
+    for part in points.chunk_by_mut(|a, b| at(b)[axis] - at(a)[axis] < gap) {
+        let failed = if part.len() == count { failed + 1 } else { 1 };
+        cut(part, at, gap, 1 - axis, failed, take);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn of(points: &[[i64; 2]], gap: i64) -> Vec<Vec<[i64; 2]>> {
+        let (mut points, mut found) = (points.to_vec(), Vec::new());
+        islands(&mut points, |point| *point, gap, &mut |island| found.push(island.to_vec()));
+        found
+    }
+
+    fn bounds(points: &[[i64; 2]], axis: usize) -> (i64, i64) {
+        let along = || points.iter().map(|point| point[axis]);
+        (along().min().unwrap(), along().max().unwrap())
+    }
+
+    /// An empty strip that goes through all points, found place by place.
+    fn can_be_cut(points: &[[i64; 2]], gap: i64) -> bool {
+        (0..2).any(|axis| {
+            let (first, last) = bounds(points, axis);
+            let is_empty = |place: i64| points.iter().all(|point| point[axis] != place);
+            (first + 1..last - gap + 2).any(|start| (start..start + gap - 1).all(is_empty))
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn islands_hold_all_points_and_nothing_is_left_to_cut(
+            points in prop::collection::vec(prop::array::uniform2(0..40i64), 0..40),
+            gap in 2..9i64,
+        ) {
+            let found = of(&points, gap);
+            let (mut all, mut points) = (found.concat(), points);
+            all.sort();
+            points.sort();
+            prop_assert_eq!(all, points);
+            for (index, island) in found.iter().enumerate() {
+                prop_assert!(island.is_sorted_by_key(|[x, y]| (*y, *x)));
+                prop_assert!(!can_be_cut(island, gap));
+                for other in &found[index + 1..] {
+                    let is_apart = (0..2).any(|axis| {
+                        let (a, b) = (bounds(island, axis), bounds(other, axis));
+                        b.0 - a.1 >= gap || a.0 - b.1 >= gap
+                    });
+                    prop_assert!(is_apart, "{island:?} {other:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn two_people_beside_each_other_are_two_islands() {
+        assert_eq!(of(&[[9, 0], [0, 0], [1, 5]], 4), [vec![[0, 0]], vec![[9, 0]], vec![[1, 5]]]);
+        assert_eq!(of(&[], 4), Vec::<Vec<[i64; 2]>>::new());
+    }
+}
