@@ -103,17 +103,13 @@ impl DepthImage {
     /// else; they are given up as soon as most of their places do.
     pub fn surface_within(&self, of: &Rect, range_m: RangeInclusive<f64>) -> Option<f64> {
         let (least, most) = (*range_m.start() as f32, *range_m.end() as f32);
-        let tap = |from: f64, size: f64, i: usize| (from + size * (2 + i) as f64 / 8.0) as i64;
-        let columns: [i64; TAPS] = std::array::from_fn(|i| tap(of.x, of.width, i));
-        let (mut readings, mut count) = ([0.0; TAPS * TAPS], 0);
-        let (mut nearer, mut farther) = (0, 0);
-        for y in (0..TAPS).map(|i| tap(of.y, of.height, i)) {
-            for metres in columns.iter().filter_map(|x| self.get(*x, y)) {
-                let is_reading = metres > 0.0 && metres.is_finite();
-                readings[count] = metres;
-                count += usize::from(is_reading);
-                nearer += usize::from(is_reading && metres < least);
-                farther += usize::from(is_reading && metres > most);
+        let (columns, rows) = (taps(of.x, of.width), taps(of.y, of.height));
+        let (mut count, mut nearer, mut farther) = (0, 0, 0);
+        for y in rows {
+            for metres in self.readings(&columns, y) {
+                count += usize::from(is_reading(metres));
+                nearer += usize::from(is_reading(metres) & (metres < least));
+                farther += usize::from(is_reading(metres) & (metres > most));
             }
             if nearer.max(farther) > TAPS * TAPS / 2 {
                 return None;
@@ -123,9 +119,29 @@ impl DepthImage {
         if count < LEAST_READINGS || nearer > middle || farther >= count - middle {
             return None;
         }
-        let (_, median, _) = readings[..count].select_nth_unstable_by(middle, f32::total_cmp);
+        let mut sorted = [f32::INFINITY; TAPS * TAPS];
+        let readings = rows.into_iter().flat_map(|y| self.readings(&columns, y));
+        let readings = readings.filter(|metres| is_reading(*metres));
+        sorted.iter_mut().zip(readings).for_each(|(to, metres)| *to = metres);
+        let (_, median, _) = sorted[..count].select_nth_unstable_by(middle, f32::total_cmp);
         Some(f64::from(*median))
     }
+
+    /// What some places of a row show; NaN outside of the image.
+    fn readings(&self, columns: &[usize; TAPS], y: usize) -> [f32; TAPS] {
+        let row = if y < self.height { self.row(y) } else { &[] };
+        columns.map(|x| row.get(x).copied().unwrap_or(f32::NAN))
+    }
+}
+
+/// Where depth is read in the central half of what begins at `from`; what is negative
+/// becomes larger than any image.
+fn taps(from: f64, size: f64) -> [usize; TAPS] {
+    std::array::from_fn(|i| (from + size * (2 + i) as f64 / 8.0) as i64 as usize)
+}
+
+fn is_reading(metres: f32) -> bool {
+    (metres > 0.0) & (metres < f32::INFINITY)
 }
 
 #[cfg(test)]

@@ -83,6 +83,12 @@ pub struct Cascade {
 }
 
 impl Cascade {
+    /// One that takes everything for a face, for windows of `side` pixels.
+    pub fn without_stages(side: usize) -> Self {
+        let (features, stages) = (Vec::new(), Vec::new());
+        Self { width: side, height: side, features, stages, calibration: None }
+    }
+
     /// True if windows are judged relative to their contrast.
     pub fn is_normalised(&self) -> bool {
         self.features.iter().any(|feature| matches!(feature, Feature::Haar(_)))

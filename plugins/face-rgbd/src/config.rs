@@ -7,7 +7,7 @@ use tagalong_core::{ANY, POSITIVE, Result, check_ranges};
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Cascade in OpenCV's XML, relative to the config; empty: the one that is
-    /// built in.
+    /// built in. Training goes on from it; empty: begins anew.
     pub model: String,
     /// Faces with lower log-odds are dropped.
     pub min_score: f64,

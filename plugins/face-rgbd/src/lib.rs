@@ -49,6 +49,9 @@ pub fn register(registry: &mut Registry) {
     registry.detector(NAME, "faces by a cascade, where depth allows them (P2)", FaceRgbd::new);
     #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {
-        train::CascadeTrainer::new(config.training, context.seed)
+        let begun = (!config.model.is_empty())
+            .then(|| context.model(&config.model, "", Cascade::from_xml))
+            .transpose()?;
+        train::CascadeTrainer::new(config.training, begun, context.seed)
     });
 }

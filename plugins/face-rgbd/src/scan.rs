@@ -74,7 +74,7 @@ impl Scanner {
         propose: impl Fn(&Rect) -> bool,
         hits: &mut Vec<Hit>,
     ) {
-        let size = |length: usize| (length as f64 * scale).round();
+        let size = |length: usize| rounded(length as f64 * scale);
         let (width, height) = (size(cascade.width), size(cascade.height));
         let region = |x: usize, y: usize| Rect::new(size(x), size(y), width, height);
         for area in areas {
@@ -98,11 +98,11 @@ impl Scanner {
         take: &mut impl FnMut(Seen<'_>),
     ) {
         let step = if scale >= FINE_FROM { 1 } else { 2 };
-        let size = [image.width(), image.height()].map(|length| (length as f64 / scale).round());
-        let size = size.map(|length| length as usize);
+        let size =
+            [image.width(), image.height()].map(|length| rounded(length as f64 / scale) as usize);
         let starts = |from: f64, to: f64, length: usize, window: usize| {
-            let half = 0.5 * (window as f64 * scale).round();
-            let middle = |x: usize| (x as f64 * scale).round() + half;
+            let half = 0.5 * rounded(window as f64 * scale);
+            let middle = |x: usize| rounded(x as f64 * scale) + half;
             let all = (0..=length.checked_sub(window)?).step_by(step);
             let mut inside = all.filter(|x| (from..to).contains(&middle(*x)));
             let first = inside.next()?;
@@ -131,6 +131,12 @@ impl Scanner {
             }
         }
     }
+}
+
+/// To the nearest whole number; `value` is not negative. Called for each window, where
+/// `round` would be a call of a library.
+fn rounded(value: f64) -> f64 {
+    (value + 0.5) as i64 as f64
 }
 
 /// All of an image.

@@ -30,6 +30,9 @@ pub struct Config {
     pub min_depth_m: f64,
     /// See `min_depth_m`.
     pub max_depth_m: f64,
+    /// With depth: where most of what is above a square is as far away as what it shows,
+    /// give or take this, it shows no head, m; 0: not asked.
+    pub above_m: f64,
     /// Heights of a head's centre above the floor, m.
     pub min_head_height_m: f64,
     /// See `min_head_height_m`.
@@ -66,6 +69,7 @@ impl Default for Config {
             size_tolerance: 1.2,
             min_depth_m: 0.5,
             max_depth_m: 7.0,
+            above_m: 0.25,
             min_head_height_m: 0.8,
             max_head_height_m: 2.1,
             depth_proposals: true,
@@ -134,6 +138,7 @@ impl Config {
             ("min_depth_m", self.min_depth_m, ANY),
             ("max_depth_m", self.max_depth_m, POSITIVE),
             ("min_head_height_m", self.min_head_height_m, ANY),
+            ("above_m", self.above_m, NOT_NEGATIVE),
             ("max_head_height_m", self.max_head_height_m, ANY),
             ("overlap", self.overlap, NOT_NEGATIVE),
             ("apart_m", self.apart_m, NOT_NEGATIVE),

@@ -10,6 +10,12 @@ use crate::{Config, Kind, Model, NAME, Scanner, Window, merge};
 const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
 const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
 
+/// What is above a head is looked at so far above the square, sides; the windows that show
+/// a head best end there well above it.
+const ABOVE: f64 = 0.25;
+/// In so many places.
+const TAPS: usize = 5;
+
 /// Finds heads and shoulders.
 pub struct HogUpperBody {
     config: Config,
@@ -69,6 +75,7 @@ struct Proposer<'a> {
     /// The square that a search near a track expects.
     near: Option<Rect>,
     unfit: u64,
+    goes_on: u64,
     out_of_place: u64,
 }
 
@@ -88,12 +95,24 @@ impl Proposer<'_> {
             self.unfit += 1;
             return None;
         };
+        if self.goes_on_above(depth, square, face_m) {
+            self.goes_on += 1;
+            return None;
+        }
         let height_m = self.camera.head_of(square, face_m).z;
         if !(config.min_head_height_m..=config.max_head_height_m).contains(&height_m) {
             self.out_of_place += 1;
             return None;
         }
         Some(Some(face_m))
+    }
+
+    /// True for what has no upper end here: walls, trunks of people, furniture.
+    fn goes_on_above(&self, depth: &DepthImage, square: &Rect, face_m: f64) -> bool {
+        let y = (square.y - ABOVE * square.height) as i64;
+        let column = |i: usize| (square.x + square.width * (0.25 + 0.125 * i as f64)) as i64;
+        let is_same = |m: &f32| (f64::from(*m) - face_m).abs() < self.config.above_m;
+        (0..TAPS).filter_map(|i| depth.get(column(i), y)).filter(is_same).count() > TAPS / 2
     }
 
     fn is_near(&self, square: &Rect) -> bool {
@@ -120,13 +139,15 @@ impl Detector for HogUpperBody {
             Search::Everywhere { .. } => None,
         };
         let Self { config, model, scanner, windows } = self;
-        let mut proposer = Proposer { config, camera, depth, near, unfit: 0, out_of_place: 0 };
+        let (unfit, goes_on, out_of_place) = (0, 0, 0);
+        let mut proposer = Proposer { config, camera, depth, near, unfit, goes_on, out_of_place };
         let (sides, least) = (sides(config, camera), model.sum_at(config.min_score));
         let before = scanner.looked_at();
         windows.clear();
         scanner.scan(grey, sides, least, |square| proposer.propose(square), windows);
         let looked_at = scanner.looked_at() - before;
         funnel.drop_many("window: size and depth", proposer.unfit);
+        funnel.drop_many("window: goes on above", proposer.goes_on);
         funnel.drop_many("window: head height", proposer.out_of_place);
         funnel.drop_many("window: gradients", looked_at - windows.len() as u64);
         let all = windows.len();
@@ -138,5 +159,39 @@ impl Detector for HogUpperBody {
             found.truncate(1);
         }
         Ok(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+    use tagalong_core::{Distortion, Pinhole};
+
+    use super::*;
+
+    /// What is said of the square of somebody 3 m away whose surroundings are at `depth`.
+    fn proposed(depth: impl Fn(f64) -> f32) -> (Option<Option<f64>>, u64) {
+        let lens =
+            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0);
+        let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
+        let above = |y: usize| (square.y - y as f64) / square.height;
+        let depth = DepthImage::from_fn(640, 480, |_, y| depth(above(y)));
+        let (config, near) = (&Config::default(), None);
+        let (camera, depth, counts) = (&camera, Some(&depth), [0; 3]);
+        let [unfit, goes_on, out_of_place] = counts;
+        let mut proposer = Proposer { config, camera, depth, near, unfit, goes_on, out_of_place };
+        (proposer.propose(&square), proposer.goes_on)
+    }
+
+    #[test]
+    fn a_wall_goes_on_above_and_a_head_does_not() {
+        let wall = |_: f64| 2.9;
+        assert_eq!(proposed(wall), (None, 1));
+        let head = |above: f64| if above < 0.0 { 2.9 } else { 3.3 };
+        let found = proposed(head);
+        assert!(found.0.flatten().is_some_and(|m| (m - 2.9).abs() < 1e-6) && found.1 == 0);
+        let unknown_above = |above: f64| if above < 0.0 { 2.9 } else { f32::NAN };
+        assert_eq!(proposed(unknown_above), found);
     }
 }

@@ -45,20 +45,28 @@ struct Picture {
 pub struct CascadeTrainer {
     training: Training,
     seed: u64,
+    /// The stages that there are already.
+    begun: Cascade,
     faces: Vec<Patch>,
     others: Vec<Patch>,
     pictures: Vec<Picture>,
 }
 
 impl CascadeTrainer {
-    /// A trainer without examples.
+    /// A trainer without examples, that goes on from a cascade, if there is one: with
+    /// all its stages there already, that is calibrated and measured again.
     ///
     /// # Errors
-    /// [`Error::Settings`] for numbers that cannot work.
-    pub fn new(training: Training, seed: u64) -> Result<Self> {
+    /// [`Error::Settings`] for numbers that cannot work, or windows of another size.
+    pub fn new(training: Training, begun: Option<Cascade>, seed: u64) -> Result<Self> {
         training.check()?;
+        let side = training.side;
+        let begun = begun.unwrap_or_else(|| Cascade::without_stages(side));
+        if (begun.width, begun.height) != (side, side) {
+            return Err(Error::Settings(format!("windows of the cascade are not {side} wide")));
+        }
         let (faces, others) = (Vec::new(), Vec::new());
-        Ok(Self { training, seed, faces, others, pictures: Vec::new() })
+        Ok(Self { training, seed, begun, faces, others, pictures: Vec::new() })
     }
 
     /// A face, as it is and mirrored; with small shifts if the picture shows
@@ -136,18 +144,18 @@ impl CascadeTrainer {
     }
 
     fn train(&self, progress: &mut dyn FnMut(f64)) -> (Cascade, Vec<Mined>) {
-        let Training { side, stages, others: wanted, fewest_others, .. } = self.training;
-        let mut cascade = Cascade {
-            width: side,
-            height: side,
-            features: Vec::new(),
-            stages: Vec::new(),
-            calibration: None,
-        };
+        let Training { stages, others: wanted, fewest_others, .. } = self.training;
         let (mut faces, mut others) = (self.faces.clone(), self.others.clone());
         others.truncate(wanted);
-        let mut log = Vec::new();
-        for number in 0..stages {
+        let begun = self.begun.stages.len();
+        for stage in 1..=begun {
+            let until =
+                Cascade { stages: self.begun.stages[..stage].to_vec(), ..self.begun.clone() };
+            faces.retain(|patch| patch.passes_last(&until));
+            others.retain(|patch| patch.passes_last(&until));
+        }
+        let (mut cascade, mut log) = (self.begun.clone(), Vec::new());
+        for number in begun..stages {
             progress(number as f64 / (stages + 1) as f64);
             let mut mined = Mined::default();
             if number > 0 {
@@ -158,7 +166,6 @@ impl CascadeTrainer {
             }
             let samples = Samples { faces: &faces, others: &others };
             stage(&mut cascade, &samples, &self.training, mix(self.seed ^ number as u64));
-            mined.trees = cascade.stages[number].trees.len();
             log.push(mined);
             faces.retain(|patch| patch.passes_last(&cascade));
             others.retain(|patch| patch.passes_last(&cascade));
@@ -172,7 +179,6 @@ impl CascadeTrainer {
 pub(crate) struct Mined {
     found: usize,
     looked_at: u64,
-    trees: usize,
 }
 
 impl Trainer for CascadeTrainer {
@@ -210,7 +216,8 @@ impl Trainer for CascadeTrainer {
         let mut table = figures(&cascade, &self.pictures);
         let list = |of: fn(&Mined) -> i64| log.iter().map(of).collect::<Vec<i64>>().into();
         table.insert("windows_of_faces".into(), (self.faces.len() as i64).into());
-        table.insert("trees".into(), list(|m| m.trees as i64));
+        let trees = cascade.stages.iter().map(|stage| stage.trees.len() as i64);
+        table.insert("trees".into(), trees.collect::<Vec<i64>>().into());
         table.insert("mined".into(), list(|m| m.found as i64));
         table.insert("searched".into(), list(|m| m.looked_at as i64));
         progress(1.0);
