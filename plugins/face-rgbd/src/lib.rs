@@ -52,6 +52,6 @@ pub fn register(registry: &mut Registry) {
         let begun = (!config.model.is_empty())
             .then(|| context.model(&config.model, "", Cascade::from_xml))
             .transpose()?;
-        train::CascadeTrainer::new(config.training, begun, context.seed)
+        train::CascadeTrainer::new(config, begun, context.seed)
     });
 }

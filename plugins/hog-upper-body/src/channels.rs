@@ -41,7 +41,6 @@ impl Channels {
         let height = pixels.len() / width.max(1);
         self.columns = width.saturating_sub(2) / CELL;
         self.rows = height.saturating_sub(2) / CELL;
-        self.values.clear();
         self.values.resize(self.columns * self.rows * DEPTH, 0.0);
         if self.values.is_empty() {
             return;

@@ -48,6 +48,8 @@ pub struct Resampler {
     tall: Vec<f32>,
     /// The same of several rows, side by side for each column.
     beside: Vec<[f32; LANES]>,
+    /// Samples of these rows, side by side for each column of the result.
+    across: Vec<[f32; LANES]>,
 }
 
 impl Resampler {
@@ -74,14 +76,17 @@ impl Resampler {
         let ends = self.columns.each().map(|(start, weights)| start + weights.len() as i64);
         let end = ends.max().unwrap_or(0).max(first + 1);
         self.beside.resize((end - first) as usize, [0.0; LANES]);
-        let Self { columns, rows, tall, beside } = self;
+        let Self { columns, rows, tall, beside, across } = self;
         let mut rows = rows.each();
         for lines in out.chunks_mut(width * LANES) {
             for (lane, (start, weights)) in rows.by_ref().take(LANES).enumerate() {
                 add_rows(image, (start, weights), first..end, tall);
                 beside.iter_mut().zip(&*tall).for_each(|(lanes, value)| lanes[lane] = *value);
             }
-            blend_columns(columns, first, beside, lines, width);
+            blend_columns(columns, first, beside, across);
+            for (lane, line) in lines.chunks_exact_mut(width).enumerate() {
+                line.iter_mut().zip(&*across).for_each(|(sample, lanes)| *sample = lanes[lane]);
+            }
         }
     }
 }
@@ -117,18 +122,17 @@ fn blend_columns(
     columns: &Taps,
     first: i64,
     values: &[[f32; LANES]],
-    lines: &mut [f32],
-    width: usize,
+    samples: &mut Vec<[f32; LANES]>,
 ) {
-    for (x, (start, weights)) in columns.each().enumerate() {
+    samples.clear();
+    for (start, weights) in columns.each() {
         let mut sums = [0.0_f32; LANES];
         for (values, weight) in values[(start - first) as usize..].iter().zip(weights) {
             for lane in 0..LANES {
                 sums[lane] += values[lane] * weight;
             }
         }
-        let samples = lines.iter_mut().skip(x).step_by(width);
-        samples.zip(sums).for_each(|(sample, sum)| *sample = sum);
+        samples.push(sums);
     }
 }
 

@@ -4,11 +4,8 @@ use tagalong_core::Rect;
 use tagalong_learn::{Line, platt};
 
 use super::{Picture, Use};
-use crate::{Cascade, Scanner, grouped, scales};
+use crate::{Cascade, Config, Scanner, grouped, scales};
 
-/// As in use: see [`crate::Config`].
-const SCALE_STEP: f64 = 1.05;
-const MIN_NEIGHBOURS: usize = 2;
 /// A window is of a face if they overlap by this (IoU).
 const SAME: f64 = 0.5;
 /// Windows of faces that count: those of faces that are 40 pixels wide.
@@ -27,12 +24,18 @@ struct Found {
 }
 
 impl Found {
-    fn add(&mut self, scanner: &mut Scanner, cascade: &Cascade, picture: &Picture) {
+    fn add(
+        &mut self,
+        scanner: &mut Scanner,
+        cascade: &Cascade,
+        config: &Config,
+        picture: &Picture,
+    ) {
         let grey = &*picture.grey;
         let (most, mut hits) = (grey.width().min(grey.height()) as f64, Vec::new());
-        let sizes = scales(cascade, 0.0, most, SCALE_STEP);
+        let sizes = scales(cascade, 0.0, most, config.scale_step);
         scanner.scan(grey, cascade, sizes, &mut hits);
-        let mut groups = grouped(&hits, MIN_NEIGHBOURS);
+        let mut groups = grouped(&hits, config.min_neighbours);
         groups.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let mut free: Vec<&Rect> = picture.faces.iter().collect();
         self.faces += free.iter().filter(|face| face.width >= LEAST_PX).count();
@@ -67,28 +70,33 @@ impl Found {
     }
 }
 
-fn search(cascade: &Cascade, pictures: &[Picture], wanted: impl Fn(&Picture) -> bool) -> Found {
+fn search(
+    cascade: &Cascade,
+    config: &Config,
+    pictures: &[Picture],
+    wanted: impl Fn(&Picture) -> bool,
+) -> Found {
     let (mut found, mut scanner) = (Found::default(), Scanner::default());
     let least = cascade.width.min(cascade.height);
     let is_large = |p: &&Picture| p.grey.width() > least && p.grey.height() > least;
     for picture in pictures.iter().filter(|p| wanted(p)).filter(is_large) {
-        found.add(&mut scanner, cascade, picture);
+        found.add(&mut scanner, cascade, config, picture);
     }
     found
 }
 
 /// Slope and offset of the log-odds.
-pub(super) fn calibration(cascade: &Cascade, pictures: &[Picture]) -> (f64, f64) {
-    let found = search(cascade, pictures, |p| p.use_ == Use::Calibration);
+pub(super) fn calibration(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> (f64, f64) {
+    let found = search(cascade, config, pictures, |p| p.use_ == Use::Calibration);
     let Line { slope, offset } = platt(&found.groups);
     (slope.max(1e-3), offset)
 }
 
 /// The figures of the card.
-pub(super) fn figures(cascade: &Cascade, pictures: &[Picture]) -> toml::Table {
+pub(super) fn figures(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::Table {
     let wanted = |p: &Picture| p.use_ == Use::Figures;
-    let found = search(cascade, pictures, |p| wanted(p) && !p.faces.is_empty());
-    let empty = search(cascade, pictures, |p| wanted(p) && p.faces.is_empty());
+    let found = search(cascade, config, pictures, |p| wanted(p) && !p.faces.is_empty());
+    let empty = search(cascade, config, pictures, |p| wanted(p) && p.faces.is_empty());
     let integer = |n: usize| toml::Value::Integer(n as i64);
     let mut table = toml::Table::from_iter([
         ("held_out_pictures_with_faces".to_owned(), integer(found.pictures)),

@@ -18,7 +18,7 @@ use patch::{Patch, window};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
 use tagalong_learn::{Use, mirrored, mix, shifted, use_of};
 
-use crate::{Cascade, Scanner, Training, scales, whole};
+use crate::{Cascade, Config, Scanner, Training, scales, whole};
 
 /// Small shifts of a face with surroundings, as parts of its window, and its
 /// growth.
@@ -43,7 +43,7 @@ struct Picture {
 /// A face is a candidate whose region is its window. A picture without a face is
 /// shown by candidates somewhere in it.
 pub struct CascadeTrainer {
-    training: Training,
+    config: Config,
     seed: u64,
     /// The stages that there are already.
     begun: Cascade,
@@ -53,26 +53,27 @@ pub struct CascadeTrainer {
 }
 
 impl CascadeTrainer {
-    /// A trainer without examples, that goes on from a cascade, if there is one: with
+    /// A trainer without examples, that measures and calibrates with the other settings of
+    /// the detector, and goes on from a cascade, if there is one: with
     /// all its stages there already, that is calibrated and measured again.
     ///
     /// # Errors
     /// [`Error::Settings`] for numbers that cannot work, or windows of another size.
-    pub fn new(training: Training, begun: Option<Cascade>, seed: u64) -> Result<Self> {
-        training.check()?;
-        let side = training.side;
+    pub fn new(config: Config, begun: Option<Cascade>, seed: u64) -> Result<Self> {
+        config.training.check()?;
+        let side = config.training.side;
         let begun = begun.unwrap_or_else(|| Cascade::without_stages(side));
         if (begun.width, begun.height) != (side, side) {
             return Err(Error::Settings(format!("windows of the cascade are not {side} wide")));
         }
         let (faces, others) = (Vec::new(), Vec::new());
-        Ok(Self { training, seed, begun, faces, others, pictures: Vec::new() })
+        Ok(Self { config, seed, begun, faces, others, pictures: Vec::new() })
     }
 
     /// A face, as it is and mirrored; with small shifts if the picture shows
     /// what is around it.
     fn add_face(&mut self, grey: &GreyImage, face: &Rect) {
-        let side = self.training.side;
+        let side = self.config.training.side;
         let around = face.inflated(0.2);
         let is_inside = around.clipped(grey.width(), grey.height()) == around;
         let shifts = if is_inside { &SHIFTS[..] } else { &SHIFTS[..1] };
@@ -88,7 +89,7 @@ impl CascadeTrainer {
     /// Windows that the cascade takes for faces, from pictures in an order by
     /// chance, until there are enough.
     fn mine(&self, cascade: &Cascade, others: &mut Vec<Patch>, progress: &mut Mined) {
-        let wanted = self.training.others;
+        let wanted = self.config.training.others;
         let mut order: Vec<usize> =
             (0..self.pictures.len()).filter(|i| self.pictures[*i].use_ == Use::Fit).collect();
         let salt = mix(self.seed ^ cascade.stages.len() as u64);
@@ -117,7 +118,7 @@ impl CascadeTrainer {
         salt: u64,
     ) -> Vec<Patch> {
         let Picture { grey, faces, .. } = &self.pictures[index];
-        let side = self.training.side;
+        let side = self.config.training.side;
         let (mut found, mut seen) = (Vec::new(), 0_u64);
         let longest = grey.width().min(grey.height()) as f64;
         for scale in scales(cascade, 0.0, longest, SCALE_STEP) {
@@ -144,7 +145,7 @@ impl CascadeTrainer {
     }
 
     fn train(&self, progress: &mut dyn FnMut(f64)) -> (Cascade, Vec<Mined>) {
-        let Training { stages, others: wanted, fewest_others, .. } = self.training;
+        let Training { stages, others: wanted, fewest_others, .. } = self.config.training;
         let (mut faces, mut others) = (self.faces.clone(), self.others.clone());
         others.truncate(wanted);
         let begun = self.begun.stages.len();
@@ -165,7 +166,7 @@ impl CascadeTrainer {
                 break;
             }
             let samples = Samples { faces: &faces, others: &others };
-            stage(&mut cascade, &samples, &self.training, mix(self.seed ^ number as u64));
+            stage(&mut cascade, &samples, &self.config.training, mix(self.seed ^ number as u64));
             log.push(mined);
             faces.retain(|patch| patch.passes_last(&cascade));
             others.retain(|patch| patch.passes_last(&cascade));
@@ -198,8 +199,8 @@ impl Trainer for CascadeTrainer {
         if example.is_person {
             self.add_face(grey, &candidate.region);
         } else {
-            let pixels = window(grey, &candidate.region, self.training.side);
-            self.others.extend(Patch::new(&pixels, self.training.side));
+            let pixels = window(grey, &candidate.region, self.config.training.side);
+            self.others.extend(Patch::new(&pixels, self.config.training.side));
         }
         Ok(())
     }
@@ -212,8 +213,8 @@ impl Trainer for CascadeTrainer {
         if cascade.stages.is_empty() {
             return Err(Error::Other("there are too few windows of others".into()));
         }
-        cascade.calibration = Some(calibration(&cascade, &self.pictures));
-        let mut table = figures(&cascade, &self.pictures);
+        cascade.calibration = Some(calibration(&cascade, &self.config, &self.pictures));
+        let mut table = figures(&cascade, &self.config, &self.pictures);
         let list = |of: fn(&Mined) -> i64| log.iter().map(of).collect::<Vec<i64>>().into();
         table.insert("windows_of_faces".into(), (self.faces.len() as i64).into());
         let trees = cascade.stages.iter().map(|stage| stage.trees.len() as i64);
