@@ -1,5 +1,5 @@
 use nalgebra::{Point2, Point3};
-use tagalong_core::{Camera, DepthImage, Motion};
+use tagalong_core::{Camera, DepthImage, Motion, Person};
 
 use super::CorridorSettings;
 use super::corridor::{Ahead, ahead, is_thing};
@@ -12,6 +12,10 @@ const CELL_M: f64 = 0.05;
 const ENOUGH: u16 = 3;
 /// What stands in its place for so long is a thing; somebody who walks by is not.
 const STANDS_S: f64 = 1.0;
+/// What people carry, draw along or push is this near to them, m, ...
+const CARRIED_M: f64 = 0.8;
+/// ... and stays where it is while they are slower than this, m/s.
+const STAYS_MPS: f64 = 0.25;
 /// What the image shows this far before a place hides the place, m.
 const BEFORE_M: f64 = 0.2;
 
@@ -31,7 +35,8 @@ pub(crate) struct Surroundings {
 struct Thing {
     /// Robot frame, m.
     at: Point3<f64>,
-    /// How long it has been seen, s.
+    /// How long it has been seen, s; the time does not count in which it may have
+    /// stood there because of somebody who stood beside it.
     seen_s: f64,
     /// How long it has not been seen, s.
     unseen_s: f64,
@@ -39,19 +44,18 @@ struct Thing {
 
 impl Surroundings {
     /// Takes in an image; the robot moved by `motion` since the last one. What is
-    /// near somebody, robot frame, m, moves and is not remembered; nor is what does not
-    /// stay where it is.
+    /// near somebody is not remembered, nor is what does not stay where it is.
     pub(crate) fn look(
         &mut self,
         settings: &CorridorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
         motion: &Motion,
-        people: impl Iterator<Item = Point2<f64>> + Clone,
+        people: &[Person],
     ) {
         self.see(settings, camera, depth);
         self.grid.count(settings, &self.seen);
-        self.meet_again(settings, camera, depth, motion);
+        self.meet_again(settings, camera, depth, motion, people);
         self.remember(settings, people);
     }
 
@@ -85,6 +89,7 @@ impl Surroundings {
         camera: &Camera,
         depth: Option<&DepthImage>,
         motion: &Motion,
+        people: &[Person],
     ) {
         let grid = &self.grid;
         self.things.retain_mut(|Thing { at, seen_s, unseen_s }| {
@@ -94,7 +99,9 @@ impl Surroundings {
                 return false;
             }
             if grid.is_something(at) {
-                (*seen_s, *unseen_s) = (*seen_s + motion.dt, 0.0);
+                let carried = people.iter().any(|person| may_carry(person, at));
+                *seen_s += if carried { 0.0 } else { motion.dt };
+                *unseen_s = 0.0;
                 return true;
             }
             *unseen_s += motion.dt;
@@ -127,15 +134,11 @@ impl Surroundings {
         });
     }
 
-    fn remember(
-        &mut self,
-        settings: &CorridorSettings,
-        people: impl Iterator<Item = Point2<f64>> + Clone,
-    ) {
+    fn remember(&mut self, settings: &CorridorSettings, people: &[Person]) {
         self.things.iter().for_each(|thing| self.grid.clear_around(&thing.at));
         for at in &self.seen {
-            let near = |person| nalgebra::distance(&at.xy(), &person) < settings.target_radius_m;
-            if self.grid.is_full(at) && !people.clone().any(near) {
+            let is_of = |person: &Person| far_m(person, at) < settings.target_radius_m;
+            if self.grid.is_full(at) && !people.iter().any(is_of) {
                 self.grid.clear_around(at);
                 self.things.push(Thing { at: *at, seen_s: 0.0, unseen_s: 0.0 });
             }
@@ -201,6 +204,14 @@ fn shows(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> bool {
     })
 }
 
+fn far_m(person: &Person, at: &Point3<f64>) -> f64 {
+    nalgebra::distance(&person.position.xy(), &at.xy())
+}
+
+fn may_carry(person: &Person, at: &Point3<f64>) -> bool {
+    far_m(person, at) < CARRIED_M && person.velocity.norm() < STAYS_MPS
+}
+
 fn is_near(settings: &CorridorSettings, at: &Point3<f64>) -> bool {
     at.xy().coords.norm() < reach_m(settings)
 }
@@ -211,6 +222,7 @@ fn reach_m(settings: &CorridorSettings) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector2;
     use tagalong_core::{Distortion, Pinhole};
 
     use super::*;
@@ -236,6 +248,10 @@ mod tests {
         })
     }
 
+    fn person(x: f64, y: f64, forward_mps: f64) -> Person {
+        Person { position: Point3::new(x, y, 1.6), velocity: Vector2::new(forward_mps, 0.0) }
+    }
+
     /// Waits before a box at `from_m`, then drives straight towards it, until it is
     /// `to_m` away.
     fn approach(y: f64, from_m: f64, to_m: f64, memory_s: f64, someone: bool) -> Option<Ahead> {
@@ -246,9 +262,9 @@ mod tests {
             let x = from_m - 0.05 * step as f64;
             let forward = if step == 0 { 0.0 } else { 0.05 };
             let motion = Motion { forward, ..Motion::at_rest(0.1) };
-            let people = someone.then_some(Point2::new(x, y));
+            let people = someone.then(|| person(x, y, 0.0));
             let depth = with_box(x, y);
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.into_iter());
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.as_slice());
         }
         surroundings.ahead(&settings, 0.0, None)
     }
@@ -272,10 +288,10 @@ mod tests {
         let depth = with_box(1.0, 0.7);
         let still = Motion::at_rest(0.1);
         for _ in 0..WAIT {
-            surroundings.look(&settings, &camera(), Some(&depth), &still, std::iter::empty());
+            surroundings.look(&settings, &camera(), Some(&depth), &still, &[]);
         }
         let on = Motion { forward: 0.6, ..still };
-        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, std::iter::empty());
+        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, &[]);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
         let bend = surroundings.ahead(&settings, 1.2, None);
         assert!(matches!(bend, Some(Ahead::Something(at)) if at < 0.6), "{bend:?}");
@@ -288,7 +304,7 @@ mod tests {
         let mut surroundings = Surroundings::default();
         let mut look = |x| {
             let (depth, still) = (with_box(x, 0.0), Motion::at_rest(0.1));
-            surroundings.look(&settings, &camera(), Some(&depth), &still, std::iter::empty());
+            surroundings.look(&settings, &camera(), Some(&depth), &still, &[]);
             surroundings.ahead(&settings, 0.0, None)
         };
         assert!(is_at(look(1.5), 1.3));
@@ -307,7 +323,7 @@ mod tests {
             let depth = if step < 15 { with_box(1.2, y) } else { with_box(9.0, 0.0) };
             let forward = if step < 15 { 0.0 } else { 0.05 };
             let motion = Motion { forward, ..Motion::at_rest(0.1) };
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, std::iter::empty());
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, &[]);
             let ahead = surroundings.ahead(&settings, 0.0, None);
             seen += u32::from(matches!(ahead, Some(Ahead::Something(_))));
         }
@@ -315,15 +331,38 @@ mod tests {
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
     }
 
+    /// A suitcase stands behind somebody, and is gone with them when the robot is so
+    /// near that it would be below the image; a box that they walk past is not.
+    #[test]
+    fn what_stands_beside_whoever_stands_may_be_carried_away() {
+        let settings = CorridorSettings::default();
+        for (speed_mps, expected_m) in [(0.0, None), (0.6, Some(0.3))] {
+            let mut surroundings = Surroundings::default();
+            let person = [person(1.7, 0.3, speed_mps)];
+            let mut look = |x: f64, forward, people: &[Person]| {
+                let motion = Motion { forward, ..Motion::at_rest(0.1) };
+                surroundings.look(&settings, &camera(), Some(&with_box(x, 0.0)), &motion, people);
+                surroundings.ahead(&settings, 0.0, None)
+            };
+            (0..WAIT).for_each(|_| _ = look(1.2, 0.0, &person));
+            let near = look(0.5, 0.7, &[]);
+            let gone = look(9.0, 0.0, &[]);
+            match expected_m {
+                None => assert_eq!(gone, Some(Ahead::Free), "{near:?}"),
+                Some(metres) => assert!(is_at(gone, metres), "{gone:?}"),
+            }
+        }
+    }
+
     #[test]
     fn without_depth_there_is_nothing_to_say_and_an_empty_image_is_blind() {
         let settings = CorridorSettings::default();
         let mut surroundings = Surroundings::default();
         let still = Motion::at_rest(0.1);
-        surroundings.look(&settings, &camera(), None, &still, std::iter::empty());
+        surroundings.look(&settings, &camera(), None, &still, &[]);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), None);
         let empty = DepthImage::from_fn(80, 60, |_, _| f32::NAN);
-        surroundings.look(&settings, &camera(), Some(&empty), &still, std::iter::empty());
+        surroundings.look(&settings, &camera(), Some(&empty), &still, &[]);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Blind));
     }
 }
