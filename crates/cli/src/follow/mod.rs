@@ -66,8 +66,7 @@ pub struct FollowArgs {
     /// tables, to this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Print the settings [target.looks] that fit these rides best; use the split
-    /// `training`.
+    /// Print the settings [target.looks] that fit these rides best; use the split `train`.
     #[arg(long)]
     pub fit: bool,
     /// How to print.
