@@ -10,7 +10,7 @@ use tagalong_omni_appearance::train::{Collector, Sample, Training, head};
 use tagalong_omni_appearance::{Config, Distance, Head};
 use tagalong_sim::{Event, Scene, Simulation, Truth};
 use tagalong_trials::{Contender, Draw, Trial, TrialError};
-use tagalong_triangulate::{HatColour, Known, Sight, Station, calibrate, find_hat, triangulate};
+use tagalong_triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate, find_hat};
 
 use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
 
@@ -381,8 +381,6 @@ fn filters(title: &str, walks: &[Walk]) -> Table {
     }
 }
 
-/// Standard deviation of a webcam's bearing, rad.
-const BEARING_RAD: f64 = 0.004;
 /// How far off the first guess of a webcam is: m, rad, and part of the focal length.
 const GUESS: (f64, f64, f64) = (0.3, 0.08, 0.1);
 
@@ -441,9 +439,10 @@ fn guessed(truth: &[Station]) -> Vec<Station> {
     truth.iter().enumerate().map(off).collect()
 }
 
+/// Distances of measured from known places, cm.
 fn distances_to(stations: &[Station], known: &[Known]) -> Vec<f64> {
-    let fix = |known: &Known| triangulate(stations, &known.sights, BEARING_RAD);
-    known.iter().filter_map(|k| Some(100.0 * (fix(k)?.place - k.place).norm())).collect()
+    let cameras = Cameras::new(stations.to_vec());
+    cameras.distances_m(known).iter().map(|m| 100.0 * m).collect()
 }
 
 /// Section 3.

@@ -15,8 +15,8 @@ use crate::suggest::check_log_path;
 /// The arguments of `tagalong eval`.
 #[derive(Args, Debug)]
 pub struct EvalArgs {
-    /// Who was there: MOTChallenge text, people.csv, KITTI labels, or a log with
-    /// the channel /truth/people.
+    /// Who was there: MOTChallenge text, people.csv, KITTI labels, a log with the
+    /// channel /truth/people, or what it would carry, line by line (.jsonl).
     #[arg(long, value_name = "FILE")]
     pub truth: PathBuf,
     /// Who was reported: MOTChallenge text, KITTI labels, tracks-metres.csv, or

@@ -7,7 +7,7 @@ use tagalong_core::{HEAD_RADIUS_M, Rect};
 use tagalong_eval::formats::mot::{self, SequenceInfo};
 use tagalong_eval::formats::{Timeline, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
-use tagalong_log::{Limits, TRUTH_TOPIC, TruthPerson, read_truth};
+use tagalong_log::{Limits, TRUTH_TOPIC, TruthPerson, read_truth, read_truth_lines};
 
 use super::{Shots, read_text, region};
 use crate::outcome::Failure;
@@ -151,9 +151,13 @@ impl TruthFile {
     }
 
     fn of_log(path: &Path) -> Result<Self, Failure> {
-        let frames = read_truth(path, &Limits::default())?.ok_or_else(|| {
-            Failure::failed(format!("{} has no truth: no channel {TRUTH_TOPIC}", path.display()))
-        })?;
+        let frames = match is_lines(path) {
+            true => read_truth_lines(path)?,
+            false => read_truth(path, &Limits::default())?.ok_or_else(|| {
+                let shown = path.display();
+                Failure::failed(format!("{shown} has no truth: no channel {TRUTH_TOPIC}"))
+            })?,
+        };
         let mut file = Self::empty(Kind::Log);
         for frame in frames {
             let annotated = file.frames.entry(frame.stamp_ns).or_default();
@@ -255,9 +259,14 @@ fn guess(rows: &[mot::Row]) -> mot::Rules {
     if rows.iter().all(has_class) { mot::Rules::Mot17 } else { mot::Rules::Mot15 }
 }
 
+/// True for what a log would carry, as a text with one JSON object in each line.
+fn is_lines(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "jsonl")
+}
+
 /// Tells formats apart by how they begin.
 fn kind_of(path: &Path) -> Result<Kind, Failure> {
-    if path.extension().is_some_and(|extension| extension == "mcap") {
+    if is_lines(path) || path.extension().is_some_and(|extension| extension == "mcap") {
         return Ok(Kind::Log);
     }
     let text = read_text(path)?;
