@@ -140,7 +140,8 @@ mod tests {
 
     #[test]
     fn truth_is_read_from_lines_and_a_wrong_one_is_named() {
-        let path = std::env::temp_dir().join(format!("tagalong-lines-{}.jsonl", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("tagalong-lines-{}.jsonl", std::process::id()));
         let line = |stamp_ns| {
             String::from_utf8(TruthFrame { stamp_ns, people: Vec::new() }.encode()).unwrap()
         };

@@ -120,8 +120,7 @@ fn guess(path: &Path) -> Result<Vec<WebcamSettings>, Failure> {
 }
 
 fn put(path: &Path, text: &str) -> Result<(), Failure> {
-    fs::write(path, text)
-        .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))
+    fs::write(path, text).map_err(|error| Failure::failed(format!("{}: {error}", path.display())))
 }
 
 /// What all cameras saw at one moment.
