@@ -103,7 +103,7 @@ fn webcams_make_the_truth_of_a_log() {
 
     fs::write(
         path("c.toml"),
-        "[[detectors]]\nplugin = \"omni-appearance\"\n[filter]\nplugin = \"ekf\"\n",
+        "[[detectors]]\nplugin = \"omni-appearance\"\nconfig = { distance = \"analytic\" }\n[filter]\nplugin = \"ekf\"\n",
     )
     .unwrap();
     let plan = run(
@@ -111,6 +111,23 @@ fn webcams_make_the_truth_of_a_log() {
         &["bench", "plan", "--logs", "hat.mcap", "--configs", "c.toml", "-o", "b"],
     );
     assert!(plan.contains("hat.truth.jsonl"), "{plan}");
+    run(folder.path(), &["run", "c.toml", "hat.mcap", "-o", "r"]);
+    let scores = run(
+        folder.path(),
+        &[
+            "eval",
+            "--truth",
+            "hat.truth.jsonl",
+            "--tracks",
+            "r",
+            "--similarity",
+            "metres",
+            "--format",
+            "json",
+        ],
+    );
+    let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
+    assert_eq!(scores["truths"].as_u64(), Some(measured.len() as u64), "{scores}");
 }
 
 #[test]

@@ -55,7 +55,13 @@ pub(super) fn frames(
         let person = person.map(|(place, ignore)| {
             let here = robot.inverse_transform_point(&place);
             let head = Some([here.x, here.y, args.head]);
-            TruthPerson { id: PERSON, head_in_robot_m: head, ignore, ..TruthPerson::default() }
+            TruthPerson {
+                id: PERSON,
+                head_in_robot_m: head,
+                ignore,
+                visible: 1.0,
+                ..TruthPerson::default()
+            }
         });
         Some(TruthFrame { stamp_ns: shot.stamp_ns, people: person.into_iter().collect() })
     };
