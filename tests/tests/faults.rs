@@ -15,29 +15,7 @@ use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
 use tagalong_pipeline::{FrameReport, LockState, Pipeline};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
 
-/// Somebody stands before a robot that stands. Small images are enough.
-const SCENE: &str = "
-seed = 3
-duration_s = 3.0
-
-[room]
-size_m = [12.0, 8.0]
-
-[camera]
-width = 160
-height = 120
-rate_hz = 10.0
-
-[faults]
-late = 0.0
-
-[robot]
-start = [0.8, 2.0]
-
-[[people]]
-path = [[3.0, 2.0], [3.6, 2.0]]
-speed_mps = 0.2
-";
+const SCENE: &str = include_str!("../scenes/small-room.toml");
 
 const PERIOD_S: f64 = 0.1;
 
@@ -126,18 +104,8 @@ fn send(log: &mut MessageLog, recorded: Stamp, stamp: Stamp, images: &Images, is
 
 fn info(camera: &Camera) -> CameraInfo {
     let Lens::Pinhole(lens) = camera.lens else { panic!("a pinhole camera") };
-    let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
-    CameraInfo {
-        header: Header::new(at(0), "camera"),
-        height: camera.height as u32,
-        width: camera.width as u32,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-        ..CameraInfo::default()
-    }
+    let size = (camera.width, camera.height);
+    CameraInfo::of_lens(&Header::new(at(0), "camera"), &lens, size, 0.0)
 }
 
 /// What a run over a log gave: stamps with tracks, and how many images found no

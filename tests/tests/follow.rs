@@ -8,33 +8,17 @@ use std::sync::Arc;
 use nalgebra::Isometry2;
 use tagalong_core::{Camera, Frame, Motion, Registry, Stamp, TrackId};
 use tagalong_pipeline::Pipeline;
-use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+use tagalong_sim::{Event, Scene, Shot, Simulation, Truth, Variant};
 
-/// A person walks ahead and around a bend at 0.7 m/s. Small images are enough
-/// for somebody so near, and quickly drawn.
-const SCENE: &str = "
-seed = 3
-duration_s = 11.0
-
-[room]
-size_m = [12.0, 8.0]
-
-[camera]
-width = 160
-height = 120
-rate_hz = 10.0
-
-[faults]
-late = 0.0
-
-[robot]
-start = [0.8, 2.0]
-
-[[people]]
-path = [[3.0, 2.0], [6.0, 2.0], [9.0, 5.5]]
-speed_mps = 0.7
-start_s = 1.0
-";
+/// A person walks ahead and around a bend at 0.7 m/s.
+fn scene() -> Scene {
+    let walk = Variant::default()
+        .with("duration_s", 11.0)
+        .with("people.0.path", "[[3.0, 2.0], [6.0, 2.0], [9.0, 5.5]]")
+        .with("people.0.speed_mps", 0.7)
+        .with("people.0.start_s", 1.0);
+    Scene::parse_with(include_str!("../scenes/small-room.toml"), &walk).unwrap()
+}
 
 /// The frames that a pipeline gets, from what a robot records.
 struct Recorder {
@@ -79,7 +63,7 @@ struct Step {
 
 fn follow() -> Vec<Step> {
     let mut pipeline = pipeline();
-    let mut simulation = Simulation::new(&Scene::parse(SCENE).unwrap(), 2);
+    let mut simulation = Simulation::new(&scene(), 2);
     let mut recorder = Recorder::new(simulation.camera());
     let mut steps = Vec::new();
     while let Some(event) = simulation.next_event() {

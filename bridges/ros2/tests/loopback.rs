@@ -24,32 +24,17 @@ use tagalong_log::msgs::{
     TFMessage, TransformStamped, TwistStamped,
 };
 use tagalong_ros2::{BridgeError, Options, Summary, run};
-use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation};
+use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Variant};
 
 /// Somebody stands before the robot and then walks away slowly.
-const SCENE: &str = "
-seed = 3
-duration_s = 10.0
-
-[room]
-size_m = [12.0, 8.0]
-
-[camera]
-width = 160
-height = 120
-rate_hz = 10.0
-
-[faults]
-late = 0.0
-
-[robot]
-start = [0.8, 2.0]
-
-[[people]]
-path = [[3.0, 2.0], [7.0, 2.0]]
-speed_mps = 0.4
-start_s = 3.0
-";
+fn scene() -> Scene {
+    let walk = Variant::default()
+        .with("duration_s", 10.0)
+        .with("people.0.path", "[[3.0, 2.0], [7.0, 2.0]]")
+        .with("people.0.speed_mps", 0.4)
+        .with("people.0.start_s", 3.0);
+    Scene::parse_with(include_str!("../../../tests/scenes/small-room.toml"), &walk).unwrap()
+}
 
 /// What may pass between the moment that an image was sent last and that a command
 /// was received: how long a command lasts, a control period, and the way.
@@ -246,18 +231,8 @@ impl Robot {
 
     fn calibration(&self, header: &Header) -> CameraInfo {
         let Lens::Pinhole(lens) = self.camera.lens else { panic!("a pinhole camera") };
-        let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
-        CameraInfo {
-            header: header.clone(),
-            height: self.camera.height as u32,
-            width: self.camera.width as u32,
-            distortion_model: "plumb_bob".into(),
-            d: vec![0.0; 5],
-            k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-            ..CameraInfo::default()
-        }
+        let size = (self.camera.width, self.camera.height);
+        CameraInfo::of_lens(header, &lens, size, 0.0)
     }
 }
 
@@ -285,7 +260,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
         return;
     }
     let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-    let simulation = Simulation::new(&Scene::parse(SCENE).unwrap(), 1);
+    let simulation = Simulation::new(&scene(), 1);
     let mut robot = Robot::new(domain(0), simulation.camera());
     let tracks = robot.peer.collect::<Detection3DArray>("/people/tracks", &heard_all);
     let poses = robot.peer.collect::<PoseStamped>("/people/target_pose", &heard_all);

@@ -1,6 +1,6 @@
 //! What trainers of plugins share, so that their cards can be compared: groups
 //! are dealt out to folds and never split ([`parts`]), held-out values become
-//! figures ([`area`], [`accepted`]), and log-odds ([`platt`]), and pictures become more
+//! figures ([`area`], [`accepted`]) and log-odds ([`platt`], [`logistic`]), and pictures become more
 //! of them ([`mirrored`], [`shifted`]). Boosted trees are
 //! grown here, too ([`boost`]).
 //!
@@ -10,9 +10,11 @@ pub mod boost;
 mod calibrate;
 mod folds;
 mod held_out;
+mod logistic;
 mod variants;
 
 pub use calibrate::{Line, platt};
 pub use folds::{Use, mix, parts, use_of};
 pub use held_out::{accepted, area};
+pub use logistic::{Example, logistic};
 pub use variants::{mirrored, shifted};

@@ -2,7 +2,7 @@
 
 use tagalong_core::{ConicalMirror, Distortion, Panorama, Pinhole};
 
-use crate::msgs::CameraInfo;
+use crate::msgs::{CameraInfo, Header};
 
 /// A lens with the image it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,31 @@ pub enum Mirrored {
 /// tangents of the smallest and the largest angle from the axis; K is that of
 /// any image with evenly spaced angles, and follows from D.
 pub const UNWRAPPED: &str = "conical_mirror_unwrapped";
+
+impl CameraInfo {
+    /// The calibration of a camera without mirror, as its driver would publish it;
+    /// [`intrinsics`] reads it back. `size` is columns and rows of the image, and
+    /// `aside_m` how far to the right of the left camera of a stereo pair it is, m.
+    pub fn of_lens(header: &Header, lens: &Pinhole, size: (usize, usize), aside_m: f64) -> Self {
+        let Pinhole { fx, fy, cx, cy, distortion } = *lens;
+        let (model, d) = match distortion {
+            Distortion::None => ("plumb_bob", vec![0.0; 5]),
+            Distortion::PlumbBob(d) => ("plumb_bob", d.to_vec()),
+            Distortion::Rational(d) => ("rational_polynomial", d.to_vec()),
+        };
+        Self {
+            header: header.clone(),
+            width: size.0 as u32,
+            height: size.1 as u32,
+            distortion_model: model.into(),
+            d,
+            k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            p: [fx, 0.0, cx, -fx * aside_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ..Self::default()
+        }
+    }
+}
 
 /// Why a calibration cannot be used; the field is named.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -258,6 +283,22 @@ mod tests {
             r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
             p: [480.0, 0.0, 321.0, -48.0, 0.0, 480.0, 241.0, 0.0, 0.0, 0.0, 1.0, 0.0],
             ..CameraInfo::default()
+        }
+    }
+
+    #[test]
+    fn what_a_lens_publishes_is_read_back() {
+        use Distortion::{None, PlumbBob, Rational};
+        let bent = PlumbBob([0.1, -0.2, 0.001, 0.002, 0.05]);
+        let fish = Rational([0.1, -0.2, 0.001, 0.002, 0.05, 0.3, 0.2, 0.1]);
+        for distortion in [None, bent, fish] {
+            let lens = Pinhole { fx: 500.0, fy: 510.0, cx: 320.0, cy: 240.0, distortion };
+            let info = CameraInfo::of_lens(&Header::default(), &lens, (640, 480), 0.12);
+            let read = intrinsics(&info, false).unwrap();
+            let size = (read.width, read.height);
+            let baseline_m = read.baseline_m.unwrap();
+            assert_eq!((read.lens, size, read.mirror), (lens, (640, 480), Option::None));
+            assert!((baseline_m - 0.12).abs() < 1e-12, "{baseline_m}");
         }
     }
 

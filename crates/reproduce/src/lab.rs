@@ -6,9 +6,9 @@ use tagalong_sim::{Scene, Split, Variant};
 use tagalong_trials::{Contender, Trial, TrialError, each};
 
 /// Fewest seeds of a quick experiment.
-const FEWEST: u64 = 3;
+const FEWEST: u64 = 1;
 /// A quick experiment has one seed where a whole one has this many.
-const QUICK: u64 = 12;
+const QUICK: u64 = 50;
 
 /// Why an experiment has no findings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -156,7 +156,7 @@ mod tests {
     fn seeds_are_as_asked_or_few_when_quick() {
         let registry = Registry::default();
         assert_eq!(lab(&registry, false, None).seeds(100), 100);
-        assert_eq!(lab(&registry, true, None).seeds(100), 8);
+        assert_eq!(lab(&registry, true, None).seeds(100), 2);
         assert_eq!(lab(&registry, true, None).seeds(20), FEWEST);
         assert_eq!(lab(&registry, true, None).seeds(1), 1);
         assert_eq!(lab(&registry, true, Some(7)).seeds(100), 7);

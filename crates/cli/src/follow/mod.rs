@@ -1,5 +1,6 @@
 //! `tagalong follow`: a pipeline steers the simulated robot through scenes.
 
+mod fit;
 mod log;
 mod story;
 mod table;
@@ -12,6 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use log::RideLog;
 use serde::Serialize;
 use tagalong_core::Registry;
+use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
 use tagalong_sim::{Scene, Split, Variant};
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
@@ -64,6 +66,9 @@ pub struct FollowArgs {
     /// tables, to this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+    /// Print the settings [target.looks] that fit these rides best; use the split `train`.
+    #[arg(long)]
+    pub fit: bool,
     /// How to print.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
@@ -103,6 +108,8 @@ pub struct Followed {
 #[derive(Serialize)]
 struct Findings<'a> {
     tables: &'a [Table],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    looks: Option<&'a LooksSettings>,
     rides: &'a [Followed],
 }
 
@@ -228,7 +235,8 @@ fn bar(rides: usize) -> ProgressBar {
 
 fn report(args: &FollowArgs, results: &[Followed]) -> Result<(), Failure> {
     let tables = table::tables(results);
-    let findings = Findings { tables: &tables, rides: results };
+    let looks = args.fit.then(|| fit::looks(results));
+    let findings = Findings { tables: &tables, looks: looks.as_ref(), rides: results };
     let json = serde_json::to_string_pretty(&findings).unwrap_or_default() + "\n";
     let joined = |show: fn(&Table) -> String| -> String {
         tables.iter().map(show).collect::<Vec<_>>().join("\n")
@@ -242,6 +250,9 @@ fn report(args: &FollowArgs, results: &[Followed]) -> Result<(), Failure> {
             }
             print(&joined(Table::text))?;
         }
+    }
+    if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
+        print(&fit::toml(&looks))?;
     }
     let Some(folder) = &args.output else { return Ok(()) };
     let markdown = joined(Table::markdown);

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::Isometry3;
-use tagalong_core::Stamp;
+use tagalong_core::{Distortion, Pinhole, Stamp};
 use tagalong_log::msgs::{
     CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, TransformStamped,
 };
@@ -105,17 +105,9 @@ fn info(
     let [fx, fy] = lens.focal;
     let middle = [width, height].map(|side| 0.5 * (f64::from(side) - 1.0));
     let [cx, cy] = lens.centre.unwrap_or(middle);
-    Some(CameraInfo {
-        header: header.clone(),
-        height,
-        width,
-        distortion_model: "plumb_bob".into(),
-        d: lens.distortion.to_vec(),
-        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [fx, 0.0, cx, -fx * aside_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-        ..CameraInfo::default()
-    })
+    let distortion = Distortion::PlumbBob(lens.distortion);
+    let lens = Pinhole { fx, fy, cx, cy, distortion };
+    Some(CameraInfo::of_lens(header, &lens, (width as usize, height as usize), aside_m))
 }
 
 /// A 16-bit PNG as millimetres.

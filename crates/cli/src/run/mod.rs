@@ -135,6 +135,9 @@ fn work(
         let Some(item) = frames.next(signals) else { return Ok(None) };
         desk.timings.add("read", ms_since(waiting));
         desk.tally.read(item.frame.odom_stale);
+        if item.frame.odom_jumped {
+            pipeline.disarm("odometry jumped");
+        }
         let report = match pipeline.step(&item.frame.frame) {
             Ok(report) => report,
             Err(error) => return Ok(Some(error)),

@@ -190,18 +190,8 @@ impl Recorder {
 
 fn info(camera: &Camera, header: &Header, aside_m: f64) -> Option<CameraInfo> {
     let Lens::Pinhole(lens) = camera.lens else { return None };
-    let (fx, fy, cx, cy) = (lens.fx, lens.fy, lens.cx, lens.cy);
-    Some(CameraInfo {
-        header: header.clone(),
-        height: camera.height as u32,
-        width: camera.width as u32,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [fx, 0.0, cx, -fx * aside_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-        ..CameraInfo::default()
-    })
+    let size = (camera.width, camera.height);
+    Some(CameraInfo::of_lens(header, &lens, size, aside_m))
 }
 
 fn webcam_frame(index: usize) -> String {

@@ -57,9 +57,11 @@ pub fn config(folder: &Path, extra: &str) -> PathBuf {
     path
 }
 
+const LENS: Pinhole =
+    Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+
 pub fn camera() -> Camera {
-    let lens = Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
-    Camera::mounted(lens, WIDTH, HEIGHT, 1.2, 0.0, 0.0)
+    Camera::mounted(LENS, WIDTH, HEIGHT, 1.2, 0.0, 0.0)
 }
 
 /// What a drawn log consists of.
@@ -97,7 +99,8 @@ impl Drawn {
 
     fn write_frame(&self, log: &mut Log, stamp: u64, index: u64) {
         let header = Header::new(Stamp::from_nanos(stamp), "camera_optical");
-        log.send("/camera/color/camera_info", stamp, &info(&header));
+        let info = CameraInfo::of_lens(&header, &LENS, (WIDTH, HEIGHT), 0.0);
+        log.send("/camera/color/camera_info", stamp, &info);
         let colour = colour(index);
         log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", 3, &colour));
         if self.in_space {
@@ -107,7 +110,7 @@ impl Drawn {
             log.send("/detections", stamp, &boxes(&header, index));
         }
         if self.depth {
-            log.send("/camera/depth/camera_info", stamp, &info(&header));
+            log.send("/camera/depth/camera_info", stamp, &info);
             let depth = depth(index);
             log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", 2, &depth));
         }
@@ -177,20 +180,6 @@ fn image<'a>(header: &Header, encoding: &'a str, bytes: u32, data: &'a [u8]) -> 
         is_bigendian: 0,
         step: bytes * WIDTH as u32,
         data,
-    }
-}
-
-fn info(header: &Header) -> CameraInfo {
-    CameraInfo {
-        header: header.clone(),
-        height: HEIGHT as u32,
-        width: WIDTH as u32,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [130.0, 0.0, 79.5, 0.0, 130.0, 59.5, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [130.0, 0.0, 79.5, 0.0, 0.0, 130.0, 59.5, 0.0, 0.0, 0.0, 1.0, 0.0],
-        ..CameraInfo::default()
     }
 }
 

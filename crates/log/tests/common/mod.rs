@@ -153,17 +153,8 @@ fn transform(parent: &str, child: &str, stamp: Stamp, pose: &Isometry3<f64>) -> 
 
 pub fn info_of(frame: &str, camera: &Camera) -> CameraInfo {
     let tagalong_core::Lens::Pinhole(lens) = &camera.lens else { panic!("pinhole") };
-    CameraInfo {
-        header: Header::new(at(0.0), frame),
-        height: camera.height as u32,
-        width: camera.width as u32,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [lens.fx, 0.0, lens.cx, 0.0, lens.fy, lens.cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [lens.fx, 0.0, lens.cx, 0.0, 0.0, lens.fy, lens.cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-        ..CameraInfo::default()
-    }
+    let size = (camera.width, camera.height);
+    CameraInfo::of_lens(&Header::new(at(0.0), frame), lens, size, 0.0)
 }
 
 /// A level camera 1.2 m high.

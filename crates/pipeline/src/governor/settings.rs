@@ -100,7 +100,7 @@ impl Default for CorridorSettings {
             target_radius_m: 0.45,
             min_points: 6,
             min_seen: 0.02,
-            memory_s: 8.0,
+            memory_s: 20.0,
         }
     }
 }

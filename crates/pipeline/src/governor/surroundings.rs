@@ -1,5 +1,5 @@
 use nalgebra::{Point2, Point3};
-use tagalong_core::{Camera, DepthImage, Motion};
+use tagalong_core::{Camera, DepthImage, Motion, Person};
 
 use super::CorridorSettings;
 use super::corridor::{Ahead, ahead, is_thing};
@@ -10,6 +10,12 @@ const COLUMNS: usize = 160;
 const CELL_M: f64 = 0.05;
 /// So many points in a cell are no noise.
 const ENOUGH: u16 = 3;
+/// What stands in its place for so long is a thing; somebody who walks by is not.
+const STANDS_S: f64 = 1.0;
+/// What people carry, draw along or push is this near to them, m, ...
+const CARRIED_M: f64 = 0.8;
+/// ... and stays where it is while they are slower than this, m/s.
+const STAYS_MPS: f64 = 0.25;
 /// What the image shows this far before a place hides the place, m.
 const BEFORE_M: f64 = 0.2;
 
@@ -21,30 +27,35 @@ pub(crate) struct Surroundings {
     seen: Vec<Point3<f64>>,
     /// Part of the image that has depth; `None` without a depth image.
     with_depth: Option<f64>,
-    remembered: Vec<Thing>,
-    /// Points in each cell of a grid around the robot.
-    cells: Vec<u16>,
+    things: Vec<Thing>,
+    grid: Grid,
 }
 
-/// Something that was seen; robot frame, m.
+/// Something that does not move.
 struct Thing {
+    /// Robot frame, m.
     at: Point3<f64>,
-    ago_s: f64,
+    /// How long it has been seen, s; the time does not count in which it may have
+    /// stood there because of somebody who stood beside it.
+    seen_s: f64,
+    /// How long it has not been seen, s.
+    unseen_s: f64,
 }
 
 impl Surroundings {
     /// Takes in an image; the robot moved by `motion` since the last one. What is
-    /// near somebody, robot frame, m, moves and is not remembered.
+    /// near somebody is not remembered, nor is what does not stay where it is.
     pub(crate) fn look(
         &mut self,
         settings: &CorridorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
         motion: &Motion,
-        people: impl Iterator<Item = Point2<f64>> + Clone,
+        people: &[Person],
     ) {
-        self.forget(settings, camera, depth, motion);
         self.see(settings, camera, depth);
+        self.grid.count(settings, &self.seen);
+        self.meet_again(settings, camera, depth, motion, people);
         self.remember(settings, people);
     }
 
@@ -64,25 +75,38 @@ impl Surroundings {
             return Some(Ahead::Blind);
         }
         let seen = self.seen.iter().map(|point| (*point, 1));
-        let remembered = self.remembered.iter().map(|thing| (thing.at, settings.min_points));
-        Some(ahead(settings, seen.chain(remembered), curvature, target))
+        let unseen = self.things.iter().filter(|thing| thing.unseen_s > 0.0);
+        let unseen = unseen.map(|thing| (thing.at, settings.min_points));
+        Some(ahead(settings, seen.chain(unseen), curvature, target))
     }
 
-    /// Moves what is remembered into the robot's new frame. What the camera sees
-    /// again, or sees past, need not be remembered.
-    fn forget(
+    /// Moves the things into the robot's new frame, and forgets where the camera
+    /// sees past, what did not stand there for long, and what is out of view for
+    /// too long.
+    fn meet_again(
         &mut self,
         settings: &CorridorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
         motion: &Motion,
+        people: &[Person],
     ) {
-        self.remembered.retain_mut(|Thing { at, ago_s }| {
+        let grid = &self.grid;
+        self.things.retain_mut(|Thing { at, seen_s, unseen_s }| {
             let moved = motion.apply_to_point(at.xy());
             *at = Point3::new(moved.x, moved.y, at.z);
-            *ago_s += motion.dt;
-            let is_seen = depth.is_some_and(|depth| shows(camera, depth, at));
-            *ago_s <= settings.memory_s && is_near(settings, at) && !is_seen
+            if !is_near(settings, at) {
+                return false;
+            }
+            if grid.is_something(at) {
+                let carried = people.iter().any(|person| may_carry(person, at));
+                *seen_s += if carried { 0.0 } else { motion.dt };
+                *unseen_s = 0.0;
+                return true;
+            }
+            *unseen_s += motion.dt;
+            let stands = *seen_s >= STANDS_S && *unseen_s <= settings.memory_s;
+            stands && !depth.is_some_and(|depth| shows(camera, depth, at))
         });
     }
 
@@ -110,27 +134,61 @@ impl Surroundings {
         });
     }
 
-    fn remember(
-        &mut self,
-        settings: &CorridorSettings,
-        people: impl Iterator<Item = Point2<f64>> + Clone,
-    ) {
-        let side = 2 * (reach_m(settings) / CELL_M).ceil() as usize + 1;
-        let cell = |at: &Point3<f64>| {
-            let of = |metres: f64| (metres / CELL_M + side as f64 / 2.0) as usize;
-            of(at.x).min(side - 1) * side + of(at.y).min(side - 1)
-        };
-        self.cells.clear();
-        self.cells.resize(side * side, 0);
-        self.remembered.iter().for_each(|thing| self.cells[cell(&thing.at)] = ENOUGH);
+    fn remember(&mut self, settings: &CorridorSettings, people: &[Person]) {
+        self.things.iter().for_each(|thing| self.grid.clear_around(&thing.at));
         for at in &self.seen {
-            let points = &mut self.cells[cell(at)];
-            *points = points.saturating_add(1);
-            let near = |person| nalgebra::distance(&at.xy(), &person) < settings.target_radius_m;
-            if *points == ENOUGH && !people.clone().any(near) {
-                self.remembered.push(Thing { at: *at, ago_s: 0.0 });
+            let is_of = |person: &Person| far_m(person, at) < settings.target_radius_m;
+            if self.grid.is_full(at) && !people.iter().any(is_of) {
+                self.grid.clear_around(at);
+                self.things.push(Thing { at: *at, seen_s: 0.0, unseen_s: 0.0 });
             }
         }
+    }
+}
+
+/// Points in each cell of a grid around the robot, and a border of one cell.
+#[derive(Default)]
+struct Grid {
+    points: Vec<u16>,
+    side: usize,
+}
+
+impl Grid {
+    fn count(&mut self, settings: &CorridorSettings, seen: &[Point3<f64>]) {
+        self.side = 2 * (reach_m(settings) / CELL_M).ceil() as usize + 3;
+        self.points.clear();
+        self.points.resize(self.side * self.side, 0);
+        for at in seen {
+            let cell = self.cell(at);
+            self.points[cell] = self.points[cell].saturating_add(1);
+        }
+    }
+
+    /// The cell of a place within reach.
+    fn cell(&self, at: &Point3<f64>) -> usize {
+        let of = |metres: f64| {
+            let cell = (metres / CELL_M + self.side as f64 / 2.0) as usize;
+            cell.clamp(1, self.side - 2)
+        };
+        of(at.x) * self.side + of(at.y)
+    }
+
+    fn around(&self, at: &Point3<f64>) -> [usize; 9] {
+        let (cell, side) = (self.cell(at), self.side);
+        std::array::from_fn(|i| cell + (i / 3) * side + i % 3 - side - 1)
+    }
+
+    fn is_full(&self, at: &Point3<f64>) -> bool {
+        self.points[self.cell(at)] >= ENOUGH
+    }
+
+    /// True if there is something here, or one cell away.
+    fn is_something(&self, at: &Point3<f64>) -> bool {
+        self.around(at).iter().any(|cell| self.points[*cell] >= ENOUGH)
+    }
+
+    fn clear_around(&mut self, at: &Point3<f64>) {
+        self.around(at).iter().for_each(|cell| self.points[*cell] = 0);
     }
 }
 
@@ -146,6 +204,14 @@ fn shows(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> bool {
     })
 }
 
+fn far_m(person: &Person, at: &Point3<f64>) -> f64 {
+    nalgebra::distance(&person.position.xy(), &at.xy())
+}
+
+fn may_carry(person: &Person, at: &Point3<f64>) -> bool {
+    far_m(person, at) < CARRIED_M && person.velocity.norm() < STAYS_MPS
+}
+
 fn is_near(settings: &CorridorSettings, at: &Point3<f64>) -> bool {
     at.xy().coords.norm() < reach_m(settings)
 }
@@ -156,6 +222,7 @@ fn reach_m(settings: &CorridorSettings) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector2;
     use tagalong_core::{Distortion, Pinhole};
 
     use super::*;
@@ -165,6 +232,9 @@ mod tests {
         let lens = Pinhole { fx: 40.0, fy: 40.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
         Camera::mounted(lens, 80, 60, 1.0, 0.0, 0.0)
     }
+
+    /// So many frames are enough to know that something stands, at 10 a second.
+    const WAIT: usize = 12;
 
     /// A wall at 6 m and a box 0.4 m wide and 0.6 m high, its front at (x, y).
     fn with_box(x: f64, y: f64) -> DepthImage {
@@ -178,18 +248,23 @@ mod tests {
         })
     }
 
-    /// Drives straight towards a box at `from_m`, and on until it is `to_m` away.
+    fn person(x: f64, y: f64, forward_mps: f64) -> Person {
+        Person { position: Point3::new(x, y, 1.6), velocity: Vector2::new(forward_mps, 0.0) }
+    }
+
+    /// Waits before a box at `from_m`, then drives straight towards it, until it is
+    /// `to_m` away.
     fn approach(y: f64, from_m: f64, to_m: f64, memory_s: f64, someone: bool) -> Option<Ahead> {
         let settings = CorridorSettings { memory_s, ..CorridorSettings::default() };
         let mut surroundings = Surroundings::default();
         let steps = ((from_m - to_m) / 0.05).round() as usize;
-        for step in 0..=steps {
+        for step in (0..WAIT).map(|_| 0).chain(1..=steps) {
             let x = from_m - 0.05 * step as f64;
             let forward = if step == 0 { 0.0 } else { 0.05 };
             let motion = Motion { forward, ..Motion::at_rest(0.1) };
-            let people = someone.then_some(Point2::new(x, y));
+            let people = someone.then(|| person(x, y, 0.0));
             let depth = with_box(x, y);
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.into_iter());
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.as_slice());
         }
         surroundings.ahead(&settings, 0.0, None)
     }
@@ -212,9 +287,11 @@ mod tests {
         let mut surroundings = Surroundings::default();
         let depth = with_box(1.0, 0.7);
         let still = Motion::at_rest(0.1);
-        surroundings.look(&settings, &camera(), Some(&depth), &still, std::iter::empty());
+        for _ in 0..WAIT {
+            surroundings.look(&settings, &camera(), Some(&depth), &still, &[]);
+        }
         let on = Motion { forward: 0.6, ..still };
-        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, std::iter::empty());
+        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, &[]);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
         let bend = surroundings.ahead(&settings, 1.2, None);
         assert!(matches!(bend, Some(Ahead::Something(at)) if at < 0.6), "{bend:?}");
@@ -227,11 +304,54 @@ mod tests {
         let mut surroundings = Surroundings::default();
         let mut look = |x| {
             let (depth, still) = (with_box(x, 0.0), Motion::at_rest(0.1));
-            surroundings.look(&settings, &camera(), Some(&depth), &still, std::iter::empty());
+            surroundings.look(&settings, &camera(), Some(&depth), &still, &[]);
             surroundings.ahead(&settings, 0.0, None)
         };
         assert!(is_at(look(1.5), 1.3));
         assert_eq!(look(9.0), Some(Ahead::Free));
+    }
+
+    /// Somebody whose head is above the image walks through the way, half a metre
+    /// before the robot: only the legs were seen, and they are no thing.
+    #[test]
+    fn who_walks_by_is_not_remembered() {
+        let settings = CorridorSettings::default();
+        let mut surroundings = Surroundings::default();
+        let mut seen = 0;
+        for step in 0..=30 {
+            let y = -1.5 + 0.1 * f64::from(step);
+            let depth = if step < 15 { with_box(1.2, y) } else { with_box(9.0, 0.0) };
+            let forward = if step < 15 { 0.0 } else { 0.05 };
+            let motion = Motion { forward, ..Motion::at_rest(0.1) };
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, &[]);
+            let ahead = surroundings.ahead(&settings, 0.0, None);
+            seen += u32::from(matches!(ahead, Some(Ahead::Something(_))));
+        }
+        assert!(seen >= 3, "{seen}");
+        assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
+    }
+
+    /// A suitcase stands behind somebody, and is gone with them when the robot is so
+    /// near that it would be below the image; a box that they walk past is not.
+    #[test]
+    fn what_stands_beside_whoever_stands_may_be_carried_away() {
+        let settings = CorridorSettings::default();
+        for (speed_mps, expected_m) in [(0.0, None), (0.6, Some(0.3))] {
+            let mut surroundings = Surroundings::default();
+            let person = [person(1.7, 0.3, speed_mps)];
+            let mut look = |x: f64, forward, people: &[Person]| {
+                let motion = Motion { forward, ..Motion::at_rest(0.1) };
+                surroundings.look(&settings, &camera(), Some(&with_box(x, 0.0)), &motion, people);
+                surroundings.ahead(&settings, 0.0, None)
+            };
+            (0..WAIT).for_each(|_| _ = look(1.2, 0.0, &person));
+            let near = look(0.5, 0.7, &[]);
+            let gone = look(9.0, 0.0, &[]);
+            match expected_m {
+                None => assert_eq!(gone, Some(Ahead::Free), "{near:?}"),
+                Some(metres) => assert!(is_at(gone, metres), "{gone:?}"),
+            }
+        }
     }
 
     #[test]
@@ -239,10 +359,10 @@ mod tests {
         let settings = CorridorSettings::default();
         let mut surroundings = Surroundings::default();
         let still = Motion::at_rest(0.1);
-        surroundings.look(&settings, &camera(), None, &still, std::iter::empty());
+        surroundings.look(&settings, &camera(), None, &still, &[]);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), None);
         let empty = DepthImage::from_fn(80, 60, |_, _| f32::NAN);
-        surroundings.look(&settings, &camera(), Some(&empty), &still, std::iter::empty());
+        surroundings.look(&settings, &camera(), Some(&empty), &still, &[]);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Blind));
     }
 }
