@@ -43,8 +43,8 @@ fn samples(lab: &Lab, scene: &Scene, person: u64) -> Result<Vec<Sample>, Reprodu
 
 pub(super) fn appearance(lab: &Lab) -> Result<Findings, ReproduceError> {
     let known = alone(lab, "omni-room", 1, IMAGES)?;
-    let strangers = if lab.quick { 1 } else { STRANGERS };
-    let strangers = alone(lab, "omni-strangers", strangers, STRANGER_IMAGES)?;
+    let seeds = lab.seeds(STRANGERS).min(STRANGERS);
+    let strangers = alone(lab, "omni-strangers", seeds, STRANGER_IMAGES)?;
     lab.progress.begin(known.len() + strangers.len(), "drawing the room");
     let mut persons = Vec::new();
     for (number, scene) in known.iter().enumerate() {

@@ -9,11 +9,9 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 /// The printed method, ours, its detector with the filter of P1, and our best.
 const PIPELINES: [&str; 4] =
     ["omni-appearance-as-printed", "omni-appearance", "omni-ekf", "omni-best"];
-/// Draws of each scene, ...
+/// Draws of each scene.
 const SEEDS: u64 = 5;
-/// ... in a minute's version so many ...
-const QUICK_SEEDS: u64 = 1;
-/// ... and so long, s.
+/// How long they are in a minute's version, s.
 const QUICK_S: f64 = 30.0;
 
 /// A name, a scene, and how many of its people walk in it.
@@ -41,8 +39,7 @@ pub(super) fn people(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 fn scenes(lab: &Lab, name: &str, people: usize) -> Result<Vec<Scene>, ReproduceError> {
-    let seeds = lab.seeds.unwrap_or(if lab.quick { QUICK_SEEDS } else { SEEDS });
-    let mut scenes = lab.scenes(name, &[], seeds)?;
+    let mut scenes = lab.scenes(name, &[], lab.seeds(SEEDS))?;
     for scene in &mut scenes {
         scene.webcams.clear();
         scene.people.truncate(people);
