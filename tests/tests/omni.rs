@@ -121,8 +121,11 @@ fn info(model: &str, size: [usize; 2], focal: f64, centre: [f64; 2], d: [f64; 4]
     }
 }
 
+/// Where people are in each image, m.
+type Places = Vec<Vec<[f64; 3]>>;
+
 /// What is seen in a log: images as they reach the tracker, and where people are.
-fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Vec<Vec<[f64; 3]>>) {
+fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
     let few = "[[detectors]]\nplugin = \"omni-appearance\"\nconfig = { distance = \"rich\", \
                background_frames = 6 }\n[filter]\nplugin = \"floor-kalman\"\n";
     let mut pipeline = Contender::new("few", few).pipeline(&registry(), 0).unwrap();
@@ -169,6 +172,6 @@ fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
     for (a, b) in from_circles.iter().flatten().zip(from_panoramas.iter().flatten()) {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6), "{a:?} {b:?}");
     }
-    let counts = |all: &[Vec<[f64; 3]>]| all.iter().map(Vec::len).collect::<Vec<_>>();
+    let counts = |all: &Places| all.iter().map(Vec::len).collect::<Vec<_>>();
     assert_eq!(counts(&from_circles), counts(&from_panoramas));
 }
