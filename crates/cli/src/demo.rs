@@ -70,7 +70,8 @@ fn draw(folder: &Path, seed: Option<u64>) -> Result<PathBuf, Failure> {
     let log = folder.join("demo.mcap");
     make_folder(folder)?;
     put(&folder.join("demo-scene.toml"), SCENE)?;
-    record(Simulation::new(&scene, threads(None)), &scene, &log).map_err(Failure::failed)?;
+    record(Simulation::new(&scene, threads(None)), &scene, &log, &|| true)
+        .map_err(Failure::failed)?;
     Ok(log)
 }
 

@@ -17,5 +17,5 @@ const SCENE: &str = include_str!("../../../configs/scenes/sample.toml");
 #[expect(clippy::expect_used, reason = "the scene is part of the program, and a test reads it")]
 pub fn write(path: &Path) -> Result<(), WriteError> {
     let scene = Scene::parse(SCENE).expect("the built-in scene is right");
-    record(Simulation::new(&scene, threads(None)), &scene, path).map(|_| ())
+    record(Simulation::new(&scene, threads(None)), &scene, path, &|| true).map(|_| ())
 }

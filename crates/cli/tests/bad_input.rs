@@ -52,7 +52,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: what it is, the command, the exit code, and what is said.
-const OTHERS: [(&str, &str, i32, &str); 22] = [
+const OTHERS: [(&str, &str, i32, &str); 23] = [
     ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
     ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
     ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
@@ -80,6 +80,7 @@ const OTHERS: [(&str, &str, i32, &str); 22] = [
     ("an existing output", "run nearest.toml good.mcap -o full", 2, "--overwrite"),
     ("an existing output", "doctor nearest.toml good.mcap -o full", 2, "--overwrite"),
     ("an existing output", "demo -o full", 2, "--overwrite"),
+    ("an existing output", "simulate scene.toml -o good.mcap", 2, "--overwrite"),
     ("an existing output", "import images photos -o good.mcap", 2, "--overwrite"),
     ("an unknown plugin", "config nearest-thin", 2, "nearest-thing"),
     ("an unknown plugin", "train svm-pitch", 2, "svm-patch"),
@@ -205,6 +206,7 @@ fn json_is_printed_by_every_command_that_prints_data() {
         "run nearest.toml good.mcap -o json-out",
         "reproduce",
         "import bag old.bag",
+        "simulate scene.toml -o json.mcap",
     ];
     for line in lines {
         let mut command = own_plugin();

@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use common::{Drawn, code, config, own_plugin, text};
+use common::{Drawn, code, config, own_plugin, tagalong, text};
 
 /// A run that takes much longer than the test.
 fn slow_run(home: &Path) -> Child {
@@ -25,22 +25,30 @@ fn slow_run(home: &Path) -> Child {
         .unwrap()
 }
 
-/// Waits until tracks have reached the disk.
-fn wait_for_tracks(home: &Path) {
+/// Waits until something has reached the disk.
+fn wait_for(file: &Path) {
     let started = Instant::now();
-    let file = home.join("out/tracks.csv.partial");
-    while fs::metadata(&file).map_or(0, |about| about.len()) == 0 {
-        assert!(started.elapsed() < Duration::from_secs(60), "no tracks were written");
+    while fs::metadata(file).map_or(0, |about| about.len()) == 0 {
+        let late = started.elapsed() > Duration::from_secs(60);
+        assert!(!late, "nothing was written to {}", file.display());
         thread::sleep(Duration::from_millis(20));
     }
+}
+
+fn wait_for_tracks(home: &Path) {
+    wait_for(&home.join("out/tracks.csv.partial"));
+}
+
+fn interrupt(child: &Child, signal: &str) {
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-s", signal, &pid]).status().unwrap().success());
 }
 
 fn stopped_by(signal: &str, expected: i32) {
     let home = tempfile::tempdir().unwrap();
     let child = slow_run(home.path());
     wait_for_tracks(home.path());
-    let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-s", signal, &pid]).status().unwrap().success());
+    interrupt(&child, signal);
     let output = child.wait_with_output().unwrap();
     assert_eq!(code(&output), expected, "{}", text(&output.stderr));
     let out = home.path().join("out");
@@ -104,4 +112,20 @@ fn a_full_disk_is_told_with_the_name_of_the_file() {
     assert_eq!(code(&output), 1, "{told}");
     assert!(told.contains("cannot write") && told.contains("out/tracks"), "{told}");
     assert!(!home.path().join("out/tracks.mcap").exists(), "half a file has no final name");
+}
+
+#[test]
+fn an_interrupted_simulation_leaves_a_whole_log() {
+    let home = tempfile::tempdir().unwrap();
+    let scene = "duration_s = 600.0\n[camera]\nwidth = 64\nheight = 48\n";
+    fs::write(home.path().join("long.toml"), scene).unwrap();
+    let mut simulate = tagalong();
+    simulate.current_dir(home.path()).args(["simulate", "long.toml", "-o", "long.mcap"]);
+    let child = simulate.stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(&home.path().join("long.mcap.partial"));
+    interrupt(&child, "INT");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(code(&output), 130, "{}", text(&output.stderr));
+    let bytes = fs::read(home.path().join("long.mcap")).unwrap();
+    assert!(mcap::Summary::read(&bytes).unwrap().unwrap().stats.unwrap().message_count > 0);
 }

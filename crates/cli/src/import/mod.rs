@@ -15,7 +15,8 @@ use clap::{Args, ValueEnum};
 
 use self::sequence::Sequence;
 use crate::args::Format;
-use crate::outcome::{Ended, Failure, Outcome, make_room_for, print, say};
+use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, claim, print, say};
+use crate::signals::Signals;
 use crate::suggest::converter;
 
 /// What is imported.
@@ -105,20 +106,20 @@ pub fn import(args: &ImportArgs) -> Outcome {
         return converted(path, args.format);
     }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
-    if log.exists() && !args.overwrite {
-        let message =
-            format!("{} exists; give another name with -o, or --overwrite", log.display());
-        return Err(Failure::usage(message));
-    }
+    let signals = Signals::listen().map_err(Failure::failed)?;
+    claim(&log, args.overwrite)?;
     if !path.is_dir() {
         let message =
             format!("{} is a file; give the folder that holds the sequence", path.display());
         return Err(Failure::failed(message));
     }
     let sequence = read(args)?;
-    make_room_for(&log)?;
-    writer::write(&sequence, &log)?;
+    writer::write(&sequence, &log, &signals)?;
     beside(&sequence, &log)?;
+    if let Some(signal) = signals.received() {
+        say(CUT_SHORT);
+        return Ok(Ended::BySignal(signal));
+    }
     sequence.notes.iter().for_each(|note| say(&format!("note: {note}")));
     let images = sequence.moments.len();
     print(&match args.format {

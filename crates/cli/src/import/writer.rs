@@ -12,17 +12,18 @@ use tagalong_log::write::{MessageLog, WriteError};
 
 use super::sequence::{Eye, Moment, Placed, Sequence, size};
 use crate::outcome::Failure;
+use crate::signals::Signals;
 
 const CAMERA_FRAME: &str = "camera_optical_frame";
 const RIGHT_FRAME: &str = "camera_right_optical_frame";
 const ROBOT_FRAME: &str = "base_link";
 const ODOM_FRAME: &str = "odom";
 
-/// Writes the log.
+/// Writes the log, until a signal comes.
 ///
 /// # Errors
 /// An image that cannot be read is exit code 1, a log that cannot be written 2.
-pub fn write(sequence: &Sequence, path: &Path) -> Result<(), Failure> {
+pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), Failure> {
     let mut log = MessageLog::create(path).map_err(Failure::usage)?;
     let start = sequence.moments.first().map_or(Stamp::default(), |moment| moment.stamp);
     if let Some(mount) = &sequence.mount {
@@ -30,7 +31,7 @@ pub fn write(sequence: &Sequence, path: &Path) -> Result<(), Failure> {
         log.send("/tf_static", start, &tf).map_err(Failure::failed)?;
     }
     let mut places = sequence.placed.iter().peekable();
-    for moment in &sequence.moments {
+    for moment in sequence.moments.iter().take_while(|_| signals.received().is_none()) {
         // A place goes before the image that it is for.
         while let Some(placed) = places.next_if(|placed| placed.stamp <= moment.stamp) {
             place(&mut log, placed).map_err(Failure::failed)?;

@@ -15,8 +15,9 @@ use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
 use crate::args::Format;
-use crate::outcome::{Ended, Failure, Outcome, make_room_for, say};
+use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, claim, print, say};
 use crate::realism::realism;
+use crate::signals::Signals;
 
 /// The arguments of `tagalong simulate`.
 #[derive(Args, Debug)]
@@ -49,8 +50,11 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
           value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
-    /// How the checks are printed.
-    #[arg(long, value_enum, default_value_t, requires = "realism")]
+    /// Replace the log if it is there.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// How the log or the checks are told.
+    #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
 
@@ -68,9 +72,26 @@ pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
         Some(folder) => gallery::paint(simulation, &scene, folder)?,
         None => {
             let log = args.output.clone().unwrap_or_else(|| default_log(path));
-            make_room_for(&log)?;
-            let images = record(simulation, &scene, &log).map_err(Failure::failed)?;
-            say(&format!("{images} images and the truth are in {}", log.display()));
+            claim(&log, args.overwrite)?;
+            return write(simulation, &scene, &log, args.format);
+        }
+    }
+    Ok(Ended::Well)
+}
+
+fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> Outcome {
+    let signals = Signals::listen().map_err(Failure::failed)?;
+    let goes_on = || signals.received().is_none();
+    let images = record(simulation, scene, log, &goes_on).map_err(Failure::failed)?;
+    if let Some(signal) = signals.received() {
+        say(CUT_SHORT);
+        return Ok(Ended::BySignal(signal));
+    }
+    match format {
+        Format::Text => say(&format!("{images} images and the truth are in {}", log.display())),
+        Format::Json => {
+            let told = serde_json::json!({ "log": log, "images": images });
+            print(&format!("{told:#}\n"))?;
         }
     }
     Ok(Ended::Well)
@@ -106,15 +127,21 @@ fn default_log(scene: &Path) -> PathBuf {
     Path::new("runs").join(scene.file_stem().unwrap_or_default()).with_extension("mcap")
 }
 
-/// Writes all that the robot records; returns the number of images.
+/// Writes all that the robot records, as long as it `goes_on`; returns the number of
+/// images.
 ///
 /// # Errors
 /// [`WriteError`] if the disk says no.
-pub fn record(mut simulation: Simulation, scene: &Scene, path: &Path) -> Result<u64, WriteError> {
+pub fn record(
+    mut simulation: Simulation,
+    scene: &Scene,
+    path: &Path,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<u64, WriteError> {
     let mut recorder = Recorder::create(path, scene, &simulation)?;
     let bar = ProgressBar::new((scene.duration_s * 10.0) as u64);
     let mut images = 0;
-    while let Some(event) = simulation.next_event() {
+    while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
         if let Event::Shot(shot) = &event {
             images += 1;
             bar.set_position(shot.captured_ns / 100_000_000);
@@ -142,7 +169,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.mcap");
         let scene = Scene::parse(SCENE).unwrap();
-        record(Simulation::new(&scene, 1), &scene, &path).unwrap();
+        record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
         let seen = inspect(&path, &InputSettings::default(), &Limits::default()).unwrap();
         for (topic, schema) in [
             ("/joint_states", "sensor_msgs/msg/JointState"),
@@ -161,7 +188,7 @@ mod tests {
         let scene = Scene::parse(SCENE).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.mcap");
-        record(Simulation::new(&scene, 1), &scene, &path).unwrap();
+        record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
         let needs = Needs { depth: true, ..Needs::default() };
         let mut source =
             FrameSource::open(&path, &InputSettings::default(), &Limits::default(), needs).unwrap();
