@@ -75,7 +75,7 @@ fn detecting(c: &mut Criterion) {
     let mut eyes = Eyes::new(config).expect("the settings are right");
     let mut see = |frame: &Frame| {
         let blobs = eyes.look(frame, &mut Funnel::default());
-        eyes.adapt(frame).and(blobs).expect("the frame is in colour").len()
+        eyes.adapt(frame, &[]).and(blobs).expect("the frame is in colour").len()
     };
     let shots: Vec<Shot> = std::iter::from_fn(|| next(&mut world)).take(40).collect();
     let mut index = 0;

@@ -197,7 +197,10 @@ ones that it was not told.
 Examples:
   tagalong simulate configs/scenes/omni-hat.toml -o runs/hat.mcap
   tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml -o runs/hat.csv
-  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --hue 240";
+  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --hue 240
+  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --robot 5,2.5,0 \
+    --truth lab.truth.jsonl    (then `tagalong bench --logs lab.mcap`)
+  tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml --format json | jq .held_out";
 
 const RUN_HELP: &str = "\
 Files: tracks.mcap (open it in Rerun or Foxglove), tracks.csv (MOTChallenge columns, pixels),

@@ -9,6 +9,7 @@
 //! (message encoding `json`, schema encoding `jsonschema`, schema name
 //! [`TRUTH_SCHEMA`]).
 
+use std::io::Read as _;
 use std::path::Path;
 
 use schemars::JsonSchema;
@@ -106,6 +107,25 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
     Ok(present.then_some(frames))
 }
 
+/// Reads truth that is a text with one [`TruthFrame`] in each line, in the order of
+/// the stamps.
+///
+/// # Errors
+/// A file that cannot be read, or a line that is no [`TruthFrame`].
+pub fn read_truth_lines(path: &Path) -> Result<Vec<TruthFrame>, LogError> {
+    let wrong = |number, why| LogError::Truth { path: path.to_owned(), number, why };
+    let mut text = String::new();
+    let read = open_file(path)?.read_to_string(&mut text);
+    read.map_err(|error| wrong(1, error.to_string()))?;
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let frames = lines.map(|(at, line)| {
+        serde_json::from_str(line).map_err(|error| wrong(at + 1, error.to_string()))
+    });
+    let mut frames = frames.collect::<Result<Vec<TruthFrame>, LogError>>()?;
+    frames.sort_by_key(|frame| frame.stamp_ns);
+    Ok(frames)
+}
+
 fn parse(data: &[u8], plain: bool) -> Result<TruthFrame, String> {
     if plain {
         return serde_json::from_slice(data).map_err(|error| error.to_string());
@@ -117,6 +137,23 @@ fn parse(data: &[u8], plain: bool) -> Result<TruthFrame, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn truth_is_read_from_lines_and_a_wrong_one_is_named() {
+        let path =
+            std::env::temp_dir().join(format!("tagalong-lines-{}.jsonl", std::process::id()));
+        let line = |stamp_ns| {
+            String::from_utf8(TruthFrame { stamp_ns, people: Vec::new() }.encode()).unwrap()
+        };
+        std::fs::write(&path, format!("{}\n\n{}\n", line(7), line(5))).unwrap();
+        let stamps: Vec<u64> =
+            read_truth_lines(&path).unwrap().iter().map(|frame| frame.stamp_ns).collect();
+        assert_eq!(stamps, [5, 7]);
+        std::fs::write(&path, format!("{}\nnonsense\n", line(7))).unwrap();
+        let error = read_truth_lines(&path).unwrap_err();
+        assert!(matches!(error, LogError::Truth { number: 2, .. }), "{error}");
+        std::fs::remove_file(&path).unwrap();
+    }
 
     #[test]
     fn what_is_left_out_means_whole_and_counted() {

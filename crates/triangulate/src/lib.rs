@@ -2,7 +2,7 @@
 //! measurement system of P5, section 3.
 //!
 //! Each camera sees the hat in a direction ([`find_hat`], [`Station::bearing`]).
-//! Two directions or more meet in a place ([`triangulate`]). Where the cameras
+//! Two directions or more meet in a place ([`triangulate`], [`Cameras::fix`]). Where the cameras
 //! hang and look is found from places that are known ([`calibrate`]).
 //!
 //! The paper takes the bearing to be linear in the image column, averages the
@@ -18,5 +18,5 @@ mod station;
 
 pub use calibration::{Calibrated, Known, calibrate};
 pub use hat::{Hat, HatColour, find_hat};
-pub use place::{Fix, Sight, triangulate};
+pub use place::{Cameras, Fix, Sight, triangulate};
 pub use station::Station;

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use crate::Station;
 use crate::station::wrapped;
+use crate::{Known, Station};
 
 /// A hat in the image of one camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,63 @@ pub struct Fix {
     pub covariance: Matrix2<f64>,
     /// Root of the mean square of the directions' misfits, rad.
     pub misfit_rad: f64,
+    /// Cameras whose directions it fits.
+    pub cameras: usize,
+}
+
+impl Fix {
+    /// Standard deviation of a coordinate, m: the mean of both.
+    pub fn sigma_m(&self) -> f64 {
+        (0.5 * self.covariance.trace()).sqrt()
+    }
+}
+
+/// Cameras whose places are known, and what is believed of what they see.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cameras {
+    /// The cameras.
+    pub stations: Vec<Station>,
+    /// Standard deviation of a bearing, rad.
+    pub sigma_rad: f64,
+    /// A place is none if the directions to it do not fit, on average, to within
+    /// so many of these.
+    pub most_misfit: f64,
+    /// Nor if it is not known better than to within this, m: on the line through two
+    /// cameras they tell nothing of how far away it is.
+    pub most_sigma_m: f64,
+}
+
+impl Cameras {
+    /// Cameras with ordinary images.
+    pub fn new(stations: Vec<Station>) -> Self {
+        Self { stations, sigma_rad: 0.004, most_misfit: 3.0, most_sigma_m: 0.3 }
+    }
+
+    /// Where the hat is that was seen. Of three cameras or more, those that
+    /// contradict the others are left out: something else has its colour.
+    pub fn fix(&self, sights: &[Sight]) -> Option<Fix> {
+        let fix = |sights: &[Sight]| triangulate(&self.stations, sights, self.sigma_rad);
+        let fits = |fix: &Fix| fix.misfit_rad <= self.most_misfit * self.sigma_rad;
+        let mut sights = sights.to_vec();
+        let mut best = fix(&sights);
+        while !best.as_ref().is_some_and(fits) && sights.len() > 2 {
+            let without = |left_out: usize| {
+                let others = |at: usize| (at != left_out).then_some(sights[at]);
+                (0..sights.len()).filter_map(others).collect::<Vec<Sight>>()
+            };
+            let misfit = |s: &[Sight]| fix(s).map_or(f64::INFINITY, |fix| fix.misfit_rad);
+            let ways = (0..sights.len()).map(without);
+            let fittest = ways.min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+            sights = fittest.unwrap_or_default();
+            best = fix(&sights);
+        }
+        best.filter(|best| fits(best) && best.sigma_m() <= self.most_sigma_m)
+    }
+
+    /// Distances of measured places from known ones, m, where there are any.
+    pub fn distances_m(&self, known: &[Known]) -> Vec<f64> {
+        known.iter().filter_map(|k| Some((self.fix(&k.sights)?.place - k.place).norm())).collect()
+    }
 }
 
 /// Steps of Gauss and Newton; three or four are enough.
@@ -51,7 +108,12 @@ pub fn triangulate(stations: &[Station], sights: &[Sight], sigma_rad: f64) -> Op
     };
     let finite = place.iter().chain(covariance.iter()).all(|v| v.is_finite());
     let misfit_rad = (squares / seen.len() as f64).sqrt();
-    (finite && seen.iter().all(ahead)).then_some(Fix { place, covariance, misfit_rad })
+    (finite && seen.iter().all(ahead)).then_some(Fix {
+        place,
+        covariance,
+        misfit_rad,
+        cameras: seen.len(),
+    })
 }
 
 /// Where the lines of all directions come nearest to each other.
@@ -149,6 +211,35 @@ mod tests {
                 prop_assert!(cost(fix.place + Vector2::from(step)) >= cost(fix.place) - 1e-12);
             }
         }
+    }
+
+    /// Who sees a place, some of them with an error of the bearing, rad.
+    fn sights(place: Point2<f64>, errors: &[(usize, f64)]) -> Vec<Sight> {
+        let stations = stations();
+        let sight = |(station, error): &(usize, f64)| {
+            let bearing = stations[*station].towards(&place) + error;
+            Sight { station: *station, pixel: pixel(&stations[*station], bearing) }
+        };
+        errors.iter().map(sight).collect()
+    }
+
+    #[test]
+    fn who_contradicts_the_others_is_left_out() {
+        let (cameras, place) = (Cameras::new(stations()), Point2::new(3.0, 2.0));
+        let fix = cameras.fix(&sights(place, &[(0, 0.0), (1, 0.3), (2, 0.0), (3, 0.0)])).unwrap();
+        assert!((fix.place - place).norm() < 1e-6 && fix.cameras == 3, "{fix:?}");
+        // Of three, two of which must be wrong, nobody knows which.
+        assert_eq!(cameras.fix(&sights(place, &[(0, 0.0), (0, 0.5), (0, -0.5)])), None);
+    }
+
+    #[test]
+    fn on_the_line_between_two_cameras_there_is_no_place() {
+        let cameras = Cameras::new(stations());
+        let between = Point2::from(0.5 * (stations()[0].at.coords + stations()[2].at.coords));
+        let two = [(0, 0.002), (2, -0.001)];
+        assert_eq!(cameras.fix(&sights(between + Vector2::new(0.0, 0.05), &two)), None);
+        let third = [(0, 0.0), (2, 0.0), (1, 0.0)];
+        assert!(cameras.fix(&sights(between, &third)).is_some());
     }
 
     #[test]

@@ -1,7 +1,8 @@
 use crate::Config;
+use crate::warp::{Sweep, Warp};
 
-/// The background is renewed in so many turns.
-const PHASES: usize = 4;
+/// The background is renewed in so many turns while the robot stands.
+pub(crate) const TURNS: usize = 4;
 /// While the robot moves an image is this part of what it makes.
 const MOVING_PART: f32 = 0.5;
 
@@ -14,6 +15,8 @@ pub(crate) struct Pace {
     pub(crate) absorb_s: f32,
     /// Since the image before, s.
     pub(crate) dt_s: f32,
+    /// One row in so many has its turn in each image.
+    pub(crate) turns: usize,
 }
 
 /// What the empty room looks like: three colours a pixel, row by row.
@@ -110,10 +113,11 @@ impl Background {
     }
 
     /// Follows an image: by a part where `taken` is 0; at once where it has not
-    /// been 0 for long. One row in [`PHASES`] has its turn.
+    /// been 0 for long. One row in [`Pace::turns`] has its turn.
     pub(crate) fn follow(&mut self, colours: &[u8], taken: &[u8], pace: &Pace, phase: usize) {
-        let part = 1.0 - (1.0 - pace.part.clamp(0.0, 1.0)).powi(PHASES as i32);
-        let passed_s = PHASES as f32 * pace.dt_s;
+        let turns = pace.turns.max(1);
+        let part = 1.0 - (1.0 - pace.part.clamp(0.0, 1.0)).powi(turns as i32);
+        let passed_s = turns as f32 * pace.dt_s;
         let width = self.width.max(1);
         let known = self
             .mean
@@ -122,7 +126,7 @@ impl Background {
             .zip(self.taken_s.chunks_exact_mut(width));
         let seen = colours.chunks_exact(3 * width).zip(taken.chunks_exact(width));
         for (((mean, level), taken_s), (colours, taken)) in
-            known.zip(seen).skip(phase % PHASES).step_by(PHASES)
+            known.zip(seen).skip(phase % turns).step_by(turns)
         {
             let pixels = mean.chunks_exact_mut(3).zip(level.chunks_exact_mut(3));
             let seen = colours.chunks_exact(3).zip(taken.iter().zip(taken_s));
@@ -138,11 +142,9 @@ impl Background {
         }
     }
 
-    /// Replaces the mean by what `read` finds in it, colour by colour.
-    pub(crate) fn move_by(&mut self, read: impl FnOnce(&[f32], &mut [f32]), moved: &mut Vec<f32>) {
-        moved.resize(self.mean.len(), 0.0);
-        read(&self.mean, moved);
-        std::mem::swap(&mut self.mean, moved);
+    /// Moves all that is known of each pixel, as `sweep` finds it moved.
+    pub(crate) fn move_by(&mut self, sweep: &mut Sweep, warps: &[Warp], colours: &[u8]) {
+        sweep.apply(warps, colours, &mut self.mean, &mut self.taken_s);
         for (level, mean) in self.level.iter_mut().zip(&self.mean) {
             *level = (*mean + 0.5) as u8;
         }
@@ -175,7 +177,7 @@ mod tests {
     fn it_follows_the_light_but_not_the_people() {
         let mut background = Background::new(2, 1);
         background.add(&[100; 6], &config());
-        let pace = Pace { part: 0.05, absorb_s: 30.0, dt_s: 0.1 };
+        let pace = Pace { part: 0.05, absorb_s: 30.0, dt_s: 0.1, turns: TURNS };
         for phase in 0..280 {
             background.follow(&[120; 6], &[0, 1], &pace, phase);
         }

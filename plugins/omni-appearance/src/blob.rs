@@ -66,6 +66,9 @@ pub struct Blob {
     pub features: Features,
     /// Mean colour of its upper half.
     pub colour: [f64; 3],
+    /// How much of the person it shows, from 0 to 1: the rest is hidden behind
+    /// somebody who is known to be there.
+    pub visible: f64,
 }
 
 impl Blob {
@@ -97,7 +100,7 @@ impl Blob {
         };
         let upper = top..(middle as usize + 1).min(rows.len());
         let colour = mean_colour(&core, upper, counts, colours);
-        Some(Self { run, column: mean(&run, width, height), features, colour })
+        Some(Self { run, column: mean(&run, width, height), features, colour, visible: 1.0 })
     }
 }
 

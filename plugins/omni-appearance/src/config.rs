@@ -60,13 +60,15 @@ pub struct Config {
     pub max_people: usize,
     /// Heights of heads that are believed, m.
     pub head_height_m: [f64; 2],
-    /// Standard deviation of the bearing, degrees.
+    /// Standard deviation of the bearing, degrees, ...
     pub sigma_bearing_deg: f64,
+    /// ... and of what is seen of a body about its middle, m: arms and legs swing.
+    pub sigma_aside_m: f64,
     /// Standard deviation of the head's height, m.
     pub sigma_height_m: f64,
-    /// Walls and furniture are taken to be so far away when the background
-    /// follows the robot's motion, m.
-    pub wall_m: f64,
+    /// Walls and furniture are taken to be at one of these distances, whichever fits
+    /// best, when the background follows the robot's motion, m.
+    pub walls_m: Vec<f64>,
     /// The background is known to within so many columns and rows after the
     /// robot has moved.
     pub slack_px: [usize; 2],
@@ -94,9 +96,10 @@ impl Default for Config {
             valley: 0.5,
             max_people: 8,
             head_height_m: [0.9, 2.2],
-            sigma_bearing_deg: 0.8,
+            sigma_bearing_deg: 0.4,
+            sigma_aside_m: 0.035,
             sigma_height_m: 0.12,
-            wall_m: 3.5,
+            walls_m: vec![1.2, 2.0, 3.5, 6.0],
             slack_px: [3, 2],
             compat_printed_seam: false,
         }
@@ -127,8 +130,13 @@ impl Config {
                 (0.01..=90.0).contains(&self.sigma_bearing_deg),
                 "sigma_bearing_deg must be 0.01 to 90",
             ),
+            ((0.0..=1.0).contains(&self.sigma_aside_m), "sigma_aside_m must be 0 to 1"),
             ((0.001..=10.0).contains(&self.sigma_height_m), "sigma_height_m must be 0.001 to 10"),
-            ((0.5..=1000.0).contains(&self.wall_m), "wall_m must be 0.5 to 1000"),
+            (
+                (1..=16).contains(&self.walls_m.len())
+                    && self.walls_m.iter().all(|wall| (0.5..=1000.0).contains(wall)),
+                "walls_m must be 1 to 16 distances of 0.5 to 1000",
+            ),
             (self.slack_px.iter().all(|px| *px <= 20), "slack_px must be at most 20"),
         ];
         match rules.iter().find(|(holds, _)| !holds) {

@@ -3,7 +3,7 @@ use tagalong_core::{
     Camera, Context, Detection, Detector, Error, Frame, Funnel, Result, Search, Track,
 };
 
-use crate::{Blob, Config, Eyes, Geometry, Model, NAME, View};
+use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, View};
 
 /// The model that is part of the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/omni-distance.toml");
@@ -13,6 +13,10 @@ const HALF_HEAD_M: f64 = 0.115;
 /// deviation of this many metres costs.
 const SURE: f64 = 3.0;
 const STATURE: [f64; 2] = [1.6, 0.2];
+/// Of whom less is seen the distance is told by the feet alone.
+const WHOLE: f64 = 0.8;
+/// What is wholly hidden would move the middle by so much, m.
+const HIDDEN_M: f64 = 0.25;
 /// A search near a track takes what is within so many standard deviations.
 const NEAR_SIGMAS: f64 = 3.0;
 
@@ -48,7 +52,8 @@ impl OmniAppearance {
 
     /// The place of somebody.
     fn placed(&self, blob: &Blob, camera: &Camera, view: &View<'_>) -> Detection {
-        let how = self.config.distance;
+        // Width and area of a part say nothing of the whole; feet do.
+        let how = if blob.visible < WHOLE { Distance::Analytic } else { self.config.distance };
         let head = self.model.head(&self.config.person, blob, view, how);
         let (distance, sigma) = head.distance(&blob.features, view, how);
         let distance = distance.clamp(0.3, 30.0);
@@ -62,27 +67,30 @@ impl OmniAppearance {
         Detection {
             region: camera.upper_body(&position),
             position,
-            covariance: self.covariance(&position, camera, distance, sigma),
+            covariance: self.covariance(&position, camera, [distance, sigma], blob.visible),
             score: self.score(position.z),
             source: NAME,
         }
     }
 
-    /// Polar: the distance's own spread along the ray, the bearing's across.
+    /// Polar: the distance's own spread along the ray, across it that of the bearing,
+    /// of the body about its middle, and of what is hidden of it.
     fn covariance(
         &self,
         position: &Point3<f64>,
         camera: &Camera,
-        distance: f64,
-        sigma: f64,
+        [distance, sigma]: [f64; 2],
+        visible: f64,
     ) -> Matrix3<f64> {
         let from = camera.robot_from_camera.translation.vector;
         let out = Vector3::new(position.x - from.x, position.y - from.y, 0.0);
         let out = out.try_normalize(1e-9).unwrap_or_else(Vector3::x);
         let aside = Vector3::new(-out.y, out.x, 0.0);
-        let across = distance * self.config.sigma_bearing_deg.to_radians();
+        let bearing = distance * self.config.sigma_bearing_deg.to_radians();
+        let across = [bearing, self.config.sigma_aside_m, HIDDEN_M * (1.0 - visible)];
+        let across = across.iter().map(|sigma| sigma * sigma).sum::<f64>().max(1e-6);
         out * out.transpose() * (sigma * sigma)
-            + aside * aside.transpose() * (across * across).max(1e-6)
+            + aside * aside.transpose() * across
             + Vector3::z() * Vector3::z().transpose() * self.config.sigma_height_m.powi(2)
     }
 
@@ -94,7 +102,7 @@ impl OmniAppearance {
 
     fn check_camera(&self, view: &View<'_>) -> Result<()> {
         if self.model.geometry.is_like(&Geometry::of(view))
-            || self.config.distance == crate::Distance::Analytic
+            || self.config.distance == Distance::Analytic
         {
             return Ok(());
         }
@@ -135,8 +143,8 @@ impl Detector for OmniAppearance {
         Ok(found)
     }
 
-    fn learn(&mut self, frame: &Frame, _: &[Track]) -> Result<()> {
-        self.eyes.adapt(frame)
+    fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
+        self.eyes.adapt(frame, tracks)
     }
 }
 

@@ -1,8 +1,9 @@
-use tagalong_core::{Frame, Funnel, Result, Stamp};
+use tagalong_core::{Frame, Funnel, Result, Stamp, Track};
 
-use crate::background::Pace;
-use crate::warp::{Bounds, Warp, is_moving};
-use crate::{Background, Blob, Config, Segmenter};
+use crate::background::{Pace, TURNS};
+use crate::expected::{Expected, Known, divided};
+use crate::warp::{Bounds, Sweep, Warp, is_moving};
+use crate::{Background, Blob, Config, Segmenter, View};
 
 /// Sees who differs from the background, image after image.
 pub struct Eyes {
@@ -16,10 +17,12 @@ struct Scene {
     background: Background,
     segmenter: Segmenter,
     bounds: Bounds,
-    moved: Vec<f32>,
+    sweep: Sweep,
     /// The image that was looked at last, and who is in it.
     seen: Option<(u64, Stamp)>,
     blobs: Vec<Blob>,
+    /// Who was known after the image before.
+    known: Vec<Known>,
     /// The robot has moved since the background was made.
     uncertain: bool,
     /// Grey images as colours.
@@ -79,14 +82,15 @@ impl Eyes {
         Ok(scene.blobs.clone())
     }
 
-    /// Lets the background follow the image that was looked at last; to be called
-    /// once after each.
+    /// Lets the background follow the image that was looked at last, and remembers
+    /// who is known to be there; to be called once after each.
     ///
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame without images.
-    pub fn adapt(&mut self, frame: &Frame) -> Result<()> {
+    pub fn adapt(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
         let Some(scene) = &mut self.scene else { return Ok(()) };
         if scene.seen == Some((frame.index, frame.stamp)) {
+            scene.known = tracks.iter().filter_map(Known::of).collect();
             scene.adapt(frame, &self.config)?;
         }
         Ok(())
@@ -100,9 +104,10 @@ impl Scene {
             background: Background::new(size.0, size.1),
             segmenter: Segmenter::new(size.0, config),
             bounds: Bounds::default(),
-            moved: Vec::new(),
+            sweep: Sweep::default(),
             seen: None,
             blobs: Vec::new(),
+            known: Vec::new(),
             uncertain: false,
             grey: Vec::new(),
             phase: 0,
@@ -122,7 +127,7 @@ impl Scene {
             self.grey.clear();
             self.grey.extend(frame.grey()?.pixels().iter().flat_map(|v| [*v; 3]));
         }
-        self.follow_robot(frame, config);
+        self.follow_robot(frame, grey, config)?;
         let Self { background, segmenter, bounds, .. } = self;
         let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
         let learning = background.frames() < config.background_frames;
@@ -147,18 +152,23 @@ impl Scene {
         } else {
             segmenter.compare(colours, background, !grey, config);
         }
-        self.blobs = people(segmenter, colours, config, funnel);
+        let expected = expected(&self.known, frame);
+        self.blobs = people(segmenter, colours, &expected, config, funnel);
         Ok(())
     }
 
-    fn follow_robot(&mut self, frame: &Frame, config: &Config) {
-        let Some(panorama) = frame.camera.panorama() else { return };
+    /// Moves the background as the robot moved.
+    fn follow_robot(&mut self, frame: &Frame, grey: bool, config: &Config) -> Result<()> {
+        let Some(panorama) = frame.camera.panorama() else { return Ok(()) };
         if self.background.frames() == 0 || !is_moving(&frame.motion) {
-            return;
+            return Ok(());
         }
         self.uncertain = true;
-        let warp = Warp::new(&frame.camera, panorama, &frame.motion, config.wall_m);
-        self.background.move_by(|from, to| warp.apply(from, to), &mut self.moved);
+        let warp = |wall_m: &f64| Warp::new(&frame.camera, panorama, &frame.motion, *wall_m);
+        let warps: Vec<Warp> = config.walls_m.iter().map(warp).collect();
+        let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
+        self.background.move_by(&mut self.sweep, &warps, colours);
+        Ok(())
     }
 
     /// The background follows what is not taken for people.
@@ -166,17 +176,15 @@ impl Scene {
         if self.background.frames() < config.background_frames {
             return Ok(());
         }
-        // What is carried along by the odometry must be renewed soon.
-        let after =
-            if self.uncertain { config.adapt_s.min(MOVING_ADAPT_S) } else { config.adapt_s };
         let dt_s = frame.motion.dt as f32;
-        let absorb_s = match config.absorb_s {
-            after_s if after_s <= 0.0 => f32::INFINITY,
-            after_s if self.uncertain => after_s.min(MOVING_ABSORB_S) as f32,
-            after_s => after_s as f32,
+        let seconds = |s: f64| if s > 0.0 { s as f32 } else { f32::INFINITY };
+        let (adapt_s, absorb_s) = (seconds(config.adapt_s), seconds(config.absorb_s));
+        // What is carried along by the odometry must be renewed soon.
+        let (adapt_s, absorb_s, turns) = match self.uncertain {
+            true => (adapt_s.min(MOVING_ADAPT_S), absorb_s.min(MOVING_ABSORB_S), 1),
+            false => (adapt_s, absorb_s, TURNS),
         };
-        let part = if after > 0.0 { dt_s / after as f32 } else { 0.0 };
-        let pace = Pace { part, absorb_s, dt_s };
+        let pace = Pace { part: dt_s / adapt_s, absorb_s, dt_s, turns };
         let colour = frame.images().colour.as_deref();
         let colours = colour.map_or(&self.grey[..], |c| c.pixels().as_flattened());
         let taken = &self.segmenter.counts().taken;
@@ -187,22 +195,33 @@ impl Scene {
 }
 
 /// The background follows within this while the robot moves, s ...
-const MOVING_ADAPT_S: f64 = 1.0;
-/// ... and where it no longer fits, it is given up after this, s.
-const MOVING_ABSORB_S: f64 = 1.5;
+const MOVING_ADAPT_S: f32 = 0.5;
+/// ... and what stays in its place in the room for longer although it differs is no
+/// person who walks, s.
+const MOVING_ABSORB_S: f32 = 2.0;
+
+/// Where those are expected who were known after the image before.
+fn expected(known: &[Known], frame: &Frame) -> Vec<Expected> {
+    let Some(view) = View::of(&frame.camera) else { return Vec::new() };
+    let (dt_s, moved) = (frame.motion.dt, frame.motion.isometry());
+    known.iter().map(|known| Expected::of(&known.moved(dt_s, &moved), frame, &view)).collect()
+}
 
 /// The largest runs that may be people, largest first.
 fn people(
     segmenter: &Segmenter,
     colours: &[u8],
+    expected: &[Expected],
     config: &Config,
     funnel: &mut Funnel,
 ) -> Vec<Blob> {
     let mut blobs = Vec::new();
-    for run in segmenter.runs(config) {
-        let measured = Blob::measure(run, segmenter.counts(), colours);
+    let width = segmenter.counts().columns.len();
+    let runs = segmenter.runs(config);
+    for part in runs.iter().flat_map(|run| divided(*run, width, expected)) {
+        let measured = Blob::measure(part.run, segmenter.counts(), colours);
         match measured.filter(|blob| blob.features.pixels >= f64::from(config.min_pixels)) {
-            Some(blob) => blobs.push(blob),
+            Some(blob) => blobs.push(Blob { visible: part.visible, ..blob }),
             None => funnel.drop_many("too few pixels", 1),
         }
     }
@@ -210,7 +229,6 @@ fn people(
     funnel.drop_many("too many people", blobs.len().saturating_sub(config.max_people) as u64);
     blobs.truncate(config.max_people);
     if config.compat_printed_seam {
-        let width = segmenter.counts().columns.len();
         blobs.iter_mut().for_each(|blob| forget_the_seam(blob, width, segmenter));
     }
     blobs

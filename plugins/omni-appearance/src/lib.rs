@@ -19,7 +19,10 @@ mod blob;
 pub mod circular;
 mod config;
 mod detector;
+mod expected;
 mod eyes;
+#[cfg(feature = "train")]
+mod fit;
 mod model;
 mod network;
 mod segment;

@@ -30,7 +30,8 @@ impl Network {
         (inputs[i] - self.mean[i]) / self.scale[i]
     }
 
-    fn forward(&self, input: impl Fn(usize) -> f64) -> f64 {
+    /// The output before it is scaled, for inputs that are.
+    pub(crate) fn forward(&self, input: impl Fn(usize) -> f64) -> f64 {
         let (weights, bias) = split(&self.output);
         let unit = |weights: &[f64]| {
             let (weights, bias) = split(weights);

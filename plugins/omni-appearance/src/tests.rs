@@ -184,8 +184,7 @@ mod fits {
             collector.add(&frame(index, &camera, &people), &heads).unwrap();
         }
         assert!(collector.samples.len() == 120 && collector.missed == 0);
-        let training =
-            Training { epochs: 300, rich_epochs: 300, restarts: 2, ..Training::default() };
+        let training = Training::default();
         let fitted = head(&collector.samples, &training, 3).unwrap();
         assert_eq!(head(&collector.samples, &training, 3).unwrap(), fitted);
         for how in [Distance::Network, Distance::Rich, Distance::Ridge, Distance::Analytic] {

@@ -1,43 +1,26 @@
 //! Fits the distance to people whose place is known.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Point3};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, Funnel, Result, Trainer};
 use tagalong_learn::mix;
 
+pub use crate::fit::Fit;
+use crate::fit::mean_and_scale;
 use crate::model::INPUTS;
-use crate::network::split;
 use crate::{
-    Blob, Config, Distance, Eyes, Features, Geometry, Head, Line, Model, Network, Person, Ridge,
-    Signature, View,
+    Blob, Config, Distance, Eyes, Features, Geometry, Head, Line, Model, Person, Ridge, Signature,
+    View,
 };
 
-/// How networks are fitted: steps along the gradient of the mean square error
-/// over all samples, with momentum. What is returned is the best of all steps of
-/// all restarts on the samples held out.
+/// How a model is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Training {
-    /// Hidden units of the paper's network.
-    pub hidden: usize,
-    /// Hidden units of the rich network.
-    pub rich_hidden: usize,
-    /// Rate of learning of the paper's network (P5, section 4.4) ...
-    pub rate: f64,
-    /// ... and of the rich one, whose inputs resemble each other.
-    pub rich_rate: f64,
-    /// Part of the last step that is taken again.
-    pub momentum: f64,
-    /// Most steps of the paper's network ...
-    pub epochs: usize,
-    /// ... and of the rich one.
-    pub rich_epochs: usize,
-    /// A fit ends after so many steps without progress on what is held out.
-    pub patience: usize,
-    /// Fits from other random weights.
-    pub restarts: u64,
-    /// One block in so many is held out to stop in time.
-    pub held_out: u64,
+    /// The paper's network: three inputs, four hidden units (P5, section 4.4).
+    pub network: Fit,
+    /// The network of all features.
+    pub rich: Fit,
     /// Weight of the squares of the ridge's weights, for each sample.
     pub ridge: f64,
     /// Images of a block: neighbours are near-duplicates and stay together.
@@ -46,22 +29,29 @@ pub struct Training {
 
 impl Default for Training {
     fn default() -> Self {
+        let network = Fit { hidden: 4, decay: 1e-2, restarts: 3, steps: 150 };
         Self {
-            hidden: 4,
-            rich_hidden: 8,
-            rate: 0.3,
-            rich_rate: 0.03,
-            momentum: 0.9,
-            epochs: 2000,
-            rich_epochs: 4000,
-            patience: 300,
-            restarts: 5,
-            held_out: 5,
+            network,
+            rich: Fit { hidden: 8, decay: 3e-2, ..network },
             ridge: 1e-4,
             block_frames: 15,
         }
     }
 }
+
+/// What is held out to see how far a model can be believed: whole blocks of images,
+/// or whole people, where there are several: most of those whom the detector will see
+/// are strangers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldOut {
+    /// Blocks of images.
+    Blocks,
+    /// People.
+    People,
+}
+
+/// Parts of which each is held out once.
+const FOLDS: u64 = 5;
 
 /// A person whose place is known, as the detector saw them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,7 +134,7 @@ impl Collector {
     pub fn add(&mut self, frame: &Frame, people: &[(u64, Point3<f64>)]) -> Result<()> {
         let blobs = self.eyes.look(frame, &mut Funnel::default())?;
         if self.last.replace(frame.index) != Some(frame.index) {
-            self.eyes.adapt(frame)?;
+            self.eyes.adapt(frame, &[])?;
         }
         let Some(view) = View::of(&frame.camera).filter(|_| self.eyes.is_ready()) else {
             return Ok(());
@@ -191,7 +181,8 @@ fn sample(
     })
 }
 
-/// Fits one head. The same samples and the same seed give the same head.
+/// Fits one head. The same samples and the same seed give the same head. Its
+/// deviations are those of the samples themselves.
 ///
 /// # Errors
 /// [`Error::Other`] for fewer than ten samples.
@@ -199,17 +190,10 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
     if samples.len() < 10 {
         return Err(Error::Other(format!("{} samples are too few to fit", samples.len())));
     }
-    let block = |s: &Sample| (s.frame / training.block_frames) ^ seed;
-    let held = |s: &Sample| mix(block(s)).is_multiple_of(training.held_out);
     let targets: Vec<f64> = samples.iter().map(|s| s.distance_m).collect();
-    let held: Vec<bool> = samples.iter().map(held).collect();
     let printed: Vec<Vec<f64>> =
         samples.iter().map(|s| s.features.values()[..3].to_vec()).collect();
     let all: Vec<Vec<f64>> = samples.iter().map(|s| s.inputs().to_vec()).collect();
-    let data = |inputs| Data { inputs, targets: &targets, held: &held };
-    let long = Training { epochs: training.rich_epochs, ..*training };
-    let network = data(&printed).network(training.hidden, training.rate, training, seed);
-    let rich = data(&all).network(training.rich_hidden, training.rich_rate, &long, seed);
     let flat = Line { start: 0.0, slope: 0.0 };
     let mut head = Head {
         floor_offset_m: samples.iter().map(|s| s.distance_m - s.floor_m).sum::<f64>()
@@ -219,24 +203,76 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         network_sigma: flat,
         rich_sigma: flat,
         ridge: ridge(samples, training.ridge),
-        network,
-        rich,
+        network: training.network.network(&printed, &targets, seed),
+        rich: training.rich.network(&all, &targets, seed),
     };
-    head.analytic_sigma = spread(samples, &head, Distance::Analytic);
-    head.ridge_sigma = spread(samples, &head, Distance::Ridge);
-    head.network_sigma = spread(samples, &head, Distance::Network);
-    head.rich_sigma = spread(samples, &head, Distance::Rich);
+    let answers: Vec<Answers> = samples.iter().map(|sample| sample.answers(&head)).collect();
+    head.believe(samples, &answers);
     Ok(head)
 }
 
+/// The distance by all ways, in the order of [`WAYS`].
+pub type Answers = [f64; WAYS.len()];
+
+/// All ways to the distance.
+pub const WAYS: [Distance; 4] =
+    [Distance::Network, Distance::Rich, Distance::Ridge, Distance::Analytic];
+
+/// What heads say that were fitted to everybody but those of whom they say it.
+///
+/// # Errors
+/// As [`head`].
+pub fn held_out(
+    samples: &[Sample],
+    held: HeldOut,
+    training: &Training,
+    seed: u64,
+) -> Result<Vec<Answers>> {
+    let people: BTreeSet<u64> = samples.iter().map(|s| s.person).collect();
+    let key = |s: &Sample| match held {
+        HeldOut::People if people.len() > 1 => people.range(..s.person).count() as u64,
+        _ => s.frame / training.block_frames,
+    };
+    let mut answers = vec![[0.0; WAYS.len()]; samples.len()];
+    for fold in 0..FOLDS {
+        let is_test = |s: &Sample| key(s) % FOLDS == fold;
+        let rest: Vec<Sample> = samples.iter().filter(|s| !is_test(s)).copied().collect();
+        if rest.len() == samples.len() {
+            continue;
+        }
+        let fitted = head(&rest, training, seed)?;
+        let tested = samples.iter().zip(&mut answers).filter(|(sample, _)| is_test(sample));
+        tested.for_each(|(sample, answers)| *answers = sample.answers(&fitted));
+    }
+    Ok(answers)
+}
+
+impl Sample {
+    fn answers(&self, head: &Head) -> Answers {
+        WAYS.map(|how| self.distance(head, how))
+    }
+}
+
+impl Head {
+    /// Takes the standard deviations from what was said of these samples.
+    fn believe(&mut self, samples: &[Sample], answers: &[Answers]) {
+        let line = |way: usize| {
+            spread(samples.iter().zip(answers).map(|(s, said)| (said[way], s.distance_m)))
+        };
+        [self.network_sigma, self.rich_sigma, self.ridge_sigma, self.analytic_sigma] =
+            [line(0), line(1), line(2), line(3)];
+    }
+}
+
 /// Standard deviation by distance: a line through the absolute errors, which are
-/// the standard deviation times the square root of 2 / pi.
-fn spread(samples: &[Sample], head: &Head, how: Distance) -> Line {
+/// the standard deviation times the square root of 2 / pi. What was said comes
+/// first, the truth second.
+fn spread(pairs: impl Iterator<Item = (f64, f64)>) -> Line {
     let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for sample in samples {
-        let d = sample.distance(head, how);
-        let error = (d - sample.distance_m).abs() * (0.5 * std::f64::consts::PI).sqrt();
-        (n, x, y, xx, xy) = (n + 1.0, x + d, y + error, xx + d * d, xy + d * error);
+    for (said, truth) in pairs {
+        let error = (said - truth).abs() * (0.5 * std::f64::consts::PI).sqrt();
+        (n, x, y) = (n + 1.0, x + said, y + error);
+        (xx, xy) = (xx + said * said, xy + said * error);
     }
     let determinant = n * xx - x * x;
     let slope = if determinant > 1e-9 { (n * xy - x * y) / determinant } else { 0.0 };
@@ -265,158 +301,6 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
     }
 }
 
-/// Mean, and standard deviation that is never 0.
-fn mean_and_scale(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let count = values.clone().count().max(1) as f64;
-    let mean = values.clone().sum::<f64>() / count;
-    let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / count;
-    (mean, variance.sqrt().max(1e-9))
-}
-
-/// What a network is fitted to.
-struct Data<'a> {
-    inputs: &'a [Vec<f64>],
-    targets: &'a [f64],
-    held: &'a [bool],
-}
-
-impl Data<'_> {
-    fn network(&self, hidden: usize, rate: f64, training: &Training, seed: u64) -> Network {
-        let start = |restart: u64| self.random(hidden, mix(seed ^ (restart << 32)));
-        let fits = (0..training.restarts.max(1)).map(|r| self.fit(start(r), rate, training));
-        let best = fits.min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map_or_else(|| start(0), |(_, network)| network)
-    }
-
-    /// Small random weights.
-    fn random(&self, hidden: usize, seed: u64) -> Network {
-        let count = self.inputs.first().map_or(0, Vec::len);
-        let (mean, scale) =
-            (0..count).map(|i| mean_and_scale(self.inputs.iter().map(move |x| x[i]))).unzip();
-        let (target, deviation) = mean_and_scale(self.targets.iter().copied());
-        let mut state = seed;
-        let mut weight = |reach: f64| {
-            state = mix(state);
-            reach * (state as f64 / u64::MAX as f64 * 2.0 - 1.0)
-        };
-        let reach = 1.0 / (count as f64 + 1.0).sqrt();
-        let unit =
-            |weight: &mut dyn FnMut(f64) -> f64| (0..=count).map(|_| weight(reach)).collect();
-        let hidden_weights = (0..hidden).map(|_| unit(&mut weight)).collect();
-        let output = (0..=hidden).map(|_| weight(0.5)).collect();
-        Network { mean, scale, target: [target, deviation], hidden: hidden_weights, output }
-    }
-
-    /// The best network on what is held out, and its mean square error there.
-    fn fit(&self, start: Network, rate: f64, training: &Training) -> (f64, Network) {
-        let scaled: Vec<Vec<f64>> = self
-            .inputs
-            .iter()
-            .map(|x| (0..x.len()).map(|i| start.scaled(x, i)).collect())
-            .collect();
-        let [mean, scale] = start.target;
-        let targets: Vec<f64> = self.targets.iter().map(|t| (t - mean) / scale).collect();
-        let (mut network, mut best) = (start.clone(), (f64::INFINITY, start));
-        let mut step = Weights::of(&network).zeros();
-        let mut since = 0;
-        for _ in 0..training.epochs {
-            let (held_error, gradient) = self.gradient(&network, &scaled, &targets);
-            if held_error < best.0 {
-                best = (held_error, network.clone());
-                since = 0;
-            }
-            since += 1;
-            if since > training.patience || !held_error.is_finite() {
-                break;
-            }
-            step.blend(training.momentum, &gradient, -rate);
-            step.add_to(&mut network);
-        }
-        best
-    }
-
-    /// Mean square error on what is held out, and the gradient of half of it on
-    /// everything else.
-    fn gradient(&self, network: &Network, inputs: &[Vec<f64>], targets: &[f64]) -> (f64, Weights) {
-        let mut gradient = Weights::of(network).zeros();
-        let (mut held, mut held_count, mut count) = (0.0, 0.0_f64, 0.0_f64);
-        let mut units = vec![0.0; network.hidden.len()];
-        let (output, bias) = split(&network.output);
-        for ((x, target), is_held) in inputs.iter().zip(targets).zip(self.held) {
-            for (unit, weights) in units.iter_mut().zip(&network.hidden) {
-                let (weights, bias) = split(weights);
-                *unit = (weights.iter().zip(x).map(|(w, x)| w * x).sum::<f64>() + bias).tanh();
-            }
-            let answer = output.iter().zip(&units).map(|(w, u)| w * u).sum::<f64>() + bias;
-            let error = answer - target;
-            if *is_held {
-                (held, held_count) = (held + error * error, held_count + 1.0);
-            } else {
-                count += 1.0;
-                gradient.add_sample(error, output, &units, x);
-            }
-        }
-        gradient.scale(1.0 / count.max(1.0));
-        // With nothing held out the last step is the best one.
-        (if held_count > 0.0 { held / held_count } else { 0.0 }, gradient)
-    }
-}
-
-/// The weights of a network, or a step along them.
-struct Weights {
-    hidden: Vec<Vec<f64>>,
-    output: Vec<f64>,
-}
-
-impl Weights {
-    fn of(network: &Network) -> Self {
-        Self { hidden: network.hidden.clone(), output: network.output.clone() }
-    }
-
-    fn zeros(mut self) -> Self {
-        self.scale(0.0);
-        self
-    }
-
-    fn all(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.hidden.iter_mut().flatten().chain(&mut self.output)
-    }
-
-    fn scale(&mut self, by: f64) {
-        self.all().for_each(|w| *w *= by);
-    }
-
-    /// `self = keep * self + part * other`.
-    fn blend(&mut self, keep: f64, other: &Self, part: f64) {
-        let others = other.hidden.iter().flatten().chain(&other.output);
-        for (w, o) in self.all().zip(others) {
-            *w = keep * *w + part * o;
-        }
-    }
-
-    fn add_to(&self, network: &mut Network) {
-        let weights = network.hidden.iter_mut().flatten().chain(&mut network.output);
-        for (w, step) in weights.zip(self.hidden.iter().flatten().chain(&self.output)) {
-            *w += step;
-        }
-    }
-
-    /// Adds the gradient of half the squared error of one sample.
-    fn add_sample(&mut self, error: f64, output: &[f64], units: &[f64], x: &[f64]) {
-        let rows = self.hidden.iter_mut().zip(&mut self.output).zip(output.iter().zip(units));
-        for ((row, out), (weight, unit)) in rows {
-            *out += error * unit;
-            let back = error * weight * (1.0 - unit * unit);
-            for (g, x) in row.iter_mut().zip(x.iter().chain(&[1.0])) {
-                *g += back * x;
-            }
-        }
-        if let Some(bias) = self.output.last_mut() {
-            *bias += error;
-        }
-    }
-}
-
 /// Mean and deviation of what somebody looks like.
 fn signature(samples: &[Sample]) -> Signature {
     let of = |i: usize| mean_and_scale(samples.iter().map(move |s| s.looks[i]));
@@ -427,7 +311,8 @@ fn signature(samples: &[Sample]) -> Signature {
 /// People with this number and higher ones get no head of their own.
 pub const STRANGERS: u64 = 100;
 
-/// Fits everybody's head, and one for each person below [`STRANGERS`].
+/// Fits everybody's head, and one for each person below [`STRANGERS`]. How far each
+/// can be believed is found on what it was not fitted to.
 ///
 /// # Errors
 /// As [`head`].
@@ -441,16 +326,21 @@ pub fn model(
     for sample in samples.iter().filter(|sample| sample.person < STRANGERS) {
         people.entry(sample.person).or_default().push(*sample);
     }
+    let believed = |samples: &[Sample], held: HeldOut, seed: u64| {
+        let mut head = head(samples, training, seed)?;
+        head.believe(samples, &held_out(samples, held, training, seed)?);
+        Ok::<Head, Error>(head)
+    };
     let person = |(id, own): (&u64, &Vec<Sample>)| {
         Ok(Person {
             name: format!("person-{id}"),
             signature: signature(own),
-            head: head(own, training, mix(seed ^ id))?,
+            head: believed(own, HeldOut::Blocks, mix(seed ^ id))?,
         })
     };
     Ok(Model {
         geometry,
-        general: head(samples, training, seed)?,
+        general: believed(samples, HeldOut::People, seed)?,
         people: people.iter().map(person).collect::<Result<_>>()?,
     })
 }
@@ -495,36 +385,29 @@ impl Trainer for DistanceTrainer {
     }
 }
 
-/// Held-out errors: five folds of blocks.
+/// Errors on what is held out: five folds of blocks, and of people.
 fn figures(collector: &Collector, training: &Training, seed: u64) -> Result<toml::Table> {
-    let mut table = toml::Table::new();
-    let mut put = |key: &str, value: f64| {
-        table.insert(key.into(), toml::Value::Float((1e4 * value).round() / 1e4));
-    };
     let samples = &collector.samples;
-    let bearing = samples.iter().map(Sample::bearing_error_rad).sum::<f64>();
-    put("bearing_error_deg", (bearing / samples.len().max(1) as f64).to_degrees());
-    let mut sums = [0.0; 4];
-    const WAYS: [(&str, Distance); 4] = [
-        ("network_error_m", Distance::Network),
-        ("rich_error_m", Distance::Rich),
-        ("ridge_error_m", Distance::Ridge),
-        ("analytic_error_m", Distance::Analytic),
-    ];
-    for fold in 0..5 {
-        let block = |s: &&Sample| s.frame / training.block_frames % 5 == fold;
-        let (test, rest): (Vec<&Sample>, Vec<&Sample>) = samples.iter().partition(block);
-        let rest: Vec<Sample> = rest.into_iter().copied().collect();
-        let fitted = head(&rest, training, seed)?;
-        for (sum, (_, how)) in sums.iter_mut().zip(WAYS) {
-            *sum +=
-                test.iter().map(|s| (s.distance(&fitted, how) - s.distance_m).abs()).sum::<f64>();
-        }
+    let count = samples.len().max(1) as f64;
+    let bearing = samples.iter().map(Sample::bearing_error_rad).sum::<f64>() / count;
+    let mut table = toml::Table::new();
+    table.insert("samples".into(), (samples.len() as i64).into());
+    table.insert("missed".into(), (collector.missed as i64).into());
+    table.insert("bearing_error_deg".into(), rounded(bearing.to_degrees()));
+    for (name, held) in
+        [("five_folds_of_blocks", HeldOut::Blocks), ("five_folds_of_people", HeldOut::People)]
+    {
+        let answers = held_out(samples, held, training, seed)?;
+        let errors = WAYS.iter().enumerate().map(|(way, how)| {
+            let off =
+                samples.iter().zip(&answers).map(|(s, said)| (said[way] - s.distance_m).abs());
+            (format!("{how:?}_error_m").to_lowercase(), rounded(off.sum::<f64>() / count))
+        });
+        table.insert(name.into(), toml::Table::from_iter(errors).into());
     }
-    for (sum, (key, _)) in sums.iter().zip(WAYS) {
-        put(key, sum / samples.len().max(1) as f64);
-    }
-    put("samples", samples.len() as f64);
-    put("missed", collector.missed as f64);
     Ok(table)
+}
+
+fn rounded(value: f64) -> toml::Value {
+    toml::Value::Float((1e4 * value).round() / 1e4)
 }

@@ -50,6 +50,14 @@ impl Warp {
         [mix(0), mix(1)]
     }
 
+    /// The pixel nearest to where a pixel was.
+    fn nearest(&self, column: usize, row: usize) -> usize {
+        let [x, y] = self.place(column, row);
+        let column = (x.round() as i64).rem_euclid(self.columns as i64) as usize;
+        let row = y.round().clamp(0.0, self.rows as f32 - 1.0) as usize;
+        row * self.columns + column
+    }
+
     /// Reads three colours a pixel from where they were; bilinear.
     pub(crate) fn apply(&self, from: &[f32], to: &mut [f32]) {
         for row in 0..self.rows {
@@ -103,6 +111,82 @@ fn before(
     let point = Point3::new(there.x, there.y, now.z);
     let seen = panorama.pixel(&camera.robot_from_camera.inverse_transform_point(&point));
     [camera.column_near(seen.x, pixel.x) as f32, seen.y as f32]
+}
+
+/// Blocks of so many columns and rows are moved as if all in them were equally far
+/// away.
+const BLOCK: usize = 8;
+
+/// The background after the robot has moved, where nobody knows how far away walls
+/// and furniture are: it is moved as if they stood at each of several distances, and
+/// each block is taken from that one of these images which looks most like the new
+/// image there, and around it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sweep {
+    images: Vec<Vec<f32>>,
+    /// Differences to the new image: a row of blocks after the other, all images.
+    costs: Vec<Vec<f32>>,
+    times: Vec<f32>,
+}
+
+impl Sweep {
+    /// Moves colours, and a number for each pixel, to where `warps` say, one for each
+    /// distance; `colours` is the new image.
+    pub(crate) fn apply(
+        &mut self,
+        warps: &[Warp],
+        colours: &[u8],
+        mean: &mut [f32],
+        times: &mut [f32],
+    ) {
+        let Some(first) = warps.first() else { return };
+        let (columns, rows) = (first.columns, first.rows);
+        self.images.resize(warps.len(), Vec::new());
+        self.costs.resize(warps.len(), Vec::new());
+        for ((warp, image), costs) in warps.iter().zip(&mut self.images).zip(&mut self.costs) {
+            image.resize(mean.len(), 0.0);
+            warp.apply(mean, image);
+            differences(image, colours, columns, costs);
+        }
+        self.times.clear();
+        self.times.extend_from_slice(times);
+        let blocks = (rows.div_ceil(BLOCK), columns.div_ceil(BLOCK));
+        for (row, column) in (0..blocks.0).flat_map(|row| (0..blocks.1).map(move |c| (row, c))) {
+            let cost = |k: &usize| around(&self.costs[*k], (row, column), blocks);
+            let best = (0..warps.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0);
+            let across = column * BLOCK..(column * BLOCK + BLOCK).min(columns);
+            for y in row * BLOCK..(row * BLOCK + BLOCK).min(rows) {
+                let pixels = 3 * (y * columns + across.start)..3 * (y * columns + across.end);
+                mean[pixels.clone()].copy_from_slice(&self.images[best][pixels]);
+                for x in across.clone() {
+                    times[y * columns + x] = self.times[warps[best].nearest(x, y)];
+                }
+            }
+        }
+    }
+}
+
+/// Sums of absolute differences over blocks.
+fn differences(image: &[f32], colours: &[u8], columns: usize, sums: &mut Vec<f32>) {
+    let across = columns.div_ceil(BLOCK);
+    sums.clear();
+    let rows = image.chunks_exact(3 * columns).zip(colours.chunks_exact(3 * columns));
+    for (row, (image, colours)) in rows.enumerate() {
+        let start = row / BLOCK * across;
+        sums.resize(start + across, 0.0);
+        let blocks = image.chunks(3 * BLOCK).zip(colours.chunks(3 * BLOCK));
+        for (sum, (image, colours)) in sums[start..].iter_mut().zip(blocks) {
+            let off = image.iter().zip(colours).map(|(a, b)| (a - f32::from(*b)).abs());
+            *sum += off.sum::<f32>();
+        }
+    }
+}
+
+/// The sum over a block and those around it; columns are counted modulo their number.
+fn around(sums: &[f32], (row, column): (usize, usize), (down, across): (usize, usize)) -> f32 {
+    let rows = row.saturating_sub(1)..(row + 2).min(down);
+    let columns = [column + across - 1, column, column + 1].map(|c| c % across);
+    rows.flat_map(|row| columns.map(|column| sums[row * across + column])).sum()
 }
 
 /// Lowest and highest value within some columns and rows, for each colour. What
@@ -229,6 +313,30 @@ mod tests {
         };
         assert!(off(&moved, &after) < 2.0, "{}", off(&moved, &after));
         assert!(off(&before, &after) > 10.0, "{}", off(&before, &after));
+    }
+
+    #[test]
+    fn a_wall_is_found_at_its_distance() {
+        let camera = camera();
+        let panorama = camera.panorama().unwrap();
+        let motion =
+            Motion { dt: 0.3, forward: 0.2, left: 0.0, turn: 0.05, covariance: Matrix3::zeros() };
+        let before = room(&camera, &nalgebra::Isometry2::identity(), 2.0);
+        let warps = [1.2, 2.0, 6.0].map(|wall| Warp::new(&camera, panorama, &motion, wall));
+        // What somebody sees to whom the wall is where the middle distance has it.
+        let mut now = vec![0.0; before.len()];
+        warps[1].apply(&before, &mut now);
+        let colours: Vec<u8> = now.iter().map(|value| value.round() as u8).collect();
+        let mut moved = before.clone();
+        let mut times: Vec<f32> = (0..COLUMNS * ROWS).map(|pixel| pixel as f32).collect();
+        Sweep::default().apply(&warps, &colours, &mut moved, &mut times);
+        let off = |a: &[f32]| {
+            a.iter().zip(&now).map(|(a, b)| (a - b).abs()).sum::<f32>() / now.len() as f32
+        };
+        assert!(off(&moved) < 0.05, "{}", off(&moved));
+        assert_eq!(times[40 * COLUMNS + 90] as usize, warps[1].nearest(90, 40));
+        warps[2].apply(&before, &mut moved);
+        assert!(off(&moved) > 1.0, "{}", off(&moved));
     }
 
     proptest! {

@@ -220,8 +220,8 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
             let stem = log.with_extension("");
             let stem = stem.display();
             Failure::usage(format!(
-                "{} has no truth: neither {stem}.people.csv nor {stem}.boxes.csv nor a channel \
-                 {} in it",
+                "{} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
+                 {stem}.boxes.csv nor a channel {} in it",
                 log.display(),
                 tagalong_log::TRUTH_TOPIC
             ))
@@ -247,7 +247,8 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 /// The log with its truth, if it has any.
 fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
     let beside = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
-    let (truth, whole_bodies) = match (beside("people.csv"), beside("boxes.csv")) {
+    let people = beside("people.csv").or_else(|| beside("truth.jsonl"));
+    let (truth, whole_bodies) = match (people, beside("boxes.csv")) {
         (Some(people), _) => (people, false),
         (None, Some(boxes)) => (boxes, true),
         (None, None) if read_truth(log, &Limits::default())?.is_some() => (log.to_owned(), false),

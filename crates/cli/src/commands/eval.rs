@@ -15,8 +15,8 @@ use crate::suggest::check_log_path;
 /// The arguments of `tagalong eval`.
 #[derive(Args, Debug)]
 pub struct EvalArgs {
-    /// Who was there: MOTChallenge text, people.csv, KITTI labels, or a log with
-    /// the channel /truth/people.
+    /// Who was there: MOTChallenge text, people.csv, KITTI labels, a log with the
+    /// channel /truth/people, or what it would carry, line by line (.jsonl).
     #[arg(long, value_name = "FILE")]
     pub truth: PathBuf,
     /// Who was reported: MOTChallenge text, KITTI labels, tracks-metres.csv, or
@@ -118,11 +118,16 @@ fn rate(args: &EvalArgs, truth: &TruthFile) -> Result<Rate, Failure> {
 
 /// The frames of the log, if one is named, or found where it is of use.
 fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, Failure> {
-    let found = args.log.clone().or_else(|| match truth.needs_stamps() {
+    let found = args.log.clone().or_else(|| match truth.is_in_log() {
         true => Some(args.truth.clone()),
         false => beside(&args.truth, tracks.log_name.as_deref()),
     });
-    let Some(log) = found else { return Ok(Shots::default()) };
+    let Some(log) = found else {
+        let shown = args.truth.display();
+        let text =
+            format!("{shown} tells frames by their stamps; name the log with --log LOG.mcap");
+        return if truth.needs_stamps() { Err(Failure::usage(text)) } else { Ok(Shots::default()) };
+    };
     let outer = match &args.config {
         Some(config) => ConfigFile::read(config)?.outer()?,
         None => OuterSettings::default(),

@@ -71,6 +71,16 @@ impl Shots {
         self.shots.push(shot);
     }
 
+    /// The first frame.
+    pub fn first(&self) -> Option<&Shot> {
+        self.shots.first()
+    }
+
+    /// All frames, in their order.
+    pub fn iter(&self) -> impl Iterator<Item = &Shot> {
+        self.shots.iter()
+    }
+
     /// The number of the last frame; 0 without any.
     pub fn last(&self) -> u32 {
         self.shots.last().map_or(0, |shot| shot.number)

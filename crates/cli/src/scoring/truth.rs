@@ -7,7 +7,7 @@ use tagalong_core::{HEAD_RADIUS_M, Rect};
 use tagalong_eval::formats::mot::{self, SequenceInfo};
 use tagalong_eval::formats::{Timeline, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
-use tagalong_log::{Limits, TRUTH_TOPIC, TruthPerson, read_truth};
+use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
 
 use super::{Shots, read_text, region};
 use crate::outcome::Failure;
@@ -60,6 +60,8 @@ enum Kind {
     People,
     Kitti,
     Log,
+    /// What a log would carry, as a text.
+    Lines,
 }
 
 /// A frame as annotated; the key of the map is its number, or its stamp.
@@ -86,6 +88,7 @@ impl TruthFile {
     pub fn read(path: &Path, options: TruthOptions) -> Result<Self, Failure> {
         let mut truth = match kind_of(path)? {
             Kind::Log => Self::of_log(path)?,
+            Kind::Lines => Self::of_frames(Kind::Lines, read_truth_lines(path)?),
             Kind::People => Self::of_people(path)?,
             Kind::Kitti => Self::of_kitti(path)?,
             Kind::Mot => Self::of_mot(path, options.rules)?,
@@ -154,12 +157,16 @@ impl TruthFile {
         let frames = read_truth(path, &Limits::default())?.ok_or_else(|| {
             Failure::failed(format!("{} has no truth: no channel {TRUTH_TOPIC}", path.display()))
         })?;
-        let mut file = Self::empty(Kind::Log);
+        Ok(Self::of_frames(Kind::Log, frames))
+    }
+
+    fn of_frames(kind: Kind, frames: Vec<TruthFrame>) -> Self {
+        let mut file = Self::empty(kind);
         for frame in frames {
             let annotated = file.frames.entry(frame.stamp_ns).or_default();
             annotated.people = frame.people.iter().map(of_person).collect();
         }
-        Ok(file)
+        file
     }
 
     fn cut_to_upper_bodies(&mut self) {
@@ -184,6 +191,11 @@ impl TruthFile {
 
     /// True if frames are told by stamp: only the log knows their numbers.
     pub fn needs_stamps(&self) -> bool {
+        matches!(self.kind, Kind::Log | Kind::Lines)
+    }
+
+    /// True if the file of truth is the log itself.
+    pub fn is_in_log(&self) -> bool {
         self.kind == Kind::Log
     }
 
@@ -201,7 +213,7 @@ impl TruthFile {
 
     fn number(&self, key: u64, shots: &Shots) -> Option<u32> {
         match self.kind {
-            Kind::Log => shots.near(key, SAME_MOMENT_NS).map(|shot| shot.number),
+            Kind::Log | Kind::Lines => shots.near(key, SAME_MOMENT_NS).map(|shot| shot.number),
             _ => u32::try_from(key).ok(),
         }
     }
@@ -257,8 +269,10 @@ fn guess(rows: &[mot::Row]) -> mot::Rules {
 
 /// Tells formats apart by how they begin.
 fn kind_of(path: &Path) -> Result<Kind, Failure> {
-    if path.extension().is_some_and(|extension| extension == "mcap") {
-        return Ok(Kind::Log);
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("mcap") => return Ok(Kind::Log),
+        Some("jsonl") => return Ok(Kind::Lines),
+        _ => {}
     }
     let text = read_text(path)?;
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();

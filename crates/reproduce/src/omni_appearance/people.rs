@@ -1,0 +1,83 @@
+//! What the paper leaves to others: several people, and a robot that drives.
+
+use tagalong_eval::Tally;
+use tagalong_sim::Scene;
+use tagalong_trials::{Judge, Trial, TrialError};
+
+use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+
+/// The printed method, ours, its detector with the filter of P1, and our best.
+const PIPELINES: [&str; 4] =
+    ["omni-appearance-as-printed", "omni-appearance", "omni-ekf", "omni-best"];
+/// Draws of each scene.
+const SEEDS: u64 = 5;
+/// How long they are in a minute's version, s.
+const QUICK_S: f64 = 30.0;
+
+/// A name, a scene, and how many of its people walk in it.
+const WORLDS: [(&str, &str, usize); 3] = [
+    ("two people", "omni-people", 2),
+    ("three people", "omni-people", 3),
+    ("two people, the robot drives", "omni-moving", 2),
+];
+
+/// How one pipeline did.
+struct Done {
+    tally: Tally,
+    errors_m: Vec<f64>,
+}
+
+pub(super) fn people(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let contenders = lab.contenders(&PIPELINES)?;
+    let mut tables = Vec::new();
+    for (title, name, people) in WORLDS {
+        let scenes = scenes(lab, name, people)?;
+        let all = lab.trials(title, &scenes, &contenders, judged)?;
+        tables.push(table(title, &all));
+    }
+    Ok(Findings { tables, pictures: Vec::new() })
+}
+
+fn scenes(lab: &Lab, name: &str, people: usize) -> Result<Vec<Scene>, ReproduceError> {
+    let mut scenes = lab.scenes(name, &[], lab.seeds(SEEDS))?;
+    for scene in &mut scenes {
+        scene.webcams.clear();
+        scene.people.truncate(people);
+        if lab.quick {
+            scene.duration_s = scene.duration_s.min(QUICK_S);
+        }
+    }
+    Ok(scenes)
+}
+
+fn judged(trial: Trial) -> Result<Vec<Done>, TrialError> {
+    let judge = Judge::default();
+    let done = |run| {
+        let judged = judge.judge(&trial, run)?;
+        Ok(Done { tally: judged.tally, errors_m: judged.errors_in_robot_m })
+    };
+    trial.runs.iter().map(done).collect()
+}
+
+fn table(title: &str, trials: &[Vec<Done>]) -> Table {
+    let row = |(at, name): (usize, &&str)| {
+        let scores = Tally::combine(trials.iter().map(|done| &done[at].tally)).scores();
+        let errors: Vec<f64> = trials.iter().flat_map(|done| done[at].errors_m.clone()).collect();
+        let share = |value: Option<f64>| {
+            value.map_or_else(Cell::default, |value| Cell::number(100.0 * value, 1))
+        };
+        let swaps = Cell::number(scores.idsw as f64, 0);
+        let cells = vec![share(scores.idf1), share(scores.mota), swaps, Cell::mean(&errors, 3)];
+        Row::ours(*name, cells)
+    };
+    let columns = ["IDF1, %", "MOTA, %", "renamed", "position error, m"];
+    Table {
+        title: format!("{title}: who is where (not in P5)"),
+        columns: columns.map(String::from).to_vec(),
+        rows: PIPELINES.iter().enumerate().map(row).collect(),
+        notes: vec![format!(
+            "{} draws; a report is right within half a metre; nobody counts beyond 6 m",
+            trials.len()
+        )],
+    }
+}

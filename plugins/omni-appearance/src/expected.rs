@@ -1,0 +1,182 @@
+//! People who are known, and where in the image they should be: two who are seen
+//! as one run of columns are told apart by that.
+
+use nalgebra::{Isometry2, Point3};
+use tagalong_core::{Frame, Track};
+
+use crate::View;
+use crate::circular::Run;
+
+/// Half the width of a person, arms included, m.
+const HALF_WIDTH_M: f64 = 0.27;
+/// Whoever was not seen for longer is expected nowhere, s.
+const FRESH_S: f64 = 1.5;
+/// Nearer to the axis nobody is expected, m.
+const NEAREST_M: f64 = 0.4;
+/// Who shows a smaller part of their width is hidden: nothing is measured of them.
+const LEAST_VISIBLE: f64 = 0.4;
+
+/// A track that was seen lately.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Known {
+    position: Point3<f64>,
+    velocity: nalgebra::Vector2<f64>,
+}
+
+impl Known {
+    pub(crate) fn of(track: &Track) -> Option<Self> {
+        let person = &track.estimate.person;
+        let fresh = track.confirmed && track.unseen_s <= FRESH_S;
+        fresh.then_some(Self { position: person.position, velocity: person.velocity })
+    }
+
+    /// After a time, seen by a robot that has moved: `before_from_now` is its motion.
+    pub(crate) fn moved(&self, dt_s: f64, before_from_now: &Isometry2<f64>) -> Self {
+        let back = before_from_now.inverse();
+        let there = self.position.xy() + dt_s * self.velocity;
+        let here = back * there;
+        Self {
+            position: Point3::new(here.x, here.y, self.position.z),
+            velocity: back * self.velocity,
+        }
+    }
+}
+
+/// Where somebody should be seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Expected {
+    /// Middle column, from 0 up to the width.
+    column: f64,
+    /// Columns to each side.
+    half: f64,
+    range_m: f64,
+}
+
+/// Columns of a run that are one person's, and how much of that person they show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Part {
+    pub(crate) run: Run,
+    /// From 0 to 1.
+    pub(crate) visible: f64,
+}
+
+impl Expected {
+    pub(crate) fn of(known: &Known, frame: &Frame, view: &View<'_>) -> Self {
+        let head = frame.camera.robot_from_camera.inverse_transform_point(&known.position);
+        let range_m = head.xy().coords.norm().max(NEAREST_M);
+        let half = (HALF_WIDTH_M / range_m).atan() / std::f64::consts::TAU;
+        let width = view.panorama.columns as f64;
+        let column = view.panorama.pixel(&head).x.rem_euclid(width);
+        Self { column, half: half * width, range_m }
+    }
+
+    /// How far a column is off the middle, in half widths; right is positive.
+    fn off(&self, column: usize, width: usize) -> f64 {
+        let width = width as f64;
+        let columns = (column as f64 - self.column + 0.5 * width).rem_euclid(width) - 0.5 * width;
+        columns / self.half
+    }
+}
+
+/// The parts of a run that are different people's; itself if it is one person's.
+pub(crate) fn divided(run: Run, width: usize, expected: &[Expected]) -> Vec<Part> {
+    let inside = visible(run, width, expected);
+    if inside.len() < 2 {
+        return vec![Part { run, visible: 1.0 }];
+    }
+    let mut parts: Vec<(usize, Run)> = Vec::new();
+    for (offset, column) in run.columns(width).enumerate() {
+        let owner = owner(column, width, &inside);
+        match parts.last_mut() {
+            Some((last, part)) if *last == owner => part.length += 1,
+            _ => parts.push((owner, Run { first: (run.first + offset) % width, length: 1 })),
+        }
+    }
+    // Who is seen on both sides of somebody nearer is measured by the larger one.
+    let largest = |who: usize| {
+        let own = parts.iter().filter(|(owner, _)| *owner == who).map(|(_, part)| *part);
+        own.max_by_key(|part| part.length)
+    };
+    let part = |(who, expected): (usize, &Expected)| {
+        let run = largest(who)?;
+        let visible = (run.length as f64 / (2.0 * expected.half).max(1.0)).min(1.0);
+        (visible >= LEAST_VISIBLE).then_some(Part { run, visible })
+    };
+    inside.iter().enumerate().filter_map(part).collect()
+}
+
+/// Who is expected in a run and not hidden behind the others, from near to far.
+fn visible(run: Run, width: usize, expected: &[Expected]) -> Vec<Expected> {
+    let mut inside: Vec<Expected> =
+        expected.iter().filter(|e| shares(e, run, width)).copied().collect();
+    inside.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
+    let mut seen: Vec<Expected> = Vec::new();
+    for person in inside {
+        let is_on = |who: &Expected, column: usize| who.off(column, width).abs() <= 1.0;
+        let shown = |column: &usize| {
+            is_on(&person, *column) && !seen.iter().any(|nearer| is_on(nearer, *column))
+        };
+        let columns = run.columns(width).filter(shown).count() as f64;
+        if columns >= LEAST_VISIBLE * 2.0 * person.half {
+            seen.push(person);
+        }
+    }
+    seen
+}
+
+/// Somebody is expected in a run if the middle of theirs is in it.
+fn shares(expected: &Expected, run: Run, width: usize) -> bool {
+    let middle = expected.column.round() as usize % width.max(1);
+    (middle + width - run.first) % width < run.length
+}
+
+/// Whose a column is: of those whose width it is in, the nearest person; otherwise
+/// the one whose edge is nearest. `inside` goes from near to far.
+fn owner(column: usize, width: usize, inside: &[Expected]) -> usize {
+    let off = |who: usize| inside[who].off(column, width).abs();
+    let covering = (0..inside.len()).find(|who| off(*who) <= 1.0);
+    let nearest = || (0..inside.len()).min_by(|a, b| off(*a).total_cmp(&off(*b)));
+    covering.or_else(nearest).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn expected(column: f64, half: f64, range_m: f64) -> Expected {
+        Expected { column, half, range_m }
+    }
+
+    fn run(first: usize, length: usize) -> Run {
+        Run { first, length }
+    }
+
+    #[test]
+    fn a_run_of_one_person_stays_whole() {
+        let alone = [expected(20.0, 8.0, 2.0), expected(200.0, 8.0, 2.0)];
+        assert_eq!(divided(run(12, 17), 480, &alone), [Part { run: run(12, 17), visible: 1.0 }]);
+        // A second track on the same person explains nothing more.
+        let doubled = [expected(20.0, 8.0, 2.0), expected(21.0, 8.0, 2.2)];
+        assert_eq!(divided(run(12, 17), 480, &doubled).len(), 1);
+    }
+
+    #[test]
+    fn two_side_by_side_get_their_columns_across_the_seam() {
+        let both = [expected(474.0, 8.0, 2.0), expected(8.0, 6.0, 3.0)];
+        let parts = divided(run(466, 28), 480, &both);
+        assert_eq!(parts.len(), 2);
+        assert_eq!((parts[0].run, parts[1].run), (run(466, 17), run(3, 11)));
+        assert!(parts[0].visible == 1.0 && parts[1].visible > 0.9);
+    }
+
+    #[test]
+    fn of_somebody_behind_another_only_what_is_seen_counts() {
+        let (near, far) = (expected(100.0, 20.0, 1.0), expected(122.0, 6.0, 3.0));
+        let parts = divided(run(80, 49), 480, &[far, near]);
+        assert_eq!(parts[0].run, run(80, 41));
+        assert_eq!(parts[1].run, run(121, 8));
+        assert!((parts[1].visible - 8.0 / 12.0).abs() < 1e-9);
+        let hidden = divided(run(80, 41), 480, &[expected(118.0, 6.0, 3.0), near]);
+        assert_eq!(hidden, [Part { run: run(80, 41), visible: 1.0 }]);
+    }
+}
