@@ -86,17 +86,17 @@ pub fn make_room_for(file: &Path) -> Result<(), Failure> {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).map_or(Ok(()), make_folder)
 }
 
-/// Makes sure that a file may be written: it is not there, or may be replaced.
+/// Spares a file that is there, unless it may be replaced.
 ///
 /// # Errors
-/// A file that is there, and as [`make_folder`]: exit code 2.
-pub fn claim(file: &Path, overwrite: bool) -> Result<(), Failure> {
+/// A file that is there: exit code 2.
+pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
     if file.exists() && !overwrite {
         let shown = file.display();
         let why = format!("{shown} exists; give another name with -o, or --overwrite");
         return Err(Failure::usage(why));
     }
-    make_room_for(file)
+    Ok(())
 }
 
 /// What is said where a signal ended the writing of a log.

@@ -15,7 +15,7 @@ use clap::{Args, ValueEnum};
 
 use self::sequence::Sequence;
 use crate::args::Format;
-use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, claim, print, say};
+use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use crate::signals::Signals;
 use crate::suggest::converter;
 
@@ -107,13 +107,14 @@ pub fn import(args: &ImportArgs) -> Outcome {
     }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
     let signals = Signals::listen().map_err(Failure::failed)?;
-    claim(&log, args.overwrite)?;
+    spare(&log, args.overwrite)?;
     if !path.is_dir() {
         let message =
             format!("{} is a file; give the folder that holds the sequence", path.display());
         return Err(Failure::failed(message));
     }
     let sequence = read(args)?;
+    make_room_for(&log)?;
     writer::write(&sequence, &log, &signals)?;
     beside(&sequence, &log)?;
     if let Some(signal) = signals.received() {

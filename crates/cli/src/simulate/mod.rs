@@ -15,7 +15,7 @@ use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
 use crate::args::Format;
-use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, claim, print, say};
+use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use crate::realism::realism;
 use crate::signals::Signals;
 
@@ -72,7 +72,8 @@ pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
         Some(folder) => gallery::paint(simulation, &scene, folder)?,
         None => {
             let log = args.output.clone().unwrap_or_else(|| default_log(path));
-            claim(&log, args.overwrite)?;
+            spare(&log, args.overwrite)?;
+            make_room_for(&log)?;
             return write(simulation, &scene, &log, args.format);
         }
     }
