@@ -12,9 +12,9 @@ use tagalong_log::{Limits, TruthFrame, read_truth, read_truth_lines};
 /// A room in which somebody with a green hat walks before four webcams; the robot's
 /// own images are too small for anything.
 const ROOM: &str = "seed = 3\nduration_s = 26.0\n[room]\nsize_m = [10.0, 5.0]\n[camera]\n\
-    kind = \"panorama\"\nwidth = 64\nheight = 64\nrate_hz = 2.0\nheight_m = 1.55\n\
+    kind = \"panorama\"\nwidth = 64\nheight = 64\nrate_hz = 8.0\nheight_m = 1.55\n\
     [robot]\nstart = [5.0, 2.5]\nheading_deg = 30.0\n[[people]]\n\
-    path = [[2.0, 1.4], [8.0, 1.2], [8.4, 3.6], [1.8, 3.8], [3.4, 2.4]]\nspeed_mps = 1.0\n\
+    path = [[2.0, 1.4], [8.0, 1.2], [8.4, 3.6], [1.8, 3.8], [3.4, 2.4]]\nspeed_mps = 0.7\n\
     start_s = 0.0\nlook = 11\nextras = [\"green-hat\"]\n";
 
 /// Where the webcams hang, and how far off the guess is: m and degrees.

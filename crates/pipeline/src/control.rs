@@ -1,5 +1,5 @@
 use tagalong_core::{
-    Command, Controller, Frame, Motion, Person, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
+    Command, Controller, Frame, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
 };
 
 use crate::boundary::{StepError, contain};
@@ -104,9 +104,9 @@ impl Steering {
         };
         self.last = Some(frame.stamp);
         let place = |track: &Track| track.estimate.person.position.xy();
-        let people: Vec<Person> = tracks.iter().map(|track| track.estimate.person).collect();
+        let person = target.map(|track| &track.estimate.person);
         let (corridor, camera) = (self.governor.corridor(), &frame.camera);
-        self.surroundings.look(corridor, camera, frame.depth().ok(), motion, &people);
+        self.surroundings.look(corridor, camera, frame.depth().ok(), motion, person);
         let look = |corridor: &_, curvature| {
             self.surroundings.ahead(corridor, curvature, target.map(place))
         };

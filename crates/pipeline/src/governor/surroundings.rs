@@ -36,7 +36,7 @@ struct Thing {
     /// Robot frame, m.
     at: Point3<f64>,
     /// How long it has been seen, s; the time does not count in which it may have
-    /// stood there because of somebody who stood beside it.
+    /// stood there because of the person who is followed and stood beside it.
     seen_s: f64,
     /// How long it has not been seen, s.
     unseen_s: f64,
@@ -44,19 +44,20 @@ struct Thing {
 
 impl Surroundings {
     /// Takes in an image; the robot moved by `motion` since the last one. What is
-    /// near somebody is not remembered, nor is what does not stay where it is.
+    /// near the person who is followed is not remembered, nor is what does not stay
+    /// where it is.
     pub(crate) fn look(
         &mut self,
         settings: &CorridorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
         motion: &Motion,
-        people: &[Person],
+        target: Option<&Person>,
     ) {
         self.see(settings, camera, depth);
         self.grid.count(settings, &self.seen);
-        self.meet_again(settings, camera, depth, motion, people);
-        self.remember(settings, people);
+        self.meet_again(settings, camera, depth, motion, target);
+        self.remember(settings, target);
     }
 
     /// Everything was elsewhere.
@@ -89,7 +90,7 @@ impl Surroundings {
         camera: &Camera,
         depth: Option<&DepthImage>,
         motion: &Motion,
-        people: &[Person],
+        target: Option<&Person>,
     ) {
         let grid = &self.grid;
         self.things.retain_mut(|Thing { at, seen_s, unseen_s }| {
@@ -99,7 +100,7 @@ impl Surroundings {
                 return false;
             }
             if grid.is_something(at) {
-                let carried = people.iter().any(|person| may_carry(person, at));
+                let carried = target.is_some_and(|person| may_carry(person, at));
                 *seen_s += if carried { 0.0 } else { motion.dt };
                 *unseen_s = 0.0;
                 return true;
@@ -134,11 +135,11 @@ impl Surroundings {
         });
     }
 
-    fn remember(&mut self, settings: &CorridorSettings, people: &[Person]) {
+    fn remember(&mut self, settings: &CorridorSettings, target: Option<&Person>) {
         self.things.iter().for_each(|thing| self.grid.clear_around(&thing.at));
         for at in &self.seen {
             let is_of = |person: &Person| far_m(person, at) < settings.target_radius_m;
-            if self.grid.is_full(at) && !people.iter().any(is_of) {
+            if self.grid.is_full(at) && !target.is_some_and(is_of) {
                 self.grid.clear_around(at);
                 self.things.push(Thing { at: *at, seen_s: 0.0, unseen_s: 0.0 });
             }
@@ -264,7 +265,7 @@ mod tests {
             let motion = Motion { forward, ..Motion::at_rest(0.1) };
             let people = someone.then(|| person(x, y, 0.0));
             let depth = with_box(x, y);
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.as_slice());
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.as_ref());
         }
         surroundings.ahead(&settings, 0.0, None)
     }
@@ -288,10 +289,10 @@ mod tests {
         let depth = with_box(1.0, 0.7);
         let still = Motion::at_rest(0.1);
         for _ in 0..WAIT {
-            surroundings.look(&settings, &camera(), Some(&depth), &still, &[]);
+            surroundings.look(&settings, &camera(), Some(&depth), &still, None);
         }
         let on = Motion { forward: 0.6, ..still };
-        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, &[]);
+        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
         let bend = surroundings.ahead(&settings, 1.2, None);
         assert!(matches!(bend, Some(Ahead::Something(at)) if at < 0.6), "{bend:?}");
@@ -304,7 +305,7 @@ mod tests {
         let mut surroundings = Surroundings::default();
         let mut look = |x| {
             let (depth, still) = (with_box(x, 0.0), Motion::at_rest(0.1));
-            surroundings.look(&settings, &camera(), Some(&depth), &still, &[]);
+            surroundings.look(&settings, &camera(), Some(&depth), &still, None);
             surroundings.ahead(&settings, 0.0, None)
         };
         assert!(is_at(look(1.5), 1.3));
@@ -323,7 +324,7 @@ mod tests {
             let depth = if step < 15 { with_box(1.2, y) } else { with_box(9.0, 0.0) };
             let forward = if step < 15 { 0.0 } else { 0.05 };
             let motion = Motion { forward, ..Motion::at_rest(0.1) };
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, &[]);
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
             let ahead = surroundings.ahead(&settings, 0.0, None);
             seen += u32::from(matches!(ahead, Some(Ahead::Something(_))));
         }
@@ -338,15 +339,15 @@ mod tests {
         let settings = CorridorSettings::default();
         for (speed_mps, expected_m) in [(0.0, None), (0.6, Some(0.3))] {
             let mut surroundings = Surroundings::default();
-            let person = [person(1.7, 0.3, speed_mps)];
-            let mut look = |x: f64, forward, people: &[Person]| {
+            let person = person(1.7, 0.3, speed_mps);
+            let mut look = |x: f64, forward, target: Option<&Person>| {
                 let motion = Motion { forward, ..Motion::at_rest(0.1) };
-                surroundings.look(&settings, &camera(), Some(&with_box(x, 0.0)), &motion, people);
+                surroundings.look(&settings, &camera(), Some(&with_box(x, 0.0)), &motion, target);
                 surroundings.ahead(&settings, 0.0, None)
             };
-            (0..WAIT).for_each(|_| _ = look(1.2, 0.0, &person));
-            let near = look(0.5, 0.7, &[]);
-            let gone = look(9.0, 0.0, &[]);
+            (0..WAIT).for_each(|_| _ = look(1.2, 0.0, Some(&person)));
+            let near = look(0.5, 0.7, None);
+            let gone = look(9.0, 0.0, None);
             match expected_m {
                 None => assert_eq!(gone, Some(Ahead::Free), "{near:?}"),
                 Some(metres) => assert!(is_at(gone, metres), "{gone:?}"),
@@ -359,10 +360,10 @@ mod tests {
         let settings = CorridorSettings::default();
         let mut surroundings = Surroundings::default();
         let still = Motion::at_rest(0.1);
-        surroundings.look(&settings, &camera(), None, &still, &[]);
+        surroundings.look(&settings, &camera(), None, &still, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), None);
         let empty = DepthImage::from_fn(80, 60, |_, _| f32::NAN);
-        surroundings.look(&settings, &camera(), Some(&empty), &still, &[]);
+        surroundings.look(&settings, &camera(), Some(&empty), &still, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Blind));
     }
 }

@@ -109,6 +109,8 @@ pub(crate) struct Lock {
     memory: Memory,
     /// Log-odds that the followed track is the person.
     belief: f64,
+    /// How long there has been somebody to choose, s.
+    waited_s: f64,
     /// Somebody came near or the track was out of sight: it may have changed over.
     doubtful: bool,
     sightings: u32,
@@ -127,6 +129,7 @@ impl Lock {
             track: None,
             memory: Memory::default(),
             belief: 0.0,
+            waited_s: 0.0,
             doubtful: false,
             sightings: 0,
             last: None,
@@ -194,7 +197,7 @@ impl Lock {
         let likeness = self.likeness(&looks);
         let log_odds = likeness.iter().map(|(like, odds)| (like.track, *odds)).collect();
         match self.state {
-            LockState::Initial if may_choose => self.start(tracks),
+            LockState::Initial if may_choose => self.start(tracks, motion.dt),
             LockState::Initial => {}
             LockState::Lost => self.look_for(tracks, &log_odds),
             _ => self.hold(tracks, &log_odds),
@@ -237,15 +240,21 @@ impl Lock {
     }
 
     /// Chooses somebody.
-    fn start(&mut self, tracks: &[Track]) {
+    fn start(&mut self, tracks: &[Track], dt_s: f64) {
+        let far_m = |track: &Track| track.estimate.person.position.xy().coords.norm();
         let fits = |track: &&Track| {
             let place = track.estimate.person.position.xy();
             let bearing = place.y.atan2(place.x).abs().to_degrees();
             let near = bearing <= self.settings.choose_within_deg
-                && place.coords.norm() <= self.settings.choose_within_m;
+                && far_m(track) <= self.settings.choose_within_m;
             track.confirmed && self.settings.track.map_or(near, |id| id == track.id.0)
         };
-        let Some(track) = tracks.iter().find(fits) else { return };
+        let nearest = tracks.iter().filter(fits).min_by(|a, b| far_m(a).total_cmp(&far_m(b)));
+        let Some(track) = nearest else { return self.waited_s = 0.0 };
+        if self.settings.track.is_none() && self.waited_s < self.settings.choose_after_s {
+            self.waited_s += dt_s;
+            return;
+        }
         self.track = Some(track.id);
         self.belief = CERTAIN;
         self.see(track);

@@ -11,8 +11,11 @@ pub struct TargetSettings {
     pub track: Option<u32>,
     /// In front is up to this bearing to either side, degrees ...
     pub choose_within_deg: f64,
-    /// ... and up to this distance, m.
+    /// ... and up to this distance, m, ...
     pub choose_within_m: f64,
+    /// ... once there has been somebody for this long, s: who is nearest is not
+    /// always seen first.
+    pub choose_after_s: f64,
     /// Remember what the person looks like, doubt a track that looks like
     /// somebody else, and know the person again. Without it a track is followed
     /// while it lives, and nobody after that.
@@ -50,6 +53,7 @@ impl Default for TargetSettings {
             track: None,
             choose_within_deg: 45.0,
             choose_within_m: 5.0,
+            choose_after_s: 0.0,
             remember: true,
             training_sightings: 15,
             belief_weight: 0.25,

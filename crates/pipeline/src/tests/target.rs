@@ -44,6 +44,20 @@ fn the_nearest_in_front_is_chosen_and_known_well_after_some_sightings() {
 }
 
 #[test]
+fn who_is_nearest_is_chosen_even_if_seen_second() {
+    let people = |i| match i {
+        0..2 => vec![tall(1.6, 4.0, 0.0)],
+        _ => vec![tall(1.6, 4.0, 0.0), tall(1.6, 2.0, 0.3)],
+    };
+    for (settings, expected_m) in [("", 4.0), ("choose_after_s = 0.5", 2.0)] {
+        let reports = ride(settings, 20, people);
+        let last = &reports[19];
+        let target = last.tracks.iter().find(|t| Some(t.id) == last.target).unwrap();
+        assert_eq!(target.estimate.person.position.x, expected_m, "{settings}");
+    }
+}
+
+#[test]
 fn somebody_can_be_chosen_by_number() {
     let people = |_| vec![tall(1.6, 2.0, 0.0), tall(1.6, 4.0, 0.0)];
     let far = ride("", 3, people)[2].tracks.iter().map(|t| t.id.0).max().unwrap();
