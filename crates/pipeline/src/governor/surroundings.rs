@@ -1,5 +1,5 @@
-use nalgebra::{Point2, Point3};
-use tagalong_core::{Camera, DepthImage, Motion, Person};
+use nalgebra::{Point2, Point3, Vector3};
+use tagalong_core::{Camera, DepthImage, Motion, Person, Track, TrackId};
 
 use super::CorridorSettings;
 use super::corridor::{Ahead, ahead, is_thing};
@@ -12,6 +12,8 @@ const CELL_M: f64 = 0.05;
 const ENOUGH: u16 = 3;
 /// What stands in its place for so long is a thing; somebody who walks by is not.
 const STANDS_S: f64 = 1.0;
+/// From the torso of a person to the head, m.
+const TORSO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.35);
 /// What people carry, draw along or push is this near to them, m, ...
 const CARRIED_M: f64 = 0.8;
 /// ... and stays where it is while they are slower than this, m/s.
@@ -40,6 +42,8 @@ struct Thing {
     seen_s: f64,
     /// How long it has not been seen, s.
     unseen_s: f64,
+    /// Whom it was, if it is somebody: where a track was seen last.
+    who: Option<TrackId>,
 }
 
 impl Surroundings {
@@ -58,6 +62,20 @@ impl Surroundings {
         self.grid.count(settings, &self.seen);
         self.meet_again(settings, camera, depth, motion, target);
         self.remember(settings, target);
+    }
+
+    /// Other people who were seen are in the way where that was, until the camera
+    /// sees past them or them elsewhere: somebody who steps before the robot is soon
+    /// too near to be seen.
+    pub(crate) fn meet(&mut self, tracks: &[Track], followed: Option<TrackId>) {
+        for track in tracks.iter().filter(|track| track.seen) {
+            self.things.retain(|thing| thing.who != Some(track.id));
+            if Some(track.id) != followed {
+                let at = track.estimate.person.position - TORSO;
+                let who = Some(track.id);
+                self.things.push(Thing { at, seen_s: STANDS_S, unseen_s: 0.0, who });
+            }
+        }
     }
 
     /// Everything was elsewhere.
@@ -93,7 +111,7 @@ impl Surroundings {
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
-        self.things.retain_mut(|Thing { at, seen_s, unseen_s }| {
+        self.things.retain_mut(|Thing { at, seen_s, unseen_s, .. }| {
             let moved = motion.apply_to_point(at.xy());
             *at = Point3::new(moved.x, moved.y, at.z);
             if !is_near(settings, at) {
@@ -141,7 +159,7 @@ impl Surroundings {
             let is_of = |person: &Person| far_m(person, at) < settings.target_radius_m;
             if self.grid.is_full(at) && !target.is_some_and(is_of) {
                 self.grid.clear_around(at);
-                self.things.push(Thing { at: *at, seen_s: 0.0, unseen_s: 0.0 });
+                self.things.push(Thing { at: *at, seen_s: 0.0, unseen_s: 0.0, who: None });
             }
         }
     }
@@ -223,8 +241,8 @@ fn reach_m(settings: &CorridorSettings) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector2;
-    use tagalong_core::{Distortion, Pinhole};
+    use nalgebra::{SMatrix, Vector2};
+    use tagalong_core::{Distortion, Estimate, Pinhole};
 
     use super::*;
 
@@ -353,6 +371,41 @@ mod tests {
                 Some(metres) => assert!(is_at(gone, metres), "{gone:?}"),
             }
         }
+    }
+
+    fn track(x: f64, y: f64) -> Track {
+        let region = camera().upper_body(&Point3::new(x, y, 1.6));
+        let estimate =
+            Estimate { person: person(x, y, 0.0), covariance: SMatrix::identity(), region };
+        Track {
+            id: TrackId(2),
+            estimate,
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    #[test]
+    fn whoever_stepped_before_the_robot_is_there_until_they_are_seen_elsewhere() {
+        let settings = CorridorSettings::default();
+        let mut surroundings = Surroundings::default();
+        let mut look = |forward, seen: Option<Track>, followed| {
+            let motion = Motion { forward, ..Motion::at_rest(0.1) };
+            let depth = with_box(9.0, 0.0);
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
+            surroundings.meet(seen.as_slice(), followed);
+            surroundings.ahead(&settings, 0.0, None)
+        };
+        look(0.0, Some(track(0.6, 0.1)), None);
+        let near = look(0.3, None, None);
+        assert!(matches!(near, Some(Ahead::Something(at)) if at < 0.2), "{near:?}");
+        assert_eq!(look(0.0, Some(track(0.5, 0.9)), None), Some(Ahead::Free));
+        look(0.0, Some(track(0.3, 0.1)), None);
+        assert_eq!(look(0.0, Some(track(0.3, 0.1)), Some(TrackId(2))), Some(Ahead::Free));
     }
 
     #[test]
