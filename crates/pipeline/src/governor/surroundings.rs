@@ -10,6 +10,8 @@ const COLUMNS: usize = 160;
 const CELL_M: f64 = 0.05;
 /// So many points in a cell are no noise.
 const ENOUGH: u16 = 3;
+/// Depth cameras may see nothing that is nearer, m.
+const BLIND_M: f64 = 0.8;
 /// What stands in its place for so long is a thing; somebody who walks by is not.
 const STANDS_S: f64 = 1.0;
 /// From the torso of a person to the head, m.
@@ -124,6 +126,9 @@ impl Surroundings {
                 return true;
             }
             *unseen_s += motion.dt;
+            if depth.is_some_and(|depth| is_too_near(camera, depth, at)) {
+                *seen_s = STANDS_S;
+            }
             let stands = *seen_s >= STANDS_S && *unseen_s <= settings.memory_s;
             stands && !depth.is_some_and(|depth| shows(camera, depth, at))
         });
@@ -211,16 +216,22 @@ impl Grid {
     }
 }
 
+/// True if the image shows no depth at this place, which is nearer than cameras see.
+fn is_too_near(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> bool {
+    let seen_m = depth_at(camera, depth, at);
+    camera.depth_of(at) < BLIND_M && seen_m.is_some_and(|z| !(z.is_finite() && z > 0.0))
+}
+
+/// What the image says at a place, m; `None` outside of the image.
+fn depth_at(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> Option<f64> {
+    let pixel = camera.project(at)?;
+    depth.get(pixel.x.round() as i64, pixel.y.round() as i64).map(f64::from)
+}
+
 /// True if the image shows this place, or what is behind it.
 fn shows(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> bool {
-    let seen_m = camera.project(at).and_then(|pixel| {
-        let (x, y) = (pixel.x.round(), pixel.y.round());
-        depth.get(x as i64, y as i64)
-    });
-    seen_m.is_some_and(|z| {
-        let z = f64::from(z);
-        z.is_finite() && z > 0.0 && z > camera.depth_of(at) - BEFORE_M
-    })
+    let before_m = camera.depth_of(at) - BEFORE_M;
+    depth_at(camera, depth, at).is_some_and(|z| z.is_finite() && z > 0.0 && z > before_m)
 }
 
 fn far_m(person: &Person, at: &Point3<f64>) -> f64 {
@@ -406,6 +417,26 @@ mod tests {
         assert_eq!(look(0.0, Some(track(0.5, 0.9)), None), Some(Ahead::Free));
         look(0.0, Some(track(0.3, 0.1)), None);
         assert_eq!(look(0.0, Some(track(0.3, 0.1)), Some(TrackId(2))), Some(Ahead::Free));
+    }
+
+    /// The camera sees nothing nearer than half a metre: there the image is empty.
+    #[test]
+    fn who_came_too_near_to_be_seen_is_still_there() {
+        let settings = CorridorSettings::default();
+        let mut surroundings = Surroundings::default();
+        let mut look = |x: f64, blind: bool| {
+            let seen = with_box(x, 0.0);
+            let depth = DepthImage::from_fn(80, 60, |u, v| {
+                let middle = (30..50).contains(&u);
+                if blind && middle { f32::NAN } else { seen.row(v)[u] }
+            });
+            let motion = Motion::at_rest(0.1);
+            surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
+            surroundings.ahead(&settings, 0.0, None)
+        };
+        assert!(is_at(look(0.75, false), 0.55));
+        assert!(is_at(look(9.0, true), 0.55), "hidden");
+        assert_eq!(look(9.0, false), Some(Ahead::Free), "gone");
     }
 
     #[test]
