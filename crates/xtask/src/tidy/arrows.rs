@@ -54,6 +54,8 @@ const ARROWS: &[(&str, &[&str])] = &[
             "reproduce",
             "triangulate",
             "catalog",
+            // `follow --fit`: weights of the lock, fitted to rides.
+            "learn",
         ],
     ),
     ("xtask", &[]),
