@@ -39,12 +39,16 @@ impl Blend for u8 {
 impl Blend for [u8; 3] {
     #[inline]
     fn mean(four: [Self; 4]) -> Self {
-        [0, 1, 2].map(|i| u8::mean(four.map(|pixel| pixel[i])))
+        let [a, b, c, d] = four;
+        let one = |i: usize| u8::mean([a[i], b[i], c[i], d[i]]);
+        [one(0), one(1), one(2)]
     }
 
     #[inline]
     fn bilinear(four: [Self; 4], across: u32, down: u32) -> Self {
-        [0, 1, 2].map(|i| u8::bilinear(four.map(|pixel| pixel[i]), across, down))
+        let [a, b, c, d] = four;
+        let one = |i: usize| u8::bilinear([a[i], b[i], c[i], d[i]], across, down);
+        [one(0), one(1), one(2)]
     }
 }
 
