@@ -2,8 +2,11 @@
 
 mod ci;
 mod docs;
+mod markdown;
 mod metadata;
 mod new_plugin;
+mod program;
+mod rehearse;
 mod tidy;
 mod try_out;
 mod walk_through;
@@ -38,6 +41,8 @@ enum Command {
         #[arg(long, value_name = "PART")]
         slow: Option<String>,
     },
+    /// Runs the command lines of the documents that take no more than seconds
+    Rehearse,
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -77,6 +82,7 @@ fn run(command: Command) -> Result<()> {
         Command::NewPlugin(_) => try_out::try_out(&workspace),
         Command::Docs { slow } => docs::fill(&workspace, slow.as_deref()),
         Command::Tidy => tidy::tidy(&workspace),
+        Command::Rehearse => rehearse::rehearse(&workspace),
         Command::Ci => ci::ci(&workspace),
     }
 }

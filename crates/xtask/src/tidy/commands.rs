@@ -1,20 +1,20 @@
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::process::Command;
 
 use anyhow::Result;
 
-use super::markdown::Document;
+use crate::markdown::Document;
 use crate::metadata::Metadata;
+use crate::program::Program;
 use crate::workspace::{Workspace, output};
 
-/// Complains about command lines in documents whose sub-command or option does
-/// not exist.
+/// Complains about command lines in documents that the program does not understand.
 pub fn check(
     workspace: &Workspace,
     metadata: &Metadata,
     documents: &[Document],
 ) -> Result<Vec<String>> {
-    let mut known = Known::new(workspace, metadata)?;
+    let known = Known::new(workspace, metadata)?;
     let mut complaints = Vec::new();
     for document in documents {
         for (number, line) in &document.shell {
@@ -44,12 +44,16 @@ fn calls(line: &str) -> Vec<Call<'_>> {
 }
 
 fn calls_of_part(part: &str) -> Vec<Call<'_>> {
-    let words: Vec<&str> = part.split_whitespace().filter(|word| !word.contains('=')).collect();
-    match words.as_slice() {
+    let settings = |word: &&str| word.contains('=');
+    let all: Vec<&str> = part.split_whitespace().skip_while(settings).collect();
+    // What goes on in the shell is none of the program's.
+    let words = all.split(|word| matches!(*word, ">" | "|")).next().unwrap_or_default();
+    match words {
         ["tagalong", rest @ ..] => vec![Call::Tagalong(rest.to_vec())],
         ["cargo", "xtask", command, ..] => vec![Call::Xtask(command)],
         ["cargo", "run", rest @ ..] => {
-            let own = rest.iter().any(|word| matches!(*word, "-p" | "--package" | "--example"));
+            let other = ["-p", "--package", "--example", "--manifest-path"];
+            let own = rest.iter().any(|word| other.contains(word));
             let after = rest.iter().position(|word| *word == "--").map(|at| &rest[at + 1..]);
             match after {
                 Some(words) if !own => vec![Call::Cargo("run"), Call::Tagalong(words.to_vec())],
@@ -65,78 +69,48 @@ fn calls_of_part(part: &str) -> Vec<Call<'_>> {
 const INSTALLED: &[&str] = &["deny", "install"];
 
 /// What there is to call.
-struct Known<'a> {
-    workspace: &'a Workspace,
+struct Known {
     cargo: BTreeSet<String>,
-    /// The help of each sub-command of `tagalong`; `None` before it is built.
-    tagalong: Option<BTreeMap<String, String>>,
-    has_program: bool,
+    program: Option<Program>,
 }
 
-impl<'a> Known<'a> {
-    fn new(workspace: &'a Workspace, metadata: &Metadata) -> Result<Self> {
+impl Known {
+    fn new(workspace: &Workspace, metadata: &Metadata) -> Result<Self> {
         let list = output(Command::new("cargo").arg("--list"))?;
-        let cargo = list.lines().skip(1).filter_map(first_word).map(String::from);
+        let cargo = list.lines().skip(1).filter_map(|line| line.split_whitespace().next());
         let members = metadata.members(workspace.root());
         let has_program = members.get("crates/cli").is_some_and(|package| package.is_program());
-        let cargo = cargo.chain(INSTALLED.iter().map(|name| (*name).to_owned())).collect();
-        Ok(Self { workspace, cargo, tagalong: None, has_program })
+        let cargo = cargo.chain(INSTALLED.iter().copied()).map(str::to_owned).collect();
+        let program = has_program.then(|| Program::built(workspace)).transpose()?;
+        Ok(Self { cargo, program })
     }
 
-    fn complaint(&mut self, call: &Call<'_>) -> Result<Option<String>> {
-        Ok(match call {
-            Call::Cargo(command) => {
+    fn complaint(&self, call: &Call<'_>) -> Result<Option<String>> {
+        Ok(match (call, &self.program) {
+            (Call::Cargo(command), _) => {
                 (!self.cargo.contains(*command)).then(|| format!("there is no `cargo {command}`"))
             }
-            Call::Xtask(command) => (!crate::subcommands().iter().any(|name| name == command))
+            (Call::Xtask(command), _) => (!crate::subcommands().iter().any(|name| name == command))
                 .then(|| format!("there is no `cargo xtask {command}`")),
-            Call::Tagalong(words) if self.has_program => unknown_words(self.helps()?, words),
-            Call::Tagalong(_) => None,
+            (Call::Tagalong(words), Some(program)) => misunderstood(program, words)?,
+            (Call::Tagalong(_), None) => None,
         })
     }
-
-    /// The help of `tagalong` itself under the empty name, and of each of its
-    /// sub-commands.
-    fn helps(&mut self) -> Result<&BTreeMap<String, String>> {
-        if self.tagalong.is_none() {
-            let help = |words: &[&str]| {
-                let mut cargo = Command::new("cargo");
-                cargo.args(["run", "--quiet", "--package", "tagalong-cli", "--"]);
-                output(cargo.args(words).arg("--help").current_dir(self.workspace.root()))
-            };
-            let all = help(&[])?;
-            let mut helps = BTreeMap::new();
-            for name in commands_in(&all).filter(|name| *name != "help") {
-                helps.insert(name.to_owned(), help(&[name])?);
-            }
-            helps.insert(String::new(), all);
-            self.tagalong = Some(helps);
-        }
-        Ok(self.tagalong.get_or_insert_default())
-    }
 }
 
-fn first_word(line: &str) -> Option<&str> {
-    line.split_whitespace().next()
+/// What the program says to words that it does not understand; asked for help, it
+/// reads them all and does nothing.
+fn misunderstood(program: &Program, words: &[&str]) -> Result<Option<String>> {
+    let said = program.call(&[]).args(words.iter().map(plain)).arg("--help").output()?;
+    let error = String::from_utf8_lossy(&said.stderr);
+    let first = error.lines().next().unwrap_or_default();
+    Ok((!said.status.success()).then(|| format!("`tagalong {}`: {first}", words.join(" "))))
 }
 
-/// The names listed under `Commands:` in a help text.
-fn commands_in(help: &str) -> impl Iterator<Item = &str> {
-    let lines = help.lines().skip_while(|line| !line.starts_with("Commands:")).skip(1);
-    lines.take_while(|line| line.starts_with("  ")).filter_map(|line| {
-        let name = line.strip_prefix("  ").filter(|rest| !rest.starts_with(' '));
-        name.and_then(first_word)
-    })
-}
-
-fn unknown_words(helps: &BTreeMap<String, String>, words: &[&str]) -> Option<String> {
-    let command = words.iter().find(|word| !word.starts_with('-')).copied().unwrap_or_default();
-    let Some(help) = helps.get(command) else {
-        return Some(format!("there is no `tagalong {command}`"));
-    };
-    let flags = words.iter().filter_map(|word| word.strip_prefix("--"));
-    let mut missing = flags.filter(|flag| !help.contains(&format!("--{flag}")));
-    missing.next().map(|flag| format!("`tagalong {command}` has no option `--{flag}`"))
+/// A word as the shell hands it on; any number for a variable.
+fn plain(word: &&str) -> String {
+    let word = word.trim_matches(['\'', '"']);
+    if word.starts_with('$') { "1".to_owned() } else { word.to_owned() }
 }
 
 #[cfg(test)]
@@ -154,16 +128,10 @@ mod tests {
     }
 
     #[test]
-    fn unknown_sub_commands_and_options_are_named() {
-        let all = "Usage: x\n\nCommands:\n  run   Runs\n  list  Lists\n\nOptions:\n  -h, --help\n";
-        assert_eq!(commands_in(all).collect::<Vec<_>>(), ["run", "list"]);
-        let helps = BTreeMap::from([
-            (String::new(), all.to_owned()),
-            ("run".to_owned(), "--overlay  Draws".to_owned()),
-        ]);
-        assert_eq!(unknown_words(&helps, &["run", "x", "--overlay"]), None);
-        assert!(unknown_words(&helps, &["walk"]).unwrap().contains("tagalong walk"));
-        assert!(unknown_words(&helps, &["run", "--over"]).is_none(), "a beginning is accepted");
-        assert!(unknown_words(&helps, &["run", "--blue"]).unwrap().contains("--blue"));
+    fn what_the_shell_does_is_left_out_and_settings_are_kept() {
+        let set = Call::Tagalong(vec!["simulate", "--set", "a.b=1"]);
+        assert_eq!(calls("tagalong simulate --set a.b=1 > x"), [set]);
+        assert_eq!(plain(&"'HOTA<-0.01'"), "HOTA<-0.01");
+        assert_eq!(plain(&"\"$TASK\""), "1");
     }
 }

@@ -5,12 +5,12 @@ mod arrows;
 mod commands;
 mod files;
 mod licences;
-mod markdown;
 mod paths;
 mod plugins;
 
 use anyhow::{Result, bail};
 
+use crate::markdown;
 use crate::metadata::Metadata;
 use crate::workspace::Workspace;
 

@@ -1,6 +1,6 @@
 use std::path::{Component, Path, PathBuf};
 
-use super::markdown::Document;
+use crate::markdown::Document;
 use crate::workspace::Workspace;
 
 /// Complains about paths that a document names, in backticks or as a link, and

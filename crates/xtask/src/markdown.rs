@@ -10,7 +10,8 @@ pub struct Document {
     pub path: PathBuf,
     /// Line numbers with the text outside of fences.
     pub prose: Vec<(usize, String)>,
-    /// Line numbers with the text inside of fences for the shell.
+    /// Line numbers with the text inside of fences for the shell; a line that ends
+    /// with a backslash goes on.
     pub shell: Vec<(usize, String)>,
 }
 
@@ -34,13 +35,23 @@ fn parse(path: PathBuf, text: &str) -> Document {
         }
         match &fence {
             None => document.prose.push((number, line.to_owned())),
-            Some(word) if SHELL.contains(&word.as_str()) => {
-                document.shell.push((number, line.to_owned()));
-            }
+            Some(word) if SHELL.contains(&word.as_str()) => document.add_shell(number, line),
             Some(_) => {}
         }
     }
     document
+}
+
+impl Document {
+    fn add_shell(&mut self, number: usize, line: &str) {
+        match self.shell.last_mut() {
+            Some((_, before)) if before.ends_with('\\') => {
+                before.pop();
+                before.push_str(line.trim_start());
+            }
+            _ => self.shell.push((number, line.to_owned())),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -49,9 +60,9 @@ mod tests {
 
     #[test]
     fn prose_and_shell_are_told_apart() {
-        let text = "a\n```toml\nb\n```\n```sh\ncargo c\n```\nd\n";
+        let text = "a\n```toml\nb\n```\n```sh\ncargo c \\\n  --e\n```\nd\n";
         let document = parse(PathBuf::from("x.md"), text);
-        assert_eq!(document.prose, [(1, "a".to_owned()), (8, "d".to_owned())]);
-        assert_eq!(document.shell, [(6, "cargo c".to_owned())]);
+        assert_eq!(document.prose, [(1, "a".to_owned()), (9, "d".to_owned())]);
+        assert_eq!(document.shell, [(6, "cargo c --e".to_owned())]);
     }
 }

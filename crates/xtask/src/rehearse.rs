@@ -1,0 +1,158 @@
+//! Runs the documented command lines of `tagalong`, each document in a folder of its
+//! own in which the files lie that the lines speak of.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+use std::{env, fs};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::markdown::{Document, documents};
+use crate::program::Program;
+use crate::workspace::{Workspace, output};
+
+/// Where it happens: where `cargo clean` removes it.
+const STAGE: &str = "target/rehearsal";
+
+/// Lines with this in them are not run, for a reason. Tidy checks their options.
+const LEFT_OUT: &[(&str, &str)] = &[
+    ("contrast", "needs the plugin of the walk-through, whose own trial runs it"),
+    ("import bag", "needs somebody else's data"),
+    ("import kitti", "needs somebody else's data"),
+    ("import mot", "needs somebody else's data"),
+    ("import tum", "needs somebody else's data"),
+    ("../shared", "needs the annotated logs"),
+    ("LOG.people.csv", "needs an annotated log"),
+    ("old/report.json", "needs a report of last week"),
+    ("SLURM_", "needs a cluster"),
+    ("reproduce", "takes long"),
+    ("realism", "takes long"),
+    ("train", "takes long"),
+    ("trials", "takes long"),
+    ("--seeds", "takes long"),
+    ("--fit", "takes long"),
+];
+
+/// What lies in each folder: a short log, a folder of logs, and one of images.
+const PROPS: &[&str] = &[
+    "simulate configs/scenes/crossing.toml --set duration_s=3 -o LOG.mcap",
+    "simulate configs/scenes/crossing.toml --set duration_s=3 -o logs/drawn.mcap",
+    "simulate configs/scenes/crossing.toml --set duration_s=3 -o LOGS/drawn.mcap",
+    "simulate configs/scenes/crossing.toml --gallery FOLDER",
+];
+
+/// Runs all that can be run in a few minutes; an error if any line fails.
+pub fn rehearse(workspace: &Workspace) -> Result<()> {
+    let program = Program::built(workspace)?;
+    let stage = workspace.root().join(STAGE);
+    if stage.exists() {
+        fs::remove_dir_all(&stage).with_context(|| format!("cannot remove {}", stage.display()))?;
+    }
+    let props = stage.join("props");
+    copy_configs(workspace, &props)?;
+    for line in PROPS {
+        output(program.call(&words(line)).current_dir(&props))?;
+    }
+    let (mut done, mut failed) = (0, Vec::new());
+    for (number, document) in documents(workspace)?.iter().enumerate() {
+        let lines: Vec<_> = lines(document).collect();
+        if lines.is_empty() {
+            continue;
+        }
+        let folder = stage.join(number.to_string());
+        copy(&props, &folder)?;
+        for (at, line) in lines {
+            let place = format!("{}:{at}", document.path.display());
+            let start = Instant::now();
+            match output(&mut in_shell(&program, &line, &folder)?) {
+                Ok(_) => done += 1,
+                Err(error) => failed.push(format!("{place}: {error:#}")),
+            }
+            eprintln!("rehearse: {place}: {line} ({:.1} s)", start.elapsed().as_secs_f64());
+        }
+    }
+    if failed.is_empty() {
+        eprintln!("rehearse: {done} documented lines run");
+        return Ok(());
+    }
+    bail!("{}", failed.join("\n"))
+}
+
+/// The lines of a document that call `tagalong` and are not left out.
+fn lines(document: &Document) -> impl Iterator<Item = (usize, String)> {
+    let lines = document.shell.iter().filter_map(|(at, line)| Some((*at, call(line)?)));
+    lines.filter(|(_, line)| !LEFT_OUT.iter().any(|(part, _)| line.contains(part)))
+}
+
+/// The line as `tagalong ...`, without its comment; `None` if it calls something else.
+fn call(line: &str) -> Option<String> {
+    let line = line.trim_start().trim_start_matches("$ ");
+    let line = line.split(" #").next().unwrap_or(line).trim_end();
+    match line.strip_prefix("cargo run --release -- ") {
+        Some(rest) => Some(format!("tagalong {rest}")),
+        None => line.starts_with("tagalong ").then(|| line.to_owned()),
+    }
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+/// The line as a shell runs it, for `tagalong` this workspace's program.
+fn in_shell(program: &Program, line: &str, folder: &Path) -> Result<Command> {
+    let others = env::var_os("PATH").unwrap_or_default();
+    let all = std::iter::once(program.folder().to_owned()).chain(env::split_paths(&others));
+    let mut shell = Command::new("sh");
+    shell.args(["-c", line]).current_dir(folder).env("PATH", env::join_paths(all)?);
+    Ok(shell)
+}
+
+fn copy_configs(workspace: &Workspace, to: &Path) -> Result<()> {
+    let files = workspace.files()?.into_iter();
+    for file in files.filter(|file| file.starts_with("configs")) {
+        copy_file(&workspace.root().join(&file), &to.join(&file))?;
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    for entry in fs::read_dir(from)? {
+        let entry: PathBuf = entry?.path();
+        let Some(name) = entry.file_name() else { continue };
+        match entry.is_dir() {
+            true => copy(&entry, &to.join(name))?,
+            false => copy_file(&entry, &to.join(name))?,
+        }
+    }
+    Ok(())
+}
+
+fn copy_file(from: &Path, to: &Path) -> Result<()> {
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::copy(from, to).with_context(|| format!("cannot copy {}", from.display()))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calls_of_the_program_are_found_without_comments() {
+        let run = call("cargo run --release -- run a.toml   # why").unwrap();
+        assert_eq!(run, "tagalong run a.toml");
+        assert_eq!(call("$ tagalong list").unwrap(), "tagalong list");
+        assert_eq!(call("cargo run -p x -- go"), None);
+        assert_eq!(call("cargo test"), None);
+    }
+
+    #[test]
+    fn what_takes_long_is_left_out() {
+        let shell = vec![(1, "tagalong list".to_owned()), (2, "tagalong train x".to_owned())];
+        let document = Document { path: PathBuf::from("x.md"), prose: Vec::new(), shell };
+        assert_eq!(lines(&document).collect::<Vec<_>>(), [(1, "tagalong list".to_owned())]);
+    }
+}
