@@ -1,16 +1,14 @@
 //! `tagalong simulate`: the logs it writes, and what it says to wrong scenes.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{code, tagalong, text};
 use tagalong_core::ConicalMirror;
 use tagalong_log::msgs::{CameraInfo, PoseStamped, TFMessage, decode};
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::Scene;
+
+use crate::common::{code, tagalong, text};
 
 const SMALL: &str = "duration_s = 0.6\n[camera]\nwidth = 64\nheight = 48\n[faults]\ndropped = 0.0\n\
     [[people]]\npath = [[4.0, 3.0], [4.0, 5.0]]\n";

@@ -1,15 +1,11 @@
 //! Every command with every kind of bad input: one clear message that names the
 //! file, and the right exit code: 1 for data that cannot be used, 2 for settings
 //! and outputs that cannot.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
 
-use common::{Drawn, code, config, own_plugin, people, text};
+use crate::common::{Drawn, code, config, own_plugin, people, text, unread};
 
 /// What stands where a file is asked for.
 const BAD_FILES: [(&str, &str); 4] = [
@@ -177,15 +173,7 @@ fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
         "import bag old.bag",
     ];
     for line in lines {
-        let mut child = own_plugin()
-            .args(line.split(' '))
-            .current_dir(home.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        drop(child.stdout.take());
-        let output = child.wait_with_output().unwrap();
+        let output = unread(own_plugin().args(line.split(' ')).current_dir(home.path()));
         let told = text(&output.stderr);
         assert!(!told.contains("roken pipe") && !told.contains("panic"), "{line}: {told}");
         assert!([0, 3].contains(&code(&output)) || line.starts_with("eval"), "{line}: {told}");

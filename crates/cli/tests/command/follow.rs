@@ -1,14 +1,12 @@
 //! `tagalong follow`: what it prints and writes, and what it refuses.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use common::{code, tagalong, text};
 use serde_json::Value;
+
+use crate::common::{code, tagalong, text};
 
 const SCENE: &str = "duration_s = 5.0\n[camera]\nwidth = 120\nheight = 90\ncolour = false\n\
     [robot]\nstart = [1.0, 3.0]\n[[people]]\npath = [[3.2, 3.0], [8.0, 3.0]]\nspeed_mps = 0.6\n";

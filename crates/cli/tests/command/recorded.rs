@@ -1,14 +1,12 @@
 //! The shipped `configs/recorded.toml` on a log in which another program has
 //! recorded its boxes.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{Drawn, code, tagalong, text};
 use serde_json::Value;
+
+use crate::common::{Drawn, code, tagalong, text};
 
 fn shipped() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/recorded.toml")
@@ -18,7 +16,7 @@ fn shipped() -> std::path::PathBuf {
 fn scores(log: &Drawn, similarity: &str) -> Value {
     let folder = tempfile::tempdir().unwrap();
     log.write(&folder.path().join("walk.mcap"));
-    fs::write(folder.path().join("walk.people.csv"), common::people(20)).unwrap();
+    fs::write(folder.path().join("walk.people.csv"), crate::common::people(20)).unwrap();
     let mut run = tagalong();
     run.current_dir(folder.path()).arg("run").arg(shipped()).args(["walk.mcap", "-o", "out"]);
     let output = run.output().unwrap();

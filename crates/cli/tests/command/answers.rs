@@ -1,12 +1,9 @@
 //! The subcommands that answer a question, and runs over real logs.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{Drawn, code, config, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, config, own_plugin, tagalong, text};
 
 fn answer(args: &[&str], folder: &Path) -> String {
     let output = own_plugin().args(args).current_dir(folder).output().unwrap();

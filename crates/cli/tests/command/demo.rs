@@ -1,11 +1,8 @@
 //! `tagalong demo` and `tagalong trials`: what they refuse, and what they print.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 
-use common::{code, tagalong, text};
+use crate::common::{code, tagalong, text};
 
 #[test]
 fn a_folder_with_other_files_is_left_alone() {

@@ -1,16 +1,14 @@
 //! `tagalong bench` over drawn logs: nothing is computed twice, nothing depends
 //! on how many jobs there are, and one bad pipeline does not spoil the rest.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use common::{Drawn, code, own_plugin, text};
 use serde_json::Value;
+
+use crate::common::{Drawn, code, own_plugin, text};
 
 /// The two logs and their truth, and a config or more.
 struct Home {
@@ -22,7 +20,7 @@ impl Home {
         let home = Self { folder: tempfile::tempdir().unwrap() };
         for (name, frames) in [("long", 24), ("short", 9)] {
             Drawn::of(frames).write(&home.path(&format!("logs/{name}.mcap")));
-            fs::write(home.path(&format!("logs/{name}.people.csv")), common::people(frames))
+            fs::write(home.path(&format!("logs/{name}.people.csv")), crate::common::people(frames))
                 .unwrap();
         }
         home.config("near", "");
@@ -37,7 +35,7 @@ impl Home {
     }
 
     fn config(&self, name: &str, extra: &str) {
-        let written = common::config(self.folder.path(), extra);
+        let written = crate::common::config(self.folder.path(), extra);
         fs::rename(written, self.path(&format!("configs/{name}.toml"))).unwrap();
     }
 
@@ -218,7 +216,7 @@ fn a_hash_changes_with_what_matters_and_with_nothing_else() {
     fs::write(&path, config.replace("seed = 7", "seed = 8")).unwrap();
     let seeded = plan("c");
     assert_eq!((&seeded[0], seeded[1] != first[1]), (&first[0], true), "far, then near");
-    fs::write(home.path("logs/short.people.csv"), common::people(8)).unwrap();
+    fs::write(home.path("logs/short.people.csv"), crate::common::people(8)).unwrap();
     assert!(plan("d").iter().zip(&seeded).all(|(new, old)| new != old), "other truth");
 }
 
@@ -243,7 +241,7 @@ fn files_that_a_config_names_belong_to_the_hash() {
 fn what_changed_since_the_plan_is_not_run() {
     let home = Home::new();
     ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", "out"]));
-    fs::write(home.path("logs/short.people.csv"), common::people(8)).unwrap();
+    fs::write(home.path("logs/short.people.csv"), crate::common::people(8)).unwrap();
     let output = home.bench(&["run", "-o", "out"]);
     assert_eq!(code(&output), 2);
     assert!(text(&output.stderr).contains("plan again"), "{}", text(&output.stderr));
@@ -292,7 +290,7 @@ fn times_are_taken_only_when_asked_for() {
 fn pictures_show_what_went_wrong() {
     let home = Home::new();
     // Truth somewhere else: a miss, and a false track.
-    let shifted = common::people(24).replace(",1,", ",2,");
+    let shifted = crate::common::people(24).replace(",1,", ",2,");
     let moved: String = shifted
         .lines()
         .map(|line| {

@@ -1,13 +1,10 @@
 //! Users' mistakes at the boundary of the process: each gets its exit code and
 //! a message that says what is wrong and what to do.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{Drawn, code, config, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, config, own_plugin, tagalong, text, unread};
 
 /// A mistake: arguments, exit code, and what the message must contain.
 struct Mistake {
@@ -122,15 +119,7 @@ fn every_mistake_has_its_exit_code_and_says_what_to_do() {
 
 #[test]
 fn a_closed_pipe_is_a_quiet_end() {
-    use std::process::Stdio;
-    let mut child = tagalong()
-        .args(["config", "pipeline"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    drop(child.stdout.take());
-    let output = child.wait_with_output().unwrap();
+    let output = unread(tagalong().args(["config", "pipeline"]));
     assert_eq!((code(&output), text(&output.stderr).as_str()), (0, ""));
 }
 

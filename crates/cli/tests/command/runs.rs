@@ -1,14 +1,11 @@
 //! Whole runs over a drawn log: the files, their formats, and that they are the
 //! same every time.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::{Drawn, code, config, own_plugin, text};
+use crate::common::{Drawn, code, config, own_plugin, text};
 
 const FILES: [&str; 4] = ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"];
 
@@ -92,7 +89,7 @@ fn metres_have_a_header_and_the_place_of_the_walker() {
     assert!(rows.iter().all(|row| row.len() == rows[0].len()));
     let last = rows.last().unwrap();
     let value = |i: usize| last[i].parse::<f64>().unwrap();
-    assert_eq!(last[0], (common::FIRST_NS + 19 * 100_000_000).to_string());
+    assert_eq!(last[0], (crate::common::FIRST_NS + 19 * 100_000_000).to_string());
     assert!((value(3) - 2.88).abs() < 0.15, "the head is 2.88 m ahead: {}", value(3));
     assert_eq!(value(3), value(6), "no odometry: both frames agree");
 }

@@ -1,13 +1,10 @@
 //! `tagalong train`: the same bytes for the same seed, a model that its plugin
 //! reads, and answers to wrong usage.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{code, tagalong, text};
+use crate::common::{code, tagalong, text};
 
 fn train(folder: &Path, arguments: &[&str]) -> std::process::Output {
     tagalong().current_dir(folder).arg("train").args(arguments).output().unwrap()

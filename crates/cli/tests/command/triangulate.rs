@@ -1,13 +1,11 @@
 //! `tagalong triangulate`, from a drawn log with webcams to the truth of that log.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{code, tagalong, text};
 use tagalong_log::{Limits, TruthFrame, read_truth, read_truth_lines};
+
+use crate::common::{code, tagalong, text};
 
 /// A room in which somebody with a green hat walks before four webcams; the robot's
 /// own images are too small for anything.

@@ -1,5 +1,4 @@
 //! A small drawn log, and the programs under test.
-#![allow(dead_code, reason = "each test file uses a part of it")]
 
 pub mod broken;
 
@@ -7,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
@@ -23,6 +22,13 @@ use tagalong_log::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame};
 pub const WIDTH: usize = 160;
 pub const HEIGHT: usize = 120;
 pub const FIRST_NS: u64 = 1_700_000_000_000_000_000;
+
+/// What a command says whose output nobody reads to the end.
+pub fn unread(command: &mut Command) -> Output {
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    child.wait_with_output().unwrap()
+}
 
 /// The program as it is shipped.
 pub fn tagalong() -> Command {

@@ -1,8 +1,4 @@
 //! Ctrl-C and SIGTERM leave valid files.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-#![cfg(unix)]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use common::{Drawn, code, config, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, config, own_plugin, tagalong, text};
 
 /// A run that takes much longer than the test.
 fn slow_run(home: &Path) -> Child {

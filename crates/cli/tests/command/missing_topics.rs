@@ -1,12 +1,9 @@
 //! A topic that is missing is told before a run starts: what is wanted, what is
 //! there, and the nearest name (fault T6).
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::path::Path;
 
-use common::{Drawn, code, config, own_plugin, text};
+use crate::common::{Drawn, code, config, own_plugin, text};
 
 /// Runs with these settings; the exit code and what was told.
 fn run(home: &Path, log: &str, input: &str) -> (i32, String) {

@@ -1,17 +1,15 @@
 //! The doctor finds what is wrong with logs that were broken on purpose, and has
 //! nothing to say about good ones.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use common::broken::{self, Changes, reading};
-use common::{code, tagalong, text};
 use serde_json::Value;
 use tagalong_log::msgs::{CameraInfo, TFMessage};
 use tempfile::TempDir;
+
+use crate::common::broken::{self, Changes, reading};
+use crate::common::{code, tagalong, text};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -231,7 +229,7 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-const FIRST_NS: u64 = common::FIRST_NS;
+const FIRST_NS: u64 = crate::common::FIRST_NS;
 
 #[test]
 fn what_was_broken_is_found() {

@@ -1,11 +1,8 @@
 //! What shells and `man` get.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop loudly")]
-
-mod common;
 
 use std::fs;
 
-use common::{code, tagalong, text};
+use crate::common::{code, tagalong, text};
 
 #[test]
 fn every_shell_learns_the_commands() {

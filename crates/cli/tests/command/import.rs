@@ -1,15 +1,13 @@
 //! Data sets become logs: tiny folders of each layout, written here, and read
 //! back as a pipeline reads them.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{code, tagalong, text};
 use image::{ImageBuffer, Luma, Rgb};
 use tagalong_log::{FrameSource, InputSettings, Limits, LogFrame, Needs};
+
+use crate::common::{code, tagalong, text};
 
 const SMALL: (u32, u32) = (64, 48);
 

@@ -1,0 +1,24 @@
+//! The program `tagalong`, as a user runs it: one test program for all commands, so
+//! that it is linked once and its tests run beside each other.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
+
+mod common;
+
+mod answers;
+mod bad_input;
+mod bench;
+mod demo;
+mod doctor;
+mod eval;
+mod follow;
+mod import;
+mod missing_topics;
+mod mistakes;
+mod recorded;
+mod runs;
+mod shell;
+#[cfg(unix)]
+mod signals;
+mod simulate;
+mod train;
+mod triangulate;
