@@ -1,4 +1,4 @@
-use nalgebra::Vector2;
+use nalgebra::{Point2, Vector2};
 use tagalong_core::{Motion, Person};
 
 /// Where the target is in robot axes when the wheels answer.
@@ -21,7 +21,11 @@ impl Aim {
         let is_known = is_finite(person.velocity.as_slice());
         let walks = if is_known { person.velocity } else { Vector2::zeros() };
         let place = to_come.apply_to_point(person.position.xy() + walks * to_come.dt);
-        let velocity = to_come.apply_to_velocity(walks);
+        Self::at(place, to_come.apply_to_velocity(walks))
+    }
+
+    /// A place that moves.
+    pub(crate) fn at(place: Point2<f64>, velocity: Vector2<f64>) -> Option<Self> {
         let range_m = place.x.hypot(place.y);
         if !range_m.is_finite() {
             return None;

@@ -50,6 +50,9 @@ pub struct Config {
     pub turn_in_place_deg: [f64; 2],
     /// The same for path B, which steers in no other way, degrees.
     pub align_deg: [f64; 2],
+    /// Steers to where the person went, this far ahead, m, instead of straight to the
+    /// person: through the middle of doors and round corners. 0 is off.
+    pub trail_m: f64,
     /// Drives after a person who is not seen for half of this time, then slows
     /// down, and stands still at the end of it, s.
     pub max_unseen_s: f64,
@@ -74,6 +77,7 @@ impl Default for Config {
             min_range_m: 0.5,
             turn_in_place_deg: [30.0, 60.0],
             align_deg: [3.0, 12.0],
+            trail_m: 0.0,
             max_unseen_s: 1.0,
             latency_s: 0.1,
         }
@@ -112,6 +116,7 @@ impl Config {
             ("max_turn_rate", self.max_turn_rate, POSITIVE),
             ("max_curvature", self.max_curvature, NOT_NEGATIVE),
             ("min_range_m", self.min_range_m, POSITIVE),
+            ("trail_m", self.trail_m, NOT_NEGATIVE),
             ("max_unseen_s", self.max_unseen_s, POSITIVE),
             ("latency_s", self.latency_s, NOT_NEGATIVE),
         ])

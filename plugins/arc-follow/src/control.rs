@@ -1,12 +1,16 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use nalgebra::Vector2;
 use tagalong_core::{Controller, Motion, Scene, Sent, Track, WheelSpeeds, Wheels};
 
 use crate::aim::Aim;
 use crate::config::{Config, MOST, Path};
+use crate::trail::Trail;
 
 /// A longer pause between frames counts as this one, s.
 const LONGEST_STEP_S: f64 = 0.5;
+/// Whoever is farther aside than this is looked at, wherever they went, rad.
+const IN_VIEW_RAD: f64 = 0.4;
 
 /// Follows a person along the paths of P1, section 3.
 #[derive(Clone, Debug)]
@@ -17,6 +21,7 @@ pub struct ArcFollow {
     /// Turning on the spot: to the left (1) or to the right (-1).
     turning: Option<f64>,
     sent: Sent,
+    trail: Trail,
 }
 
 /// Forward speed, m/s, and turn rate, rad/s.
@@ -58,7 +63,7 @@ impl ArcFollow {
     pub fn new(config: Config) -> tagalong_core::Result<Self> {
         config.check()?;
         let sent = Sent::new(config.latency_s);
-        Ok(Self { config, speed_mps: 0.0, turning: None, sent })
+        Ok(Self { config, speed_mps: 0.0, turning: None, sent, trail: Trail::default() })
     }
 
     fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
@@ -67,21 +72,41 @@ impl ArcFollow {
             return None;
         }
         let target = scene.target?;
-        let aim = Aim::new(&target.estimate.person, &self.sent.forecast(wheels))?;
+        let to_come = self.sent.forecast(wheels);
+        let aim = Aim::new(&target.estimate.person, &to_come)?;
+        let goes_after = aim.range_m > self.config.stand_off_m && aim.bearing.abs() < IN_VIEW_RAD;
+        let way = self.way(scene, target, &to_come).filter(|_| goes_after);
         let trust = self.trust(target);
         self.turning = self.turn_in_place(&aim);
         let speed_mps = self.ramped(self.wanted_speed(&aim, max), dt).min(trust * max);
-        let facing = trust * (1.0 - speed_mps / max) * self.facing_rate(&aim);
-        let turn_rate = speed_mps * self.curvature(&aim)? + facing;
+        let (towards, gain) = match way.filter(|_| speed_mps > 0.0) {
+            Some(way) => (way, 1.0),
+            None => (aim, self.config.gain()),
+        };
+        let facing = trust * (1.0 - speed_mps / max) * self.facing_rate(&towards);
+        let turn_rate = speed_mps * self.curvature(&towards, gain)? + facing;
         let twist = self.within_limits(Twist { speed_mps, turn_rate }, scene);
         self.speed_mps = twist.speed_mps;
         twist.turn_rate.is_finite().then_some(twist)
+    }
+
+    /// Where the person went, so far ahead as the setting says; `None` if the person is
+    /// nearer than that, or straight ahead is the way.
+    fn way(&mut self, scene: &Scene<'_>, target: &Track, to_come: &Motion) -> Option<Aim> {
+        if self.config.trail_m == 0.0 {
+            return None;
+        }
+        let place = target.estimate.person.position.xy();
+        self.trail.go_on(&scene.frame.motion, target.id, place);
+        let next = self.trail.ahead(self.config.trail_m)?;
+        Aim::at(to_come.apply_to_point(next), Vector2::zeros())
     }
 
     /// Stands still, and will start anew.
     fn halt(&mut self) -> WheelSpeeds {
         self.turning = None;
         self.speed_mps = 0.0;
+        self.trail = Trail::default();
         WheelSpeeds::STOP
     }
 
@@ -123,14 +148,14 @@ impl ArcFollow {
 
     /// 1 / rho of P1, section 3, times the path's gain, 1/m. As printed there is
     /// none at the origin.
-    fn curvature(&self, aim: &Aim) -> Option<f64> {
+    fn curvature(&self, aim: &Aim, gain: f64) -> Option<f64> {
         let config = &self.config;
         if config.as_printed {
-            let curvature = 2.0 * config.gain() * aim.sine / aim.range_m;
+            let curvature = 2.0 * gain * aim.sine / aim.range_m;
             return curvature.is_finite().then_some(curvature);
         }
         let range = aim.range_m.max(config.min_range_m);
-        let curvature = 2.0 * config.gain() * aim.sine * (aim.range_m / range) / range;
+        let curvature = 2.0 * gain * aim.sine * (aim.range_m / range) / range;
         Some(curvature.clamp(-config.max_curvature, config.max_curvature))
     }
 

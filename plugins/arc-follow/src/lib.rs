@@ -20,6 +20,7 @@ mod config;
 mod control;
 #[cfg(test)]
 mod tests;
+mod trail;
 
 pub use config::{Config, Path};
 pub use control::ArcFollow;

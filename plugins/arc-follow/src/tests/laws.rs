@@ -273,3 +273,27 @@ fn it_turns_too_far_if_it_does_not_know_of_its_latency() {
     assert!(overshoot(0.0) > 10.0, "{}", overshoot(0.0));
     assert!(overshoot(0.3) < 1.0, "{}", overshoot(0.3));
 }
+
+/// How far the robot has left its lane 0.4 m before the bend of a person's way who is
+/// some metres ahead.
+fn cut_m(trail_m: f64) -> f64 {
+    let mut drive = Drive::new(Config { trail_m, ..Config::default() }, 0.1, 1);
+    for step in 0..120 {
+        let way_m = 2.0 + 0.08 * f64::from(step);
+        let after_m = 0.7 * (way_m - 4.0).max(0.0);
+        let place = Point2::new(way_m.min(4.0) + after_m, after_m);
+        let velocity =
+            if after_m > 0.0 { Vector2::new(0.56, 0.56) } else { Vector2::new(0.8, 0.0) };
+        drive.step(place, velocity);
+        if drive.pose.translation.x >= 3.6 {
+            return drive.pose.translation.y;
+        }
+    }
+    panic!("it did not get there: {}", drive.pose);
+}
+
+#[test]
+fn it_goes_round_a_corner_where_the_person_went() {
+    let (straight_m, trail_m) = (cut_m(0.0), cut_m(1.0));
+    assert!(straight_m > 0.2 && trail_m < 0.5 * straight_m, "{straight_m} {trail_m}");
+}

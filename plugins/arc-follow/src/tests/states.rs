@@ -52,9 +52,12 @@ fn row() -> impl Strategy<Value = Vec<State>> {
 fn config() -> impl Strategy<Value = Config> {
     let kinds =
         [(Path::A, false), (Path::B, false), (Path::C, false), (Path::A, true), (Path::C, true)];
-    prop::sample::select(kinds.to_vec()).prop_map(|(path, as_printed)| Config {
+    let kinds = prop::sample::select(kinds.to_vec());
+    let trail_m = prop::sample::select(vec![0.0, 1.0]);
+    (kinds, trail_m).prop_map(|((path, as_printed), trail_m)| Config {
         path,
         as_printed,
+        trail_m,
         ..Config::default()
     })
 }
