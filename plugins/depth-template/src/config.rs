@@ -62,6 +62,9 @@ pub struct DepthTemplateConfig {
     pub relief_per_m2: f64,
     /// Part of the person's pixels that must have a reading, 0 to 1.
     pub min_foreground_valid: f64,
+    /// Cost of a pixel beside the person that has no reading, or shows somebody
+    /// nearer, 0 to 1. Less where a camera sees nothing of what is far away.
+    pub unknown_cost: f64,
     /// Largest cost of a newcomer, and of a track that is not confirmed yet.
     pub discover_cost: f64,
     /// Largest cost of somebody already tracked and confirmed.
@@ -129,6 +132,7 @@ impl Default for DepthTemplateConfig {
             relief_full_m: 0.30,
             relief_per_m2: 0.0,
             min_foreground_valid: 0.5,
+            unknown_cost: 0.2,
             discover_cost: 0.16,
             follow_cost: 0.30,
             refine_cost: 0.4,

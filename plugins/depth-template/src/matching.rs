@@ -136,7 +136,8 @@ impl Matcher {
             Cost::Robust => {
                 let holes = (0.95 * tally.foreground - tally.foreground_valid).max(0.0);
                 let inside = (tally.foreground_cost + 3.0 * holes) / tally.foreground.max(1.0);
-                let beside = tally.background_cost + 0.2 * tally.unknown + tally.outside;
+                let unknown = self.config.unknown_cost * tally.unknown;
+                let beside = tally.background_cost + unknown + tally.outside;
                 let weight = self.config.foreground_weight;
                 weight * inside + (1.0 - weight) * beside / tally.background.max(1.0)
             }
@@ -194,7 +195,7 @@ mod tests {
                 for u in window.clone().filter(|u| side(*u)) {
                     wrong += match pixel(u) {
                         None => 1.0,
-                        Some(0) => 0.2,
+                        Some(0) => config.unknown_cost,
                         Some(_) => 0.0,
                     };
                 }
@@ -204,7 +205,7 @@ mod tests {
                 }
                 let mean = bg.iter().sum::<f64>() / bg.len() as f64;
                 if mean > units / (z - config.boundary_margin_m).max(0.2) {
-                    wrong += 0.2 * bg.len() as f64;
+                    wrong += config.unknown_cost * bg.len() as f64;
                     continue;
                 }
                 let b = mean.min(units / (z + config.boundary_margin_m));

@@ -20,20 +20,31 @@ pub(crate) enum Ahead {
     Something(f64),
 }
 
+/// Something that is seen or remembered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sign {
+    /// Robot frame, m.
+    pub(super) at: Point2<f64>,
+    /// As many points of the image count like it.
+    pub(super) points: u32,
+    /// It may come nearer to the middle of the corridor by this until the robot is
+    /// there, m.
+    pub(super) steps_in_m: f64,
+}
+
 /// The nearest thing in the corridor that the robot sweeps on an arc of this
-/// curvature, 1/m, to the left positive. Each of the points, robot frame, m, counts
-/// as many times as is said with it; those around `target` are the person who is
+/// curvature, 1/m, to the left positive; signs around `target` are the person who is
 /// followed.
 pub(super) fn ahead(
     settings: &CorridorSettings,
-    points: impl Iterator<Item = (Point3<f64>, u32)>,
+    signs: impl Iterator<Item = Sign>,
     curvature: f64,
     target: Option<Point2<f64>>,
 ) -> Ahead {
     let mut bins = vec![0_u32; (settings.range_m / BIN_M).ceil() as usize + 1];
-    for (point, count) in points {
-        if let Some(along_m) = in_the_way(settings, &point, curvature, target) {
-            bins[(along_m / BIN_M) as usize] += count;
+    for sign in signs {
+        if let Some(along_m) = in_the_way(settings, &sign, curvature, target) {
+            bins[(along_m / BIN_M) as usize] += sign.points;
         }
     }
     nearest(settings, &bins)
@@ -55,23 +66,22 @@ fn nearest(settings: &CorridorSettings, bins: &[u32]) -> Ahead {
     first.map_or(Ahead::Free, |bin| Ahead::Something(bin as f64 * BIN_M))
 }
 
-/// Distance from the front along the path, m, of a point that the robot would
-/// hit.
+/// Distance from the front along the path, m, of what the robot would hit.
 fn in_the_way(
     settings: &CorridorSettings,
-    point: &Point3<f64>,
+    sign: &Sign,
     curvature: f64,
     target: Option<Point2<f64>>,
 ) -> Option<f64> {
-    let flat = point.xy();
+    let flat = sign.at;
     let of_target = |t| nalgebra::distance(&flat, &t) < settings.target_radius_m;
     if target.is_some_and(of_target) {
         return None;
     }
     let (along, aside) = on_arc(flat, curvature);
     let from_front = along - settings.front_m;
-    let inside =
-        aside.abs() < settings.half_width_m && along > 0.0 && from_front < settings.range_m;
+    let half_width_m = settings.half_width_m + sign.steps_in_m;
+    let inside = aside.abs() < half_width_m && along > 0.0 && from_front < settings.range_m;
     inside.then_some(from_front.max(0.0))
 }
 
@@ -113,8 +123,9 @@ mod tests {
     fn floor_target_and_what_is_aside_or_overhead_are_not_in_the_way() {
         let settings = CorridorSettings::default();
         let way = |x: f64, y: f64, z: f64, target: Option<Point2<f64>>| {
-            let point = Point3::new(x, y, z);
-            is_thing(&settings, &point).then(|| in_the_way(&settings, &point, 0.0, target))?
+            let (point, at) = (Point3::new(x, y, z), Point2::new(x, y));
+            let sign = Sign { at, points: 1, steps_in_m: 0.0 };
+            is_thing(&settings, &point).then(|| in_the_way(&settings, &sign, 0.0, target))?
         };
         assert_eq!(way(1.2, 0.0, 0.5, None), Some(1.0));
         assert_eq!(way(1.2, 0.0, 0.05, None), None);

@@ -68,6 +68,9 @@ pub struct CorridorSettings {
     pub half_width_m: f64,
     /// The robot's foremost point, ahead of the point between its wheels, m.
     pub front_m: f64,
+    /// What has not stood in its place for a second may step in: for it the robot
+    /// sweeps so much more on both sides, m.
+    pub steps_in_m: f64,
     /// No movement towards what is nearer to the front than this, m.
     pub stop_m: f64,
     /// What is farther away does not matter, m.
@@ -92,6 +95,7 @@ impl Default for CorridorSettings {
     fn default() -> Self {
         Self {
             half_width_m: 0.34,
+            steps_in_m: 0.25,
             front_m: 0.2,
             stop_m: 0.4,
             range_m: 3.0,

@@ -2,7 +2,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use tagalong_core::{Camera, DepthImage, Motion, Person, Track, TrackId};
 
 use super::CorridorSettings;
-use super::corridor::{Ahead, ahead, is_thing};
+use super::corridor::{Ahead, Sign, ahead, is_thing};
 
 /// Columns of the image that are looked at.
 const COLUMNS: usize = 160;
@@ -10,10 +10,12 @@ const COLUMNS: usize = 160;
 const CELL_M: f64 = 0.05;
 /// So many points in a cell are no noise.
 const ENOUGH: u16 = 3;
-/// Depth cameras may see nothing that is nearer, m.
-const BLIND_M: f64 = 0.8;
 /// What stands in its place for so long is a thing; somebody who walks by is not.
 const STANDS_S: f64 = 1.0;
+/// What was so close before the robot that it could not drive on, m, and left the
+/// image for its edge or below, is believed to be there for so long, s.
+const CLOSE_M: f64 = 0.6;
+const STEPPED_IN_S: f64 = 5.0;
 /// From the torso of a person to the head, m.
 const TORSO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.35);
 /// What people carry, draw along or push is this near to them, m, ...
@@ -22,6 +24,12 @@ const CARRIED_M: f64 = 0.8;
 const STAYS_MPS: f64 = 0.25;
 /// What the image shows this far before a place hides the place, m.
 const BEFORE_M: f64 = 0.2;
+/// Heights are told apart to this, m.
+const BAND_M: f64 = 0.1;
+/// A column of the image with readings in less than this part of it shows nothing.
+const DARK: f64 = 0.05;
+/// What hides a column is at this depth, m.
+const HIDES_M: f64 = 0.4;
 
 /// What is around the robot: what the depth image shows, and what it showed lately
 /// and cannot show now, because it is beside the robot, below the image, too near
@@ -31,14 +39,34 @@ pub(crate) struct Surroundings {
     seen: Vec<Point3<f64>>,
     /// Part of the image that has depth; `None` without a depth image.
     with_depth: Option<f64>,
+    /// Columns of the image that are looked at.
+    columns: Vec<Column>,
     things: Vec<Thing>,
     grid: Grid,
+}
+
+/// Heights above the floor, a bit for each decimetre.
+#[derive(Clone, Copy, Default)]
+struct Heights(u16);
+
+/// A column of the image.
+#[derive(Clone)]
+struct Column {
+    /// Where somebody stands who hides it, robot frame, m.
+    at: Point2<f64>,
+    /// Readings in it.
+    read: u32,
+    /// For how long there are next to none, s; for ever where there never was one: the
+    /// images of some cameras have an empty border.
+    dark_s: f64,
 }
 
 /// Something that does not move.
 struct Thing {
     /// Robot frame, m.
-    at: Point3<f64>,
+    at: Point2<f64>,
+    /// Where it was seen above that.
+    heights: Heights,
     /// How long it has been seen, s; the time does not count in which it may have
     /// stood there because of the person who is followed and stood beside it.
     seen_s: f64,
@@ -60,7 +88,7 @@ impl Surroundings {
         motion: &Motion,
         target: Option<&Person>,
     ) {
-        self.see(settings, camera, depth);
+        self.see(settings, camera, depth, motion.dt);
         self.grid.count(settings, &self.seen);
         self.meet_again(settings, camera, depth, motion, target);
         self.remember(settings, target);
@@ -73,9 +101,10 @@ impl Surroundings {
         for track in tracks.iter().filter(|track| track.seen) {
             self.things.retain(|thing| thing.who != Some(track.id));
             if Some(track.id) != followed {
-                let at = track.estimate.person.position - TORSO;
+                let Point3 { coords: torso } = track.estimate.person.position - TORSO;
+                let (at, heights) = (torso.xy().into(), Heights::of(torso.z));
                 let who = Some(track.id);
-                self.things.push(Thing { at, seen_s: STANDS_S, unseen_s: 0.0, who });
+                self.things.push(Thing { at, heights, seen_s: STANDS_S, unseen_s: 0.0, who });
             }
         }
     }
@@ -95,10 +124,16 @@ impl Surroundings {
         if self.with_depth? < settings.min_seen {
             return Some(Ahead::Blind);
         }
-        let seen = self.seen.iter().map(|point| (*point, 1));
+        let stays = |at: Point2<f64>, points| Sign { at, points, steps_in_m: 0.0 };
+        let seen = self.seen.iter().map(|point| match self.grid.stands(&point.xy()) {
+            true => stays(point.xy(), 1),
+            false => Sign { steps_in_m: settings.steps_in_m, ..stays(point.xy(), 1) },
+        });
         let unseen = self.things.iter().filter(|thing| thing.unseen_s > 0.0);
-        let unseen = unseen.map(|thing| (thing.at, settings.min_points));
-        Some(ahead(settings, seen.chain(unseen), curvature, target))
+        let unseen = unseen.map(|thing| stays(thing.at, settings.min_points));
+        let hidden = self.columns.iter().filter(|column| column.is_hidden(settings));
+        let hidden = hidden.map(|column| stays(column.at, 1));
+        Some(ahead(settings, seen.chain(unseen).chain(hidden), curvature, target))
     }
 
     /// Moves the things into the robot's new frame, and forgets where the camera
@@ -113,9 +148,8 @@ impl Surroundings {
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
-        self.things.retain_mut(|Thing { at, seen_s, unseen_s, .. }| {
-            let moved = motion.apply_to_point(at.xy());
-            *at = Point3::new(moved.x, moved.y, at.z);
+        self.things.retain_mut(|Thing { at, heights, seen_s, unseen_s, .. }| {
+            *at = motion.apply_to_point(*at);
             if !is_near(settings, at) {
                 return false;
             }
@@ -123,50 +157,104 @@ impl Surroundings {
                 let carried = target.is_some_and(|person| may_carry(person, at));
                 *seen_s += if carried { 0.0 } else { motion.dt };
                 *unseen_s = 0.0;
+                heights.0 |= grid.heights_around(at).0;
                 return true;
             }
             *unseen_s += motion.dt;
-            if depth.is_some_and(|depth| is_too_near(camera, depth, at)) {
-                *seen_s = STANDS_S;
-            }
-            let stands = *seen_s >= STANDS_S && *unseen_s <= settings.memory_s;
-            stands && !depth.is_some_and(|depth| shows(camera, depth, at))
+            let is_gone = depth.is_some_and(|depth| shows_past(camera, depth, at, *heights));
+            let kept_s = match () {
+                () if *seen_s >= STANDS_S => settings.memory_s,
+                () if is_close(settings, at) => STEPPED_IN_S,
+                () => 0.0,
+            };
+            !is_gone && *unseen_s <= kept_s
         });
     }
 
-    fn see(&mut self, settings: &CorridorSettings, camera: &Camera, depth: Option<&DepthImage>) {
+    fn see(
+        &mut self,
+        settings: &CorridorSettings,
+        camera: &Camera,
+        depth: Option<&DepthImage>,
+        dt_s: f64,
+    ) {
         self.seen.clear();
         self.with_depth = depth.map(|depth| {
             let step = depth.width().div_ceil(COLUMNS).max(1);
-            let (mut looked, mut read) = (0_u32, 0_u32);
+            let rows = depth.height().div_ceil(step);
+            self.columns.resize(depth.width().div_ceil(step), Column::NEVER_SEEN);
             for y in (0..depth.height()).step_by(step) {
-                let row = depth.row(y);
-                for x in (0..depth.width()).step_by(step) {
-                    looked += 1;
-                    let z = f64::from(row[x]);
+                let row = depth.row(y).iter().step_by(step);
+                for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
+                    let z = f64::from(*z);
                     if !(z > 0.0 && z.is_finite()) {
                         continue;
                     }
-                    read += 1;
-                    let point = camera.back_project(Point2::new(x as f64, y as f64), z);
-                    if is_near(settings, &point) && is_thing(settings, &point) {
+                    column.read += 1;
+                    let pixel = Point2::new((at * step) as f64, y as f64);
+                    let point = camera.back_project(pixel, z);
+                    if is_near(settings, &point.xy()) && is_thing(settings, &point) {
                         self.seen.push(point);
                     }
                 }
             }
-            f64::from(read) / f64::from(looked.max(1))
+            let read: u32 = self.columns.iter().map(|column| column.read).sum();
+            let middle = 0.5 * depth.height() as f64;
+            for (at, column) in self.columns.iter_mut().enumerate() {
+                let pixel = Point2::new((at * step) as f64, middle);
+                column.at = camera.back_project(pixel, HIDES_M).xy();
+                column.end(rows, dt_s);
+            }
+            f64::from(read) / (rows * self.columns.len()).max(1) as f64
         });
     }
 
     fn remember(&mut self, settings: &CorridorSettings, target: Option<&Person>) {
-        self.things.iter().for_each(|thing| self.grid.clear_around(&thing.at));
-        for at in &self.seen {
-            let is_of = |person: &Person| far_m(person, at) < settings.target_radius_m;
-            if self.grid.is_full(at) && !target.is_some_and(is_of) {
-                self.grid.clear_around(at);
-                self.things.push(Thing { at: *at, seen_s: 0.0, unseen_s: 0.0, who: None });
+        for thing in &self.things {
+            self.grid.clear_around(&thing.at);
+            if thing.seen_s >= STANDS_S {
+                self.grid.mark_standing(&thing.at);
             }
         }
+        for point in &self.seen {
+            let at = point.xy();
+            let is_of = |person: &Person| far_m(person, &at) < settings.target_radius_m;
+            if self.grid.is_full(&at) && !target.is_some_and(is_of) {
+                self.grid.clear_around(&at);
+                let heights = self.grid.heights_around(&at);
+                self.things.push(Thing { at, heights, seen_s: 0.0, unseen_s: 0.0, who: None });
+            }
+        }
+    }
+}
+
+impl Heights {
+    /// Of what is nearest to a height, m.
+    fn of(height_m: f64) -> Self {
+        Self(1 << (height_m / BAND_M).clamp(0.0, 15.0) as u16)
+    }
+
+    /// Each of them, m.
+    fn metres(self) -> impl Iterator<Item = f64> {
+        let is_set = move |bit: &u16| self.0 & (1 << bit) != 0;
+        (0..16).filter(is_set).map(|bit| (f64::from(bit) + 0.5) * BAND_M)
+    }
+}
+
+impl Column {
+    const NEVER_SEEN: Self = Self { at: Point2::new(0.0, 0.0), read: 0, dark_s: f64::INFINITY };
+
+    /// Somebody stands before the camera, nearer than it measures: what it saw a while
+    /// ago it sees no more, from the floor to the top of the image.
+    fn is_hidden(&self, settings: &CorridorSettings) -> bool {
+        0.0 < self.dark_s && self.dark_s <= settings.memory_s
+    }
+
+    /// All readings of an image of so many rows were counted.
+    fn end(&mut self, rows: usize, dt_s: f64) {
+        let is_dark = f64::from(self.read) < DARK * rows as f64;
+        self.dark_s = if is_dark { self.dark_s + dt_s } else { 0.0 };
+        self.read = 0;
     }
 }
 
@@ -174,6 +262,10 @@ impl Surroundings {
 #[derive(Default)]
 struct Grid {
     points: Vec<u16>,
+    /// Where they are above each cell.
+    heights: Vec<Heights>,
+    /// Something has stood here for long enough.
+    standing: Vec<bool>,
     side: usize,
 }
 
@@ -182,14 +274,19 @@ impl Grid {
         self.side = 2 * (reach_m(settings) / CELL_M).ceil() as usize + 3;
         self.points.clear();
         self.points.resize(self.side * self.side, 0);
-        for at in seen {
-            let cell = self.cell(at);
+        self.heights.clear();
+        self.heights.resize(self.side * self.side, Heights::default());
+        self.standing.clear();
+        self.standing.resize(self.side * self.side, false);
+        for point in seen {
+            let cell = self.cell(&point.xy());
             self.points[cell] = self.points[cell].saturating_add(1);
+            self.heights[cell].0 |= Heights::of(point.z).0;
         }
     }
 
     /// The cell of a place within reach.
-    fn cell(&self, at: &Point3<f64>) -> usize {
+    fn cell(&self, at: &Point2<f64>) -> usize {
         let of = |metres: f64| {
             let cell = (metres / CELL_M + self.side as f64 / 2.0) as usize;
             cell.clamp(1, self.side - 2)
@@ -197,53 +294,68 @@ impl Grid {
         of(at.x) * self.side + of(at.y)
     }
 
-    fn around(&self, at: &Point3<f64>) -> [usize; 9] {
+    fn around(&self, at: &Point2<f64>) -> [usize; 9] {
         let (cell, side) = (self.cell(at), self.side);
         std::array::from_fn(|i| cell + (i / 3) * side + i % 3 - side - 1)
     }
 
-    fn is_full(&self, at: &Point3<f64>) -> bool {
+    fn is_full(&self, at: &Point2<f64>) -> bool {
         self.points[self.cell(at)] >= ENOUGH
     }
 
+    /// Here, or one cell away.
+    fn heights_around(&self, at: &Point2<f64>) -> Heights {
+        Heights(self.around(at).iter().fold(0, |all, cell| all | self.heights[*cell].0))
+    }
+
     /// True if there is something here, or one cell away.
-    fn is_something(&self, at: &Point3<f64>) -> bool {
+    fn is_something(&self, at: &Point2<f64>) -> bool {
         self.around(at).iter().any(|cell| self.points[*cell] >= ENOUGH)
     }
 
-    fn clear_around(&mut self, at: &Point3<f64>) {
+    /// True if what is here has stood here, or one cell away.
+    fn stands(&self, at: &Point2<f64>) -> bool {
+        self.standing[self.cell(at)]
+    }
+
+    fn mark_standing(&mut self, at: &Point2<f64>) {
+        self.around(at).iter().for_each(|cell| self.standing[*cell] = true);
+    }
+
+    fn clear_around(&mut self, at: &Point2<f64>) {
         self.around(at).iter().for_each(|cell| self.points[*cell] = 0);
     }
 }
 
-/// True if the image shows no depth at this place, which is nearer than cameras see.
-fn is_too_near(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> bool {
-    let seen_m = depth_at(camera, depth, at);
-    camera.depth_of(at) < BLIND_M && seen_m.is_some_and(|z| !(z.is_finite() && z > 0.0))
+/// True if the image shows what is behind a place at one of the heights, and not
+/// something before it. Out of the image and where there is no depth it shows nothing.
+fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: Heights) -> bool {
+    heights.metres().any(|height_m| {
+        let place = Point3::new(at.x, at.y, height_m);
+        let seen_m = camera.project(&place).and_then(|pixel| {
+            let (x, y) = (pixel.x.round(), pixel.y.round());
+            depth.get(x as i64, y as i64).map(f64::from)
+        });
+        seen_m.is_some_and(|z| z > 0.0 && z.is_finite() && z > camera.depth_of(&place) - BEFORE_M)
+    })
 }
 
-/// What the image says at a place, m; `None` outside of the image.
-fn depth_at(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> Option<f64> {
-    let pixel = camera.project(at)?;
-    depth.get(pixel.x.round() as i64, pixel.y.round() as i64).map(f64::from)
+/// Close before the robot, in its way straight ahead.
+fn is_close(settings: &CorridorSettings, at: &Point2<f64>) -> bool {
+    let before_m = at.x - settings.front_m;
+    at.y.abs() < settings.half_width_m && 0.0 < before_m && before_m < CLOSE_M
 }
 
-/// True if the image shows this place, or what is behind it.
-fn shows(camera: &Camera, depth: &DepthImage, at: &Point3<f64>) -> bool {
-    let before_m = camera.depth_of(at) - BEFORE_M;
-    depth_at(camera, depth, at).is_some_and(|z| z.is_finite() && z > 0.0 && z > before_m)
+fn far_m(person: &Person, at: &Point2<f64>) -> f64 {
+    nalgebra::distance(&person.position.xy(), at)
 }
 
-fn far_m(person: &Person, at: &Point3<f64>) -> f64 {
-    nalgebra::distance(&person.position.xy(), &at.xy())
-}
-
-fn may_carry(person: &Person, at: &Point3<f64>) -> bool {
+fn may_carry(person: &Person, at: &Point2<f64>) -> bool {
     far_m(person, at) < CARRIED_M && person.velocity.norm() < STAYS_MPS
 }
 
-fn is_near(settings: &CorridorSettings, at: &Point3<f64>) -> bool {
-    at.xy().coords.norm() < reach_m(settings)
+fn is_near(settings: &CorridorSettings, at: &Point2<f64>) -> bool {
+    at.coords.norm() < reach_m(settings)
 }
 
 fn reach_m(settings: &CorridorSettings) -> f64 {
@@ -252,8 +364,9 @@ fn reach_m(settings: &CorridorSettings) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{SMatrix, Vector2};
-    use tagalong_core::{Distortion, Estimate, Pinhole};
+    use nalgebra::Vector2;
+    use tagalong_conformance::target;
+    use tagalong_core::{Distortion, Pinhole};
 
     use super::*;
 
@@ -361,6 +474,39 @@ mod tests {
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
     }
 
+    /// Half a metre beside the way somebody comes along, a box stands.
+    #[test]
+    fn what_moves_has_a_wider_way_than_what_stands() {
+        let settings = CorridorSettings::default();
+        for (step_m, is_in_the_way) in [(0.0, false), (-0.06, true)] {
+            let mut surroundings = Surroundings::default();
+            for step in 0..=WAIT {
+                let y = 0.7 + step_m * (step as f64 - WAIT as f64);
+                let depth = with_box(1.0, y);
+                surroundings.look(&settings, &camera(), Some(&depth), &Motion::at_rest(0.1), None);
+            }
+            let ahead = surroundings.ahead(&settings, 0.0, None);
+            assert_eq!(is_at(ahead, 0.8), is_in_the_way, "{step_m}: {ahead:?}");
+        }
+    }
+
+    /// Somebody stepped close before the robot, and was out of the image at once.
+    #[test]
+    fn who_left_the_image_close_before_the_robot_is_believed_there_for_a_while() {
+        let settings = CorridorSettings::default();
+        let mut surroundings = Surroundings::default();
+        let mut look = |x, y, forward| {
+            let motion = Motion { forward, ..Motion::at_rest(0.1) };
+            surroundings.look(&settings, &camera(), Some(&with_box(x, y)), &motion, None);
+            surroundings.ahead(&settings, 0.0, None)
+        };
+        look(0.75, 0.3, 0.0);
+        look(9.0, 0.0, 0.5);
+        let then: Vec<bool> = (0..60).map(|_| look(9.0, 0.0, 0.0) != Some(Ahead::Free)).collect();
+        assert!(then[..40].iter().all(|there| *there), "{then:?}");
+        assert!(then[55..].iter().all(|there| !there), "{then:?}");
+    }
+
     /// A suitcase stands behind somebody, and is gone with them when the robot is so
     /// near that it would be below the image; a box that they walk past is not.
     #[test]
@@ -376,7 +522,7 @@ mod tests {
             };
             (0..WAIT).for_each(|_| _ = look(1.2, 0.0, Some(&person)));
             let near = look(0.5, 0.7, None);
-            let gone = look(9.0, 0.0, None);
+            let gone = (0..60).fold(near, |_, _| look(9.0, 0.0, None));
             match expected_m {
                 None => assert_eq!(gone, Some(Ahead::Free), "{near:?}"),
                 Some(metres) => assert!(is_at(gone, metres), "{gone:?}"),
@@ -384,20 +530,36 @@ mod tests {
         }
     }
 
-    fn track(x: f64, y: f64) -> Track {
-        let region = camera().upper_body(&Point3::new(x, y, 1.6));
-        let estimate =
-            Estimate { person: person(x, y, 0.0), covariance: SMatrix::identity(), region };
-        Track {
-            id: TrackId(2),
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
+    /// A standing person's legs are below the image when the robot is near; that the
+    /// trunk is gone says that the legs are gone too. A low box may still be there.
+    #[test]
+    fn who_stood_and_left_is_gone_down_to_the_feet() {
+        let settings = CorridorSettings::default();
+        for (top_m, is_gone) in [(1.4, true), (0.5, false)] {
+            let camera = camera();
+            let seen = |x: f64, stands: bool| {
+                DepthImage::from_fn(80, 60, |u, v| {
+                    let at = camera.back_project(Point2::new(u as f64, v as f64), x);
+                    let hit = stands && at.y.abs() < 0.2 && 0.1 < at.z && at.z < top_m;
+                    if hit { x as f32 } else { 6.0 }
+                })
+            };
+            let mut surroundings = Surroundings::default();
+            let mut look = |x, forward, stands| {
+                let motion = Motion { forward, ..Motion::at_rest(0.1) };
+                let depth = seen(x, stands);
+                surroundings.look(&settings, &camera, Some(&depth), &motion, None);
+                surroundings.ahead(&settings, 0.0, None)
+            };
+            (0..WAIT).for_each(|_| _ = look(1.6, 0.0, true));
+            look(0.6, 1.0, true);
+            let left = look(0.6, 0.0, false);
+            assert_eq!(left == Some(Ahead::Free), is_gone, "{top_m}: {left:?}");
         }
+    }
+
+    fn there(x: f64, y: f64) -> Track {
+        target(x, y, Vector2::zeros())
     }
 
     #[test]
@@ -411,32 +573,32 @@ mod tests {
             surroundings.meet(seen.as_slice(), followed);
             surroundings.ahead(&settings, 0.0, None)
         };
-        look(0.0, Some(track(0.6, 0.1)), None);
+        look(0.0, Some(there(0.6, 0.1)), None);
         let near = look(0.3, None, None);
         assert!(matches!(near, Some(Ahead::Something(at)) if at < 0.2), "{near:?}");
-        assert_eq!(look(0.0, Some(track(0.5, 0.9)), None), Some(Ahead::Free));
-        look(0.0, Some(track(0.3, 0.1)), None);
-        assert_eq!(look(0.0, Some(track(0.3, 0.1)), Some(TrackId(2))), Some(Ahead::Free));
+        assert_eq!(look(0.0, Some(there(0.5, 0.9)), None), Some(Ahead::Free));
+        look(0.0, Some(there(0.3, 0.1)), None);
+        assert_eq!(look(0.0, Some(there(0.3, 0.1)), Some(TrackId(1))), Some(Ahead::Free));
     }
 
-    /// The camera sees nothing nearer than half a metre: there the image is empty.
+    /// Somebody stepped in from the side, nearer than the camera measures.
     #[test]
-    fn who_came_too_near_to_be_seen_is_still_there() {
+    fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
         let settings = CorridorSettings::default();
         let mut surroundings = Surroundings::default();
-        let mut look = |x: f64, blind: bool| {
-            let seen = with_box(x, 0.0);
+        let mut look = |dark: std::ops::Range<usize>| {
+            let seen = with_box(9.0, 0.0);
             let depth = DepthImage::from_fn(80, 60, |u, v| {
-                let middle = (30..50).contains(&u);
-                if blind && middle { f32::NAN } else { seen.row(v)[u] }
+                if dark.contains(&u) { f32::NAN } else { seen.row(v)[u] }
             });
             let motion = Motion::at_rest(0.1);
             surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
             surroundings.ahead(&settings, 0.0, None)
         };
-        assert!(is_at(look(0.75, false), 0.55));
-        assert!(is_at(look(9.0, true), 0.55), "hidden");
-        assert_eq!(look(9.0, false), Some(Ahead::Free), "gone");
+        assert_eq!(look(0..20), Some(Ahead::Free), "a border that was always empty");
+        assert!(is_at(look(0..50), HIDES_M - settings.front_m));
+        assert_eq!(look(0..20), Some(Ahead::Free), "gone");
+        assert_eq!(look(0..23), Some(Ahead::Free), "too narrow");
     }
 
     #[test]
