@@ -14,12 +14,22 @@ const MAX_ACCELERATION: f64 = 1.2;
 const MAX_TURN: f64 = 2.6;
 /// A point of the path is reached at this distance, m.
 const REACHED_M: f64 = 0.25;
+/// Who is held up so near to it, m, by something that stands there, leaves it at that.
+const NEAR_ENOUGH_M: f64 = 1.0;
 /// Strength, m/s², and reach, m, of the push between people (Helbing & Molnár
 /// 1995, with the reach of indoor crowds).
 const PUSH: f64 = 2.2;
 const PUSH_REACH_M: f64 = 0.45;
 /// Reach of the push away from things, m: people pass close to door jambs.
 const THING_REACH_M: f64 = 0.18;
+/// Who makes so little headway, as a part of their speed, for so long, s, and so near
+/// to the surface of a thing, m, is held up by it and goes round it for some time, s,
+/// so much to the side, rad.
+const HEADWAY: f64 = 0.3;
+const HELD_UP_S: f64 = 0.6;
+const HELD_UP_M: f64 = 0.7;
+const ROUND_S: f64 = 2.0;
+const ROUND_RAD: f64 = 1.4;
 /// Somebody with the posture [`Posture::Bending`] bends down for the second half
 /// of every so many seconds, by this angle, rad, which takes them some time, s.
 const BEND_EVERY_S: f64 = 6.0;
@@ -37,6 +47,15 @@ pub struct Obstacle {
     pub at: Point2<f64>,
     /// Its radius, m.
     pub radius_m: f64,
+    /// Where it goes, m, if it goes: whoever it holds up goes round behind it.
+    pub ahead: Vector2<f64>,
+}
+
+impl Obstacle {
+    /// A thing that stays where it is.
+    pub fn standing(at: Point2<f64>, radius_m: f64) -> Self {
+        Self { at, radius_m, ahead: Vector2::zeros() }
+    }
 }
 
 /// Where somebody who walks along should be now, and how they move there.
@@ -65,6 +84,8 @@ pub struct Walker {
     ahead: usize,
     waits_until_s: f64,
     tricked: bool,
+    /// How long a thing has held them up, s.
+    held_up_s: f64,
 }
 
 impl Walker {
@@ -89,6 +110,7 @@ impl Walker {
             ahead: 1,
             waits_until_s,
             tricked: false,
+            held_up_s: 0.0,
         }
     }
 
@@ -131,7 +153,7 @@ impl Walker {
         let wanted = match lead {
             Some(lead) => self.follow(lead),
             None if now_s < self.waits_until_s => Vector2::zeros(),
-            None => self.wanted(),
+            None => self.round(self.wanted(), dt, obstacles),
         };
         let mut change = (wanted - self.velocity) / 0.5;
         // Who stands lets the others do the avoiding.
@@ -154,6 +176,31 @@ impl Walker {
         self.turn(dt, lead);
         self.stride(dt);
         self.bend(now_s, dt);
+    }
+
+    /// The wanted velocity, or, for who is held up by a thing, one that leads round it,
+    /// past the side that is nearer.
+    fn round(&mut self, wanted: Vector2<f64>, dt: f64, obstacles: &[Obstacle]) -> Vector2<f64> {
+        let surface_m = |o: &Obstacle| (o.at - self.stance.place).norm() - o.radius_m;
+        let nearest = obstacles.iter().min_by(|a, b| surface_m(a).total_cmp(&surface_m(b)));
+        let thing = nearest.filter(|o| surface_m(o) < HELD_UP_M);
+        let goes_round = self.held_up_s > HELD_UP_S;
+        let held_up = self.velocity.dot(&wanted) < HEADWAY * wanted.norm_squared();
+        let (Some(thing), true) = (thing, goes_round || held_up) else {
+            self.held_up_s = 0.0;
+            return wanted;
+        };
+        self.held_up_s += dt;
+        if self.held_up_s > HELD_UP_S + ROUND_S {
+            self.held_up_s = 0.0;
+        }
+        let middle = thing.at + thing.ahead;
+        let is_left = wanted.perp(&(middle - self.stance.place)) >= 0.0;
+        let aside = if is_left { -ROUND_RAD } else { ROUND_RAD };
+        match wanted.try_normalize(1e-6) {
+            Some(way) if goes_round => Rotation2::new(aside) * way * self.settings.speed_mps,
+            _ => wanted,
+        }
     }
 
     /// Nobody walks through things, however hard they are pushed.
@@ -187,8 +234,8 @@ impl Walker {
     /// Goes on to the next point of the path where one is reached.
     fn look_ahead(&mut self, now_s: f64) {
         let path = &self.settings.path;
-        let reached =
-            |point: &[f64; 2]| (self.stance.place - Point2::from(*point)).norm() < REACHED_M;
+        let near_m = if self.held_up_s > HELD_UP_S { NEAR_ENOUGH_M } else { REACHED_M };
+        let reached = |point: &[f64; 2]| (self.stance.place - Point2::from(*point)).norm() < near_m;
         if path.len() < 2 || !path.get(self.ahead).is_some_and(reached) {
             return;
         }
@@ -421,12 +468,39 @@ mod tests {
     #[test]
     fn nobody_walks_through_things() {
         let mut walkers = [walker(&[[1.0, 1.0], [5.0, 1.0]], Trick::None)];
-        let pillar = Obstacle { at: Point2::new(3.0, 1.01), radius_m: 0.4 };
+        let pillar = Obstacle::standing(Point2::new(3.0, 1.01), 0.4);
         for step in 0..500 {
             walkers[0].step(f64::from(step) * 0.02, 0.02, None, &[], &[pillar]);
             assert!((walkers[0].stance.place - pillar.at).norm() > 0.399);
         }
         assert!(walkers[0].stance.place.x > 4.5, "{}", walkers[0].stance.place);
+    }
+
+    #[test]
+    fn nobody_stands_for_ever_before_a_thing() {
+        for aside in -8..=8 {
+            let way = 0.1 * f64::from(aside);
+            for speed_mps in [0.55, 0.8, 1.2] {
+                let mut one = walker(&[[1.0, 1.0], [6.0, 1.0 + way]], Trick::None);
+                one.settings.speed_mps = speed_mps;
+                let robot = Obstacle::standing(Point2::new(3.5, 1.0), 0.5);
+                for step in 0..700 {
+                    one.step(f64::from(step) * 0.02, 0.02, None, &[], &[robot]);
+                }
+                assert!(one.stance.place.x > 5.3, "{way} {speed_mps}: {}", one.stance.place);
+            }
+        }
+    }
+
+    /// A robot stopped where somebody wants to go through.
+    #[test]
+    fn nobody_dances_around_a_point_that_is_taken() {
+        let mut one = walker(&[[1.0, 1.0], [4.0, 1.0], [4.0, 4.0]], Trick::None);
+        let robot = Obstacle::standing(Point2::new(4.3, 0.8), 0.5);
+        for step in 0..600 {
+            one.step(f64::from(step) * 0.02, 0.02, None, &[], &[robot]);
+        }
+        assert!((one.stance.place - Point2::new(4.0, 4.0)).norm() < 0.3, "{}", one.stance.place);
     }
 
     #[test]

@@ -197,7 +197,7 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     let turn = Rotation2::new(piece.heading_deg.to_radians());
     let round = |aside: f64, radius_m: f64| {
         let at = Point2::from(piece.at) + turn * Vector2::new(0.0, aside);
-        Obstacle { at, radius_m }
+        Obstacle::standing(at, radius_m)
     };
     match piece.kind {
         FurnitureKind::Desk => vec![round(0.0, 0.75)],

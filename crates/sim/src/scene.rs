@@ -455,6 +455,27 @@ pub enum FurnitureKind {
     Partition,
 }
 
+impl FurnitureKind {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CoatStand => "coat stand",
+            Self::DrapedChair => "draped chair",
+            Self::FloorLamp => "floor lamp",
+            Self::Plant => "plant",
+            Self::Pillar => "pillar",
+            Self::Poster => "poster",
+            Self::CardboardFigure => "cardboard figure",
+            Self::Desk => "desk",
+            Self::Shelf => "shelf",
+            Self::Chair => "chair",
+            Self::BinOnTable => "bin on a table",
+            Self::Doorway => "doorway",
+            Self::Partition => "partition",
+        }
+    }
+}
+
 /// What somebody does when the robot cannot see them for the first time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

@@ -32,6 +32,8 @@ const CROWD_PAIRS: f64 = 0.3;
 const STEP_NS: u64 = 20_000_000;
 /// People keep this far away from the middle of the robot, m.
 const ROBOT_M: f64 = 0.5;
+/// They expect it to go on by about this much, m.
+const GOES_M: f64 = 0.6;
 /// Rays in so many directions, and at these heights, m, feel for things around
 /// the robot.
 const FEELERS: u32 = 48;
@@ -143,6 +145,7 @@ pub struct Simulation {
     webcams: Vec<Webcam>,
     fixed: Vec<Object>,
     lamps: Vec<Lamp>,
+    pieces: Vec<Furniture>,
     obstacles: Vec<Obstacle>,
     walkers: Vec<Walker>,
     robot: Robot,
@@ -180,6 +183,7 @@ impl Simulation {
             fixed,
             lamps: room::lamps(&scene.room, &scene.light),
             walkers: walkers(scene, &obstacles, &mut stream(3)),
+            pieces,
             obstacles,
             robot: Robot::new(&scene.robot, stream(4)),
             exposures: [Exposure::new(threads); 2],
@@ -209,6 +213,12 @@ impl Simulation {
     /// **world**.
     pub fn webcams(&self) -> impl Iterator<Item = &Camera> {
         self.webcams.iter().map(Webcam::camera)
+    }
+
+    /// What stands around, the clutter that is there by chance included; places are in
+    /// the world.
+    pub fn furniture(&self) -> &[Furniture] {
+        &self.pieces
     }
 
     /// Commands the wheels from now on: the loop is closed, the scene's path
@@ -282,7 +292,8 @@ impl Simulation {
         let ways: Vec<_> = (0..self.walkers.len())
             .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i)))
             .collect();
-        self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M });
+        let ahead = self.robot.pose.rotation * Vector2::new(GOES_M, 0.0);
+        self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M, ahead });
         for (walker, (lead, others)) in self.walkers.iter_mut().zip(&ways) {
             walker.step(now_s, dt, lead.as_ref(), others, &self.obstacles);
         }

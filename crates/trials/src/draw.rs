@@ -71,6 +71,11 @@ impl Draw {
         self.simulation.steer(command);
     }
 
+    /// The camera of all frames, as the pipelines believe it to be.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
     /// The scene in motion.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation

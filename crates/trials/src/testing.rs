@@ -32,8 +32,8 @@ pub fn trial(people: &[&[Place]], tracks: &[Path<'_>]) -> Trial {
     let camera = camera();
     let moments = (0..frames).map(|at| moment(at, people, &camera)).collect();
     let reports = (0..frames).map(|at| report(at, tracks, &camera)).collect();
-    let runs = vec![Run { pipeline: "hand".into(), reports }];
-    Trial { seed: 1, camera, moments, runs }
+    let runs = vec![Run { pipeline: "hand".into(), reports, worked_ms: 0.0 }];
+    Trial { seed: 1, camera, furniture: Vec::new(), moments, runs }
 }
 
 fn stamp(at: usize) -> Stamp {

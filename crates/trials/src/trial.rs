@@ -1,8 +1,9 @@
+use cpu_time::ThreadTime;
 use nalgebra::Isometry2;
 use tagalong_core::{Camera, Registry, Stamp};
 use tagalong_eval::EvalError;
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
-use tagalong_sim::{Scene, Truth};
+use tagalong_sim::{Furniture, Scene, Truth};
 
 use crate::{Contender, Draw, Drawn};
 
@@ -54,6 +55,8 @@ pub struct Run {
     pub pipeline: String,
     /// One report a frame, in the order of [`Trial::moments`].
     pub reports: Vec<FrameReport>,
+    /// Time that a processor worked on them, drawing not included, ms.
+    pub worked_ms: f64,
 }
 
 /// One scene, and what each contender said about it.
@@ -63,6 +66,8 @@ pub struct Trial {
     pub seed: u64,
     /// The camera, as the pipelines believe it to be.
     pub camera: Camera,
+    /// What stands around; places are in the world.
+    pub furniture: Vec<Furniture>,
     /// The frames.
     pub moments: Vec<Moment>,
     /// The contenders, in the order in which they were named.
@@ -81,22 +86,16 @@ impl Trial {
         threads: usize,
     ) -> Result<Self, TrialError> {
         let mut draw = Draw::new(scene, threads);
+        let furniture = draw.simulation().furniture().to_vec();
+        let camera = draw.camera().clone();
         let mut lanes = Lane::all(scene, contenders, registry)?;
         let mut moments = Vec::new();
-        let mut camera = None;
         while let Some(drawn) = draw.next_frame() {
             lanes.iter_mut().try_for_each(|lane| lane.step(&drawn))?;
-            camera.get_or_insert_with(|| Camera::clone(&drawn.frame.camera));
             moments.push(Moment::of(drawn));
         }
-        Ok(Self::of(scene, camera, moments, lanes))
-    }
-
-    fn of(scene: &Scene, camera: Option<Camera>, moments: Vec<Moment>, lanes: Vec<Lane>) -> Self {
-        let camera =
-            camera.unwrap_or_else(|| tagalong_sim::Simulation::new(scene, 1).camera().clone());
         let runs = lanes.into_iter().map(|lane| lane.run).collect();
-        Self { seed: scene.seed, camera, moments, runs }
+        Ok(Self { seed: scene.seed, camera, furniture, moments, runs })
     }
 }
 
@@ -117,7 +116,7 @@ struct Lane {
 impl Lane {
     fn new(scene: &Scene, contender: &Contender, registry: &Registry) -> Result<Self, TrialError> {
         let pipeline = contender.pipeline(registry, scene.seed)?;
-        let run = Run { pipeline: contender.name.clone(), reports: Vec::new() };
+        let run = Run { pipeline: contender.name.clone(), reports: Vec::new(), worked_ms: 0.0 };
         Ok(Self { pipeline, seed: scene.seed, run })
     }
 
@@ -130,11 +129,13 @@ impl Lane {
     }
 
     fn step(&mut self, drawn: &Drawn) -> Result<(), TrialError> {
+        let before = ThreadTime::now();
         let report = self.pipeline.step(&drawn.frame).map_err(|error| TrialError::Step {
             pipeline: self.run.pipeline.clone(),
             seed: self.seed,
             error,
         })?;
+        self.run.worked_ms += 1e3 * before.elapsed().as_secs_f64();
         self.run.reports.push(report);
         Ok(())
     }
