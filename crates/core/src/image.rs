@@ -1,5 +1,3 @@
-use std::ops::RangeInclusive;
-
 use crate::Rect;
 
 /// Places a side of a region at which its depth is read.
@@ -96,34 +94,17 @@ impl DepthImage {
     /// The depth of what fills the middle of a region, m: the median of what 5x5
     /// places in its central half show, of which a third have to show something.
     pub fn surface_m(&self, of: &Rect) -> Option<f64> {
-        self.surface_within(of, 0.0..=f64::MAX)
-    }
-
-    /// The same, where it lies within a range of depths. Most regions show something
-    /// else; they are given up as soon as most of their places do.
-    pub fn surface_within(&self, of: &Rect, range_m: RangeInclusive<f64>) -> Option<f64> {
-        let (least, most) = (*range_m.start() as f32, *range_m.end() as f32);
         let (columns, rows) = (taps(of.x, of.width), taps(of.y, of.height));
-        let (mut count, mut nearer, mut farther) = (0, 0, 0);
-        for y in rows {
-            for metres in self.readings(&columns, y) {
-                count += usize::from(is_reading(metres));
-                nearer += usize::from(is_reading(metres) & (metres < least));
-                farther += usize::from(is_reading(metres) & (metres > most));
-            }
-            if nearer.max(farther) > TAPS * TAPS / 2 {
-                return None;
-            }
-        }
-        let middle = count / 2;
-        if count < LEAST_READINGS || nearer > middle || farther >= count - middle {
-            return None;
-        }
         let mut sorted = [f32::INFINITY; TAPS * TAPS];
         let readings = rows.into_iter().flat_map(|y| self.readings(&columns, y));
         let readings = readings.filter(|metres| is_reading(*metres));
-        sorted.iter_mut().zip(readings).for_each(|(to, metres)| *to = metres);
-        let (_, median, _) = sorted[..count].select_nth_unstable_by(middle, f32::total_cmp);
+        let mut count = 0;
+        for (to, metres) in sorted.iter_mut().zip(readings) {
+            *to = metres;
+            count += 1;
+        }
+        let shown = (count >= LEAST_READINGS).then_some(&mut sorted[..count])?;
+        let (_, median, _) = shown.select_nth_unstable_by(count / 2, f32::total_cmp);
         Some(f64::from(*median))
     }
 
@@ -167,7 +148,7 @@ mod tests {
         #[test]
         fn the_surface_is_the_median_of_what_the_middle_shows(
             x in -20.0..50.0f64, y in -20.0..40.0f64, width in 2.0..40.0f64, height in 2.0..40.0f64,
-            holes in 2..9usize, near in 0.0..6.0f64, long in 0.0..3.0f64,
+            holes in 2..9usize,
         ) {
             let depth = DepthImage::from_fn(48, 32, |x, y| match (x * 7 + y * 13) % holes {
                 0 => f32::NAN,
@@ -175,11 +156,7 @@ mod tests {
                 _ => ((x * 31 + y * 17) % 50) as f32 * 0.1,
             });
             let of = Rect::new(x, y, width, height);
-            let slow = slow_surface_m(&depth, &of);
-            prop_assert_eq!(depth.surface_m(&of), slow);
-            let range = f64::from(near as f32)..=f64::from((near + long) as f32);
-            let within = slow.filter(|m| range.contains(m));
-            prop_assert_eq!(depth.surface_within(&of, range), within);
+            prop_assert_eq!(depth.surface_m(&of), slow_surface_m(&depth, &of));
         }
     }
 }

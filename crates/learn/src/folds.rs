@@ -45,12 +45,21 @@ pub enum Use {
     Fit,
 }
 
-/// What a group is for, by chance: two tenths for the figures, one for the
-/// calibration.
-pub fn use_of(group: u64) -> Use {
-    match mix(group) % 10 {
+/// The tenth that calibrates, if nobody asks for others.
+pub const CALIBRATION: u64 = 2;
+
+/// Which tenth of all groups a group is in, by chance: 0 to 9.
+fn tenth_of(group: u64) -> u64 {
+    mix(group) % 10
+}
+
+/// What a group is for: two tenths are for the figures, those of `calibration` for the
+/// calibration, and the others for fitting. Other tenths in turn cross-validate, and
+/// leave the figures alone.
+pub fn use_of(group: u64, calibration: &[u64]) -> Use {
+    match tenth_of(group) {
         0 | 1 => Use::Figures,
-        2 => Use::Calibration,
+        tenth if calibration.contains(&tenth) => Use::Calibration,
         _ => Use::Fit,
     }
 }

@@ -14,7 +14,7 @@ mod logistic;
 mod variants;
 
 pub use calibrate::{Line, platt};
-pub use folds::{Use, mix, parts, use_of};
+pub use folds::{CALIBRATION, Use, mix, parts, use_of};
 pub use held_out::{accepted, area};
 pub use logistic::{Example, logistic};
 pub use variants::{mirrored, shifted};

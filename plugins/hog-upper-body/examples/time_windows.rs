@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
 use tagalong_core::{GreyImage, Rect};
-use tagalong_hog_upper_body::{Model, Scanner, merge, window_of};
+use tagalong_hog_upper_body::{Grid, Model, Scanner, Wanted, merge, window_of};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -30,7 +30,9 @@ fn main() {
         let least = model.sum_at(0.0);
         let sides = sides.take_while(|side| *side <= most);
         windows.clear();
-        scanner.scan(&image, sides, least, is_inside, &mut windows);
+        let propose =
+            |grid: &Grid, wanted: &mut Vec<Wanted>| wanted.extend(grid.windows(is_inside));
+        scanner.scan(&image, sides, least, propose, &mut windows);
         merge(&mut windows, 0.4, 0.4);
     }
     println!(

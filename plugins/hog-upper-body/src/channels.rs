@@ -2,11 +2,16 @@
 //! small cells and compared with what is around (after P. Dollar et al., *Fast
 //! feature pyramids for object detection*, PAMI 36, 2014).
 
+use std::ops::Range;
+
+use crate::Spans;
 use crate::gradients::{Gradients, LANES, Votes, votes};
 use crate::hog::CELL as HOG_CELL;
 
 /// Side of a cell, pixels.
-pub(crate) const CELL: usize = HOG_CELL / 2;
+pub(crate) const CELL: usize = HOG_CELL / HALVES;
+/// Cells along a side of those that histograms are made of.
+const HALVES: usize = 2;
 /// Directions, over half a turn.
 const BINS: usize = 6;
 /// Numbers of a cell: brightness, length of gradients, and length by direction.
@@ -36,17 +41,18 @@ type Columns = Votes<DEPTH>;
 impl Channels {
     /// Takes the place of the channels of another image: `pixels` of grey values,
     /// `width` to a row. The outermost pixels belong to no cell; they are there
-    /// for the gradients of their neighbours.
-    pub fn fill(&mut self, pixels: &[f32], width: usize) {
-        let height = pixels.len() / width.max(1);
-        self.columns = width.saturating_sub(2) / CELL;
-        self.rows = height.saturating_sub(2) / CELL;
+    /// for the gradients of their neighbours. Only cells in `spans` are looked at; others
+    /// are as if there were nothing.
+    pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
+        self.columns = HALVES * (width.saturating_sub(2) / HOG_CELL);
+        self.rows = HALVES * spans.cells().len();
+        self.values.clear();
         self.values.resize(self.columns * self.rows * DEPTH, 0.0);
         if self.values.is_empty() {
             return;
         }
         for y in 0..self.rows {
-            self.add(&pixels[y * CELL * width..], width, y);
+            self.add(&pixels[y * CELL * width..], width, y, &spans.cells()[y / HALVES]);
         }
         self.compare();
         self.before.resize(self.values.len(), 0.0);
@@ -55,16 +61,19 @@ impl Channels {
     }
 
     /// Makes row `y` of cells from the rows of pixels that begin above it.
-    fn add(&mut self, pixels: &[f32], width: usize, y: usize) {
-        let lanes = (self.columns * CELL).div_ceil(LANES);
+    fn add(&mut self, pixels: &[f32], width: usize, y: usize, span: &Range<usize>) {
+        let lanes = span.len() * HOG_CELL / LANES;
         self.columns_of.clear();
         self.columns_of.resize(lanes, [[0.0; LANES]; DEPTH]);
         for y in 0..CELL {
-            let rows = [0, 1, 2].map(|row| &pixels[(y + row) * width..(y + row + 1) * width]);
+            let rows = [0, 1, 2].map(|row| (y + row) * width);
+            let rows = rows.map(|at| at + span.start * HOG_CELL..at + span.end * HOG_CELL + 2);
+            let rows = rows.map(|part| &pixels[part]);
             self.gradients.fill(rows, 0, lanes);
             add_row(&self.gradients, &rows[1][1..], &mut self.columns_of);
         }
-        let row = &mut self.values[y * self.columns * DEPTH..(y + 1) * self.columns * DEPTH];
+        let of = |x: usize| (y * self.columns + HALVES * x) * DEPTH;
+        let row = &mut self.values[of(span.start)..of(span.end)];
         sum_columns(&self.columns_of, row);
     }
 

@@ -66,7 +66,7 @@ impl Default for Config {
             min_side_px: 40.0,
             max_side: 0.9,
             scale_step: 1.15,
-            size_tolerance: 1.2,
+            size_tolerance: 1.08,
             min_depth_m: 0.5,
             max_depth_m: 7.0,
             above_m: 0.25,

@@ -1,10 +1,13 @@
+use std::ops::RangeInclusive;
+
 use nalgebra::Matrix3;
 use tagalong_core::{
     Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
     Search, UPPER_BODY_SIDE_M,
 };
 
-use crate::{Config, Kind, Model, NAME, Scanner, Window, merge};
+use crate::lattice::Lattice;
+use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
 
 /// The models that are part of the program.
 const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
@@ -15,12 +18,15 @@ const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear
 const ABOVE: f64 = 0.25;
 /// In so many places.
 const TAPS: usize = 5;
+/// A search near a track looks at windows so many times as wide as the track expects.
+const ALIKE: RangeInclusive<f64> = 0.7..=1.4;
 
 /// Finds heads and shoulders.
 pub struct HogUpperBody {
     config: Config,
     model: Model,
     scanner: Scanner,
+    lattice: Lattice,
     windows: Vec<Window>,
 }
 
@@ -34,7 +40,8 @@ impl HogUpperBody {
         config.check()?;
         let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
         let model = context.model(&config.model, built_in, Model::from_text)?;
-        Ok(Self { config, scanner: Scanner::new(&model), windows: Vec::new(), model })
+        let (scanner, lattice) = (Scanner::new(&model), Lattice::default());
+        Ok(Self { config, model, scanner, lattice, windows: Vec::new() })
     }
 
     fn detection(&self, camera: &Camera, window: &Window) -> Option<Detection> {
@@ -59,12 +66,13 @@ impl HogUpperBody {
     }
 }
 
-/// The sizes that are looked for, pixels.
-fn sides(config: &Config, camera: &Camera) -> impl Iterator<Item = f64> + use<> {
+/// The sizes that are looked for, pixels; near a track, those like its own.
+fn sides(config: &Config, camera: &Camera, near: Option<Rect>) -> impl Iterator<Item = f64> {
     let most = config.max_side * camera.width.min(camera.height) as f64;
     let step = config.scale_step;
     std::iter::successors(Some(config.min_side_px), move |side| Some(side * step))
         .take_while(move |side| *side <= most)
+        .filter(move |side| near.is_none_or(|near| ALIKE.contains(&(side / near.width.max(1.0)))))
 }
 
 /// Which windows are worth a look, and how many were not, by test.
@@ -72,6 +80,7 @@ struct Proposer<'a> {
     config: &'a Config,
     camera: &'a Camera,
     depth: Option<&'a DepthImage>,
+    lattice: &'a mut Lattice,
     /// The square that a search near a track expects.
     near: Option<Rect>,
     unfit: u64,
@@ -79,32 +88,56 @@ struct Proposer<'a> {
     out_of_place: u64,
 }
 
-impl Proposer<'_> {
-    /// The depth of what the square shows, where it is known; `None` for
-    /// squares that are not worth a look.
-    fn propose(&mut self, square: &Rect) -> Option<Option<f64>> {
-        if !self.is_near(square) {
-            return None;
+impl<'a> Proposer<'a> {
+    fn new(
+        config: &'a Config,
+        camera: &'a Camera,
+        depth: Option<&'a DepthImage>,
+        lattice: &'a mut Lattice,
+        near: Option<Rect>,
+    ) -> Self {
+        let (unfit, goes_on, out_of_place) = (0, 0, 0);
+        Self { config, camera, depth, lattice, near, unfit, goes_on, out_of_place }
+    }
+
+    /// Adds the windows of one size that are worth a look.
+    fn propose(&mut self, grid: &Grid, wanted: &mut Vec<Wanted>) {
+        match self.depth {
+            Some(depth) => self.propose_by_depth(depth, grid, wanted),
+            None => wanted.extend(grid.windows(|square| self.is_near(square).then_some(None))),
         }
-        let Some(depth) = self.depth else { return Some(None) };
+    }
+
+    /// Those that show something as far away as somebody would be who is so large.
+    fn propose_by_depth(&mut self, depth: &DepthImage, grid: &Grid, wanted: &mut Vec<Wanted>) {
         let config = self.config;
-        let fits_m = self.camera.focal_px() * UPPER_BODY_SIDE_M / square.width;
+        let fits_m = self.camera.focal_px() * UPPER_BODY_SIDE_M / grid.side;
         let nearest_m = (fits_m / config.size_tolerance).max(config.min_depth_m);
         let farthest_m = (fits_m * config.size_tolerance).min(config.max_depth_m);
-        let Some(face_m) = depth.surface_within(square, nearest_m..=farthest_m) else {
-            self.unfit += 1;
-            return None;
-        };
+        self.lattice.fill(depth, grid, nearest_m..=farthest_m);
+        let mut index = 0..;
+        wanted.extend(grid.windows(|square| {
+            let index = index.next()?;
+            if !self.is_near(square) {
+                return None;
+            }
+            let face_m = self.lattice.surface_m(index);
+            self.unfit += u64::from(face_m.is_none());
+            self.is_head(depth, square, face_m?).then_some(face_m)
+        }));
+    }
+
+    /// True if what is in a square ends there, at a height where heads are.
+    fn is_head(&mut self, depth: &DepthImage, square: &Rect, face_m: f64) -> bool {
         if self.goes_on_above(depth, square, face_m) {
             self.goes_on += 1;
-            return None;
+            return false;
         }
         let height_m = self.camera.head_of(square, face_m).z;
-        if !(config.min_head_height_m..=config.max_head_height_m).contains(&height_m) {
-            self.out_of_place += 1;
-            return None;
-        }
-        Some(Some(face_m))
+        let heights_m = self.config.min_head_height_m..=self.config.max_head_height_m;
+        let in_place = heights_m.contains(&height_m);
+        self.out_of_place += u64::from(!in_place);
+        in_place
     }
 
     /// True for what has no upper end here: walls, trunks of people, furniture.
@@ -118,8 +151,7 @@ impl Proposer<'_> {
     fn is_near(&self, square: &Rect) -> bool {
         self.near.is_none_or(|expected| {
             let off = (square.centre() - expected.centre()).norm();
-            let ratio = square.width / expected.width.max(1.0);
-            off < self.config.near * expected.width && (0.7..=1.4).contains(&ratio)
+            off < self.config.near * expected.width
         })
     }
 }
@@ -138,13 +170,12 @@ impl Detector for HogUpperBody {
             Search::Near(track) => Some(track.estimate.region),
             Search::Everywhere { .. } => None,
         };
-        let Self { config, model, scanner, windows } = self;
-        let (unfit, goes_on, out_of_place) = (0, 0, 0);
-        let mut proposer = Proposer { config, camera, depth, near, unfit, goes_on, out_of_place };
-        let (sides, least) = (sides(config, camera), model.sum_at(config.min_score));
+        let Self { config, model, scanner, lattice, windows } = self;
+        let mut proposer = Proposer::new(config, camera, depth, lattice, near);
+        let (sides, least) = (sides(config, camera, near), model.sum_at(config.min_score));
         let before = scanner.looked_at();
         windows.clear();
-        scanner.scan(grey, sides, least, |square| proposer.propose(square), windows);
+        scanner.scan(grey, sides, least, |grid, wanted| proposer.propose(grid, wanted), windows);
         let looked_at = scanner.looked_at() - before;
         funnel.drop_many("window: size and depth", proposer.unfit);
         funnel.drop_many("window: goes on above", proposer.goes_on);
@@ -169,29 +200,27 @@ mod tests {
 
     use super::*;
 
-    /// What is said of the square of somebody 3 m away whose surroundings are at `depth`.
-    fn proposed(depth: impl Fn(f64) -> f32) -> (Option<Option<f64>>, u64) {
+    /// Whether the square of somebody 3 m away whose surroundings are at `depth` shows a
+    /// head, and how many squares do not because what they show goes on above.
+    fn is_head(depth: impl Fn(f64) -> f32) -> (bool, u64) {
         let lens =
             Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0);
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
         let above = |y: usize| (square.y - y as f64) / square.height;
         let depth = DepthImage::from_fn(640, 480, |_, y| depth(above(y)));
-        let (config, near) = (&Config::default(), None);
-        let (camera, depth, counts) = (&camera, Some(&depth), [0; 3]);
-        let [unfit, goes_on, out_of_place] = counts;
-        let mut proposer = Proposer { config, camera, depth, near, unfit, goes_on, out_of_place };
-        (proposer.propose(&square), proposer.goes_on)
+        let (config, mut lattice) = (Config::default(), Lattice::default());
+        let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
+        (proposer.is_head(&depth, &square, 2.9), proposer.goes_on)
     }
 
     #[test]
     fn a_wall_goes_on_above_and_a_head_does_not() {
         let wall = |_: f64| 2.9;
-        assert_eq!(proposed(wall), (None, 1));
+        assert_eq!(is_head(wall), (false, 1));
         let head = |above: f64| if above < 0.0 { 2.9 } else { 3.3 };
-        let found = proposed(head);
-        assert!(found.0.flatten().is_some_and(|m| (m - 2.9).abs() < 1e-6) && found.1 == 0);
+        assert_eq!(is_head(head), (true, 0));
         let unknown_above = |above: f64| if above < 0.0 { 2.9 } else { f32::NAN };
-        assert_eq!(proposed(unknown_above), found);
+        assert_eq!(is_head(unknown_above), (true, 0));
     }
 }

@@ -44,15 +44,18 @@ pub(crate) fn votes<const BINS: usize>(
     first: f32,
 ) -> Votes<BINS> {
     let mut votes = [[0.0; LANES]; BINS];
-    let last = (BINS - 1) as f32;
     for lane in 0..LANES {
-        let at = turn[lane] * BINS as f32 - first;
-        for (bin, votes) in votes.iter_mut().enumerate() {
-            votes[lane] = length[lane] * (1.0 - (at - bin as f32).abs()).max(0.0);
-        }
+        let length = length[lane];
+        // In widths of a bin, times the length.
+        let mut away = length * (turn[lane] * BINS as f32 - first);
         // Half a turn on, the first direction follows the last one.
-        votes[0][lane] += length[lane] * (at - last).max(0.0);
-        votes[BINS - 1][lane] += length[lane] * (-at).max(0.0);
+        let last = (-away).max(0.0);
+        for votes in &mut votes {
+            votes[lane] = (length - away.abs()).max(0.0);
+            away -= length;
+        }
+        votes[0][lane] += (away + length).max(0.0);
+        votes[BINS - 1][lane] += last;
     }
     votes
 }

@@ -1,5 +1,6 @@
 //! Cells and blocks.
 
+use crate::Spans;
 use crate::gradients::{Gradients, LANES, Votes, votes};
 
 /// Side of a cell, pixels.
@@ -35,53 +36,74 @@ pub struct Blocks {
 impl Blocks {
     /// Takes the place of the blocks of another image: `pixels` of grey values,
     /// `width` to a row. The outermost pixels belong to no cell; they are there
-    /// for the gradients of their neighbours.
-    pub fn fill(&mut self, pixels: &[f32], width: usize) {
-        let height = pixels.len() / width.max(1);
-        let (across, down) = (width.max(2) - 2, height.max(2) - 2);
-        let (across, down) = (across / CELL, down / CELL);
+    /// for the gradients of their neighbours. Only cells in `spans` are looked at;
+    /// other blocks are of no use.
+    pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
+        let (across, down) = (width.saturating_sub(2) / CELL, spans.cells().len());
         (self.columns, self.rows) = (across.saturating_sub(1), down.saturating_sub(1));
-        self.cells.clear();
-        self.values.clear();
+        self.values.resize(self.columns * self.rows + 1, [0.0; BLOCK]);
         if self.columns * self.rows == 0 {
             return;
         }
-        self.roots.clear();
-        self.roots.extend(pixels.iter().map(|grey| grey.max(0.0).sqrt()));
-        self.vote(width, down, across);
-        for y in 0..self.rows {
-            let [above, below] = [y, y + 1].map(|y| &self.cells[y * across..(y + 1) * across]);
-            normalise(above, below, &mut self.values);
+        self.root(pixels, width, spans);
+        self.vote(width, spans);
+        for (y, rows) in spans.cells().windows(2).enumerate() {
+            let (start, end) = (rows[0].start.max(rows[1].start), rows[0].end.min(rows[1].end));
+            let cells = |y: usize| self.cells.get(y * across + start..y * across + end);
+            if let (Some(above), Some(below)) = (cells(y), cells(y + 1)) {
+                let blocks = &mut self.values[y * self.columns + start..];
+                normalise(above, below, blocks);
+            }
         }
-        self.values.push([0.0; BLOCK]);
+    }
+
+    /// Takes the square roots of the pixels that are needed.
+    fn root(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
+        self.roots.resize(pixels.len(), 0.0);
+        let rows = pixels.chunks_exact(width).zip(self.roots.chunks_exact_mut(width));
+        for (y, (pixels, roots)) in rows.enumerate() {
+            let span = spans.pixels(y / CELL);
+            let roots = roots[span.clone()].iter_mut();
+            roots.zip(&pixels[span]).for_each(|(root, grey)| *root = grey.max(0.0).sqrt());
+        }
     }
 
     /// The histograms of all cells: each gradient votes for the two directions and
     /// the four cells that are nearest.
-    fn vote(&mut self, width: usize, down: usize, across: usize) {
+    fn vote(&mut self, width: usize, spans: &Spans) {
+        let across = self.columns + 1;
+        self.cells.resize(across * spans.cells().len(), [0.0; BINS]);
         for votes in [&mut self.above, &mut self.below] {
             votes.clear();
             votes.resize(across + 1, [[0.0; LANES]; BINS]);
         }
-        for y in 0..down * CELL + CELL / 2 {
-            // Half a cell below a cell's first row its own middle is passed.
-            if y % CELL == CELL / 2 {
-                self.finish(y / CELL);
+        for (row, span) in spans.cells().iter().enumerate() {
+            for pixel in 0..CELL {
+                // Half a cell below a cell's first row its own middle is passed.
+                if pixel == CELL / 2 {
+                    self.finish(row, spans);
+                }
+                let y = row * CELL + pixel;
+                let rows = [0, 1, 2].map(|row| (y + row) * width);
+                let rows = rows.map(|at| at + span.start * CELL..at + span.end * CELL + 2);
+                let rows = rows.map(|part| &self.roots[part]);
+                self.gradients.fill(rows, BEFORE, span.len() + 1);
+                let share = ramp((pixel + CELL / 2) % CELL);
+                let votes = span.start..=span.end;
+                let (above, below) = (&mut self.above[votes.clone()], &mut self.below[votes]);
+                add_votes(&self.gradients, share, above, below);
             }
-            let rows =
-                [0, 1, 2].map(|row| (y + row) * width).map(|at| self.roots.get(at..at + width));
-            let [Some(above), Some(row), Some(below)] = rows else { break };
-            self.gradients.fill([above, row, below], BEFORE, across + 1);
-            let share = ramp((y + CELL / 2) % CELL);
-            add_votes(&self.gradients, share, &mut self.above, &mut self.below);
         }
-        self.finish(down);
+        self.finish(spans.cells().len(), spans);
     }
 
-    /// Row `y` of cells, numbered from 1, has all its votes. Row 0 lies outside.
-    fn finish(&mut self, y: usize) {
-        if y > 0 {
-            self.cells.extend(self.above.windows(2).map(histogram));
+    /// The row of cells above row `y` has all its votes. There is none above the first.
+    fn finish(&mut self, y: usize, spans: &Spans) {
+        if let Some(y) = y.checked_sub(1) {
+            let (span, across) = (&spans.cells()[y], self.columns + 1);
+            let cells = &mut self.cells[y * across + span.start..y * across + span.end];
+            let sides = self.above[span.start..=span.end].windows(2);
+            cells.iter_mut().zip(sides).for_each(|(cell, sides)| *cell = histogram(sides));
         }
         std::mem::swap(&mut self.above, &mut self.below);
         self.below.fill([[0.0; LANES]; BINS]);
@@ -142,11 +164,11 @@ fn histogram(sides: &[Votes<BINS>]) -> [f32; BINS] {
     cell
 }
 
-/// Adds the blocks of two rows of cells. L2-Hys: divided by the length, clipped,
+/// Makes the blocks of two rows of cells. L2-Hys: divided by the length, clipped,
 /// divided again.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
-fn normalise(above: &[[f32; BINS]], below: &[[f32; BINS]], blocks: &mut Vec<[f32; BLOCK]>) {
-    for (above, below) in above.windows(2).zip(below.windows(2)) {
+fn normalise(above: &[[f32; BINS]], below: &[[f32; BINS]], blocks: &mut [[f32; BLOCK]]) {
+    for ((above, below), out) in above.windows(2).zip(below.windows(2)).zip(blocks) {
         let mut block = [0.0; BLOCK];
         for (corner, cell) in above.iter().chain(below).enumerate() {
             block[corner * BINS..(corner + 1) * BINS].copy_from_slice(cell);
@@ -155,7 +177,7 @@ fn normalise(above: &[[f32; BINS]], below: &[[f32; BINS]], blocks: &mut Vec<[f32
         block.iter_mut().for_each(|v| *v = (*v * scale).min(CLIP));
         let scale = 1.0 / (norm(&block) + 1e-3);
         block.iter_mut().for_each(|v| *v *= scale);
-        blocks.push(block);
+        *out = block;
     }
 }
 

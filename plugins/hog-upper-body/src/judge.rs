@@ -1,9 +1,10 @@
 //! Machines as they are run: windows side by side, of an image in one size.
 
+use crate::Spans;
 use crate::channels::{Channels, DEPTH, Planes};
 use crate::hog::{BLOCK, Blocks};
 use crate::model::{Machine, Model, SIDE};
-use crate::trees::{CELLS, PATIENCE, Tree, Trees};
+use crate::trees::{CELLS, ROUND, Tree, Trees};
 
 /// Windows or numbers that are dealt with at once.
 pub(crate) const LANES: usize = 8;
@@ -28,10 +29,10 @@ impl Judge {
     }
 
     /// Takes the place of another image (see [`Blocks::fill`]).
-    pub(crate) fn fill(&mut self, pixels: &[f32], width: usize) {
+    pub(crate) fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         match self {
-            Self::Linear(linear) => linear.blocks.fill(pixels, width),
-            Self::Trees(forest) => forest.fill(pixels, width),
+            Self::Linear(linear) => linear.blocks.fill(pixels, width, spans),
+            Self::Trees(forest) => forest.fill(pixels, width, spans),
         }
     }
 
@@ -108,8 +109,8 @@ impl Forest {
         Self { trees, channels: Channels::default(), planes: Planes::default(), places, layout: 0 }
     }
 
-    fn fill(&mut self, pixels: &[f32], width: usize) {
-        self.channels.fill(pixels, width);
+    fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
+        self.channels.fill(pixels, width, spans);
         self.channels.planes(&mut self.planes);
         if self.layout != self.planes.layout() {
             let place = |number: u16| {
@@ -132,36 +133,31 @@ impl Forest {
     }
 }
 
-/// The sums of windows side by side; each stays what it was when it became hopeless.
+/// The sums of windows side by side; see [`Trees::sum_of`].
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn add_trees(trees: &Trees, places: &[[u32; 3]], cells: &[f32], sums: &mut [f32; LANES]) {
-    let mut hopeless = f32::NEG_INFINITY;
-    for (index, (tree, [a, b, c])) in trees.trees.iter().zip(places).enumerate() {
-        if index > PATIENCE {
-            hopeless = trees.hopeless;
-            if index % LANES == 0 && most(sums) < hopeless {
-                break;
+    let rounds = trees.trees.chunks(ROUND).zip(places.chunks(ROUND)).zip(&trees.least);
+    for ((trees, places), least) in rounds {
+        for (tree, [a, b, c]) in trees.iter().zip(places) {
+            let Tree { below: [first, yes, no], values, .. } = *tree;
+            let [yes_yes, yes_no, no_yes, no_no] = values;
+            let a = &cells[*a as usize..][..LANES];
+            let b = &cells[*b as usize..][..LANES];
+            let c = &cells[*c as usize..][..LANES];
+            for lane in 0..LANES {
+                let if_yes = if b[lane] < yes { yes_yes } else { yes_no };
+                let if_no = if c[lane] < no { no_yes } else { no_no };
+                sums[lane] += if a[lane] < first { if_yes } else { if_no };
             }
         }
-        let Tree { below: [first, yes, no], values, .. } = *tree;
-        let [yes_yes, yes_no, no_yes, no_no] = values;
-        let a = &cells[*a as usize..][..LANES];
-        let b = &cells[*b as usize..][..LANES];
-        let c = &cells[*c as usize..][..LANES];
-        for lane in 0..LANES {
-            let if_yes = if b[lane] < yes { yes_yes } else { yes_no };
-            let if_no = if c[lane] < no { no_yes } else { no_no };
-            let value = if a[lane] < first { if_yes } else { if_no };
-            sums[lane] += if sums[lane] < hopeless { 0.0 } else { value };
+        let mut alive = false;
+        for sum in &mut *sums {
+            let is_hopeless = *sum < *least;
+            *sum = if is_hopeless { f32::NEG_INFINITY } else { *sum };
+            alive |= !is_hopeless;
+        }
+        if !alive {
+            break;
         }
     }
-}
-
-#[inline(always)]
-fn most(sums: &[f32; LANES]) -> f32 {
-    let mut most = sums[0];
-    for sum in sums {
-        most = most.max(*sum);
-    }
-    most
 }

@@ -21,9 +21,11 @@ mod detect;
 mod gradients;
 mod hog;
 mod judge;
+mod lattice;
 mod model;
 mod resample;
 mod scan;
+mod spans;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "train")]
@@ -36,9 +38,10 @@ pub use detect::HogUpperBody;
 pub use hog::Blocks;
 pub use model::{Field, Kind, Machine, Model, NUMBERS};
 pub use resample::resampled;
-pub use scan::{Scanner, Window, merge, window_numbers, window_of};
+pub use scan::{Grid, Scanner, Wanted, Window, merge, window_numbers, window_of};
+pub use spans::Spans;
 use tagalong_core::Registry;
-pub use trees::{Tree, Trees};
+pub use trees::{ROUND, Tree, Trees};
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "hog-upper-body";

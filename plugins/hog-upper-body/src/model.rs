@@ -3,6 +3,7 @@ use base64::prelude::BASE64_STANDARD;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Spans;
 use crate::channels::Channels;
 use crate::hog::{BLOCK, Blocks};
 use crate::trees::{self, Trees};
@@ -12,7 +13,7 @@ pub(crate) const SIDE: usize = 7;
 /// Numbers of a window for a linear machine.
 pub const NUMBERS: usize = SIDE * SIDE * BLOCK;
 
-const FORMAT: &str = "hog-upper-body 2";
+const FORMAT: &str = "hog-upper-body 3";
 
 /// What judges windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -58,10 +59,10 @@ impl Field {
     }
 
     /// Takes the place of another image (see [`Blocks::fill`]).
-    pub fn fill(&mut self, pixels: &[f32], width: usize) {
+    pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         match self {
-            Self::Blocks(blocks) => blocks.fill(pixels, width),
-            Self::Channels(channels) => channels.fill(pixels, width),
+            Self::Blocks(blocks) => blocks.fill(pixels, width, spans),
+            Self::Channels(channels) => channels.fill(pixels, width, spans),
         }
     }
 
@@ -97,8 +98,8 @@ pub struct Model {
 struct Kept {
     format: String,
     machine: Kind,
-    /// The bias of a linear machine; where trees give a window up.
-    level: f32,
+    /// The bias of a linear machine; below what trees give a window up, for each round.
+    levels: Vec<f32>,
     slope: f64,
     offset: f64,
     /// Little-endian numbers in base64: weights, or trees.
@@ -134,16 +135,16 @@ impl Model {
 
     /// The content of a model file.
     pub fn to_text(&self) -> String {
-        let (level, bytes) = match &self.machine {
+        let (levels, bytes) = match &self.machine {
             Machine::Linear { weights, bias } => {
-                (*bias, weights.iter().flat_map(|w| w.to_le_bytes()).collect())
+                (vec![*bias], weights.iter().flat_map(|w| w.to_le_bytes()).collect())
             }
-            Machine::Trees(all) => (all.hopeless, trees::to_bytes(&all.trees)),
+            Machine::Trees(all) => (all.least.clone(), trees::to_bytes(&all.trees)),
         };
         let kept = Kept {
             format: FORMAT.into(),
             machine: self.kind(),
-            level,
+            levels,
             slope: self.slope,
             offset: self.offset,
             numbers: BASE64_STANDARD.encode(bytes),
@@ -161,20 +162,26 @@ impl Model {
             return Err(format!("its format is `{}`, expected `{FORMAT}`", kept.format));
         }
         let bytes = BASE64_STANDARD.decode(&kept.numbers).map_err(|error| error.to_string())?;
-        let Kept { machine, level, slope, offset, .. } = kept;
-        let finite = level.is_finite() && slope.is_finite() && offset.is_finite();
+        let Kept { machine, levels, slope, offset, .. } = kept;
+        let finite =
+            levels.iter().all(|level| level.is_finite()) && slope.is_finite() && offset.is_finite();
         if !finite || slope <= 0.0 {
             return Err(
                 "it has numbers that are no numbers, or a slope that is not positive".into()
             );
         }
         let machine = match machine {
-            Kind::Linear => Machine::Linear { weights: weights(&bytes)?, bias: level },
-            Kind::Trees => {
-                Machine::Trees(Trees { trees: trees::from_bytes(&bytes)?, hopeless: level })
-            }
+            Kind::Linear => Machine::Linear { weights: weights(&bytes)?, bias: bias(&levels)? },
+            Kind::Trees => Machine::Trees(trees::from_bytes(&bytes, levels)?),
         };
         Ok(Self { machine, slope, offset })
+    }
+}
+
+fn bias(levels: &[f32]) -> Result<f32, String> {
+    match levels {
+        [bias] => Ok(*bias),
+        _ => Err(format!("it has {} levels, expected the bias", levels.len())),
     }
 }
 

@@ -4,6 +4,9 @@ use std::ops::Range;
 
 use tagalong_core::GreyImage;
 
+use crate::Spans;
+use crate::hog::CELL;
+
 /// Weights of the source pixels that a sample is the mean of.
 #[derive(Clone, Debug, Default)]
 struct Taps {
@@ -29,10 +32,20 @@ impl Taps {
         }
     }
 
-    fn each(&self) -> impl Iterator<Item = (i64, &[f32])> {
-        let ends = self.starts.iter().skip(1).map(|(_, from)| *from);
-        let ends = ends.chain(std::iter::once(self.weights.len()));
-        self.starts.iter().zip(ends).map(|((start, from), to)| (*start, &self.weights[*from..to]))
+    /// The first source pixel of some samples, and the weights from there on.
+    fn of(&self, samples: Range<usize>) -> impl Iterator<Item = (i64, &[f32])> {
+        let end = |sample: usize| self.starts.get(sample + 1).map(|(_, from)| *from);
+        samples.map(move |sample| {
+            let (start, from) = self.starts[sample];
+            (start, &self.weights[from..end(sample).unwrap_or(self.weights.len())])
+        })
+    }
+
+    /// The source pixels of some samples.
+    fn sources(&self, samples: Range<usize>) -> Range<i64> {
+        let start = self.starts[samples.start].0;
+        let last = self.of(samples.end - 1..samples.end);
+        start..last.fold(start, |_, (start, weights)| start + weights.len() as i64)
     }
 }
 
@@ -44,9 +57,9 @@ const LANES: usize = 8;
 pub struct Resampler {
     columns: Taps,
     rows: Taps,
-    /// A row of the result in all columns of the source that matter.
-    tall: Vec<f32>,
-    /// The same of several rows, side by side for each column.
+    /// Some rows of the result in all columns of the source that matter.
+    tall: [Vec<f32>; LANES],
+    /// The same, side by side for each column.
     beside: Vec<[f32; LANES]>,
     /// Samples of these rows, side by side for each column of the result.
     across: Vec<[f32; LANES]>,
@@ -56,13 +69,15 @@ impl Resampler {
     /// `width` by `height` samples of an image, `step` of its pixels apart, the
     /// first one centred half a step right of and below `origin` (pixel edges).
     /// Each is a triangular mean as wide as the step, so that small sizes do not
-    /// alias; outside the image its border goes on.
+    /// alias; outside the image its border goes on. Samples that are not in `spans` stay
+    /// what they are.
     pub fn fill(
         &mut self,
         image: &GreyImage,
         origin: (f64, f64),
         step: f64,
         (width, height): (usize, usize),
+        spans: &Spans,
         out: &mut Vec<f32>,
     ) {
         out.resize(width * height, 0.0);
@@ -72,21 +87,33 @@ impl Resampler {
         }
         self.columns.fill(origin.0, step, width);
         self.rows.fill(origin.1, step, height);
-        let first = self.columns.each().map(|(start, _)| start).min().unwrap_or(0);
-        let ends = self.columns.each().map(|(start, weights)| start + weights.len() as i64);
-        let end = ends.max().unwrap_or(0).max(first + 1);
-        self.beside.resize((end - first) as usize, [0.0; LANES]);
-        let Self { columns, rows, tall, beside, across } = self;
-        let mut rows = rows.each();
-        for lines in out.chunks_mut(width * LANES) {
-            for (lane, (start, weights)) in rows.by_ref().take(LANES).enumerate() {
-                add_rows(image, (start, weights), first..end, tall);
-                beside.iter_mut().zip(&*tall).for_each(|(lanes, value)| lanes[lane] = *value);
+        for (index, lines) in out.chunks_mut(width * LANES).enumerate() {
+            let (span, rows) =
+                (spans.pixels(index), LANES * index..height.min(LANES * (index + 1)));
+            if !span.is_empty() {
+                self.fill_rows(image, span, rows, lines);
             }
-            blend_columns(columns, first, beside, across);
-            for (lane, line) in lines.chunks_exact_mut(width).enumerate() {
-                line.iter_mut().zip(&*across).for_each(|(sample, lanes)| *sample = lanes[lane]);
-            }
+        }
+    }
+
+    /// Some samples of a few rows.
+    fn fill_rows(
+        &mut self,
+        image: &GreyImage,
+        span: Range<usize>,
+        rows: Range<usize>,
+        lines: &mut [f32],
+    ) {
+        let Self { columns, rows: all_rows, tall, beside, across } = self;
+        let (sources, width) = (columns.sources(span.clone()), lines.len() / rows.len());
+        for (tall, row) in tall.iter_mut().zip(all_rows.of(rows)) {
+            add_rows(image, row, sources.clone(), tall);
+        }
+        lay_beside(tall.each_ref().map(Vec::as_slice), beside);
+        blend_columns(columns.of(span.clone()), sources.start, beside, across);
+        for (lane, line) in lines.chunks_exact_mut(width).enumerate() {
+            let samples = line[span.clone()].iter_mut();
+            samples.zip(&*across).for_each(|(sample, lanes)| *sample = lanes[lane]);
         }
     }
 }
@@ -116,16 +143,28 @@ fn add_rows(
     out[middle.end..].fill(right);
 }
 
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn lay_beside(rows: [&[f32]; LANES], beside: &mut Vec<[f32; LANES]>) {
+    let length = rows[0].len();
+    beside.resize(length, [0.0; LANES]);
+    let rows = rows.map(|row| if row.len() < length { rows[0] } else { &row[..length] });
+    for (x, beside) in beside.iter_mut().enumerate() {
+        for lane in 0..LANES {
+            beside[lane] = rows[lane][x];
+        }
+    }
+}
+
 /// Samples of several rows from the values of their columns.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
-fn blend_columns(
-    columns: &Taps,
+fn blend_columns<'a>(
+    columns: impl Iterator<Item = (i64, &'a [f32])>,
     first: i64,
     values: &[[f32; LANES]],
     samples: &mut Vec<[f32; LANES]>,
 ) {
     samples.clear();
-    for (start, weights) in columns.each() {
+    for (start, weights) in columns {
         let mut sums = [0.0_f32; LANES];
         for (values, weight) in values[(start - first) as usize..].iter().zip(weights) {
             for lane in 0..LANES {
@@ -141,15 +180,11 @@ fn add_scaled(to: &mut [f32], from: &[u8], scale: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * f32::from(*from));
 }
 
-/// As `Resampler::fill`, once.
-pub fn resampled(
-    image: &GreyImage,
-    origin: (f64, f64),
-    step: f64,
-    width: usize,
-    height: usize,
-) -> Vec<f32> {
-    let mut out = Vec::new();
-    Resampler::default().fill(image, origin, step, (width, height), &mut out);
+/// As `Resampler::fill`, once: `cells` by `cells` cells of 8 samples, and a sample more on
+/// each side.
+pub fn resampled(image: &GreyImage, origin: (f64, f64), step: f64, cells: usize) -> Vec<f32> {
+    let (side, mut out) = (cells * CELL + 2, Vec::new());
+    let spans = Spans::whole(side, side);
+    Resampler::default().fill(image, origin, step, (side, side), &spans, &mut out);
     out
 }

@@ -1,6 +1,6 @@
 //! Windows over an image in many sizes.
 
-use std::ops::RangeInclusive;
+use std::ops::Range;
 
 use tagalong_core::{GreyImage, Rect};
 use tagalong_vision::islands;
@@ -9,6 +9,7 @@ use crate::hog::CELL;
 use crate::judge::Judge;
 use crate::model::{Field, Kind, Model, SIDE};
 use crate::resample::{Resampler, resampled};
+use crate::spans::Spans;
 
 /// Side of a window, pixels of the resampled image.
 pub(crate) const WINDOW_PX: usize = (SIDE + 1) * CELL;
@@ -53,17 +54,20 @@ pub struct Scanner {
     resampler: Resampler,
     pixels: Vec<f32>,
     wanted: Vec<Wanted>,
+    spans: Spans,
     sums: Vec<f32>,
     looked_at: u64,
 }
 
-/// A window that is worth a look: the cell at which it begins, and the depth of what
-/// it shows.
-#[derive(Clone, Copy, Debug)]
-struct Wanted {
-    x: i64,
-    y: i64,
-    depth_m: Option<f64>,
+/// A window that is worth a look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted {
+    /// Column of the cell at which it begins, of 8 pixels of the resampled image ...
+    pub x: i64,
+    /// ... and the row. A window may begin outside of the image.
+    pub y: i64,
+    /// Depth of what its square shows, m, where that is known.
+    pub depth_m: Option<f64>,
 }
 
 impl Scanner {
@@ -75,6 +79,7 @@ impl Scanner {
             resampler: Resampler::default(),
             pixels: Vec::new(),
             wanted: Vec::new(),
+            spans: Spans::default(),
             sums: Vec::new(),
             looked_at: 0,
         }
@@ -86,63 +91,53 @@ impl Scanner {
     }
 
     /// Adds all windows whose upper-body square has one of `sides`, pixels, and that
-    /// `propose` allows; it is given the square and says the depth of what it
-    /// shows, if there is one to say. Windows below `least` are left out.
+    /// `propose` adds to those of their size that are wanted, row by row. Windows below
+    /// `least` are left out.
     pub fn scan(
         &mut self,
         image: &GreyImage,
         sides: impl Iterator<Item = f64>,
         least: f32,
-        mut propose: impl FnMut(&Rect) -> Option<Option<f64>>,
+        mut propose: impl FnMut(&Grid, &mut Vec<Wanted>),
         found: &mut Vec<Window>,
     ) {
+        let mut wanted = std::mem::take(&mut self.wanted);
+        // Islands that are this far apart share no pixels.
+        let gap = (SIDE + 1 + 2 * around(self.kind)) as i64;
         for side in sides {
-            let size = Size { side, step: side / (FILLED * WINDOW_PX as f64) };
-            self.ask(image, &size, &mut propose);
-            self.looked_at += self.wanted.len() as u64;
-            let mut wanted = std::mem::take(&mut self.wanted);
-            // Islands that are this far apart share no pixels.
-            let gap = (SIDE + 1 + 2 * around(self.kind)) as i64;
+            let grid = Grid::new((image.width(), image.height()), side);
+            wanted.clear();
+            propose(&grid, &mut wanted);
+            self.looked_at += wanted.len() as u64;
             islands(&mut wanted, |w| [w.x, w.y], gap, &mut |island| {
                 let bounds = bounds(island);
-                self.fill(image, size.step, bounds);
-                self.judge(island, &size, bounds, least, found);
+                self.fill(image, grid.step, island, bounds);
+                self.judge(island, &grid, bounds, least, found);
             });
-            self.wanted = wanted;
         }
+        self.wanted = wanted;
     }
 
-    /// Notes which windows of a size are wanted, row by row.
-    fn ask(
-        &mut self,
-        image: &GreyImage,
-        size: &Size,
-        propose: &mut impl FnMut(&Rect) -> Option<Option<f64>>,
-    ) {
-        let (left_px, above_px) = margins();
-        let columns = inside(image.width() as f64 / size.step, left_px);
-        self.wanted.clear();
-        for y in inside(image.height() as f64 / size.step, above_px) {
-            let of = |x| Some(Wanted { x, y, depth_m: propose(&size.square(x, y))? });
-            self.wanted.extend(columns.clone().filter_map(of));
-        }
-    }
-
-    /// Makes what the machine looks at, for windows within bounds.
-    fn fill(&mut self, image: &GreyImage, step: f64, [left, top, right, bottom]: Bounds) {
-        let around_px = around_px(self.kind);
-        let long = |from: i64, to: i64| ((to - from) as usize + SIDE + 1) * CELL + 2 * around_px;
+    /// Makes what the machine looks at, for wanted windows within bounds.
+    fn fill(&mut self, image: &GreyImage, step: f64, wanted: &[Wanted], bounds: Bounds) {
+        let (around, around_px) = (around(self.kind), around_px(self.kind));
+        let side = SIDE + 1 + 2 * around;
+        let [left, top, right, bottom] = bounds;
+        let [across, down] = [right - left, bottom - top].map(|long| long as usize + side);
+        let places = wanted.iter().map(|w| ((w.x - left) as usize, (w.y - top) as usize));
+        self.spans.fill(places, side, down);
         let start = |cell: i64| ((cell * CELL as i64) as f64 - around_px as f64) * step;
-        let (origin, size) = ((start(left), start(top)), (long(left, right), long(top, bottom)));
-        self.resampler.fill(image, origin, step, size, &mut self.pixels);
-        self.judge.fill(&self.pixels, size.0);
+        let (origin, size) = ((start(left), start(top)), [across, down].map(|n| n * CELL + 2));
+        let (size, spans) = ((size[0], size[1]), &self.spans);
+        self.resampler.fill(image, origin, step, size, spans, &mut self.pixels);
+        self.judge.fill(&self.pixels, size.0, spans);
     }
 
     /// Adds the wanted windows that reach `least`; neighbours are judged together.
     fn judge(
         &mut self,
         wanted: &[Wanted],
-        size: &Size,
+        grid: &Grid,
         [left, top, ..]: Bounds,
         least: f32,
         found: &mut Vec<Window>,
@@ -154,7 +149,7 @@ impl Scanner {
             self.judge.sums((at(run[0].x, left), at(run[0].y, top)), &mut self.sums);
             let good = run.iter().zip(&self.sums).filter(|(_, sum)| **sum >= least);
             found.extend(good.map(|(window, sum)| Window {
-                region: size.square(window.x, window.y),
+                region: grid.square(window.x, window.y),
                 depth_m: window.depth_m,
                 sum: *sum,
             }));
@@ -162,20 +157,44 @@ impl Scanner {
     }
 }
 
-/// Windows of one size: the side of their square, and that of a pixel of the
-/// resampled image, pixels.
-#[derive(Clone, Copy, Debug)]
-struct Size {
-    side: f64,
+/// All windows of one size.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// The side of their squares, pixels of the image.
+    pub side: f64,
+    /// The cells at which they begin.
+    pub columns: Range<i64>,
+    /// See `columns`.
+    pub rows: Range<i64>,
+    /// A pixel of the resampled image, pixels.
     step: f64,
 }
 
-impl Size {
-    /// The square of the window that begins at a cell.
-    fn square(&self, x: i64, y: i64) -> Rect {
+impl Grid {
+    /// For an image of some width and height.
+    pub(crate) fn new((width, height): (usize, usize), side: f64) -> Self {
+        let step = side / (FILLED * WINDOW_PX as f64);
+        let (left_px, above_px) = margins();
+        let columns = inside(width as f64 / step, left_px);
+        let rows = inside(height as f64 / step, above_px);
+        Self { side, columns, rows, step }
+    }
+
+    /// The upper-body square of the window that begins at a cell.
+    pub fn square(&self, x: i64, y: i64) -> Rect {
         let (left_px, above_px) = margins();
         let at = |cell: i64, margin: f64| ((cell * CELL as i64) as f64 + margin) * self.step;
         Rect::new(at(x, left_px), at(y, above_px), self.side, self.side)
+    }
+
+    /// Every window that `ask` allows, row by row; it is given the square and says the
+    /// depth of what that shows, if there is one to say.
+    pub fn windows(
+        &self,
+        mut ask: impl FnMut(&Rect) -> Option<Option<f64>>,
+    ) -> impl Iterator<Item = Wanted> {
+        let cells = self.rows.clone().flat_map(|y| self.columns.clone().map(move |x| (x, y)));
+        cells.filter_map(move |(x, y)| Some(Wanted { x, y, depth_m: ask(&self.square(x, y))? }))
     }
 }
 
@@ -187,10 +206,10 @@ fn margins() -> (f64, f64) {
 
 /// The first cells of the windows whose square lies in an image of `length`
 /// pixels; the rest of a window may hang over, where the border goes on.
-fn inside(length: f64, margin: f64) -> RangeInclusive<i64> {
+fn inside(length: f64, margin: f64) -> Range<i64> {
     let cell = CELL as f64;
     let last = (length - margin - FILLED * WINDOW_PX as f64) / cell;
-    (-margin / cell).ceil() as i64..=last.floor() as i64
+    (-margin / cell).ceil() as i64..last.floor() as i64 + 1
 }
 
 /// The window of an upper-body square, pixels of the image.
@@ -216,10 +235,10 @@ fn bounds(wanted: &[Wanted]) -> Bounds {
 pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> {
     let step = square.width.max(1.0) / (FILLED * WINDOW_PX as f64);
     let (window, margin) = (window_of(square), around_px(kind) as f64 * step);
-    let (origin, side) = ((window.x - margin, window.y - margin), WINDOW_PX + 2 * around_px(kind));
-    let pixels = resampled(image, origin, step, side, side);
+    let (origin, cells) = ((window.x - margin, window.y - margin), SIDE + 1 + 2 * around(kind));
+    let (pixels, width) = (resampled(image, origin, step, cells), cells * CELL + 2);
     let mut field = Field::new(kind);
-    field.fill(&pixels, side);
+    field.fill(&pixels, width, &Spans::whole(width, width));
     field.numbers(around(kind), around(kind))
 }
 

@@ -7,8 +7,8 @@ use crate::model::SIDE;
 pub(crate) const CELLS: usize = 2 * (SIDE + 1);
 /// Numbers of a window.
 pub(crate) const CHANNEL_NUMBERS: usize = CELLS * CELLS * DEPTH;
-/// A window is given up after this many trees at the earliest.
-pub(crate) const PATIENCE: usize = 32;
+/// Trees after which windows may be given up, and again after as many.
+pub const ROUND: usize = 8;
 /// Bytes of a tree in a file.
 const BYTES: usize = 3 * 6 + 4 * 4;
 
@@ -49,39 +49,38 @@ impl Tree {
     }
 }
 
-/// Trees one after the other; a window whose sum falls below `hopeless` is given up.
+/// Trees in rounds, one after the other; after each round, windows are given up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trees {
-    /// The trees.
+    /// The trees, [`ROUND`] to a round.
     pub trees: Vec<Tree>,
-    /// The least sum on the way.
-    pub hopeless: f32,
+    /// For each round: a window whose sum is less after it is given up. A person may
+    /// have to catch up early, and not late.
+    pub least: Vec<f32>,
 }
 
 impl Trees {
-    /// The sum of a window's numbers, or that at which the window was given up.
-    pub fn sum_of(&self, numbers: &[f32]) -> f32 {
-        let mut sum = 0.0;
-        for (count, tree) in self.trees.iter().enumerate() {
-            sum += tree.value(numbers);
-            if sum < self.hopeless && count >= PATIENCE {
-                break;
-            }
-        }
-        sum
+    /// Trees that give up all windows below the same sum.
+    pub fn new(trees: Vec<Tree>, least: f32) -> Self {
+        let rounds = trees.len().div_ceil(ROUND);
+        Self { trees, least: vec![least; rounds] }
     }
 
-    /// The least sum on the way to the end, once windows may be given up.
-    #[cfg(feature = "train")]
-    pub(crate) fn least_on_the_way(&self, numbers: &[f32]) -> f32 {
-        let (mut sum, mut least) = (0.0, f32::MAX);
-        for (count, tree) in self.trees.iter().enumerate() {
-            sum += tree.value(numbers);
-            if count >= PATIENCE {
-                least = least.min(sum);
-            }
+    /// The sum of a window's numbers; minus infinity if the window is given up.
+    pub fn sum_of(&self, numbers: &[f32]) -> f32 {
+        let mut last = 0.0;
+        for (sum, least) in self.on_the_way(numbers).zip(&self.least) {
+            last = if sum < *least { return f32::NEG_INFINITY } else { sum };
         }
-        least
+        last
+    }
+
+    /// The sum after each round, whether the window is given up or not.
+    pub(crate) fn on_the_way(&self, numbers: &[f32]) -> impl Iterator<Item = f32> {
+        self.trees.chunks(ROUND).scan(0.0, |sum, round| {
+            round.iter().for_each(|tree| *sum += tree.value(numbers));
+            Some(*sum)
+        })
     }
 }
 
@@ -93,7 +92,7 @@ pub(crate) fn to_bytes(trees: &[Tree]) -> Vec<u8> {
 ///
 /// # Errors
 /// In a sentence, what is wrong with the bytes.
-pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Vec<Tree>, String> {
+pub(crate) fn from_bytes(bytes: &[u8], least: Vec<f32>) -> Result<Trees, String> {
     let trees: Vec<Tree> = bytes.chunks_exact(BYTES).map(Tree::from_bytes).collect();
     let is_right = |tree: &Tree| {
         let known = tree.numbers.iter().all(|n| usize::from(*n) < CHANNEL_NUMBERS);
@@ -102,5 +101,8 @@ pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Vec<Tree>, String> {
     if trees.is_empty() || !bytes.len().is_multiple_of(BYTES) || !trees.iter().all(is_right) {
         return Err("its trees are broken".into());
     }
-    Ok(trees)
+    if least.len() != trees.len().div_ceil(ROUND) {
+        return Err(format!("it has {} levels for {} trees", least.len(), trees.len()));
+    }
+    Ok(Trees { trees, least })
 }

@@ -13,10 +13,14 @@ use std::sync::Arc;
 use boosted::boosted;
 use svm::{Windows, separate};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
-use tagalong_learn::{Line, Use, accepted, area, mirrored, mix, platt, shifted, use_of};
+use tagalong_learn::{
+    CALIBRATION, Line, Use, accepted, area, mirrored, mix, platt, shifted, use_of,
+};
 
 use crate::scan::FILLED;
-use crate::{Kind, Machine, Model, Scanner, Training, Trees, merge, window_numbers, window_of};
+use crate::{
+    Grid, Kind, Machine, Model, Scanner, Training, Trees, Wanted, merge, window_numbers, window_of,
+};
 
 /// Sizes at which pictures without anybody are searched, pixels of the
 /// upper-body square, and the factor between them.
@@ -27,10 +31,10 @@ const MINED_OVERLAP: f64 = 0.5;
 /// Windows with lower sums are no near misses: they are neither mined nor matter
 /// for the calibration. A linear machine wants people above 1; sums of trees spread
 /// more.
-const NEAR_MISS: [f32; 2] = [-1.0, -6.0];
+const NEAR_MISS: [f32; 2] = [-1.0, -10.0];
 /// While others are mined, trees give a window up below this.
-const HOPELESS: f32 = -8.0;
-/// In use, they may give up this part of the people that they were not grown with.
+const HOPELESS: f32 = -14.0;
+/// In use, they may give up this part of the people who would be found.
 const GIVEN_UP: f64 = 0.01;
 /// Small shifts of a person, as fractions of the square, and its growth.
 const SHIFTS: [(f64, f64, f64); 4] =
@@ -131,7 +135,7 @@ impl HogTrainer {
             Kind::Trees => {
                 let count = (trees >> (2 * rounds_left).min(31)).max(16);
                 let trees = boosted(&self.windows, count, numbers, self.seed);
-                Machine::Trees(Trees { trees, hopeless: HOPELESS })
+                Machine::Trees(Trees::new(trees, HOPELESS))
             }
         };
         Model { machine, slope: 1.0, offset: 0.0 }
@@ -164,7 +168,7 @@ impl HogTrainer {
     fn apart(&self, model: &Model, wanted: Use, merged: bool) -> (Vec<(f64, bool)>, u64) {
         let people = self.people.iter().filter(|(use_, _)| *use_ == wanted);
         let mut sums: Vec<(f64, bool)> =
-            people.map(|(_, numbers)| (f64::from(model.sum_of(numbers)), true)).collect();
+            people.map(|(_, numbers)| (sum_of(model, numbers, self.near_miss()), true)).collect();
         let mut scanner = Scanner::new(model);
         for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
             let mut windows = search(&mut scanner, picture, self.near_miss());
@@ -204,14 +208,19 @@ impl HogTrainer {
         NEAR_MISS[usize::from(self.kind == Kind::Trees)]
     }
 
-    /// Lets trees give windows up, as early as people allow who are kept apart.
+    /// Lets trees give windows up as early as people allow who are kept apart and would be
+    /// found (after C. Zhang and P. Viola, *Multiple-instance pruning for learning efficient
+    /// cascade detectors*, NIPS 2007).
     fn hurry(&self, model: &mut Model) {
+        let near_miss = self.near_miss();
         let Machine::Trees(trees) = &mut model.machine else { return };
         let apart = self.people.iter().filter(|(use_, _)| *use_ == Use::Calibration);
-        let mut least: Vec<f32> = apart.map(|(_, n)| trees.least_on_the_way(n)).collect();
-        least.sort_by(f32::total_cmp);
-        let given_up = (GIVEN_UP * least.len() as f64) as usize;
-        trees.hopeless = least.get(given_up).copied().unwrap_or(HOPELESS).min(0.0);
+        let ways = apart.map(|(_, numbers)| trees.on_the_way(numbers).collect());
+        let found = |way: &Vec<f32>| way.last().is_some_and(|last| *last >= near_miss);
+        let ways: Vec<Vec<f32>> = ways.filter(found).collect();
+        if !ways.is_empty() {
+            trees.least = least_on_the_way(&ways);
+        }
     }
 
     fn count(&self, people: bool) -> usize {
@@ -222,7 +231,7 @@ impl HogTrainer {
 impl Trainer for HogTrainer {
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
         let grey = frame.grey()?;
-        let use_ = use_of(example.group);
+        let use_ = use_of(example.group, &[CALIBRATION]);
         if example.is_person {
             self.add_person(grey, &candidate.region, use_);
             return Ok(());
@@ -262,7 +271,8 @@ fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::
     let most = picture.width().min(picture.height()) as f64;
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
     let (sides, mut found) = (sides.take_while(|side| *side <= most), Vec::new());
-    scanner.scan(picture, sides, least, |_| Some(None), &mut found);
+    let all = |grid: &Grid, wanted: &mut Vec<Wanted>| wanted.extend(grid.windows(|_| Some(None)));
+    scanner.scan(picture, sides, least, all, &mut found);
     found
 }
 
@@ -278,6 +288,44 @@ fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f
     missed as f64 / people.len().max(1) as f64
 }
 
+/// What nobody's sums are below who is like those whose sums after each round are known:
+/// the least of theirs, less what somebody may be behind all others. At most 0.
+fn least_on_the_way(ways: &[Vec<f32>]) -> Vec<f32> {
+    let rounds = ways.first().map_or(0, Vec::len);
+    let mut least_two = vec![[0.0_f32; 2]; rounds];
+    for way in ways {
+        for ([least, next], sum) in least_two.iter_mut().zip(way) {
+            (*least, *next) = (least.min(*sum), next.min(sum.max(*least)));
+        }
+    }
+    let behind = |way: &Vec<f32>| {
+        let behind = way.iter().zip(&least_two).map(|(sum, [_, next])| next - sum);
+        behind.fold(0.0, f32::max)
+    };
+    let mut behind: Vec<f32> = ways.iter().map(behind).collect();
+    behind.sort_by(|a, b| b.total_cmp(a));
+    let margin = behind.get((GIVEN_UP * behind.len() as f64) as usize).copied().unwrap_or(0.0);
+    least_two.iter().map(|[least, _]| least - margin).collect()
+}
+
+/// The sum of somebody's window, who is as good as missed if it is less than `least`.
+fn sum_of(model: &Model, numbers: &[f32], least: f32) -> f64 {
+    f64::from(model.sum_of(numbers).max(least))
+}
+
 fn rounded(value: f64) -> toml::Value {
     toml::Value::Float((value * 1e4).round() / 1e4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_is_found_may_be_as_far_behind_as_one_was_behind_the_others() {
+        let ways = [vec![-1.0, 2.0, 5.0], vec![-3.0, -4.0, 9.0], vec![0.5, -2.0, 1.0]];
+        // The second is 2 behind the next one after two rounds, and nobody farther.
+        assert_eq!(least_on_the_way(&ways), [-5.0, -6.0, -2.0]);
+        assert!(least_on_the_way(&[]).is_empty());
+    }
 }

@@ -1,0 +1,184 @@
+//! What a depth image shows in the middle of all windows of a size.
+//!
+//! Windows lie a quarter of their square apart, and what one shows is read in five by
+//! five places that are an eighth of it apart. So neighbours share places: all
+//! windows together ask on one lattice, each place once, and whether the median of a
+//! window's readings lies within a range is told by counts of those before and behind it.
+
+use std::ops::{Range, RangeInclusive};
+
+use tagalong_core::DepthImage;
+
+use crate::Grid;
+
+/// Places along a side of a window.
+const TAPS: usize = 5;
+/// Places from a window to the next one.
+const STRIDE: usize = 2;
+/// Places to a side of the square; the first one is so many from its edge.
+const PLACES: f64 = 8.0;
+const EDGE: f64 = 2.0;
+/// Readings that a window needs to show anything.
+const LEAST_READINGS: u32 = 8;
+
+/// Counts of readings side by side in one number: all, those before a range, those behind.
+type Counts = u32;
+const BITS: u32 = 8;
+
+/// Readings of all windows of a size; keeps its memory from one size to the next.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lattice {
+    /// The image's column of each column of places.
+    columns: Vec<usize>,
+    /// Row by row; NaN outside of the image.
+    readings: Vec<f32>,
+    counts: Vec<Counts>,
+    /// Scratch: counts of a row of windows, and of others between them.
+    sums: Vec<Counts>,
+    /// Of each window, row by row: does what it shows lie within the range?
+    is_within: Vec<bool>,
+    /// Windows in a row.
+    across: usize,
+}
+
+impl Lattice {
+    /// Reads what the windows of a grid show, and asks whether it is within a range, m.
+    pub(crate) fn fill(&mut self, depth: &DepthImage, grid: &Grid, range_m: RangeInclusive<f64>) {
+        let [across, down] = [&grid.columns, &grid.rows].map(|cells| cells.clone().count());
+        let first = grid.square(grid.columns.start, grid.rows.start);
+        self.read(depth, places(first.x, first.width, across), places(first.y, first.width, down));
+        let (least, most) = (*range_m.start() as f32, *range_m.end() as f32);
+        count(&self.readings, least, most, &mut self.counts);
+        self.across = across;
+        self.is_within.clear();
+        for y in 0..down {
+            let rows = self.window_rows(y).map(|row| &self.counts[row]);
+            add_places(rows, &mut self.sums);
+            self.is_within.extend(self.sums.iter().step_by(STRIDE).copied().map(is_middle_within));
+        }
+    }
+
+    fn read(
+        &mut self,
+        depth: &DepthImage,
+        columns: impl Iterator<Item = usize>,
+        rows: impl Iterator<Item = usize>,
+    ) {
+        self.columns.clear();
+        self.columns.extend(columns);
+        self.readings.clear();
+        for y in rows {
+            let row = if y < depth.height() { depth.row(y) } else { &[] };
+            let reading = |x: &usize| row.get(*x).copied().unwrap_or(f32::NAN);
+            self.readings.extend(self.columns.iter().map(reading));
+        }
+    }
+
+    /// The depth of what a window shows, m: the median of its readings, if that is within
+    /// the range. Windows are counted row by row.
+    pub(crate) fn surface_m(&self, window: usize) -> Option<f64> {
+        self.is_within.get(window).filter(|is_within| **is_within)?;
+        let (x, y) = (window % self.across, window / self.across);
+        let mut readings = [f32::NAN; TAPS * TAPS];
+        for (readings, row) in readings.chunks_exact_mut(TAPS).zip(self.window_rows(y)) {
+            readings.copy_from_slice(&self.readings[row][STRIDE * x..][..TAPS]);
+        }
+        Some(f64::from(median(readings)))
+    }
+
+    /// Where the rows of places lie that row `y` of windows shows.
+    fn window_rows(&self, y: usize) -> [Range<usize>; TAPS] {
+        let width = self.columns.len();
+        std::array::from_fn(|row| {
+            let row = STRIDE * y + row;
+            row * width..(row + 1) * width
+        })
+    }
+}
+
+/// Columns or rows of the image in which `windows` are read, the first of which begins at
+/// `from`; what is negative becomes larger than any image.
+fn places(from: f64, side: f64, windows: usize) -> impl Iterator<Item = usize> {
+    let count = if windows == 0 { 0 } else { STRIDE * (windows - 1) + TAPS };
+    (0..count).map(move |k| (from + side * (EDGE + k as f64) / PLACES).floor() as i64 as usize)
+}
+
+#[inline(always)]
+fn is_reading(metres: f32) -> bool {
+    (metres > 0.0) & (metres < f32::INFINITY)
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn count(readings: &[f32], least: f32, most: f32, counts: &mut Vec<Counts>) {
+    counts.resize(readings.len(), 0);
+    for (count, metres) in counts.iter_mut().zip(readings) {
+        let (before, behind) = (*metres < least, *metres > most);
+        let one = 1 | Counts::from(before) << BITS | Counts::from(behind) << (2 * BITS);
+        *count = if is_reading(*metres) { one } else { 0 };
+    }
+}
+
+/// The counts of five by five places, for each place that begins them.
+#[multiversion::multiversion(targets("x86_64+avx2"))]
+fn add_places(rows: [&[Counts]; TAPS], sums: &mut Vec<Counts>) {
+    let [a, b, c, d, e] = rows;
+    sums.resize(a.len(), 0);
+    for (i, sum) in sums.iter_mut().enumerate() {
+        *sum = a[i] + b[i] + c[i] + d[i] + e[i];
+    }
+    for i in 0..(sums.len() + 1).saturating_sub(TAPS) {
+        sums[i] = sums[i] + sums[i + 1] + sums[i + 2] + sums[i + 3] + sums[i + 4];
+    }
+    sums.truncate((sums.len() + 1).saturating_sub(TAPS));
+}
+
+/// The median of those that are readings (of an even number the farther one). Their bits
+/// are in the order of the numbers.
+fn median(readings: [f32; TAPS * TAPS]) -> f32 {
+    let key = |metres: f32| if is_reading(metres) { metres.to_bits() } else { u32::MAX };
+    let mut keys = readings.map(key);
+    keys.sort_unstable();
+    f32::from_bits(keys[keys.partition_point(|key| *key < u32::MAX) / 2])
+}
+
+/// Whether there are readings enough, and the median (of an even number the farther one)
+/// is neither before the range nor behind it.
+fn is_middle_within(counts: Counts) -> bool {
+    let of = |kind: u32| counts >> (kind * BITS) & ((1 << BITS) - 1);
+    let [all, before, behind] = [0, 1, 2].map(of);
+    let middle = all / 2;
+    all >= LEAST_READINGS && before <= middle && behind < all - middle
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn windows_on_a_lattice_show_what_each_alone_shows(
+            side in 4.01..20.0f64, width in 3..60usize, height in 3..40usize,
+            holes in 2..9usize, near in 0.0..4.0f32, long in 0.0..3.0f32,
+        ) {
+            let depth = DepthImage::from_fn(width, height, |x, y| match (x * 7 + y * 13) % holes {
+                0 => f32::NAN,
+                1 => 0.0,
+                _ => ((x * 31 + y * 17) % 50) as f32 * 0.1,
+            });
+            let range = f64::from(near)..=f64::from(near + long);
+            let (grid, mut lattice) = (Grid::new((width + 2, height + 2), side), Lattice::default());
+            lattice.fill(&depth, &grid, range.clone());
+            let mut found = Vec::new();
+            let slow: Vec<Option<f64>> = grid
+                .windows(|square| {
+                    found.push(lattice.surface_m(found.len()));
+                    Some(depth.surface_m(square).filter(|m| range.contains(m)))
+                })
+                .map(|window| window.depth_m)
+                .collect();
+            prop_assert_eq!(found, slow);
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! What of an island is needed: windows seldom fill the rectangle around them.
+
+use std::ops::Range;
+
+use crate::hog::CELL;
+
+/// For each row of cells, of 8 pixels, of a resampled part of an image: the columns of
+/// cells that are needed. The part has one pixel more on each side, for gradients.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Spans(Vec<Range<usize>>);
+
+impl Spans {
+    /// All that `width` by `height` pixels have.
+    pub fn whole(width: usize, height: usize) -> Self {
+        let [across, down] = [width, height].map(|length| length.saturating_sub(2) / CELL);
+        Self(vec![0..across; down])
+    }
+
+    /// Takes the place of others: those of squares of `side` cells that begin at `places`,
+    /// in `rows` rows.
+    pub(crate) fn fill(
+        &mut self,
+        places: impl Iterator<Item = (usize, usize)>,
+        side: usize,
+        rows: usize,
+    ) {
+        self.0.clear();
+        self.0.resize(rows, 0..0);
+        for (x, y) in places {
+            for span in &mut self.0[y..y + side] {
+                *span = union(span, &(x..x + side));
+            }
+        }
+    }
+
+    /// Columns of cells in each row of them.
+    pub(crate) fn cells(&self) -> &[Range<usize>] {
+        &self.0
+    }
+
+    /// Columns of pixels in the `index`th 8 rows of pixels: those of the cells there and
+    /// in the row above, and one more on each side.
+    pub(crate) fn pixels(&self, index: usize) -> Range<usize> {
+        let row = |index: usize| self.0.get(index).cloned().unwrap_or_default();
+        let above = index.checked_sub(1).map_or(0..0, row);
+        let cells = union(&above, &row(index));
+        if cells.is_empty() { 0..0 } else { cells.start * CELL..cells.end * CELL + 2 }
+    }
+}
+
+/// The least span that has both.
+fn union(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b.clone(),
+        (_, true) => a.clone(),
+        _ => a.start.min(b.start)..a.end.max(b.end),
+    }
+}
