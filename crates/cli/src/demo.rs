@@ -43,7 +43,7 @@ pub struct DemoArgs {
 pub fn demo(args: &DemoArgs, registry: &Registry) -> Outcome {
     let folder = &args.output;
     RunDir::check(folder, args.overwrite, Path::new("")).map_err(Failure::usage)?;
-    let signals = Signals::listen().map_err(Failure::failed)?;
+    let signals = Signals::listen()?;
     say("1/4 drawing four people around a moving robot");
     let log = draw(folder, args.seed)?;
     for ((name, config), step) in PIPELINES.iter().zip(2..) {

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
+use crate::outcome::Failure;
+
 /// Whether somebody wants the program to stop.
 ///
 /// The first SIGINT or SIGTERM only leaves a note, so that the current frame
@@ -16,7 +18,15 @@ pub struct Signals {
 
 impl Signals {
     /// Listens from now on.
-    pub fn listen() -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// A system that does not let us: exit code 1.
+    pub fn listen() -> Result<Self, Failure> {
+        Self::register()
+            .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))
+    }
+
+    fn register() -> io::Result<Self> {
         let signals = Self::default();
         let impatient = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {

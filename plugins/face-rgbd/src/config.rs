@@ -88,6 +88,8 @@ impl Default for Config {
 pub struct Training {
     /// Side of a window, pixels.
     pub side: usize,
+    /// Faces are shown as they are, and turned by this at most, rad.
+    pub tilt: f64,
     /// Stages at most.
     pub stages: usize,
     /// Part of the faces that every stage has to pass.
@@ -106,12 +108,16 @@ pub struct Training {
     /// Where fewer than this are to be found, a stage would know them by heart: it
     /// is done.
     pub fewest_others: usize,
+    /// Tenths of the pictures, 2 to 9, that calibrate and validate; 0 and 1 are held out,
+    /// and the others are trained with.
+    pub calibration: Vec<u64>,
 }
 
 impl Default for Training {
     fn default() -> Self {
         Self {
             side: 20,
+            tilt: 0.15,
             stages: 12,
             min_hit_rate: 0.995,
             max_false_alarm: 0.4,
@@ -120,6 +126,7 @@ impl Default for Training {
             features: 2500,
             others: 5000,
             fewest_others: 300,
+            calibration: vec![2],
         }
     }
 }
@@ -157,10 +164,12 @@ impl Training {
         let fine = is_part(self.min_hit_rate)
             && is_part(self.max_false_alarm)
             && (12..=64).contains(&self.side)
+            && (0.0..1.0).contains(&self.tilt)
             && counts.iter().all(|count| *count > 0)
-            && self.depth <= 4;
-        let why = "`training`: rates lie between 0 and 1, `side` between 12 and 64, `depth` is at \
-                   most 4, and counts are positive";
+            && self.depth <= 4
+            && self.calibration.iter().all(|tenth| (2..10).contains(tenth));
+        let why = "`training`: rates and `tilt` lie between 0 and 1, `side` between 12 and 64, `depth` is at \
+                   most 4, `calibration` has numbers from 2 to 9, and counts are positive";
         if fine { Ok(()) } else { Err(tagalong_core::Error::Settings(why.into())) }
     }
 }

@@ -49,8 +49,7 @@ type Group = Vec<Ready>;
 /// A plan of another program, a task that is not in it, a disk that fails.
 /// A pipeline that fails is no error: its result says so.
 pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally, Failure> {
-    let signals = Signals::listen()
-        .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))?;
+    let signals = Signals::listen()?;
     let asked = asked(args, store)?;
     let due = |task: &&Task| is_due(args, store, task);
     let pending: Vec<Task> = asked.iter().filter(due).cloned().collect();

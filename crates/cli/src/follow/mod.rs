@@ -119,8 +119,7 @@ struct Findings<'a> {
 /// Scenes and configs that cannot be used are exit code 2; plugins that fail and
 /// files that cannot be written are 1.
 pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
-    let signals = Signals::listen()
-        .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))?;
+    let signals = Signals::listen()?;
     let jobs = jobs(args, registry)?;
     if let Some(folder) = &args.output {
         make_folder(folder)?;

@@ -106,7 +106,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
         return converted(path, args.format);
     }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
-    let signals = Signals::listen().map_err(Failure::failed)?;
+    let signals = Signals::listen()?;
     spare(&log, args.overwrite)?;
     if !path.is_dir() {
         let message =

@@ -35,8 +35,7 @@ use crate::suggest::check_log_path;
 /// A config, log or output directory that cannot be used; a plugin that fails
 /// on a frame; a disk that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
-    let signals = Signals::listen()
-        .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))?;
+    let signals = Signals::listen()?;
     if args.log.is_none() {
         sample::write(args.log()).map_err(refused)?;
         say(&format!("no log given: two drawn people walk through {}", args.log().display()));

@@ -49,7 +49,8 @@ pub fn assemble(
 }
 
 /// The part of a sequence that a similarity can compare: reports without the
-/// place it looks at are left out; `None` if a truth lacks it.
+/// place it looks at are left out, and people who are not in the image where boxes are
+/// compared; `None` if the truth lacks places, or has no boxes at all.
 pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequence> {
     let has_truth = |truth: &Truth| match similarity {
         Similarity::Iou => truth.region.is_some(),
@@ -59,14 +60,17 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
         Similarity::Iou => report.region.is_some(),
         Similarity::Metres => report.floor_m.is_some(),
     };
+    let mut truths = sequence.frames.iter().flat_map(|frame| &frame.truths);
+    let is_comparable = match similarity {
+        Similarity::Iou => truths.clone().next().is_none() || truths.any(has_truth),
+        Similarity::Metres => truths.all(has_truth),
+    };
     let mut kept = sequence.clone();
     for frame in &mut kept.frames {
-        if !frame.truths.iter().all(has_truth) {
-            return None;
-        }
+        frame.truths.retain(has_truth);
         frame.reports.retain(has_report);
     }
-    Some(kept)
+    is_comparable.then_some(kept)
 }
 
 /// The comparison that the truth's protocol asks for.

@@ -81,7 +81,7 @@ pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
 }
 
 fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> Outcome {
-    let signals = Signals::listen().map_err(Failure::failed)?;
+    let signals = Signals::listen()?;
     let goes_on = || signals.received().is_none();
     let images = record(simulation, scene, log, &goes_on).map_err(Failure::failed)?;
     if let Some(signal) = signals.received() {

@@ -33,9 +33,8 @@ const MOST_BYTES: u64 = 200_000_000;
 /// # Errors
 /// Files that are not there or cannot be read, and those of `take`.
 pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
-    let faces = data.join("faces");
-    let mut count = fddb(&faces, share, take)?;
-    count += cbcl(&faces.join("cbcl-train.tar.gz"), share, take)?;
+    let mut count = fddb(data, share, take)?;
+    count += cbcl(&data.join("faces/cbcl-train.tar.gz"), share, take)?;
     let both = [photos(data, false), photos(data, true)];
     let empty = both.into_iter().flatten().filter(|photo| !photo.is_person());
     for photo in empty.filter(|photo| photo.group / 5 % share == 0) {
@@ -46,8 +45,11 @@ pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> 
 }
 
 /// The pictures of FDDB; its table says where the faces are.
-fn fddb(folder: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
-    let table = folder.join("fddb.csv");
+///
+/// # Errors
+/// As [`visit`].
+pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
+    let (table, folder) = (data.join("faces/fddb.csv"), data.join("faces/fddb"));
     let wrong = |why: String| Failure::failed(format!("{}: {why}", table.display()));
     let text = fs::read_to_string(&table).map_err(|error| wrong(error.to_string()))?;
     let mut lines = text.lines();
@@ -75,7 +77,7 @@ fn fddb(folder: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
         if !(group / 5).is_multiple_of(share) {
             continue;
         }
-        let frame = frame(read(&folder.join("fddb").join(file))?);
+        let frame = frame(read(&folder.join(file))?);
         let example = Example { is_person: true, group };
         of_picture.iter().try_for_each(|(_, window)| take(&frame, &candidate(*window), example))?;
         count += 1;

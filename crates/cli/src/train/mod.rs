@@ -9,6 +9,9 @@
 mod card;
 mod faces;
 mod held_out;
+mod in_use;
+#[cfg(test)]
+mod overlap;
 mod panorama;
 mod photos;
 mod rooms;
@@ -24,22 +27,18 @@ use tagalong_core::{
     ConfigError, Context, Detection, Example, Frame, Kind, Registry, Trainer, Verifier, Wheels,
 };
 use tagalong_pipeline::Pipeline;
-use tagalong_sim::Split;
+use tagalong_sim::{CameraKind, Split};
 use toml::Spanned;
 use toml::de::DeTable;
 
 use self::card::{Card, Harvest};
 use self::held_out::{Comparison, Effect, Tally};
+use self::in_use::InUse;
 use self::photos::{fingerprint, photos};
 use self::rooms::Look;
 use self::seen::{Label, Seen, in_log, in_scene, label};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::simulate::threads;
-
-/// Proposes candidates.
-const HARVEST: &str = include_str!("harvest.toml");
-/// What the verifier is tried in.
-const IN_USE: &str = include_str!("../../../../configs/depth-ekf.toml");
 
 /// A margin below this is unsure: log-odds.
 const UNSURE: f64 = 1.0;
@@ -94,7 +93,7 @@ impl Plan {
             Self { scenes: [6, 4], rounds: 1, test_scenes: 4, look, test_look }
         } else {
             let test_look = Look { rate_hz: 5.0, duration_s: 4.0 };
-            Self { scenes: [144, 72], rounds: 2, test_scenes: 36, look, test_look }
+            Self { scenes: [256, 64], rounds: 2, test_scenes: 36, look, test_look }
         }
     }
 
@@ -246,8 +245,9 @@ impl<'a> Session<'a> {
         for number in numbers {
             let scene =
                 rooms::scene(Split::Train, number, self.plan.look).map_err(Failure::failed)?;
-            let mut pipeline = pipeline(HARVEST, self.registry)?;
-            in_scene(&scene, threads(None), &mut |seen| {
+            let in_use = InUse::of(scene.camera.kind)?;
+            let mut pipeline = pipeline(&in_use.proposing()?, self.registry)?;
+            in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
                 propose(&mut pipeline, seen, |_| number, &mut show)
             })?;
             self.bar.inc(1);
@@ -255,8 +255,9 @@ impl<'a> Session<'a> {
         let Some(data) = &self.args.data else { return Ok(harvest) };
         self.tell(round, "reading logs and photographs");
         if round == 0 {
+            let proposing = InUse::of(CameraKind::Rgbd)?.proposing()?;
             for log in TRAIN_LOGS {
-                let mut pipeline = pipeline(HARVEST, self.registry)?;
+                let mut pipeline = pipeline(&proposing, self.registry)?;
                 let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
                 self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
             }
@@ -277,14 +278,10 @@ impl<'a> Session<'a> {
     }
 
     /// The pipeline in use, without and with the verifier.
-    fn comparison(&self) -> Result<Comparison, Failure> {
-        let mut section = toml::Table::new();
-        section.insert("plugin".into(), self.args.plugin.clone().into());
-        section.insert("config".into(), self.with_model()?.into());
-        let mut table = toml::Table::new();
-        table.insert("verifiers".into(), vec![toml::Value::Table(section)].into());
-        let with_verifier = format!("{IN_USE}\n{table}");
-        Comparison::new([HARVEST, IN_USE, &with_verifier], self.verifier()?, self.registry)
+    fn comparison(&self, in_use: &InUse) -> Result<Comparison, Failure> {
+        let verified = in_use.verified(&self.args.plugin, self.with_model()?);
+        let configs = [in_use.proposing()?, in_use.plain(), verified];
+        Comparison::new(configs.each_ref().map(String::as_str), self.verifier()?, self.registry)
     }
 
     fn try_rooms(&self) -> Result<Effect, Failure> {
@@ -295,9 +292,12 @@ impl<'a> Session<'a> {
         for number in 0..self.plan.test_scenes {
             let scene =
                 rooms::scene(Split::Test, number, self.plan.test_look).map_err(Failure::failed)?;
-            let mut comparison = self.comparison()?;
+            let in_use = InUse::of(scene.camera.kind)?;
+            let mut comparison = self.comparison(&in_use)?;
             tally.next_scene();
-            in_scene(&scene, threads(None), &mut |seen| comparison.step(seen, &mut tally))?;
+            in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
+                comparison.step(seen, &mut tally)
+            })?;
             self.bar.inc(1);
         }
         Ok(tally.effect())
@@ -307,7 +307,7 @@ impl<'a> Session<'a> {
         let Some(data) = &self.args.data else { return Ok(None) };
         let mut tally = Tally::default();
         for log in TEST_LOGS {
-            let mut comparison = self.comparison()?;
+            let mut comparison = self.comparison(&InUse::of(CameraKind::Rgbd)?)?;
             tally.next_scene();
             self.in_log(data, log, &mut |seen| comparison.step(seen, &mut tally))?;
         }

@@ -1,5 +1,6 @@
 //! Photographs without depth: crops of people, and pictures without anybody.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,7 +50,12 @@ pub fn photos(data: &Path, held_out: bool) -> Vec<Photo> {
     ];
     for (folder, kind) in folders {
         let files = pictures(&data.join(folder));
-        all.extend(files.into_iter().map(|path| Photo { group: stem_group(&path), path, kind }));
+        let groups = match kind {
+            Kind::Body => runs(&files),
+            _ => files.iter().map(|path| fingerprint(&photograph(path))).collect(),
+        };
+        let each = files.into_iter().zip(groups);
+        all.extend(each.map(|(path, group)| Photo { path, kind, group }));
     }
     all.extend(busts(&data.join("people/head-shoulder-50")));
     all.retain(|photo| (photo.group % 5 == 0) == held_out);
@@ -66,14 +72,36 @@ fn pictures(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Crops of one photograph have its name and a letter or a number behind it.
-fn stem_group(path: &Path) -> u64 {
+/// The photograph of a crop: crops have its name and a letter or a number behind it.
+fn photograph(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let base = match stem.rsplit_once('_') {
-        Some((base, number)) if number.parse::<u32>().is_ok() => base,
+    let name = match stem.rsplit_once('_') {
+        Some((name, number)) if number.parse::<u32>().is_ok() => name,
         _ => stem.trim_end_matches(|c: char| c.is_ascii_lowercase()),
     };
-    fingerprint(base)
+    name.to_owned()
+}
+
+/// Groups of crops: photographs with numbers one after the other were taken one after the
+/// other, and often show the same people.
+fn runs(crops: &[PathBuf]) -> Vec<u64> {
+    let numbered = |path: &PathBuf| {
+        let name = photograph(path);
+        let series = name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
+        let number = name[series.len()..].parse().unwrap_or(0_u64);
+        (series, number)
+    };
+    let taken: BTreeSet<(String, u64)> = crops.iter().map(numbered).collect();
+    let first = |crop: &PathBuf| {
+        let (series, number) = numbered(crop);
+        let before = |number: &u64| {
+            let before = number.checked_sub(1)?;
+            taken.contains(&(series.clone(), before)).then_some(before)
+        };
+        let first = std::iter::successors(Some(number), before).last();
+        fingerprint(&format!("{series}{}", first.unwrap_or(number)))
+    };
+    crops.iter().map(first).collect()
 }
 
 /// FNV-1a: a number for a name.
@@ -148,6 +176,12 @@ pub fn read(path: &Path) -> Result<GreyImage, Failure> {
 }
 
 impl Photo {
+    /// True if it shows a person from head to feet.
+    #[cfg(test)]
+    pub fn is_body(&self) -> bool {
+        self.kind == Kind::Body
+    }
+
     /// True if it shows a person.
     pub fn is_person(&self) -> bool {
         self.kind != Kind::Nobody
@@ -216,11 +250,18 @@ mod tests {
 
     #[test]
     fn crops_of_one_photograph_are_one_group() {
-        let group = |name: &str| stem_group(Path::new(name));
-        assert_eq!(group("crop001248a.png"), group("crop001248c.png"));
-        assert_eq!(group("125_8.jpg"), group("125_11.jpg"));
-        assert_ne!(group("125_8.jpg"), group("126_8.jpg"));
-        assert_ne!(group("crop001248a.png"), group("crop001249a.png"));
+        let name = |name: &str| photograph(Path::new(name));
+        assert_eq!(name("crop001248a.png"), name("crop001248c.png"));
+        assert_eq!(name("125_8.jpg"), name("125_11.jpg"));
+        assert_ne!(name("125_8.jpg"), name("126_8.jpg"));
+    }
+
+    #[test]
+    fn photographs_one_after_the_other_are_one_group() {
+        let names = ["crop001248a", "crop001248c", "crop001249a", "crop001251a", "person_249b"];
+        let groups = runs(&names.map(|name| PathBuf::from(name).with_extension("png")));
+        assert_eq!([groups[0]; 3], groups[..3]);
+        assert!(groups[3] != groups[0] && groups[4] != groups[0] && groups[4] != groups[3]);
     }
 
     #[test]

@@ -84,7 +84,7 @@ fn room(seed: u64, people: usize) -> Scene {
         camera: CameraSettings {
             width: 512,
             height: 384,
-            field_of_view_deg: chance.between(56.0, 75.0),
+            field_of_view_deg: chance.between(56.0, 100.0),
             baseline_m: 0.12,
             height_m: chance.between(0.9, 1.5),
             pitch_down_deg: chance.between(-3.0, 6.0),

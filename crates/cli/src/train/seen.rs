@@ -78,10 +78,15 @@ pub type See<'a> = &'a mut dyn FnMut(&Seen) -> Result<(), Failure>;
 /// Goes through a drawn scene. A stereo pair is matched, as a pipeline would.
 ///
 /// # Errors
-/// Those of `see`.
-pub fn in_scene(scene: &Scene, threads: usize, see: See<'_>) -> Result<(), Failure> {
+/// Settings that are none, and those of `see`.
+pub fn in_scene(
+    scene: &Scene,
+    threads: usize,
+    stereo: StereoSettings,
+    see: See<'_>,
+) -> Result<(), Failure> {
     let mut draw = Draw::new(scene, threads);
-    let mut stereo = StereoDepth::new(StereoSettings::default()).map_err(Failure::failed)?;
+    let mut stereo = StereoDepth::new(stereo).map_err(Failure::failed)?;
     while let Some(drawn) = draw.next_frame() {
         let people = drawn.truth.iter().map(known).collect();
         let frame = match drawn.frame.depth() {

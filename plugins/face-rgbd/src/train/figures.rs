@@ -92,21 +92,53 @@ pub(super) fn calibration(cascade: &Cascade, config: &Config, pictures: &[Pictur
     (slope.max(1e-3), offset)
 }
 
-/// The figures of the card.
+/// What a cascade finds in pictures for one purpose, with faces or without.
+fn found_in(
+    cascade: &Cascade,
+    config: &Config,
+    pictures: &[Picture],
+    use_: Use,
+    with_faces: bool,
+) -> Found {
+    search(cascade, config, pictures, |p| p.use_ == use_ && p.faces.is_empty() != with_faces)
+}
+
+/// The figures of the card: of the pictures that nothing was chosen with, and of those of
+/// the calibration, with which settings may be chosen. With those, it also says what the
+/// cascade would find that had fewer stages, down to half of them.
 pub(super) fn figures(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::Table {
-    let wanted = |p: &Picture| p.use_ == Use::Figures;
-    let found = search(cascade, config, pictures, |p| wanted(p) && !p.faces.is_empty());
-    let empty = search(cascade, config, pictures, |p| wanted(p) && p.faces.is_empty());
+    let empty = found_in(cascade, config, pictures, Use::Figures, false);
     let integer = |n: usize| toml::Value::Integer(n as i64);
     let mut table = toml::Table::from_iter([
-        ("held_out_pictures_with_faces".to_owned(), integer(found.pictures)),
-        ("held_out_faces".to_owned(), integer(found.faces)),
         ("held_out_pictures_without".to_owned(), integer(empty.pictures)),
         ("false_alarms_in_those".to_owned(), integer(empty.groups.len())),
+        ("validation_found_by_stages".to_owned(), by_stages(cascade, config, pictures)),
     ]);
-    for rate in FALSE_ALARMS {
-        let part = (found.found_at(rate) * 1e4).round() / 1e4;
-        table.insert(format!("found_at_{rate}_false_alarms_a_picture"), part.into());
+    for (name, use_) in [("held_out", Use::Figures), ("validation", Use::Calibration)] {
+        let found = found_in(cascade, config, pictures, use_, true);
+        table.insert(format!("{name}_pictures_with_faces"), integer(found.pictures));
+        table.insert(format!("{name}_faces"), integer(found.faces));
+        for rate in FALSE_ALARMS {
+            let part = rounded(found.found_at(rate));
+            table.insert(format!("{name}_found_at_{rate}_false_alarms_a_picture"), part);
+        }
     }
     table
+}
+
+/// The part of the faces that the last stage finds at one false alarm a picture, and
+/// before it what fewer stages find.
+fn by_stages(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::Value {
+    let stages = cascade.stages.len();
+    let found = (stages / 2 + 1..=stages).map(|count| {
+        let stages = cascade.stages[..count].to_vec();
+        let shorter = Cascade { stages, ..cascade.clone() };
+        let found = found_in(&shorter, config, pictures, Use::Calibration, true);
+        rounded(found.found_at(FALSE_ALARMS[0]))
+    });
+    found.collect::<Vec<_>>().into()
+}
+
+fn rounded(part: f64) -> toml::Value {
+    toml::Value::Float((part * 1e4).round() / 1e4)
 }

@@ -20,10 +20,14 @@ use tagalong_learn::{Use, mirrored, mix, shifted, use_of};
 
 use crate::{Cascade, Config, Scanner, Training, scales, whole};
 
-/// Small shifts of a face with surroundings, as parts of its window, and its
-/// growth.
-const SHIFTS: [(f64, f64, f64); 4] =
-    [(0.0, 0.0, 1.0), (0.05, -0.04, 1.06), (-0.05, 0.04, 0.94), (0.02, 0.06, 1.1)];
+/// How a face with surroundings is shown: shifted a little, as parts of its window, grown,
+/// and turned, as a part of the most that faces are turned.
+const VARIANTS: [((f64, f64, f64), f64); 4] = [
+    ((0.0, 0.0, 1.0), 0.0),
+    ((0.05, -0.04, 1.06), 1.0),
+    ((-0.05, 0.04, 0.94), -1.0),
+    ((0.02, 0.06, 1.1), 0.5),
+];
 /// Windows that overlap a face by less than this (IoU) are of others.
 const BESIDE: f64 = 0.3;
 /// The factor between the sizes that are searched for others.
@@ -54,15 +58,16 @@ pub struct CascadeTrainer {
 
 impl CascadeTrainer {
     /// A trainer without examples, that measures and calibrates with the other settings of
-    /// the detector, and goes on from a cascade, if there is one: with
-    /// all its stages there already, that is calibrated and measured again.
+    /// the detector, and goes on from a cascade, if there is one: with all stages or more
+    /// there already, those are calibrated and measured again.
     ///
     /// # Errors
     /// [`Error::Settings`] for numbers that cannot work, or windows of another size.
     pub fn new(config: Config, begun: Option<Cascade>, seed: u64) -> Result<Self> {
         config.training.check()?;
         let side = config.training.side;
-        let begun = begun.unwrap_or_else(|| Cascade::without_stages(side));
+        let mut begun = begun.unwrap_or_else(|| Cascade::without_stages(side));
+        begun.stages.truncate(config.training.stages);
         if (begun.width, begun.height) != (side, side) {
             return Err(Error::Settings(format!("windows of the cascade are not {side} wide")));
         }
@@ -70,18 +75,17 @@ impl CascadeTrainer {
         Ok(Self { config, seed, begun, faces, others, pictures: Vec::new() })
     }
 
-    /// A face, as it is and mirrored; with small shifts if the picture shows
-    /// what is around it.
+    /// A face, as it is and mirrored; in all variants if the picture shows what is
+    /// around it.
     fn add_face(&mut self, grey: &GreyImage, face: &Rect) {
-        let side = self.config.training.side;
-        let around = face.inflated(0.2);
-        let is_inside = around.clipped(grey.width(), grey.height()) == around;
-        let shifts = if is_inside { &SHIFTS[..] } else { &SHIFTS[..1] };
+        let Training { side, tilt, .. } = self.config.training;
+        let variants = if is_inside(grey, &face.inflated(0.2)) { VARIANTS.len() } else { 1 };
         let mirror = mirrored(grey);
         let flipped = Rect { x: grey.width() as f64 - face.right(), ..*face };
-        for shift in shifts {
+        for (shift, turned) in &VARIANTS[..variants] {
             let both = [(grey, face), (&mirror, &flipped)];
-            let cut = both.map(|(image, face)| window(image, &shifted(face, *shift), side));
+            let cut = both
+                .map(|(image, face)| window(image, &shifted(face, *shift), turned * tilt, side));
             self.faces.extend(cut.iter().filter_map(|pixels| Patch::new(pixels, side)));
         }
     }
@@ -185,7 +189,7 @@ pub(crate) struct Mined {
 impl Trainer for CascadeTrainer {
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
         let grey = frame.grey()?;
-        let use_ = use_of(example.group);
+        let use_ = use_of(example.group, &self.config.training.calibration);
         if self.pictures.last().is_none_or(|last| *last.grey != *grey) {
             let faces = Vec::new();
             self.pictures.push(Picture { use_, grey: Arc::new(grey.clone()), faces });
@@ -199,7 +203,7 @@ impl Trainer for CascadeTrainer {
         if example.is_person {
             self.add_face(grey, &candidate.region);
         } else {
-            let pixels = window(grey, &candidate.region, self.config.training.side);
+            let pixels = window(grey, &candidate.region, 0.0, self.config.training.side);
             self.others.extend(Patch::new(&pixels, self.config.training.side));
         }
         Ok(())
@@ -223,5 +227,32 @@ impl Trainer for CascadeTrainer {
         table.insert("searched".into(), list(|m| m.looked_at as i64));
         progress(1.0);
         Ok(Fitted { model: cascade.to_xml(), figures: table })
+    }
+}
+
+/// True if a region lies in a picture.
+fn is_inside(grey: &GreyImage, region: &Rect) -> bool {
+    let (width, height) = (grey.width() as f64, grey.height() as f64);
+    region.x >= 0.0 && region.y >= 0.0 && region.right() <= width && region.bottom() <= height
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_face_with_surroundings_is_shown_in_all_variants_and_another_as_it_is(
+            x in 5.0..40.0f64, y in 5.0..40.0f64, side in 20.0..44.0f64, left in -20.0..0.0f64,
+        ) {
+            let picture = GreyImage::from_fn(90, 90, |x, y| (x * 37 + y * 91) as u8);
+            let mut trainer = CascadeTrainer::new(Config::default(), None, 1).unwrap();
+            trainer.add_face(&picture, &Rect::new(x, y, side, side));
+            prop_assert_eq!(trainer.faces.len(), 2 * VARIANTS.len());
+            trainer.add_face(&picture, &Rect::new(left, y, side, side));
+            prop_assert_eq!(trainer.faces.len(), 2 * VARIANTS.len() + 2);
+        }
     }
 }

@@ -42,20 +42,48 @@ impl Patch {
 }
 
 /// A window, `side` pixels wide, as a scan would see it: interpolated, without
-/// means over what is skipped. Outside the picture its border goes on.
-pub(super) fn window(grey: &GreyImage, region: &Rect, side: usize) -> GreyImage {
-    let scale = region.width / side as f64;
+/// means over what is skipped. Outside the picture its border goes on. It is turned
+/// clockwise about its middle by `tilt`, rad.
+pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) -> GreyImage {
+    let (scale, middle) = (region.width / side as f64, region.centre());
+    let (sin, cos) = tilt.sin_cos();
     let clamp = |v: i64, length: usize| v.clamp(0, length.max(1) as i64 - 1);
     let at = |x: i64, y: i64| {
         f64::from(grey.get(clamp(x, grey.width()), clamp(y, grey.height())).unwrap_or_default())
     };
     GreyImage::from_fn(side, side, |i, j| {
-        let x = region.x + (i as f64 + 0.5) * scale - 0.5;
-        let y = region.y + (j as f64 + 0.5) * scale - 0.5;
+        let [right, down] = [i, j].map(|at| (at as f64 + 0.5 - 0.5 * side as f64) * scale);
+        let x = middle.x + right * cos - down * sin - 0.5;
+        let y = middle.y + right * sin + down * cos - 0.5;
         let (left, top) = (x.floor(), y.floor());
         let (right, down) = (x - left, y - top);
         let (left, top) = (left as i64, top as i64);
         let across = |y: i64| at(left, y) * (1.0 - right) + at(left + 1, y) * right;
         (across(top) * (1.0 - down) + across(top + 1) * down).round() as u8
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_turned_window_sees_a_plane_turned(
+            x in 30.0..50.0f64, y in 30.0..50.0f64, width in 10.0..40.0f64, tilt in -0.5..0.5f64,
+        ) {
+            let picture = GreyImage::from_fn(120, 120, |x, y| (x + y / 2) as u8);
+            let region = Rect::new(x, y, width, width);
+            let found = window(&picture, &region, tilt, 12);
+            let middle = region.centre() - nalgebra::Point2::new(0.5, 0.5);
+            let turn = nalgebra::Rotation2::new(tilt);
+            for (index, value) in found.pixels().iter().enumerate() {
+                let (i, j) = ((index % 12) as f64 - 5.5, (index / 12) as f64 - 5.5);
+                let at = middle + turn * nalgebra::Vector2::new(i, j) * width / 12.0;
+                prop_assert!((f64::from(*value) - at.x - 0.5 * at.y).abs() < 1.5, "{value} {at}");
+            }
+        }
+    }
 }

@@ -1,0 +1,118 @@
+//! The pipelines that a verifier is trained for: one for colour and depth, one for
+//! stereo pairs.
+
+use tagalong_sim::CameraKind;
+use tagalong_stereo::StereoSettings;
+use toml::{Table, Value};
+
+use crate::outcome::Failure;
+
+const RGBD: &str = include_str!("../../../../configs/depth-ekf.toml");
+const STEREO: &str = include_str!("../../../../configs/stereo-best.toml");
+/// What changes where candidates are wanted.
+const HARVEST: &str = include_str!("harvest.toml");
+
+/// A config in use, without verifiers and controller.
+pub struct InUse(Table);
+
+impl InUse {
+    /// The one for a kind of camera.
+    ///
+    /// # Errors
+    /// A config that is no TOML.
+    pub fn of(kind: CameraKind) -> Result<Self, Failure> {
+        let text = if kind == CameraKind::Stereo { STEREO } else { RGBD };
+        let mut config: Table = text.parse().map_err(Failure::failed)?;
+        config.retain(|key, _| key != "verifiers" && key != "controller");
+        Ok(Self(config))
+    }
+
+    /// How depth is made of a pair.
+    ///
+    /// # Errors
+    /// Settings that are none.
+    pub fn stereo(&self) -> Result<StereoSettings, Failure> {
+        let settings = self.0.get("stereo").cloned().unwrap_or_else(|| Table::new().into());
+        settings.try_into().map_err(Failure::failed)
+    }
+
+    /// The config as it is in use.
+    pub fn plain(&self) -> String {
+        self.0.to_string()
+    }
+
+    /// The config with a verifier.
+    pub fn verified(&self, plugin: &str, settings: Table) -> String {
+        let verifier = Table::from_iter([
+            ("plugin".to_owned(), Value::from(plugin)),
+            ("config".to_owned(), settings.into()),
+        ]);
+        let mut config = self.0.clone();
+        config.insert("verifiers".to_owned(), vec![verifier].into());
+        config.to_string()
+    }
+
+    /// The config with thresholds so low that much is proposed.
+    ///
+    /// # Errors
+    /// A config whose first detector is none.
+    pub fn proposing(&self) -> Result<String, Failure> {
+        let mut harvest: Table = HARVEST.parse().map_err(Failure::failed)?;
+        let mut config = self.0.clone();
+        let detector = config
+            .get_mut("detectors")
+            .and_then(|all| all.get_mut(0))
+            .and_then(Value::as_table_mut)
+            .ok_or_else(|| Failure::failed("the config in use has no detector"))?;
+        let settings = detector.entry("config").or_insert_with(|| Table::new().into());
+        if let (Some(settings), Some(Value::Table(low))) =
+            (settings.as_table_mut(), harvest.remove("detector"))
+        {
+            settings.extend(low);
+        }
+        config.extend(harvest);
+        Ok(config.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_proposes_is_the_detector_in_use_with_lower_thresholds() {
+        for kind in [CameraKind::Rgbd, CameraKind::Stereo] {
+            let in_use = InUse::of(kind).unwrap();
+            let of = |text: String| {
+                let config: Table = text.parse().unwrap();
+                let settings = config["detectors"][0].get("config").cloned();
+                settings.unwrap_or_else(|| Table::new().into())
+            };
+            let (plain, low) = (of(in_use.plain()), of(in_use.proposing().unwrap()));
+            let cost = |config: &Value| config.get("discover_cost").and_then(Value::as_float);
+            assert!(cost(&low) > cost(&plain).or(Some(0.16)));
+            assert_eq!(low.get("even_cost"), plain.get("even_cost"), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn pairs_are_matched_as_they_are_in_use() {
+        let stereo = InUse::of(CameraKind::Stereo).unwrap().stereo().unwrap();
+        assert_ne!(stereo, StereoSettings::default());
+        assert_eq!(
+            InUse::of(CameraKind::Rgbd).unwrap().stereo().unwrap(),
+            StereoSettings::default()
+        );
+    }
+
+    #[test]
+    fn a_verifier_is_added_to_none() {
+        let in_use = InUse::of(CameraKind::Stereo).unwrap();
+        assert!(!in_use.plain().contains("verifiers"));
+        let text = in_use.verified("svm-patch", Table::new());
+        assert_eq!(
+            text.parse::<Table>().unwrap()["verifiers"][0]["plugin"].as_str(),
+            Some("svm-patch")
+        );
+    }
+}

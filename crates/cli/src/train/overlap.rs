@@ -1,0 +1,97 @@
+//! Do pictures that are tested look like pictures that are trained with?
+
+use std::path::{Path, PathBuf};
+
+use tagalong_core::{Detection, Example, Frame, GreyImage};
+use tagalong_learn::{CALIBRATION, Use, use_of};
+
+use super::faces;
+use super::photos::{Take, photos};
+use crate::outcome::Failure;
+
+/// Columns and rows of a small picture.
+const SMALL: (usize, usize) = (10, 20);
+/// Pictures with a larger correlation show the same; different people on one meadow reach
+/// 0.904.
+const SAME: f32 = 0.92;
+
+/// The real data, where there is some.
+fn data() -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if !path.exists() {
+        eprintln!("skipped: {} is not here", path.display());
+    }
+    path.exists().then_some(path)
+}
+
+/// A small picture of unit length and without its mean.
+fn small(grey: &GreyImage) -> Vec<f32> {
+    let (columns, rows) = SMALL;
+    let mean = |x: usize, y: usize| {
+        let (across, down) = (grey.width(), grey.height());
+        let xs = x * across / columns..((x + 1) * across / columns).max(x * across / columns + 1);
+        let ys = y * down / rows..((y + 1) * down / rows).max(y * down / rows + 1);
+        let count = (xs.len() * ys.len()) as f32;
+        let row = |y: usize| grey.row(y)[xs.clone()].iter().map(|v| f32::from(*v)).sum::<f32>();
+        ys.map(row).sum::<f32>() / count
+    };
+    let means = (0..columns * rows).map(|at| mean(at % columns, at / columns));
+    let mut small: Vec<f32> = means.collect();
+    let middle = small.iter().sum::<f32>() / small.len() as f32;
+    small.iter_mut().for_each(|v| *v -= middle);
+    let length = small.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
+    small.iter_mut().for_each(|v| *v /= length);
+    small
+}
+
+fn mirrored(small: &[f32]) -> Vec<f32> {
+    small.chunks(SMALL.0).flat_map(|row| row.iter().rev()).copied().collect()
+}
+
+/// Pictures that show people, and what they are for.
+fn with_people(visit: impl FnOnce(Take<'_>) -> Result<(), Failure>) -> Vec<(Use, Vec<f32>)> {
+    let mut shown = Vec::new();
+    let taken = visit(&mut |frame: &Frame, _: &Detection, example: Example| {
+        if example.is_person {
+            let grey = frame.grey().map_err(Failure::failed)?;
+            shown.push((use_of(example.group, &[CALIBRATION]), small(grey)));
+        }
+        Ok(())
+    });
+    taken.unwrap_or_else(|failure| panic!("{}", failure.message));
+    shown
+}
+
+/// The largest correlation of a picture that is not trained with to one that is, or to its
+/// mirror image; at least some are of either kind.
+fn most_alike(shown: &[(Use, Vec<f32>)]) -> f32 {
+    let of = |is_fit: bool| shown.iter().filter(move |(use_, _)| (*use_ == Use::Fit) == is_fit);
+    assert!(of(true).count() > 100 && of(false).count() > 50, "{}", shown.len());
+    let product = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+    let alike = of(false).flat_map(|(_, tested)| {
+        let both = [tested.clone(), mirrored(tested)];
+        of(true).map(move |(_, trained)| product(&both[0], trained).max(product(&both[1], trained)))
+    });
+    alike.fold(f32::MIN, f32::max)
+}
+
+/// The crops of heads and shoulders, which the verifiers are trained with, are left out:
+/// near-duplicates among them are told apart less well (0.927).
+#[test]
+fn tested_people_are_not_trained_with() {
+    let Some(data) = data() else { return };
+    let visit = |take: Take<'_>| {
+        let all = [photos(&data, false), photos(&data, true)];
+        let mut people = all.into_iter().flatten().filter(|photo| photo.is_body());
+        people.try_for_each(|photo| photo.visit(0, take))
+    };
+    let most = most_alike(&with_people(visit));
+    assert!(most < SAME, "{most}");
+}
+
+#[test]
+fn tested_pictures_of_faces_are_not_trained_with() {
+    let Some(data) = data() else { return };
+    let most = most_alike(&with_people(|take| faces::fddb(&data, 1, take).map(drop)));
+    assert!(most < SAME, "{most}");
+}
