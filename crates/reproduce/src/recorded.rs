@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
+use cpu_time::ThreadTime;
 use tagalong_eval::formats::people;
 use tagalong_eval::{Comparison, Frame, Sequence, SetDistance, Similarity, Tally, Truth};
 use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
@@ -22,6 +23,8 @@ pub(crate) struct Recorded {
     pub(crate) reports: Vec<FrameReport>,
     /// How its boxes lie on those of the people.
     pub(crate) tally: Tally,
+    /// Time that a processor worked on it, reading not included, ms.
+    pub(crate) worked_ms: f64,
 }
 
 /// Takes all contenders over each annotated log of colour and depth images; for each
@@ -90,11 +93,13 @@ impl Log {
         let (input, limits) = (InputSettings::default(), Limits::default());
         let mut source = FrameSource::open(&self.path, &input, &limits, needs)
             .map_err(|error| failed(error.to_string()))?;
-        let (mut reports, mut frames) = (Vec::new(), BTreeMap::new());
+        let (mut reports, mut frames, mut worked_ms) = (Vec::new(), BTreeMap::new(), 0.0);
         while let Some(item) = source.next_frame() {
             let camera = &item.frame.camera;
             let size = (camera.width, camera.height);
+            let before = ThreadTime::now();
             let report = pipeline.step(&item.frame).map_err(|error| failed(error.to_string()))?;
+            worked_ms += 1e3 * before.elapsed().as_secs_f64();
             let number = u32::try_from(item.frame.index).unwrap_or(u32::MAX);
             frames.insert(
                 number,
@@ -103,7 +108,7 @@ impl Log {
             reports.push(report);
         }
         let tally = self.tally(frames)?;
-        Ok(Recorded { reports, tally })
+        Ok(Recorded { reports, tally, worked_ms })
     }
 
     fn frame(

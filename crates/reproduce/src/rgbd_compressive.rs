@@ -88,6 +88,7 @@ struct Done {
 #[derive(Clone, Copy, Default)]
 struct Work {
     frames: u64,
+    /// Time that a processor worked.
     ms: f64,
     /// Windows that could have been looked at, and that were.
     windows: [u64; 2],
@@ -96,15 +97,14 @@ struct Work {
 }
 
 impl Work {
-    fn of(reports: &[FrameReport]) -> Self {
+    fn of(reports: &[FrameReport], ms: f64) -> Self {
         let count = |test: &str| reports.iter().map(|r| r.funnel.count(test)).sum::<u64>();
         let by_depth: u64 = BY_DEPTH.map(count).iter().sum();
         let looked_at = count(BY_GRADIENTS);
         let compared = count(COMPARED);
-        let times = reports.iter().flat_map(|report| &report.timings);
         Self {
             frames: reports.len() as u64,
-            ms: times.map(|(_, ms)| ms).sum(),
+            ms,
             windows: [by_depth + looked_at, looked_at],
             boxes: [compared + BOXES.map(count).iter().sum::<u64>(), compared],
         }
@@ -186,7 +186,7 @@ const WORK: [&str; 5] =
 /// The judge of real and of drawn people.
 const JUDGE: Judge = Judge { similarity: Similarity::Iou, max_range_m: 6.0, coasting: true };
 const TIMES: &str =
-    "Frames a second are of one core of this machine, and not exact while it does other things.";
+    "Frames a second are of the time that one core worked; a busy machine makes it work slower.";
 
 /// Frames a second of the paper, behind so many columns that it says nothing of.
 fn published(name: &str, hz: f64, before: usize) -> Row {
@@ -210,7 +210,10 @@ fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let real = recorded(lab, &contenders, &JUDGE, false)?;
     let row = |(name, logs): (&&str, &Vec<Recorded>)| {
         let mut cells = scores(logs.iter().map(|log| &log.tally)).to_vec();
-        cells.push(Work::sum(logs.iter().map(|log| Work::of(&log.reports))).cells()[0].clone());
+        cells.push(
+            Work::sum(logs.iter().map(|log| Work::of(&log.reports, log.worked_ms))).cells()[0]
+                .clone(),
+        );
         Row::ours(*name, cells)
     };
     let rows = WITHOUT_DEPTH.iter().zip(&real).map(row).collect();
@@ -221,7 +224,10 @@ fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
 
 fn done(trial: Trial) -> Result<Vec<Done>, TrialError> {
     let of = |run: &Run| {
-        Ok(Done { tally: JUDGE.judge(&trial, run)?.tally, work: Work::of(&run.reports) })
+        Ok(Done {
+            tally: JUDGE.judge(&trial, run)?.tally,
+            work: Work::of(&run.reports, run.worked_ms),
+        })
     };
     trial.runs.iter().map(of).collect()
 }

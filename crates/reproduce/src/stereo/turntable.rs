@@ -95,7 +95,9 @@ fn columns() -> Vec<String> {
 }
 
 fn looks(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Look>, ReproduceError> {
-    let scenes = lab.scenes("turntable", &ONE_TURN, lab.seeds(60))?;
+    // Distances take turns: fewer scenes would leave some out.
+    let seeds = lab.seeds(60).max(DISTANCES_M.len() as u64);
+    let scenes = lab.scenes("turntable", &ONE_TURN, seeds)?;
     let contenders: Vec<Contender> =
         subsets.iter().map(|subset| detector(lab, subset)).collect::<Result<_, _>>()?;
     let looks = lab.trials("turns on the spot", &scenes, &contenders, of_trial)?;

@@ -1,10 +1,11 @@
 //! P4, Table I and P1, Fig. 5: what a verifier removes, and whom it costs.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
+use nalgebra::Point2;
 use tagalong_core::{Detection, Track};
 use tagalong_pipeline::{Fate, FrameReport};
-use tagalong_sim::Truth;
+use tagalong_sim::{Furniture, FurnitureKind, Truth};
 use tagalong_trials::{Moment, Trial, TrialError};
 
 use super::STEREO;
@@ -22,10 +23,25 @@ const SEQUENCES: [Sequence; 3] = [
 /// Without a verifier, with P4's, and with the better one.
 const PIPELINES: [&str; 3] = ["stereo-ekf", "stereo-svm-ekf", "stereo-best"];
 
-/// Something is a person's if it is this near on the floor, m ...
+/// Something is a person's if it is this near on the floor, m, ...
 const SAME_M: f64 = 0.5;
+/// ... and a sighting is of head and shoulders, and not of an arm, if it overlaps them by
+/// this much (IoU); ...
+const SAME_OVERLAP: f64 = 0.4;
 /// ... and nobody's if everybody is farther than this, m.
 const NOBODY_M: f64 = 0.9;
+/// What is seen is a piece of furniture if that is this near on the floor, m.
+const FURNITURE_M: f64 = 0.6;
+
+/// What is drawn with the silhouette of a person.
+const LOOK_ALIKES: [FurnitureKind; 6] = [
+    FurnitureKind::BinOnTable,
+    FurnitureKind::CardboardFigure,
+    FurnitureKind::CoatStand,
+    FurnitureKind::DrapedChair,
+    FurnitureKind::FloorLamp,
+    FurnitureKind::Plant,
+];
 
 /// What one pipeline did to one scene, or to many.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +49,8 @@ struct Tally {
     frames: u64,
     /// Sightings of nobody that the detector believes, and of these rejected.
     nobody: [u64; 2],
+    /// The same by what stands there.
+    things: BTreeMap<&'static str, [u64; 2]>,
     /// The same of people.
     people: [u64; 2],
     false_tracks: u64,
@@ -71,7 +89,11 @@ pub fn verifier(lab: &Lab) -> Result<Findings, ReproduceError> {
     sightings.extend(rows("all", &everything, Tally::sighting_cells));
     tracks.extend(rows("all", &everything, Tally::track_cells));
     let drawn = format!("{scenes_drawn} drawn stereo scenes that nothing was trained on; Wilson");
-    let tables = vec![sightings_table(sightings, &drawn), tracks_table(tracks, &drawn)];
+    let tables = vec![
+        sightings_table(sightings, &drawn),
+        things_table(&everything),
+        tracks_table(tracks, &drawn),
+    ];
     Ok(Findings { tables, pictures: Vec::new() })
 }
 
@@ -90,8 +112,32 @@ fn sightings_table(rows: Vec<Row>, drawn: &str) -> Table {
         rows,
         notes: vec![
             format!("{drawn} intervals, over sightings"),
-            "False sightings a frame: before the verifier.".into(),
+            "False sightings a frame: before the verifier. People's: of head and shoulders; \
+             an arm is neither."
+                .into(),
         ],
+    }
+}
+
+/// What the false sightings are of.
+fn things_table(tallies: &[Tally]) -> Table {
+    let kinds: BTreeSet<&str> =
+        tallies.iter().flat_map(|tally| tally.things.keys().copied()).collect();
+    let row = |kind: &str| {
+        let of = |tally: &Tally| tally.things.get(kind).copied().unwrap_or_default();
+        let before = Cell::number(of(&tallies[0])[0] as f64, 0);
+        let removed = tallies[1..].iter().map(|tally| share(of(tally)));
+        Row::ours(kind, std::iter::once(before).chain(removed).collect())
+    };
+    let removed = PIPELINES[1..].iter().map(|name| format!("{name}: removed %"));
+    Table {
+        title: "False sightings by what stands there".into(),
+        columns: std::iter::once(format!("{}: sightings", PIPELINES[0])).chain(removed).collect(),
+        rows: kinds.into_iter().map(row).collect(),
+        notes: vec![format!(
+            "Drawn to be taken for people: {}.",
+            LOOK_ALIKES.map(FurnitureKind::name).join(", ")
+        )],
     }
 }
 
@@ -124,7 +170,7 @@ fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
         let mut tally = Tally::default();
         let mut false_tracks = BTreeSet::new();
         for (moment, report) in trial.moments.iter().zip(&trial.runs[run].reports) {
-            tally.frame(moment, report, &mut false_tracks);
+            tally.frame(moment, report, &trial.furniture, &mut false_tracks);
         }
         tally.false_tracks = false_tracks.len() as u64;
         tally.compare(&plain, &covers(run));
@@ -134,7 +180,13 @@ fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
 }
 
 impl Tally {
-    fn frame(&mut self, moment: &Moment, report: &FrameReport, false_tracks: &mut BTreeSet<u32>) {
+    fn frame(
+        &mut self,
+        moment: &Moment,
+        report: &FrameReport,
+        furniture: &[Furniture],
+        false_tracks: &mut BTreeSet<u32>,
+    ) {
         self.frames += 1;
         for candidate in &report.candidates {
             let rejected = match candidate.fate {
@@ -142,13 +194,16 @@ impl Tally {
                 Fate::Dropped(_) => continue,
                 Fate::Matched(_) | Fate::Started(_) => false,
             };
-            let counts = match whose(&candidate.detection, &moment.truth) {
-                Whose::Somebody => &mut self.people,
-                Whose::Nobody => &mut self.nobody,
-                Whose::Unclear => continue,
-            };
-            counts[0] += 1;
-            counts[1] += u64::from(rejected);
+            let one = [1, u64::from(rejected)];
+            match whose(&candidate.detection, &moment.truth) {
+                Whose::Somebody => add(&mut self.people, one),
+                Whose::Nobody => {
+                    let at = moment.world_from_robot * candidate.detection.position.xy();
+                    add(self.things.entry(what_stands_at(at, furniture)).or_default(), one);
+                    add(&mut self.nobody, one);
+                }
+                Whose::Unclear => {}
+            }
         }
         for track in report.tracks.iter().filter(|track| track.confirmed) {
             if moment.truth.iter().all(|truth| off_m(track, truth) > NOBODY_M) {
@@ -175,8 +230,9 @@ impl Tally {
             (&mut self.covered, other.covered),
             (&mut self.tracked, other.tracked),
         ];
-        for (sum, one) in pairs {
-            sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
+        pairs.into_iter().for_each(|(sum, one)| add(sum, one));
+        for (thing, one) in &other.things {
+            add(self.things.entry(thing).or_default(), *one);
         }
         self.frames += other.frames;
         self.false_tracks += other.false_tracks;
@@ -201,6 +257,10 @@ impl Tally {
     }
 }
 
+fn add(sum: &mut [u64; 2], one: [u64; 2]) {
+    sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
+}
+
 /// The second number as a share of the first.
 fn share([of, count]: [u64; 2]) -> Cell {
     Cell::share(count, of, 1)
@@ -218,9 +278,22 @@ fn whose(detection: &Detection, people: &[Truth]) -> Whose {
     match nearest {
         None => Whose::Nobody,
         Some(truth) if off(truth) > NOBODY_M => Whose::Nobody,
-        Some(truth) if off(truth) <= SAME_M && !truth.ignore => Whose::Somebody,
+        Some(truth) if off(truth) <= SAME_M && overlaps(detection, truth) => Whose::Somebody,
         Some(_) => Whose::Unclear,
     }
+}
+
+/// True for somebody who counts, seen where head and shoulders are.
+fn overlaps(detection: &Detection, truth: &Truth) -> bool {
+    let overlap = truth.upper_body.map_or(0.0, |region| region.iou(&detection.region));
+    !truth.ignore && overlap >= SAME_OVERLAP
+}
+
+/// The name of what stands at a place of the world.
+fn what_stands_at(at: Point2<f64>, furniture: &[Furniture]) -> &'static str {
+    let off = |piece: &Furniture| (at - Point2::from(piece.at)).norm();
+    let nearest = furniture.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    nearest.filter(|piece| off(piece) <= FURNITURE_M).map_or("anything else", |p| p.kind.name())
 }
 
 fn off_m(track: &Track, truth: &Truth) -> f64 {
@@ -248,6 +321,17 @@ mod tests {
         let mut sum = tally.clone();
         sum.add(&tally);
         assert_eq!((sum.covered, sum.tracked), ([6, 2], [4, 2]));
+    }
+
+    #[test]
+    fn what_is_seen_is_the_nearest_thing_if_it_is_near() {
+        let piece = |kind, x| Furniture { kind, at: [x, 0.0], heading_deg: 0.0 };
+        let (stand, lamp) = (FurnitureKind::CoatStand, FurnitureKind::FloorLamp);
+        let furniture = [piece(stand, 3.0), piece(lamp, 4.0)];
+        assert_eq!(what_stands_at(Point2::new(3.6, 0.0), &furniture), "floor lamp");
+        assert_eq!(what_stands_at(Point2::new(3.0, 0.5), &furniture), "coat stand");
+        assert_eq!(what_stands_at(Point2::new(3.0, 0.7), &furniture), "anything else");
+        assert_eq!(what_stands_at(Point2::new(3.0, 0.5), &[]), "anything else");
     }
 
     #[test]
