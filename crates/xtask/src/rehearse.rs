@@ -32,6 +32,8 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("trials", "takes long"),
     ("--seeds", "takes long"),
     ("--fit", "takes long"),
+    ("crowd=5", "takes half a minute, as the tests build it"),
+    ("--gallery pictures", "takes half a minute, as the tests build it"),
 ];
 
 /// What lies in each folder: a short log, a folder of logs, and one of images.
