@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use crate::args::Format;
+
 /// The arguments of `tagalong bench`.
 #[derive(Args, Debug)]
 #[command(args_conflicts_with_subcommands = true)]
@@ -14,7 +16,7 @@ pub struct BenchArgs {
     #[command(flatten)]
     pub run: RunArgs,
     #[command(flatten)]
-    pub gate: GateArgs,
+    pub report: ReportArgs,
     #[command(flatten)]
     pub folder: FolderArgs,
 }
@@ -44,7 +46,7 @@ pub enum Step {
                             --fail-if 'HOTA<-0.01' --fail-if 'IDSW>0'")]
     Report {
         #[command(flatten)]
-        gate: GateArgs,
+        report: ReportArgs,
         #[command(flatten)]
         folder: FolderArgs,
     },
@@ -104,6 +106,16 @@ pub struct RunArgs {
     pub timing: bool,
 }
 
+/// What is said of the results.
+#[derive(Args, Clone, Debug)]
+pub struct ReportArgs {
+    #[command(flatten)]
+    pub gate: GateArgs,
+    /// How to print; JSON is what is in report.json.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
 /// When a benchmark is worse than it was.
 #[derive(Args, Clone, Debug)]
 pub struct GateArgs {
@@ -123,7 +135,10 @@ impl BenchArgs {
             step: None,
             plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1 },
             run: RunArgs { jobs: 1, task: None, retry_failed: false, timing: false },
-            gate: GateArgs { baseline: None, fail_if: Vec::new() },
+            report: ReportArgs {
+                gate: GateArgs { baseline: None, fail_if: Vec::new() },
+                format: Format::Text,
+            },
             folder: FolderArgs { output },
         }
     }

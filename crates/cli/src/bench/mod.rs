@@ -24,6 +24,7 @@ use store::Store;
 use tagalong_core::Registry;
 use work::Tally;
 
+use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 
 /// `tagalong bench`.
@@ -41,9 +42,9 @@ pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
             let tally = work::work(run, &store(folder), registry)?;
             verdict(tally)
         }
-        Some(Step::Report { gate, folder }) => {
-            let gate = Gate::read(gate)?;
-            make_report(folder, gate.as_ref())?;
+        Some(Step::Report { report, folder }) => {
+            let gate = Gate::read(&report.gate)?;
+            make_report(folder, report.format, gate.as_ref())?;
             Ok(Ended::Well)
         }
         Some(Step::Export { trackeval, folder }) => {
@@ -63,14 +64,14 @@ fn store(folder: &FolderArgs) -> Store {
 
 /// A failed task does not keep the others from being reported.
 fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
-    let gate = Gate::read(&args.gate)?;
+    let gate = Gate::read(&args.report.gate)?;
     make_plan(&args.plan, &args.folder, registry)?;
     let tally = work::work(&args.run, &store(&args.folder), registry)?;
     if let Some(signal) = tally.signal {
         return Ok(Ended::BySignal(signal));
     }
     if args.run.task.is_none() {
-        make_report(&args.folder, gate.as_ref())?;
+        make_report(&args.folder, args.report.format, gate.as_ref())?;
     }
     verdict(tally)
 }
@@ -84,11 +85,14 @@ fn make_plan(args: &PlanArgs, folder: &FolderArgs, registry: &Registry) -> Resul
     Ok(text)
 }
 
-fn make_report(folder: &FolderArgs, gate: Option<&Gate>) -> Result<(), Failure> {
+fn make_report(folder: &FolderArgs, format: Format, gate: Option<&Gate>) -> Result<(), Failure> {
     let store = store(folder);
     let benchmark = report::gather(&store)?;
-    report::write(&store, &benchmark)?;
-    print(&report::text(&store, &benchmark))?;
+    let json = report::write(&store, &benchmark)?;
+    match format {
+        Format::Text => print(&report::text(&store, &benchmark))?,
+        Format::Json => print(&json)?,
+    }
     match gate.and_then(|gate| gate.worse(&benchmark)) {
         Some(worse) => Err(Failure::failed(worse.trim_end())),
         None => Ok(()),
@@ -136,6 +140,6 @@ mod tests {
     #[test]
     fn all_arguments_have_their_step() {
         let args = parse("bench --jobs 3").unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!((args.plan.seeds, args.run.jobs, args.gate.baseline), (1, 3, None));
+        assert_eq!((args.plan.seeds, args.run.jobs, args.report.gate.baseline), (1, 3, None));
     }
 }

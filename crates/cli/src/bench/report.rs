@@ -57,11 +57,11 @@ fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
     Some(Timings { exclusive, machine, tasks })
 }
 
-/// Writes the files of the report.
+/// Writes the files of the report; the JSON of report.json.
 ///
 /// # Errors
 /// A disk that fails.
-pub fn write(store: &Store, benchmark: &Benchmark) -> Result<(), Failure> {
+pub fn write(store: &Store, benchmark: &Benchmark) -> Result<String, Failure> {
     let timings = timings(store, benchmark);
     let json = tagalong_report::json(benchmark).map_err(Failure::failed)?;
     store.put("report.json", json.as_bytes())?;
@@ -71,7 +71,7 @@ pub fn write(store: &Store, benchmark: &Benchmark) -> Result<(), Failure> {
         let json = serde_json::to_string_pretty(timings).map_err(Failure::failed)? + "\n";
         store.put("timings.json", json.as_bytes())?;
     }
-    Ok(())
+    Ok(json)
 }
 
 /// The main figures, for a person at the terminal.

@@ -91,6 +91,8 @@ fn one_command_ends_in_a_report_and_a_second_one_computes_nothing() {
     assert!(told.contains("0 tasks run, 4 had their results"), "{told}");
     assert_eq!(fs::metadata(&result).unwrap().modified().unwrap(), written);
     assert!(before == files(&home.path("out")), "the second report differs");
+    let printed = home.bench(&["report", "-o", "out", "--format", "json"]);
+    assert!(printed.stdout == before["report.json"], "{}", text(&printed.stdout));
 }
 
 fn before_result(home: &Home) -> String {
