@@ -33,6 +33,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("--seeds", "takes long"),
     ("--fit", "takes long"),
     ("crowd=5", "takes half a minute, as the tests build it"),
+    ("hide_s=3", "takes a quarter of a minute, as the tests build it"),
     ("--gallery pictures", "takes half a minute, as the tests build it"),
 ];
 
