@@ -6,11 +6,11 @@ use std::process::Command;
 use std::time::Instant;
 use std::{env, fs};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 
 use crate::markdown::{Document, documents};
 use crate::program::Program;
-use crate::workspace::{Workspace, output};
+use crate::workspace::{Workspace, copy_file, output, remove_folder};
 
 /// Where it happens: where `cargo clean` removes it.
 const STAGE: &str = "target/rehearsal";
@@ -49,11 +49,9 @@ const PROPS: &[&str] = &[
 pub fn rehearse(workspace: &Workspace) -> Result<()> {
     let program = Program::built(workspace)?;
     let stage = workspace.root().join(STAGE);
-    if stage.exists() {
-        fs::remove_dir_all(&stage).with_context(|| format!("cannot remove {}", stage.display()))?;
-    }
+    remove_folder(&stage)?;
     let props = stage.join("props");
-    copy_configs(workspace, &props)?;
+    workspace.copy_to(&props, |file| file.starts_with("configs"))?;
     for line in PROPS {
         output(program.call(&words(line)).current_dir(&props))?;
     }
@@ -111,14 +109,6 @@ fn in_shell(program: &Program, line: &str, folder: &Path) -> Result<Command> {
     Ok(shell)
 }
 
-fn copy_configs(workspace: &Workspace, to: &Path) -> Result<()> {
-    let files = workspace.files()?.into_iter();
-    for file in files.filter(|file| file.starts_with("configs")) {
-        copy_file(&workspace.root().join(&file), &to.join(&file))?;
-    }
-    Ok(())
-}
-
 fn copy(from: &Path, to: &Path) -> Result<()> {
     for entry in fs::read_dir(from)? {
         let entry: PathBuf = entry?.path();
@@ -128,14 +118,6 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
             false => copy_file(&entry, &to.join(name))?,
         }
     }
-    Ok(())
-}
-
-fn copy_file(from: &Path, to: &Path) -> Result<()> {
-    if let Some(folder) = to.parent() {
-        fs::create_dir_all(folder)?;
-    }
-    fs::copy(from, to).with_context(|| format!("cannot copy {}", from.display()))?;
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use clap::ValueEnum as _;
 use crate::metadata::Metadata;
 use crate::new_plugin::{Kind, create, format};
 use crate::walk_through;
-use crate::workspace::{Workspace, succeed};
+use crate::workspace::{Workspace, remove_folder, succeed};
 
 /// Where the copy lives: where `cargo clean` removes it.
 const COPY: &str = "target/try-new-plugin";
@@ -112,16 +112,7 @@ fn has_program(copy: &Workspace) -> Result<bool> {
 /// A fresh copy of all files that git knows or would know.
 fn copy_of(workspace: &Workspace) -> Result<Workspace> {
     let root = workspace.root().join(COPY);
-    if root.exists() {
-        fs::remove_dir_all(&root).with_context(|| format!("cannot remove {}", root.display()))?;
-    }
-    for file in workspace.files()? {
-        let to = root.join(&file);
-        if let Some(folder) = to.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        fs::copy(workspace.root().join(&file), &to)
-            .with_context(|| format!("cannot copy {}", file.display()))?;
-    }
+    remove_folder(&root)?;
+    workspace.copy_to(&root, |_| true)?;
     Ok(Workspace::at(root))
 }

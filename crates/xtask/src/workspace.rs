@@ -76,6 +76,33 @@ impl Workspace {
         files.dedup();
         Ok(files)
     }
+
+    /// Copies those of its files that are wanted into a folder.
+    pub fn copy_to(&self, folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Result<()> {
+        let files = self.files()?.into_iter().filter(|file| is_wanted(file));
+        for file in files {
+            copy_file(&self.root.join(&file), &folder.join(&file))?;
+        }
+        Ok(())
+    }
+}
+
+/// Copies a file, and makes the folders above it.
+pub fn copy_file(from: &Path, to: &Path) -> Result<()> {
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::copy(from, to).with_context(|| format!("cannot copy {}", from.display()))?;
+    Ok(())
+}
+
+/// Removes a folder, if there is one.
+pub fn remove_folder(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)
+            .with_context(|| format!("cannot remove {}", folder.display()))?;
+    }
+    Ok(())
 }
 
 /// What a command prints; an error if it fails.
