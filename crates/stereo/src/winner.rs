@@ -88,22 +88,33 @@ fn row<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
     let [disparity, cost, below, above, second] =
         [disparity, cost, below, above, second].map(|row| &mut row[..width]);
     for (x, sums) in sums.iter().enumerate() {
-        let [least, at] = best(sums).to_be_bytes();
+        let lowest = least(sums);
+        let at = first(sums, lowest);
         let d = usize::from(at);
-        (disparity[x], cost[x]) = (at, least);
+        (disparity[x], cost[x]) = (at, lowest);
         (below[x], above[x]) = (sums[d.saturating_sub(1)], sums[(d + 1).min(D - 1)]);
         second[x] = rival(sums, at);
     }
 }
 
-/// The lowest cost, and in the lower byte its disparity.
 #[inline(always)]
-fn best<const D: usize>(sums: &[u8; D]) -> u16 {
-    let mut best = u16::MAX;
-    for (d, sum) in sums.iter().enumerate() {
-        best = best.min(u16::from_be_bytes([*sum, d as u8]));
+fn least<const D: usize>(values: &[u8; D]) -> u8 {
+    let mut least = u8::MAX;
+    for value in values {
+        least = least.min(*value);
     }
-    best
+    least
+}
+
+/// The first disparity whose cost is this one.
+#[inline(always)]
+fn first<const D: usize>(sums: &[u8; D], cost: u8) -> u8 {
+    let mut last = 0;
+    for (d, sum) in sums.iter().enumerate() {
+        let from_end = (D - 1 - d) as u8;
+        last = last.max(if *sum == cost { from_end } else { 0 });
+    }
+    (D - 1) as u8 - last
 }
 
 /// The lowest cost of a disparity that is not beside this one.
@@ -111,12 +122,12 @@ fn best<const D: usize>(sums: &[u8; D]) -> u16 {
 fn rival<const D: usize>(sums: &[u8; D], at: u8) -> u8 {
     let below = at.saturating_sub(1);
     let near = at.saturating_add(1).wrapping_sub(below);
-    let mut least = u8::MAX;
-    for (d, sum) in sums.iter().enumerate() {
+    let mut others = [0; D];
+    for d in 0..D {
         let is_beside = (d as u8).wrapping_sub(below) <= near;
-        least = least.min(if is_beside { u8::MAX } else { *sum });
+        others[d] = sums[d] | u8::from(is_beside).wrapping_neg();
     }
-    least
+    least(&others)
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
