@@ -68,12 +68,7 @@ fn step_on<const D: usize>(
     large: u8,
     sum: &mut [u8; D],
 ) -> [u8; D] {
-    let (mut beside, mut above) = ([u8::MAX; D], [u8::MAX; D]);
-    beside[1..].copy_from_slice(&own[..D - 1]);
-    above[..D - 1].copy_from_slice(&own[1..]);
-    for d in 0..D {
-        beside[d] = beside[d].min(above[d]);
-    }
+    let beside = std::array::from_fn(|d| own[d.saturating_sub(1)].min(own[(d + 1).min(D - 1)]));
     ahead(cost, own, &beside, small, large, sum)
 }
 

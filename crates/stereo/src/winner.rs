@@ -44,7 +44,10 @@ impl Winners {
 
     /// Finds the best disparity of each pixel.
     pub fn find<const D: usize>(&mut self, sums: &[[u8; D]]) {
-        row(sums, self);
+        lowest(sums, &mut self.cost);
+        first(sums, &self.cost, &mut self.disparity);
+        rivals(sums, &self.disparity, &mut self.second);
+        neighbours(sums, self);
     }
 
     /// Writes the disparities that lie within the right image and whose second best
@@ -81,20 +84,52 @@ impl Winners {
     }
 }
 
+// One loop for each of a row's results: of all three in one loop, the compiler makes
+// vector instructions of none or of one, and which one changes with every line.
+
+/// The lowest costs.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn row<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
-    let width = sums.len();
-    let Winners { disparity, cost, below, above, second } = winners;
-    let [disparity, cost, below, above, second] =
-        [disparity, cost, below, above, second].map(|row| &mut row[..width]);
-    for (x, sums) in sums.iter().enumerate() {
-        let lowest = least(sums);
-        let at = first(sums, lowest);
-        let d = usize::from(at);
-        (disparity[x], cost[x]) = (at, lowest);
-        (below[x], above[x]) = (sums[d.saturating_sub(1)], sums[(d + 1).min(D - 1)]);
-        second[x] = rival(sums, at);
+fn lowest<const D: usize>(sums: &[[u8; D]], cost: &mut [u8]) {
+    for (sums, cost) in sums.iter().zip(cost) {
+        *cost = if D < ENOUGH { least(&filled(sums)) } else { least(sums) };
     }
+}
+
+/// The first disparities that have these costs.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn first<const D: usize>(sums: &[[u8; D]], cost: &[u8], disparity: &mut [u8]) {
+    for ((sums, cost), disparity) in sums.iter().zip(cost).zip(disparity) {
+        *disparity =
+            if D < ENOUGH { place(&filled(sums), *cost) } else { place(sums, *cost) };
+    }
+}
+
+/// The lowest costs of disparities that are not beside these.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn rivals<const D: usize>(sums: &[[u8; D]], disparity: &[u8], second: &mut [u8]) {
+    for ((sums, at), second) in sums.iter().zip(disparity).zip(second) {
+        *second = if D < ENOUGH { rival(&filled(sums), *at) } else { rival(sums, *at) };
+    }
+}
+
+/// The costs of the disparities below and above these.
+fn neighbours<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
+    let (below, above) = (winners.below.iter_mut(), winners.above.iter_mut());
+    for (((sums, at), below), above) in sums.iter().zip(&winners.disparity).zip(below).zip(above) {
+        let at = usize::from(*at);
+        (*below, *above) = (sums[at.saturating_sub(1)], sums[(at + 1).min(D - 1)]);
+    }
+}
+
+/// Fewer costs than this, and the compiler makes no vector instructions of their loops.
+const ENOUGH: usize = 64;
+
+/// Enough costs: the highest for disparities that are none.
+#[inline(always)]
+fn filled<const D: usize>(sums: &[u8; D]) -> [u8; ENOUGH] {
+    let mut all = [u8::MAX; ENOUGH];
+    all[..D].copy_from_slice(sums);
+    all
 }
 
 #[inline(always)]
@@ -106,9 +141,8 @@ fn least<const D: usize>(values: &[u8; D]) -> u8 {
     least
 }
 
-/// The first disparity whose cost is this one.
 #[inline(always)]
-fn first<const D: usize>(sums: &[u8; D], cost: u8) -> u8 {
+fn place<const D: usize>(sums: &[u8; D], cost: u8) -> u8 {
     let mut last = 0;
     for (d, sum) in sums.iter().enumerate() {
         let from_end = (D - 1 - d) as u8;
@@ -117,7 +151,6 @@ fn first<const D: usize>(sums: &[u8; D], cost: u8) -> u8 {
     (D - 1) as u8 - last
 }
 
-/// The lowest cost of a disparity that is not beside this one.
 #[inline(always)]
 fn rival<const D: usize>(sums: &[u8; D], at: u8) -> u8 {
     let below = at.saturating_sub(1);
