@@ -18,7 +18,7 @@ const SAME_PART: f32 = 0.1;
 /// Judges pixels by row; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct TextureTest {
-    /// All bits of those that are textured.
+    /// All bits of those that are textured and have a disparity.
     textured: Vec<u32>,
     /// The disparity of the last textured pixel up to each one, and of the next.
     before: Vec<f32>,
@@ -48,6 +48,7 @@ impl TextureTest {
         }
         self.textured.resize(row.len(), 0);
         find_textured(rows, least, &mut self.textured);
+        leave_known(row, &mut self.textured);
         let mut last = f32::NAN.to_bits();
         let own = row.iter().zip(&self.textured);
         for ((own, textured), before) in own.clone().zip(&mut self.before) {
@@ -64,10 +65,17 @@ impl TextureTest {
 /// Carries the disparities of textured pixels on. All bits at once, since no one can
 /// foresee which pixels are textured, a processor neither.
 #[inline(always)]
-fn carried(last: &mut u32, own: f32, textured: u32) -> f32 {
-    let is_anchor = if own.is_nan() { 0 } else { textured };
-    *last = (own.to_bits() & is_anchor) | (*last & !is_anchor);
+const fn carried(last: &mut u32, own: f32, textured: u32) -> f32 {
+    *last = (own.to_bits() & textured) | (*last & !textured);
     f32::from_bits(*last)
+}
+
+/// Clears the bits of those without a disparity.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn leave_known(row: &[f32], textured: &mut [u32]) {
+    for (textured, own) in textured.iter_mut().zip(row) {
+        *textured &= u32::from(!own.is_nan()).wrapping_neg();
+    }
 }
 
 /// How much disparities of one surface differ at most.

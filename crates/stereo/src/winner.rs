@@ -65,19 +65,21 @@ impl Winners {
         best: &mut Vec<u16>,
         disparities: &mut [f32],
     ) -> u32 {
-        const LEFT_OF_IMAGE: usize = 256;
+        // Right columns by how far they are right of the farthest match to the left.
+        const REACH: usize = 256;
         best.clear();
-        best.resize(self.disparity.len() + LEFT_OF_IMAGE, u16::MAX);
-        let seen = |x: usize, d: u8| x + LEFT_OF_IMAGE - usize::from(d);
+        best.resize(self.disparity.len() + REACH, u16::MAX);
         for (x, (d, cost)) in self.disparity.iter().zip(&self.cost).enumerate() {
-            let best = &mut best[seen(x, *d)];
+            let Some(reach) = best[x..].first_chunk_mut::<{ REACH + 1 }>() else { break };
+            let best = &mut reach[REACH - usize::from(*d)];
             *best = (*best).min(u16::from_be_bytes([*cost, *d]));
         }
-        let mut dropped = 0;
-        for (x, (d, value)) in self.disparity.iter().zip(disparities).enumerate() {
-            let [_, back] = best[seen(x, *d)].to_be_bytes();
+        let mut dropped = 0_u32;
+        let reaches = best.array_windows::<{ REACH + 1 }>();
+        for ((d, value), reach) in self.disparity.iter().zip(disparities).zip(reaches) {
+            let [_, back] = reach[REACH - usize::from(*d)].to_be_bytes();
             let differ = d.abs_diff(back) > tolerance;
-            dropped += u32::from(differ & !value.is_nan());
+            dropped = dropped.wrapping_add(u32::from(differ & !value.is_nan()));
             *value = if differ { f32::NAN } else { *value };
         }
         dropped
