@@ -205,16 +205,15 @@ fn write(
     let (width, fine) = (disparities.width, (depth.width(), depth.height()));
     let height = disparities.values.len() / width.max(1);
     let mut out = 0;
+    let columns: Vec<usize> = (0..fine.0).map(|x| x * width / fine.0).collect();
     for (y, row) in depth.pixels_mut().chunks_exact_mut(fine.0.max(1)).enumerate() {
         let from = y * height / fine.1 * width;
         let values = &disparities.values[from..from + width];
-        for (x, depth) in row.iter_mut().enumerate() {
-            let metres = focal_baseline / values[x * width / fine.0];
-            if range.contains(&metres) {
-                *depth = metres;
-            } else {
-                out += u64::from(!metres.is_nan());
-            }
+        for (depth, column) in row.iter_mut().zip(&columns) {
+            let metres = focal_baseline / values[*column];
+            let inside = range.contains(&metres);
+            *depth = if inside { metres } else { f32::NAN };
+            out += u64::from(!inside & !metres.is_nan());
         }
     }
     out

@@ -122,11 +122,12 @@ impl RowSums {
 /// Fills what is still empty in a reduced row from one row of its blocks.
 fn fill_row(row: &mut [u16], depth: &[f32], scale: usize) {
     let nearest = RowSums::MIN_DEPTH_M as f32;
-    for (out, block) in row.iter_mut().zip(depth.chunks_exact(scale)) {
-        if *out == 0
-            && let Some(z) = block.iter().find(|z| **z >= nearest)
-        {
-            *out = (RowSums::UNITS as f32 / z + 0.5) as u16;
+    for column in 0..scale {
+        for (out, block) in row.iter_mut().zip(depth.chunks_exact(scale)) {
+            let z = block[column];
+            let value = (RowSums::UNITS as f32 / z.max(nearest) + 0.5) as u16;
+            let is_wanted = (*out == 0) & (z >= nearest);
+            *out = if is_wanted { value } else { *out };
         }
     }
 }
