@@ -101,8 +101,7 @@ fn lowest<const D: usize>(sums: &[[u8; D]], cost: &mut [u8]) {
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn first<const D: usize>(sums: &[[u8; D]], cost: &[u8], disparity: &mut [u8]) {
     for ((sums, cost), disparity) in sums.iter().zip(cost).zip(disparity) {
-        *disparity =
-            if D < ENOUGH { place(&filled(sums), *cost) } else { place(sums, *cost) };
+        *disparity = if D < ENOUGH { place(&filled(sums), *cost) } else { place(sums, *cost) };
     }
 }
 

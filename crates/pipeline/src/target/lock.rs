@@ -1,7 +1,7 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{Frame, Motion, Track, TrackId};
+use tagalong_core::{Frame, Motion, Person, Track, TrackId};
 
 use super::looks::Looks;
 use super::memory::{Differences, Memory};
@@ -16,6 +16,14 @@ const UNSEEN_S: f64 = 0.25;
 /// five times that of a frame.
 const KEPT: f64 = 0.9;
 const NEW: f64 = 0.5;
+/// Who is slower stands, m/s.
+const STANDS_MPS: f64 = 0.3;
+/// Who is this near to where somebody stood is the same one, m, ...
+const SAME_PLACE_M: f64 = 0.4;
+/// ... for so long, s.
+const STANDING_S: f64 = 60.0;
+/// Whom it believes at least this much to be the person, nobody else is.
+const SURE: f64 = 0.95;
 /// Somebody may have moved by this much more than their speed says, m.
 const REACH_M: f64 = 0.6;
 
@@ -118,6 +126,10 @@ pub(crate) struct Lock {
     /// Log-odds of others while the person is lost, their sightings added up, and
     /// how often in a row that was enough.
     candidates: BTreeMap<TrackId, (f64, u32)>,
+    /// Tracks that are not the person: both were seen at once.
+    others: BTreeSet<TrackId>,
+    /// Where those of them were who stood, robot frame, m, and how long ago, s.
+    standing: Vec<(Point2<f64>, f64)>,
 }
 
 impl Lock {
@@ -134,6 +146,8 @@ impl Lock {
             sightings: 0,
             last: None,
             candidates: BTreeMap::new(),
+            others: BTreeSet::new(),
+            standing: Vec::new(),
             settings,
         }
     }
@@ -154,6 +168,8 @@ impl Lock {
         }
         self.last = None;
         self.candidates.clear();
+        self.others.clear();
+        self.standing.clear();
     }
 
     pub(crate) fn state(&self) -> LockState {
@@ -202,6 +218,7 @@ impl Lock {
             LockState::Lost => self.look_for(tracks, &log_odds),
             _ => self.hold(tracks, &log_odds),
         }
+        self.tell_apart(tracks);
         self.learn(tracks, looks);
         LockReport {
             state: self.state,
@@ -219,6 +236,11 @@ impl Lock {
             last.velocity = motion.apply_to_velocity(last.velocity);
             last.ago_s += motion.dt;
         }
+        for (place, ago_s) in &mut self.standing {
+            *place = motion.apply_to_point(*place);
+            *ago_s += motion.dt;
+        }
+        self.standing.retain(|(_, ago_s)| *ago_s < STANDING_S);
     }
 
     /// What everybody looks like who is seen whole.
@@ -291,9 +313,13 @@ impl Lock {
 
     /// Nobody else is near a track.
     fn is_alone(&self, track: &Track, tracks: &[Track]) -> bool {
-        let place = |track: &Track| track.estimate.person.position.xy();
-        let off_m = |other: &Track| nalgebra::distance(&place(track), &place(other));
-        tracks.iter().all(|other| other.id == track.id || off_m(other) >= self.settings.alone_m)
+        tracks.iter().all(|other| other.id == track.id || self.are_apart(other, track))
+    }
+
+    /// So far apart that neither is taken for the other.
+    fn are_apart(&self, a: &Track, b: &Track) -> bool {
+        let [a, b] = [a, b].map(|track| track.estimate.person.position.xy());
+        nalgebra::distance(&a, &b) >= self.settings.alone_m
     }
 
     /// The track is not seen.
@@ -343,7 +369,8 @@ impl Lock {
         }
         let enough = logit(self.settings.again_from);
         let mut seen = BTreeMap::new();
-        for track in tracks.iter().filter(|track| self.is_in_reach(track)) {
+        let may_be = |track: &&Track| !self.is_other(track) && self.is_in_reach(track);
+        for track in tracks.iter().filter(may_be) {
             let Some(odds) = log_odds.get(&track.id) else { continue };
             let (before, times) = self.candidates.get(&track.id).copied().unwrap_or_default();
             // Evidence adds up, but looks of one moment to the next are much the same.
@@ -384,6 +411,25 @@ impl Lock {
         self.sightings = self.sightings.saturating_add(1);
     }
 
+    /// A track is not the person. Neither is who is seen later where it stood: a thing
+    /// that was taken for somebody stays where it is, but its track does not live on
+    /// while the robot looks elsewhere.
+    fn note_other(&mut self, track: &Track) {
+        let Person { position, velocity, .. } = &track.estimate.person;
+        self.others.insert(track.id);
+        if velocity.norm() < STANDS_MPS {
+            let place = position.xy();
+            self.standing.retain(|(other, _)| nalgebra::distance(other, &place) > SAME_PLACE_M);
+            self.standing.push((place, 0.0));
+        }
+    }
+
+    fn is_other(&self, track: &Track) -> bool {
+        let place = track.estimate.person.position.xy();
+        let mut standing = self.standing.iter().map(|(other, _)| nalgebra::distance(other, &place));
+        self.others.contains(&track.id) || standing.any(|off_m| off_m <= SAME_PLACE_M)
+    }
+
     fn lose(&mut self, why: &'static str) {
         self.candidates.clear();
         self.go(LockState::Lost, why);
@@ -396,6 +442,27 @@ impl Lock {
         if state == LockState::Suspect {
             self.sightings = 0;
         }
+    }
+
+    /// Whoever is seen beside the person is not the person, until that track is out of
+    /// sight, or comes so near to the person's or to a new one that it may change over.
+    fn tell_apart(&mut self, tracks: &[Track]) {
+        let is_own = |track: &Track| Some(track.id) == self.track;
+        let is_sure = self.state.follows() && !self.state.doubts() && self.belief >= logit(SURE);
+        let own = tracks.iter().find(|track| is_own(track) && track.seen && is_sure);
+        let is_beside =
+            |track: &Track| own.is_some_and(|own| track.seen && self.are_apart(own, track));
+        let is_known = |track: &Track| self.others.contains(&track.id);
+        let may_be_taken = |track: &Track| {
+            let mut others = tracks.iter().filter(|t| is_own(t) || t.seen && !is_known(t));
+            others.any(|other| other.id != track.id && !self.are_apart(other, track))
+        };
+        let stays =
+            |track: &&Track| is_known(track) && track.unseen_s <= UNSEEN_S && !may_be_taken(track);
+        let stay = tracks.iter().filter(stays).map(|track| track.id).collect();
+        let beside: Vec<&Track> = tracks.iter().filter(|t| !is_own(t) && is_beside(t)).collect();
+        self.others = stay;
+        beside.into_iter().for_each(|track| self.note_other(track));
     }
 
     /// Learns what the person looks like, and others, while that is certain.

@@ -97,6 +97,36 @@ fn a_person_who_comes_back_is_known_again_after_several_sightings() {
     assert_eq!(reports[found.unwrap() + 19].command.unwrap().reason, Reason::Unsure);
 }
 
+/// A coat stand looks like the person; it was seen beside them, and out of sight since.
+#[test]
+fn what_stood_beside_the_person_is_never_taken_for_them() {
+    for (back, is_taken) in [((3.0, -1.5), false), ((3.0, -0.8), true)] {
+        let people = |i| match i {
+            0..20 => vec![tall(1.6, 2.0, 0.0), tall(1.6, 3.0, -1.5)],
+            20..40 => vec![tall(1.6, 3.0, -1.5)],
+            40..60 => vec![],
+            _ => vec![tall(1.6, back.0, back.1)],
+        };
+        let reports = ride("", 100, people);
+        assert!(reports[..20].iter().all(|r| r.target.is_some()));
+        assert!(reports[45..60].iter().all(|r| r.target.is_none()), "{:?}", states(&reports));
+        assert_eq!(reports[99].target.is_some(), is_taken, "{:?}", states(&reports));
+    }
+}
+
+/// Others walk beside the person, and go on alone.
+#[test]
+fn who_walked_beside_the_person_is_not_taken_for_them_while_in_sight() {
+    let people = |i| {
+        let along_m = 2.0 + 0.05 * f64::from(i);
+        let mut seen = vec![tall(1.6, along_m, -1.0)];
+        seen.extend((i < 20).then(|| tall(1.6, along_m, 0.5)));
+        seen
+    };
+    let reports = ride("", 90, people);
+    assert!(reports[45..].iter().all(|r| r.target.is_none()), "{:?}", states(&reports));
+}
+
 #[test]
 fn nobody_comes_back_from_farther_than_they_can_have_got() {
     let people = |i| match i {
