@@ -2,6 +2,8 @@ use std::any::{Any, TypeId};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use nalgebra::Point3;
+
 use crate::{Camera, DepthImage, Error, GreyImage, Motion, Recorded, Result, RgbImage, Stamp};
 
 /// The images that one moment delivered. All have the size of the camera's
@@ -54,6 +56,7 @@ pub struct Frame {
     pub motion: Motion,
     images: Images,
     recorded: Option<Vec<Recorded>>,
+    laser: Option<Arc<[Point3<f64>]>>,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
 }
@@ -74,6 +77,7 @@ impl Frame {
             motion,
             images,
             recorded: None,
+            laser: None,
             grey: OnceLock::new(),
             derived: Mutex::default(),
         }
@@ -90,12 +94,24 @@ impl Frame {
         self.recorded.as_deref()
     }
 
+    /// The same frame with what a laser scanner met.
+    pub fn with_laser(self, laser: Option<Arc<[Point3<f64>]>>) -> Self {
+        Self { laser, ..self }
+    }
+
+    /// Where the rays of a laser scanner met something, robot frame at the time of the
+    /// image, m; `None` without a scanner, or where it was silent.
+    pub fn laser(&self) -> Option<&[Point3<f64>]> {
+        self.laser.as_deref()
+    }
+
     /// The same moment with a depth image.
     pub fn with_depth(&self, depth: Arc<DepthImage>) -> Self {
         let images = Images { depth: Some(depth), ..self.images.clone() };
         let camera = Arc::clone(&self.camera);
         let frame = Self::new(self.index, self.stamp, camera, self.motion, images);
-        Self { recorded: self.recorded.clone(), grey: self.grey.clone(), ..frame }
+        let (recorded, laser) = (self.recorded.clone(), self.laser.clone());
+        Self { recorded, laser, grey: self.grey.clone(), ..frame }
     }
 
     /// The images as they came.
@@ -187,6 +203,16 @@ mod tests {
         assert_eq!(frame.derived::<Mean>().unwrap().0, 2.0);
         assert_eq!(frame.derived::<Mean>().unwrap().0, 2.0);
         assert_eq!(COMPUTED.load(Ordering::Relaxed), 1);
+    }
+
+    #[test]
+    fn depth_that_is_added_leaves_the_rest() {
+        let laser: Arc<[Point3<f64>]> = Arc::new([Point3::new(1.0, 0.5, 0.2)]);
+        let frame = frame(Images::default()).with_laser(Some(laser)).with_recorded(Some(vec![]));
+        let with_depth = frame.with_depth(Arc::new(DepthImage::filled(4, 4, 2.0)));
+        assert!(with_depth.depth().is_ok());
+        assert_eq!(with_depth.laser(), frame.laser());
+        assert_eq!(with_depth.recorded().map(<[_]>::len), Some(0));
     }
 
     #[test]

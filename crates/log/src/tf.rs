@@ -164,7 +164,9 @@ fn interpolate(
     let span = t1.seconds_since(*t0);
     let part = if span > 0.0 { at.seconds_since(*t0) / span } else { 0.0 };
     let translation = a.translation.vector.lerp(&b.translation.vector, part);
-    let rotation = a.rotation.try_slerp(&b.rotation, part, 1e-9).unwrap_or(a.rotation);
+    // Between rotations that are nearly the same the result is not quite of length one.
+    let mut rotation = a.rotation.try_slerp(&b.rotation, part, 1e-9).unwrap_or(a.rotation);
+    rotation.renormalize();
     Isometry3::from_parts(translation.into(), rotation)
 }
 

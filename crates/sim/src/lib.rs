@@ -41,6 +41,7 @@
 mod behaviour;
 mod body;
 mod gait;
+mod laser;
 mod material;
 mod mirror;
 mod parallel;
@@ -61,6 +62,7 @@ mod variation;
 mod webcam;
 mod world;
 
+pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;
 pub use person::Extra;
 pub use robot::Encoder;

@@ -6,6 +6,7 @@ use tagalong_core::ConfigError;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
+use crate::laser::LaserSettings;
 use crate::mirror::MirrorSettings;
 use crate::person::Extra;
 use crate::split::{SUBJECTS, Split};
@@ -36,6 +37,8 @@ pub struct Scene {
     pub robot: RobotSettings,
     /// What goes wrong on the way into the log.
     pub faults: FaultSettings,
+    /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
+    pub laser: Option<LaserSettings>,
     /// Cameras that hang in the room.
     pub webcams: Vec<WebcamSettings>,
     /// What stands around.
@@ -56,6 +59,7 @@ impl Default for Scene {
             camera: CameraSettings::default(),
             robot: RobotSettings::default(),
             faults: FaultSettings::default(),
+            laser: None,
             webcams: Vec::new(),
             furniture: Vec::new(),
             people: Vec::new(),
@@ -179,7 +183,8 @@ impl Scene {
             ),
         ];
         let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
-        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(webcams);
+        let laser = self.laser.iter().flat_map(LaserSettings::rules);
+        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(webcams).chain(laser);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
             None => Ok(()),

@@ -24,7 +24,7 @@ use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
 use crate::split::{SUBJECTS, Split};
 use crate::webcam::Webcam;
-use crate::world::{Hit, Lamp, Object, World};
+use crate::world::{self, Hit, Lamp, Object, World};
 
 /// So many of a crowd come as two.
 const CROWD_PAIRS: f64 = 0.3;
@@ -96,6 +96,9 @@ pub struct Shot {
     /// Colour and depth, the grey images of a stereo pair, or the circular image
     /// of a mirror.
     pub images: Images,
+    /// What the rays of a laser scanner measure, m, in the order of
+    /// [`LaserSettings::directions`](crate::LaserSettings::directions); none without one.
+    pub laser: Option<Vec<f32>>,
     /// Everybody.
     pub truth: Vec<Truth>,
     /// The robot in the world, m and rad.
@@ -240,16 +243,9 @@ impl Simulation {
         });
         let things = rays.map(|(height_m, angle)| {
             let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            self.first_thing(&Point3::new(robot.x, robot.y, height_m), &ray)
+            world::distance(&self.fixed, &Point3::new(robot.x, robot.y, height_m), &ray)
         });
         Clearance { people_m: least(&mut { people }), things_m: least(&mut { things }) }
-    }
-
-    /// How far it is to furniture or a wall in a direction of length one, m.
-    fn first_thing(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
-        let solids = self.fixed.iter().flat_map(|object| &object.shapes);
-        let met = solids.filter(|shape| shape.near(eye, ray, 1.0)).filter_map(|s| s.meet(eye, ray));
-        met.fold(f64::INFINITY, f64::min)
     }
 
     /// The robot's forward speed over ground, m/s.
@@ -358,9 +354,11 @@ impl Simulation {
             CameraKind::Stereo => self.stereo(&world, &seen),
             CameraKind::Panorama => self.circle(&seen),
         };
+        let seed = self.moment(0, 1.0).seed;
+        let laser = self.scene.laser.as_ref().map(|laser| laser.measure(&world, &pose, seed));
         let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
         let depth_ns = captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64;
-        Shot { captured_ns, recorded_ns, depth_ns, images, truth, world_from_robot }
+        Shot { captured_ns, recorded_ns, depth_ns, images, laser, truth, world_from_robot }
     }
 
     /// Who is in the room, with their numbers.

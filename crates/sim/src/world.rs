@@ -76,6 +76,12 @@ impl World {
         numbered.flat_map(|(index, object)| object.shapes.iter().map(move |shape| (index, shape)))
     }
 
+    /// How far it is to the first solid in a direction of length one, m; infinite
+    /// where there is none.
+    pub(crate) fn distance(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+        distance(&self.objects, eye, ray)
+    }
+
     /// The first of some solids that a ray meets: for rays that have no eye in
     /// common, and the reference for those that have.
     pub(crate) fn first<'a>(
@@ -152,6 +158,14 @@ impl Hit {
     /// What a ray meets that goes on for ever.
     pub const NOTHING: Self =
         Self { t: f64::INFINITY, light: [0.0; 3], infrared: 0.0, facing: 0.0, person: None };
+}
+
+/// How far it is to the first solid of some objects in a direction of length one, m;
+/// infinite where there is none.
+pub(crate) fn distance(objects: &[Object], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+    let solids = objects.iter().flat_map(|object| &object.shapes);
+    let met = solids.filter(|shape| shape.near(eye, ray, 1.0)).filter_map(|s| s.meet(eye, ray));
+    met.fold(f64::INFINITY, f64::min)
 }
 
 fn scaled_light(colour: Colour, lux: f64) -> Colour {

@@ -1,0 +1,179 @@
+//! A laser scanner: rays in one plane around the robot.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::random::{mix, normal_at};
+use crate::world::World;
+
+/// A laser scanner on the robot, above the point between its wheels. It looks
+/// whenever the camera does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LaserSettings {
+    /// Rays in a scan.
+    pub rays: usize,
+    /// Around the direction ahead, degrees; 360 is all around.
+    pub field_of_view_deg: f64,
+    /// Height above the floor, m.
+    pub height_m: f64,
+    /// Nearest range that is measured, m.
+    pub min_range_m: f64,
+    /// Farthest range that is measured, m.
+    pub max_range_m: f64,
+    /// Standard deviation of a range, m.
+    pub sigma_m: f64,
+}
+
+impl Default for LaserSettings {
+    fn default() -> Self {
+        Self {
+            rays: 360,
+            field_of_view_deg: 360.0,
+            height_m: 0.2,
+            min_range_m: 0.12,
+            max_range_m: 8.0,
+            sigma_m: 0.01,
+        }
+    }
+}
+
+impl LaserSettings {
+    /// What must hold, and what to say where it does not.
+    pub(crate) fn rules(&self) -> [(bool, &'static str); 4] {
+        let ranges = 0.0 <= self.min_range_m
+            && self.min_range_m < self.max_range_m
+            && self.max_range_m <= 100.0;
+        [
+            ((2..=4096).contains(&self.rays), "laser.rays must be in 2 to 4096"),
+            (
+                (10.0..=360.0).contains(&self.field_of_view_deg),
+                "laser.field_of_view_deg must be in 10 to 360",
+            ),
+            ((0.02..=2.0).contains(&self.height_m), "laser.height_m must be in 0.02 to 2"),
+            (
+                ranges && (0.0..=1.0).contains(&self.sigma_m),
+                "laser ranges must grow from 0 to 100 at most, and laser.sigma_m be in 0 to 1",
+            ),
+        ]
+    }
+
+    /// Direction of the first ray, robot frame, to the left positive, rad.
+    pub fn first_rad(&self) -> f64 {
+        -0.5 * self.field_of_view_deg.to_radians()
+    }
+
+    /// From one ray to the next, rad.
+    pub fn step_rad(&self) -> f64 {
+        let whole = self.field_of_view_deg >= 360.0;
+        let gaps = if whole { self.rays } else { self.rays - 1 };
+        self.field_of_view_deg.to_radians().min(TAU) / gaps as f64
+    }
+
+    /// Directions of the rays, robot frame, to the left positive, rad.
+    pub fn directions(&self) -> impl Iterator<Item = f64> + use<> {
+        let (first, step) = (self.first_rad(), self.step_rad());
+        (0..self.rays).map(move |ray| first + ray as f64 * step)
+    }
+
+    /// What the rays measure, m; infinite where nothing is near enough, NaN where
+    /// something is too near. The noise depends on the seed.
+    pub(crate) fn measure(
+        &self,
+        world: &World,
+        world_from_robot: &Isometry3<f64>,
+        seed: u64,
+    ) -> Vec<f32> {
+        let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
+        let seed = mix(seed, self.rays as u64);
+        let range = |(ray, direction): (u64, f64)| {
+            let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
+            let metres = world.distance(&eye, &(world_from_robot.rotation * ahead));
+            let measured = metres + self.sigma_m * normal_at(seed, ray);
+            match () {
+                () if measured > self.max_range_m => f32::INFINITY,
+                () if measured < self.min_range_m => f32::NAN,
+                () => measured as f32,
+            }
+        };
+        (0..).zip(self.directions()).map(range).collect()
+    }
+
+    /// The points that some ranges stand for, robot frame, m.
+    pub fn points(&self, ranges: &[f32]) -> impl Iterator<Item = Point3<f64>> {
+        let met = self.directions().zip(ranges).filter(|(_, range)| range.is_finite());
+        let height_m = self.height_m;
+        met.map(move |(direction, range)| {
+            let range = f64::from(*range);
+            Point3::new(range * direction.cos(), range * direction.sin(), height_m)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+
+    use super::*;
+    use crate::material::Material;
+    use crate::shape::{Form, Shape};
+    use crate::world::Object;
+
+    const FOUR: LaserSettings = LaserSettings {
+        rays: 4,
+        field_of_view_deg: 360.0,
+        height_m: 0.2,
+        min_range_m: 0.3,
+        max_range_m: 8.0,
+        sigma_m: 0.0,
+    };
+
+    /// Balls of half a metre at these places.
+    fn world(places: &[[f64; 2]]) -> World {
+        let ball = |at: &[f64; 2]| {
+            let form = Form::Ellipsoid(Vector3::repeat(0.5));
+            let at = Point3::new(at[0], at[1], 0.2);
+            Shape::new(form, at, Rotation3::identity(), Material::plain([0.5; 3]))
+        };
+        let objects = vec![Object::new(places.iter().map(ball).collect(), Some(1), true)];
+        World::new(objects, Vec::new(), 100.0)
+    }
+
+    #[test]
+    fn rays_go_round_the_robot_and_meet_what_is_nearest() {
+        let world = world(&[[3.0, 1.0], [5.0, 1.0], [1.0, 4.0], [0.3, 1.0]]);
+        let robot = Isometry3::translation(1.0, 1.0, 0.0);
+        let ranges = FOUR.measure(&world, &robot, 1);
+        let near = |range: f32, metres: f32| (range - metres).abs() < 1e-5;
+        assert!(ranges[0].is_nan(), "behind, something is too near: {ranges:?}");
+        assert_eq!(ranges[1], f32::INFINITY, "nothing to the right");
+        assert!(near(ranges[2], 1.5) && near(ranges[3], 2.5), "ahead and left: {ranges:?}");
+        let points: Vec<Point3<f64>> = FOUR.points(&ranges).collect();
+        assert!((points[0] - Point3::new(1.5, 0.0, 0.2)).norm() < 1e-6);
+        assert!((points[1] - Point3::new(0.0, 2.5, 0.2)).norm() < 1e-6);
+        assert_eq!(points.len(), 2);
+    }
+
+    #[test]
+    fn the_rays_of_a_narrow_scanner_reach_both_ends_of_its_view() {
+        let narrow = LaserSettings { field_of_view_deg: 90.0, rays: 91, ..FOUR };
+        let directions: Vec<f64> = narrow.directions().map(f64::to_degrees).collect();
+        assert!((directions[0] + 45.0).abs() < 1e-9 && (directions[90] - 45.0).abs() < 1e-9);
+        assert!((FOUR.step_rad().to_degrees() - 90.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn noise_has_the_deviation_that_is_asked_for() {
+        let world = world(&[[3.0, 0.0]]);
+        let noisy = LaserSettings { sigma_m: 0.05, ..FOUR };
+        let off = |seed| {
+            let ranges = noisy.measure(&world, &Isometry3::identity(), seed);
+            f64::from(ranges[2]) - 2.5
+        };
+        let variance = (0..400).map(|seed| off(seed).powi(2)).sum::<f64>() / 400.0;
+        assert!((0.04..0.06).contains(&variance.sqrt()), "{variance}");
+    }
+}
