@@ -15,7 +15,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{
-    CameraInfo, Detection2DArray, Detection3DArray, Message, Odometry, TFMessage, encode,
+    CameraInfo, Detection2DArray, Detection3DArray, LaserScan, Message, Odometry, TFMessage, encode,
 };
 
 use crate::BridgeError;
@@ -130,6 +130,7 @@ impl Network {
             }
             CameraInfo::TYPE => self.plain::<CameraInfo>(topic, sensor(OTHERS), inbox),
             Odometry::TYPE => self.plain::<Odometry>(topic, sensor(OTHERS), inbox),
+            LaserScan::TYPE => self.plain::<LaserScan>(topic, sensor(OTHERS), inbox),
             TFMessage::TYPE if topic.ends_with("tf_static") => {
                 self.plain::<TFMessage>(topic, latched(), inbox)
             }

@@ -18,6 +18,9 @@ pub struct InputSettings {
     pub depth_info_topic: Option<String>,
     /// Topic of the odometry; without one, tf from `odom_frame` to the robot is used.
     pub odometry_topic: Option<String>,
+    /// Topic of a laser scanner's scans (`sensor_msgs` LaserScan), for the governor of a
+    /// robot that is steered.
+    pub laser_topic: Option<String>,
     /// Topic of detections that another program recorded (`vision_msgs`
     /// Detection2DArray or Detection3DArray), for `recorded-detections`.
     pub detections_topic: Option<String>,
@@ -56,6 +59,7 @@ impl Default for InputSettings {
             colour_info_topic: None,
             depth_info_topic: None,
             odometry_topic: None,
+            laser_topic: None,
             detections_topic: None,
             right_topic: None,
             right_info_topic: None,

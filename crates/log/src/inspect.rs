@@ -60,7 +60,8 @@ pub struct Inspection {
     pub skew: Option<Skew>,
     /// The transforms: each frame with its parent.
     pub transforms: BTreeMap<String, String>,
-    /// What a pipeline could use: `colour`, `depth`, `right`, `odometry`.
+    /// What a pipeline could use: `colour`, `depth`, `right`, `odometry`,
+    /// `laser`.
     pub usable: Vec<&'static str>,
     /// Why no frames can be made, if so.
     pub unusable: Option<String>,
@@ -154,6 +155,7 @@ impl Inspection {
             ("depth", &facts.depth_topic),
             ("right", &facts.right_topic),
             ("odometry", &facts.odometry_topic),
+            ("laser", &facts.laser_topic),
         ];
         self.usable = usable.iter().filter(|(_, t)| t.is_some()).map(|(name, _)| *name).collect();
         let stamps = |topic: &Option<String>| {

@@ -11,7 +11,9 @@ use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
 use crate::mcap_walk::{Channel, Counters, Message, Walker};
-use crate::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, decode};
+use crate::msgs::{
+    CameraInfo, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
+};
 use crate::tf::TfBuffer;
 use crate::{Limits, LogError};
 
@@ -26,6 +28,7 @@ pub(crate) enum Type {
     CameraInfo,
     Tf,
     Odometry,
+    LaserScan,
     Detections2D,
     Detections3D,
     Other,
@@ -41,6 +44,7 @@ impl Type {
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
+            ("sensor_msgs", "LaserScan") => Self::LaserScan,
             ("vision_msgs", "Detection2DArray") => Self::Detections2D,
             ("vision_msgs", "Detection3DArray") => Self::Detections3D,
             _ => Self::Other,
@@ -267,6 +271,7 @@ impl Gathering {
             Type::Image => topic.take_image(message.data, unit),
             Type::CompressedImage => topic.take_compressed(message.data),
             Type::Odometry => topic.take_odometry(message.data),
+            Type::LaserScan => topic.take_laser(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data),
             Type::Detections2D | Type::Detections3D | Type::Other => Some(()),
@@ -329,6 +334,12 @@ impl Topic {
     fn take_odometry(&mut self, data: &[u8]) -> Option<()> {
         let odometry: Odometry = decode(data).ok()?;
         self.take_header(odometry.header);
+        Some(())
+    }
+
+    fn take_laser(&mut self, data: &[u8]) -> Option<()> {
+        let scan: LaserScan = decode(data).ok()?;
+        self.take_header(scan.header);
         Some(())
     }
 

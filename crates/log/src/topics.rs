@@ -16,6 +16,7 @@ pub(crate) struct Chosen {
     pub(crate) depth_info: Option<String>,
     pub(crate) right_info: Option<String>,
     pub(crate) odometry: Option<String>,
+    pub(crate) laser: Option<String>,
     pub(crate) detections: Option<String>,
 }
 
@@ -25,7 +26,7 @@ impl Chosen {
         let Self { colour, depth, right, colour_info, depth_info, right_info, .. } = self;
         [colour, depth, right, colour_info, depth_info, right_info]
             .into_iter()
-            .chain([&self.odometry, &self.detections])
+            .chain([&self.odometry, &self.laser, &self.detections])
             .any(|chosen| chosen.as_deref() == Some(topic))
     }
 }
@@ -60,6 +61,8 @@ pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result
         depth,
         right,
         odometry,
+        laser: named("laser_topic", &input.laser_topic, &[Type::LaserScan])?
+            .or_else(|| best(scan, laser_rank)),
         detections: named("detections_topic", &input.detections_topic, detections)?,
     };
     check(scan, &chosen, needs)?;
@@ -170,6 +173,11 @@ fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
 fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
     let filtered = has(name, &["filtered", "fused"]);
     (topic.kind == Type::Odometry).then(|| i32::from(!has(name, &["visual"])) + i32::from(filtered))
+}
+
+fn laser_rank(name: &str, topic: &Topic) -> Option<i32> {
+    let rank = 2 * i32::from(name.ends_with("/scan")) - i32::from(has(name, &["rear", "back"]));
+    (topic.kind == Type::LaserScan).then_some(rank)
 }
 
 /// The calibration of an image topic: its `camera_info` sibling, else the only

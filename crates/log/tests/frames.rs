@@ -7,7 +7,7 @@ use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
 use mcap::WriteOptions;
 use nalgebra::{Isometry3, Point2, Vector3};
 use tagalong_core::{Camera, DepthImage};
-use tagalong_log::msgs::{CameraInfo, Image, encode_big_endian};
+use tagalong_log::msgs::{CameraInfo, Header, Image, LaserScan, encode_big_endian};
 use tagalong_log::{FrameSource, InputSettings, Limits, LogError, LogFrame, MountSettings, Needs};
 
 const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
@@ -177,6 +177,55 @@ fn odometry_is_taken_at_the_stamps_of_the_images() {
     assert_eq!(found[0].frame.motion.dt, 0.0);
 }
 
+/// A scanner 0.2 m ahead of the robot's middle sees a wall 5 m ahead of the start, ten
+/// times a second, while the robot drives towards it at 0.4 m/s.
+fn with_scanner(log: &mut LogWriter) {
+    for i in 0..20 {
+        let t = f64::from(i) * 0.1;
+        log.odometry(at(t), 0.4 * t, 0.0);
+        let scan = LaserScan {
+            header: Header::new(at(t), "laser"),
+            angle_increment: 0.1,
+            range_min: 0.1,
+            range_max: 20.0,
+            ranges: vec![(4.8 - 0.4 * t) as f32, f32::INFINITY],
+            ..LaserScan::default()
+        };
+        log.message("/scan", at(t), &scan);
+        log.colour(at(t + 0.05));
+    }
+}
+
+#[test]
+fn what_a_laser_met_is_where_it_is_at_the_time_of_the_image() {
+    let mut log = started();
+    let ahead = Isometry3::translation(0.2, 0.0, 0.15);
+    log.fixed("base_link", "laser", &ahead);
+    with_scanner(&mut log);
+    let (mut source, _saved) = open(log, Needs::default());
+    assert_eq!(source.facts().laser_topic.as_deref(), Some("/scan"));
+    let found = frames(&mut source);
+    assert_eq!(found.len(), 20);
+    for found in &found {
+        let t = found.frame.stamp.seconds_since(at(0.0));
+        let [wall] = found.frame.laser().unwrap() else { panic!("one ray met something") };
+        assert!((wall.x - (5.0 - 0.4 * t)).abs() < 1e-5 && (wall.z - 0.15).abs() < 1e-6, "{wall}");
+    }
+    assert_eq!(count(&source, "frames_without_laser"), 0);
+}
+
+#[test]
+fn a_laser_without_a_place_or_silent_for_long_is_told() {
+    let mut log = started();
+    with_scanner(&mut log);
+    log.colour(at(3.0));
+    let (mut source, _saved) = open(log, Needs::default());
+    assert!(frames(&mut source).iter().all(|found| found.frame.laser().is_none()));
+    assert_eq!(count(&source, "laser_scans_without_pose"), 20);
+    assert_eq!(count(&source, "frames_without_laser"), 1);
+    assert_eq!(source.notes().iter().filter(|note| note.contains("laser scanner")).count(), 1);
+}
+
 #[test]
 fn gaps_and_jumps_of_odometry_are_told() {
     let mut log = started();
@@ -234,7 +283,7 @@ fn both_byte_orders_and_every_compression_give_the_same_frames() {
         log.bytes::<CameraInfo>(INFO, at(0.0), &encode_big_endian(&info));
         let data: Vec<u8> = (0..16 * 12 * 3).map(|v| v as u8).collect();
         let mut image = Image {
-            header: tagalong_log::msgs::Header::new(at(1.0), "colour"),
+            header: Header::new(at(1.0), "colour"),
             height: 12,
             width: 16,
             encoding: "bgr8".into(),
@@ -243,7 +292,7 @@ fn both_byte_orders_and_every_compression_give_the_same_frames() {
             data: &data,
         };
         log.bytes::<Image<'_>>("/camera/color/image_raw", at(1.0), &encode_big_endian(&image));
-        image.header = tagalong_log::msgs::Header::new(at(2.0), "colour");
+        image.header = Header::new(at(2.0), "colour");
         log.message("/camera/color/image_raw", at(2.0), &image);
         let (mut source, _saved) = open(log, Needs { colour: true, ..Needs::default() });
         let found = frames(&mut source);

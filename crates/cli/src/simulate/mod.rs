@@ -161,7 +161,7 @@ mod tests {
 
     use super::*;
 
-    const SCENE: &str = "seed = 3\nduration_s = 3.0\n[camera]\nwidth = 64\nheight = 48\n\
+    const SCENE: &str = "seed = 3\nduration_s = 3.0\n[laser]\nrays = 90\n[camera]\nwidth = 64\nheight = 48\n\
         rate_hz = 20.0\ndepth_offset_s = 0.015\nrolling_shutter_s = 0.015\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.1\n\
         [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
 
@@ -209,6 +209,9 @@ mod tests {
             let (a, b) = (logged.frame.depth().unwrap(), drawn.depth().unwrap());
             let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
             assert!(a.pixels().iter().zip(b.pixels()).all(same));
+            let (a, b) = (logged.frame.laser().unwrap(), drawn.laser().unwrap());
+            assert!(a.len() == b.len() && a.len() > 80);
+            assert!(a.iter().zip(b).all(|(a, b)| (a - b).norm() < 1e-5), "{:?} {:?}", a[0], b[0]);
             frames += 1;
         }
         assert!(frames > 40 && draw.next_frame().is_none(), "{frames}");

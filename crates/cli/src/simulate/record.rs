@@ -7,15 +7,18 @@ use tagalong_core::{
     Camera, ConicalMirror, DepthImage, GreyImage, Lens, Panorama, Rect, RgbImage, Stamp,
 };
 use tagalong_log::msgs::{
-    CameraInfo, CompressedImage, Header, Image, JointState, Odometry, PoseStamped, StringMsg,
-    TFMessage, TransformStamped, TwistStamped,
+    CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry, PoseStamped,
+    StringMsg, TFMessage, TransformStamped, TwistStamped,
 };
 use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{TruthFrame, TruthPerson};
-use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot};
+use tagalong_sim::{
+    Event, LaserSettings, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot,
+};
 
 /// The moment at which every drawn log starts.
 const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
+const LASER_FRAME: &str = "laser";
 const CAMERA_FRAME: &str = "camera_color_optical_frame";
 /// The wheels of the encoders, left and right.
 const WHEEL_JOINTS: [&str; 2] = ["left_wheel_joint", "right_wheel_joint"];
@@ -38,6 +41,7 @@ pub struct Recorder {
     log: MessageLog,
     camera: Camera,
     mirror: Option<ConicalMirror>,
+    laser: Option<LaserSettings>,
     webcams: Vec<Camera>,
 }
 
@@ -52,13 +56,16 @@ impl Recorder {
         log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
         let camera = simulation.camera().clone();
         log.send("/tf_static", EPOCH, &mount("base_link", [(CAMERA_FRAME.into(), &camera)]))?;
+        if let Some(laser) = &scene.laser {
+            log.send("/tf_static", EPOCH, &laser_mount(laser))?;
+        }
         let webcams: Vec<Camera> = simulation.webcams().cloned().collect();
         if !webcams.is_empty() {
             let named = webcams.iter().enumerate().map(|(i, camera)| (webcam_frame(i), camera));
             log.send(TRUE_WEBCAMS_TOPIC, EPOCH, &mount(WORLD_FRAME, named))?;
         }
         let mirror = simulation.panorama().map(|panorama: &Panorama| panorama.mirror);
-        Ok(Self { log, camera, mirror, webcams })
+        Ok(Self { log, camera, mirror, laser: scene.laser.clone(), webcams })
     }
 
     /// Writes one thing.
@@ -101,6 +108,9 @@ impl Recorder {
         let (captured, recorded) = (after(shot.captured_ns), after(shot.recorded_ns));
         let header = Header::new(captured, CAMERA_FRAME);
         let images = &shot.images;
+        if let Some((laser, ranges)) = self.laser.as_ref().zip(shot.laser.as_ref()) {
+            self.log.send("/scan", recorded, &scan(captured, laser, ranges))?;
+        }
         if let Some(colour) = &images.colour {
             self.info("color", recorded, &header, 0.0)?;
             self.colour("/camera/color", recorded, &header, colour)?;
@@ -229,6 +239,30 @@ fn mount<'a>(parent: &str, cameras: impl IntoIterator<Item = (String, &'a Camera
         transform: (&camera.robot_from_camera).into(),
     };
     TFMessage { transforms: cameras.into_iter().map(transform).collect() }
+}
+
+/// The static transform to a laser scanner.
+fn laser_mount(laser: &LaserSettings) -> TFMessage {
+    let transform = TransformStamped {
+        header: Header::new(EPOCH, "base_link"),
+        child_frame_id: LASER_FRAME.into(),
+        transform: (&Isometry3::translation(0.0, 0.0, laser.height_m)).into(),
+    };
+    TFMessage { transforms: vec![transform] }
+}
+
+fn scan(captured: Stamp, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
+    let (first, step) = (laser.first_rad(), laser.step_rad());
+    LaserScan {
+        header: Header::new(captured, LASER_FRAME),
+        angle_min: first as f32,
+        angle_max: (first + step * (laser.rays - 1) as f64) as f32,
+        angle_increment: step as f32,
+        range_min: laser.min_range_m as f32,
+        range_max: laser.max_range_m as f32,
+        ranges: ranges.to_vec(),
+        ..LaserScan::default()
+    }
 }
 
 /// A pose on the floor.

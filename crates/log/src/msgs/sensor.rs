@@ -82,6 +82,33 @@ pub struct CameraInfo {
 
 message!(CameraInfo, "sensor_msgs/msg/CameraInfo", "CameraInfo.msg");
 
+/// `sensor_msgs/LaserScan`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LaserScan {
+    /// When the first ray was sent, and by which scanner.
+    pub header: Header,
+    /// Direction of the first ray, rad, from X towards Y.
+    pub angle_min: f32,
+    /// Direction of the last one, rad.
+    pub angle_max: f32,
+    /// From one ray to the next, rad.
+    pub angle_increment: f32,
+    /// From one ray to the next, s.
+    pub time_increment: f32,
+    /// From one scan to the next, s.
+    pub scan_time: f32,
+    /// Nearest range that is measured, m.
+    pub range_min: f32,
+    /// Farthest range that is measured, m.
+    pub range_max: f32,
+    /// What the rays measured, m; what lies beyond the limits is no reading.
+    pub ranges: Vec<f32>,
+    /// How much came back, in units of the maker; may be empty.
+    pub intensities: Vec<f32>,
+}
+
+message!(LaserScan, "sensor_msgs/msg/LaserScan", "LaserScan.msg");
+
 /// `sensor_msgs/JointState`: lists of one length, or empty where nothing is known.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointState {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3};
+use nalgebra::{Isometry2, Isometry3, Point3};
 use tagalong_core::{
     Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Lens, Motion, Panorama, Pinhole,
     RightImage, Stamp, planar_pose,
@@ -11,6 +11,7 @@ use tagalong_vision::Unwrapping;
 
 use super::LogFrame;
 use super::intake::Intake;
+use super::mount::robot_frame;
 use super::pairing::Payload;
 use super::plan::Plan;
 use super::recorded::recorded;
@@ -94,8 +95,9 @@ impl Assembler {
             return None;
         }
         let recorded = recorded(plan, detections, intake, tally);
+        let laser = self.laser(plan, image.stamp, intake, tally);
         let mut item = self.finish(plan, image.stamp, camera, images, intake, tally);
-        item.frame = item.frame.with_recorded(recorded);
+        item.frame = item.frame.with_recorded(recorded).with_laser(laser);
         Some(item)
     }
 
@@ -220,6 +222,29 @@ impl Assembler {
             self.registration = Some(Registration::new(from, camera, colour_from_depth));
         }
         self.registration.as_ref()?.apply(seen).map(Arc::new)
+    }
+
+    /// What the laser scanner met, in the robot frame at the time of the image.
+    fn laser(
+        &self,
+        plan: &Plan,
+        stamp: Stamp,
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> Option<Arc<[Point3<f64>]>> {
+        plan.chosen.laser.as_ref()?;
+        let Some(scan) = intake.laser.near(stamp) else {
+            tally.count("frames_without_laser");
+            return None;
+        };
+        let robot = robot_frame(&plan.scan, &plan.input);
+        let Some(mount) = intake.tf.lookup(robot, &scan.frame_id, scan.stamp) else {
+            tally.count("laser_scans_without_pose");
+            tally.note("tf does not connect the laser scanner with the robot: it is not used");
+            return None;
+        };
+        let pose = |stamp| self.pose_at(plan, stamp, intake).pose;
+        Some(scan.seen_from(&mount, &(pose(stamp).inverse() * pose(scan.stamp))))
     }
 
     fn finish(

@@ -119,6 +119,7 @@ impl Assembly {
             depth_topic: chosen.depth.clone(),
             right_topic: chosen.right.clone(),
             odometry_topic: chosen.odometry.clone(),
+            laser_topic: chosen.laser.clone(),
             calibration_topic: self.plan.calibration_topic().cloned(),
             camera_frame: scan.frame_of(self.plan.primary()).map(str::to_owned),
             robot_frame: robot_frame(scan, &self.plan.input).to_owned(),

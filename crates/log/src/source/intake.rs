@@ -2,13 +2,14 @@
 
 use tagalong_core::planar_pose;
 
+use super::laser::Scans;
 use super::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use super::plan::Plan;
 use super::tally::Tally;
 use crate::InputSettings;
 use crate::mcap_walk::Message;
 use crate::msgs::{
-    CameraInfo, CdrError, CompressedImage, Header, Image, Odometry, TFMessage, decode,
+    CameraInfo, CdrError, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
 };
 use crate::odometry::PoseBuffer;
 use crate::scan::{Scan, Type, is_static};
@@ -25,6 +26,7 @@ pub(super) struct Intake {
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
     pub(super) detections: Waiting,
+    pub(super) laser: Scans,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
 }
@@ -42,6 +44,7 @@ impl Intake {
             depth: Waiting::default(),
             right: Waiting::default(),
             detections: Waiting::default(),
+            laser: Scans::default(),
             tf,
             poses: PoseBuffer::default(),
         }
@@ -58,6 +61,8 @@ impl Intake {
             payload(message).map(|image| self.right.push(image))
         } else if topic == self.chosen.detections.as_ref() {
             headed(message).map(|detections| self.detections.push(detections))
+        } else if topic == self.chosen.laser.as_ref() {
+            decode(message.data).map(|scan| self.take_scan(&scan, tally))
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
         } else if topic == self.chosen.colour_info.as_ref() {
@@ -95,6 +100,12 @@ impl Intake {
             pose.is_some_and(|pose| self.poses.push(odometry.header.stamp(), planar_pose(&pose)));
         if !taken {
             tally.lose("odometry_invalid", || "a pose of the odometry is not finite".into());
+        }
+    }
+
+    fn take_scan(&mut self, scan: &LaserScan, tally: &mut Tally) {
+        if !self.laser.push(scan) {
+            tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
         }
     }
 

@@ -3,6 +3,7 @@
 mod assemble;
 mod assembly;
 mod intake;
+mod laser;
 mod live;
 mod mount;
 mod pairing;
@@ -56,6 +57,8 @@ pub struct LogFacts {
     pub right_topic: Option<String>,
     /// Topic of the odometry.
     pub odometry_topic: Option<String>,
+    /// Topic of a laser scanner's scans.
+    pub laser_topic: Option<String>,
     /// Frame id of the images.
     pub camera_frame: Option<String>,
     /// Topic of the calibration that the frames have.
