@@ -3,6 +3,8 @@ use tagalong_core::{Camera, DepthImage, Motion, Person, Track, TrackId};
 
 use super::CorridorSettings;
 use super::corridor::{Ahead, Sign, ahead, is_thing};
+use super::felt::Felt;
+use super::settings::STANDS_S;
 
 /// Columns of the image that are looked at.
 const COLUMNS: usize = 160;
@@ -10,8 +12,6 @@ const COLUMNS: usize = 160;
 const CELL_M: f64 = 0.05;
 /// So many points in a cell are no noise.
 const ENOUGH: u16 = 3;
-/// What stands in its place for so long is a thing; somebody who walks by is not.
-const STANDS_S: f64 = 1.0;
 /// What was so close before the robot that it could not drive on, m, and left the
 /// image for its edge or below, is believed to be there for so long, s.
 const CLOSE_M: f64 = 0.6;
@@ -37,6 +37,8 @@ const HIDES_M: f64 = 0.4;
 #[derive(Default)]
 pub(crate) struct Surroundings {
     seen: Vec<Point3<f64>>,
+    /// What the rays of a laser scanner meet; `None` without one.
+    felt: Option<Felt>,
     /// Part of the image that has depth; `None` without a depth image.
     with_depth: Option<f64>,
     /// Columns of the image that are looked at.
@@ -94,6 +96,18 @@ impl Surroundings {
         self.remember(settings, target);
     }
 
+    /// Takes in what a laser scanner met; the robot moved by `motion` since the last
+    /// image.
+    pub(crate) fn feel(
+        &mut self,
+        settings: &CorridorSettings,
+        laser: Option<&[Point3<f64>]>,
+        motion: &Motion,
+    ) {
+        self.felt =
+            laser.map(|points| self.felt.take().unwrap_or_default().next(settings, points, motion));
+    }
+
     /// Other people who were seen are in the way where that was, until the camera
     /// sees past them or them elsewhere: somebody who steps before the robot is soon
     /// too near to be seen.
@@ -114,14 +128,17 @@ impl Surroundings {
         *self = Self::default();
     }
 
-    /// What is ahead on an arc, as [`ahead`]; `None` without a depth image.
+    /// What is ahead on an arc, as [`ahead`]; `None` with neither depth nor laser.
     pub(crate) fn ahead(
         &self,
         settings: &CorridorSettings,
         curvature: f64,
         target: Option<Point2<f64>>,
     ) -> Option<Ahead> {
-        if self.with_depth? < settings.min_seen {
+        if self.with_depth.is_none() && self.felt.is_none() {
+            return None;
+        }
+        if self.with_depth.is_some_and(|part| part < settings.min_seen) {
             return Some(Ahead::Blind);
         }
         let stays = |at: Point2<f64>, points| Sign { at, points, steps_in_m: 0.0 };
@@ -133,7 +150,11 @@ impl Surroundings {
         let unseen = unseen.map(|thing| stays(thing.at, settings.min_points));
         let hidden = self.columns.iter().filter(|column| column.is_hidden(settings));
         let hidden = hidden.map(|column| stays(column.at, 1));
-        Some(ahead(settings, seen.chain(unseen).chain(hidden), curvature, target))
+        let felt = self.felt.iter().flat_map(Felt::points).map(|(at, stood_s)| Sign {
+            steps_in_m: if self.grid.stands(&at) { 0.0 } else { settings.beside_m(stood_s) },
+            ..stays(at, settings.ray_points())
+        });
+        Some(ahead(settings, seen.chain(unseen).chain(hidden).chain(felt), curvature, target))
     }
 
     /// Moves the things into the robot's new frame, and forgets where the camera
@@ -599,6 +620,56 @@ mod tests {
         assert!(is_at(look(0..50), HIDES_M - settings.front_m));
         assert_eq!(look(0..20), Some(Ahead::Free), "gone");
         assert_eq!(look(0..23), Some(Ahead::Free), "too narrow");
+    }
+
+    /// A laser scanner meets the shins of somebody beside the robot, with and without a
+    /// depth image: in the way while they may step in, and of a bend as long as they are
+    /// there. What is high above is no obstacle, nor is the person who is followed; one
+    /// ray may be dust.
+    #[test]
+    fn what_a_laser_met_is_in_the_way_for_as_long_as_it_meets_it() {
+        let settings = CorridorSettings::default();
+        let still = Motion::at_rest(0.1);
+        let leg = [Point3::new(0.45, 0.5, 0.2), Point3::new(0.45, 0.52, 0.2)];
+        let shelf = leg.map(|point| point + Vector3::z() * 1.5);
+        let is_near = |ahead| matches!(ahead, Some(Ahead::Something(at)) if at < 0.7);
+        for depth in [Some(with_box(9.0, 0.0)), None] {
+            let mut surroundings = Surroundings::default();
+            let mut feel = |laser: &[Point3<f64>], curvature, target| {
+                surroundings.look(&settings, &camera(), depth.as_ref(), &still, None);
+                surroundings.feel(&settings, Some(laser), &still);
+                surroundings.ahead(&settings, curvature, target)
+            };
+            assert!(is_near(feel(&leg, 0.0, None)), "may step in");
+            (0..WAIT).for_each(|_| _ = feel(&leg, 0.0, None));
+            assert_eq!(feel(&leg, 0.0, None), Some(Ahead::Free), "stands beside the way");
+            assert!(is_near(feel(&leg, 1.2, None)), "in the way of a bend");
+            assert_eq!(feel(&leg, 1.2, Some(Point2::new(0.5, 0.5))), Some(Ahead::Free));
+            assert_eq!(feel(&leg[..1], 1.2, None), Some(Ahead::Free), "dust");
+            assert_eq!(feel(&shelf, 1.2, None), Some(Ahead::Free), "overhead");
+            assert_eq!(feel(&[], 1.2, None), Some(Ahead::Free), "gone");
+        }
+    }
+
+    /// The shins are 0.4 m beside the way, the body above is nearer; a table's leg stays
+    /// there, and so does what the camera saw standing.
+    #[test]
+    fn shins_count_for_more_than_the_legs_of_tables() {
+        let settings = CorridorSettings::default();
+        let still = Motion::at_rest(0.1);
+        let leg = [Point3::new(0.8, 0.4, 0.2), Point3::new(0.8, 0.42, 0.2)];
+        for (depth, free_after_s) in [(with_box(9.0, 0.0), 10.0), (with_box(0.8, 0.6), 1.0)] {
+            let mut surroundings = Surroundings::default();
+            let mut feel = |frame: u32| {
+                let depth = if frame < 15 { &depth } else { &with_box(9.0, 0.0) };
+                surroundings.look(&settings, &camera(), Some(depth), &still, None);
+                surroundings.feel(&settings, Some(&leg), &still);
+                surroundings.ahead(&settings, 0.0, None) == Some(Ahead::Free)
+            };
+            let free: Vec<bool> = (0..120).map(&mut feel).collect();
+            let first = free.iter().position(|free| *free).unwrap();
+            assert!((first as f64 * 0.1 - free_after_s).abs() < 0.3, "{first}");
+        }
     }
 
     #[test]
