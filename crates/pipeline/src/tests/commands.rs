@@ -1,6 +1,7 @@
 //! Faults on the way to the wheels: each leads to zero within the frame in which
 //! it is seen, or, where no frame comes, within a command's validity.
 
+use nalgebra::Point3;
 use tagalong_core::{Command, Frame, Images, Motion, Reason, Stamp, WheelSpeeds};
 
 use super::doubles::{PLAIN, World, camera, frame, person, scored};
@@ -46,6 +47,20 @@ fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
     pipeline.arm();
     assert!(is_moving(&pipeline.step(&frame(23, 2.3)).unwrap().command.unwrap()));
     assert!(!is_moving(&paused(1.0).1));
+}
+
+/// Somebody steps in from beside the camera, and is in no image.
+#[test]
+fn who_is_in_the_laser_scan_alone_is_not_driven_into() {
+    let (_, mut pipeline) = driving("");
+    let shins = [Point3::new(0.5, 0.3, 0.2), Point3::new(0.5, 0.15, 0.2)];
+    for (index, laser, reason) in [(21, &shins[..], Reason::Blocked), (22, &[], Reason::Limited)] {
+        let frame = frame(index, index as f64 * 0.1).with_laser(Some(laser.into()));
+        let command = pipeline.step(&frame).unwrap().command.unwrap();
+        assert_eq!(command.reason, reason, "{index}");
+        let WheelSpeeds { left, right } = command.wheels;
+        assert_eq!(left + right > 1e-9, laser.is_empty(), "turning is allowed: {command:?}");
+    }
 }
 
 #[test]
