@@ -4,7 +4,7 @@ use tagalong_core::GreyImage;
 
 use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
-use crate::winner::{Found, Winners};
+use crate::winner::{Found, FromRight, Winners};
 use crate::{Dropped, Method, StereoSettings, cost, paths, window};
 
 /// Rows above a strip from which the paths into it come.
@@ -18,8 +18,7 @@ pub struct Strip {
     costs: Vec<u8>,
     sums: Vec<u8>,
     winners: Winners,
-    /// Best cost and its disparity by column of the right image.
-    from_right: Vec<u16>,
+    from_right: FromRight,
     /// Excess costs of the paths from above left, above and above right.
     excess: [Excess; 3],
     /// Costs of the rows in the window, and their sums.
@@ -125,8 +124,8 @@ impl Strip {
         self.winners.find(self.sums.as_chunks::<D>().0);
         let mut found = Found { disparities, confidences };
         let refused = self.winners.judge(settings.uniqueness as f32, &mut found);
-        let (tolerance, best) = (settings.left_right, &mut self.from_right);
-        let disagree = self.winners.look_from_right(tolerance, best, found.disparities);
+        let (tolerance, buffers) = (settings.left_right, &mut self.from_right);
+        let disagree = self.winners.look_from_right(tolerance, buffers, found.disparities);
         self.dropped.outside += u64::from(refused.outside);
         self.dropped.not_unique += u64::from(refused.not_unique);
         self.dropped.left_right += u64::from(disagree);

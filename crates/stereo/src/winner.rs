@@ -58,32 +58,53 @@ impl Winners {
 
     /// Drops the disparities of pixels whose match in the right image has another
     /// best disparity, among those that won in the left one: off by more than
-    /// `tolerance`; returns how many that were. `best` is a buffer.
+    /// `tolerance`; returns how many that were.
     pub fn look_from_right(
         &self,
         tolerance: u8,
-        best: &mut Vec<u16>,
+        FromRight { best, back }: &mut FromRight,
         disparities: &mut [f32],
     ) -> u32 {
         // Right columns by how far they are right of the farthest match to the left.
         const REACH: usize = 256;
+        let width = self.disparity.len();
+        let (disparity, cost) = (&self.disparity[..width], &self.cost[..width]);
+        // An iterator that counts looks for an overflow, which takes as long as the rest.
+        let match_of = |x: usize| x.wrapping_add(REACH - usize::from(disparity[x]));
         best.clear();
-        best.resize(self.disparity.len() + REACH, u16::MAX);
-        for (x, (d, cost)) in self.disparity.iter().zip(&self.cost).enumerate() {
-            let Some(reach) = best[x..].first_chunk_mut::<{ REACH + 1 }>() else { break };
-            let best = &mut reach[REACH - usize::from(*d)];
-            *best = (*best).min(u16::from_be_bytes([*cost, *d]));
+        best.resize(width + REACH, u16::MAX);
+        for x in 0..width {
+            let best = &mut best[match_of(x)];
+            *best = (*best).min(u16::from_be_bytes([cost[x], disparity[x]]));
         }
-        let mut dropped = 0_u32;
-        let reaches = best.array_windows::<{ REACH + 1 }>();
-        for ((d, value), reach) in self.disparity.iter().zip(disparities).zip(reaches) {
-            let [_, back] = reach[REACH - usize::from(*d)].to_be_bytes();
-            let differ = d.abs_diff(back) > tolerance;
-            dropped = dropped.wrapping_add(u32::from(differ & !value.is_nan()));
-            *value = if differ { f32::NAN } else { *value };
+        back.resize(width, 0);
+        let back = &mut back[..width];
+        for x in 0..width {
+            [_, back[x]] = best[match_of(x)].to_be_bytes();
         }
-        dropped
+        leave_agreeing(disparity, back, tolerance, disparities)
     }
+}
+
+/// A row as it is seen from the right image; buffers.
+#[derive(Debug, Default)]
+pub struct FromRight {
+    /// Best cost and its disparity by column of the right image.
+    best: Vec<u16>,
+    /// That disparity where the pixels of the left image have their matches.
+    back: Vec<u8>,
+}
+
+/// Drops the disparities that differ from those of their matches, and counts them.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn leave_agreeing(there: &[u8], back: &[u8], tolerance: u8, disparities: &mut [f32]) -> u32 {
+    let mut dropped = 0_u32;
+    for ((there, back), value) in there.iter().zip(back).zip(disparities) {
+        let differ = there.abs_diff(*back) > tolerance;
+        dropped = dropped.wrapping_add(u32::from(differ & !value.is_nan()));
+        *value = if differ { f32::NAN } else { *value };
+    }
+    dropped
 }
 
 // One loop for each of a row's results: of all three in one loop, the compiler makes

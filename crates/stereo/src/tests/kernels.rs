@@ -10,7 +10,7 @@ use crate::paths::{Excess, Penalties};
 use crate::refine::Refiner;
 use crate::speckle::SpeckleFilter;
 use crate::texture::TextureTest;
-use crate::winner::{Found, Winners};
+use crate::winner::{Found, FromRight, Winners};
 use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window};
 
 const D: usize = 16;
@@ -35,7 +35,11 @@ fn features(pair: &[GreyImage], noise: u8, y: usize) -> (Features, Features) {
 fn cost_row(pair: &[GreyImage], noise: u8, y: usize) -> Vec<[u8; D]> {
     let (left, right) = features(pair, noise, y);
     let mut costs = vec![[0; D]; pair[0].width()];
-    cost::bits(&left, &right, &mut costs);
+    let mut columns = costs.clone();
+    cost::bits(&left, &right, &mut costs, &mut columns);
+    assert_eq!(costs, columns, "the sums of one row");
+    cost::bits(&left, &right, &mut costs, &mut columns);
+    assert_eq!(costs, columns, "a row in its own place");
     costs
 }
 
@@ -212,7 +216,7 @@ proptest! {
         let (mut disparities, mut confidences) = (vec![0.0; width], vec![0; width]);
         let mut found = Found { disparities: &mut disparities, confidences: &mut confidences };
         let refused = winners.judge(uniqueness, &mut found);
-        let disagree = winners.look_from_right(tolerance, &mut Vec::new(), &mut disparities);
+        let disagree = winners.look_from_right(tolerance, &mut FromRight::default(), &mut disparities);
         let (slow, counts) = reference::judged(&winners, uniqueness, tolerance);
         prop_assert_eq!([refused.outside, refused.not_unique, disagree], counts);
         for (fast, slow) in disparities.iter().zip(slow) {
