@@ -120,6 +120,8 @@ struct Equations {
     d: Vec<f32>,
     g: Vec<f32>,
     q: Vec<f32>,
+    /// Columns of the right image up to which the pixels are shifted.
+    columns: Vec<u32>,
 }
 
 impl Equations {
@@ -133,23 +135,42 @@ impl Equations {
             *own = if d.is_nan() { UNKNOWN } else { *d };
         }
         let (d, g, q) = (&self.d[from..to], &mut self.g[from..to], &mut self.q[from..to]);
-        between(right, d, g, q);
+        between(right, d, &mut self.columns, g, q);
         solve_for(left, d, gain(left, d, q), g, q);
     }
 }
 
+/// From this power of two on, the last bits of a number are a whole number as it is. A
+/// cast, which looks for what does not fit, is no vector instruction.
+const WHOLE: f32 = 8_388_608.0;
+const LAST_BITS: u32 = WHOLE as u32 - 1;
+
 /// Brightness and slope of the right image where the left pixels are in it; its
 /// border goes on.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn between(right: &[[f32; 2]], disparities: &[f32], slope: &mut [f32], level: &mut [f32]) {
-    let last = (right.len() - 2) as f32;
-    for (x, ((d, slope), level)) in disparities.iter().zip(slope).zip(level).enumerate() {
-        let at = (x as f32 - d).clamp(0.0, last);
-        let i = at as u32;
-        let part = at - i as f32;
-        let [here, next] = [right[i as usize], right[i as usize + 1]];
-        *level = here[0] + part * (next[0] - here[0]);
-        *slope = here[1] + part * (next[1] - here[1]);
+fn between(
+    right: &[[f32; 2]],
+    disparities: &[f32],
+    columns: &mut Vec<u32>,
+    slope: &mut [f32],
+    level: &mut [f32],
+) {
+    let width = disparities.len();
+    columns.resize(width, 0);
+    let columns = &mut columns[..width];
+    let (slope, level) = (&mut slope[..width], &mut level[..width]);
+    let last = (width - 1) as f32;
+    // Where that is first, apart from the images: so far it is vector instructions.
+    for x in 0..width {
+        let at = (x as i32 as f32 - disparities[x]).clamp(0.0, last);
+        columns[x] = (at.floor() + WHOLE).to_bits() & LAST_BITS;
+        level[x] = at - at.floor();
+    }
+    for x in 0..width {
+        let Some([here, next]) = right[columns[x] as usize..].first_chunk() else { break };
+        let part = level[x];
+        level[x] = here[0] + part * (next[0] - here[0]);
+        slope[x] = here[1] + part * (next[1] - here[1]);
     }
 }
 
