@@ -28,21 +28,22 @@ pub fn holes(image: &mut [f32], width: usize, most: &Most) -> u64 {
 }
 
 fn fill_row(row: &mut [f32], most: &Most) -> u64 {
-    let (mut filled, mut last) = (0, None::<usize>);
-    for x in 0..row.len() {
-        if row[x].is_nan() {
-            continue;
+    let mut filled = 0;
+    let mut known = next(row, 0, |v| !v.is_nan());
+    while let Some(hole) = known.and_then(|at| next(row, at, f32::is_nan)) {
+        known = next(row, hole, |v| !v.is_nan());
+        let Some(end) = known else { break };
+        if most.spans(end - hole, row[hole - 1], row[end]) {
+            bridge(&mut row[hole - 1..=end]);
+            filled += (end - hole) as u64;
         }
-        if let Some(from) = last {
-            let hole = x - from - 1;
-            if hole > 0 && most.spans(hole, row[from], row[x]) {
-                bridge(&mut row[from..=x]);
-                filled += hole as u64;
-            }
-        }
-        last = Some(x);
     }
     filled
+}
+
+/// The next column from `at` on that is so.
+fn next(row: &[f32], at: usize, is_so: impl Fn(f32) -> bool) -> Option<usize> {
+    row[at..].iter().position(|v| is_so(*v)).map(|columns| at + columns)
 }
 
 fn bridge(row: &mut [f32]) {

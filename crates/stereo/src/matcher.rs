@@ -92,8 +92,9 @@ impl Matcher {
         dropped.unsupported = self.texture.apply(left, settings.texture, &mut self.disparities);
         dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
         dropped.filled = fill::holes(&mut self.disparities, width, &holes);
-        let gone = self.disparities.iter().zip(&mut self.confidences);
-        gone.filter(|(d, _)| d.is_nan()).for_each(|(_, confidence)| *confidence = 0);
+        for (d, confidence) in self.disparities.iter().zip(&mut self.confidences) {
+            *confidence = if d.is_nan() { 0 } else { *confidence };
+        }
         let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());
         Ok(Disparities { width, values, confidences, dropped })
     }
