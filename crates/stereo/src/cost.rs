@@ -33,14 +33,28 @@ impl Features {
 /// Writes, for each column `x` and disparity `d`, in how many bits the left
 /// pixel `x` and the right pixel `x - d` differ. `right` is mirrored. Left of
 /// the image's first column its border goes on.
+///
+/// The costs take the place of a row that leaves a window, in the row itself and in
+/// the sums of columns: at once, while they are in registers.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg",
     "x86_64+avx2"
 ))]
-pub fn bits<const D: usize>(left: &Features, right: &Features, costs: &mut [[u8; D]]) {
-    let width = costs.len();
-    for (x, costs) in costs.iter_mut().enumerate() {
-        differing(&left.census, &right.census, x, width - 1 - x, costs);
+pub fn bits<const D: usize>(
+    left: &Features,
+    right: &Features,
+    row: &mut [[u8; D]],
+    columns: &mut [[u8; D]],
+) {
+    let width = row.len();
+    let columns = &mut columns[..width];
+    for x in 0..width {
+        let mut costs = [0; D];
+        differing(&left.census, &right.census, x, width - 1 - x, &mut costs);
+        for d in 0..D {
+            columns[x][d] = columns[x][d].wrapping_add(costs[d]).wrapping_sub(row[x][d]);
+        }
+        row[x] = costs;
     }
 }
 

@@ -47,7 +47,6 @@ impl Strip {
     /// Fills the rows of a strip.
     pub fn fill<const D: usize>(&mut self, pair: &Pair<'_>, output: &mut Output<'_>) {
         let width = pair.left.width();
-        self.costs.resize(width * D, 0);
         self.sums.resize(width * D, 0);
         self.winners.resize(width);
         self.dropped = Dropped::default();
@@ -59,6 +58,7 @@ impl Strip {
 
     fn semi_global<const D: usize>(&mut self, pair: &Pair<'_>, output: &mut Output<'_>) {
         let width = pair.left.width();
+        self.costs.resize(width * D, 0);
         self.excess.iter_mut().for_each(|e| e.reset::<D>(width));
         let rows = output.disparities.len() / width;
         for y in output.first_row.saturating_sub(RUN_UP)..output.first_row + rows {
@@ -88,24 +88,17 @@ impl Strip {
         let rows = output.disparities.len() / width;
         for step in 0..rows + 2 * radius {
             let y = (output.first_row + step).saturating_sub(radius).min(height - 1);
-            self.census_costs::<D>(pair, y);
-            let leaves = &mut self.ring[step % side];
+            self.left.census(pair.left, y, pair.settings.noise, None);
+            self.right.census(pair.right, y, pair.settings.noise, Some(D));
+            let row = self.ring[step % side].as_chunks_mut::<D>().0;
             let columns = self.columns.as_chunks_mut::<D>().0;
-            window::slide_down(columns, self.costs.as_chunks::<D>().0, leaves.as_chunks::<D>().0);
-            std::mem::swap(leaves, &mut self.costs);
+            cost::bits(&self.left, &self.right, row, columns);
             if step >= 2 * radius {
                 let sums = self.sums.as_chunks_mut::<D>().0;
                 window::slide_along(columns, radius, shift, sums);
                 self.decide::<D>(pair, step - 2 * radius, output);
             }
         }
-    }
-
-    fn census_costs<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {
-        let noise = pair.settings.noise;
-        self.left.census(pair.left, y, noise, None);
-        self.right.census(pair.right, y, noise, Some(D));
-        cost::bits(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
     }
 
     fn blended_costs<const D: usize>(&mut self, pair: &Pair<'_>, y: usize) {

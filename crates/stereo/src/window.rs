@@ -2,15 +2,6 @@
 //! by running sums, so that the work does not depend on the window's size. The sum
 //! of a column must fit in a byte: at most ten rows of 24 bits.
 
-/// Replaces a row in the sums of columns.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn slide_down<const D: usize>(columns: &mut [[u8; D]], enters: &[[u8; D]], leaves: &[[u8; D]]) {
-    let cells = columns.as_flattened_mut().iter_mut();
-    for ((c, e), l) in cells.zip(enters.as_flattened()).zip(leaves.as_flattened()) {
-        *c = c.wrapping_add(*e).wrapping_sub(*l);
-    }
-}
-
 /// Sums of windows of `2 * radius + 1` columns, shifted right by `shift` so
 /// that they fit in a byte. Outside of the image its border goes on.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]

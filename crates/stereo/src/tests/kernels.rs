@@ -167,12 +167,11 @@ proptest! {
         const WIDTH: usize = 7;
         let rows: Vec<&[[u8; D]]> = cells.as_chunks::<D>().0.chunks(WIDTH).collect();
         let side = 2 * radius + 1;
-        let mut columns = vec![[0; D]; WIDTH];
-        let nothing = vec![[0; D]; WIDTH];
         for y in 0..rows.len() {
-            let leaves = if y < side { &nothing } else { rows[y - side] };
-            window::slide_down(&mut columns, rows[y], leaves);
             let first = (y + 1).saturating_sub(side);
+            let column = |x: usize, d: usize| rows[first..=y].iter().map(|row| row[x][d]).sum();
+            let columns: Vec<[u8; D]> =
+                (0..WIDTH).map(|x| std::array::from_fn(|d| column(x, d))).collect();
             let mut sums = vec![[0; D]; WIDTH];
             window::slide_along(&columns, radius, shift, &mut sums);
             let around = |row: &[[u8; D]], x: usize, d: usize| -> u32 {
@@ -216,7 +215,8 @@ proptest! {
         let (mut disparities, mut confidences) = (vec![0.0; width], vec![0; width]);
         let mut found = Found { disparities: &mut disparities, confidences: &mut confidences };
         let refused = winners.judge(uniqueness, &mut found);
-        let disagree = winners.look_from_right(tolerance, &mut FromRight::default(), &mut disparities);
+        let mut buffers = FromRight::default();
+        let disagree = winners.look_from_right(tolerance, &mut buffers, &mut disparities);
         let (slow, counts) = reference::judged(&winners, uniqueness, tolerance);
         prop_assert_eq!([refused.outside, refused.not_unique, disagree], counts);
         for (fast, slow) in disparities.iter().zip(slow) {
