@@ -74,14 +74,12 @@ pub const SLOPE_WEIGHT: u8 = 3;
 ))]
 pub fn blend<const D: usize>(left: &Features, right: &Features, costs: &mut [[u8; D]]) {
     let width = costs.len();
-    for (x, costs) in costs.iter_mut().enumerate() {
-        let from = width - 1 - x;
-        differing(&left.census, &right.census, x, from, costs);
-        add::<D, MOST_BRIGHTNESS, 1>(&left.brightness, &right.brightness, x, from, costs);
-        add::<D, MOST_SLOPE, SLOPE_WEIGHT>(&left.slope, &right.slope, x, from, costs);
-        for cost in costs {
-            *cost >>= 1;
-        }
+    for (x, costs) in (0..width).zip(costs) {
+        let (from, mut cost) = (width - 1 - x, [0; D]);
+        differing(&left.census, &right.census, x, from, &mut cost);
+        add::<D, MOST_BRIGHTNESS, 1>(&left.brightness, &right.brightness, x, from, &mut cost);
+        add::<D, MOST_SLOPE, SLOPE_WEIGHT>(&left.slope, &right.slope, x, from, &mut cost);
+        *costs = cost.map(|cost| cost >> 1);
     }
 }
 
