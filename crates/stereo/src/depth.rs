@@ -1,3 +1,4 @@
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use tagalong_core::{DepthImage, Error, Frame, Funnel, GreyImage, Lens, Result};
@@ -206,7 +207,7 @@ fn count(dropped: &Dropped, funnel: &mut Funnel) {
 fn write(
     disparities: &Disparities<'_>,
     focal_baseline: f32,
-    range: &std::ops::RangeInclusive<f32>,
+    range: &RangeInclusive<f32>,
     depth: &mut DepthImage,
 ) -> u64 {
     let (width, fine) = (disparities.width, (depth.width(), depth.height()));
@@ -216,12 +217,27 @@ fn write(
     for (y, row) in depth.pixels_mut().chunks_exact_mut(fine.0.max(1)).enumerate() {
         let from = y * height / fine.1 * width;
         let values = &disparities.values[from..from + width];
-        for (depth, column) in row.iter_mut().zip(&columns) {
-            let metres = focal_baseline / values[*column];
-            let inside = range.contains(&metres);
-            *depth = if inside { metres } else { f32::NAN };
-            out += u64::from(!inside & !metres.is_nan());
+        if width == fine.0 {
+            row.copy_from_slice(values);
+        } else {
+            row.iter_mut().zip(&columns).for_each(|(depth, column)| *depth = values[*column]);
         }
+        out += u64::from(to_depth(row, focal_baseline, range));
+    }
+    out
+}
+
+/// Turns the disparities of a row into depths; returns how many were out of range.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn to_depth(row: &mut [f32], focal_baseline: f32, range: &RangeInclusive<f32>) -> u32 {
+    let (nearest, farthest) = (*range.start(), *range.end());
+    let mut out = 0_u32;
+    for depth in row {
+        let metres = focal_baseline / *depth;
+        let inside = (metres >= nearest) & (metres <= farthest);
+        // A sum that may overflow is no vector instruction.
+        out = out.wrapping_add(u32::from(!inside & !metres.is_nan()));
+        *depth = if inside { metres } else { f32::NAN };
     }
     out
 }
