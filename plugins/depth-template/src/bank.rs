@@ -60,6 +60,22 @@ pub struct Template {
     pub rows: Vec<TemplateRow>,
     /// The window reaches this many pixels left and right of the head centre.
     pub half_width: i64,
+    /// Pixels of the person in all rows.
+    pub person: f64,
+    /// Pixels of the background in all rows.
+    pub background: f64,
+}
+
+impl Template {
+    fn new(rows: Vec<TemplateRow>, half_width: i64) -> Self {
+        let person = rows.iter().map(|row| (row.to - row.from) as f64).sum();
+        let beside = |row: &TemplateRow| {
+            let sides = [row.guard_from + half_width, half_width + 1 - row.guard_to];
+            sides.map(|pixels| pixels.max(0) as f64).iter().sum::<f64>()
+        };
+        let background = rows.iter().map(beside).sum();
+        Self { rows, half_width, person, background }
+    }
 }
 
 /// Which silhouette: how the person is seen.
@@ -163,7 +179,7 @@ fn cut(relief: &Relief, pose: Pose, max_rows: usize) -> Template {
             relief_m: sum / count,
         }
     };
-    Template { rows: (first..=last).step_by(step).map(row).collect(), half_width }
+    Template::new((first..=last).step_by(step).map(row).collect(), half_width)
 }
 
 #[cfg(test)]

@@ -94,7 +94,8 @@ impl DepthTemplate {
             for x in (x0..inside.right().ceil() as i64).step_by(View::GRID as usize) {
                 let Some(depth_m) = rows.depth_m(x, y) else { continue };
                 let spacing = spacing(view.px_per_m(depth_m));
-                if x % spacing != 0 || y % spacing != 0 {
+                // A power of two: no division for the many cells that are left here.
+                if (x | y) & (spacing - 1) != 0 {
                     continue;
                 }
                 if !self.in_volume(depth_m, view.head_height_m(x, y, depth_m)) {
@@ -106,7 +107,8 @@ impl DepthTemplate {
                     dropped.add(test, x, y, depth_m);
                     continue;
                 }
-                match self.best(scene, &local).filter(|fit| fit.cost < self.config.refine_cost) {
+                let most = self.config.refine_cost;
+                match self.best(scene, &local, most).filter(|fit| fit.cost < most) {
                     Some(fit) => {
                         let head = view.head(x as f64, y as f64, depth_m);
                         self.cells.push(Cell { x, y, depth_m, cost: fit.cost, head });
@@ -161,14 +163,14 @@ impl DepthTemplate {
         let step = (spacing(local.px_per_m) / 2).max(1);
         let mut at = (cell.x, cell.y, cell.cost);
         for _ in 0..6 {
+            let limit = 1.5 * at.2 + 0.02;
             let fits = AROUND.map(|(dx, dy)| {
                 let beside = local.moved_to(at.0 + step * dx, at.1 + step * dy);
-                let cost = self.best(scene, &beside).map_or(f64::INFINITY, |fit| fit.cost);
+                let cost = self.best(scene, &beside, limit).map_or(f64::INFINITY, |fit| fit.cost);
                 (beside.x, beside.y, cost)
             });
             let better = fits.into_iter().filter(|f| f.2 < at.2).min_by(|a, b| a.2.total_cmp(&b.2));
             let Some(better) = better else {
-                let limit = 1.5 * at.2 + 0.02;
                 let all = fits.into_iter().chain([at]);
                 let (x, y) = weighted_centre(all, limit).unwrap_or((at.0 as f64, at.1 as f64));
                 return Fitted { x, y, depth_m: cell.depth_m, cost: at.2 };
@@ -178,8 +180,9 @@ impl DepthTemplate {
         Fitted { x: at.0 as f64, y: at.1 as f64, depth_m: cell.depth_m, cost: at.2 }
     }
 
-    /// The best of the body directions.
-    fn best(&mut self, scene: &Scene<'_>, local: &Local) -> Option<Match> {
+    /// The best of the body directions; it need not be found where it costs more than
+    /// `most`.
+    fn best(&mut self, scene: &Scene<'_>, local: &Local, mut most: f64) -> Option<Match> {
         let Self { bank, config, .. } = self;
         let directions = config.directions.iter();
         directions
@@ -187,7 +190,10 @@ impl DepthTemplate {
                 let pose =
                     Pose::nearest(*direction, local.pitch_rad, local.roll_rad, local.px_per_m);
                 let template = bank.template(pose);
-                scene.matcher.fit(scene.rows, template, local.x, local.y, local.depth_m)
+                let at = (local.x, local.y);
+                let fit = scene.matcher.fit_up_to(most, scene.rows, template, at, local.depth_m)?;
+                most = most.min(fit.cost);
+                Some(fit)
             })
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
@@ -316,7 +322,7 @@ fn on_grid(at: f64) -> i64 {
     at as i64 / View::GRID * View::GRID
 }
 
-/// Cells are 2, 4 or 8 pixels apart: about 3 cm at the person.
+/// Cells are 2, 4 or 8 pixels apart, always a power of two: about 3 cm at the person.
 fn spacing(px_per_m: f64) -> i64 {
     match px_per_m * 0.03 {
         px if px >= 8.0 => 8,

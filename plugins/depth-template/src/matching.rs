@@ -18,29 +18,64 @@ pub struct Matcher {
     config: DepthTemplateConfig,
     /// The background value that the papers use: the percentile of the frame.
     background: f64,
+    /// True if no row makes the cost of those above it less.
+    rises: bool,
 }
 
 /// What one template collects over its rows.
 #[derive(Default)]
 struct Tally {
-    foreground: f64,
     foreground_valid: f64,
     foreground_cost: f64,
-    background: f64,
     background_valid: f64,
     background_cost: f64,
     unknown: f64,
     outside: f64,
 }
 
+/// Rows from one look at the cost so far to the next: each has divisions of its own.
+const ROWS_PER_LOOK: usize = 4;
+
 /// A run of pixels of a row, inside the image.
 type Run = (usize, usize, usize);
+
+/// What the depth of a face says of all rows. Inverse depths are in
+/// [`RowSums::UNITS`].
+struct Face {
+    depth_m: f64,
+    inverse: f64,
+    /// What is beside the person and nearer than this is somebody else.
+    nearest_beside: f64,
+    /// Background that is farther than this is as good as background can be.
+    clearly_behind: f64,
+    /// Depth errors of the person that cost nothing and everything, m.
+    free_m: f64,
+    full_m: f64,
+}
+
+impl Face {
+    fn new(config: &DepthTemplateConfig, depth_m: f64) -> Self {
+        let margin_m = config.boundary_margin_m;
+        let noise_m = config.relief_per_m2 * depth_m * depth_m;
+        Self {
+            depth_m,
+            inverse: RowSums::UNITS / depth_m,
+            nearest_beside: RowSums::UNITS / (depth_m - margin_m).max(0.2),
+            clearly_behind: RowSums::UNITS / (depth_m + margin_m),
+            free_m: config.relief_free_m + noise_m,
+            full_m: config.relief_full_m + noise_m,
+        }
+    }
+}
 
 impl Matcher {
     /// A matcher for one frame; `background` is the percentile of its inverse
     /// depths, in [`RowSums::UNITS`].
     pub fn new(config: &DepthTemplateConfig, background: f64) -> Self {
-        Self { config: config.clone(), background }
+        let rises = config.cost == Cost::Robust
+            && (0.0..=1.0).contains(&config.foreground_weight)
+            && config.unknown_cost >= 0.0;
+        Self { config: config.clone(), background, rises }
     }
 
     /// Fits `template` with its head centre on the reduced pixel (`x`, `y`) and
@@ -53,30 +88,46 @@ impl Matcher {
         y: i64,
         depth_m: f64,
     ) -> Option<Match> {
+        self.fit_up_to(f64::INFINITY, rows, template, (x, y), depth_m)
+    }
+
+    /// As [`Matcher::fit`]; `None` also where the rows down to some one already cost
+    /// more than `most`: most places where nobody is cost too much within a few rows.
+    pub fn fit_up_to(
+        &self,
+        most: f64,
+        rows: &RowSums,
+        template: &Template,
+        (x, y): (i64, i64),
+        depth_m: f64,
+    ) -> Option<Match> {
         let mut tally = Tally::default();
+        let face = Face::new(&self.config, depth_m);
         let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
-        for row in &template.rows {
+        for (i, row) in template.rows.iter().enumerate() {
             let window = (x - template.half_width, x + template.half_width + 1);
             let sides = [(window.0, x + row.guard_from), (x + row.guard_to, window.1)];
             let wanted = sides.map(|(from, to)| (to - from).max(0) as f64);
-            tally.foreground += (row.to - row.from) as f64;
-            tally.background += wanted[0] + wanted[1];
             let Some(line) = usize::try_from(y + row.dy).ok().filter(|l| *l < rows.height()) else {
                 tally.outside += wanted[0] + wanted[1];
                 continue;
             };
             let person = (line, inside(x + row.from), inside(x + row.to));
-            self.foreground(&mut tally, rows, person, depth_m, row.relief_m);
+            self.foreground(&mut tally, rows, person, &face, row.relief_m);
             for ((from, to), wanted) in sides.into_iter().zip(wanted) {
                 let run = (line, inside(from), inside(to).max(inside(from)));
                 tally.outside += wanted - (run.2 - run.1) as f64;
-                self.background(&mut tally, rows, run, depth_m);
+                self.background(&mut tally, rows, run, &face);
+            }
+            let is_asked = self.rises && i % ROWS_PER_LOOK == 0;
+            if is_asked && self.robust_cost(&tally, template, 0.0) > most {
+                return None;
             }
         }
-        self.judge(&tally)
+        self.judge(&tally, template)
     }
 
-    fn foreground(&self, tally: &mut Tally, rows: &RowSums, run: Run, depth_m: f64, relief_m: f64) {
+    fn foreground(&self, tally: &mut Tally, rows: &RowSums, run: Run, face: &Face, relief_m: f64) {
         let sums = rows.run(run.0, run.1, run.2);
         if sums.count == 0 {
             return;
@@ -84,22 +135,20 @@ impl Matcher {
         let count = f64::from(sums.count);
         tally.foreground_valid += count;
         let relief_m = if self.config.cost == Cost::Robust { relief_m } else { 0.0 };
-        let expected_m = (depth_m + relief_m).max(0.1);
+        let expected_m = (face.depth_m + relief_m).max(0.1);
         let expected = RowSums::UNITS / expected_m;
         let error = sums.squared_error(expected);
         tally.foreground_cost += match self.config.cost {
             Cost::Robust => {
                 let off = |m: f64| RowSums::UNITS / (expected_m - m).max(0.1) - expected;
-                let noise_m = self.config.relief_per_m2 * depth_m * depth_m;
-                let free = off(self.config.relief_free_m + noise_m).powi(2);
-                let full = off(self.config.relief_full_m + noise_m).powi(2);
+                let (free, full) = (off(face.free_m).powi(2), off(face.full_m).powi(2));
                 count * ((error / count - free) / (full - free)).clamp(0.0, 1.0)
             }
             Cost::Squared | Cost::Printed => error,
         };
     }
 
-    fn background(&self, tally: &mut Tally, rows: &RowSums, run: Run, depth_m: f64) {
+    fn background(&self, tally: &mut Tally, rows: &RowSums, run: Run, face: &Face) {
         let sums = rows.run(run.0, run.1, run.2);
         let count = f64::from(sums.count);
         tally.unknown += (run.2 - run.1) as f64 - count;
@@ -108,25 +157,24 @@ impl Matcher {
         }
         if self.config.cost != Cost::Robust {
             tally.background_valid += count;
-            let limit = RowSums::UNITS / (depth_m + 1.0);
+            let limit = RowSums::UNITS / (face.depth_m + 1.0);
             tally.background_cost += sums.squared_error(self.background.min(limit));
             return;
         }
-        let margin = self.config.boundary_margin_m;
         let mean = sums.mean();
-        if mean > RowSums::UNITS / (depth_m - margin).max(0.2) {
+        if mean > face.nearest_beside {
             tally.unknown += count;
             return;
         }
-        let expected = mean.min(RowSums::UNITS / (depth_m + margin));
-        let contrast = RowSums::UNITS / depth_m - expected;
+        let expected = mean.min(face.clearly_behind);
+        let contrast = face.inverse - expected;
         let error = sums.squared_error(expected) / (contrast * contrast);
         tally.background_valid += count;
         tally.background_cost += error.min(count);
     }
 
-    fn judge(&self, tally: &Tally) -> Option<Match> {
-        let foreground_valid = tally.foreground_valid / tally.foreground.max(1.0);
+    fn judge(&self, tally: &Tally, template: &Template) -> Option<Match> {
+        let foreground_valid = tally.foreground_valid / template.person.max(1.0);
         if foreground_valid < self.config.min_foreground_valid {
             return None;
         }
@@ -134,17 +182,23 @@ impl Matcher {
         let sum = tally.foreground_cost + tally.background_cost;
         let cost = match self.config.cost {
             Cost::Robust => {
-                let holes = (0.95 * tally.foreground - tally.foreground_valid).max(0.0);
-                let inside = (tally.foreground_cost + 3.0 * holes) / tally.foreground.max(1.0);
-                let unknown = self.config.unknown_cost * tally.unknown;
-                let beside = tally.background_cost + unknown + tally.outside;
-                let weight = self.config.foreground_weight;
-                weight * inside + (1.0 - weight) * beside / tally.background.max(1.0)
+                let holes = (0.95 * template.person - tally.foreground_valid).max(0.0);
+                self.robust_cost(tally, template, holes)
             }
             Cost::Squared => (sum / valid.max(1.0)).sqrt() / RowSums::UNITS,
             Cost::Printed => sum.sqrt() / valid.max(1.0) / RowSums::UNITS,
         };
         Some(Match { cost, foreground_valid })
+    }
+
+    /// The cost of what was collected; `holes` are pixels of the person without a
+    /// reading that are too many.
+    fn robust_cost(&self, tally: &Tally, template: &Template, holes: f64) -> f64 {
+        let inside = (tally.foreground_cost + 3.0 * holes) / template.person.max(1.0);
+        let unknown = self.config.unknown_cost * tally.unknown;
+        let beside = tally.background_cost + unknown + tally.outside;
+        let weight = self.config.foreground_weight;
+        weight * inside + (1.0 - weight) * beside / template.background.max(1.0)
     }
 }
 
@@ -225,6 +279,7 @@ mod tests {
         fn runs_equal_pixels(
             pixels in prop::collection::vec(prop_oneof![Just(f32::NAN), 1.5f32..2.5, 3.0f32..6.0], 48 * 40),
             x in -4i64..52, y in -4i64..44, z in 1.5f64..4.0, noise in 0.0f64..0.03, roll in -0.4f64..0.4, which in 0usize..3,
+            most in 0.0f64..1.0,
         ) {
             let rows = RowSums::new(&DepthImage::from_pixels(48, 40, pixels).unwrap(), 1);
             let pose = Pose::nearest(Direction::ALL[which], 0.3, roll, 40.0);
@@ -236,6 +291,13 @@ mod tests {
                 ..Default::default()
             };
             let fast = Matcher::new(&config, 300.0).fit(&rows, template, x, y, z).map(|m| m.cost);
+            let up_to = |most: f64| {
+                let found = Matcher::new(&config, 300.0).fit_up_to(most, &rows, template, (x, y), z);
+                found.map(|m| m.cost)
+            };
+            prop_assert!(fast.is_none_or(|cost| up_to(cost) == fast));
+            prop_assert!(up_to(most).is_none_or(|cost| Some(cost) == fast));
+            prop_assert!(fast.is_none_or(|cost| cost > most || up_to(most) == fast));
             let slow = slow(&config, &rows, template, x, y, z);
             prop_assert_eq!(fast.is_some(), slow.is_some());
             if let (Some(a), Some(b)) = (fast, slow) {

@@ -381,7 +381,7 @@ impl Silhouettes {
 
 impl Silhouette {
     fn new(template: &Template, number: usize) -> Self {
-        let Template { rows, half_width } = template.clone();
+        let Template { rows, half_width, .. } = template.clone();
         let pixels: i64 = rows.iter().map(|row| (row.to - row.from).max(0)).sum();
         let step = ROW_STEPS[usize::from(rows.len() >= MANY_ROWS)];
         let every = |from| rows.iter().skip(from).step_by(step as usize).copied().collect();
