@@ -210,7 +210,8 @@ mod tests {
             let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
             assert!(a.pixels().iter().zip(b.pixels()).all(same));
             let (a, b) = (logged.frame.laser().unwrap(), drawn.laser().unwrap());
-            assert!(a.len() == b.len() && a.len() > 80);
+            assert_eq!(a.len(), b.len());
+            assert!(a.len() > 60, "most rays meet something: {}", a.len());
             assert!(a.iter().zip(b).all(|(a, b)| (a - b).norm() < 1e-5), "{:?} {:?}", a[0], b[0]);
             frames += 1;
         }

@@ -6,7 +6,6 @@
 //! command why it is what it is and until when it may be obeyed.
 
 mod corridor;
-mod felt;
 mod settings;
 mod surroundings;
 

@@ -1,12 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What stands in its place for so long is a thing; somebody who walks by is not.
-pub(super) const STANDS_S: f64 = 1.0;
-/// What a laser scanner meets in its place for so long is furniture: people do not
-/// stand so still.
-const FURNITURE_S: f64 = 10.0;
-
 /// What the robot may do, whatever the controller wishes. The figures are those
 /// that makers and users of mobile robots work with; this is no safety function
 /// in the sense of the standards.
@@ -77,9 +71,6 @@ pub struct CorridorSettings {
     /// What has not stood in its place for a second may step in: for it the robot
     /// sweeps so much more on both sides, m.
     pub steps_in_m: f64,
-    /// A laser scanner meets people's shins, and they are wider above: what it met and
-    /// the camera has not seen standing may reach so much farther into the way, m.
-    pub overhang_m: f64,
     /// No movement towards what is nearer to the front than this, m.
     pub stop_m: f64,
     /// What is farther away does not matter, m.
@@ -105,7 +96,6 @@ impl Default for CorridorSettings {
         Self {
             half_width_m: 0.34,
             steps_in_m: 0.25,
-            overhang_m: 0.12,
             front_m: 0.2,
             stop_m: 0.4,
             range_m: 3.0,
@@ -124,15 +114,5 @@ impl CorridorSettings {
     /// something, one may be dust.
     pub(super) fn ray_points(&self) -> u32 {
         self.min_points.div_ceil(2)
-    }
-
-    /// How much nearer to the middle of the corridor something may come that a laser
-    /// scanner has met in its place for so long, m.
-    pub(super) fn beside_m(&self, stood_s: f64) -> f64 {
-        match () {
-            () if stood_s < STANDS_S => self.steps_in_m,
-            () if stood_s < FURNITURE_S => self.overhang_m,
-            () => 0.0,
-        }
     }
 }

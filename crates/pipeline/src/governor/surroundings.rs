@@ -3,8 +3,6 @@ use tagalong_core::{Camera, DepthImage, Motion, Person, Track, TrackId};
 
 use super::CorridorSettings;
 use super::corridor::{Ahead, Sign, ahead, is_thing};
-use super::felt::Felt;
-use super::settings::STANDS_S;
 
 /// Columns of the image that are looked at.
 const COLUMNS: usize = 160;
@@ -12,6 +10,8 @@ const COLUMNS: usize = 160;
 const CELL_M: f64 = 0.05;
 /// So many points in a cell are no noise.
 const ENOUGH: u16 = 3;
+/// What stands in its place for so long is a thing; somebody who walks by is not.
+const STANDS_S: f64 = 1.0;
 /// What was so close before the robot that it could not drive on, m, and left the
 /// image for its edge or below, is believed to be there for so long, s.
 const CLOSE_M: f64 = 0.6;
@@ -38,7 +38,7 @@ const HIDES_M: f64 = 0.4;
 pub(crate) struct Surroundings {
     seen: Vec<Point3<f64>>,
     /// What the rays of a laser scanner meet; `None` without one.
-    felt: Option<Felt>,
+    felt: Option<Vec<Point2<f64>>>,
     /// Part of the image that has depth; `None` without a depth image.
     with_depth: Option<f64>,
     /// Columns of the image that are looked at.
@@ -96,16 +96,14 @@ impl Surroundings {
         self.remember(settings, target);
     }
 
-    /// Takes in what a laser scanner met; the robot moved by `motion` since the last
-    /// image.
-    pub(crate) fn feel(
-        &mut self,
-        settings: &CorridorSettings,
-        laser: Option<&[Point3<f64>]>,
-        motion: &Motion,
-    ) {
-        self.felt =
-            laser.map(|points| self.felt.take().unwrap_or_default().next(settings, points, motion));
+    /// Takes in what a laser scanner met. That needs no memory: it looks to the sides,
+    /// and down to the robot itself.
+    pub(crate) fn feel(&mut self, settings: &CorridorSettings, laser: Option<&[Point3<f64>]>) {
+        let heights = settings.floor_m..settings.top_m;
+        self.felt = laser.map(|points| {
+            let met = points.iter().filter(|point| heights.contains(&point.z)).map(Point3::xy);
+            met.filter(|at| is_near(settings, at)).collect()
+        });
     }
 
     /// Other people who were seen are in the way where that was, until the camera
@@ -150,10 +148,7 @@ impl Surroundings {
         let unseen = unseen.map(|thing| stays(thing.at, settings.min_points));
         let hidden = self.columns.iter().filter(|column| column.is_hidden(settings));
         let hidden = hidden.map(|column| stays(column.at, 1));
-        let felt = self.felt.iter().flat_map(Felt::points).map(|(at, stood_s)| Sign {
-            steps_in_m: if self.grid.stands(&at) { 0.0 } else { settings.beside_m(stood_s) },
-            ..stays(at, settings.ray_points())
-        });
+        let felt = self.felt.iter().flatten().map(|at| stays(*at, settings.ray_points()));
         Some(ahead(settings, seen.chain(unseen).chain(hidden).chain(felt), curvature, target))
     }
 
@@ -622,53 +617,29 @@ mod tests {
         assert_eq!(look(0..23), Some(Ahead::Free), "too narrow");
     }
 
-    /// A laser scanner meets the shins of somebody beside the robot, with and without a
-    /// depth image: in the way while they may step in, and of a bend as long as they are
-    /// there. What is high above is no obstacle, nor is the person who is followed; one
-    /// ray may be dust.
+    /// A laser scanner meets somebody beside the robot, with and without a depth image:
+    /// in the way of a bend as long as they are there. What is high above is no
+    /// obstacle, nor is the person who is followed; one ray may be dust.
     #[test]
     fn what_a_laser_met_is_in_the_way_for_as_long_as_it_meets_it() {
         let settings = CorridorSettings::default();
         let still = Motion::at_rest(0.1);
-        let leg = [Point3::new(0.45, 0.5, 0.2), Point3::new(0.45, 0.52, 0.2)];
+        let leg = [Point3::new(0.45, 0.4, 0.2), Point3::new(0.45, 0.42, 0.2)];
         let shelf = leg.map(|point| point + Vector3::z() * 1.5);
-        let is_near = |ahead| matches!(ahead, Some(Ahead::Something(at)) if at < 0.7);
+        let is_near = |ahead| matches!(ahead, Some(Ahead::Something(at)) if at < 0.6);
         for depth in [Some(with_box(9.0, 0.0)), None] {
             let mut surroundings = Surroundings::default();
             let mut feel = |laser: &[Point3<f64>], curvature, target| {
                 surroundings.look(&settings, &camera(), depth.as_ref(), &still, None);
-                surroundings.feel(&settings, Some(laser), &still);
+                surroundings.feel(&settings, Some(laser));
                 surroundings.ahead(&settings, curvature, target)
             };
-            assert!(is_near(feel(&leg, 0.0, None)), "may step in");
-            (0..WAIT).for_each(|_| _ = feel(&leg, 0.0, None));
-            assert_eq!(feel(&leg, 0.0, None), Some(Ahead::Free), "stands beside the way");
+            assert_eq!(feel(&leg, 0.0, None), Some(Ahead::Free), "beside the way");
             assert!(is_near(feel(&leg, 1.2, None)), "in the way of a bend");
             assert_eq!(feel(&leg, 1.2, Some(Point2::new(0.5, 0.5))), Some(Ahead::Free));
             assert_eq!(feel(&leg[..1], 1.2, None), Some(Ahead::Free), "dust");
             assert_eq!(feel(&shelf, 1.2, None), Some(Ahead::Free), "overhead");
             assert_eq!(feel(&[], 1.2, None), Some(Ahead::Free), "gone");
-        }
-    }
-
-    /// The shins are 0.4 m beside the way, the body above is nearer; a table's leg stays
-    /// there, and so does what the camera saw standing.
-    #[test]
-    fn shins_count_for_more_than_the_legs_of_tables() {
-        let settings = CorridorSettings::default();
-        let still = Motion::at_rest(0.1);
-        let leg = [Point3::new(0.8, 0.4, 0.2), Point3::new(0.8, 0.42, 0.2)];
-        for (depth, free_after_s) in [(with_box(9.0, 0.0), 10.0), (with_box(0.8, 0.6), 1.0)] {
-            let mut surroundings = Surroundings::default();
-            let mut feel = |frame: u32| {
-                let depth = if frame < 15 { &depth } else { &with_box(9.0, 0.0) };
-                surroundings.look(&settings, &camera(), Some(depth), &still, None);
-                surroundings.feel(&settings, Some(&leg), &still);
-                surroundings.ahead(&settings, 0.0, None) == Some(Ahead::Free)
-            };
-            let free: Vec<bool> = (0..120).map(&mut feel).collect();
-            let first = free.iter().position(|free| *free).unwrap();
-            assert!((first as f64 * 0.1 - free_after_s).abs() < 0.3, "{first}");
         }
     }
 
