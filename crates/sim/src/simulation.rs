@@ -13,6 +13,7 @@ use tagalong_core::{
 
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
+use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
 use crate::person::Person;
 use crate::random::Random;
@@ -97,7 +98,7 @@ pub struct Shot {
     /// of a mirror.
     pub images: Images,
     /// What the rays of a laser scanner measure, m, in the order of
-    /// [`LaserSettings::directions`](crate::LaserSettings::directions); none without one.
+    /// [`LaserSettings::directions`]; none without one.
     pub laser: Option<Vec<f32>>,
     /// Everybody.
     pub truth: Vec<Truth>,
@@ -210,6 +211,11 @@ impl Simulation {
     /// image in which the truth gives regions.
     pub fn panorama(&self) -> Option<&Panorama> {
         self.mirror.as_ref().map(|mirror| &mirror.panorama)
+    }
+
+    /// The laser scanner, if the robot has one.
+    pub fn laser(&self) -> Option<&LaserSettings> {
+        self.scene.laser.as_ref()
     }
 
     /// The cameras in the room; their `robot_from_camera` is their pose in the
@@ -354,8 +360,9 @@ impl Simulation {
             CameraKind::Stereo => self.stereo(&world, &seen),
             CameraKind::Panorama => self.circle(&seen),
         };
-        let seed = self.moment(0, 1.0).seed;
-        let laser = self.scene.laser.as_ref().map(|laser| laser.measure(&world, &pose, seed));
+        let measured =
+            |laser: &LaserSettings| laser.measure(&world, &pose, self.moment(0, 1.0).seed);
+        let laser = self.laser().map(measured);
         let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
         let depth_ns = captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64;
         Shot { captured_ns, recorded_ns, depth_ns, images, laser, truth, world_from_robot }

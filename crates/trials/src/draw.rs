@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry2;
 use tagalong_core::{Camera, DepthImage, Frame, Images, Lens, Motion, Stamp, WheelSpeeds};
-use tagalong_sim::{Event, LaserSettings, Scene, Shot, Simulation, Truth};
+use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapping;
 
 /// Standard deviation of odometry as a fraction of the travel, as the log
@@ -31,7 +31,6 @@ pub struct Drawn {
 pub struct Draw {
     simulation: Simulation,
     camera: Arc<Camera>,
-    laser: Option<LaserSettings>,
     unwrapping: Unwrapping,
     odometry: BTreeMap<u64, Isometry2<f64>>,
     /// Images by their stamps, ns.
@@ -57,7 +56,6 @@ impl Draw {
         let simulation = Simulation::new(scene, threads);
         Self {
             camera: Arc::new(seen_by(&simulation)),
-            laser: scene.laser.clone(),
             unwrapping: Unwrapping::default(),
             simulation,
             odometry: BTreeMap::new(),
@@ -124,7 +122,7 @@ impl Draw {
             .map_or_else(Isometry2::identity, |(_, pose)| *pose);
         let motion = self.motion(stamp, odom_from_robot);
         let camera = Arc::clone(&self.camera);
-        let scan = self.laser.as_ref().zip(shot.laser.as_deref());
+        let scan = self.simulation.laser().zip(shot.laser.as_deref());
         let laser = scan.map(|(laser, ranges)| laser.points(ranges).collect());
         let frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images));
         Drawn {

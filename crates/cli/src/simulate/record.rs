@@ -55,17 +55,23 @@ impl Recorder {
         let text = toml::to_string(scene).unwrap_or_default();
         log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
         let camera = simulation.camera().clone();
-        log.send("/tf_static", EPOCH, &mount("base_link", [(CAMERA_FRAME.into(), &camera)]))?;
-        if let Some(laser) = &scene.laser {
-            log.send("/tf_static", EPOCH, &laser_mount(laser))?;
+        log.send(
+            "/tf_static",
+            EPOCH,
+            &mount("base_link", [(CAMERA_FRAME.into(), camera.robot_from_camera)]),
+        )?;
+        if let Some(laser) = simulation.laser() {
+            let above = Isometry3::translation(0.0, 0.0, laser.height_m);
+            log.send("/tf_static", EPOCH, &mount("base_link", [(LASER_FRAME.into(), above)]))?;
         }
         let webcams: Vec<Camera> = simulation.webcams().cloned().collect();
         if !webcams.is_empty() {
-            let named = webcams.iter().enumerate().map(|(i, camera)| (webcam_frame(i), camera));
+            let poses = webcams.iter().map(|camera| camera.robot_from_camera);
+            let named = poses.enumerate().map(|(i, pose)| (webcam_frame(i), pose));
             log.send(TRUE_WEBCAMS_TOPIC, EPOCH, &mount(WORLD_FRAME, named))?;
         }
         let mirror = simulation.panorama().map(|panorama: &Panorama| panorama.mirror);
-        Ok(Self { log, camera, mirror, laser: scene.laser.clone(), webcams })
+        Ok(Self { log, camera, mirror, laser: simulation.laser().cloned(), webcams })
     }
 
     /// Writes one thing.
@@ -231,24 +237,14 @@ fn millimetres(depth_m: f32) -> [u8; 2] {
     millimetres.to_le_bytes()
 }
 
-/// Static transforms to cameras from the frame that their poses are given in.
-fn mount<'a>(parent: &str, cameras: impl IntoIterator<Item = (String, &'a Camera)>) -> TFMessage {
-    let transform = |(child_frame_id, camera): (String, &Camera)| TransformStamped {
+/// Static transforms to sensors from the frame that their poses are given in.
+fn mount(parent: &str, sensors: impl IntoIterator<Item = (String, Isometry3<f64>)>) -> TFMessage {
+    let transform = |(child_frame_id, pose): (String, Isometry3<f64>)| TransformStamped {
         header: Header::new(EPOCH, parent),
         child_frame_id,
-        transform: (&camera.robot_from_camera).into(),
+        transform: (&pose).into(),
     };
-    TFMessage { transforms: cameras.into_iter().map(transform).collect() }
-}
-
-/// The static transform to a laser scanner.
-fn laser_mount(laser: &LaserSettings) -> TFMessage {
-    let transform = TransformStamped {
-        header: Header::new(EPOCH, "base_link"),
-        child_frame_id: LASER_FRAME.into(),
-        transform: (&Isometry3::translation(0.0, 0.0, laser.height_m)).into(),
-    };
-    TFMessage { transforms: vec![transform] }
+    TFMessage { transforms: sensors.into_iter().map(transform).collect() }
 }
 
 fn scan(captured: Stamp, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {

@@ -11,6 +11,7 @@ use tagalong_vision::Unwrapping;
 
 use super::LogFrame;
 use super::intake::Intake;
+use super::laser::seen_from;
 use super::mount::robot_frame;
 use super::pairing::Payload;
 use super::plan::Plan;
@@ -238,13 +239,14 @@ impl Assembler {
             return None;
         };
         let robot = robot_frame(&plan.scan, &plan.input);
-        let Some(mount) = intake.tf.lookup(robot, &scan.frame_id, scan.stamp) else {
+        let then = scan.header.stamp();
+        let Some(mount) = intake.tf.lookup(robot, &scan.header.frame_id, then) else {
             tally.count("laser_scans_without_pose");
             tally.note("tf does not connect the laser scanner with the robot: it is not used");
             return None;
         };
         let pose = |stamp| self.pose_at(plan, stamp, intake).pose;
-        Some(scan.seen_from(&mount, &(pose(stamp).inverse() * pose(scan.stamp))))
+        Some(seen_from(scan, &mount, &(pose(stamp).inverse() * pose(then))))
     }
 
     fn finish(

@@ -62,7 +62,7 @@ impl Intake {
         } else if topic == self.chosen.detections.as_ref() {
             headed(message).map(|detections| self.detections.push(detections))
         } else if topic == self.chosen.laser.as_ref() {
-            decode(message.data).map(|scan| self.take_scan(&scan, tally))
+            decode(message.data).map(|scan| self.take_scan(scan, tally))
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
         } else if topic == self.chosen.colour_info.as_ref() {
@@ -103,7 +103,7 @@ impl Intake {
         }
     }
 
-    fn take_scan(&mut self, scan: &LaserScan, tally: &mut Tally) {
+    fn take_scan(&mut self, scan: LaserScan, tally: &mut Tally) {
         if !self.laser.push(scan) {
             tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
         }

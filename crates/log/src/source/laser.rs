@@ -1,6 +1,7 @@
 //! What a laser scanner met at the time of an image.
 
 use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3, Point3};
@@ -18,24 +19,16 @@ const MAX_RAYS: usize = 65_536;
 /// The scans of the last seconds, as they came.
 #[derive(Default)]
 pub(super) struct Scans {
-    scans: VecDeque<Scan>,
-}
-
-/// Where the rays of one scan ended.
-pub(super) struct Scan {
-    pub(super) stamp: Stamp,
-    /// The scanner's frame.
-    pub(super) frame_id: String,
-    /// In the scanner's frame, m.
-    points: Vec<Point3<f64>>,
+    scans: VecDeque<LaserScan>,
 }
 
 impl Scans {
     /// Takes in a scan; false if its angles or ranges are none.
-    pub(super) fn push(&mut self, scan: &LaserScan) -> bool {
-        let Some(points) = points(scan) else { return false };
-        let (stamp, frame_id) = (scan.header.stamp(), scan.header.frame_id.clone());
-        self.scans.push_back(Scan { stamp, frame_id, points });
+    pub(super) fn push(&mut self, scan: LaserScan) -> bool {
+        if !is_sane(&scan) {
+            return false;
+        }
+        self.scans.push_back(scan);
         if self.scans.len() > KEPT {
             self.scans.pop_front();
         }
@@ -43,45 +36,51 @@ impl Scans {
     }
 
     /// The scan nearest to an image in time, if one is near.
-    pub(super) fn near(&self, image: Stamp) -> Option<&Scan> {
-        let off_s = |scan: &&Scan| scan.stamp.seconds_since(image).abs();
+    pub(super) fn near(&self, image: Stamp) -> Option<&LaserScan> {
+        let off_s = |scan: &&LaserScan| scan.header.stamp().seconds_since(image).abs();
         let nearest = self.scans.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
         nearest.filter(|scan| off_s(scan) <= NEAR_S)
     }
 }
 
-impl Scan {
-    /// The points in the frame of a robot that has moved by `robot_from_then` since the
-    /// scan, m.
-    pub(super) fn seen_from(
-        &self,
-        robot_from_laser: &Isometry3<f64>,
-        robot_from_then: &Isometry2<f64>,
-    ) -> Arc<[Point3<f64>]> {
-        let moved = |point: &Point3<f64>| {
-            let then = robot_from_laser * point;
-            let now = robot_from_then * then.xy();
-            Point3::new(now.x, now.y, then.z)
-        };
-        self.points.iter().map(moved).collect()
-    }
+/// Where the rays of a scan met something, in the frame of a robot that has moved by
+/// `robot_from_then` since, m.
+pub(super) fn seen_from(
+    scan: &LaserScan,
+    robot_from_laser: &Isometry3<f64>,
+    robot_from_then: &Isometry2<f64>,
+) -> Arc<[Point3<f64>]> {
+    let moved = |point: Point3<f64>| {
+        let then = robot_from_laser * point;
+        let now = robot_from_then * then.xy();
+        Point3::new(now.x, now.y, then.z)
+    };
+    points(scan).map(moved).collect()
 }
 
-/// Where the rays met something; `None` for a scan that cannot be read. Ranges beyond
-/// the scanner's own limits, infinite and NaN ones are rays that met nothing.
-fn points(scan: &LaserScan) -> Option<Vec<Point3<f64>>> {
+fn is_sane(scan: &LaserScan) -> bool {
+    let angles = [scan.angle_min, scan.angle_increment];
+    let is_known = angles.into_iter().all(f32::is_finite) && !limits(scan).is_empty();
+    is_known && scan.ranges.len() <= MAX_RAYS
+}
+
+/// What the scanner measures, m.
+fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
+    scan.range_min.max(0.0)..=scan.range_max
+}
+
+/// Where the rays met something, in the frame of the scanner, m. Ranges beyond the
+/// scanner's own limits, infinite and NaN ones are rays that met nothing.
+fn points(scan: &LaserScan) -> impl Iterator<Item = Point3<f64>> {
     let (first, step) = (f64::from(scan.angle_min), f64::from(scan.angle_increment));
-    let limits = scan.range_min.max(0.0)..=scan.range_max;
-    let sane = first.is_finite() && step.is_finite() && !limits.is_empty();
-    if !sane || scan.ranges.len() > MAX_RAYS {
-        return None;
-    }
-    let met = scan.ranges.iter().enumerate().filter(|(_, range)| limits.contains(*range));
-    let point = |(ray, range): (usize, &f32)| {
+    let limits = limits(scan);
+    let rays = scan.ranges.iter().enumerate();
+    let met = rays.filter(move |(_, range)| limits.contains(*range));
+    let point = move |(ray, range): (usize, &f32)| {
         let (angle, range) = (first + ray as f64 * step, f64::from(*range));
         Point3::new(range * angle.cos(), range * angle.sin(), 0.0)
     };
-    Some(met.map(point).filter(|point| point.coords.norm().is_finite()).collect())
+    met.map(point).filter(|point| point.coords.norm().is_finite())
 }
 
 #[cfg(test)]
@@ -106,31 +105,34 @@ mod tests {
 
     #[test]
     fn rays_turn_from_right_to_left_and_what_met_nothing_is_left_out() {
-        let [right, left] = points(&scan(1.0, &[2.0, f32::INFINITY, 3.0])).unwrap()[..] else {
+        let [right, left] = points(&scan(1.0, &[2.0, f32::INFINITY, 3.0])).collect::<Vec<_>>()[..]
+        else {
             panic!("two rays met something");
         };
         assert!((right - Point3::new(0.0, -2.0, 0.0)).norm() < 1e-6);
         assert!((left - Point3::new(0.0, 3.0, 0.0)).norm() < 1e-6);
-        assert!(points(&scan(1.0, &[0.05, f32::NAN, 11.0])).unwrap().is_empty());
+        assert_eq!(points(&scan(1.0, &[0.05, f32::NAN, 11.0])).count(), 0);
     }
 
     #[test]
     fn a_scan_without_angles_or_with_turned_limits_is_none() {
         let mut scans = Scans::default();
-        assert!(!scans.push(&LaserScan { angle_min: f32::NAN, ..scan(1.0, &[1.0]) }));
-        assert!(!scans.push(&LaserScan { range_max: f32::NAN, ..scan(1.0, &[1.0]) }));
-        assert!(!scans.push(&LaserScan { range_max: 0.01, ..scan(1.0, &[1.0]) }));
-        assert!(!scans.push(&scan(1.0, &vec![1.0; MAX_RAYS + 1])));
+        assert!(!scans.push(LaserScan { angle_min: f32::NAN, ..scan(1.0, &[1.0]) }));
+        assert!(!scans.push(LaserScan { range_max: f32::NAN, ..scan(1.0, &[1.0]) }));
+        assert!(!scans.push(LaserScan { range_max: 0.01, ..scan(1.0, &[1.0]) }));
+        assert!(!scans.push(scan(1.0, &vec![1.0; MAX_RAYS + 1])));
         assert!(scans.near(Stamp::default().plus_seconds(1.0)).is_none());
     }
 
     #[test]
     fn the_nearest_scan_counts_and_one_of_long_ago_does_not() {
         let mut scans = Scans::default();
-        (0..100).for_each(|i| assert!(scans.push(&scan(0.1 * f64::from(i), &[1.0]))));
+        (0..100).for_each(|i| assert!(scans.push(scan(0.1 * f64::from(i), &[1.0]))));
         let near = |seconds| {
             let found = scans.near(Stamp::default().plus_seconds(seconds));
-            found.map(|scan| (scan.stamp.seconds_since(Stamp::default()) * 10.0).round() as i64)
+            found.map(|scan| {
+                (scan.header.stamp().seconds_since(Stamp::default()) * 10.0).round() as i64
+            })
         };
         assert_eq!((near(7.03), near(9.99)), (Some(70), Some(99)));
         assert_eq!((near(1.0), near(12.0)), (None, None), "dropped, and silent");
@@ -139,11 +141,11 @@ mod tests {
     #[test]
     fn points_move_with_the_robot() {
         let mut scans = Scans::default();
-        scans.push(&scan(1.0, &[f32::NAN, 2.0]));
+        scans.push(scan(1.0, &[f32::NAN, 2.0]));
         let scan = scans.near(Stamp::default().plus_seconds(1.0)).unwrap();
         let mount = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::zeros());
         let driven = Isometry2::translation(-0.5, 0.0);
-        let points = scan.seen_from(&mount, &driven);
+        let points = seen_from(scan, &mount, &driven);
         assert!((points[0] - Point3::new(1.6, 0.0, 0.2)).norm() < 1e-6, "{points:?}");
     }
 }
