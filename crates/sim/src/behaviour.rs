@@ -35,6 +35,8 @@ const ROUND_RAD: f64 = 1.4;
 const BEND_EVERY_S: f64 = 6.0;
 const BEND_RAD: f64 = 1.1;
 const BEND_TAKES_S: f64 = 0.4;
+/// Slower than this, m/s, somebody stands, and leaves the avoiding to the others.
+const STANDS_MPS: f64 = 0.1;
 /// Companions come no nearer to each other than about this, m.
 const TOO_NEAR_M: f64 = 0.6;
 /// Whoever walks along closes a gap to their place within about this time, s.
@@ -170,7 +172,7 @@ impl Walker {
         self.velocity = self.velocity.cap_magnitude(1.3 * self.settings.speed_mps.max(0.1));
         self.stance.place += self.velocity * dt;
         self.stance.speed_mps = self.velocity.norm();
-        if wanted != Vector2::zeros() {
+        if wanted != Vector2::zeros() || self.stance.speed_mps > STANDS_MPS {
             self.stay_outside(obstacles);
         }
         self.turn(dt, lead);
@@ -474,6 +476,22 @@ mod tests {
             assert!((walkers[0].stance.place - pillar.at).norm() > 0.399);
         }
         assert!(walkers[0].stance.place.x > 4.5, "{}", walkers[0].stance.place);
+    }
+
+    #[test]
+    fn who_comes_to_a_stop_does_not_glide_into_a_thing() {
+        let mut nearest = f64::MAX;
+        for (x, y) in (0..10).flat_map(|x| (-8..=8).map(move |y| (x, y))) {
+            let mut one = walker(&[[1.0, 1.0], [3.0, 1.0], [5.0, 1.0]], Trick::None);
+            one.settings.rest_s = vec![0.0, 5.0];
+            let at = Point2::new(3.0 + 0.1 * f64::from(x), 1.0 + 0.1 * f64::from(y));
+            for step in 0..250 {
+                one.step(f64::from(step) * 0.02, 0.02, None, &[], &[Obstacle::standing(at, 0.5)]);
+                nearest = nearest.min((one.stance.place - at).norm());
+            }
+        }
+        let slow_m = 0.5 * STANDS_MPS;
+        assert!(nearest > 0.5 - slow_m, "{nearest}");
     }
 
     #[test]
