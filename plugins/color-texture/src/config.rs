@@ -53,7 +53,7 @@ pub struct Training {
 impl Default for Training {
     fn default() -> Self {
         Self {
-            trees: vec![50, 100, 200, 400],
+            trees: vec![100, 200, 400, 800],
             rate: 0.1,
             features: 0.25,
             caution: 5.0,

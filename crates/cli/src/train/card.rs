@@ -29,6 +29,8 @@ pub struct Card {
     pub quick: bool,
     /// The seed.
     pub seed: u64,
+    /// Scenes that were drawn for the first round.
+    pub scenes: u64,
     /// What it was trained on.
     pub trained_on: Vec<String>,
     /// What was added in each round.
@@ -44,11 +46,12 @@ pub struct Card {
 
 impl Card {
     /// A card without figures.
-    pub fn new(args: &TrainArgs, trained_on: Vec<String>) -> Self {
+    pub fn new(args: &TrainArgs, scenes: u64, trained_on: Vec<String>) -> Self {
         Self {
             plugin: args.plugin.clone(),
             quick: args.quick,
             seed: args.seed,
+            scenes,
             trained_on,
             rounds: Vec::new(),
             fit: toml::Table::new(),

@@ -68,6 +68,10 @@ pub struct TrainArgs {
     /// A minute's version, to see that it works; the model is poor.
     #[arg(long)]
     pub quick: bool,
+    /// Scenes that are drawn for the first round [default: 256]; more of them take
+    /// longer, and help a model that has much to learn.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(4..=900))]
+    pub scenes: Option<u64>,
     /// Everything random depends on it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -86,14 +90,14 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(quick: bool) -> Self {
+    fn new(quick: bool, scenes: Option<u64>) -> Self {
         let look = Look { rate_hz: 1.0, duration_s: 7.0 };
         if quick {
             let test_look = Look { rate_hz: 4.0, duration_s: 2.0 };
-            Self { scenes: [6, 4], rounds: 1, test_scenes: 4, look, test_look }
+            Self { scenes: [scenes.unwrap_or(6), 4], rounds: 1, test_scenes: 4, look, test_look }
         } else {
             let test_look = Look { rate_hz: 5.0, duration_s: 4.0 };
-            Self { scenes: [256, 64], rounds: 2, test_scenes: 36, look, test_look }
+            Self { scenes: [scenes.unwrap_or(256), 64], rounds: 2, test_scenes: 36, look, test_look }
         }
     }
 
@@ -132,7 +136,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     if is_detector || args.plugin == faces::NAME {
         return windows::train(&session, trainer.as_mut());
     }
-    let mut card = Card::new(args, session.sources());
+    let mut card = Card::new(args, session.plan.scenes[0], session.sources());
     let mut doubter: Option<Box<dyn Verifier>> = None;
     for round in 0..=session.plan.rounds {
         let harvest = session.harvest(round, trainer.as_mut(), doubter)?;
@@ -168,7 +172,7 @@ impl<'a> Session<'a> {
             bar.set_style(style);
         }
         let settings = settings(args.settings.as_deref())?;
-        Ok(Self { args, registry, plan: Plan::new(args.quick), settings, model, bar })
+        Ok(Self { args, registry, plan: Plan::new(args.quick, args.scenes), settings, model, bar })
     }
 
     fn tell(&self, round: usize, what: &str) {

@@ -1,5 +1,6 @@
 //! What is looked at.
 
+mod body;
 mod colour;
 mod gradients;
 mod place;
@@ -15,7 +16,7 @@ use self::window::{Surface, Window};
 
 /// Numbers of a candidate.
 pub const COUNT: usize =
-    gradients::COUNT + texture::COUNT + colour::COUNT + shape::COUNT + place::COUNT;
+    gradients::COUNT + texture::COUNT + colour::COUNT + shape::COUNT + place::COUNT + body::COUNT;
 
 /// What a number is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,12 +31,14 @@ pub enum Family {
     Shape,
     /// Where it is, and how well its silhouette fits.
     Place,
+    /// Intensity edges from the floor up.
+    Body,
 }
 
 impl Family {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 5] =
-        [Self::Gradients, Self::Texture, Self::Colour, Self::Shape, Self::Place];
+    pub const ALL: [Self; 6] =
+        [Self::Gradients, Self::Texture, Self::Colour, Self::Shape, Self::Place, Self::Body];
 
     /// Its place among the numbers.
     pub fn range(self) -> Range<usize> {
@@ -43,12 +46,14 @@ impl Family {
         const COLOUR: usize = TEXTURE + texture::COUNT;
         const SHAPE: usize = COLOUR + colour::COUNT;
         const PLACE: usize = SHAPE + shape::COUNT;
+        const BODY: usize = PLACE + place::COUNT;
         match self {
             Self::Gradients => 0..TEXTURE,
             Self::Texture => TEXTURE..COLOUR,
             Self::Colour => COLOUR..SHAPE,
             Self::Shape => SHAPE..PLACE,
-            Self::Place => PLACE..COUNT,
+            Self::Place => PLACE..BODY,
+            Self::Body => BODY..COUNT,
         }
     }
 
@@ -60,6 +65,7 @@ impl Family {
             Self::Colour => "colour",
             Self::Shape => "shape",
             Self::Place => "place",
+            Self::Body => "body",
         }
     }
 }
@@ -96,8 +102,9 @@ impl Features {
             Some(surface) => {
                 shape::push(surface, out);
                 place::push(&frame.camera, candidate, out);
+                body::push(&frame.camera, grey, candidate, out);
             }
-            None => unknown(shape::COUNT + place::COUNT, out),
+            None => unknown(COUNT - Family::Shape.range().start, out),
         }
         Ok(())
     }

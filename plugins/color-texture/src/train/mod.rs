@@ -69,15 +69,28 @@ impl TreeTrainer {
         let parts = parts(self.examples.iter().map(|l| l.example), *folds, self.seed);
         let mut trials: Vec<Trial> =
             counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
-        for fold in 0..*folds {
-            let is_out = |k: &usize| parts.get(&self.examples[*k].example.group) == Some(&fold);
-            let (out, rest): (Vec<usize>, Vec<usize>) = (0..self.examples.len()).partition(is_out);
-            let trees = self.boost(examples, &rest)?;
+        let fold_of = |k: &usize| parts.get(&self.examples[*k].example.group);
+        let fit = |fold: usize| {
+            let everything = 0..self.examples.len();
+            let (out, rest) = everything.partition::<Vec<_>, _>(|k| fold_of(k) == Some(&fold));
+            Ok((out, self.boost(examples, &rest)?))
+        };
+        let fitted: Vec<Result<(Vec<usize>, Vec<Tree>)>> = std::thread::scope(|scope| {
+            let fit = &fit;
+            let jobs: Vec<_> = (0..*folds).map(|fold| scope.spawn(move || fit(fold))).collect();
+            let join = |(done, job): (usize, std::thread::ScopedJoinHandle<'_, _>)| {
+                let fitted = job.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+                progress((done + 1) as f64 / (folds + 1) as f64);
+                fitted
+            };
+            jobs.into_iter().enumerate().map(join).collect()
+        });
+        for fold in fitted {
+            let (out, trees) = fold?;
             for trial in &mut trials {
                 let found = &trees[..trial.trees.min(trees.len())];
                 trial.held_out.extend(out.iter().map(|&k| self.judge(found, examples, k)));
             }
-            progress((fold + 1) as f64 / (folds + 1) as f64);
         }
         Ok(trials)
     }

@@ -1,0 +1,156 @@
+use nalgebra::{Point2, Point3, Vector2};
+use tagalong_core::{Camera, Detection, GreyImage};
+
+use super::gradients::{Blocks, DIRECTIONS};
+
+/// An upright plane through the candidate, across the line of sight, is sampled in so
+/// many rows and columns, ...
+const ROWS: usize = 80;
+const COLUMNS: usize = 36;
+/// ... so far from each other, m, down from this height above the floor, m.
+const STEP_M: f64 = 0.025;
+const TOP_M: f64 = 2.0;
+/// Rows and columns of a block.
+const BLOCK: [usize; 2] = [8, 6];
+/// Blocks of the plane.
+const BLOCKS: usize = (ROWS / BLOCK[0]) * (COLUMNS / BLOCK[1]);
+
+/// Numbers of the body.
+pub const COUNT: usize = BLOCKS * (DIRECTIONS + 2);
+
+/// Intensity on the plane, row by row, and whether the image shows the place.
+struct Plane {
+    grey: Vec<f32>,
+    is_seen: Vec<bool>,
+}
+
+/// The whole of the candidate, always at the same scale and from the floor up, since its
+/// place is known: coats hang from poles, plants grow out of pots, and people have legs.
+/// Histograms of gradients block by block, then the logarithm of the strength of each
+/// block, then its intensity beside the mean of all. Blocks whose middle is outside the
+/// image are not known.
+pub fn push(camera: &Camera, image: &GreyImage, candidate: &Detection, out: &mut Vec<f32>) {
+    let start = out.len();
+    let Some(plane) = Plane::new(camera, image, &candidate.position) else {
+        out.resize(start + COUNT, f32::NAN);
+        return;
+    };
+    let strength = Blocks { grey: &plane.grey, columns: COLUMNS, block: BLOCK }.push(out);
+    out.extend(strength.iter().map(|sum| sum.ln_1p()));
+    let mean = plane.grey.iter().sum::<f32>() / plane.grey.len() as f32;
+    out.extend((0..BLOCKS).map(|block| plane.mean(block) - mean));
+    for block in (0..BLOCKS).filter(|block| !plane.is_seen[middle(*block)]) {
+        let histogram = start + block * DIRECTIONS;
+        out[histogram..histogram + DIRECTIONS].fill(f32::NAN);
+        let others = start + BLOCKS * DIRECTIONS + block;
+        [out[others], out[others + BLOCKS]] = [f32::NAN; 2];
+    }
+}
+
+/// The first cell of a block.
+fn corner(block: usize) -> usize {
+    let across = COLUMNS / BLOCK[1];
+    block / across * BLOCK[0] * COLUMNS + block % across * BLOCK[1]
+}
+
+fn middle(block: usize) -> usize {
+    corner(block) + BLOCK[0] / 2 * COLUMNS + BLOCK[1] / 2
+}
+
+impl Plane {
+    /// The plane through a head in the robot frame; `None` if part of it is behind the
+    /// camera. What is outside the image continues its border.
+    fn new(camera: &Camera, image: &GreyImage, head: &Point3<f64>) -> Option<Self> {
+        let eye = camera.robot_from_camera.translation.vector.xy();
+        let ahead = (head.coords.xy() - eye).try_normalize(1e-9)?;
+        let half_m = 0.5 * (COLUMNS - 1) as f64 * STEP_M;
+        let right = Vector2::new(ahead.y, -ahead.x) * half_m;
+        let (mut grey, mut is_seen) = (Vec::new(), Vec::new());
+        for row in 0..ROWS {
+            let height_m = TOP_M - STEP_M * row as f64;
+            let at = |side: f64| {
+                let floor = head.coords.xy() + right * side;
+                camera.project(&Point3::new(floor.x, floor.y, height_m))
+            };
+            // A straight line of the plane is one of the image, nearly evenly spaced.
+            let (from, to) = (at(-1.0)?, at(1.0)?);
+            for column in 0..COLUMNS {
+                let pixel = from + (to - from) * (column as f64 / (COLUMNS - 1) as f64);
+                let (intensity, seen) = sample(image, pixel)?;
+                grey.push(intensity);
+                is_seen.push(seen);
+            }
+        }
+        Some(Self { grey, is_seen })
+    }
+
+    fn mean(&self, block: usize) -> f32 {
+        let rows = (0..BLOCK[0]).map(|row| corner(block) + row * COLUMNS);
+        let sum: f32 = rows.flat_map(|first| &self.grey[first..first + BLOCK[1]]).sum();
+        sum / (BLOCK[0] * BLOCK[1]) as f32
+    }
+}
+
+/// The pixel there, or that of the border next to it, and whether it is inside; `None`
+/// in an image without pixels.
+fn sample(image: &GreyImage, pixel: Point2<f64>) -> Option<(f32, bool)> {
+    let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+    let last = |size: usize| size as i64 - 1;
+    let inside = (x.max(0).min(last(image.width())), y.max(0).min(last(image.height())));
+    Some((f32::from(image.get(inside.0, inside.1)?), inside == (x, y)))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use tagalong_core::{Distortion, Pinhole, Rect};
+
+    use super::*;
+
+    /// A camera 1.2 m above the floor, and what is painted on an upright plane so far
+    /// ahead, m, by how far it is to the left and above the floor, m.
+    fn numbers(ahead_m: f64, paint: impl Fn(f64, f64) -> u8) -> Vec<f32> {
+        let lens =
+            Pinhole { fx: 300.0, fy: 300.0, cx: 160.0, cy: 160.0, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 320, 320, 1.2, 0.0, 0.0);
+        let metres = |pixel: usize| (160.0 - pixel as f64) / 300.0 * ahead_m;
+        let image = GreyImage::from_fn(320, 320, |x, y| paint(metres(x), 1.2 + metres(y)));
+        let candidate = Detection {
+            region: Rect::new(140.0, 60.0, 40.0, 40.0),
+            position: Point3::new(ahead_m, 0.0, 1.6),
+            covariance: Matrix3::identity(),
+            score: 0.0,
+            source: "test",
+        };
+        let mut out = Vec::new();
+        push(&camera, &image, &candidate, &mut out);
+        assert_eq!(out.len(), COUNT);
+        out
+    }
+
+    #[test]
+    fn somebody_looks_the_same_near_and_far() {
+        let legs = |left: f64, up: f64| match (left.abs(), up) {
+            (l, u) if u < 0.9 && (l - 0.12).abs() < 0.06 => 30,
+            (l, u) if (0.9..1.5).contains(&u) && l < 0.2 => 90,
+            _ => 200,
+        };
+        let (near, far) = (numbers(2.4, legs), numbers(4.8, legs));
+        let off: f32 = near.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();
+        let pole = numbers(4.8, |left, up| if up < 0.9 && left.abs() < 0.02 { 30 } else { 200 });
+        let other: f32 = pole.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();
+        assert!(3.0 * off < other, "{off} {other}");
+    }
+
+    #[test]
+    fn what_is_outside_the_image_is_not_known() {
+        let near = numbers(1.0, |left, _| if left > 0.0 { 200 } else { 30 });
+        let (chest, feet) = (4 * 6 + 3, 9 * 6 + 3);
+        let of = |block: usize| &near[block * DIRECTIONS..(block + 1) * DIRECTIONS];
+        assert!(of(chest).iter().all(|v| v.is_finite()));
+        assert!(of(feet).iter().all(|v| v.is_nan()));
+        let strength = &near[BLOCKS * DIRECTIONS..];
+        assert!(strength[feet].is_nan() && strength[BLOCKS + feet].is_nan());
+        assert!(strength[chest].is_finite() && strength[BLOCKS + chest].is_finite());
+    }
+}
