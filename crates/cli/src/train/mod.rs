@@ -97,7 +97,13 @@ impl Plan {
             Self { scenes: [scenes.unwrap_or(6), 4], rounds: 1, test_scenes: 4, look, test_look }
         } else {
             let test_look = Look { rate_hz: 5.0, duration_s: 4.0 };
-            Self { scenes: [scenes.unwrap_or(256), 64], rounds: 2, test_scenes: 36, look, test_look }
+            Self {
+                scenes: [scenes.unwrap_or(256), 64],
+                rounds: 2,
+                test_scenes: 36,
+                look,
+                test_look,
+            }
         }
     }
 

@@ -94,10 +94,16 @@ impl Plane {
 /// The pixel there, or that of the border next to it, and whether it is inside; `None`
 /// in an image without pixels.
 fn sample(image: &GreyImage, pixel: Point2<f64>) -> Option<(f32, bool)> {
-    let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
-    let last = |size: usize| size as i64 - 1;
-    let inside = (x.max(0).min(last(image.width())), y.max(0).min(last(image.height())));
-    Some((f32::from(image.get(inside.0, inside.1)?), inside == (x, y)))
+    let (x, has_column) = nearest(pixel.x, image.width());
+    let (y, has_row) = nearest(pixel.y, image.height());
+    Some((f32::from(image.get(x, y)?), has_column && has_row))
+}
+
+/// The nearest of so many pixels, and whether that is where the place is.
+fn nearest(place: f64, size: usize) -> (i64, bool) {
+    // From 1 on, since what is positive is rounded by cutting it off.
+    let (number, size) = ((place.clamp(-1.0, size as f64) + 1.5) as i64, size as i64);
+    (number.min(size).max(1) - 1, (1..=size).contains(&number))
 }
 
 #[cfg(test)]
@@ -140,6 +146,15 @@ mod tests {
         let pole = numbers(4.8, |left, up| if up < 0.9 && left.abs() < 0.02 { 30 } else { 200 });
         let other: f32 = pole.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();
         assert!(3.0 * off < other, "{off} {other}");
+    }
+
+    #[test]
+    fn places_have_the_nearest_pixel_and_those_outside_that_of_the_border() {
+        let places = [-7.0, -0.51, -0.49, 0.49, 0.51, 3.49, 3.51, 9.0];
+        let found = places.map(|place| nearest(place, 4));
+        assert_eq!(found.map(|(pixel, _)| pixel), [0, 0, 0, 0, 1, 3, 3, 3]);
+        let inside = [false, false, true, true, true, true, false, false];
+        assert_eq!(found.map(|(_, is_inside)| is_inside), inside);
     }
 
     #[test]
