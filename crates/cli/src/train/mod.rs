@@ -68,8 +68,8 @@ pub struct TrainArgs {
     /// A minute's version, to see that it works; the model is poor.
     #[arg(long)]
     pub quick: bool,
-    /// Scenes that are drawn for the first round [default: 256]; more of them take
-    /// longer, and help a model that has much to learn.
+    /// Scenes that are drawn for the first round of a verifier [default: 256]; more of
+    /// them take longer, and help a model that has much to learn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(4..=900))]
     pub scenes: Option<u64>,
     /// Everything random depends on it.
