@@ -2,7 +2,8 @@
 //! are dealt out to folds and never split ([`parts`]), held-out values become
 //! figures ([`area`], [`accepted`]) and log-odds ([`platt`], [`logistic`]), and pictures become more
 //! of them ([`mirrored`], [`shifted`]). Boosted trees are
-//! grown here, too ([`boost`]).
+//! grown here, too ([`boost`]), and what is tried is tried on all cores
+//! ([`side_by_side`]).
 //!
 //! What machines look at is the business of the plugins.
 
@@ -11,10 +12,12 @@ mod calibrate;
 mod folds;
 mod held_out;
 mod logistic;
+mod parallel;
 mod variants;
 
 pub use calibrate::{Line, platt};
 pub use folds::{CALIBRATION, Use, mix, parts, use_of};
 pub use held_out::{accepted, area};
 pub use logistic::{Example, logistic};
+pub use parallel::side_by_side;
 pub use variants::{mirrored, shifted};

@@ -10,6 +10,7 @@ const COLUMNS: usize = 36;
 /// ... so far from each other, m, down from this height above the floor, m.
 const STEP_M: f64 = 0.025;
 const TOP_M: f64 = 2.0;
+const CELLS: usize = ROWS * COLUMNS;
 /// Rows and columns of a block.
 const BLOCK: [usize; 2] = [8, 6];
 /// Blocks of the plane.
@@ -20,8 +21,8 @@ pub const COUNT: usize = BLOCKS * (DIRECTIONS + 2);
 
 /// Intensity on the plane, row by row, and whether the image shows the place.
 struct Plane {
-    grey: Vec<f32>,
-    is_seen: Vec<bool>,
+    grey: [f32; CELLS],
+    is_seen: [bool; CELLS],
 }
 
 /// The whole of the candidate, always at the same scale and from the floor up, since its
@@ -65,7 +66,7 @@ impl Plane {
         let ahead = (head.coords.xy() - eye).try_normalize(1e-9)?;
         let half_m = 0.5 * (COLUMNS - 1) as f64 * STEP_M;
         let right = Vector2::new(ahead.y, -ahead.x) * half_m;
-        let (mut grey, mut is_seen) = (Vec::new(), Vec::new());
+        let mut plane = Self { grey: [0.0; CELLS], is_seen: [false; CELLS] };
         for row in 0..ROWS {
             let height_m = TOP_M - STEP_M * row as f64;
             let at = |side: f64| {
@@ -76,12 +77,11 @@ impl Plane {
             let (from, to) = (at(-1.0)?, at(1.0)?);
             for column in 0..COLUMNS {
                 let pixel = from + (to - from) * (column as f64 / (COLUMNS - 1) as f64);
-                let (intensity, seen) = sample(image, pixel)?;
-                grey.push(intensity);
-                is_seen.push(seen);
+                let cell = row * COLUMNS + column;
+                (plane.grey[cell], plane.is_seen[cell]) = sample(image, pixel)?;
             }
         }
-        Some(Self { grey, is_seen })
+        Some(plane)
     }
 
     fn mean(&self, block: usize) -> f32 {

@@ -6,7 +6,7 @@ mod boost;
 
 pub use boost::Examples;
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
-use tagalong_learn::{Line, accepted, area, parts, platt};
+use tagalong_learn::{Line, accepted, area, parts, platt, side_by_side};
 
 use crate::{COUNT, Family, Features, Model, Stump, Training, Tree};
 
@@ -70,23 +70,14 @@ impl TreeTrainer {
         let mut trials: Vec<Trial> =
             counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
         let fold_of = |k: &usize| parts.get(&self.examples[*k].example.group);
-        let fit = |fold: usize| {
+        let fit = |fold: &usize| {
             let everything = 0..self.examples.len();
-            let (out, rest) = everything.partition::<Vec<_>, _>(|k| fold_of(k) == Some(&fold));
+            let (out, rest) = everything.partition::<Vec<_>, _>(|k| fold_of(k) == Some(fold));
             Ok((out, self.boost(examples, &rest)?))
         };
-        let fitted: Vec<Result<(Vec<usize>, Vec<Tree>)>> = std::thread::scope(|scope| {
-            let fit = &fit;
-            let jobs: Vec<_> = (0..*folds).map(|fold| scope.spawn(move || fit(fold))).collect();
-            let join = |(done, job): (usize, std::thread::ScopedJoinHandle<'_, _>)| {
-                let fitted = job.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-                progress((done + 1) as f64 / (folds + 1) as f64);
-                fitted
-            };
-            jobs.into_iter().enumerate().map(join).collect()
-        });
-        for fold in fitted {
-            let (out, trees) = fold?;
+        let all: Vec<usize> = (0..*folds).collect();
+        let fitted_part = *folds as f64 / (folds + 1) as f64;
+        for (out, trees) in side_by_side(&all, fit, &mut |part| progress(part * fitted_part))? {
             for trial in &mut trials {
                 let found = &trees[..trial.trees.min(trees.len())];
                 trial.held_out.extend(out.iter().map(|&k| self.judge(found, examples, k)));

@@ -1,8 +1,7 @@
 use std::collections::BTreeMap;
-use std::thread::available_parallelism;
 
-use tagalong_core::{Error, Result};
-use tagalong_learn::{accepted, area, mix, parts};
+use tagalong_core::Result;
+use tagalong_learn::{accepted, area, mix, parts, side_by_side};
 
 use super::{Sample, solver};
 use crate::{Sampler, Training};
@@ -46,30 +45,12 @@ pub fn trials(
     let parts = parts(samples.iter().map(|s| s.example), training.folds, seed);
     let each = training.gammas.iter().flat_map(|g| training.penalties.iter().map(|c| (*g, *c)));
     let grid: Vec<(f64, f64)> = each.collect();
-    let attempt = |gamma, penalty| {
+    let attempt = |&(gamma, penalty): &(f64, f64)| {
         let fit = |fitted: &[&Sample]| solver::fit(fitted, sampler, gamma, penalty);
         let held_out = hold_out(samples, &parts, training.folds, fit)?;
         Ok(Trial { gamma, penalty, held_out })
     };
-    let mut all = Vec::with_capacity(grid.len());
-    for few in grid.chunks(available_parallelism().map_or(1, usize::from)) {
-        all.extend(side_by_side(few, &attempt)?);
-        progress(all.len() as f64 / grid.len() as f64);
-    }
-    Ok(all)
-}
-
-/// Each combination in a thread of its own; the results in their order.
-fn side_by_side(
-    grid: &[(f64, f64)],
-    attempt: &(impl Fn(f64, f64) -> Result<Trial> + Sync),
-) -> Result<Vec<Trial>> {
-    let died = |_| Err(Error::Other("the solver panicked".into()));
-    std::thread::scope(|scope| {
-        let running: Vec<_> =
-            grid.iter().map(|(g, c)| scope.spawn(move || attempt(*g, *c))).collect();
-        running.into_iter().map(|thread| thread.join().unwrap_or_else(died)).collect()
-    })
+    side_by_side(&grid, attempt, progress)
 }
 
 fn hold_out(

@@ -1,0 +1,57 @@
+use std::thread::available_parallelism;
+
+use tagalong_core::{Error, Result};
+
+/// Works on each thing in a thread of its own, as many at once as there are cores;
+/// `progress` is told the part that is done. The results are in the order of the things.
+///
+/// # Errors
+/// The first one of `work`, and [`Error::Other`] if it panics.
+pub fn side_by_side<S: Sync, T: Send>(
+    things: &[S],
+    work: impl Fn(&S) -> Result<T> + Sync,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<T>> {
+    let mut all = Vec::with_capacity(things.len());
+    for few in things.chunks(available_parallelism().map_or(1, usize::from)) {
+        all.extend(at_once(few, &work)?);
+        progress(all.len() as f64 / things.len() as f64);
+    }
+    Ok(all)
+}
+
+fn at_once<S: Sync, T: Send>(
+    things: &[S],
+    work: &(impl Fn(&S) -> Result<T> + Sync),
+) -> Result<Vec<T>> {
+    let died = |_| Err(Error::Other("the solver panicked".into()));
+    // All are joined before the first failure counts: one that panics and is not joined
+    // takes the rest down with it.
+    let results: Vec<Result<T>> = std::thread::scope(|scope| {
+        let running: Vec<_> = things.iter().map(|thing| scope.spawn(move || work(thing))).collect();
+        running.into_iter().map(|thread| thread.join().unwrap_or_else(died)).collect()
+    });
+    results.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_are_in_order_and_the_first_failure_counts() {
+        let mut parts = Vec::new();
+        let things: Vec<u64> = (0..40).collect();
+        let squares = side_by_side(&things, |n| Ok(n * n), &mut |part| parts.push(part)).unwrap();
+        assert_eq!(squares, things.iter().map(|n| n * n).collect::<Vec<_>>());
+        assert!(parts.is_sorted() && parts.last() == Some(&1.0), "{parts:?}");
+        let fails = |n: &u64| match n {
+            3 | 4 => Err(Error::Other(format!("{n}"))),
+            _ => Ok(()),
+        };
+        let failure = side_by_side(&things, fails, &mut |_| {}).unwrap_err();
+        assert_eq!(failure.to_string(), "3");
+        let panics = side_by_side(&things, |_| -> Result<()> { panic!("on purpose") }, &mut |_| {});
+        assert!(panics.unwrap_err().to_string().contains("panicked"));
+    }
+}
