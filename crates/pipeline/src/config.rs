@@ -15,6 +15,7 @@ use toml::de::{DeTable, DeValue};
 use crate::GovernorSettings;
 use crate::clock::Clock;
 use crate::control::Steering;
+use crate::doubts::Doubts;
 use crate::lifecycle::Lifecycle;
 use crate::pipeline::{DetectorSlot, Pipeline, Slot};
 use crate::settings::{DetectorSettings, PipelineSettings, PluginSettings, RobotSettings, Role};
@@ -125,6 +126,7 @@ impl Pipeline {
         let pipeline = Self {
             clock: Clock::new(settings.clock.clone()),
             lifecycle: Lifecycle::new(settings.lifecycle.clone()),
+            doubts: Doubts::default(),
             stereo,
             settings,
             detectors,

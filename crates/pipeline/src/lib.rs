@@ -34,6 +34,7 @@
 //! | `same person` | the weaker of two sightings of one person |
 //! | `tracked already` | a newcomer where somebody else is seen |
 //! | `score`, `verifier` | a candidate that is probably no person, by its detector or by the verifiers |
+//! | `doubt` | a newcomer where others were rejected shortly before |
 //! | `filter` | a match that the filter did not accept |
 //! | `too many detections`, `no track numbers left` | what exceeds a limit |
 //! | `support of an unknown track`, `estimate of an unknown track`, `nis not finite` | a filter's mistakes |
@@ -46,6 +47,7 @@ mod boundary;
 mod clock;
 mod config;
 mod control;
+mod doubts;
 mod governor;
 mod lifecycle;
 mod needs;

@@ -10,6 +10,7 @@ use tagalong_stereo::StereoDepth;
 use crate::boundary::{contain, guard};
 use crate::clock::{Clock, Tick};
 use crate::control::{Steered, Steering};
+use crate::doubts::Doubts;
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, range_m, visibility};
@@ -30,6 +31,7 @@ pub struct Pipeline {
     pub(crate) resolved: String,
     pub(crate) clock: Clock,
     pub(crate) lifecycle: Lifecycle,
+    pub(crate) doubts: Doubts,
     /// Processed frames.
     pub(crate) frames: u64,
     pub(crate) failed: Option<u64>,
@@ -217,6 +219,7 @@ impl Pipeline {
         {
             steering.reset();
         }
+        self.doubts.clear();
         ids.into_iter().try_for_each(|id| self.end(now, id, test))
     }
 
@@ -227,6 +230,7 @@ impl Pipeline {
             let Slot { name, plugin: filter } = &mut self.filter;
             contain(name, now.frame.index, || filter.predict(&motion))?;
             self.lifecycle.grow_older(motion.dt);
+            self.doubts.predict(&motion, self.lifecycle.settings());
         }
         now.due = self.due();
         let estimates = self.estimates(now)?;
@@ -377,15 +381,18 @@ impl Pipeline {
                 now.sightings.settle(index, Fate::Dropped("tracked already"));
                 continue;
             }
-            if sighting.detection.score < start_score {
-                now.sightings.settle(index, Fate::Dropped(sighting.score_test(start_score)));
+            let log_odds = self.log_odds(&sighting);
+            if log_odds < start_score {
+                let alone = sighting.detection.score < start_score;
+                let test = if alone { sighting.score_test(start_score) } else { "doubt" };
+                now.sightings.settle(index, Fate::Dropped(test));
                 continue;
             }
             if !sighting.is_discovery {
                 now.sightings.settle(index, Fate::Dropped("no track fits"));
                 continue;
             }
-            let Some(id) = self.lifecycle.start(sighting.detection.score, sighting.detector) else {
+            let Some(id) = self.lifecycle.start(log_odds, sighting.detector) else {
                 now.sightings.settle(index, Fate::Dropped("no track numbers left"));
                 continue;
             };
@@ -395,6 +402,14 @@ impl Pipeline {
             started.insert(id);
         }
         Ok(started)
+    }
+
+    /// That a newcomer is a person. Doubts are of places that were searched for newcomers.
+    fn log_odds(&mut self, sighting: &Sighting) -> f64 {
+        match sighting.is_discovery {
+            true => self.doubts.hear(&sighting.detection, self.lifecycle.settings()),
+            false => sighting.detection.score,
+        }
     }
 
     /// Where the people are whom this frame supports.

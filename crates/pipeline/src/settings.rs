@@ -183,6 +183,13 @@ pub struct LifecycleSettings {
     /// A detection that belongs to no track starts one from this score on
     /// (log-odds, verifiers included).
     pub start_score: f64,
+    /// Newcomers who were rejected at the same place count, too, and are forgotten
+    /// with this time constant, s; 0: each newcomer is judged alone.
+    pub doubt_s: f64,
+    /// A place is the same within this, m.
+    pub doubt_m: f64,
+    /// No place is doubted more than this, log-odds.
+    pub doubt_limit: f64,
     /// A track is confirmed when it was seen this often ...
     pub confirm_hits: u32,
     /// ... in so many frames in which it could have been seen (at most 32), ...
@@ -220,6 +227,9 @@ impl Default for LifecycleSettings {
     fn default() -> Self {
         Self {
             start_score: 0.0,
+            doubt_s: 0.0,
+            doubt_m: 0.3,
+            doubt_limit: 6.0,
             confirm_hits: 3,
             confirm_within: 5,
             confirm_score: 4.0,

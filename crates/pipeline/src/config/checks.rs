@@ -123,6 +123,9 @@ fn lifecycle_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
     let hits = f64::from(s.confirm_hits);
     [
         ("start_score", s.start_score, Must::Finite),
+        ("doubt_s", s.doubt_s, Must::NotNegative),
+        ("doubt_m", s.doubt_m, Must::NotNegative),
+        ("doubt_limit", s.doubt_limit, Must::NotNegative),
         ("confirm_hits", hits, Must::Positive),
         ("confirm_within", f64::from(s.confirm_within), Must::AtMost(32.0, "")),
         ("confirm_within", f64::from(s.confirm_within), Must::AtLeast(hits, ", as `confirm_hits`")),

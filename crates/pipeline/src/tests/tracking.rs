@@ -366,3 +366,27 @@ fn all_stages_are_timed() {
     let timed: Vec<&str> = report.timings.iter().map(|t| t.0).collect();
     assert_eq!(timed, pipeline.stage_names());
 }
+
+/// A coat stand: doubted in most frames, believed in one of four.
+fn first_track_of_a_coat_stand(lifecycle: &str) -> Option<usize> {
+    let score = |i: i32| if i % 4 == 3 { 1.5 } else { -2.0 };
+    let world = World::of((0..20).map(|i| vec![scored(score(i), person(3.0, 0.0))]));
+    let reports = world.run(&format!("{PLAIN}[lifecycle]\n{lifecycle}"), 20, 0.1);
+    reports.iter().position(|report| !report.tracks.is_empty())
+}
+
+#[test]
+fn where_somebody_was_rejected_one_look_starts_no_track() {
+    assert_eq!(first_track_of_a_coat_stand(""), Some(3));
+    assert_eq!(first_track_of_a_coat_stand("doubt_s = 3.0"), None);
+}
+
+#[test]
+fn who_comes_to_a_doubted_place_is_believed_a_little_later() {
+    let score = |i: i32| if i < 10 { -3.0 } else { 2.5 };
+    let world = World::of((0..20).map(|i| vec![scored(score(i), person(3.0, 0.0))]));
+    let reports = world.run(&format!("{PLAIN}[lifecycle]\ndoubt_s = 3.0"), 20, 0.1);
+    let first = reports.iter().position(|report| !report.tracks.is_empty()).unwrap();
+    assert!((11..=13).contains(&first), "{first}");
+    assert_eq!(reports[10].funnel.count("doubt"), 1);
+}

@@ -190,7 +190,7 @@ impl Tally {
         self.frames += 1;
         for candidate in &report.candidates {
             let rejected = match candidate.fate {
-                Fate::Dropped("verifier") => true,
+                Fate::Dropped("verifier" | "doubt") => true,
                 Fate::Dropped(_) => continue,
                 Fate::Matched(_) | Fate::Started(_) => false,
             };

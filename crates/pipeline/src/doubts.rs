@@ -1,0 +1,117 @@
+//! Places of which it was said before that nobody stands there.
+//!
+//! A coat stand that was rejected in twenty frames is no person when the twenty-first
+//! look is mistaken. The log-odds of all newcomers at one place add up, and fade, as
+//! those of a track do (P4, section II-C, has neither; `algorithms`, section 3).
+
+use nalgebra::Point2;
+use tagalong_core::{Detection, Motion};
+
+use crate::LifecycleSettings;
+
+/// Doubts fade out below this, log-odds.
+const FAINT: f64 = 0.05;
+
+/// Where newcomers were rejected, in the frame of the robot.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Doubts {
+    places: Vec<Place>,
+}
+
+#[derive(Clone, Debug)]
+struct Place {
+    at: Point2<f64>,
+    /// Sum of what was said, below zero.
+    log_odds: f64,
+}
+
+impl Doubts {
+    /// The robot moves on, time passes.
+    pub(crate) fn predict(&mut self, motion: &Motion, settings: &LifecycleSettings) {
+        let faded = (-motion.dt / settings.doubt_s).exp();
+        for place in &mut self.places {
+            place.at = motion.apply_to_point(place.at);
+            place.log_odds *= faded;
+        }
+        self.places.retain(|place| place.log_odds < -FAINT);
+    }
+
+    /// The log-odds that a newcomer is a person, with all that was said of the place
+    /// before. Below `start_score` they are remembered.
+    pub(crate) fn hear(&mut self, detection: &Detection, settings: &LifecycleSettings) -> f64 {
+        if settings.doubt_s <= 0.0 {
+            return detection.score;
+        }
+        let at = detection.position.xy();
+        let before = self.take(&at, settings.doubt_m);
+        let sum = detection.score + before;
+        if sum < settings.start_score {
+            let log_odds = sum.max(-settings.doubt_limit);
+            self.places.push(Place { at, log_odds });
+        }
+        sum
+    }
+
+    /// Forgets everything: the clock jumped, the robot may be anywhere.
+    pub(crate) fn clear(&mut self) {
+        self.places.clear();
+    }
+
+    /// Takes out what is remembered of the nearest place within a radius, m.
+    fn take(&mut self, at: &Point2<f64>, radius_m: f64) -> f64 {
+        let off = |place: &Place| (place.at - at).norm();
+        let near = self.places.iter().enumerate().filter(|(_, place)| off(place) <= radius_m);
+        match near.min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))) {
+            Some((index, _)) => self.places.swap_remove(index).log_odds,
+            None => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::doubles::{person, scored};
+
+    fn settings() -> LifecycleSettings {
+        LifecycleSettings { doubt_s: 2.0, ..LifecycleSettings::default() }
+    }
+
+    #[test]
+    fn what_was_said_of_a_place_adds_up_to_a_limit() {
+        let mut doubts = Doubts::default();
+        let mut hear = |score| doubts.hear(&scored(score, person(3.0, 0.0)), &settings());
+        assert_eq!([-2.0, -3.0, -4.0].map(&mut hear), [-2.0, -5.0, -9.0]);
+        assert_eq!([4.0, 1.0, 3.0, 3.0].map(hear), [-2.0, -1.0, 2.0, 3.0], "from -6 on");
+    }
+
+    #[test]
+    fn each_newcomer_is_judged_alone_unless_the_config_says_otherwise() {
+        let (mut doubts, alone) = (Doubts::default(), LifecycleSettings::default());
+        for score in [-5.0, -5.0, 1.0] {
+            assert_eq!(doubts.hear(&scored(score, person(3.0, 0.0)), &alone), score);
+        }
+    }
+
+    #[test]
+    fn a_place_stays_where_it_is_while_the_robot_turns_and_drives() {
+        let mut doubts = Doubts::default();
+        doubts.hear(&scored(-4.0, person(3.0, 0.0)), &settings());
+        let turn = std::f64::consts::FRAC_PI_2;
+        let motion = Motion { forward: 1.0, turn, ..Motion::at_rest(0.0) };
+        doubts.predict(&motion, &settings());
+        assert_eq!(doubts.clone().hear(&person(3.0, 0.0), &settings()), 1.0, "another place");
+        assert_eq!(doubts.hear(&person(0.0, -2.0), &settings()), -3.0);
+    }
+
+    #[test]
+    fn doubts_fade() {
+        let mut doubts = Doubts::default();
+        doubts.hear(&scored(-4.0, person(3.0, 0.0)), &settings());
+        doubts.predict(&Motion::at_rest(2.0), &settings());
+        let log_odds = doubts.clone().hear(&person(3.0, 0.0), &settings());
+        assert!((log_odds - (1.0 - 4.0 / std::f64::consts::E)).abs() < 1e-12, "{log_odds}");
+        doubts.predict(&Motion::at_rest(20.0), &settings());
+        assert!(doubts.places.is_empty());
+    }
+}
