@@ -9,8 +9,10 @@ mod panorama;
 pub mod quality;
 pub mod registration;
 mod row_sums;
+mod upright;
 
 pub use integral::Integral;
 pub use islands::islands;
 pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};
+pub use upright::Upright;

@@ -1,29 +1,16 @@
-use nalgebra::{Point2, Point3, Vector2};
 use tagalong_core::{Camera, Detection, GreyImage};
+use tagalong_vision::Upright;
 
 use super::gradients::{Blocks, DIRECTIONS};
 
-/// An upright plane through the candidate, across the line of sight, is sampled in so
-/// many rows and columns, ...
-const ROWS: usize = 80;
-const COLUMNS: usize = 36;
-/// ... so far from each other, m, down from this height above the floor, m.
-const STEP_M: f64 = 0.025;
-const TOP_M: f64 = 2.0;
-const CELLS: usize = ROWS * COLUMNS;
+const COLUMNS: usize = Upright::COLUMNS;
 /// Rows and columns of a block.
 const BLOCK: [usize; 2] = [8, 6];
 /// Blocks of the plane.
-const BLOCKS: usize = (ROWS / BLOCK[0]) * (COLUMNS / BLOCK[1]);
+const BLOCKS: usize = (Upright::ROWS / BLOCK[0]) * (COLUMNS / BLOCK[1]);
 
 /// Numbers of the body.
 pub const COUNT: usize = BLOCKS * (DIRECTIONS + 2);
-
-/// Intensity on the plane, row by row, and whether the image shows the place.
-struct Plane {
-    grey: [f32; CELLS],
-    is_seen: [bool; CELLS],
-}
 
 /// The whole of the candidate, always at the same scale and from the floor up, since its
 /// place is known: coats hang from poles, plants grow out of pots, and people have legs.
@@ -32,14 +19,14 @@ struct Plane {
 /// image are not known.
 pub fn push(camera: &Camera, image: &GreyImage, candidate: &Detection, out: &mut Vec<f32>) {
     let start = out.len();
-    let Some(plane) = Plane::new(camera, image, &candidate.position) else {
+    let Some(plane) = Upright::new(camera, image, &candidate.position) else {
         out.resize(start + COUNT, f32::NAN);
         return;
     };
     let strength = Blocks { grey: &plane.grey, columns: COLUMNS, block: BLOCK }.push(out);
     out.extend(strength.iter().map(|sum| sum.ln_1p()));
     let mean = plane.grey.iter().sum::<f32>() / plane.grey.len() as f32;
-    out.extend((0..BLOCKS).map(|block| plane.mean(block) - mean));
+    out.extend((0..BLOCKS).map(|block| mean_of(&plane, block) - mean));
     for block in (0..BLOCKS).filter(|block| !plane.is_seen[middle(*block)]) {
         let histogram = start + block * DIRECTIONS;
         out[histogram..histogram + DIRECTIONS].fill(f32::NAN);
@@ -58,57 +45,15 @@ fn middle(block: usize) -> usize {
     corner(block) + BLOCK[0] / 2 * COLUMNS + BLOCK[1] / 2
 }
 
-impl Plane {
-    /// The plane through a head in the robot frame; `None` if part of it is behind the
-    /// camera. What is outside the image continues its border.
-    fn new(camera: &Camera, image: &GreyImage, head: &Point3<f64>) -> Option<Self> {
-        let eye = camera.robot_from_camera.translation.vector.xy();
-        let ahead = (head.coords.xy() - eye).try_normalize(1e-9)?;
-        let half_m = 0.5 * (COLUMNS - 1) as f64 * STEP_M;
-        let right = Vector2::new(ahead.y, -ahead.x) * half_m;
-        let mut plane = Self { grey: [0.0; CELLS], is_seen: [false; CELLS] };
-        for row in 0..ROWS {
-            let height_m = TOP_M - STEP_M * row as f64;
-            let at = |side: f64| {
-                let floor = head.coords.xy() + right * side;
-                camera.project(&Point3::new(floor.x, floor.y, height_m))
-            };
-            // A straight line of the plane is one of the image, nearly evenly spaced.
-            let (from, to) = (at(-1.0)?, at(1.0)?);
-            for column in 0..COLUMNS {
-                let pixel = from + (to - from) * (column as f64 / (COLUMNS - 1) as f64);
-                let cell = row * COLUMNS + column;
-                (plane.grey[cell], plane.is_seen[cell]) = sample(image, pixel)?;
-            }
-        }
-        Some(plane)
-    }
-
-    fn mean(&self, block: usize) -> f32 {
-        let rows = (0..BLOCK[0]).map(|row| corner(block) + row * COLUMNS);
-        let sum: f32 = rows.flat_map(|first| &self.grey[first..first + BLOCK[1]]).sum();
-        sum / (BLOCK[0] * BLOCK[1]) as f32
-    }
-}
-
-/// The pixel there, or that of the border next to it, and whether it is inside; `None`
-/// in an image without pixels.
-fn sample(image: &GreyImage, pixel: Point2<f64>) -> Option<(f32, bool)> {
-    let (x, has_column) = nearest(pixel.x, image.width());
-    let (y, has_row) = nearest(pixel.y, image.height());
-    Some((f32::from(image.get(x, y)?), has_column && has_row))
-}
-
-/// The nearest of so many pixels, and whether that is where the place is.
-fn nearest(place: f64, size: usize) -> (i64, bool) {
-    // From 1 on, since what is positive is rounded by cutting it off.
-    let (number, size) = ((place.clamp(-1.0, size as f64) + 1.5) as i64, size as i64);
-    (number.min(size).max(1) - 1, (1..=size).contains(&number))
+fn mean_of(plane: &Upright, block: usize) -> f32 {
+    let rows = (0..BLOCK[0]).map(|row| corner(block) + row * COLUMNS);
+    let sum: f32 = rows.flat_map(|first| &plane.grey[first..first + BLOCK[1]]).sum();
+    sum / (BLOCK[0] * BLOCK[1]) as f32
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Matrix3;
+    use nalgebra::{Matrix3, Point3};
     use tagalong_core::{Distortion, Pinhole, Rect};
 
     use super::*;
@@ -146,15 +91,6 @@ mod tests {
         let pole = numbers(4.8, |left, up| if up < 0.9 && left.abs() < 0.02 { 30 } else { 200 });
         let other: f32 = pole.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();
         assert!(3.0 * off < other, "{off} {other}");
-    }
-
-    #[test]
-    fn places_have_the_nearest_pixel_and_those_outside_that_of_the_border() {
-        let places = [-7.0, -0.51, -0.49, 0.49, 0.51, 3.49, 3.51, 9.0];
-        let found = places.map(|place| nearest(place, 4));
-        assert_eq!(found.map(|(pixel, _)| pixel), [0, 0, 0, 0, 1, 3, 3, 3]);
-        let inside = [false, false, true, true, true, true, false, false];
-        assert_eq!(found.map(|(_, is_inside)| is_inside), inside);
     }
 
     #[test]

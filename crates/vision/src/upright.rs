@@ -1,0 +1,118 @@
+use nalgebra::{Point2, Point3, Vector2};
+use tagalong_core::{Camera, GreyImage};
+
+/// An upright plane through a person's head, across the line of sight, as an image
+/// shows it: the whole of somebody, always at the same scale and from the floor up.
+///
+/// Which pixel is where follows from the camera's pose, so coats hang from poles here,
+/// plants grow out of pots, and people have legs, however near or far they are.
+pub struct Upright {
+    /// Intensity of the cells, row by row from the top, from left to right. Cells outside
+    /// the image continue its border.
+    pub grey: [f32; Self::CELLS],
+    /// Whether the image shows the cell.
+    pub is_seen: [bool; Self::CELLS],
+}
+
+impl Upright {
+    /// Rows of cells, from [`Self::TOP_M`] down to the floor, ...
+    pub const ROWS: usize = 80;
+    /// ... and columns; the head is in the middle.
+    pub const COLUMNS: usize = 36;
+    /// Cells of the plane.
+    pub const CELLS: usize = Self::ROWS * Self::COLUMNS;
+    /// From cell to cell, m.
+    pub const STEP_M: f64 = 0.025;
+    /// Height of the first row above the floor, m.
+    pub const TOP_M: f64 = 2.0;
+
+    /// The plane through a head in the robot frame; `None` if part of it is behind the
+    /// camera, or the image has no pixels.
+    pub fn new(camera: &Camera, image: &GreyImage, head: &Point3<f64>) -> Option<Self> {
+        let eye = camera.robot_from_camera.translation.vector.xy();
+        let ahead = (head.coords.xy() - eye).try_normalize(1e-9)?;
+        let half_m = 0.5 * (Self::COLUMNS - 1) as f64 * Self::STEP_M;
+        let right = Vector2::new(ahead.y, -ahead.x) * half_m;
+        let mut plane = Self { grey: [0.0; Self::CELLS], is_seen: [false; Self::CELLS] };
+        for row in 0..Self::ROWS {
+            let height_m = Self::TOP_M - Self::STEP_M * row as f64;
+            let at = |side: f64| {
+                let floor = head.coords.xy() + right * side;
+                camera.project(&Point3::new(floor.x, floor.y, height_m))
+            };
+            // A straight line of the plane is one of the image, nearly evenly spaced.
+            let (from, to) = (at(-1.0)?, at(1.0)?);
+            for column in 0..Self::COLUMNS {
+                let pixel = from + (to - from) * (column as f64 / (Self::COLUMNS - 1) as f64);
+                let cell = row * Self::COLUMNS + column;
+                (plane.grey[cell], plane.is_seen[cell]) = sample(image, pixel)?;
+            }
+        }
+        Some(plane)
+    }
+}
+
+/// The pixel there, or that of the border next to it, and whether it is inside; `None`
+/// in an image without pixels.
+fn sample(image: &GreyImage, pixel: Point2<f64>) -> Option<(f32, bool)> {
+    let (x, has_column) = nearest(pixel.x, image.width());
+    let (y, has_row) = nearest(pixel.y, image.height());
+    Some((f32::from(image.get(x, y)?), has_column && has_row))
+}
+
+/// The nearest of so many pixels, and whether that is where the place is.
+fn nearest(place: f64, size: usize) -> (i64, bool) {
+    // From 1 on, since what is positive is rounded by cutting it off.
+    let (number, size) = ((place.clamp(-1.0, size as f64) + 1.5) as i64, size as i64);
+    (number.min(size).max(1) - 1, (1..=size).contains(&number))
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 300.0, fy: 300.0, cx: 160.0, cy: 160.0, distortion: Distortion::None };
+        Camera::mounted(lens, 320, 320, 1.2, 0.0, 0.0)
+    }
+
+    /// What the image shows beside each other on the plane, 3 m away.
+    #[test]
+    fn a_cell_has_the_intensity_of_its_place() {
+        let image = GreyImage::from_fn(320, 320, |x, y| (x / 4 + y / 2) as u8);
+        let plane = Upright::new(&camera(), &image, &Point3::new(3.0, 0.0, 1.6)).unwrap();
+        for row in (0..Upright::ROWS).step_by(7) {
+            for column in (0..Upright::COLUMNS).step_by(5) {
+                let left_m = (17.5 - column as f64) * Upright::STEP_M;
+                let place = Point3::new(3.0, left_m, 2.0 - row as f64 * Upright::STEP_M);
+                let pixel = camera().project(&place).unwrap();
+                let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+                let cell = row * Upright::COLUMNS + column;
+                let off = plane.grey[cell] - f32::from(image.get(x, y).unwrap());
+                assert!(off.abs() <= 1.0, "{row} {column}: {off}");
+                assert!(plane.is_seen[cell]);
+            }
+        }
+    }
+
+    #[test]
+    fn places_have_the_nearest_pixel_and_those_outside_that_of_the_border() {
+        let places = [-7.0, -0.51, -0.49, 0.49, 0.51, 3.49, 3.51, 9.0];
+        let found = places.map(|place| nearest(place, 4));
+        assert_eq!(found.map(|(pixel, _)| pixel), [0, 0, 0, 0, 1, 3, 3, 3]);
+        let inside = [false, false, true, true, true, true, false, false];
+        assert_eq!(found.map(|(_, is_inside)| is_inside), inside);
+    }
+
+    #[test]
+    fn there_is_no_plane_behind_the_camera_or_without_an_image() {
+        let image = GreyImage::from_fn(320, 320, |_, _| 0);
+        let behind = Point3::new(-1.0, 0.0, 1.6);
+        assert!(Upright::new(&camera(), &image, &behind).is_none());
+        let nothing = GreyImage::from_fn(0, 0, |_, _| 0);
+        assert!(Upright::new(&camera(), &nothing, &Point3::new(3.0, 0.0, 1.6)).is_none());
+    }
+}
