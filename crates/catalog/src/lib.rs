@@ -10,6 +10,7 @@ use tagalong_core::Registry;
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {
     tagalong_arc_follow::register(registry);
+    tagalong_body_net::register(registry);
     tagalong_clear_follow::register(registry);
     tagalong_color_texture::register(registry);
     tagalong_compressive::register(registry);

@@ -15,4 +15,4 @@ pub use integral::Integral;
 pub use islands::islands;
 pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};
-pub use upright::Upright;
+pub use upright::{Upright, UprightGrey};

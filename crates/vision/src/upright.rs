@@ -1,17 +1,31 @@
 use nalgebra::{Point2, Point3, Vector2};
-use tagalong_core::{Camera, GreyImage};
+use tagalong_core::{Camera, DepthImage, GreyImage};
 
 /// An upright plane through a person's head, across the line of sight, as an image
 /// shows it: the whole of somebody, always at the same scale and from the floor up.
 ///
 /// Which pixel is where follows from the camera's pose, so coats hang from poles here,
 /// plants grow out of pots, and people have legs, however near or far they are.
+#[derive(Clone, Debug)]
 pub struct Upright {
-    /// Intensity of the cells, row by row from the top, from left to right. Cells outside
-    /// the image continue its border.
-    pub grey: [f32; Self::CELLS],
+    /// The left and the right end of each row.
+    rows: [[End; 2]; Self::ROWS],
+}
+
+/// An end of a row: the pixel, and how far it is along the optical axis, m.
+#[derive(Clone, Copy, Debug)]
+struct End {
+    pixel: Point2<f64>,
+    ahead_m: f64,
+}
+
+/// Intensities on the plane.
+pub struct UprightGrey {
+    /// Row by row from the top, from left to right. Cells outside the image continue its
+    /// border.
+    pub grey: [f32; Upright::CELLS],
     /// Whether the image shows the cell.
-    pub is_seen: [bool; Self::CELLS],
+    pub is_seen: [bool; Upright::CELLS],
 }
 
 impl Upright {
@@ -27,28 +41,55 @@ impl Upright {
     pub const TOP_M: f64 = 2.0;
 
     /// The plane through a head in the robot frame; `None` if part of it is behind the
-    /// camera, or the image has no pixels.
-    pub fn new(camera: &Camera, image: &GreyImage, head: &Point3<f64>) -> Option<Self> {
+    /// camera.
+    pub fn new(camera: &Camera, head: &Point3<f64>) -> Option<Self> {
         let eye = camera.robot_from_camera.translation.vector.xy();
         let ahead = (head.coords.xy() - eye).try_normalize(1e-9)?;
         let half_m = 0.5 * (Self::COLUMNS - 1) as f64 * Self::STEP_M;
         let right = Vector2::new(ahead.y, -ahead.x) * half_m;
-        let mut plane = Self { grey: [0.0; Self::CELLS], is_seen: [false; Self::CELLS] };
-        for row in 0..Self::ROWS {
-            let height_m = Self::TOP_M - Self::STEP_M * row as f64;
-            let at = |side: f64| {
-                let floor = head.coords.xy() + right * side;
-                camera.project(&Point3::new(floor.x, floor.y, height_m))
-            };
-            // A straight line of the plane is one of the image, nearly evenly spaced.
-            let (from, to) = (at(-1.0)?, at(1.0)?);
-            for column in 0..Self::COLUMNS {
-                let pixel = from + (to - from) * (column as f64 / (Self::COLUMNS - 1) as f64);
-                let cell = row * Self::COLUMNS + column;
-                (plane.grey[cell], plane.is_seen[cell]) = sample(image, pixel)?;
-            }
+        let end = |row: usize, side: f64| {
+            let floor = head.coords.xy() + right * side;
+            let place = Point3::new(floor.x, floor.y, Self::TOP_M - Self::STEP_M * row as f64);
+            let ahead_m = camera.robot_from_camera.inverse_transform_point(&place).z;
+            Some(End { pixel: camera.project(&place)?, ahead_m })
+        };
+        let nowhere = End { pixel: Point2::origin(), ahead_m: 0.0 };
+        let mut rows = [[nowhere; 2]; Self::ROWS];
+        for (row, ends) in rows.iter_mut().enumerate() {
+            *ends = [end(row, -1.0)?, end(row, 1.0)?];
         }
-        Some(plane)
+        Some(Self { rows })
+    }
+
+    /// The intensities; `None` in an image without pixels.
+    pub fn grey(&self, image: &GreyImage) -> Option<UprightGrey> {
+        let mut out = UprightGrey { grey: [0.0; Self::CELLS], is_seen: [false; Self::CELLS] };
+        for cell in 0..Self::CELLS {
+            let at = self.at(cell / Self::COLUMNS, cell % Self::COLUMNS);
+            (out.grey[cell], out.is_seen[cell]) = sample(image, at.pixel)?;
+        }
+        Some(out)
+    }
+
+    /// How far what is seen in a cell is behind the plane, along the optical axis, m;
+    /// `None` where the depth is not known.
+    pub fn behind_m(&self, depth: &DepthImage, row: usize, column: usize) -> Option<f32> {
+        let End { pixel, ahead_m } = self.at(row, column);
+        let ((x, has_column), (y, has_row)) =
+            (nearest(pixel.x, depth.width()), nearest(pixel.y, depth.height()));
+        let reading = depth.get(x, y).filter(|_| has_column && has_row)?;
+        (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
+    }
+
+    /// The middle of a cell. A straight line of the plane is one of the image, nearly
+    /// evenly spaced.
+    fn at(&self, row: usize, column: usize) -> End {
+        let [from, to] = self.rows[row];
+        let part = column as f64 / (Self::COLUMNS - 1) as f64;
+        End {
+            pixel: from.pixel + (to.pixel - from.pixel) * part,
+            ahead_m: from.ahead_m + (to.ahead_m - from.ahead_m) * part,
+        }
     }
 }
 
@@ -83,7 +124,8 @@ mod tests {
     #[test]
     fn a_cell_has_the_intensity_of_its_place() {
         let image = GreyImage::from_fn(320, 320, |x, y| (x / 4 + y / 2) as u8);
-        let plane = Upright::new(&camera(), &image, &Point3::new(3.0, 0.0, 1.6)).unwrap();
+        let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
+        let shown = plane.grey(&image).unwrap();
         for row in (0..Upright::ROWS).step_by(7) {
             for column in (0..Upright::COLUMNS).step_by(5) {
                 let left_m = (17.5 - column as f64) * Upright::STEP_M;
@@ -91,9 +133,9 @@ mod tests {
                 let pixel = camera().project(&place).unwrap();
                 let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
                 let cell = row * Upright::COLUMNS + column;
-                let off = plane.grey[cell] - f32::from(image.get(x, y).unwrap());
+                let off = shown.grey[cell] - f32::from(image.get(x, y).unwrap());
                 assert!(off.abs() <= 1.0, "{row} {column}: {off}");
-                assert!(plane.is_seen[cell]);
+                assert!(shown.is_seen[cell]);
             }
         }
     }
@@ -109,10 +151,21 @@ mod tests {
 
     #[test]
     fn there_is_no_plane_behind_the_camera_or_without_an_image() {
-        let image = GreyImage::from_fn(320, 320, |_, _| 0);
         let behind = Point3::new(-1.0, 0.0, 1.6);
-        assert!(Upright::new(&camera(), &image, &behind).is_none());
-        let nothing = GreyImage::from_fn(0, 0, |_, _| 0);
-        assert!(Upright::new(&camera(), &nothing, &Point3::new(3.0, 0.0, 1.6)).is_none());
+        assert!(Upright::new(&camera(), &behind).is_none());
+        let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
+        assert!(plane.grey(&GreyImage::from_fn(0, 0, |_, _| 0)).is_none());
+        assert_eq!(plane.behind_m(&DepthImage::from_fn(0, 0, |_, _| 0.0), 0, 0), None);
+    }
+
+    #[test]
+    fn a_wall_is_behind_the_plane_and_what_is_not_measured_is_nowhere() {
+        let wall = |x: usize| if x < 160 { 3.5 } else { f32::NAN };
+        let depth = DepthImage::from_fn(320, 320, |x, _| wall(x));
+        let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
+        assert!((plane.behind_m(&depth, 40, 3).unwrap() - 0.5).abs() < 1e-6);
+        assert_eq!(plane.behind_m(&depth, 40, 30), None);
+        let near = Upright::new(&camera(), &Point3::new(1.0, 0.0, 1.6)).unwrap();
+        assert_eq!(near.behind_m(&depth, 79, 3), None, "feet are below the image");
     }
 }

@@ -353,6 +353,7 @@ fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
 fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
+        "body-net" => "[training]\nepochs = 2",
         "color-texture" => "[training]\ntrees = [25, 50]",
         "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
         "cascade" => "[training]\nstages = 4\nfeatures = 200",

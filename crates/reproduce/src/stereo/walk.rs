@@ -1,7 +1,7 @@
 //! P4, Fig. 11: where is a person who walks along two edges of a square?
 
 use tagalong_eval::{Bootstrap, PositionError, percentile};
-use tagalong_trials::{Judge, Trial, TrialError};
+use tagalong_trials::{Judge, Moment, Trial, TrialError};
 
 use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
@@ -15,7 +15,16 @@ struct Errors {
     in_start: Vec<f64>,
 }
 
-/// A figure that sums up the errors of some walks.
+/// One walk.
+struct Walk {
+    /// Of each contender.
+    errors: Vec<Errors>,
+    /// How far the true place is from itself, seen from where the odometry believes the
+    /// robot to be, m: no tracker is better in the frame of the start.
+    drift: Vec<f64>,
+}
+
+/// Errors of some walks.
 type Walks<'a> = Vec<&'a [f64]>;
 
 /// The error of the one who walks ahead.
@@ -30,8 +39,9 @@ pub fn walk(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 /// The other person is nobody's miss and nobody's false alarm.
-fn errors(mut trial: Trial) -> Result<Vec<Errors>, TrialError> {
+fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
     let walker = trial.moments.iter().flat_map(|m| &m.truth).map(|truth| truth.id).min();
+    let drift = drift(&trial.moments, walker);
     let everybody = trial.moments.iter_mut().flat_map(|moment| &mut moment.truth);
     everybody.filter(|truth| Some(truth.id) != walker).for_each(|truth| truth.ignore = true);
     let judge = Judge { coasting: true, ..Judge::default() };
@@ -39,17 +49,37 @@ fn errors(mut trial: Trial) -> Result<Vec<Errors>, TrialError> {
         let judged = judge.judge(&trial, run)?;
         Ok(Errors { in_robot: judged.errors_in_robot_m, in_start: judged.errors_in_start_m })
     };
-    trial.runs.iter().map(of_run).collect()
+    let errors = trial.runs.iter().map(of_run).collect::<Result<_, TrialError>>()?;
+    Ok(Walk { errors, drift })
 }
 
-fn table(walks: &[Vec<Errors>]) -> Table {
+/// What the odometry alone does to the places of the one who walks ahead.
+fn drift(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
+    let Some(first) = moments.first() else { return Vec::new() };
+    let off = |moment: &Moment| {
+        let seen = moment.truth.iter().find(|truth| Some(truth.id) == walker && !truth.ignore)?;
+        let head = seen.head_in_robot.xy();
+        let real = first.world_from_robot.inverse() * moment.world_from_robot * head;
+        let believed = first.odom_from_robot.inverse() * moment.odom_from_robot * head;
+        Some((real - believed).norm())
+    };
+    moments.iter().filter_map(off).collect()
+}
+
+fn table(walks: &[Walk]) -> Table {
     let published = [125.0, f64::NAN, f64::NAN, 336.0].map(|mm| Cell::number(mm, 0)).to_vec();
     let mut rows = vec![Row::published("one walk, frame of the start", published)];
     for (at, name) in PIPELINES.iter().enumerate() {
-        let of = |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w[at])).collect();
+        let of =
+            |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w.errors[at])).collect();
         rows.push(Row::ours(format!("{name}, frame of the start"), cells(&of(|e| &e.in_start))));
         rows.push(Row::ours(format!("{name}, frame of the robot"), cells(&of(|e| &e.in_robot))));
     }
+    let drift: Walks<'_> = walks.iter().map(|walk| &walk.drift[..]).collect();
+    rows.push(Row::ours(
+        "no tracker: the drift of the odometry, frame of the start",
+        cells(&drift),
+    ));
     let columns = ["mean mm", "95 % below mm", "worst of a walk, median mm", "worst mm"];
     Table {
         title: "Error of the place of the person who is followed (P4, Fig. 11)".into(),
@@ -61,7 +91,9 @@ fn table(walks: &[Vec<Errors>]) -> Table {
                 walks.len()
             ),
             "Predicted places count, too: the other person passes between.".into(),
-            "The robot drives on a path of its own, with the errors of its odometry.".into(),
+            "The robot drives on a path of its own, with the errors of its odometry; the last \
+             row is the true place, seen from where the odometry believes the robot to be."
+                .into(),
         ],
     }
 }
@@ -87,7 +119,37 @@ fn cells(walks: &Walks<'_>) -> Vec<Cell> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Isometry2, Point3, Vector2};
+    use tagalong_core::Stamp;
+    use tagalong_sim::Truth;
+
     use super::*;
+
+    #[test]
+    fn drift_is_what_the_odometry_does_to_the_true_place_of_the_walker() {
+        let head = Point3::new(2.0, 0.0, 1.6);
+        let truth = |id: u16| Truth {
+            id,
+            head_in_robot: head,
+            torso_in_robot: head,
+            upper_body: None,
+            visible: None,
+            visible_fraction: 1.0,
+            occluder: None,
+            ignore: false,
+        };
+        let moment = |at: f64, ids: &[u16]| Moment {
+            stamp: Stamp::default(),
+            truth: ids.iter().map(|id| truth(*id)).collect(),
+            odom_from_robot: Isometry2::new(Vector2::new(at, 0.0), 0.1 * at),
+            world_from_robot: Isometry2::new(Vector2::new(5.0 + at, 1.0), 0.0),
+        };
+        let moments = [moment(0.0, &[1, 2]), moment(1.0, &[2, 1]), moment(2.0, &[2])];
+        let found = drift(&moments, Some(1));
+        assert_eq!(found.len(), 2, "who is not there has no place");
+        // A turn by 0.1 rad that was none moves what is 2 m away along a chord.
+        assert!(found[0] < 1e-12 && (found[1] - 4.0 * 0.05f64.sin()).abs() < 1e-12, "{found:?}");
+    }
 
     #[test]
     fn the_mean_is_over_frames_and_the_worst_over_walks() {

@@ -1,5 +1,5 @@
 use tagalong_core::{Camera, Detection, GreyImage};
-use tagalong_vision::Upright;
+use tagalong_vision::{Upright, UprightGrey};
 
 use super::gradients::{Blocks, DIRECTIONS};
 
@@ -19,7 +19,8 @@ pub const COUNT: usize = BLOCKS * (DIRECTIONS + 2);
 /// image are not known.
 pub fn push(camera: &Camera, image: &GreyImage, candidate: &Detection, out: &mut Vec<f32>) {
     let start = out.len();
-    let Some(plane) = Upright::new(camera, image, &candidate.position) else {
+    let upright = Upright::new(camera, &candidate.position);
+    let Some(plane) = upright.and_then(|plane| plane.grey(image)) else {
         out.resize(start + COUNT, f32::NAN);
         return;
     };
@@ -45,7 +46,7 @@ fn middle(block: usize) -> usize {
     corner(block) + BLOCK[0] / 2 * COLUMNS + BLOCK[1] / 2
 }
 
-fn mean_of(plane: &Upright, block: usize) -> f32 {
+fn mean_of(plane: &UprightGrey, block: usize) -> f32 {
     let rows = (0..BLOCK[0]).map(|row| corner(block) + row * COLUMNS);
     let sum: f32 = rows.flat_map(|first| &plane.grey[first..first + BLOCK[1]]).sum();
     sum / (BLOCK[0] * BLOCK[1]) as f32

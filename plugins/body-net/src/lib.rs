@@ -1,0 +1,38 @@
+//! Doubts candidates by what a small convolutional network makes of all of them.
+//!
+//! An upright plane through the candidate, from the floor to 2 m, is sampled in
+//! intensity and depth ([`View`]), always at one scale. A network of four layers
+//! ([`Net`]) turns it into log-odds ([`Model`]). Where there is no depth it says nothing:
+//! where the candidate is would be a guess.
+//!
+//! With the feature `train` the plugin also offers a trainer (`train`).
+
+mod config;
+mod conv;
+mod model;
+mod net;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+mod verify;
+mod view;
+
+pub use config::{Config, Training};
+pub use model::Model;
+pub use net::{Net, Pass};
+use tagalong_core::Registry;
+pub use verify::BodyNet;
+pub use view::View;
+
+/// The name of this plugin in configs.
+pub const NAME: &str = "body-net";
+
+/// Registers the plugin, and its trainer if that is compiled in.
+pub fn register(registry: &mut Registry) {
+    registry.verifier(NAME, "a small network looks at all of a candidate", BodyNet::new);
+    #[cfg(feature = "train")]
+    registry.trainer(NAME, |config: Config, context| {
+        train::NetTrainer::new(config.training, context.seed)
+    });
+}

@@ -1,0 +1,97 @@
+//! A candidate, as it could have looked as well.
+
+use tagalong_learn::mix;
+
+use crate::View;
+
+/// Contrast is changed by at most this part, ...
+const CONTRAST: f32 = 0.2;
+/// ... and each intensity by this.
+const NOISE: f32 = 4.0;
+
+/// Numbers that look random.
+pub struct Draws(pub u64);
+
+impl Draws {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(1);
+        mix(self.0)
+    }
+
+    /// A number from -1 to 1.
+    pub fn within(&mut self) -> f32 {
+        (self.next() >> 40) as f32 / (1u64 << 23) as f32 - 1.0
+    }
+}
+
+/// Perhaps mirrored, moved by two cells, of other contrast, noisier.
+pub fn changed(view: &View, draws: &mut Draws) -> View {
+    let chance = draws.next();
+    let mirrored = chance & 1 == 1;
+    let moved = [(chance >> 8) % 3, (chance >> 16) % 3].map(|third| third as i64 - 1);
+    let contrast = 1.0 + CONTRAST * draws.within();
+    let mut grey: Vec<u8> =
+        cells(View::GREY, moved.map(|by| 2 * by), mirrored).map(|cell| view.grey[cell]).collect();
+    for value in &mut grey {
+        let around = f32::from(*value) - 128.0;
+        // A float that is cast stays within 0 to 255.
+        *value = (128.0 + contrast * around + NOISE * draws.within()).round() as u8;
+    }
+    let behind = cells(View::DEPTH, moved, mirrored).map(|cell| view.behind[cell]).collect();
+    View { grey, behind }
+}
+
+/// Where the cells of a moved and mirrored image come from; the border is continued.
+fn cells(
+    [rows, columns]: [usize; 2],
+    [down, right]: [i64; 2],
+    mirrored: bool,
+) -> impl Iterator<Item = usize> {
+    let from =
+        |at: usize, by: i64, size: usize| (at as i64 - by).clamp(0, size as i64 - 1) as usize;
+    (0..rows * columns).map(move |cell| {
+        let (row, column) =
+            (from(cell / columns, down, rows), from(cell % columns, right, columns));
+        row * columns + if mirrored { columns - 1 - column } else { column }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_moved_and_mirrored_is_still_there() {
+        let plain: Vec<usize> = cells([2, 3], [0, 0], false).collect();
+        assert_eq!(plain, [0, 1, 2, 3, 4, 5]);
+        assert_eq!(cells([2, 3], [0, 0], true).collect::<Vec<_>>(), [2, 1, 0, 5, 4, 3]);
+        assert_eq!(cells([2, 3], [1, 0], false).collect::<Vec<_>>(), [0, 1, 2, 0, 1, 2]);
+        assert_eq!(cells([2, 3], [0, -1], false).collect::<Vec<_>>(), [1, 2, 2, 4, 5, 5]);
+    }
+
+    #[test]
+    fn intensity_and_depth_move_together() {
+        let mut view = View { grey: vec![0; 80 * 36], behind: vec![0; 40 * 18] };
+        let (row, column) = (30, 8);
+        view.behind[row * 18 + column] = 90;
+        view.grey[2 * row * 36 + 2 * column] = 255;
+        for seed in 0..20 {
+            let other = changed(&view, &mut Draws(seed));
+            let depth = other.behind.iter().position(|v| *v == 90).unwrap();
+            let grey = other.grey.iter().position(|v| *v > 150).unwrap();
+            let rows = [grey / 36, 2 * (depth / 18)];
+            let columns = [grey % 36, 2 * (depth % 18)];
+            assert_eq!(rows[0], rows[1]);
+            assert!(columns[0].abs_diff(columns[1]) <= 1, "{columns:?}");
+        }
+    }
+
+    #[test]
+    fn draws_fill_their_range() {
+        let mut draws = Draws(3);
+        let all: Vec<f32> = (0..1000).map(|_| draws.within()).collect();
+        assert!(all.iter().all(|v| (-1.0..=1.0).contains(v)));
+        assert!(all.iter().sum::<f32>().abs() < 60.0);
+        assert!(all.iter().any(|v| *v < -0.95) && all.iter().any(|v| *v > 0.95));
+    }
+}

@@ -1,0 +1,199 @@
+//! Fits a [`Model`] to labelled candidates: networks learn from all groups but some,
+//! what they say of those calibrates the log-odds, and one that has seen all makes the
+//! model.
+
+mod adam;
+mod changes;
+
+use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
+use tagalong_learn::{Line, accepted, area, mix, parts, platt, side_by_side};
+
+use self::adam::Adam;
+use self::changes::{Draws, changed};
+use crate::{Model, Net, Pass, Training, View};
+
+/// A batch is always summed in so many parts, however many cores there are: the same
+/// bytes on all machines.
+const PARTS: usize = 4;
+/// No label is quite certain.
+const SURE: f32 = 0.99;
+/// Weights are kept in so many steps a unit.
+const STEPS: f32 = 1e4;
+
+/// Collects views of candidates and fits models to them.
+pub struct NetTrainer {
+    training: Training,
+    seed: u64,
+    views: Vec<View>,
+    examples: Vec<Example>,
+    /// Candidates that were not seen whole, or without depth.
+    unseen: usize,
+}
+
+impl NetTrainer {
+    /// A trainer without examples.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for numbers that cannot work.
+    pub fn new(training: Training, seed: u64) -> Result<Self> {
+        check(&training)?;
+        Ok(Self { training, seed, views: Vec::new(), examples: Vec::new(), unseen: 0 })
+    }
+
+    /// A network that has seen these examples.
+    fn network(&self, chosen: &[usize], progress: &mut dyn FnMut(f64)) -> Result<Net> {
+        let people = chosen.iter().filter(|k| self.examples[**k].is_person).count();
+        if people == 0 || people == chosen.len() {
+            let message = "people and others: both are needed, with depth, in several groups";
+            return Err(Error::Other(message.into()));
+        }
+        let mut net = start(self.seed);
+        let mut adam = Adam::default();
+        let Training { epochs, batch, rate, decay, .. } = self.training;
+        let batches = chosen.len().div_ceil(batch) * epochs as usize;
+        let mut done = 0;
+        for epoch in 0..epochs {
+            let mut order = chosen.to_vec();
+            let seed = mix(self.seed ^ mix(u64::from(epoch)));
+            order.sort_by_key(|k| mix(seed ^ *k as u64));
+            for few in order.chunks(batch) {
+                let gradient =
+                    self.gradient(&net, few, people as f32 / chosen.len() as f32, seed)?;
+                let rate = rate * pace(done as f64 / batches as f64);
+                adam.step(&mut net, &gradient, rate as f32, decay as f32);
+                done += 1;
+            }
+            progress(f64::from(epoch + 1) / f64::from(epochs));
+        }
+        for value in net.parts_mut().into_iter().flatten() {
+            *value = (*value * STEPS).round() / STEPS;
+        }
+        Ok(net)
+    }
+
+    /// How the mean loss of a batch depends on the weights. People and others weigh the
+    /// same; `share` is that of people.
+    fn gradient(&self, net: &Net, batch: &[usize], share: f32, seed: u64) -> Result<Net> {
+        let chunks: Vec<&[usize]> = batch.chunks(batch.len().div_ceil(PARTS)).collect();
+        let of_part = |part: &&[usize]| {
+            let (mut gradient, mut pass) = (Net::default(), Pass::default());
+            for &k in *part {
+                let is_person = self.examples[k].is_person;
+                let view = changed(&self.views[k], &mut Draws(mix(seed ^ !(k as u64))));
+                let said = net.look(&view, &mut pass);
+                let target = if is_person { SURE } else { 1.0 - SURE };
+                let weight = 0.5 / if is_person { share } else { 1.0 - share };
+                let of_output = (1.0 / (1.0 + (-said).exp()) - target) * weight;
+                net.learn(&pass, of_output / batch.len() as f32, &mut gradient);
+            }
+            Ok(gradient)
+        };
+        let mut sum = Net::default();
+        for part in side_by_side(&chunks, of_part, &mut |_| {})? {
+            let pairs =
+                sum.parts_mut().into_iter().flatten().zip(part.parts().into_iter().flatten());
+            pairs.for_each(|(sum, value)| *sum += value);
+        }
+        Ok(sum)
+    }
+
+    /// What networks say of candidates that they have not seen.
+    fn held_out(&self, progress: &mut dyn FnMut(f64)) -> Result<Vec<(f64, bool)>> {
+        let folds = self.training.folds;
+        let parts = parts(self.examples.iter().copied(), folds, self.seed);
+        let (mut said, mut pass) = (Vec::new(), Pass::default());
+        for fold in 0..folds {
+            let is_out = |k: &usize| parts.get(&self.examples[*k].group) == Some(&fold);
+            let (out, rest): (Vec<usize>, _) = (0..self.examples.len()).partition(is_out);
+            let net =
+                self.network(&rest, &mut |part| progress((fold as f64 + part) / folds as f64))?;
+            let look = |k: usize, pass: &mut Pass| f64::from(net.look(&self.views[k], pass));
+            said.extend(out.iter().map(|&k| (look(k, &mut pass), self.examples[k].is_person)));
+        }
+        Ok(said)
+    }
+
+    fn figures(&self, said: &[(f64, bool)], model: &Model) -> toml::Table {
+        let number = |n: usize| toml::Value::Integer(n as i64);
+        let people = self.examples.iter().filter(|example| example.is_person).count();
+        let groups: std::collections::BTreeSet<u64> =
+            self.examples.iter().map(|example| example.group).collect();
+        let log_odds: Vec<(f64, bool)> =
+            said.iter().map(|(f, is)| (model.slope * f + model.offset, *is)).collect();
+        toml::Table::from_iter([
+            ("people".to_owned(), number(people)),
+            ("others".to_owned(), number(self.examples.len() - people)),
+            ("without_depth".to_owned(), number(self.unseen)),
+            ("groups".to_owned(), number(groups.len())),
+            ("slope".to_owned(), model.slope.into()),
+            ("offset".to_owned(), model.offset.into()),
+            ("area_under_roc".to_owned(), rounded(area(said), 1e4)),
+            ("people_accepted".to_owned(), rounded(accepted(&log_odds, true), 1e4)),
+            ("others_accepted".to_owned(), rounded(accepted(&log_odds, false), 1e4)),
+        ])
+    }
+}
+
+impl Trainer for NetTrainer {
+    fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
+        match View::new(frame, candidate)? {
+            Some(view) => {
+                self.views.push(view);
+                self.examples.push(example);
+            }
+            None => self.unseen += 1,
+        }
+        Ok(())
+    }
+
+    fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        // A network that leaves a part out is trained a little faster than one of all.
+        let folds = self.training.folds as f64;
+        let first = (folds - 1.0) / folds;
+        let said = self.held_out(&mut |part| progress(first * part))?;
+        let everything: Vec<usize> = (0..self.examples.len()).collect();
+        let net = self.network(&everything, &mut |part| progress(first + (1.0 - first) * part))?;
+        let Line { slope, offset } = platt(&said);
+        let thousandths = |value: f64| (value * 1e3).round() / 1e3;
+        let model = Model { net, slope: thousandths(slope), offset: thousandths(offset) };
+        Ok(Fitted { model: model.to_text(), figures: self.figures(&said, &model) })
+    }
+}
+
+/// Weights by chance, as large as keeps the signal (He, Zhang, Ren and Sun, ICCV 2015).
+fn start(seed: u64) -> Net {
+    let mut net = Net::default();
+    let mut draws = Draws(mix(seed));
+    for (part, inputs) in net.parts_mut().into_iter().zip(Net::INPUTS) {
+        let limit = if inputs > 0 { (6.0 / inputs as f32).sqrt() } else { 0.0 };
+        part.iter_mut().for_each(|value| *value = limit * draws.within());
+    }
+    net
+}
+
+/// The rate warms up, and falls to zero as a cosine (Loshchilov and Hutter, ICLR 2017).
+fn pace(part: f64) -> f64 {
+    const WARM: f64 = 0.1;
+    match part < WARM {
+        true => part / WARM,
+        false => 0.5 + 0.5 * (std::f64::consts::PI * (part - WARM) / (1.0 - WARM)).cos(),
+    }
+}
+
+fn rounded(value: f64, steps: f64) -> toml::Value {
+    ((value * steps).round() / steps).into()
+}
+
+fn check(training: &Training) -> Result<()> {
+    let rules = [
+        (training.epochs >= 1, "`epochs` must be at least 1"),
+        (training.rate > 0.0 && training.rate <= 1.0, "`rate` must be above 0 and at most 1"),
+        ((0.0..1.0).contains(&training.decay), "`decay` must be from 0 to below 1"),
+        (training.batch >= 1, "`batch` must be at least 1"),
+        (training.folds >= 2, "`folds` must be at least 2"),
+    ];
+    match rules.iter().find(|(holds, _)| !holds) {
+        Some((_, message)) => Err(Error::Settings((*message).into())),
+        None => Ok(()),
+    }
+}

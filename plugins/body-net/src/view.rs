@@ -1,0 +1,88 @@
+use tagalong_core::{Detection, Frame, Result};
+use tagalong_vision::Upright;
+
+/// Depth is known in every second row and column of the plane.
+const EVERY: usize = 2;
+/// Depth farther from the plane than this, m, is cut off.
+const REACH_M: f32 = 1.0;
+/// Depth is kept in steps of this, m.
+const STEP_M: f32 = 0.01;
+/// Depth that is not known.
+const UNKNOWN: i8 = i8::MIN;
+
+/// What the network sees of a candidate: an upright plane through it, in intensity and
+/// in depth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    pub(crate) grey: Vec<u8>,
+    /// How far what is seen is behind the plane, in hundredths of a metre.
+    pub(crate) behind: Vec<i8>,
+}
+
+impl View {
+    /// Rows and columns of the intensity ...
+    pub const GREY: [usize; 2] = [Upright::ROWS, Upright::COLUMNS];
+    /// ... and of the depth.
+    pub const DEPTH: [usize; 2] = [Upright::ROWS / EVERY, Upright::COLUMNS / EVERY];
+
+    /// Looks at a candidate; `None` without depth, or if it is too near to be seen whole.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
+    pub fn new(frame: &Frame, candidate: &Detection) -> Result<Option<Self>> {
+        let (grey, depth) = (frame.grey()?, frame.depth().ok());
+        let Some((plane, depth)) = Upright::new(&frame.camera, &candidate.position).zip(depth)
+        else {
+            return Ok(None);
+        };
+        let behind = |cell: usize| {
+            let [row, column] = [cell / Self::DEPTH[1], cell % Self::DEPTH[1]].map(|at| at * EVERY);
+            let behind_m = plane.behind_m(depth, row, column);
+            behind_m.map_or(UNKNOWN, |m| (m.clamp(-REACH_M, REACH_M) / STEP_M).round() as i8)
+        };
+        Ok(plane.grey(grey).map(|plane| Self {
+            grey: plane.grey.iter().map(|value| *value as u8).collect(),
+            behind: (0..Self::DEPTH[0] * Self::DEPTH[1]).map(behind).collect(),
+        }))
+    }
+
+    /// Depth in units of the network, and 1 where it is known.
+    pub(crate) fn depth(&self, cell: usize) -> [f32; 2] {
+        match self.behind[cell] {
+            UNKNOWN => [0.0; 2],
+            steps => [f32::from(steps) * STEP_M * 3.0, 1.0],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tagalong_conformance::patch::{candidate, frame, picture};
+    use tagalong_core::DepthImage;
+
+    use super::*;
+
+    #[test]
+    fn without_depth_there_is_no_view() {
+        assert_eq!(View::new(&frame(picture(true, 1)), &candidate()).unwrap(), None);
+    }
+
+    #[test]
+    fn depth_is_beside_the_plane_cut_off_and_known_or_not() {
+        let at = |x: usize| match x {
+            0..32 => 0.5,
+            32..40 => 2.25,
+            _ => f32::NAN,
+        };
+        let depth = DepthImage::from_fn(64, 64, |x, _| at(x));
+        let frame = frame(picture(true, 1)).with_depth(Arc::new(depth));
+        let view = View::new(&frame, &candidate()).unwrap().unwrap();
+        // A row at the height of the camera; the plane is 27 pixels wide.
+        let row = 20 * View::DEPTH[1];
+        assert_eq!([0, 8, 10, 17].map(|column| view.behind[row + column]), [-100, -100, 25, -128]);
+        assert_eq!(view.depth(row + 10), [0.75, 1.0]);
+        assert_eq!(view.depth(row + 17), [0.0; 2]);
+    }
+}
