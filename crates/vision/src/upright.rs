@@ -63,49 +63,79 @@ impl Upright {
 
     /// The intensities; `None` in an image without pixels.
     pub fn grey(&self, image: &GreyImage) -> Option<UprightGrey> {
+        let (width, height) = (image.width(), image.height());
+        if width == 0 || height == 0 {
+            return None;
+        }
         let mut out = UprightGrey { grey: [0.0; Self::CELLS], is_seen: [false; Self::CELLS] };
-        for cell in 0..Self::CELLS {
-            let at = self.at(cell / Self::COLUMNS, cell % Self::COLUMNS);
-            (out.grey[cell], out.is_seen[cell]) = sample(image, at.pixel)?;
+        for (row, line) in self.lines().enumerate() {
+            for column in 0..Self::COLUMNS {
+                let pixel = line.at(column).pixel;
+                let (x, has_column) = nearest(pixel.x, width);
+                let (y, has_row) = nearest(pixel.y, height);
+                let cell = row * Self::COLUMNS + column;
+                out.grey[cell] = f32::from(image.row(y)[x]);
+                out.is_seen[cell] = has_column && has_row;
+            }
         }
         Some(out)
     }
 
-    /// How far what is seen in a cell is behind the plane, along the optical axis, m;
-    /// `None` where the depth is not known.
-    pub fn behind_m(&self, depth: &DepthImage, row: usize, column: usize) -> Option<f32> {
-        let End { pixel, ahead_m } = self.at(row, column);
-        let ((x, has_column), (y, has_row)) =
-            (nearest(pixel.x, depth.width()), nearest(pixel.y, depth.height()));
-        let reading = depth.get(x, y).filter(|_| has_column && has_row)?;
-        (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
+    /// How far what is seen in every n-th cell of every n-th row is behind the plane, along
+    /// the optical axis, m; `None` where the depth is not known.
+    pub fn behind_m<'a>(
+        &'a self,
+        depth: &'a DepthImage,
+        every: usize,
+    ) -> impl Iterator<Item = Option<f32>> + 'a {
+        let (width, height) = (depth.width(), depth.height());
+        let reading = move |End { pixel, ahead_m }: End| {
+            let (x, has_column) = nearest(pixel.x, width);
+            let (y, has_row) = nearest(pixel.y, height);
+            let reading = if has_column && has_row { depth.row(y)[x] } else { f32::NAN };
+            (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
+        };
+        let columns = (0..Self::COLUMNS).step_by(every);
+        self.lines()
+            .step_by(every)
+            .flat_map(move |line| columns.clone().map(move |column| reading(line.at(column))))
     }
 
-    /// The middle of a cell. A straight line of the plane is one of the image, nearly
-    /// evenly spaced.
-    fn at(&self, row: usize, column: usize) -> End {
-        let [from, to] = self.rows[row];
-        let part = column as f64 / (Self::COLUMNS - 1) as f64;
+    fn lines(&self) -> impl Iterator<Item = Line> {
+        let cells = (Self::COLUMNS - 1) as f64;
+        self.rows.iter().map(move |[from, to]| Line {
+            from: *from,
+            pixel_step: (to.pixel - from.pixel) / cells,
+            ahead_step_m: (to.ahead_m - from.ahead_m) / cells,
+        })
+    }
+}
+
+/// A row of the plane. A straight line of the plane is one of the image, nearly evenly
+/// spaced.
+#[derive(Clone, Copy)]
+struct Line {
+    from: End,
+    pixel_step: Vector2<f64>,
+    ahead_step_m: f64,
+}
+
+impl Line {
+    fn at(&self, column: usize) -> End {
+        let steps = column as f64;
         End {
-            pixel: from.pixel + (to.pixel - from.pixel) * part,
-            ahead_m: from.ahead_m + (to.ahead_m - from.ahead_m) * part,
+            pixel: self.from.pixel + self.pixel_step * steps,
+            ahead_m: self.from.ahead_m + self.ahead_step_m * steps,
         }
     }
 }
 
-/// The pixel there, or that of the border next to it, and whether it is inside; `None`
-/// in an image without pixels.
-fn sample(image: &GreyImage, pixel: Point2<f64>) -> Option<(f32, bool)> {
-    let (x, has_column) = nearest(pixel.x, image.width());
-    let (y, has_row) = nearest(pixel.y, image.height());
-    Some((f32::from(image.get(x, y)?), has_column && has_row))
-}
-
 /// The nearest of so many pixels, and whether that is where the place is.
-fn nearest(place: f64, size: usize) -> (i64, bool) {
-    // From 1 on, since what is positive is rounded by cutting it off.
-    let (number, size) = ((place.clamp(-1.0, size as f64) + 1.5) as i64, size as i64);
-    (number.min(size).max(1) - 1, (1..=size).contains(&number))
+fn nearest(place: f64, size: usize) -> (usize, bool) {
+    let is_inside = place >= -0.5 && place < size as f64 - 0.5;
+    // What is positive is rounded by cutting it off.
+    let number = ((place + 0.5) as i32).max(0) as usize;
+    (number.min(size.saturating_sub(1)), is_inside)
 }
 
 #[cfg(test)]
@@ -155,7 +185,8 @@ mod tests {
         assert!(Upright::new(&camera(), &behind).is_none());
         let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
         assert!(plane.grey(&GreyImage::from_fn(0, 0, |_, _| 0)).is_none());
-        assert_eq!(plane.behind_m(&DepthImage::from_fn(0, 0, |_, _| 0.0), 0, 0), None);
+        let nothing = DepthImage::from_fn(0, 0, |_, _| 0.0);
+        assert!(plane.behind_m(&nothing, 1).all(|behind_m| behind_m.is_none()));
     }
 
     #[test]
@@ -163,9 +194,15 @@ mod tests {
         let wall = |x: usize| if x < 160 { 3.5 } else { f32::NAN };
         let depth = DepthImage::from_fn(320, 320, |x, _| wall(x));
         let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
-        assert!((plane.behind_m(&depth, 40, 3).unwrap() - 0.5).abs() < 1e-6);
-        assert_eq!(plane.behind_m(&depth, 40, 30), None);
+        let of = |plane: &Upright, row: usize, column: usize| {
+            let half = plane.behind_m(&depth, 2).nth(row / 2 * 18 + column / 2);
+            let cell = plane.behind_m(&depth, 1).nth(row * 36 + column);
+            assert_eq!(half, cell, "every second cell of every second row");
+            half.flatten()
+        };
+        assert!((of(&plane, 40, 4).unwrap() - 0.5).abs() < 1e-6);
+        assert_eq!(of(&plane, 40, 30), None);
         let near = Upright::new(&camera(), &Point3::new(1.0, 0.0, 1.6)).unwrap();
-        assert_eq!(near.behind_m(&depth, 79, 3), None, "feet are below the image");
+        assert_eq!(of(&near, 78, 4), None, "feet are below the image");
     }
 }

@@ -35,14 +35,12 @@ impl View {
         else {
             return Ok(None);
         };
-        let behind = |cell: usize| {
-            let [row, column] = [cell / Self::DEPTH[1], cell % Self::DEPTH[1]].map(|at| at * EVERY);
-            let behind_m = plane.behind_m(depth, row, column);
+        let steps = |behind_m: Option<f32>| {
             behind_m.map_or(UNKNOWN, |m| (m.clamp(-REACH_M, REACH_M) / STEP_M).round() as i8)
         };
-        Ok(plane.grey(grey).map(|plane| Self {
-            grey: plane.grey.iter().map(|value| *value as u8).collect(),
-            behind: (0..Self::DEPTH[0] * Self::DEPTH[1]).map(behind).collect(),
+        Ok(plane.grey(grey).map(|seen| Self {
+            grey: seen.grey.iter().map(|value| *value as u8).collect(),
+            behind: plane.behind_m(depth, EVERY).map(steps).collect(),
         }))
     }
 
