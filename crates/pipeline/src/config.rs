@@ -8,6 +8,7 @@ use std::path::Path;
 use tagalong_core::{
     ConfigError, Context, Filter, Registry, Settings, Value, Verifier, nearest, parse_settings,
 };
+use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -33,10 +34,11 @@ const MAX_BYTES: usize = 1 << 20;
 /// Deepest nesting of a config.
 const MAX_DEPTH: usize = 32;
 
-const OWN: [&str; 9] = [
+const OWN: [&str; 10] = [
     "seed",
     "robot",
     "stereo",
+    "odometry",
     "clock",
     "association",
     "occlusion",
@@ -128,6 +130,7 @@ impl Pipeline {
             lifecycle: Lifecycle::new(settings.lifecycle.clone()),
             doubts: Doubts::default(),
             stereo,
+            odometry: settings.odometry.clone().map(VisualOdometry::new),
             settings,
             detectors,
             verifiers,

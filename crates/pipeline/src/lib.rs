@@ -27,6 +27,7 @@
 //! | entry | what was dropped |
 //! |---|---|
 //! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
+//! | `odometry: ...` | a frame that shows too little to correct the wheels by |
 //! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |
 //! | `motion not finite` | a frame's odometry; the robot counts as standing |
 //! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
@@ -73,6 +74,7 @@ pub use settings::{
     AssociationSettings, ClockSettings, Cost, DetectorSettings, LifecycleSettings,
     OcclusionSettings, Overlap, PipelineSettings, PluginSettings, RobotSettings, Role,
 };
+pub use tagalong_odometry::OdometrySettings;
 pub use tagalong_stereo::StereoSettings;
 pub use target::{
     Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,

@@ -5,6 +5,7 @@ use tagalong_core::{
     Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched,
     Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
 };
+use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
 
 use crate::boundary::{contain, guard};
@@ -24,6 +25,7 @@ use crate::{
 pub struct Pipeline {
     pub(crate) settings: PipelineSettings,
     pub(crate) stereo: Option<StereoDepth>,
+    pub(crate) odometry: Option<VisualOdometry>,
     pub(crate) detectors: Vec<DetectorSlot>,
     pub(crate) verifiers: Vec<Slot<dyn Verifier>>,
     pub(crate) filter: Slot<dyn Filter>,
@@ -63,8 +65,9 @@ impl DetectorSlot {
 /// Log-odds that stand for certainty. Larger ones would drown all others.
 const CERTAIN: f64 = 100.0;
 
-const STAGES: [&str; 9] = [
+const STAGES: [&str; 10] = [
     "stereo",
+    "odometry",
     "predict",
     "follow",
     "discover",
@@ -174,23 +177,25 @@ impl Pipeline {
         let with_depth = self.see_depth(&mut now)?;
         now.frame = with_depth.as_ref().unwrap_or(frame);
         now.lap(STAGES[0]);
+        let motion = self.see_motion(&mut now, motion)?;
+        now.lap(STAGES[1]);
         self.break_off(&mut now)?;
         self.predict(&mut now, motion)?;
-        now.lap(STAGES[1]);
-        self.follow(&mut now)?;
         now.lap(STAGES[2]);
-        self.discover(&mut now)?;
+        self.follow(&mut now)?;
         now.lap(STAGES[3]);
-        self.associate(&mut now);
+        self.discover(&mut now)?;
         now.lap(STAGES[4]);
-        self.update(&mut now)?;
+        self.associate(&mut now);
         now.lap(STAGES[5]);
-        self.live(&mut now)?;
+        self.update(&mut now)?;
         now.lap(STAGES[6]);
-        self.learn(&mut now)?;
+        self.live(&mut now)?;
         now.lap(STAGES[7]);
-        self.steer(&mut now)?;
+        self.learn(&mut now)?;
         now.lap(STAGES[8]);
+        self.steer(&mut now)?;
+        now.lap(STAGES[9]);
         self.frames += 1;
         Ok(now.finish())
     }
@@ -204,6 +209,23 @@ impl Pipeline {
         let (frame, funnel) = (now.frame, &mut now.report.funnel);
         let depth = guard(STAGES[0], frame.index, || stereo.depth(frame, funnel))?;
         Ok(Some(frame.with_depth(depth)))
+    }
+
+    /// The robot's motion, as far as the images show it; without one, nothing that was
+    /// seen before is of use.
+    fn see_motion(
+        &mut self,
+        now: &mut Now<'_>,
+        by_wheels: Option<Motion>,
+    ) -> Result<Option<Motion>, StepError> {
+        if self.odometry.is_none() {
+            return Ok(by_wheels);
+        }
+        let people: Vec<_> =
+            self.believed(now)?.values().map(|person| person.person.position.xy()).collect();
+        let Some(odometry) = &mut self.odometry else { return Ok(by_wheels) };
+        let (frame, funnel) = (now.frame, &mut now.report.funnel);
+        guard(STAGES[1], frame.index, || Ok(odometry.see(frame, by_wheels, &people, funnel)))
     }
 
     /// Ends the tracks that a jump of the clock cuts off.
@@ -227,6 +249,7 @@ impl Pipeline {
     fn predict(&mut self, now: &mut Now<'_>, motion: Option<Motion>) -> Result<(), StepError> {
         if let Some(motion) = motion {
             now.motion = motion;
+            now.report.motion = motion;
             let Slot { name, plugin: filter } = &mut self.filter;
             contain(name, now.frame.index, || filter.predict(&motion))?;
             self.lifecycle.grow_older(motion.dt);

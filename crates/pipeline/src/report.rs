@@ -1,4 +1,4 @@
-use tagalong_core::{Command, Detection, Funnel, Sketch, Stamp, Track, TrackId};
+use tagalong_core::{Command, Detection, Funnel, Motion, Sketch, Stamp, Track, TrackId};
 
 use crate::{LockReport, Weighing};
 
@@ -65,6 +65,10 @@ pub struct FrameReport {
     pub stamp: Stamp,
     /// What its stamp led to.
     pub outcome: Outcome,
+    /// The robot's motion since the last processed frame, by its odometry, corrected by
+    /// what stands still in the images where the config asks for that; at rest where a
+    /// jump of the clock leaves it unknown.
+    pub motion: Motion,
     /// All detections, and what became of each.
     pub candidates: Vec<Candidate>,
     /// Everything that was dropped, and by which test.
@@ -93,11 +97,13 @@ pub struct FrameReport {
 }
 
 impl FrameReport {
-    pub(crate) fn new(index: u64, stamp: Stamp) -> Self {
+    /// Of a frame that led to nothing yet.
+    pub fn new(index: u64, stamp: Stamp) -> Self {
         Self {
             index,
             stamp,
             outcome: Outcome::Tracked,
+            motion: Motion::at_rest(0.0),
             candidates: Vec::new(),
             funnel: Funnel::default(),
             tracks: Vec::new(),

@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::Wheels;
+use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 
 use crate::{GovernorSettings, TargetSettings};
@@ -20,6 +21,10 @@ pub struct PipelineSettings {
     /// carries depth, or nobody needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stereo: Option<StereoSettings>,
+    /// Odometry that is corrected by what stands still in the images. Left out: the
+    /// odometry of the log is believed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<OdometrySettings>,
     /// What to do about stamps that jump.
     pub clock: ClockSettings,
     /// Which detection belongs to which track.

@@ -33,7 +33,7 @@ pub struct Judged {
     /// Errors of the matched places in the robot frame, m.
     pub errors_in_robot_m: Vec<f64>,
     /// The same in the frame of the robot at the start, which adds the drift
-    /// of its odometry, m.
+    /// of the odometry that the pipeline believed, m.
     pub errors_in_start_m: Vec<f64>,
 }
 
@@ -113,7 +113,7 @@ fn region(rect: &Rect) -> Region {
 }
 
 /// How far the matches were off. In the frame of the start the truth goes by
-/// the robot's real way, the report by its odometry.
+/// the robot's real way, the report by the motions that the pipeline believed.
 fn errors_m(
     moments: &[(&Moment, &FrameReport)],
     sequence: &Sequence,
@@ -122,12 +122,14 @@ fn errors_m(
     in_start: bool,
 ) -> Vec<f64> {
     let Some((first, _)) = moments.first() else { return Vec::new() };
-    let (home, odom_home) = (first.world_from_robot.inverse(), first.odom_from_robot.inverse());
+    let home = first.world_from_robot.inverse();
+    let mut believed_home = Isometry2::identity();
     let mut errors = Vec::new();
-    for (at, (moment, _)) in moments.iter().enumerate() {
+    for (at, (moment, report)) in moments.iter().enumerate() {
+        believed_home *= report.motion.isometry();
         let (of, frame) = (&sequence.frames[at], &prepared.frames[at]);
         let (real, believed) = match in_start {
-            true => (home * moment.world_from_robot, odom_home * moment.odom_from_robot),
+            true => (home * moment.world_from_robot, believed_home),
             false => (Isometry2::identity(), Isometry2::identity()),
         };
         errors.extend(matches[at].iter().filter_map(|m| {
@@ -143,6 +145,7 @@ fn errors_m(
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector2;
+    use tagalong_core::Motion;
 
     use super::*;
     use crate::testing::trial;
@@ -177,7 +180,9 @@ mod tests {
         let mut trial = trial(&[&[(3.0, 0.0, 1.0); 10]], &[(1, &[Some((3.0, 0.0)); 10])]);
         for (at, moment) in trial.moments.iter_mut().enumerate() {
             moment.world_from_robot = Isometry2::new(Vector2::new(5.0, at as f64), 0.3);
-            moment.odom_from_robot = Isometry2::new(Vector2::new(0.0, 0.9 * at as f64), 0.3);
+        }
+        for report in &mut trial.runs[0].reports[1..] {
+            report.motion = Motion { left: 0.9, ..Motion::at_rest(0.1) };
         }
         let judged = judged(Judge::default(), &trial);
         assert!(judged.errors_in_robot_m.iter().all(|e| *e < 1e-12));

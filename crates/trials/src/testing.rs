@@ -1,10 +1,8 @@
 //! Trials written by hand.
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
-use tagalong_core::{
-    Camera, Distortion, Estimate, Funnel, Person, Pinhole, Sketch, Stamp, Track, TrackId,
-};
-use tagalong_pipeline::{FrameReport, Outcome, Weighing};
+use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, Stamp, Track, TrackId};
+use tagalong_pipeline::FrameReport;
 use tagalong_sim::Truth;
 
 use crate::{Moment, Run, Trial};
@@ -81,19 +79,7 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
         })
     };
     FrameReport {
-        index: at as u64 + 1,
-        stamp: stamp(at),
-        outcome: Outcome::Tracked,
-        candidates: Vec::new(),
-        funnel: Funnel::default(),
         tracks: tracks.iter().filter_map(track).collect(),
-        target: None,
-        lock: None,
-        command: None,
-        nis: Vec::new(),
-        weighing: Weighing::default(),
-        sketch: Sketch::default(),
-        timings: Vec::new(),
-        ended: Vec::new(),
+        ..FrameReport::new(at as u64 + 1, stamp(at))
     }
 }

@@ -1,9 +1,9 @@
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Distortion, Estimate, Funnel, Person, Pinhole, Rect, Silhouette, Sketch,
+    DepthImage, Detection, Distortion, Estimate, Person, Pinhole, Rect, Silhouette, Sketch,
     SketchMap, SketchPoint, Stamp, Track, TrackId,
 };
-use tagalong_pipeline::{Candidate, Fate, Outcome, Weighing};
+use tagalong_pipeline::{Candidate, Fate};
 
 use super::canvas::LINE_PX;
 use super::*;
@@ -32,20 +32,9 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> Scene {
         images: Images { depth, ..Images::default() },
         odom_from_robot: Isometry2::identity(),
         report: FrameReport {
-            index: 3,
-            stamp: Stamp::from_nanos(1_000_000_000),
-            outcome: Outcome::Tracked,
             candidates,
-            funnel: Funnel::default(),
             tracks: tracks.iter().map(|id| track(*id, &camera)).collect(),
-            target: None,
-            lock: None,
-            command: None,
-            nis: Vec::new(),
-            weighing: Weighing::default(),
-            sketch: Sketch::default(),
-            timings: Vec::new(),
-            ended: Vec::new(),
+            ..FrameReport::new(3, Stamp::from_nanos(1_000_000_000))
         },
         camera: Arc::new(camera),
     }

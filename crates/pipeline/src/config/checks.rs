@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use tagalong_core::ConfigError;
+use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 use toml::de::DeTable;
 
@@ -55,9 +56,13 @@ pub(super) fn check(settings: &PipelineSettings, root: &DeTable<'_>) -> Result<(
             return Err(ConfigError { message, span: place(root, section, key) });
         }
     }
-    if let Some((key, must)) = settings.stereo.as_ref().and_then(StereoSettings::mistake) {
-        let message = format!("`stereo.{key}` must be {must}");
-        return Err(ConfigError { message, span: place(root, "stereo", key) });
+    let of_stereo = settings.stereo.as_ref().and_then(StereoSettings::mistake);
+    let of_odometry = settings.odometry.as_ref().and_then(OdometrySettings::mistake);
+    for (section, mistake) in [("stereo", of_stereo), ("odometry", of_odometry)] {
+        if let Some((key, must)) = mistake {
+            let message = format!("`{section}.{key}` must be {must}");
+            return Err(ConfigError { message, span: place(root, section, key) });
+        }
     }
     if i64::try_from(settings.seed).is_err() {
         return Err(ConfigError::new(format!("`seed` must be at most {}", i64::MAX)));

@@ -33,6 +33,7 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         (own("lifecycle.confirm_within = 40"), &["a.toml:1:28", "at most 32"]),
         (own("robot.max_speed_mps = inf"), &["a.toml:1:23", "must be positive, not inf"]),
         (own("stereo.window = 4"), &["a.toml:1:17", "`stereo.window` must be 3, 5, 7 or 9"]),
+        (own("odometry.cell_px = 4"), &["a.toml:1:20", "`odometry.cell_px` must be from 8 to 256"]),
         (own("stereo.metod = 'block'"), &["a.toml:1:8", "did you mean `method`?"]),
         (own("stereo.method = 'blok'"), &["a.toml:1:17", "did you mean `block`?"]),
         (own("seed = 'x'"), &["a.toml:1:8", "invalid type"]),

@@ -11,7 +11,8 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 struct Errors {
     /// In the frame of the robot as it is.
     in_robot: Vec<f64>,
-    /// In the frame of the robot at the start, drift of the odometry included.
+    /// In the frame of the robot at the start, drift included: by the motions that the
+    /// pipeline believed, those of the wheels or corrected ones.
     in_start: Vec<f64>,
 }
 
@@ -76,10 +77,7 @@ fn table(walks: &[Walk]) -> Table {
         rows.push(Row::ours(format!("{name}, frame of the robot"), cells(&of(|e| &e.in_robot))));
     }
     let drift: Walks<'_> = walks.iter().map(|walk| &walk.drift[..]).collect();
-    rows.push(Row::ours(
-        "no tracker: the drift of the odometry, frame of the start",
-        cells(&drift),
-    ));
+    rows.push(Row::ours("no tracker: the drift of the wheels, frame of the start", cells(&drift)));
     let columns = ["mean mm", "95 % below mm", "worst of a walk, median mm", "worst mm"];
     Table {
         title: "Error of the place of the person who is followed (P4, Fig. 11)".into(),
@@ -91,8 +89,9 @@ fn table(walks: &[Walk]) -> Table {
                 walks.len()
             ),
             "Predicted places count, too: the other person passes between.".into(),
-            "The robot drives on a path of its own, with the errors of its odometry; the last \
-             row is the true place, seen from where the odometry believes the robot to be."
+            "The robot drives on a path of its own, with the errors of its wheels, which \
+             `stereo-best` corrects by what stands still (`[odometry]`); the last row is the \
+             true place, seen from where the wheels believe the robot to be."
                 .into(),
         ],
     }

@@ -1,0 +1,251 @@
+//! From which pose does an image show the points of a keyframe where they are?
+//!
+//! Gauss and Newton on the brightness around all points at once (Lucas and Kanade 1981;
+//! Forster, Pizzoli and Scaramuzza 2014 call it sparse image alignment), over the motion
+//! of a robot on a floor and the nod of its camera. A patch is moved and not warped: the
+//! keyframe is never far.
+
+use nalgebra::{Isometry2, Isometry3, Matrix3, Matrix4, Vector2, Vector3, Vector4};
+use tagalong_core::{Camera, Pinhole};
+
+use crate::keyframe::{Keyframe, Point, Pyramid};
+use crate::patch::Difference;
+
+/// Steps at most, at either size of the image.
+const STEPS: usize = 12;
+/// A step that moves by less than this is the last one, m and rad.
+const STILL: f64 = 2e-5;
+/// Pixels side by side are wrong together: so many count as one.
+const ALIKE: f64 = 20.0;
+/// Standard deviation of the camera's nod, rad.
+const NOD_RAD: f64 = 0.02;
+/// Nearer than this to the camera nothing is compared, m.
+const NEAREST_M: f64 = 0.2;
+/// Fewer points than this say nothing.
+const LEAST_POINTS: usize = 8;
+/// Points that differ by more than this, as a multiple of the median, count for little.
+const USUAL: f64 = 3.0;
+
+/// What the wheels say of the way from the keyframe.
+pub struct Prior {
+    /// The robot, in its frame at the keyframe.
+    pub pose: Isometry2<f64>,
+    /// Standard deviations of forward, left and turn, m and rad.
+    pub sigma: Vector3<f64>,
+}
+
+/// From where an image was taken.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The robot, in its frame at the keyframe.
+    pub pose: Isometry2<f64>,
+    /// How the camera nods, compared to the keyframe, rad.
+    pub nod: f64,
+    /// Covariance of forward, left and turn.
+    pub covariance: Matrix3<f64>,
+    /// Points of the keyframe that the image shows, ...
+    pub seen: usize,
+    /// ... and those that look as they did.
+    pub alike: usize,
+}
+
+/// Forward, left, turn, nod.
+type State = Vector4<f64>;
+
+/// The normal equations.
+struct Equations {
+    matrix: Matrix4<f64>,
+    vector: State,
+    seen: usize,
+    alike: usize,
+}
+
+/// A camera with two images, and a keyframe.
+pub struct View<'a> {
+    pub keyframe: &'a Keyframe,
+    pub camera: &'a Camera,
+    pub camera_from_robot: Isometry3<f64>,
+    pub lens: &'a Pinhole,
+    pub images: Pyramid<'a>,
+}
+
+impl View<'_> {
+    /// The pose, beginning with a guess of it and of the nod; `None` if too little is seen.
+    pub fn align(&self, prior: &Prior, guess: (Isometry2<f64>, f64)) -> Option<Fit> {
+        let sigma = prior.sigma.push(NOD_RAD);
+        let precision = Matrix4::from_diagonal(&sigma.map(|sigma| sigma.powi(-2)));
+        let by_wheels = state(&prior.pose, 0.0);
+        let mut at = state(&guess.0, guess.1);
+        let mut last = None;
+        for level in [1, 0] {
+            for _ in 0..STEPS {
+                let Equations { matrix, vector, seen, alike } = self.equations(level, &at)?;
+                let covariance = (matrix + precision).try_inverse()?;
+                let step = covariance * (vector + precision * (at - by_wheels));
+                at -= step;
+                last = Some((covariance, seen, alike));
+                if step.amax() < STILL {
+                    break;
+                }
+            }
+        }
+        let (covariance, seen, alike) = last?;
+        let covariance = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        let is_finite = at.iter().chain(&covariance).all(|value| value.is_finite());
+        is_finite.then(|| Fit { pose: pose(&at), nod: at.w, covariance, seen, alike })
+    }
+
+    /// What the image says at a state. Each point counts by how usual its difference is
+    /// (Geman and McClure).
+    fn equations(&self, level: usize, at: &State) -> Option<Equations> {
+        let stance = Stance::new(at);
+        let looks: Vec<Look> =
+            self.keyframe.points.iter().filter_map(|p| self.look(p, level, &stance)).collect();
+        let usual = median(looks.iter().map(|look| look.difference.mean_square))?.max(1.0);
+        let mut equations = Equations {
+            matrix: Matrix4::zeros(),
+            vector: State::zeros(),
+            seen: looks.len(),
+            alike: 0,
+        };
+        for look in &looks {
+            let unusual = look.difference.mean_square / (USUAL * usual);
+            let weight = (1.0 + unusual).powi(-2) / (ALIKE * usual);
+            equations.alike += usize::from(unusual < 2.0);
+            look.add_to(&mut equations, weight);
+        }
+        Some(equations)
+    }
+
+    /// How a point looks from a state, and how its pixel moves with it.
+    fn look<'p>(&self, point: &'p Point, level: usize, stance: &Stance) -> Option<Look<'p>> {
+        let here = point.after(&stance.pose);
+        let seen = stance.nod(&(self.camera_from_robot * here).coords);
+        if seen.z < NEAREST_M {
+            return None;
+        }
+        let scale = [1.0, 0.5][level];
+        let pixel = self.camera.project_from_camera(&seen.into())?;
+        let middle = pixel.coords * scale + point.shifts[level];
+        let difference = point.patches[level].compare(self.images[level], middle)?;
+        let turned = |v: Vector3<f64>| stance.nod(&(self.camera_from_robot.rotation * v));
+        let (sin, cos) = (stance.pose.rotation.im, stance.pose.rotation.re);
+        let moves = [
+            turned(Vector3::new(-cos, sin, 0.0)),
+            turned(Vector3::new(-sin, -cos, 0.0)),
+            turned(Vector3::new(here.y, -here.x, 0.0)),
+            Vector3::new(0.0, -seen.z, seen.y),
+        ];
+        let (across, down) = (seen.x / seen.z, seen.y / seen.z);
+        let [fx, fy] = [self.lens.fx, self.lens.fy].map(|f| f * scale / seen.z);
+        Some(Look {
+            difference,
+            products: &point.patches[level].products,
+            columns: moves.map(|m| fx * (m.x - across * m.z)).into(),
+            rows: moves.map(|m| fy * (m.y - down * m.z)).into(),
+        })
+    }
+}
+
+/// A point of the keyframe in the image.
+struct Look<'p> {
+    difference: Difference,
+    /// Of its slopes: xx, xy, yy.
+    products: &'p [f64; 3],
+    /// By how many columns and rows it moves with the state.
+    columns: State,
+    rows: State,
+}
+
+impl Look<'_> {
+    fn add_to(&self, equations: &mut Equations, weight: f64) {
+        let ([xx, xy, yy], [x, y]) = (self.products, self.difference.along);
+        let (by_columns, by_rows) =
+            (self.columns * *xx + self.rows * *xy, self.columns * *xy + self.rows * *yy);
+        equations.matrix +=
+            (by_columns * self.columns.transpose() + by_rows * self.rows.transpose()) * weight;
+        equations.vector += (self.columns * x + self.rows * y) * weight;
+    }
+}
+
+/// A state, ready to be applied to points.
+struct Stance {
+    pose: Isometry2<f64>,
+    nod_sin: f64,
+    nod_cos: f64,
+}
+
+impl Stance {
+    fn new(at: &State) -> Self {
+        let (nod_sin, nod_cos) = at.w.sin_cos();
+        Self { pose: pose(at), nod_sin, nod_cos }
+    }
+
+    /// A turn about the camera's horizontal axis.
+    fn nod(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        let (sin, cos) = (self.nod_sin, self.nod_cos);
+        Vector3::new(v.x, cos * v.y - sin * v.z, sin * v.y + cos * v.z)
+    }
+}
+
+fn state(pose: &Isometry2<f64>, nod: f64) -> State {
+    Vector4::new(pose.translation.x, pose.translation.y, pose.rotation.angle(), nod)
+}
+
+fn pose(state: &State) -> Isometry2<f64> {
+    Isometry2::new(Vector2::new(state.x, state.y), state.z)
+}
+
+/// Of points enough to say anything.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    (values.len() >= LEAST_POINTS).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+    use tagalong_core::{DepthImage, Distortion, GreyImage};
+
+    use super::*;
+    use crate::OdometrySettings;
+
+    #[test]
+    fn pixels_move_with_the_state_as_the_equations_say() {
+        let lens = Pinhole { fx: 80.0, fy: 85.0, cx: 47.5, cy: 35.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 96, 72, 1.1, 0.15, 0.05);
+        let image = GreyImage::from_fn(96, 72, |x, y| ((x * 13) ^ (y * 29)) as u8);
+        let half = GreyImage::from_fn(48, 36, |x, y| ((x * 26) ^ (y * 58)) as u8);
+        let depth = DepthImage::filled(96, 72, 3.0);
+        let settings = OdometrySettings { max_depth_m: 9.0, ..OdometrySettings::default() };
+        let keyframe = Keyframe::new(&settings, &camera, &[&image, &half], &depth, &[]);
+        assert!(keyframe.points.len() > 4);
+        let view = View {
+            keyframe: &keyframe,
+            camera: &camera,
+            camera_from_robot: camera.robot_from_camera.inverse(),
+            lens: &lens,
+            images: [&image, &half],
+        };
+        let at = State::new(0.02, -0.01, 0.015, 0.004);
+        let pixel = |point: &Point, at: &State| -> Point2<f64> {
+            let stance = Stance::new(at);
+            let seen = stance.nod(&(view.camera_from_robot * point.after(&stance.pose)).coords);
+            camera.project_from_camera(&seen.into()).unwrap()
+        };
+        let mut compared = 0;
+        for point in &keyframe.points {
+            let Some(look) = view.look(point, 0, &Stance::new(&at)) else { continue };
+            for axis in 0..4 {
+                let mut step = State::zeros();
+                step[axis] = 1e-6;
+                let slope = (pixel(point, &(at + step)) - pixel(point, &(at - step))) / 2e-6;
+                let expected = Vector2::new(look.columns[axis], look.rows[axis]);
+                assert!((slope - expected).norm() < 1e-3 * (1.0 + slope.norm()), "{axis}");
+            }
+            compared += 1;
+        }
+        assert!(compared > 4);
+    }
+}

@@ -1,0 +1,155 @@
+//! An image that later ones are compared with.
+
+use nalgebra::{Isometry2, Point2, Point3, Vector2};
+use tagalong_core::{Camera, DepthImage, GreyImage};
+
+use crate::OdometrySettings;
+use crate::patch::Patch;
+
+/// Pixels from a point to where its depth is compared.
+const NEAR: i64 = 3;
+/// Depths of one surface differ by less than this fraction.
+const SAME_SURFACE: f32 = 0.05;
+
+/// Images at full and at half the size.
+pub type Pyramid<'a> = [&'a GreyImage; 2];
+
+/// Points of an image whose places are known.
+pub struct Keyframe {
+    pub points: Vec<Point>,
+}
+
+/// A point, and what is around it.
+pub struct Point {
+    /// Robot frame at the time of the image, m.
+    pub place: Point3<f64>,
+    /// At full and at half the size.
+    pub patches: [Patch; 2],
+    /// From its pixel, scaled, to the middle of either patch, px.
+    pub shifts: [Vector2<f64>; 2],
+}
+
+impl Keyframe {
+    /// The points of an image. People stand at these places on the floor, robot frame, m.
+    pub fn new(
+        settings: &OdometrySettings,
+        camera: &Camera,
+        images: &Pyramid<'_>,
+        depth: &DepthImage,
+        people: &[Point2<f64>],
+    ) -> Self {
+        let cell = settings.cell_px;
+        let cells = |size: usize| (0..size).step_by(cell);
+        let (width, height) = (images[0].width(), images[0].height());
+        let eye = camera.robot_from_camera.translation.vector.xy().into();
+        let stands_still = |point: &Point| {
+            let line = [eye, point.place.xy()];
+            people.iter().all(|person| distance_m(person, line) > settings.person_m)
+        };
+        let points = cells(height)
+            .flat_map(|top| cells(width).map(move |left| (left, top)))
+            .filter_map(|corner| point(settings, camera, images, depth, corner))
+            .filter(stands_still)
+            .collect();
+        Self { points }
+    }
+}
+
+impl Point {
+    /// Where it is after the robot has moved, robot frame, m.
+    pub fn after(&self, pose: &Isometry2<f64>) -> Point3<f64> {
+        let floor = pose.inverse_transform_point(&self.place.xy());
+        Point3::new(floor.x, floor.y, self.place.z)
+    }
+}
+
+/// From a place to a line on the floor that ends, m.
+fn distance_m(place: &Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
+    let (way, off) = (to - from, place - from);
+    let part = (off.dot(&way) / way.norm_squared().max(1e-9)).clamp(0.0, 1.0);
+    (off - way * part).norm()
+}
+
+/// The point of a cell: where the brightness changes most.
+fn point(
+    settings: &OdometrySettings,
+    camera: &Camera,
+    images: &Pyramid<'_>,
+    depth: &DepthImage,
+    corner: (usize, usize),
+) -> Option<Point> {
+    let range = settings.min_depth_m as f32..=settings.max_depth_m as f32;
+    let least = (2.0 * settings.min_slope) as f32;
+    let (mut best, mut slope) = (None, least);
+    for (x, y, steepness) in slopes(images[0], corner, settings.cell_px) {
+        if steepness <= slope {
+            continue;
+        }
+        let metres = surface_m(depth, x, y).filter(|metres| range.contains(metres));
+        if let Some(metres) = metres {
+            (best, slope) = (Some((x, y, metres)), steepness);
+        }
+    }
+    let (x, y, metres) = best?;
+    let pixel = Point2::new(x as f64, y as f64);
+    let odd = |at: usize| -0.5 * (at % 2) as f64;
+    Some(Point {
+        place: camera.back_project(pixel, f64::from(metres)),
+        patches: [Patch::new(images[0], x, y)?, Patch::new(images[1], x / 2, y / 2)?],
+        shifts: [Vector2::zeros(), Vector2::new(odd(x), odd(y))],
+    })
+}
+
+/// The pixels of a cell, and by how much the brightness changes over two pixels.
+fn slopes(
+    image: &GreyImage,
+    (left, top): (usize, usize),
+    cell: usize,
+) -> impl Iterator<Item = (usize, usize, f32)> {
+    let inner = |from: usize, size: usize| from.max(1)..(from + cell).min(size - 1);
+    let columns = inner(left, image.width());
+    inner(top, image.height()).flat_map(move |y| {
+        let [above, here, below] = [y - 1, y, y + 1].map(|y| image.row(y));
+        columns.clone().map(move |x| {
+            let along = here[x + 1].abs_diff(here[x - 1]);
+            (x, y, f32::from(along.max(below[x].abs_diff(above[x]))))
+        })
+    })
+}
+
+/// The depth of a pixel, m, unless it is at the border of a surface.
+fn surface_m(depth: &DepthImage, x: usize, y: usize) -> Option<f32> {
+    let (x, y) = (x as i64, y as i64);
+    let here = depth.get(x, y)?;
+    let around = [(x - NEAR, y), (x + NEAR, y), (x, y - NEAR), (x, y + NEAR)];
+    let is_elsewhere = |there: f32| (there - here).abs() >= SAME_SURFACE * here;
+    let is_border = around.into_iter().any(|(x, y)| depth.get(x, y).is_none_or(is_elsewhere));
+    (here.is_finite() && !is_border).then_some(here)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_person_hides_is_no_point() {
+        let line = [Point2::origin(), Point2::new(4.0, 0.0)];
+        assert!((distance_m(&Point2::new(2.0, 0.5), line) - 0.5).abs() < 1e-12, "before it");
+        assert!((distance_m(&Point2::new(7.0, 4.0), line) - 5.0).abs() < 1e-12, "behind it");
+        assert!((distance_m(&Point2::new(-3.0, 4.0), line) - 5.0).abs() < 1e-12, "behind the eye");
+    }
+
+    #[test]
+    fn borders_of_surfaces_and_holes_are_no_points() {
+        let depth = DepthImage::from_fn(40, 30, |x, y| match (x, y) {
+            (0..20, _) => 2.0,
+            (_, 0..10) => f32::NAN,
+            _ => 3.0,
+        });
+        assert_eq!(surface_m(&depth, 10, 20), Some(2.0));
+        assert_eq!(surface_m(&depth, 18, 20), None, "two surfaces");
+        assert_eq!(surface_m(&depth, 25, 5), None, "no reading");
+        assert_eq!(surface_m(&depth, 18, 5), Some(2.0), "nothing is known to be beside it");
+        assert_eq!(surface_m(&depth, 1, 20), None, "the image ends");
+    }
+}

@@ -1,0 +1,169 @@
+//! What is around a point, and how it differs from what an image shows.
+
+use nalgebra::Vector2;
+use tagalong_core::GreyImage;
+
+/// Side of a patch, px.
+const SIDE: usize = 7;
+const PIXELS: usize = SIDE * SIDE;
+/// From the middle to the border, px.
+const HALF: usize = SIDE / 2;
+
+/// Brightness around a point, and its slopes, all without their means: cameras adapt to
+/// the light.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    grey: [f32; PIXELS],
+    /// From column to column, and from row to row.
+    slopes: [[f32; PIXELS]; 2],
+    /// Sums of the products of the slopes: xx, xy, yy.
+    pub products: [f64; 3],
+}
+
+/// How an image differs from a patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Of a pixel, grey levels squared.
+    pub mean_square: f64,
+    /// Sums of the differences times either slope.
+    pub along: [f64; 2],
+}
+
+impl Patch {
+    /// Around a pixel; `None` too near to the border of the image.
+    pub fn new(image: &GreyImage, x: usize, y: usize) -> Option<Self> {
+        let is_inside = |at: usize, size: usize| at > HALF && at + HALF + 1 < size;
+        if !(is_inside(x, image.width()) && is_inside(y, image.height())) {
+            return None;
+        }
+        let at = |x: usize, y: usize| f32::from(image.row(y)[x]);
+        let each = |value: &dyn Fn(usize, usize) -> f32| {
+            let pixel = |i: usize| value(x + i % SIDE - HALF, y + i / SIDE - HALF);
+            without_mean(std::array::from_fn(pixel))
+        };
+        let slopes = [
+            each(&|x, y| 0.5 * (at(x + 1, y) - at(x - 1, y))),
+            each(&|x, y| 0.5 * (at(x, y + 1) - at(x, y - 1))),
+        ];
+        let products = [(0, 0), (0, 1), (1, 1)].map(|(a, b)| dot(&slopes[a], &slopes[b]));
+        Some(Self { grey: each(&at), slopes, products })
+    }
+
+    /// Compares it with what an image shows around a place, which may be between pixels;
+    /// `None` where the image ends.
+    pub fn compare(&self, image: &GreyImage, middle: Vector2<f64>) -> Option<Difference> {
+        let mut difference = without_mean(sample(image, middle)?);
+        difference.iter_mut().zip(&self.grey).for_each(|(shown, own)| *shown -= own);
+        Some(Difference {
+            mean_square: dot(&difference, &difference) / PIXELS as f64,
+            along: [0, 1].map(|axis| dot(&difference, &self.slopes[axis])),
+        })
+    }
+}
+
+/// Brightness around a place.
+fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
+    let is_inside =
+        |at: f64, size: usize| at >= HALF as f64 && at + ((HALF + 1) as f64) < size as f64;
+    if !(is_inside(middle.x, image.width()) && is_inside(middle.y, image.height())) {
+        return None;
+    }
+    let (left, top) = (middle.x as usize - HALF, middle.y as usize - HALF);
+    let [across, down] = [middle.x, middle.y].map(|at| at.fract() as f32);
+    let mut out = [0.0; PIXELS];
+    let mut above = between(image.row(top), left, across);
+    for (row, out) in out.chunks_exact_mut(SIDE).enumerate() {
+        let below = between(image.row(top + row + 1), left, across);
+        for ((out, above), below) in out.iter_mut().zip(&above).zip(&below) {
+            *out = above + down * (below - above);
+        }
+        above = below;
+    }
+    Some(out)
+}
+
+/// Between the pixels of a row.
+fn between(row: &[u8], left: usize, part: f32) -> [f32; SIDE] {
+    let pixels = &row[left..=left + SIDE];
+    std::array::from_fn(|i| {
+        let (here, next) = (f32::from(pixels[i]), f32::from(pixels[i + 1]));
+        here + part * (next - here)
+    })
+}
+
+fn without_mean(mut values: [f32; PIXELS]) -> [f32; PIXELS] {
+    let mean = values.iter().sum::<f32>() / PIXELS as f32;
+    values.iter_mut().for_each(|value| *value -= mean);
+    values
+}
+
+fn dot(a: &[f32; PIXELS], b: &[f32; PIXELS]) -> f64 {
+    f64::from(a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn image(width: usize, height: usize) -> GreyImage {
+        GreyImage::from_fn(width, height, |x, y| ((x * x * 31 + y * 57 + x * y * 13) % 251) as u8)
+    }
+
+    /// The brightness between four pixels, one after the other.
+    fn slow_sample(image: &GreyImage, middle: Vector2<f64>) -> Vec<f64> {
+        let at = |x: f64, y: f64| f64::from(image.get(x as i64, y as i64).unwrap());
+        let mut all = Vec::new();
+        for row in -3..=3 {
+            for column in -3..=3 {
+                let (x, y) = (middle.x + f64::from(column), middle.y + f64::from(row));
+                let (left, top) = (x.floor(), y.floor());
+                let (a, b) = (x - left, y - top);
+                all.push(
+                    (1.0 - b) * ((1.0 - a) * at(left, top) + a * at(left + 1.0, top))
+                        + b * ((1.0 - a) * at(left, top + 1.0) + a * at(left + 1.0, top + 1.0)),
+                );
+            }
+        }
+        all
+    }
+
+    proptest! {
+        #[test]
+        fn brightness_between_pixels_is_that_of_the_slow_way(x in 3.0..28.0f64, y in 3.0..18.0f64) {
+            let image = image(32, 22);
+            let middle = Vector2::new(x, y);
+            let fast = sample(&image, middle).unwrap();
+            for (fast, slow) in fast.iter().zip(slow_sample(&image, middle)) {
+                prop_assert!((f64::from(*fast) - slow).abs() < 1e-3);
+            }
+        }
+
+        #[test]
+        fn nothing_is_read_beyond_the_image(x in -5.0..40.0f64, y in -5.0..30.0f64) {
+            let image = image(32, 22);
+            let is_inside = (3.0..28.0).contains(&x) && (3.0..18.0).contains(&y);
+            prop_assert_eq!(sample(&image, Vector2::new(x, y)).is_some(), is_inside);
+        }
+    }
+
+    #[test]
+    fn a_patch_is_like_itself_in_any_light() {
+        let dim = image(32, 22).map(|grey| grey / 2);
+        let bright = dim.map(|grey| grey + 100);
+        let patch = Patch::new(&dim, 10, 9).unwrap();
+        let found = patch.compare(&bright, Vector2::new(10.0, 9.0)).unwrap();
+        assert!(found.mean_square < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn the_difference_of_a_ramp_tells_how_far_it_was_moved() {
+        let ramp = GreyImage::from_fn(32, 22, |x, y| (4 * x + (y * y) / 4) as u8);
+        let patch = Patch::new(&ramp, 12, 10).unwrap();
+        let found = patch.compare(&ramp, Vector2::new(12.0, 10.5)).unwrap();
+        let [_, _, yy] = patch.products;
+        assert!((found.along[1] / yy - 0.5).abs() < 0.05, "{found:?}");
+        assert!(Patch::new(&ramp, 3, 10).is_none() && Patch::new(&ramp, 12, 18).is_none());
+    }
+}

@@ -1,0 +1,53 @@
+//! Odometry, corrected by what stands still.
+
+use std::sync::Arc;
+
+use tagalong_core::{DepthImage, Frame, GreyImage, Images, Motion};
+
+use super::doubles::{World, frame};
+
+const BY_WHEELS: &str = "
+    filter.plugin = 'steady'
+    [[detectors]]
+    plugin = 'script'
+";
+
+/// What a robot sees that stands before a wall.
+fn wall(index: u64, motion: Motion) -> Frame {
+    let plain = frame(index, 0.1 * index as f64);
+    let waves = |x: usize, y: usize| {
+        let (x, y) = (x as f64, y as f64);
+        (128.0 + 50.0 * (0.13 * x + 0.05 * y).sin() + 50.0 * (0.17 * y - 0.07 * x).sin()) as u8
+    };
+    let images = Images {
+        grey: Some(Arc::new(GreyImage::from_fn(640, 480, waves))),
+        depth: Some(Arc::new(DepthImage::filled(640, 480, 3.0))),
+        ..Images::default()
+    };
+    Frame::new(plain.index, plain.stamp, plain.camera, motion, images)
+}
+
+/// What is believed of a turn by the wheels while the robot stands, rad.
+fn believed(config: &str) -> f64 {
+    let mut pipeline = World::default().pipeline(config);
+    pipeline.step(&wall(1, Motion::at_rest(0.0))).unwrap();
+    let report =
+        pipeline.step(&wall(2, Motion { turn: 0.01, forward: 0.01, ..Motion::at_rest(0.1) }));
+    report.unwrap().motion.turn
+}
+
+#[test]
+fn the_motion_is_that_of_the_wheels_unless_the_config_asks_for_more() {
+    assert!((believed(BY_WHEELS) - 0.01).abs() < 1e-12);
+    let corrected = believed(&format!("odometry.wheel_error = 1.0\n{BY_WHEELS}"));
+    assert!(corrected.abs() < 1e-3, "{corrected} rad");
+}
+
+#[test]
+fn without_depth_the_wheels_are_believed() {
+    let mut pipeline = World::default().pipeline(&format!("odometry = {{}}\n{BY_WHEELS}"));
+    for index in 1..=2 {
+        let report = pipeline.step(&frame(index, 0.1 * index as f64)).unwrap();
+        assert!(report.funnel.entries().is_empty(), "{:?}", report.funnel);
+    }
+}
