@@ -1,6 +1,6 @@
 use nalgebra::Point3;
 
-use crate::{Detection, Frame, Funnel, Person, Rect, Result, Track};
+use crate::{Detection, Error, Frame, Funnel, Person, Rect, Result, Track};
 
 /// What a detector is asked.
 #[derive(Clone, Copy)]
@@ -110,6 +110,57 @@ impl<'a> Search<'a> {
                 occupied.iter().any(|d| (d.position.xy() - position.xy()).norm() < within_m)
             }
             Self::Near(_) => false,
+        }
+    }
+}
+
+/// What one look of a verifier is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trust {
+    weight: f64,
+    limit: f64,
+    bias: f64,
+}
+
+impl Trust {
+    /// `weight * log_odds + bias`, the log-odds within plus and minus `limit`.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for numbers that cannot work, by the names of the arguments.
+    pub fn new(weight: f64, limit: f64, bias: f64) -> Result<Self> {
+        for (name, value) in [("weight", weight), ("limit", limit)] {
+            if !(value.is_finite() && value >= 0.0) {
+                let message = format!("`{name}` = {value} must be a number from 0 on");
+                return Err(Error::Settings(message));
+            }
+        }
+        if !bias.is_finite() {
+            return Err(Error::Settings(format!("`bias` = {bias} must be finite")));
+        }
+        Ok(Self { weight, limit, bias })
+    }
+
+    /// The margin of a candidate whose model says so much of it.
+    pub fn margin(&self, log_odds: f64) -> f64 {
+        self.weight * log_odds.clamp(-self.limit, self.limit) + self.bias
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_look_is_never_beyond_doubt() {
+        let trust = Trust::new(2.0, 3.0, -1.0).unwrap();
+        assert_eq!([0.5, 9.0, -9.0].map(|odds| trust.margin(odds)), [0.0, 5.0, -7.0]);
+        for (weight, limit, bias, word) in [
+            (-1.0, 1.0, 0.0, "weight"),
+            (1.0, f64::NAN, 0.0, "limit"),
+            (1.0, 1.0, f64::INFINITY, "bias"),
+        ] {
+            let error = Trust::new(weight, limit, bias).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
         }
     }
 }

@@ -51,7 +51,7 @@ mod trainer;
 pub use camera::{Camera, Distortion, Lens, Pinhole};
 pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
 pub use detection::Detection;
-pub use detector::{Detector, Likelihood, Search, Verifier};
+pub use detector::{Detector, Likelihood, Search, Trust, Verifier};
 pub use error::{Error, Result};
 pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Support};
 pub use frame::{Derived, Frame, Images, RightImage};

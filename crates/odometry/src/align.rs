@@ -23,6 +23,8 @@ const NOD_RAD: f64 = 0.02;
 const NEAREST_M: f64 = 0.2;
 /// Fewer points than this say nothing.
 const LEAST_POINTS: usize = 8;
+/// Wheels are wrong by no more standard deviations than this.
+const MOST_SIGMAS: f64 = 3.5;
 /// Points that differ by more than this, as a multiple of the median, count for little.
 const USUAL: f64 = 3.0;
 
@@ -32,6 +34,15 @@ pub struct Prior {
     pub pose: Isometry2<f64>,
     /// Standard deviations of forward, left and turn, m and rad.
     pub sigma: Vector3<f64>,
+}
+
+impl Prior {
+    /// True for a pose that wheels cannot be so wrong about: what moves is not the robot.
+    pub fn is_contradicted_by(&self, pose: &Isometry2<f64>) -> bool {
+        let off = self.pose.inverse() * pose;
+        let off = Vector3::new(off.translation.x, off.translation.y, off.rotation.angle());
+        off.component_div(&self.sigma).amax() > MOST_SIGMAS
+    }
 }
 
 /// From where an image was taken.
@@ -210,6 +221,17 @@ mod tests {
 
     use super::*;
     use crate::OdometrySettings;
+
+    #[test]
+    fn wheels_are_not_wrong_by_any_angle() {
+        let pose = Isometry2::new(Vector2::new(0.3, 0.1), 0.8);
+        let prior = Prior { pose, sigma: Vector3::new(0.01, 0.01, 0.002) };
+        let off = |forward: f64, left: f64, turn: f64| {
+            prior.is_contradicted_by(&(pose * Isometry2::new(Vector2::new(forward, left), turn)))
+        };
+        assert!(!off(0.03, -0.03, 0.006), "three standard deviations each");
+        assert!(off(0.04, 0.0, 0.0) && off(0.0, -0.04, 0.0) && off(0.0, 0.0, 0.008));
+    }
 
     #[test]
     fn pixels_move_with_the_state_as_the_equations_say() {

@@ -133,11 +133,16 @@ impl Reference {
             images,
         };
         let guess = (self.pose * motion.isometry(), self.nod);
-        let fit = view.align(&self.by_wheels.prior(settings), guess);
+        let prior = self.by_wheels.prior(settings);
+        let fit = view.align(&prior, guess);
         let Some(fit) = fit.filter(|fit| 2 * fit.alike > fit.seen) else {
             funnel.drop_many("odometry: image too unlike the one before", 1);
             return (None, Some(motion));
         };
+        if prior.is_contradicted_by(&fit.pose) {
+            funnel.drop_many("odometry: image contradicts the wheels", 1);
+            return (None, Some(motion));
+        }
         let step = self.pose.inverse() * fit.pose;
         let corrected = Motion {
             forward: step.translation.x,

@@ -40,7 +40,7 @@ impl Default for OdometrySettings {
             max_travel_m: 0.4,
             max_turn_deg: 10.0,
             wheel_error: 0.01,
-            heading_error_per_m: 0.1,
+            heading_error_per_m: 0.05,
         }
     }
 }

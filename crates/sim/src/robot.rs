@@ -85,12 +85,17 @@ impl Robot {
         self.give(now_s, command);
     }
 
-    /// Commands what leads along the path, unless somebody steers.
-    pub fn decide(&mut self, now_s: f64) {
-        if !self.steered {
-            let command = self.along_path();
-            self.give(now_s, command);
+    /// Commands what leads along the path, or after who stands at `leader`, unless
+    /// somebody steers.
+    pub fn decide(&mut self, now_s: f64, leader: Option<Point2<f64>>) {
+        if self.steered {
+            return;
         }
+        let command = match leader.filter(|_| self.settings.behind_m > 0.0) {
+            Some(leader) => self.towards(leader, self.settings.behind_m),
+            None => self.along_path(),
+        };
+        self.give(now_s, command);
     }
 
     fn give(&mut self, now_s: f64, command: WheelSpeeds) {
@@ -133,14 +138,21 @@ impl Robot {
 
     /// Speeds that lead to the point ahead.
     fn along_path(&mut self) -> WheelSpeeds {
-        let Some(goal) = self.settings.path.get(self.ahead) else { return WheelSpeeds::STOP };
-        let way = self.pose.inverse_transform_point(&Point2::from(*goal)).coords;
-        if way.norm() < REACHED_M {
+        let Some(goal) = self.settings.path.get(self.ahead).copied().map(Point2::from) else {
+            return WheelSpeeds::STOP;
+        };
+        if nalgebra::distance(&goal, &self.pose.translation.vector.into()) < REACHED_M {
             self.ahead += 1;
         }
-        let off = way.y.atan2(way.x);
         let last = self.ahead + 1 >= self.settings.path.len();
-        let limit = if last { way.norm() } else { f64::INFINITY };
+        self.towards(goal, if last { 0.0 } else { f64::NEG_INFINITY })
+    }
+
+    /// Speeds that lead to a point and stop so far from it.
+    fn towards(&self, goal: Point2<f64>, away_m: f64) -> WheelSpeeds {
+        let way = self.pose.inverse_transform_point(&goal).coords;
+        let off = way.y.atan2(way.x);
+        let limit = (way.norm() - away_m).max(0.0);
         let speed = self.settings.speed_mps.min(limit) * off.cos().max(0.0).powi(2);
         let turn = (1.6 * off).clamp(-0.9, 0.9) * self.settings.half_separation_m;
         WheelSpeeds { left: speed - turn, right: speed + turn }
@@ -201,7 +213,7 @@ mod tests {
 
     fn run(robot: &mut Robot, seconds: f64) {
         for step in 0..(seconds / 0.02) as usize {
-            robot.decide(step as f64 * 0.02);
+            robot.decide(step as f64 * 0.02, None);
             robot.step(step as f64 * 0.02, 0.02);
         }
     }
@@ -216,6 +228,19 @@ mod tests {
         let believed = start * robot.odometry;
         let error = (believed.translation.vector - robot.pose.translation.vector).norm();
         assert!(error > 1e-3 && error < 0.5, "{error}");
+    }
+
+    #[test]
+    fn it_comes_after_who_walks_ahead_and_stays_away() {
+        let mut robot = robot(RobotSettings { behind_m: 1.5, ..RobotSettings::default() });
+        let leader = |step: usize| Point2::new(3.0, 3.0 + (0.008 * step as f64).min(4.0));
+        for step in 0..1500 {
+            robot.decide(step as f64 * 0.02, Some(leader(step)));
+            robot.step(step as f64 * 0.02, 0.02);
+        }
+        let way = robot.pose.inverse_transform_point(&leader(1500)).coords;
+        assert!((way.norm() - 1.5).abs() < 0.05, "{way}");
+        assert!(way.y.abs() < 0.1, "it looks at the person: {way}");
     }
 
     #[test]

@@ -162,6 +162,7 @@ impl Scene {
                 (0.005..=1.0).contains(&self.robot.wheel_radius_m),
                 "robot.wheel_radius_m must be in 0.005 to 1",
             ),
+            ((0.0..=20.0).contains(&self.robot.behind_m), "robot.behind_m must be in 0 to 20"),
             (self.robot.ticks_per_turn > 0, "robot.ticks_per_turn must be at least 1"),
             (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
             (self.number_of_people() <= 200, "there must be at most 200 people"),
@@ -361,6 +362,9 @@ pub struct RobotSettings {
     pub heading_deg: f64,
     /// Points that it drives to one after the other; none is a robot at rest.
     pub path: Vec<[f64; 2]>,
+    /// Comes after the first person of the scene and stays this far away, m, whatever the
+    /// path; 0 keeps to the path.
+    pub behind_m: f64,
     /// Speed, m/s.
     pub speed_mps: f64,
     /// Half the distance between the wheels, m.
@@ -387,6 +391,7 @@ impl Default for RobotSettings {
             start: [1.0, 3.0],
             heading_deg: 0.0,
             path: Vec::new(),
+            behind_m: 0.0,
             speed_mps: 0.5,
             half_separation_m: 0.167,
             wheel_radius_m: 0.0975,

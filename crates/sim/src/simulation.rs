@@ -274,7 +274,8 @@ impl Simulation {
     fn step(&mut self) {
         let due_ns = (self.shots as f64 * 1e9 / self.scene.camera.rate_hz) as u64;
         let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
-        self.robot.decide(now_s);
+        let leader = self.walkers.first().map(|walker| walker.stance.place);
+        self.robot.decide(now_s, leader);
         let odometry = self.read_odometry();
         self.record(self.now_ns, odometry);
         if self.now_ns >= due_ns {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 /// Weights are summed in so many parts at once, a register's width or a part of one.
+#[cfg(feature = "train")]
 const LANES: usize = 8;
 
 /// An image of `CHANNELS` numbers a cell, row by row.
@@ -58,6 +59,7 @@ impl<const IN: usize, const OUT: usize, const SIZE: usize> Default for Conv<IN, 
 
 impl<const IN: usize, const OUT: usize, const SIZE: usize> Conv<IN, OUT, SIZE> {
     /// Inputs of one output, which decide how large weights are at the start.
+    #[cfg(feature = "train")]
     pub const INPUTS: usize = SIZE * SIZE * IN;
 
     /// The image of half the size.
@@ -89,6 +91,7 @@ impl<const IN: usize, const OUT: usize, const SIZE: usize> Conv<IN, OUT, SIZE> {
     /// input to `of_input`, if that is asked for. `of_out` is how it depends on the
     /// output; where the output is cut off, it has to be zero.
     #[inline(always)]
+    #[cfg(feature = "train")]
     pub fn backward(
         &self,
         input: &Map<IN>,
@@ -145,6 +148,7 @@ fn place<const SIZE: usize>(out: [usize; 2], tap: [usize; 2]) -> [usize; 2] {
     [2 * out[0] + tap[0] - SIZE / 2, 2 * out[1] + tap[1] - SIZE / 2]
 }
 
+#[cfg(feature = "train")]
 #[inline(always)]
 fn add<const N: usize>(sums: &mut [f32; N], values: &[f32; N], times: f32) {
     for (sum, value) in sums.iter_mut().zip(values) {
@@ -152,6 +156,7 @@ fn add<const N: usize>(sums: &mut [f32; N], values: &[f32; N], times: f32) {
     }
 }
 
+#[cfg(feature = "train")]
 #[inline(always)]
 fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
     let mut sums = [0.0; LANES];

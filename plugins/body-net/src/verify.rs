@@ -1,4 +1,4 @@
-use tagalong_core::{Context, Detection, Error, Frame, Result, Verifier};
+use tagalong_core::{Context, Detection, Frame, Result, Trust, Verifier};
 
 use crate::{Config, Model, Pass, View};
 
@@ -9,37 +9,25 @@ const BUILT_IN: &str = include_str!("../../../configs/models/body-net.toml");
 pub struct BodyNet {
     model: Model,
     pass: Pass,
-    weight: f64,
-    limit: f64,
-    bias: f64,
+    trust: Trust,
 }
 
 impl BodyNet {
     /// A verifier; reads its model.
     ///
     /// # Errors
-    /// [`Error::Model`] for a file that cannot be read or is no model,
-    /// [`Error::Settings`] for weights that are no weights.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
+    /// [`tagalong_core::Error::Settings`] for weights that are no weights.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        let Config { weight, limit, bias, .. } = config;
-        for (name, value) in [("weight", weight), ("limit", limit)] {
-            if !(value.is_finite() && value >= 0.0) {
-                let message = format!("`{name}` = {value} must be a number from 0 on");
-                return Err(Error::Settings(message));
-            }
-        }
-        if !bias.is_finite() {
-            return Err(Error::Settings(format!("`bias` = {bias} must be finite")));
-        }
+        let trust = Trust::new(config.weight, config.limit, config.bias)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { model, pass: Pass::default(), weight, limit, bias })
+        Ok(Self { model, pass: Pass::default(), trust })
     }
 }
 
 impl Verifier for BodyNet {
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let Some(view) = View::new(frame, candidate)? else { return Ok(0.0) };
-        let log_odds = self.model.log_odds(&view, &mut self.pass).clamp(-self.limit, self.limit);
-        Ok(self.weight * log_odds + self.bias)
+        Ok(self.trust.margin(self.model.log_odds(&view, &mut self.pass)))
     }
 }

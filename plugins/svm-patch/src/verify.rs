@@ -1,4 +1,4 @@
-use tagalong_core::{Context, Detection, Error, Frame, Result, Verifier};
+use tagalong_core::{Context, Detection, Frame, Result, Trust, Verifier};
 
 use crate::{Config, Model};
 
@@ -8,32 +8,25 @@ const BUILT_IN: &str = include_str!("../../../configs/models/svm-patch.toml");
 /// The verifier.
 pub struct SvmPatch {
     model: Model,
-    weight: f64,
-    limit: f64,
+    trust: Trust,
 }
 
 impl SvmPatch {
     /// A verifier; reads its model.
     ///
     /// # Errors
-    /// [`Error::Model`] for a file that cannot be read or is no model,
-    /// [`Error::Settings`] for weights that are no weights.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
+    /// [`tagalong_core::Error::Settings`] for weights that are no weights.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        for (name, value) in [("weight", config.weight), ("limit", config.limit)] {
-            if !(value.is_finite() && value >= 0.0) {
-                let message = format!("`{name}` = {value} must be a number from 0 on");
-                return Err(Error::Settings(message));
-            }
-        }
+        let trust = Trust::new(config.weight, config.limit, 0.0)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { model, weight: config.weight, limit: config.limit })
+        Ok(Self { model, trust })
     }
 }
 
 impl Verifier for SvmPatch {
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let patch = self.model.sampler.patch(frame.grey()?, &candidate.region);
-        let log_odds = self.model.log_odds(&patch).clamp(-self.limit, self.limit);
-        Ok(self.weight * log_odds)
+        Ok(self.trust.margin(self.model.log_odds(&patch)))
     }
 }

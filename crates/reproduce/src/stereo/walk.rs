@@ -28,12 +28,15 @@ struct Walk {
 /// Errors of some walks.
 type Walks<'a> = Vec<&'a [f64]>;
 
+/// The robot keeps behind whom it follows, as the paper's does, and so in view.
+const FOLLOWED: [(&str, &str); 3] = [STEREO, ("robot.behind_m", "2.0"), ("robot.speed_mps", "0.7")];
+
 /// The error of the one who walks ahead.
 ///
 /// # Errors
 /// As [`Lab::trials`].
 pub fn walk(lab: &Lab) -> Result<Findings, ReproduceError> {
-    let scenes = lab.scenes("square-walk", &[STEREO], lab.seeds(50))?;
+    let scenes = lab.scenes("square-walk", &FOLLOWED, lab.seeds(50))?;
     let contenders = lab.contenders(&PIPELINES)?;
     let walks = lab.trials("walks along two edges", &scenes, &contenders, errors)?;
     Ok(table(&walks).into())
