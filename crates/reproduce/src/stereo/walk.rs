@@ -14,6 +14,10 @@ struct Errors {
     /// In the frame of the robot at the start, drift included: by the motions that the
     /// pipeline believed, those of the wheels or corrected ones.
     in_start: Vec<f64>,
+    /// Frames in which the person is in view, and those of them without a place: no track
+    /// is within the half metre of the judge.
+    frames: u64,
+    without: u64,
 }
 
 /// One walk.
@@ -51,7 +55,13 @@ fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
     let judge = Judge { coasting: true, ..Judge::default() };
     let of_run = |run| {
         let judged = judge.judge(&trial, run)?;
-        Ok(Errors { in_robot: judged.errors_in_robot_m, in_start: judged.errors_in_start_m })
+        let scores = judged.tally.scores();
+        Ok(Errors {
+            in_robot: judged.errors_in_robot_m,
+            in_start: judged.errors_in_start_m,
+            frames: scores.truths,
+            without: scores.fn_,
+        })
     };
     let errors = trial.runs.iter().map(of_run).collect::<Result<_, TrialError>>()?;
     Ok(Walk { errors, drift })
@@ -71,17 +81,26 @@ fn drift(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
 }
 
 fn table(walks: &[Walk]) -> Table {
-    let published = [125.0, f64::NAN, f64::NAN, 336.0].map(|mm| Cell::number(mm, 0)).to_vec();
+    let nan = f64::NAN;
+    let published = [125.0, nan, nan, 336.0, nan].map(|mm| Cell::number(mm, 0)).to_vec();
     let mut rows = vec![Row::published("one walk, frame of the start", published)];
     for (at, name) in PIPELINES.iter().enumerate() {
         let of =
             |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w.errors[at])).collect();
-        rows.push(Row::ours(format!("{name}, frame of the start"), cells(&of(|e| &e.in_start))));
-        rows.push(Row::ours(format!("{name}, frame of the robot"), cells(&of(|e| &e.in_robot))));
+        let count = |of: fn(&Errors) -> u64| walks.iter().map(|w| of(&w.errors[at])).sum();
+        let without = Cell::share(count(|e| e.without), count(|e| e.frames), 1);
+        let mut row = |frame: &str, errors: Walks<'_>| {
+            let cells = cells(&errors).into_iter().chain([without.clone()]).collect();
+            rows.push(Row::ours(format!("{name}, frame of the {frame}"), cells));
+        };
+        row("start", of(|e| &e.in_start));
+        row("robot", of(|e| &e.in_robot));
     }
     let drift: Walks<'_> = walks.iter().map(|walk| &walk.drift[..]).collect();
-    rows.push(Row::ours("no tracker: the drift of the wheels, frame of the start", cells(&drift)));
-    let columns = ["mean mm", "95 % below mm", "worst of a walk, median mm", "worst mm"];
+    let drift = cells(&drift).into_iter().chain([Cell::default()]).collect();
+    rows.push(Row::ours("no tracker: the drift of the wheels, frame of the start", drift));
+    let columns =
+        ["mean mm", "95 % below mm", "worst of a walk, median mm", "worst mm", "without a place %"];
     Table {
         title: "Error of the place of the person who is followed (P4, Fig. 11)".into(),
         columns: columns.map(str::to_owned).to_vec(),
@@ -91,10 +110,13 @@ fn table(walks: &[Walk]) -> Table {
                 "{} drawn walks in front of a stereo camera; intervals over walks",
                 walks.len()
             ),
-            "Predicted places count, too: the other person passes between.".into(),
-            "The robot drives on a path of its own, with the errors of its wheels, which \
-             `stereo-best` corrects by what stands still (`[odometry]`); the last row is the \
-             true place, seen from where the wheels believe the robot to be."
+            "Predicted places count, too: the other person passes between. Without a place: \
+             nobody is believed to be within half a metre of the person in view."
+                .into(),
+            "The robot keeps 2 m behind, by the true place: the same way for all, with the \
+             errors of its wheels, which `stereo-best` corrects by what stands still \
+             (`[odometry]`); the last row is the true place, seen from where the wheels \
+             believe the robot to be."
                 .into(),
         ],
     }
