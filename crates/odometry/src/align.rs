@@ -54,10 +54,8 @@ pub struct Fit {
     pub nod: f64,
     /// Covariance of forward, left and turn.
     pub covariance: Matrix3<f64>,
-    /// Points of the keyframe that the image shows, ...
+    /// Points of the keyframe that the image shows.
     pub seen: usize,
-    /// ... and those that look as they did.
-    pub alike: usize,
 }
 
 /// Forward, left, turn, nod.
@@ -68,7 +66,6 @@ struct Equations {
     matrix: Matrix4<f64>,
     vector: State,
     seen: usize,
-    alike: usize,
 }
 
 /// A camera with two images, and a keyframe.
@@ -90,20 +87,20 @@ impl View<'_> {
         let mut last = None;
         for level in [1, 0] {
             for _ in 0..STEPS {
-                let Equations { matrix, vector, seen, alike } = self.equations(level, &at)?;
+                let Equations { matrix, vector, seen } = self.equations(level, &at)?;
                 let covariance = (matrix + precision).try_inverse()?;
                 let step = covariance * (vector + precision * (at - by_wheels));
                 at -= step;
-                last = Some((covariance, seen, alike));
+                last = Some((covariance, seen));
                 if step.amax() < STILL {
                     break;
                 }
             }
         }
-        let (covariance, seen, alike) = last?;
+        let (covariance, seen) = last?;
         let covariance = covariance.fixed_view::<3, 3>(0, 0).into_owned();
         let is_finite = at.iter().chain(&covariance).all(|value| value.is_finite());
-        is_finite.then(|| Fit { pose: pose(&at), nod: at.w, covariance, seen, alike })
+        is_finite.then(|| Fit { pose: pose(&at), nod: at.w, covariance, seen })
     }
 
     /// What the image says at a state. Each point counts by how usual its difference is
@@ -113,16 +110,11 @@ impl View<'_> {
         let looks: Vec<Look> =
             self.keyframe.points.iter().filter_map(|p| self.look(p, level, &stance)).collect();
         let usual = median(looks.iter().map(|look| look.difference.mean_square))?.max(1.0);
-        let mut equations = Equations {
-            matrix: Matrix4::zeros(),
-            vector: State::zeros(),
-            seen: looks.len(),
-            alike: 0,
-        };
+        let mut equations =
+            Equations { matrix: Matrix4::zeros(), vector: State::zeros(), seen: looks.len() };
         for look in &looks {
             let unusual = look.difference.mean_square / (USUAL * usual);
             let weight = (1.0 + unusual).powi(-2) / (ALIKE * usual);
-            equations.alike += usize::from(unusual < 2.0);
             look.add_to(&mut equations, weight);
         }
         Some(equations)

@@ -134,9 +134,8 @@ impl Reference {
         };
         let guess = (self.pose * motion.isometry(), self.nod);
         let prior = self.by_wheels.prior(settings);
-        let fit = view.align(&prior, guess);
-        let Some(fit) = fit.filter(|fit| 2 * fit.alike > fit.seen) else {
-            funnel.drop_many("odometry: image too unlike the one before", 1);
+        let Some(fit) = view.align(&prior, guess) else {
+            funnel.drop_many("odometry: too little in common with the image before", 1);
             return (None, Some(motion));
         };
         if prior.is_contradicted_by(&fit.pose) {

@@ -181,8 +181,9 @@ mod tests {
         for (at, moment) in trial.moments.iter_mut().enumerate() {
             moment.world_from_robot = Isometry2::new(Vector2::new(5.0, at as f64), 0.3);
         }
+        let (sin, cos) = 0.3f64.sin_cos();
         for report in &mut trial.runs[0].reports[1..] {
-            report.motion = Motion { left: 0.9, ..Motion::at_rest(0.1) };
+            report.motion = Motion { forward: 0.9 * sin, left: 0.9 * cos, ..Motion::at_rest(0.1) };
         }
         let judged = judged(Judge::default(), &trial);
         assert!(judged.errors_in_robot_m.iter().all(|e| *e < 1e-12));
