@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use tagalong_core::{Frame, Motion, Support, Track, TrackId};
+use tagalong_core::{Frame, Support, Track, TrackId};
 
 use crate::FrameReport;
 use crate::sightings::Sightings;
@@ -9,8 +9,6 @@ use crate::sightings::Sightings;
 /// What is known of the frame that is being processed.
 pub(crate) struct Now<'f> {
     pub(crate) frame: &'f Frame,
-    /// The robot's since the last processed frame.
-    pub(crate) motion: Motion,
     /// All tracks, predicted to this frame, near to far.
     pub(crate) expected: Vec<Track>,
     pub(crate) sightings: Sightings,
@@ -25,7 +23,6 @@ impl<'f> Now<'f> {
     pub(crate) fn new(frame: &'f Frame) -> Self {
         Self {
             frame,
-            motion: Motion::at_rest(0.0),
             expected: Vec::new(),
             sightings: Sightings::default(),
             due: Vec::new(),

@@ -248,7 +248,6 @@ impl Pipeline {
     /// Every belief, into the robot's new frame; then whom to expect where.
     fn predict(&mut self, now: &mut Now<'_>, motion: Option<Motion>) -> Result<(), StepError> {
         if let Some(motion) = motion {
-            now.motion = motion;
             now.report.motion = motion;
             let Slot { name, plugin: filter } = &mut self.filter;
             contain(name, now.frame.index, || filter.predict(&motion))?;
@@ -500,7 +499,7 @@ impl Pipeline {
     fn steer(&mut self, now: &mut Now<'_>) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
         let Steered { command, target, lock } =
-            steering.steer(now.frame, &now.motion, &now.report.tracks)?;
+            steering.steer(now.frame, &now.report.motion, &now.report.tracks)?;
         now.report
             .funnel
             .drop_many("command not finite", u64::from(command.reason == Reason::NotFinite));
@@ -610,7 +609,7 @@ impl Pipeline {
         Rules {
             association: &self.settings.association,
             start_score: self.lifecycle.settings().start_score,
-            dt_s: now.motion.dt,
+            dt_s: now.report.motion.dt,
         }
     }
 
