@@ -11,6 +11,9 @@ const NEAR: i64 = 3;
 /// Depths of one surface differ by less than this fraction.
 const SAME_SURFACE: f32 = 0.05;
 
+/// What is lower lies on the floor, m.
+const FLOOR_M: f64 = 0.15;
+
 /// Images at full and at half the size.
 pub type Pyramid<'a> = [&'a GreyImage; 2];
 
@@ -44,7 +47,12 @@ impl Keyframe {
         let eye = camera.robot_from_camera.translation.vector.xy().into();
         let stands_still = |point: &Point| {
             let line = [eye, point.place.xy()];
-            people.iter().all(|person| distance_m(person, line) > settings.person_m)
+            let is_on_floor = point.place.z < FLOOR_M;
+            people.iter().all(|person| {
+                let apart = (point.place.xy() - person).norm();
+                distance_m(person, line) > settings.person_m
+                    && !(is_on_floor && apart < settings.shadow_m)
+            })
         };
         let points = cells(height)
             .flat_map(|top| cells(width).map(move |left| (left, top)))
@@ -129,6 +137,8 @@ fn surface_m(depth: &DepthImage, x: usize, y: usize) -> Option<f32> {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_core::{Distortion, Pinhole};
+
     use super::*;
 
     #[test]
@@ -137,6 +147,34 @@ mod tests {
         assert!((distance_m(&Point2::new(2.0, 0.5), line) - 0.5).abs() < 1e-12, "before it");
         assert!((distance_m(&Point2::new(7.0, 4.0), line) - 5.0).abs() < 1e-12, "behind it");
         assert!((distance_m(&Point2::new(-3.0, 4.0), line) - 5.0).abs() < 1e-12, "behind the eye");
+    }
+
+    #[test]
+    fn a_shadow_walks_with_somebody_and_is_no_landmark() {
+        let lens =
+            Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 320, 240, 1.0, 0.4, 0.0);
+        let floor_m = |x: usize, y: usize| {
+            let pixel = Point2::new(x as f64, y as f64);
+            let eye_m = camera.height_m();
+            let drop_m = eye_m - camera.back_project(pixel, 1.0).z;
+            if drop_m > 0.0 { (eye_m / drop_m) as f32 } else { f32::NAN }
+        };
+        let depth = DepthImage::from_fn(320, 240, floor_m);
+        let image = GreyImage::from_fn(320, 240, |x, y| ((x / 8 + y / 8) % 2 * 200) as u8);
+        let half = GreyImage::from_fn(160, 120, |x, y| ((x / 4 + y / 4) % 2 * 200) as u8);
+        let somebody = Point2::new(2.5, 1.2);
+        let nearest_m = |shadow_m: f64| {
+            let settings = OdometrySettings { shadow_m, ..OdometrySettings::default() };
+            let people = [somebody];
+            let points =
+                Keyframe::new(&settings, &camera, &[&image, &half], &depth, &people).points;
+            assert!(points.len() > 8, "{}", points.len());
+            let apart = points.iter().map(|point| (point.place.xy() - somebody).norm());
+            apart.fold(f64::INFINITY, f64::min)
+        };
+        assert!(nearest_m(0.0) < 0.7, "{}", nearest_m(0.0));
+        assert!(nearest_m(1.5) > 1.5);
     }
 
     #[test]

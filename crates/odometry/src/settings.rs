@@ -15,6 +15,8 @@ pub struct OdometrySettings {
     pub max_depth_m: f64,
     /// What is at a person or behind one, within this of the line of sight, is no point, m.
     pub person_m: f64,
+    /// Nor is what lies on the floor within this of a person, m: shadows walk, too.
+    pub shadow_m: f64,
     /// With fewer points than this an image shows too little, and the odometry of the log
     /// is believed.
     pub min_points: usize,
@@ -36,6 +38,7 @@ impl Default for OdometrySettings {
             min_depth_m: 0.8,
             max_depth_m: 10.0,
             person_m: 0.55,
+            shadow_m: 2.0,
             min_points: 12,
             max_travel_m: 0.4,
             max_turn_deg: 10.0,
@@ -58,6 +61,7 @@ impl OdometrySettings {
                 must(farther, "max_depth_m", "greater than `min_depth_m`")
             })
             .or_else(|| must(self.person_m >= 0.0, "person_m", "at least 0"))
+            .or_else(|| must(self.shadow_m >= 0.0, "shadow_m", "at least 0"))
             .or_else(|| must(self.min_points >= 8, "min_points", "at least 8"))
             .or_else(|| positive(self.max_travel_m, "max_travel_m"))
             .or_else(|| positive(self.max_turn_deg, "max_turn_deg"))
