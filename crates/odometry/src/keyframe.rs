@@ -13,6 +13,9 @@ const SAME_SURFACE: f32 = 0.05;
 
 /// What is lower lies on the floor, m.
 const FLOOR_M: f64 = 0.15;
+/// Nothing is lower than this, m: its depth is wrong, as often along level edges, which
+/// look alike in both images of a pair wherever they are.
+const LOWEST_M: f64 = -0.2;
 
 /// Images at full and at half the size.
 pub type Pyramid<'a> = [&'a GreyImage; 2];
@@ -99,10 +102,13 @@ fn point(
         }
     }
     let (x, y, metres) = best?;
-    let pixel = Point2::new(x as f64, y as f64);
+    let place = camera.back_project(Point2::new(x as f64, y as f64), f64::from(metres));
+    if place.z < LOWEST_M {
+        return None;
+    }
     let odd = |at: usize| -0.5 * (at % 2) as f64;
     Some(Point {
-        place: camera.back_project(pixel, f64::from(metres)),
+        place,
         patches: [Patch::new(images[0], x, y)?, Patch::new(images[1], x / 2, y / 2)?],
         shifts: [Vector2::zeros(), Vector2::new(odd(x), odd(y))],
     })
@@ -149,32 +155,45 @@ mod tests {
         assert!((distance_m(&Point2::new(-3.0, 4.0), line) - 5.0).abs() < 1e-12, "behind the eye");
     }
 
-    #[test]
-    fn a_shadow_walks_with_somebody_and_is_no_landmark() {
+    /// Points of a chequered floor; its depth is measured as `scale` times what it is.
+    fn points_of_floor(
+        settings: &OdometrySettings,
+        people: &[Point2<f64>],
+        scale: f64,
+    ) -> Keyframe {
         let lens =
             Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 320, 240, 1.0, 0.4, 0.0);
         let floor_m = |x: usize, y: usize| {
-            let pixel = Point2::new(x as f64, y as f64);
             let eye_m = camera.height_m();
-            let drop_m = eye_m - camera.back_project(pixel, 1.0).z;
-            if drop_m > 0.0 { (eye_m / drop_m) as f32 } else { f32::NAN }
+            let drop_m = eye_m - camera.back_project(Point2::new(x as f64, y as f64), 1.0).z;
+            if drop_m > 0.0 { (scale * eye_m / drop_m) as f32 } else { f32::NAN }
         };
         let depth = DepthImage::from_fn(320, 240, floor_m);
         let image = GreyImage::from_fn(320, 240, |x, y| ((x / 8 + y / 8) % 2 * 200) as u8);
         let half = GreyImage::from_fn(160, 120, |x, y| ((x / 4 + y / 4) % 2 * 200) as u8);
+        Keyframe::new(settings, &camera, &[&image, &half], &depth, people)
+    }
+
+    #[test]
+    fn a_shadow_walks_with_somebody_and_is_no_landmark() {
         let somebody = Point2::new(2.5, 1.2);
         let nearest_m = |shadow_m: f64| {
             let settings = OdometrySettings { shadow_m, ..OdometrySettings::default() };
-            let people = [somebody];
-            let points =
-                Keyframe::new(&settings, &camera, &[&image, &half], &depth, &people).points;
+            let points = points_of_floor(&settings, &[somebody], 1.0).points;
             assert!(points.len() > 8, "{}", points.len());
             let apart = points.iter().map(|point| (point.place.xy() - somebody).norm());
             apart.fold(f64::INFINITY, f64::min)
         };
         assert!(nearest_m(0.0) < 0.7, "{}", nearest_m(0.0));
         assert!(nearest_m(1.5) > 1.5);
+    }
+
+    #[test]
+    fn nothing_is_below_the_floor() {
+        let points = |scale| points_of_floor(&OdometrySettings::default(), &[], scale).points.len();
+        assert!(points(1.0) > 20 && points(1.1) > 20);
+        assert_eq!(points(1.4), 0);
     }
 
     #[test]

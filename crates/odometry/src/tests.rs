@@ -13,7 +13,7 @@ const SIZE: (usize, usize) = (192, 144);
 /// Where the wall stands, m.
 const WALL_M: f64 = 4.0;
 /// Half the width of somebody.
-const BODY_M: f64 = 0.25;
+const BODY_M: f64 = 0.4;
 
 /// What there is to see.
 #[derive(Clone, Copy)]
