@@ -1,7 +1,7 @@
 //! Who is hidden behind whom (P4, section III-C): silhouettes are painted at
 //! the predicted places, near over far.
 
-use nalgebra::{Matrix3, Point2, Point3};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use tagalong_core::{Camera, Rect};
 
 use crate::OcclusionSettings;
@@ -58,6 +58,59 @@ pub(crate) fn visibility(
     camera: &Camera,
     settings: &OcclusionSettings,
 ) -> Visibility {
+    let Shown { all, inside, visible } = shown(region, position, covers, camera, settings);
+    let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
+    match (all > 0 && enough(inside), enough(visible)) {
+        (false, _) => Visibility::Outside,
+        (true, false) => Visibility::Hidden,
+        (true, true) => Visibility::Visible,
+    }
+}
+
+/// The part of a person at `position`, expected at `region`, that nobody hides, 0 to 1;
+/// what is outside of the image does not count.
+pub(crate) fn part_shown(
+    region: &Rect,
+    position: &Point3<f64>,
+    covers: &[Cover],
+    camera: &Camera,
+    settings: &OcclusionSettings,
+) -> f64 {
+    let Shown { inside, visible, .. } = shown(region, position, covers, camera, settings);
+    if inside > 0 { f64::from(visible) / f64::from(inside) } else { 1.0 }
+}
+
+/// Of somebody half hidden the half that shows is found, and its middle lies up to half
+/// the width of the hidden part aside: covariance in the robot frame, m². A filter that
+/// believes such a place goes on with the pace of whoever passes by.
+pub(crate) fn aside(
+    part_shown: f64,
+    position: &Point3<f64>,
+    camera: &Camera,
+    settings: &OcclusionSettings,
+) -> Matrix3<f64> {
+    let ray = position.coords - camera.robot_from_camera.translation.vector;
+    let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
+    let off = across * (0.5 * settings.body_width_m * (1.0 - part_shown));
+    off * off.transpose()
+}
+
+/// How much of a silhouette shows, in points.
+struct Shown {
+    all: u32,
+    /// Inside of the image.
+    inside: u32,
+    /// And not behind anybody.
+    visible: u32,
+}
+
+fn shown(
+    region: &Rect,
+    position: &Point3<f64>,
+    covers: &[Cover],
+    camera: &Camera,
+    settings: &OcclusionSettings,
+) -> Shown {
     let range = range_m(position, camera);
     let in_front: Vec<&Cover> = covers
         .iter()
@@ -75,12 +128,7 @@ pub(crate) fn visibility(
             visible += u32::from(!in_front.iter().any(hides));
         }
     }
-    let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
-    match (all > 0 && enough(inside), enough(visible)) {
-        (false, _) => Visibility::Outside,
-        (true, false) => Visibility::Hidden,
-        (true, true) => Visibility::Visible,
-    }
+    Shown { all, inside, visible }
 }
 
 /// Points spread evenly over head and shoulders.
@@ -169,6 +217,18 @@ mod tests {
         let aside = Point3::new(-4.0, 0.5, 1.5);
         assert!(camera.upper_body(&aside).x < 40.0);
         assert_eq!(seen(Point3::new(-2.0, 0.18, 1.5), aside), Visibility::Hidden);
+    }
+
+    #[test]
+    fn who_is_half_hidden_may_stand_aside_and_not_nearer() {
+        let settings = OcclusionSettings { body_width_m: 0.5, ..OcclusionSettings::default() };
+        let of = |part| aside(part, &Point3::new(3.0, 0.0, 1.6), &camera(), &settings);
+        assert_eq!(of(1.0), Matrix3::zeros());
+        let off = of(0.4);
+        assert!((off[(1, 1)].sqrt() - 0.15).abs() < 1e-12, "{off}");
+        assert_eq!((off[(0, 0)], off[(2, 2)]), (0.0, 0.0));
+        let left = aside(0.4, &Point3::new(0.0, 3.0, 1.6), &camera(), &settings);
+        assert!((left[(0, 0)].sqrt() - 0.15).abs() < 1e-12 && left[(1, 1)] == 0.0, "{left}");
     }
 
     #[test]

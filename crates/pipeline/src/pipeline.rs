@@ -14,7 +14,7 @@ use crate::control::{Steered, Steering};
 use crate::doubts::Doubts;
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::now::Now;
-use crate::occlusion::{Cover, Visibility, range_m, visibility};
+use crate::occlusion::{Cover, Visibility, aside, part_shown, range_m, visibility};
 use crate::sightings::{Rules, Sighting};
 use crate::weighing::Metered;
 use crate::{
@@ -323,6 +323,27 @@ impl Pipeline {
         let rules = self.rules(now);
         now.sightings.merge(rules.association);
         now.sightings.associate(&now.expected, &rules);
+        self.widen(now);
+    }
+
+    /// Lets sightings of who is half hidden say less of the place.
+    fn widen(&self, now: &mut Now<'_>) {
+        let settings = &self.settings.occlusion;
+        if settings.body_width_m == 0.0 {
+            return;
+        }
+        let camera = &now.frame.camera;
+        let mut covers: Vec<Cover> = Vec::new();
+        for track in &now.expected {
+            let Estimate { region, person, .. } = &track.estimate;
+            let Some(seen) = now.sightings.of_track_mut(track.id) else {
+                covers.extend(track.confirmed.then(|| cover(&track.estimate, now.frame)));
+                continue;
+            };
+            let part = part_shown(region, &person.position, &covers, camera, settings);
+            seen.covariance += aside(part, &seen.position, camera, settings);
+            covers.push(Cover::new(seen.region, &seen.position, &seen.covariance, camera));
+        }
     }
 
     /// Hands the evidence to the filter.

@@ -173,11 +173,15 @@ pub struct OcclusionSettings {
     /// ... and by at least this many standard deviations of that person's
     /// range.
     pub min_gap_sigmas: f64,
+    /// Width of a body, m. Of somebody half hidden the half that shows is found, and its
+    /// middle lies up to half the width of the hidden part aside: the sighting is widened
+    /// by that. 0: it is not.
+    pub body_width_m: f64,
 }
 
 impl Default for OcclusionSettings {
     fn default() -> Self {
-        Self { min_visible: 0.4, min_gap_m: 0.3, min_gap_sigmas: 3.0 }
+        Self { min_visible: 0.4, min_gap_m: 0.3, min_gap_sigmas: 3.0, body_width_m: 0.0 }
     }
 }
 

@@ -85,6 +85,12 @@ impl Sightings {
         self.matched().find(|(track, _)| *track == id).map(|(_, s)| s)
     }
 
+    /// The detection of a track, to be changed.
+    pub(crate) fn of_track_mut(&mut self, id: TrackId) -> Option<&mut Detection> {
+        let of_track = self.all.iter_mut().find(|s| s.fate == Some(Fate::Matched(id)));
+        of_track.map(|sighting| &mut sighting.detection)
+    }
+
     /// Sightings about which nothing is decided.
     pub(crate) fn undecided(&self) -> Vec<usize> {
         (0..self.all.len()).filter(|i| self.all[*i].fate.is_none()).collect()

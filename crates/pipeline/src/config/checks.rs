@@ -99,6 +99,7 @@ fn rules(settings: &PipelineSettings) -> Vec<Rule> {
         ("occlusion", "min_visible", occlusion.min_visible, Must::Fraction),
         ("occlusion", "min_gap_m", occlusion.min_gap_m, Must::NotNegative),
         ("occlusion", "min_gap_sigmas", occlusion.min_gap_sigmas, Must::NotNegative),
+        ("occlusion", "body_width_m", occlusion.body_width_m, Must::NotNegative),
     ];
     rules.extend(association_rules(settings));
     rules.extend(lifecycle_rules(settings));

@@ -1,7 +1,7 @@
 use tagalong_core::{Detection, TrackId};
 
 use super::doubles::{PLAIN, World, person, scored};
-use crate::{Fate, FrameReport, Weighing};
+use crate::{Candidate, Fate, FrameReport, Weighing};
 
 fn ids(report: &FrameReport) -> Vec<u32> {
     let mut ids: Vec<u32> = report.tracks.iter().map(|t| t.id.0).collect();
@@ -78,6 +78,30 @@ fn a_person_hidden_behind_another_coasts_and_keeps_the_number() {
     let hidden = |r: &FrameReport| r.tracks.iter().any(|t| t.occluded && !t.seen);
     assert!(reports.iter().filter(|r| hidden(r)).count() >= 10);
     assert!(reports.iter().all(|r| r.tracks.iter().all(|t| !(t.occluded && t.seen))));
+}
+
+/// Standard deviations, along and across, with which somebody 4 m ahead was believed to
+/// be seen in the last of some frames.
+fn spread_of_second(how: &str, frames: Vec<Vec<Detection>>) -> (f64, f64) {
+    let many = frames.len() as u64;
+    let reports = World::of(frames).run(&format!("{how}\n{PLAIN}"), many, 0.1);
+    let of_second = |c: &&Candidate| c.fate == Fate::Matched(TrackId(2));
+    let seen = reports.last().unwrap().candidates.iter().find(of_second).unwrap();
+    let covariance = &seen.detection.covariance;
+    (covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt())
+}
+
+#[test]
+fn who_is_half_hidden_is_seen_aside_also_by_one_who_is_too_near_to_be_found() {
+    let near = person(2.0, 0.0);
+    let both = |y: f64| vec![near.clone(), person(4.0, y)];
+    let alone = |y: f64| vec![person(4.0, y)];
+    let seen = |how, y: f64| spread_of_second(how, vec![both(y), both(y), both(y), alone(y)]);
+    let how = "occlusion.body_width_m = 0.5";
+    let (off, beside) = (seen("", 0.4), seen(how, 1.2));
+    assert_eq!((off, beside), ((0.1, 0.1), (0.1, 0.1)));
+    let (along, across) = seen(how, 0.4);
+    assert!((0.13..0.27).contains(&across) && along < 0.11, "{along} {across}");
 }
 
 #[test]
