@@ -2,7 +2,7 @@
 //! the predicted places, near over far.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use tagalong_core::{Camera, Rect};
+use tagalong_core::{Camera, Detection, Rect};
 
 use crate::OcclusionSettings;
 
@@ -28,13 +28,18 @@ pub(crate) enum Visibility {
 }
 
 impl Cover {
+    /// Somebody where a detector found them.
+    pub(crate) fn of(seen: &Detection, camera: &Camera) -> Self {
+        Self::new(seen.region, &seen.position, &seen.covariance, camera)
+    }
+
     pub(crate) fn new(
         region: Rect,
         position: &Point3<f64>,
         covariance: &Matrix3<f64>,
         camera: &Camera,
     ) -> Self {
-        let ray = position.coords - camera.robot_from_camera.translation.vector;
+        let ray = ray(position, camera);
         let direction = ray / ray.norm().max(1e-9);
         let variance = (direction.transpose() * covariance * direction).x;
         Self { region, range_m: ray.norm(), sigma_m: variance.max(0.0).sqrt() }
@@ -43,7 +48,12 @@ impl Cover {
 
 /// Distance of a point in the robot frame from the camera, m.
 pub(crate) fn range_m(position: &Point3<f64>, camera: &Camera) -> f64 {
-    (position.coords - camera.robot_from_camera.translation.vector).norm()
+    ray(position, camera).norm()
+}
+
+/// From the camera to a point in the robot frame, m.
+fn ray(position: &Point3<f64>, camera: &Camera) -> Vector3<f64> {
+    position.coords - camera.robot_from_camera.translation.vector
 }
 
 /// Whether a person at `position`, expected at `region`, can be seen.
@@ -89,7 +99,7 @@ pub(crate) fn aside(
     camera: &Camera,
     settings: &OcclusionSettings,
 ) -> Matrix3<f64> {
-    let ray = position.coords - camera.robot_from_camera.translation.vector;
+    let ray = ray(position, camera);
     let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
     let off = across * (0.5 * settings.body_width_m * (1.0 - part_shown));
     off * off.transpose()

@@ -273,8 +273,7 @@ impl Pipeline {
                 continue;
             }
             let Some(found) = self.find(now, &followers, &track)? else { continue };
-            let Detection { region, position, covariance, .. } = &found.detection;
-            covers.push(Cover::new(*region, position, covariance, &now.frame.camera));
+            covers.push(Cover::of(&found.detection, &now.frame.camera));
             now.sightings.add(found);
         }
         Ok(())
@@ -342,7 +341,7 @@ impl Pipeline {
             };
             let part = part_shown(region, &person.position, &covers, camera, settings);
             seen.covariance += aside(part, &seen.position, camera, settings);
-            covers.push(Cover::new(seen.region, &seen.position, &seen.covariance, camera));
+            covers.push(Cover::of(seen, camera));
         }
     }
 
