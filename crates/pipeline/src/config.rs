@@ -354,7 +354,7 @@ fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, Conf
 /// Mistakes that parse.
 fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), ConfigError> {
     for (slot, place) in detectors.iter().zip(places) {
-        let DetectorSettings { plugin, roles, every, offset } = &slot.settings;
+        let DetectorSettings { plugin, roles, every, offset, .. } = &slot.settings;
         let (message, span) = if *every == 0 {
             ("`every` must be at least 1".into(), &place.every)
         } else if offset >= every {

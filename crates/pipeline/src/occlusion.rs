@@ -9,6 +9,9 @@ use crate::OcclusionSettings;
 /// Points a side at which a silhouette is looked at.
 const SAMPLES: usize = 16;
 
+/// A range with a larger standard deviation, m, was not told.
+const RANGE_UNTOLD_M: f64 = 2.0;
+
 /// Somebody found in this frame, who may hide others.
 pub(crate) struct Cover {
     region: Rect,
@@ -31,6 +34,11 @@ impl Cover {
     /// Somebody where a detector found them.
     pub(crate) fn of(seen: &Detection, camera: &Camera) -> Self {
         Self::new(seen.region, &seen.position, &seen.covariance, camera)
+    }
+
+    /// The same person where they are expected, if the detector told the direction alone.
+    pub(crate) fn or(self, expected: Self) -> Self {
+        if self.sigma_m > RANGE_UNTOLD_M { expected } else { self }
     }
 
     pub(crate) fn new(

@@ -273,7 +273,8 @@ impl Pipeline {
                 continue;
             }
             let Some(found) = self.find(now, &followers, &track)? else { continue };
-            covers.push(Cover::of(&found.detection, &now.frame.camera));
+            let expected = cover(&track.estimate, now.frame);
+            covers.push(Cover::of(&found.detection, &now.frame.camera).or(expected));
             now.sightings.add(found);
         }
         Ok(())
@@ -335,13 +336,14 @@ impl Pipeline {
         let mut covers: Vec<Cover> = Vec::new();
         for track in &now.expected {
             let Estimate { region, person, .. } = &track.estimate;
+            let expected = cover(&track.estimate, now.frame);
             let Some(seen) = now.sightings.of_track_mut(track.id) else {
-                covers.extend(track.confirmed.then(|| cover(&track.estimate, now.frame)));
+                covers.extend(track.confirmed.then_some(expected));
                 continue;
             };
             let part = part_shown(region, &person.position, &covers, camera, settings);
             seen.covariance += aside(part, &seen.position, camera, settings);
-            covers.push(Cover::of(seen, camera));
+            covers.push(Cover::of(seen, camera).or(expected));
         }
     }
 
@@ -548,9 +550,10 @@ impl Pipeline {
                 funnel.drop_many("detection not finite", 1);
                 continue;
             }
-            if let Some(sighting) =
-                self.verify(frame, Sighting::new(detection, index, is_discovery), funnel)?
-            {
+            let sighting = Sighting::new(detection, index, is_discovery);
+            if self.detectors[index].settings.verify {
+                sightings.extend(self.verify(frame, sighting, funnel)?);
+            } else {
                 sightings.push(sighting);
             }
         }

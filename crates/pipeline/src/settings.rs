@@ -282,11 +282,20 @@ pub struct DetectorSettings {
     pub every: u32,
     /// ... starting with this one, counted from 0.
     pub offset: u32,
+    /// Verifiers are asked about its sightings. Off for a detector that knows somebody
+    /// again where verifiers cannot look.
+    pub verify: bool,
 }
 
 impl Default for DetectorSettings {
     fn default() -> Self {
-        Self { plugin: String::new(), roles: vec![Role::Discover], every: 1, offset: 0 }
+        Self {
+            plugin: String::new(),
+            roles: vec![Role::Discover],
+            every: 1,
+            offset: 0,
+            verify: true,
+        }
     }
 }
 

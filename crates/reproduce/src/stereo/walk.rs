@@ -1,5 +1,6 @@
 //! P4, Fig. 11: where is a person who walks along two edges of a square?
 
+use nalgebra::{Point2, Vector2};
 use tagalong_eval::{Bootstrap, PositionError, percentile};
 use tagalong_trials::{Judge, Moment, Trial, TrialError};
 
@@ -27,7 +28,15 @@ struct Walk {
     /// How far the true place is from itself, seen from where the odometry believes the
     /// robot to be, m: no tracker is better in the frame of the start.
     drift: Vec<f64>,
+    /// How far the true place is from where somebody expects it who knows every place
+    /// exactly while half of the person shows, and keeps the pace after that, m.
+    pace: Vec<f64>,
 }
+
+/// From this part of the upper body on a place is known exactly, in [`Walk::pace`], ...
+const HALF: f64 = 0.5;
+/// ... and the pace is that of so many seconds before.
+const PACE_S: f64 = 1.0;
 
 /// Errors of some walks.
 type Walks<'a> = Vec<&'a [f64]>;
@@ -50,6 +59,7 @@ pub fn walk(lab: &Lab) -> Result<Findings, ReproduceError> {
 fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
     let walker = trial.moments.iter().flat_map(|m| &m.truth).map(|truth| truth.id).min();
     let drift = drift(&trial.moments, walker);
+    let pace = kept_pace(&trial.moments, walker);
     let everybody = trial.moments.iter_mut().flat_map(|moment| &mut moment.truth);
     everybody.filter(|truth| Some(truth.id) != walker).for_each(|truth| truth.ignore = true);
     let judge = Judge { coasting: true, ..Judge::default() };
@@ -64,7 +74,7 @@ fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
         })
     };
     let errors = trial.runs.iter().map(of_run).collect::<Result<_, TrialError>>()?;
-    Ok(Walk { errors, drift })
+    Ok(Walk { errors, drift, pace })
 }
 
 /// What the odometry alone does to the places of the one who walks ahead.
@@ -78,6 +88,43 @@ fn drift(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
         Some((real - believed).norm())
     };
     moments.iter().filter_map(off).collect()
+}
+
+/// What no filter that keeps the pace knows of the one who walks ahead.
+fn kept_pace(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
+    let mut known: Vec<(f64, Point2<f64>)> = Vec::new();
+    let mut errors = Vec::new();
+    for moment in moments {
+        let Some(seen) = moment.truth.iter().find(|truth| Some(truth.id) == walker) else {
+            continue;
+        };
+        let now_s = moment.stamp.seconds_since(moments[0].stamp);
+        let place = moment.world_from_robot * seen.head_in_robot.xy();
+        if seen.visible_fraction >= HALF {
+            known.push((now_s, place));
+        }
+        if !seen.ignore {
+            errors.extend(straight_on(&known, now_s).map(|believed| (believed - place).norm()));
+        }
+    }
+    errors
+}
+
+/// Where somebody is at a time who was at these places and goes straight on at the same
+/// pace (least squares); at the last place if that is of now.
+fn straight_on(known: &[(f64, Point2<f64>)], now_s: f64) -> Option<Point2<f64>> {
+    let (last_s, last) = *known.last()?;
+    let of: Vec<_> = known.iter().filter(|(at_s, _)| *at_s > last_s - PACE_S).collect();
+    if last_s >= now_s || of.len() < 2 {
+        return Some(last);
+    }
+    let n = of.len() as f64;
+    let mean_s = of.iter().map(|(at_s, _)| at_s).sum::<f64>() / n;
+    let mean = of.iter().map(|(_, place)| place.coords).sum::<Vector2<f64>>() / n;
+    let spread = of.iter().map(|(at_s, _)| (at_s - mean_s).powi(2)).sum::<f64>();
+    let pace = of.iter().map(|(at_s, place)| place.coords * (at_s - mean_s)).sum::<Vector2<f64>>()
+        / spread;
+    Some(Point2::from(mean + pace * (now_s - mean_s)))
 }
 
 fn table(walks: &[Walk]) -> Table {
@@ -96,9 +143,18 @@ fn table(walks: &[Walk]) -> Table {
         row("start", of(|e| &e.in_start));
         row("robot", of(|e| &e.in_robot));
     }
-    let drift: Walks<'_> = walks.iter().map(|walk| &walk.drift[..]).collect();
-    let drift = cells(&drift).into_iter().chain([Cell::default()]).collect();
-    rows.push(Row::ours("no tracker: the drift of the wheels, frame of the start", drift));
+    let mut bound = |what: &str, of: Walks<'_>| {
+        let cells = cells(&of).into_iter().chain([Cell::default()]).collect();
+        rows.push(Row::ours(format!("no tracker: {what}"), cells));
+    };
+    bound(
+        "the drift of the wheels, frame of the start",
+        walks.iter().map(|walk| &walk.drift[..]).collect(),
+    );
+    bound(
+        "exact while half shows, then the pace kept",
+        walks.iter().map(|walk| &walk.pace[..]).collect(),
+    );
     let columns =
         ["mean mm", "95 % below mm", "worst of a walk, median mm", "worst mm", "without a place %"];
     Table {
@@ -115,8 +171,11 @@ fn table(walks: &[Walk]) -> Table {
                 .into(),
             "The robot keeps 2 m behind, by the true place: the same way for all, with the \
              errors of its wheels, which `stereo-best` corrects by what stands still \
-             (`[odometry]`); the last row is the true place, seen from where the wheels \
+             (`[odometry]`); the row of the drift is the true place, seen from where the wheels \
              believe the robot to be."
+                .into(),
+            "The last row knows every place exactly in which half of the upper body shows, and \
+             goes straight on from there: who turns the corner meanwhile is not found by that."
                 .into(),
         ],
     }
@@ -143,16 +202,14 @@ fn cells(walks: &Walks<'_>) -> Vec<Cell> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry2, Point3, Vector2};
+    use nalgebra::{Isometry2, Point3};
     use tagalong_core::Stamp;
     use tagalong_sim::Truth;
 
     use super::*;
 
-    #[test]
-    fn drift_is_what_the_odometry_does_to_the_true_place_of_the_walker() {
-        let head = Point3::new(2.0, 0.0, 1.6);
-        let truth = |id: u16| Truth {
+    fn truth(id: u16, head: Point3<f64>) -> Truth {
+        Truth {
             id,
             head_in_robot: head,
             torso_in_robot: head,
@@ -161,10 +218,14 @@ mod tests {
             visible_fraction: 1.0,
             occluder: None,
             ignore: false,
-        };
+        }
+    }
+
+    #[test]
+    fn drift_is_what_the_odometry_does_to_the_true_place_of_the_walker() {
         let moment = |at: f64, ids: &[u16]| Moment {
             stamp: Stamp::default(),
-            truth: ids.iter().map(|id| truth(*id)).collect(),
+            truth: ids.iter().map(|id| truth(*id, Point3::new(2.0, 0.0, 1.6))).collect(),
             odom_from_robot: Isometry2::new(Vector2::new(at, 0.0), 0.1 * at),
             world_from_robot: Isometry2::new(Vector2::new(5.0 + at, 1.0), 0.0),
         };
@@ -173,6 +234,22 @@ mod tests {
         assert_eq!(found.len(), 2, "who is not there has no place");
         // A turn by 0.1 rad that was none moves what is 2 m away along a chord.
         assert!(found[0] < 1e-12 && (found[1] - 4.0 * 0.05f64.sin()).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn the_pace_is_kept_while_less_than_half_shows() {
+        let moment = |at_s: f64, y: f64, visible_fraction: f64| Moment {
+            stamp: Stamp::default().plus_seconds(at_s),
+            truth: vec![Truth { visible_fraction, ..truth(1, Point3::new(at_s, y, 1.6)) }],
+            odom_from_robot: Isometry2::identity(),
+            world_from_robot: Isometry2::identity(),
+        };
+        let moments = [(0.0, 0.0, 1.0), (0.1, 0.0, 0.5), (0.2, 0.3, 0.4), (0.3, 0.4, 0.9)]
+            .map(|(at_s, y, part)| moment(at_s, y, part));
+        let found = kept_pace(&moments, Some(1));
+        let expected = [0.0, 0.0, 0.3, 0.0];
+        assert_eq!(found.len(), expected.len());
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
     }
 
     #[test]

@@ -1,0 +1,197 @@
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use tagalong_core::{
+    Camera, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, HEAD_RADIUS_M, Rect, Result,
+    Search, Stamp, Track, TrackId, UPPER_BODY_SIDE_M,
+};
+
+use crate::picture::{Distance, SIDE};
+use crate::strip::Lattice;
+use crate::{Config, Fit, NAME, Picture, Strip};
+
+/// Upper bodies are at least and at most so wide, pixels.
+const SIDES_PX: std::ops::RangeInclusive<f64> = 12.0..=1000.0;
+/// From cell to cell, m.
+const CELL_M: f64 = UPPER_BODY_SIDE_M / SIDE as f64;
+
+/// Something, or the test that it failed.
+type Found<T> = std::result::Result<T, &'static str>;
+
+/// Remembers what people look like, and finds them by that.
+pub struct Correlation {
+    config: Config,
+    pictures: BTreeMap<TrackId, (Stamp, Picture)>,
+    strip: Strip,
+    fits: Vec<Placed>,
+}
+
+/// A picture laid somewhere, in cells from the expected place.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    aside: i64,
+    down: i64,
+    fit: Fit,
+}
+
+/// The images of a frame that this detector looks at.
+struct View<'a> {
+    stamp: Stamp,
+    grey: &'a GreyImage,
+    depth: &'a DepthImage,
+    camera: &'a Camera,
+}
+
+impl<'a> View<'a> {
+    fn of(frame: &'a Frame) -> Result<Self> {
+        let stamp = frame.stamp;
+        Ok(Self { stamp, grey: frame.grey()?, depth: frame.depth()?, camera: &frame.camera })
+    }
+}
+
+impl Correlation {
+    /// A detector with these settings.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        let (pictures, strip) = (BTreeMap::new(), Strip::default());
+        Ok(Self { config, pictures, strip, fits: Vec::new() })
+    }
+
+    /// Where a person is, or the test that failed.
+    fn near(&mut self, view: &View<'_>, track: &Track) -> Found<Detection> {
+        let Self { config, pictures, strip, fits } = self;
+        let (taken, picture) = pictures.get(&track.id).ok_or("correlation: not seen well yet")?;
+        if view.stamp.seconds_since(*taken) > config.memory_s {
+            return Err("correlation: forgotten");
+        }
+        let square = square(track).ok_or("correlation: too small or too large")?;
+        let distance = distance(config, view.camera, track);
+        if picture.part_known(view.depth, &square, &distance) > config.max_known {
+            return Err("correlation: depth shows the person");
+        }
+        let (aside, down) = reach(config, view.camera, track);
+        let lattice = Lattice::around(&square, aside, down);
+        strip.read(view.grey, view.depth, &lattice, &distance);
+        place(strip, picture, (aside, down), fits);
+        let best = choose(config, fits)?;
+        Ok(sighting(config, view.camera, track, &square, best))
+    }
+
+    /// Remembers what a person looks like who is in plain view.
+    fn remember(&mut self, view: &View<'_>, track: &Track) {
+        let Some(square) = square(track).filter(|_| track.seen && !track.occluded) else { return };
+        let (distance, least) = (distance(&self.config, view.camera, track), self.config.min_body);
+        if let Some(picture) = Picture::take(view.grey, view.depth, &square, &distance, least) {
+            self.pictures.insert(track.id, (view.stamp, picture));
+        }
+    }
+}
+
+/// The upper-body square in which a person is expected, if it can be looked at.
+fn square(track: &Track) -> Option<Rect> {
+    Some(track.estimate.region).filter(|square| SIDES_PX.contains(&square.width))
+}
+
+fn distance(config: &Config, camera: &Camera, track: &Track) -> Distance {
+    let ahead_m = camera.depth_of(&track.estimate.person.position);
+    Distance { ahead_m, tolerance_m: config.depth_tolerance_m }
+}
+
+/// How far around the expected place people are searched, in cells aside and down.
+fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i64) {
+    let estimate = &track.estimate;
+    let ray = estimate.person.position.coords - camera.robot_from_camera.translation.vector;
+    let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
+    let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0);
+    let sigma = |axis: Vector3<f64>| (axis.transpose() * covariance * axis).x.max(0.0).sqrt();
+    let cells = |axis, most_m: f64| {
+        ((config.search_sigmas * sigma(axis)).min(most_m) / CELL_M).ceil() as i64
+    };
+    (cells(across, config.search_aside_m), cells(Vector3::z(), config.search_up_m))
+}
+
+impl Lattice {
+    /// Cells of the size of those of a picture in `square`, and so many more on each side.
+    fn around(square: &Rect, aside: i64, down: i64) -> Self {
+        let step = square.width / SIDE as f64;
+        let corner = [square.x - step * aside as f64, square.y - step * down as f64].into();
+        let more = |cells: i64| SIDE + 2 * cells as usize;
+        Self { corner, step, columns: more(aside), rows: more(down) }
+    }
+}
+
+/// Lays a picture everywhere.
+fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut Vec<Placed>) {
+    let (columns, rows) = strip.places();
+    fits.clear();
+    for row in 0..rows {
+        for column in 0..columns {
+            let fit = strip.fit(picture, column, row);
+            fits.push(Placed { aside: column as i64 - aside, down: row as i64 - down, fit });
+        }
+    }
+}
+
+/// The best place, or the test that it failed.
+fn choose(config: &Config, fits: &[Placed]) -> Found<Placed> {
+    let shown = || fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown);
+    let by_correlation = |a: &Placed, b: &Placed| a.fit.correlation.total_cmp(&b.fit.correlation);
+    let best = shown().max_by(by_correlation).ok_or("correlation: hidden")?;
+    let off_m =
+        |at: &Placed| CELL_M * ((at.aside - best.aside) as f64).hypot((at.down - best.down) as f64);
+    let elsewhere = shown().filter(|at| off_m(at) >= config.elsewhere_m).max_by(by_correlation);
+    let lead = elsewhere.map_or(f64::INFINITY, |at| best.fit.correlation - at.fit.correlation);
+    match best.fit {
+        fit if fit.correlation < config.min_correlation => Err("correlation: too low"),
+        fit if fit.known > config.max_known => Err("correlation: depth knows better"),
+        _ if lead < config.min_lead => Err("correlation: two places"),
+        _ => Ok(best),
+    }
+}
+
+/// The head moves in the image with its square, at the distance that was expected.
+fn sighting(
+    config: &Config,
+    camera: &Camera,
+    track: &Track,
+    square: &Rect,
+    best: Placed,
+) -> Detection {
+    let head_m = camera.depth_of(&track.estimate.person.position);
+    let step = square.width / SIDE as f64;
+    let (aside, down) = (step * best.aside as f64, step * best.down as f64);
+    let region = Rect { x: square.x + aside, y: square.y + down, ..*square };
+    let position = camera.head_of(&region, head_m - HEAD_RADIUS_M);
+    let sigma_px = config.sigma_place_m * camera.focal_px() / head_m;
+    let pixel = camera.project(&position).unwrap_or(region.centre());
+    let covariance = camera.covariance(pixel, head_m, sigma_px, config.sigma_distance_m);
+    Detection { region, position, covariance, score: config.score, source: NAME }
+}
+
+impl Detector for Correlation {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        let Search::Near(track) = search else { return Ok(Vec::new()) };
+        match self.near(&View::of(frame)?, track) {
+            Ok(found) => Ok(vec![found]),
+            Err(test) => {
+                funnel.drop_at(test, track.estimate.region);
+                Ok(Vec::new())
+            }
+        }
+    }
+
+    fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
+        let view = View::of(frame)?;
+        self.pictures.retain(|id, _| tracks.iter().any(|track| track.id == *id));
+        tracks.iter().for_each(|track| self.remember(&view, track));
+        Ok(())
+    }
+}

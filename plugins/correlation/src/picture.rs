@@ -1,0 +1,121 @@
+use nalgebra::Point2;
+use tagalong_core::{DepthImage, GreyImage, Rect};
+
+/// Cells a side of an upper-body square.
+pub(crate) const SIDE: usize = 24;
+/// Cells of a picture.
+pub(crate) const CELLS: usize = SIDE * SIDE;
+
+/// Grey values are counted from here: sums of squares stay small.
+const MIDDLE: f32 = 128.0;
+
+/// What an upper body looks like, always in the same number of cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Brightness, row by row.
+    pub(crate) grey: [f32; CELLS],
+    /// 1 where depth shows the body, 0 beside it.
+    pub(crate) body: [f32; CELLS],
+    /// Cells of the body.
+    pub(crate) count: f32,
+}
+
+/// Something whose depth is to be compared.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Distance {
+    /// Along the optical axis, m.
+    pub(crate) ahead_m: f64,
+    /// What is nearer or farther by more is something else, m.
+    pub(crate) tolerance_m: f64,
+}
+
+/// What the depth of a cell says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shows {
+    /// Nothing is known.
+    Nothing,
+    /// What is looked for may be there.
+    Body,
+    Nearer,
+    Farther,
+}
+
+impl Distance {
+    pub(crate) fn shows(&self, metres: f32) -> Shows {
+        let metres = f64::from(metres);
+        if !(metres > 0.0 && metres.is_finite()) {
+            return Shows::Nothing;
+        }
+        match metres - self.ahead_m {
+            off if off < -self.tolerance_m => Shows::Nearer,
+            off if off > self.tolerance_m => Shows::Farther,
+            _ => Shows::Body,
+        }
+    }
+}
+
+impl Picture {
+    /// The picture of a person in an upper-body square, as far away along the optical axis
+    /// as `distance`; `None` unless the image shows all of the square, depth the body in
+    /// at least `min_body` of it, and nothing nearer.
+    pub(crate) fn take(
+        grey: &GreyImage,
+        depth: &DepthImage,
+        square: &Rect,
+        distance: &Distance,
+        min_body: f64,
+    ) -> Option<Self> {
+        let mut body = [0.0; CELLS];
+        for (body, at) in body.iter_mut().zip(cells(square)) {
+            match distance.shows(nearest(depth, at)?) {
+                Shows::Nearer => return None,
+                shows => *body = f32::from(shows == Shows::Body),
+            }
+        }
+        let count: f32 = body.iter().sum();
+        if f64::from(count) < min_body * CELLS as f64 {
+            return None;
+        }
+        let mut picture = Self { grey: [0.0; CELLS], body, count };
+        for (cell, at) in picture.grey.iter_mut().zip(cells(square)) {
+            *cell = brightness(grey, at)?;
+        }
+        Some(picture)
+    }
+
+    /// The part of the body, 0 to 1, in a square in which depth shows somebody so far away.
+    pub(crate) fn part_known(&self, depth: &DepthImage, square: &Rect, distance: &Distance) -> f64 {
+        let shown = cells(square).zip(&self.body).filter(|(at, body)| {
+            **body > 0.0 && nearest(depth, *at).is_some_and(|m| distance.shows(m) == Shows::Body)
+        });
+        shown.count() as f64 / f64::from(self.count)
+    }
+}
+
+/// The middles of the cells of a square, row by row.
+fn cells(square: &Rect) -> impl Iterator<Item = Point2<f64>> {
+    let square = *square;
+    let step = square.width / SIDE as f64;
+    (0..CELLS).map(move |cell| {
+        let (column, row) = ((cell % SIDE) as f64 + 0.5, (cell / SIDE) as f64 + 0.5);
+        Point2::new(square.x + step * column, square.y + step * row)
+    })
+}
+
+/// The depth at a place, m; `None` outside of the image.
+pub(crate) fn nearest(depth: &DepthImage, at: Point2<f64>) -> Option<f32> {
+    depth.get(at.x.floor() as i64, at.y.floor() as i64)
+}
+
+/// The brightness at a place, between the four pixels around it; `None` outside.
+pub(crate) fn brightness(grey: &GreyImage, at: Point2<f64>) -> Option<f32> {
+    let (x, y) = (at.x - 0.5, at.y - 0.5);
+    let (left, top) = (x.floor() as i64, y.floor() as i64);
+    let (across, down) = ((x - x.floor()) as f32, (y - y.floor()) as f32);
+    let row = |y: i64| {
+        let (here, next) = (f32::from(grey.get(left, y)?), f32::from(grey.get(left + 1, y)?));
+        Some(here + across * (next - here))
+    };
+    let (above, below) = (row(top)?, row(top + 1)?);
+    Some(above + down * (below - above) - MIDDLE)
+}
