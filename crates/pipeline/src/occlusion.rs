@@ -204,6 +204,23 @@ mod tests {
     }
 
     #[test]
+    fn who_was_seen_without_a_range_hides_from_where_they_are_expected() {
+        let (near, far) = (Point3::new(2.0, 0.0, 1.6), Point3::new(3.5, 0.0, 1.6));
+        let camera = camera();
+        let cover = |sigma_m: f64| {
+            let covariance = Matrix3::identity() * (sigma_m * sigma_m);
+            Cover::new(camera.upper_body(&near), &near, &covariance, &camera)
+        };
+        let seen = |cover| {
+            let region = camera.upper_body(&far);
+            visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
+        };
+        assert_eq!(seen(cover(3.0)), Visibility::Visible);
+        assert_eq!(seen(cover(3.0).or(cover(0.1))), Visibility::Hidden);
+        assert_eq!(seen(cover(0.1).or(cover(3.0))), Visibility::Hidden, "its own range is told");
+    }
+
+    #[test]
     fn nobody_hides_a_person_at_the_same_range_or_nearer() {
         let near = Point3::new(2.0, 0.0, 1.6);
         assert_eq!(behind(near, 0.05, Point3::new(2.2, 0.0, 1.6)), Visibility::Visible);

@@ -308,6 +308,17 @@ fn one_no_of_a_verifier_kills_no_track() {
 }
 
 #[test]
+fn verifiers_are_not_asked_about_the_sightings_of_a_detector_that_goes_without() {
+    let doubted = World::of((0..3).map(|_| vec![person(3.0, 0.3)]));
+    let started = |verify: bool| {
+        let config = PLAIN.replace("'script'", &format!("'script'\nverify = {verify}"));
+        let config = format!("{config}\n[[verifiers]]\nplugin = 'choosy'");
+        ids(&doubted.run(&config, 3, 0.1)[2])
+    };
+    assert_eq!((started(true), started(false)), (vec![], vec![1]));
+}
+
+#[test]
 fn a_track_that_is_doubted_again_and_again_ends() {
     let config = format!("{PLAIN}\n[[verifiers]]\nplugin = 'choosy'");
     let walk = |i: i32| vec![person(3.0, if i < 5 { -0.02 } else { 0.02 })];
