@@ -1,5 +1,5 @@
-//! Boxes in the image: the compressive tracker, for one person and one frame,
-//! and the whole pipeline on recorded boxes.
+//! Boxes in the image: the trackers that know somebody again, for one person and one
+//! frame, and the whole pipeline on recorded boxes.
 #![allow(clippy::expect_used, missing_docs, reason = "a broken test or bench may stop loudly")]
 
 use std::hint::black_box;
@@ -13,6 +13,7 @@ use tagalong_core::{
     Camera, DepthImage, Detector, Distortion, Estimate, Frame, Funnel, GreyImage, Images, Motion,
     Person, Pinhole, Recorded, Rect, Registry, Search, Stamp, Track, TrackId,
 };
+use tagalong_correlation::Correlation;
 use tagalong_pipeline::Pipeline;
 
 const RECORDED: &str = include_str!("../../configs/recorded.toml");
@@ -22,26 +23,27 @@ fn camera() -> Arc<Camera> {
     Arc::new(Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0))
 }
 
-/// A patterned square at 3 m before a patterned wall at 6 m.
-fn frame(camera: &Arc<Camera>, of: Rect, index: u64) -> Frame {
+/// A patterned square before a patterned wall at 6 m, and its depth, m.
+fn frame(camera: &Arc<Camera>, of: Rect, index: u64, face_m: f32) -> Frame {
     let inside = |x: usize, y: usize| of.contains(nalgebra::Point2::new(x as f64, y as f64));
     let grey = GreyImage::from_fn(640, 480, |x, y| {
         let (x, y, kind) = if inside(x, y) { (2 * x, y, 90) } else { (x, 3 * y, 20) };
         ((x * x / 64 + y * 7) % 120 + kind) as u8
     });
-    let depth = DepthImage::from_fn(640, 480, |x, y| if inside(x, y) { 2.92 } else { 6.0 });
+    let depth = DepthImage::from_fn(640, 480, |x, y| if inside(x, y) { face_m } else { 6.0 });
     let images =
         Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
     let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
     Frame::new(index, stamp, Arc::clone(camera), Motion::at_rest(0.04), images)
 }
 
-fn compressive(criterion: &mut Criterion) {
-    let (camera, head) = (camera(), Point3::new(3.0, 0.0, 1.35));
+/// Somebody at 3 m who may be elsewhere by so much, m.
+fn track(camera: &Camera, sigma_m: f64) -> Track {
+    let head = Point3::new(3.0, 0.0, 1.35);
     let region = camera.upper_body(&head);
     let person = Person { position: head, velocity: Vector2::zeros() };
-    let estimate = Estimate { person, covariance: SMatrix::identity() * 0.01, region };
-    let track = Track {
+    let estimate = Estimate { person, covariance: SMatrix::identity() * sigma_m.powi(2), region };
+    Track {
         id: TrackId(1),
         estimate,
         seen: true,
@@ -50,8 +52,40 @@ fn compressive(criterion: &mut Criterion) {
         age: 9,
         unseen_s: 0.0,
         score: 2.0,
+    }
+}
+
+/// The widest search there is, and what everybody costs who is in plain view.
+fn correlation(criterion: &mut Criterion) {
+    let camera = camera();
+    let (sure, unsure) = (track(&camera, 0.1), track(&camera, 0.4));
+    let of = sure.estimate.region;
+    let (seen, in_shadow) = (frame(&camera, of, 1, 2.92), frame(&camera, of, 2, f32::NAN));
+    let mut detector =
+        Correlation::new(tagalong_correlation::Config::default()).expect("the defaults work");
+    let learn = |detector: &mut Correlation| {
+        detector.learn(&seen, std::slice::from_ref(&sure)).expect("the frame has both images");
     };
-    let frame = frame(&camera, region, 1);
+    learn(&mut detector);
+    let mut find = |frame: &Frame, track: &Track, learns: bool| {
+        let found = detector.detect(frame, &Search::Near(track), &mut Funnel::default());
+        if learns {
+            learn(&mut detector);
+        }
+        black_box(found).expect("it has what it needs").len()
+    };
+    criterion.bench_function("correlation: one person, searched and found", |bencher| {
+        bencher.iter(|| assert_eq!(find(&in_shadow, &unsure, false), 1));
+    });
+    criterion.bench_function("correlation: one person in plain view, learnt", |bencher| {
+        bencher.iter(|| assert_eq!(find(&seen, &sure, true), 0));
+    });
+}
+
+fn compressive(criterion: &mut Criterion) {
+    let camera = camera();
+    let track = track(&camera, 0.1);
+    let frame = frame(&camera, track.estimate.region, 1, 2.92);
     let mut detector = Compressive::new(Config::default(), 1).expect("the defaults work");
     detector.learn(&frame, std::slice::from_ref(&track)).expect("the frame has a grey image");
     criterion.bench_function("compressive: one person, found and learnt", |bencher| {
@@ -100,5 +134,5 @@ fn boxes(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, compressive, boxes);
+criterion_group!(benches, correlation, compressive, boxes);
 criterion_main!(benches);
