@@ -26,6 +26,7 @@ const PLUGIN_SECTIONS: &str = "\
 # roles = [\"discover\", \"follow\"]
 # every = 1
 # offset = 0
+# verify = true
 # config = {}
 #
 # [filter]
