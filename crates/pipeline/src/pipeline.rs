@@ -273,8 +273,7 @@ impl Pipeline {
                 continue;
             }
             let Some(found) = self.find(now, &followers, &track)? else { continue };
-            let expected = cover(&track.estimate, now.frame);
-            covers.push(Cover::of(&found.detection, &now.frame.camera).or(expected));
+            covers.push(cover_seen(&found.detection, &track.estimate, now.frame));
             now.sightings.add(found);
         }
         Ok(())
@@ -336,14 +335,13 @@ impl Pipeline {
         let mut covers: Vec<Cover> = Vec::new();
         for track in &now.expected {
             let Estimate { region, person, .. } = &track.estimate;
-            let expected = cover(&track.estimate, now.frame);
             let Some(seen) = now.sightings.of_track_mut(track.id) else {
-                covers.extend(track.confirmed.then_some(expected));
+                covers.extend(track.confirmed.then(|| cover(&track.estimate, now.frame)));
                 continue;
             };
             let part = part_shown(region, &person.position, &covers, camera, settings);
             seen.covariance += aside(part, &seen.position, camera, settings);
-            covers.push(Cover::of(seen, camera).or(expected));
+            covers.push(cover_seen(seen, &track.estimate, now.frame));
         }
     }
 
@@ -653,4 +651,9 @@ fn likelihood(detectors: &[DetectorSlot]) -> Option<&dyn Likelihood> {
 fn cover(estimate: &Estimate, frame: &Frame) -> Cover {
     let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
     Cover::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
+}
+
+/// Of somebody who was expected there, and seen.
+fn cover_seen(seen: &Detection, expected: &Estimate, frame: &Frame) -> Cover {
+    Cover::of(seen, &frame.camera).or(cover(expected, frame))
 }

@@ -113,16 +113,6 @@ fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i64) {
     (cells(across, config.search_aside_m), cells(Vector3::z(), config.search_up_m))
 }
 
-impl Lattice {
-    /// Cells of the size of those of a picture in `square`, and so many more on each side.
-    fn around(square: &Rect, aside: i64, down: i64) -> Self {
-        let step = square.width / SIDE as f64;
-        let corner = [square.x - step * aside as f64, square.y - step * down as f64].into();
-        let more = |cells: i64| SIDE + 2 * cells as usize;
-        Self { corner, step, columns: more(aside), rows: more(down) }
-    }
-}
-
 /// Lays a picture everywhere.
 fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut Vec<Placed>) {
     let (columns, rows) = strip.places();

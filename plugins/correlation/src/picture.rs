@@ -1,6 +1,8 @@
 use nalgebra::Point2;
 use tagalong_core::{DepthImage, GreyImage, Rect};
 
+use crate::strip::Lattice;
+
 /// Cells a side of an upper-body square.
 pub(crate) const SIDE: usize = 24;
 /// Cells of a picture.
@@ -66,7 +68,7 @@ impl Picture {
         min_body: f64,
     ) -> Option<Self> {
         let mut body = [0.0; CELLS];
-        for (body, at) in body.iter_mut().zip(cells(square)) {
+        for (body, at) in body.iter_mut().zip(Lattice::around(square, 0, 0).middles()) {
             match distance.shows(nearest(depth, at)?) {
                 Shows::Nearer => return None,
                 shows => *body = f32::from(shows == Shows::Body),
@@ -77,7 +79,7 @@ impl Picture {
             return None;
         }
         let mut picture = Self { grey: [0.0; CELLS], body, count };
-        for (cell, at) in picture.grey.iter_mut().zip(cells(square)) {
+        for (cell, at) in picture.grey.iter_mut().zip(Lattice::around(square, 0, 0).middles()) {
             *cell = brightness(grey, at)?;
         }
         Some(picture)
@@ -85,21 +87,11 @@ impl Picture {
 
     /// The part of the body, 0 to 1, in a square in which depth shows somebody so far away.
     pub(crate) fn part_known(&self, depth: &DepthImage, square: &Rect, distance: &Distance) -> f64 {
-        let shown = cells(square).zip(&self.body).filter(|(at, body)| {
+        let shown = Lattice::around(square, 0, 0).middles().zip(&self.body).filter(|(at, body)| {
             **body > 0.0 && nearest(depth, *at).is_some_and(|m| distance.shows(m) == Shows::Body)
         });
         shown.count() as f64 / f64::from(self.count)
     }
-}
-
-/// The middles of the cells of a square, row by row.
-fn cells(square: &Rect) -> impl Iterator<Item = Point2<f64>> {
-    let square = *square;
-    let step = square.width / SIDE as f64;
-    (0..CELLS).map(move |cell| {
-        let (column, row) = ((cell % SIDE) as f64 + 0.5, (cell / SIDE) as f64 + 0.5);
-        Point2::new(square.x + step * column, square.y + step * row)
-    })
 }
 
 /// The depth at a place, m; `None` outside of the image.

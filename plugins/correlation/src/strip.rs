@@ -1,5 +1,5 @@
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, GreyImage};
+use tagalong_core::{DepthImage, GreyImage, Rect};
 
 use crate::Picture;
 use crate::picture::{Distance, SIDE, Shows, brightness, nearest};
@@ -43,6 +43,25 @@ pub(crate) struct Lattice {
     pub(crate) rows: usize,
 }
 
+impl Lattice {
+    /// Cells of the size of those of a picture in `square`, and so many more on each side.
+    pub(crate) fn around(square: &Rect, aside: i64, down: i64) -> Self {
+        let step = square.width / SIDE as f64;
+        let corner = [square.x - step * aside as f64, square.y - step * down as f64].into();
+        let more = |cells: i64| SIDE + 2 * cells as usize;
+        Self { corner, step, columns: more(aside), rows: more(down) }
+    }
+
+    /// The middles of the cells, row by row.
+    pub(crate) fn middles(self) -> impl Iterator<Item = Point2<f64>> {
+        let Self { corner, step, columns, rows } = self;
+        (0..columns * rows).map(move |cell| {
+            let (column, row) = ((cell % columns) as f64 + 0.5, (cell / columns) as f64 + 0.5);
+            Point2::new(corner.x + step * column, corner.y + step * row)
+        })
+    }
+}
+
 /// Sums over cells, one of each a column.
 type Lanes = [f32; SIDE];
 
@@ -55,15 +74,13 @@ impl Strip {
         lattice: &Lattice,
         distance: &Distance,
     ) {
-        let Lattice { corner, step, columns, rows } = *lattice;
+        let Lattice { columns, rows, .. } = *lattice;
         (self.columns, self.rows) = (columns, rows);
         for values in [&mut self.grey, &mut self.shown, &mut self.known] {
             values.clear();
             values.reserve(columns * rows);
         }
-        for cell in 0..columns * rows {
-            let (column, row) = ((cell % columns) as f64 + 0.5, (cell / columns) as f64 + 0.5);
-            let at = Point2::new(corner.x + step * column, corner.y + step * row);
+        for at in lattice.middles() {
             let value = brightness(grey, at);
             let shows = nearest(depth, at).map_or(Shows::Nothing, |m| distance.shows(m));
             self.grey.push(value.unwrap_or_default());
