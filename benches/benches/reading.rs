@@ -14,7 +14,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use tagalong_log::images::{decode_compressed, decode_raw};
 use tagalong_log::mcap_walk::Walker;
 use tagalong_log::msgs::{CompressedImage, Image, decode};
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 
 /// Walks the file; `images` decodes its pictures, too. Returns the messages.
 fn walk(path: &Path, images: bool) -> usize {
@@ -51,7 +51,7 @@ fn reading(c: &mut Criterion) {
             continue;
         }
         let (input, limits) = (InputSettings::default(), Limits::default());
-        let needs = Needs { depth: true, ..Needs::default() };
+        let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
         c.bench_function(&format!("{name}: messages alone"), |b| b.iter(|| walk(&path, false)));
         c.bench_function(&format!("{name}: messages and pictures"), |b| {
             b.iter(|| walk(&path, true))
@@ -59,7 +59,7 @@ fn reading(c: &mut Criterion) {
         c.bench_function(&format!("{name}: all frames, ready for a pipeline"), |b| {
             b.iter(|| {
                 let mut source =
-                    FrameSource::open(&path, &input, &limits, needs).expect("a healthy log");
+                    FrameSource::open(&path, &input, &limits, inputs).expect("a healthy log");
                 let mut frames = 0;
                 while let Some(frame) = source.next_frame() {
                     frames += frame.frame.index;

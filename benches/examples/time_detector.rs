@@ -10,13 +10,13 @@ use serde::de::DeserializeOwned;
 use tagalong_core::{Context, Detector, Frame, Funnel, Search, Wheels};
 use tagalong_face_rgbd::FaceRgbd;
 use tagalong_hog_upper_body::HogUpperBody;
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 
 /// All frames of a log, with their grey images made.
 fn frames(log: &Path) -> Vec<Frame> {
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let needs = Needs { colour: true, depth: true, right: false };
-    let mut source = FrameSource::open(log, &input, &limits, needs).expect("the log can be read");
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+    let mut source = FrameSource::open(log, &input, &limits, inputs).expect("the log can be read");
     let mut frames = Vec::new();
     while let Some(item) = source.next_frame() {
         item.frame.grey().expect("it has images");

@@ -55,6 +55,9 @@ fn every_check_of_detectors_can_fail() {
     let faults = with_general(&[
         ("panics", "never panics on odd frames"),
         ("vague", "a missing image is an error that names it"),
+        ("secretive", "images that it does not declare do not matter"),
+        ("easy-going", "it does without what it does not require"),
+        ("modest", "it has the roles that it declares and no others"),
         ("moody", "same seed, same output"),
         ("beside-the-image", "regions lie in the image"),
         ("lopsided", "covariance is symmetric and positive"),
@@ -77,6 +80,8 @@ fn every_check_of_verifiers_can_fail() {
     let faults = with_general(&[
         ("panics", "never panics on odd frames"),
         ("vague", "a missing image is an error that names it"),
+        ("secretive", "images that it does not declare do not matter"),
+        ("easy-going", "it does without what it does not require"),
         ("moody", "same seed, same output"),
         ("changes-its-mind", "the same candidate gets the same margin"),
     ]);

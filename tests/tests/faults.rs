@@ -11,7 +11,7 @@ use tagalong_core::{
 };
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::{FrameReport, LockState, Pipeline};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
 
@@ -118,9 +118,9 @@ struct Run {
 }
 
 fn run(recorded: &Recorded) -> Run {
-    let needs = Needs { colour: true, depth: true, right: false };
+    let inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let mut source = FrameSource::open(&recorded.path, &input, &limits, needs).unwrap();
+    let mut source = FrameSource::open(&recorded.path, &input, &limits, inputs).unwrap();
     let mut pipeline = pipeline("depth-ekf.toml");
     let mut tracks = Vec::new();
     while let Some(found) = source.next_frame() {

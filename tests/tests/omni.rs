@@ -10,7 +10,7 @@ use tagalong_core::{ConicalMirror, Panorama, Registry, RgbImage, Stamp};
 use tagalong_log::camera_info::UNWRAPPED;
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
 use tagalong_trials::{Contender, Judge, Trial};
 
@@ -129,9 +129,9 @@ fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
     let few = "[[detectors]]\nplugin = \"omni-appearance\"\nconfig = { distance = \"rich\", \
                background_frames = 6 }\n[filter]\nplugin = \"floor-kalman\"\n";
     let mut pipeline = Contender::new("few", few).pipeline(&registry(), 0).unwrap();
-    let needs = Needs { colour: true, depth: false, right: false };
+    let inputs = Inputs::ANY.require(Input::Colour);
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let mut source = FrameSource::open(path, &input, &limits, needs).unwrap();
+    let mut source = FrameSource::open(path, &input, &limits, inputs).unwrap();
     let (mut images, mut places) = (Vec::new(), Vec::new());
     while let Some(item) = source.next_frame() {
         let report = pipeline.step(&item.frame).unwrap();

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tagalong_core::{Funnel, Registry};
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::Pipeline;
 use tagalong_tests::people::{Boxes, Score, read, score};
 
@@ -40,9 +40,9 @@ fn run(path: &Path, config: &str) -> Run {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
-    let needs = Needs { depth: true, colour: config != "depth-ekf", ..Needs::default() };
     let mut source =
-        FrameSource::open(path, &InputSettings::default(), &Limits::default(), needs).unwrap();
+        FrameSource::open(path, &InputSettings::default(), &Limits::default(), pipeline.inputs())
+            .unwrap();
     let mut run = Run {
         confirmed: Boxes::new(),
         detections: BTreeMap::new(),

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use nalgebra::Point2;
 use tagalong_core::Registry;
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::{FrameReport, Pipeline};
 
 /// Where the pedestrian is in the last frame: straight ahead and to the left, m.
@@ -29,9 +29,9 @@ fn reports() -> Option<Vec<FrameReport>> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
-    let needs = Needs { colour: true, right: true, ..Needs::default() };
+    let inputs = Inputs::ANY.require(Input::Colour).require(Input::Right);
     let mut source =
-        FrameSource::open(&path, &InputSettings::default(), &Limits::default(), needs).unwrap();
+        FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs).unwrap();
     let frames = std::iter::from_fn(|| source.next_frame());
     Some(frames.map(|frame| pipeline.step(&frame.frame).unwrap()).collect())
 }

@@ -1,8 +1,8 @@
 use std::path::PathBuf;
 
 use tagalong_core::Registry;
-use tagalong_log::{InputSettings, Limits, Needs};
-use tagalong_pipeline::{Pipeline, RobotSettings, needs};
+use tagalong_log::{InputSettings, Limits};
+use tagalong_pipeline::{Pipeline, RobotSettings};
 
 use crate::{BridgeError, ClockSource};
 
@@ -93,7 +93,6 @@ fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
 pub(crate) struct Setup {
     pub(crate) pipeline: Pipeline,
     pub(crate) robot: RobotSettings,
-    pub(crate) needs: Needs,
     pub(crate) input: InputSettings,
     pub(crate) limits: Limits,
 }
@@ -112,14 +111,13 @@ impl Options {
         let folder = self.config.parent().unwrap_or("".as_ref());
         let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
         let pipelines = tagalong_pipeline::Options { foreign, seed: None };
-        let build = || Pipeline::from_toml_with(&text, folder, &registry, &pipelines);
         let mistake =
             |error: tagalong_core::ConfigError| BridgeError::Config(error.render(&shown, &text));
-        let needs = needs(|| build().map(|(pipeline, _)| pipeline)).map_err(mistake)?;
-        let (pipeline, run) = build().map_err(mistake)?;
+        let (pipeline, run) = Pipeline::from_toml_with(&text, folder, &registry, &pipelines)
+            .map_err(mistake)?;
         let input = run.table("input").map_err(mistake)?;
         let limits = run.table("limits").map_err(mistake)?;
-        Ok(Setup { pipeline, robot: run.robot, needs, input: self.named(input), limits })
+        Ok(Setup { pipeline, robot: run.robot, input: self.named(input), limits })
     }
 
     /// The settings with the topics of the command line.

@@ -11,7 +11,8 @@ use std::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Input, Inputs,
+    Rect, Result, Search,
 };
 
 fn main() -> ExitCode {
@@ -49,6 +50,15 @@ struct NearestThing {
 }
 
 impl Detector for NearestThing {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            inputs: Inputs::NONE.require(Input::Depth),
+            discovers: true,
+            tracks: false,
+            weighs: false,
+        }
+    }
+
     fn detect(&mut self, frame: &Frame, _: &Search<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
         self.frames += 1;
         let limit = self.config.panic_after_frames;

@@ -3,16 +3,19 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use tagalong_core::{Camera, Detection, Detector, Error, Frame, Funnel, Search};
+use tagalong_core::{Camera, Detection, Detector, Error, Frame, Funnel, Inputs, Search, Usage};
 
 use crate::figure::Figure;
-use crate::scenes::{bare_frame, drawn, level, mountings, odd_frames, track};
+use crate::scenes::{bare_frame, drawn, level, mountings, odd_frames, required, restricted, track};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("never panics on odd frames", odd_frames_are_survived),
     ("a missing image is an error that names it", missing_image_is_named),
+    ("images that it does not declare do not matter", undeclared_do_not_matter),
+    ("it does without what it does not require", required_suffice),
+    ("it has the roles that it declares and no others", roles_are_declared),
     ("same seed, same output", repeatable),
     ("regions lie in the image", regions_are_in_the_image),
     ("covariance is symmetric and positive", covariance_is_positive),
@@ -74,7 +77,7 @@ fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
     let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
     for search in [EVERYWHERE, Search::Near(&lost)] {
         match detector.detect(&bare_frame(), &search, &mut Funnel::default()) {
-            Err(Error::MissingImage { what }) if !what.is_empty() => {}
+            Err(Error::MissingImage { .. }) => {}
             Ok(found) if found.is_empty() => {}
             Err(error) => return Err(format!("the error does not name the image: {error}")),
             Ok(_) => return Err("it finds people in a frame without images".into()),
@@ -105,6 +108,69 @@ fn record(detector: &mut dyn Detector, frames: &[Frame]) -> Result<Vec<Detection
         learned.map_err(|error| format!("learning is an error: {error}"))?;
     }
     Ok(all)
+}
+
+fn declared(subject: &Subject<'_>) -> Result<Inputs, String> {
+    Ok(subject.detector(From::Nothing)?.capabilities().inputs)
+}
+
+fn undeclared_do_not_matter(subject: &Subject<'_>) -> Verdict {
+    let (frames, inputs) = (walk(&level()), declared(subject)?);
+    let whole = record(&mut *subject.detector(From::Nothing)?, &frames)?;
+    let frames: Vec<Frame> = frames.into_iter().map(|frame| restricted(frame, &inputs)).collect();
+    let declared = record(&mut *subject.detector(From::Nothing)?, &frames)?;
+    demand(whole == declared, || {
+        let (with, without) = (whole.len(), declared.len());
+        format!("{with} detections with images that it does not declare, {without} without")
+    })
+}
+
+fn required_suffice(subject: &Subject<'_>) -> Verdict {
+    let inputs = required(&declared(subject)?);
+    let camera = level();
+    let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &camera);
+    let detector = &mut *subject.detector(From::Nothing)?;
+    for frame in walk(&camera).into_iter().map(|frame| restricted(frame, &inputs)) {
+        if !inputs.of(Usage::Required).all(|input| frame.holds(input)) {
+            return Ok(());
+        }
+        for search in [EVERYWHERE, Search::Near(&lost)] {
+            if let Err(error) = detector.detect(&frame, &search, &mut Funnel::default()) {
+                return Err(format!("with the inputs that it requires: {error}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn roles_are_declared(subject: &Subject<'_>) -> Verdict {
+    let detector = &mut *subject.detector(From::Nothing)?;
+    let capabilities = detector.capabilities();
+    let has_likelihood = detector.likelihood().is_some();
+    demand(capabilities.weighs == has_likelihood, || {
+        format!(
+            "it declares `weighs: {}`, and its likelihood is there: {has_likelihood}",
+            capabilities.weighs
+        )
+    })?;
+    let camera = level();
+    let followed = track(1, Figure::at(2.0, 0.4).head, 0.15, &camera);
+    for frame in walk(&camera) {
+        let (everywhere, near) = (EVERYWHERE, Search::Near(&followed));
+        let roles = [
+            ("discovers", capabilities.discovers, everywhere),
+            ("tracks", capabilities.tracks, near),
+        ];
+        for (role, is_declared, search) in roles {
+            let found = people(detector, &frame, &search)?;
+            demand(is_declared || found.is_empty(), || {
+                format!("it finds people and declares `{role}: false`")
+            })?;
+        }
+        let learned = detector.learn(&frame, std::slice::from_ref(&followed));
+        learned.map_err(|error| format!("learning is an error: {error}"))?;
+    }
+    Ok(())
 }
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    Camera, DepthImage, Detection, Distortion, Estimate, Frame, Image, Images, Motion, Person,
-    Pinhole, RgbImage, RightImage, Stamp, Track, TrackId,
+    Camera, DepthImage, Detection, Distortion, Estimate, Frame, Image, Images, Inputs, Motion,
+    Person, Pinhole, RgbImage, RightImage, Stamp, Track, TrackId, Usage,
 };
 
 use crate::figure::{Figure, World};
@@ -92,6 +92,16 @@ pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
 /// A frame of an ordinary camera without any image.
 pub(crate) fn bare_frame() -> Frame {
     frame(1, &level(), Images::default())
+}
+
+/// The frame with these inputs alone.
+pub(crate) fn restricted(frame: Frame, inputs: &Inputs) -> Frame {
+    frame.restricted_to(inputs).unwrap_or(frame)
+}
+
+/// Of these inputs those that are required.
+pub(crate) fn required(inputs: &Inputs) -> Inputs {
+    inputs.of(Usage::Optional).fold(*inputs, Inputs::without)
 }
 
 /// A confirmed track at a place, at rest, known to `sigma_m`.

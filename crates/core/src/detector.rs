@@ -1,6 +1,6 @@
 use nalgebra::Point3;
 
-use crate::{Detection, Error, Frame, Funnel, Person, Rect, Result, Track};
+use crate::{Capabilities, Detection, Error, Frame, Funnel, Inputs, Person, Rect, Result, Track};
 
 /// What a detector is asked.
 #[derive(Clone, Copy)]
@@ -19,6 +19,11 @@ pub enum Search<'a> {
 /// (*discover*), where is this one now (*follow*), and, through its
 /// [`Likelihood`], how well an imagined scene explains what is seen (*weigh*).
 pub trait Detector: Send {
+    /// Returns the inputs and the roles that the detector has with its settings. A
+    /// frame holds no image that no plugin of the pipeline declares, and a config that
+    /// gives a detector another role is refused.
+    fn capabilities(&self) -> Capabilities;
+
     /// Finds people. What a test drops is counted in `funnel` under the name of
     /// the test. For [`Search::Near`] the best sighting comes first and lies
     /// within the track's uncertainty.
@@ -93,6 +98,10 @@ pub trait Likelihood: Send + Sync {
 
 /// Doubts detections (P4, II-C: an SVM on the intensity patch).
 pub trait Verifier: Send {
+    /// Returns the inputs that the verifier uses with its settings; as of
+    /// [`Detector::capabilities`].
+    fn inputs(&self) -> Inputs;
+
     /// Log-odds that the candidate is a person; negative is "no". The same
     /// candidate in the same frame always gets the same answer.
     ///

@@ -1,12 +1,24 @@
+use crate::Input;
+
 /// What can go wrong while a plugin works on a frame.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The frame lacks an image that the plugin cannot do without.
-    #[error("needs a {what} image, which this log does not carry")]
+    #[error("needs {input}, which this log does not carry")]
     MissingImage {
-        /// The kind of image, for example "depth".
-        what: &'static str,
+        /// The kind of image.
+        input: Input,
+    },
+    /// A plugin asked for an image that the log carries, but no plugin of the pipeline
+    /// declares (see [`crate::Inputs`]).
+    #[error(
+        "uses {input} without declaring them: add `Input::{input:?}` to the inputs that the plugin \
+         returns"
+    )]
+    UndeclaredImage {
+        /// The kind of image.
+        input: Input,
     },
     /// A model file could not be used.
     #[error("model file `{path}`: {why}")]

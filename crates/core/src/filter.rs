@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 
-use crate::{Camera, Detection, Frame, Likelihood, Motion, Rect, Result, Sketch, TrackId};
+use crate::{Camera, Detection, Frame, Inputs, Likelihood, Motion, Rect, Result, Sketch, TrackId};
 
 /// A person in the robot frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +68,11 @@ pub struct Support {
 /// Holds the beliefs about **all** people at once, so that a joint filter is
 /// nothing special. Filters for one person are lifted by [`PerPerson`].
 pub trait Filter: Send {
+    /// Returns the inputs that the filter itself uses; most leave images to detectors.
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE
+    }
+
     /// Starts a belief. `id` is new.
     fn start(&mut self, id: TrackId, detection: &Detection);
 

@@ -4,7 +4,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::Point3;
 
-use crate::{Camera, DepthImage, Error, GreyImage, Motion, Recorded, Result, RgbImage, Stamp};
+use crate::{
+    Camera, DepthImage, Error, GreyImage, Input, Inputs, Motion, Recorded, Result, RgbImage, Stamp,
+};
 
 /// The images that one moment delivered. All have the size of the camera's
 /// image, and show the same view unless the name says otherwise.
@@ -114,6 +116,39 @@ impl Frame {
         Self { recorded, laser, grey: self.grey.clone(), ..frame }
     }
 
+    /// Returns true if the frame holds this input.
+    pub fn holds(&self, input: Input) -> bool {
+        let Images { colour, grey, depth, right } = &self.images;
+        match input {
+            Input::Colour => colour.is_some() || grey.is_some(),
+            Input::Depth => depth.is_some(),
+            Input::Right => right.is_some(),
+            Input::Laser => self.laser.is_some(),
+            Input::Detections => self.recorded.is_some(),
+        }
+    }
+
+    /// Returns the same moment with the declared inputs alone; `None` if it holds no
+    /// others. Images are shared, not copied.
+    pub fn restricted_to(&self, inputs: &Inputs) -> Option<Self> {
+        if Input::ALL.into_iter().all(|input| inputs.uses(input) || !self.holds(input)) {
+            return None;
+        }
+        let Images { colour, grey, depth, right } = &self.images;
+        let uses = |input| inputs.uses(input).then_some(());
+        let images = Images {
+            colour: uses(Input::Colour).and_then(|()| colour.clone()),
+            grey: uses(Input::Colour).and_then(|()| grey.clone()),
+            depth: uses(Input::Depth).and_then(|()| depth.clone()),
+            right: uses(Input::Right).and_then(|()| right.clone()),
+        };
+        let camera = Arc::clone(&self.camera);
+        let frame = Self::new(self.index, self.stamp, camera, self.motion, images);
+        let laser = uses(Input::Laser).and_then(|()| self.laser.clone());
+        let recorded = uses(Input::Detections).and_then(|()| self.recorded.clone());
+        Some(frame.with_laser(laser).with_recorded(recorded))
+    }
+
     /// The images as they came.
     pub fn images(&self) -> &Images {
         &self.images
@@ -124,7 +159,7 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] where the log carries none.
     pub fn colour(&self) -> Result<&RgbImage> {
-        self.images.colour.as_deref().ok_or(Error::MissingImage { what: "colour" })
+        self.images.colour.as_deref().ok_or(Error::MissingImage { input: Input::Colour })
     }
 
     /// The depth image: metres along the optical axis, NaN = no reading.
@@ -132,7 +167,7 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] where the log carries none.
     pub fn depth(&self) -> Result<&DepthImage> {
-        self.images.depth.as_deref().ok_or(Error::MissingImage { what: "depth" })
+        self.images.depth.as_deref().ok_or(Error::MissingImage { input: Input::Depth })
     }
 
     /// The right image of a stereo pair.
@@ -140,7 +175,7 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] where the log carries none.
     pub fn right(&self) -> Result<&RightImage> {
-        self.images.right.as_deref().ok_or(Error::MissingImage { what: "right stereo" })
+        self.images.right.as_deref().ok_or(Error::MissingImage { input: Input::Right })
     }
 
     /// The intensity image, made from colour where the log carries only that.
@@ -151,8 +186,8 @@ impl Frame {
         if let Some(grey) = &self.images.grey {
             return Ok(grey);
         }
-        let colour =
-            self.images.colour.as_ref().ok_or(Error::MissingImage { what: "grey or colour" })?;
+        let missing = Error::MissingImage { input: Input::Colour };
+        let colour = self.images.colour.as_ref().ok_or(missing)?;
         Ok(self.grey.get_or_init(|| Arc::new(colour.to_grey())))
     }
 
@@ -216,14 +251,42 @@ mod tests {
     }
 
     #[test]
+    fn only_declared_inputs_are_left() {
+        let (colour, grey) = (RgbImage::filled(4, 4, [9; 3]), GreyImage::filled(4, 4, 9));
+        let right = RightImage { image: grey.clone(), baseline_m: 0.1 };
+        let images = Images {
+            colour: Some(Arc::new(colour)),
+            grey: Some(Arc::new(grey)),
+            depth: Some(Arc::new(DepthImage::filled(4, 4, 2.0))),
+            right: Some(Arc::new(right)),
+        };
+        let frame = frame(images).with_laser(Some(Arc::new([]))).with_recorded(Some(vec![]));
+        assert!(frame.restricted_to(&Inputs::ANY).is_none(), "nothing has to go");
+        let held = |frame: &Frame| {
+            let Images { colour, grey, depth, right } = frame.images();
+            let (laser, recorded) = (frame.laser().is_some(), frame.recorded().is_some());
+            assert_eq!(colour.is_some(), grey.is_some());
+            [colour.is_some(), depth.is_some(), right.is_some(), laser, recorded]
+        };
+        for (place, input) in Input::ALL.into_iter().enumerate() {
+            let alone = frame.restricted_to(&Inputs::NONE.require(input)).unwrap();
+            let expected: [bool; 5] = std::array::from_fn(|i| i == place);
+            assert_eq!((held(&alone), alone.index), (expected, frame.index), "{input}");
+            let others = frame.restricted_to(&Inputs::ANY.without(input)).unwrap();
+            assert_eq!(held(&others), expected.map(|is| !is), "{input}");
+            assert!(others.restricted_to(&Inputs::ANY.without(input)).is_none());
+        }
+    }
+
+    #[test]
     fn a_missing_image_is_named() {
         let frame = frame(Images::default());
         assert_eq!(
             frame.depth().unwrap_err().to_string(),
-            "needs a depth image, which this log does not carry"
+            "needs depth images, which this log does not carry"
         );
         assert!(frame.colour().is_err() && frame.right().is_err());
-        assert!(frame.grey().unwrap_err().to_string().contains("grey or colour"));
+        assert!(frame.grey().unwrap_err().to_string().contains("colour or grey"));
     }
 
     #[test]

@@ -111,6 +111,7 @@ impl PluginInfo {
 /// struct Config {}
 /// struct Trusting;
 /// impl Verifier for Trusting {
+///     fn inputs(&self) -> Inputs { Inputs::NONE }
 ///     fn margin(&mut self, _: &Frame, _: &Detection) -> Result<f64> { Ok(1.0) }
 /// }
 /// let mut registry = Registry::default();
@@ -373,7 +374,7 @@ mod tests {
     use serde::{Deserialize, Serialize};
 
     use super::*;
-    use crate::{Detection, Example, Fitted, Frame};
+    use crate::{Detection, Example, Fitted, Frame, Inputs};
 
     #[derive(Default, Serialize, Deserialize, JsonSchema)]
     #[serde(default, deny_unknown_fields)]
@@ -382,6 +383,10 @@ mod tests {
     struct Counting;
 
     impl Verifier for Counting {
+        fn inputs(&self) -> Inputs {
+            Inputs::NONE
+        }
+
         fn margin(&mut self, _: &Frame, _: &Detection) -> Result<f64> {
             Ok(0.0)
         }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::images::Content;
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing};
-use crate::{FrameSource, InputSettings, Limits, LogError, LogFacts, Needs};
+use crate::{FrameSource, InputSettings, Inputs, Limits, LogError, LogFacts};
 
 /// One topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -77,8 +77,8 @@ pub struct Inspection {
 pub struct Examination {
     /// What is in it.
     pub inspection: Inspection,
-    /// Its frames: with all that was asked for, else with what there is; `None` if
-    /// no frames can be made.
+    /// Its frames: with the inputs that were asked for, else with all that there are;
+    /// `None` if no frames can be made.
     pub frames: Option<FrameSource>,
     /// Why the frames are not those that were asked for.
     pub refusal: Option<LogError>,
@@ -93,10 +93,10 @@ pub fn inspect(
     input: &InputSettings,
     limits: &Limits,
 ) -> Result<Inspection, LogError> {
-    examine(path, input, limits, Needs::default()).map(|examined| examined.inspection)
+    examine(path, input, limits, Inputs::ANY).map(|examined| examined.inspection)
 }
 
-/// Looks into a log, and opens it for a pipeline that needs those images.
+/// Looks into a log, and opens it for a pipeline with those inputs.
 ///
 /// # Errors
 /// As [`inspect`]; what the log lacks is no error but
@@ -105,20 +105,21 @@ pub fn examine(
     path: &Path,
     input: &InputSettings,
     limits: &Limits,
-    needs: Needs,
+    inputs: Inputs,
 ) -> Result<Examination, LogError> {
     input.check()?;
     let scan = Arc::new(Scan::read(path, input.depth_unit_m, limits)?);
-    let open = |needs| FrameSource::of_scan(Arc::clone(&scan), input, limits, needs);
-    let (frames, refusal) = match open(needs) {
-        Ok(frames) => (Some(frames), None),
-        Err(refusal) => (open(Needs::default()).ok(), Some(refusal)),
-    };
+    let open = |inputs| FrameSource::of_scan(Arc::clone(&scan), input, limits, inputs);
+    let everything = open(Inputs::ANY);
     let mut inspection = Inspection::of_scan(&scan);
-    match &frames {
-        Some(frames) => inspection.describe(&scan, frames, input.pair_tolerance_s),
-        None => inspection.unusable = refusal.as_ref().map(ToString::to_string),
+    match &everything {
+        Ok(frames) => inspection.describe(&scan, frames, input.pair_tolerance_s),
+        Err(refusal) => inspection.unusable = Some(refusal.to_string()),
     }
+    let (frames, refusal) = match open(inputs) {
+        Ok(frames) => (Some(frames), None),
+        Err(refusal) => (everything.ok(), Some(refusal)),
+    };
     Ok(Examination { inspection, frames, refusal })
 }
 

@@ -38,6 +38,6 @@ pub use input::{InputSettings, MountSettings};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use limits::Limits;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
-pub use tagalong_core::Needs;
+pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};
 pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};

@@ -1,10 +1,10 @@
 //! Which topics of a log are the colour images, the depth images, and so on.
 
-use tagalong_core::nearest;
+use tagalong_core::{Input, Inputs, nearest};
 
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
-use crate::{InputSettings, LogError, Needs};
+use crate::{InputSettings, LogError};
 
 /// The topics that are read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -31,23 +31,46 @@ impl Chosen {
     }
 }
 
-/// Chooses topics as named in the settings, else by type, encoding and name.
+/// Chooses topics as named in the settings, else by type, encoding and name. A topic
+/// whose input is not used is not chosen, as if the log did not have it, but for one:
+/// frames are counted, timed and seen as the images of the colour topic are, and where
+/// there are none, those of the depth topic.
 ///
 /// # Errors
-/// [`LogError::Missing`] for a named topic that is not there, and for images
-/// that are needed and found nowhere.
-pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result<Chosen, LogError> {
+/// [`LogError::Missing`] for a named topic that is not there, and for inputs
+/// that are required and found nowhere.
+pub(crate) fn choose(
+    scan: &Scan,
+    input: &InputSettings,
+    inputs: Inputs,
+) -> Result<Chosen, LogError> {
     let images = &[Type::Image, Type::CompressedImage][..];
     let infos = &[Type::CameraInfo][..];
     let detections = &[Type::Detections2D, Type::Detections3D][..];
     let named = |key, topic: &Option<String>, types| named(scan, key, topic.as_deref(), types);
-    let depth =
-        named("depth_topic", &input.depth_topic, images)?.or_else(|| best(scan, depth_rank));
     let colour = named("colour_topic", &input.colour_topic, images)?
         .or_else(|| best(scan, |name, topic| colour_rank(name, topic, false)));
-    let right = named("right_topic", &input.right_topic, images)?
-        .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true)));
+    let depth = match inputs.uses(Input::Depth) || colour.is_none() {
+        true => {
+            named("depth_topic", &input.depth_topic, images)?.or_else(|| best(scan, depth_rank))
+        }
+        false => None,
+    };
+    let right = match inputs.uses(Input::Right) {
+        true => named("right_topic", &input.right_topic, images)?
+            .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true))),
+        false => None,
+    };
     let right = right.filter(|topic| Some(topic) != colour.as_ref());
+    let laser = match inputs.uses(Input::Laser) {
+        true => named("laser_topic", &input.laser_topic, &[Type::LaserScan])?
+            .or_else(|| best(scan, laser_rank)),
+        false => None,
+    };
+    let detections = match inputs.uses(Input::Detections) {
+        true => named("detections_topic", &input.detections_topic, detections)?,
+        false => None,
+    };
     let odometry = named("odometry_topic", &input.odometry_topic, &[Type::Odometry])?
         .or_else(|| best(scan, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
@@ -61,28 +84,33 @@ pub(crate) fn choose(scan: &Scan, input: &InputSettings, needs: Needs) -> Result
         depth,
         right,
         odometry,
-        laser: named("laser_topic", &input.laser_topic, &[Type::LaserScan])?
-            .or_else(|| best(scan, laser_rank)),
-        detections: named("detections_topic", &input.detections_topic, detections)?,
+        laser,
+        detections,
     };
-    check(scan, &chosen, needs)?;
+    check(scan, &chosen, inputs)?;
     Ok(chosen)
 }
 
-fn check(scan: &Scan, chosen: &Chosen, needs: Needs) -> Result<(), LogError> {
+fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
+    let lacks = |input, topic: &Option<String>| inputs.requires(input) && topic.is_none();
     let wanted = [
-        (needs.colour && chosen.colour.is_none(), "colour images", "colour_topic", COLOUR),
-        (needs.depth && chosen.depth.is_none(), "depth images", "depth_topic", DEPTH),
+        (lacks(Input::Colour, &chosen.colour), "colour images", "colour_topic", COLOUR),
+        (lacks(Input::Depth, &chosen.depth), "depth images", "depth_topic", DEPTH),
         (
-            needs.right && chosen.right.is_none(),
+            lacks(Input::Right, &chosen.right),
             "right images of a stereo pair",
             "right_topic",
             COLOUR,
         ),
+        (lacks(Input::Laser, &chosen.laser), "laser scans", "laser_topic", LASER),
         (
-            !(needs.colour || needs.depth || needs.right)
-                && chosen.colour.is_none()
-                && chosen.depth.is_none(),
+            lacks(Input::Detections, &chosen.detections),
+            "recorded detections that `detections_topic` under [input] names",
+            "detections_topic",
+            DETECTIONS,
+        ),
+        (
+            chosen.colour.is_none() && chosen.depth.is_none(),
             "images at all",
             "colour_topic",
             COLOUR,
@@ -91,10 +119,15 @@ fn check(scan: &Scan, chosen: &Chosen, needs: Needs) -> Result<(), LogError> {
     match wanted.into_iter().find(|(missing, ..)| *missing) {
         None => Ok(()),
         Some((_, what, key, kinds)) => {
-            let image = scan.topics.iter().find(|(_, topic)| is_image(topic));
-            let hint = image.map(|(name, topic)| {
-                let pixels = topic.pixels.as_deref().unwrap_or("no message");
-                format!("; if {name} ({pixels}) is meant, name it as `{key}` under [input]")
+            let types = match key {
+                "laser_topic" => &[Type::LaserScan][..],
+                "detections_topic" => &[Type::Detections2D, Type::Detections3D],
+                _ => &[Type::Image, Type::CompressedImage],
+            };
+            let fitting = scan.topics.iter().find(|(_, topic)| types.contains(&topic.kind));
+            let hint = fitting.map(|(name, topic)| {
+                let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
+                format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]")
             });
             Err(missing(scan, format!("{what} ({kinds})"), hint.unwrap_or_default()))
         }
@@ -103,6 +136,8 @@ fn check(scan: &Scan, chosen: &Chosen, needs: Needs) -> Result<(), LogError> {
 
 const COLOUR: &str = "sensor_msgs/Image with rgb8, bgr8, rgba8, bgra8 or mono8, or \
                       sensor_msgs/CompressedImage with jpeg or png";
+const LASER: &str = "sensor_msgs/LaserScan";
+const DETECTIONS: &str = "vision_msgs/Detection2DArray or Detection3DArray";
 const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, or sensor_msgs/CompressedImage \
                      with compressedDepth";
 

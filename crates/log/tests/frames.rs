@@ -8,9 +8,11 @@ use mcap::WriteOptions;
 use nalgebra::{Isometry3, Point2, Vector3};
 use tagalong_core::{Camera, DepthImage};
 use tagalong_log::msgs::{CameraInfo, Header, Image, LaserScan, encode_big_endian};
-use tagalong_log::{FrameSource, InputSettings, Limits, LogError, LogFrame, MountSettings, Needs};
+use tagalong_log::{
+    FrameSource, Input, InputSettings, Inputs, Limits, LogError, LogFrame, MountSettings,
+};
 
-const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
+const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 const INFO: &str = "/camera/color/camera_info";
 
 /// A log with a calibration and a fixed camera.
@@ -21,10 +23,10 @@ fn started() -> LogWriter {
     log
 }
 
-fn open(log: LogWriter, needs: Needs) -> (FrameSource, SavedLog) {
+fn open(log: LogWriter, inputs: Inputs) -> (FrameSource, SavedLog) {
     let saved = log.save();
     let source =
-        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), needs);
+        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), inputs);
     (source.unwrap(), saved)
 }
 
@@ -52,8 +54,8 @@ fn colour_without_depth_is_counted_and_keeps_its_index() {
     }
     let bytes = log.finish();
     let saved = SavedLog::new(&bytes);
-    let open = |needs| {
-        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), needs)
+    let open = |inputs| {
+        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), inputs)
             .unwrap()
     };
     let mut source = open(DEPTH);
@@ -64,7 +66,7 @@ fn colour_without_depth_is_counted_and_keeps_its_index() {
     assert_eq!(count(&source, "depth_without_colour"), 0);
     assert!((found[1].frame.motion.dt - 0.066).abs() < 1e-9);
     assert!(!source.data_lost());
-    let mut source = open(Needs { colour: true, ..Needs::default() });
+    let mut source = open(Inputs::ANY.require(Input::Colour));
     let found = frames(&mut source);
     assert_eq!(found.len(), 10);
     assert!(found[0].frame.depth().is_ok() && found[1].frame.depth().is_err());
@@ -161,7 +163,7 @@ fn odometry_is_taken_at_the_stamps_of_the_images() {
             log.colour(at(t - 0.02));
         }
     }
-    let (mut source, _saved) = open(log, Needs { colour: true, ..Needs::default() });
+    let (mut source, _saved) = open(log, Inputs::ANY.require(Input::Colour));
     let found = frames(&mut source);
     assert_eq!(found.len(), 8);
     assert!(!source.notes().iter().any(|note| note.contains("at rest")));
@@ -202,7 +204,7 @@ fn what_a_laser_met_is_where_it_is_at_the_time_of_the_image() {
     let ahead = Isometry3::translation(0.2, 0.0, 0.15);
     log.fixed("base_link", "laser", &ahead);
     with_scanner(&mut log);
-    let (mut source, _saved) = open(log, Needs::default());
+    let (mut source, _saved) = open(log, Inputs::ANY);
     assert_eq!(source.facts().laser_topic.as_deref(), Some("/scan"));
     let found = frames(&mut source);
     assert_eq!(found.len(), 20);
@@ -219,7 +221,7 @@ fn a_laser_without_a_place_or_silent_for_long_is_told() {
     let mut log = started();
     with_scanner(&mut log);
     log.colour(at(3.0));
-    let (mut source, _saved) = open(log, Needs::default());
+    let (mut source, _saved) = open(log, Inputs::ANY);
     assert!(frames(&mut source).iter().all(|found| found.frame.laser().is_none()));
     assert_eq!(count(&source, "laser_scans_without_pose"), 20);
     assert_eq!(count(&source, "frames_without_laser"), 1);
@@ -237,7 +239,7 @@ fn gaps_and_jumps_of_odometry_are_told() {
         }
         log.colour(at(seconds(i) + 0.01));
     }
-    let (mut source, _saved) = open(log, Needs::default());
+    let (mut source, _saved) = open(log, Inputs::ANY);
     let found = frames(&mut source);
     let stale: Vec<u64> =
         found.iter().filter(|found| found.odom_stale).map(|found| found.frame.index - 1).collect();
@@ -268,7 +270,7 @@ fn tf_can_be_the_odometry() {
             log.colour(at(t - 0.05));
         }
     }
-    let (mut source, _saved) = open(log, Needs::default());
+    let (mut source, _saved) = open(log, Inputs::ANY);
     let found = frames(&mut source);
     assert!((found[3].odom_from_robot.translation.x - 0.65).abs() < 1e-6);
     assert!((found[3].frame.motion.forward - 0.2).abs() < 1e-6);
@@ -294,7 +296,7 @@ fn both_byte_orders_and_every_compression_give_the_same_frames() {
         log.bytes::<Image<'_>>("/camera/color/image_raw", at(1.0), &encode_big_endian(&image));
         image.header = Header::new(at(2.0), "colour");
         log.message("/camera/color/image_raw", at(2.0), &image);
-        let (mut source, _saved) = open(log, Needs { colour: true, ..Needs::default() });
+        let (mut source, _saved) = open(log, Inputs::ANY.require(Input::Colour));
         let found = frames(&mut source);
         assert_eq!(stamps(&found), [1.0, 2.0], "{name}");
         assert_eq!(found[0].frame.colour().unwrap(), found[1].frame.colour().unwrap());
@@ -309,7 +311,7 @@ fn messages_that_do_not_decode_are_dropped_and_counted() {
     log.bytes::<Image<'_>>("/camera/color/image_raw", at(0.2), &[0, 1, 0, 0, 1, 2, 3]);
     log.bytes::<Image<'_>>("/camera/color/image_raw", at(0.3), &[0, 3, 0, 0, 1, 2, 3]);
     log.colour(at(0.4));
-    let (mut source, _saved) = open(log, Needs::default());
+    let (mut source, _saved) = open(log, Inputs::ANY);
     assert_eq!(frames(&mut source).len(), 2);
     assert_eq!(count(&source, "messages_undecodable"), 2);
     assert!(source.data_lost());
@@ -321,7 +323,7 @@ fn images_of_another_size_are_refused() {
     log.colour(at(0.1));
     log.colour_of(at(0.2), 20, 12);
     log.colour(at(0.3));
-    let (mut source, _saved) = open(log, Needs::default());
+    let (mut source, _saved) = open(log, Inputs::ANY);
     assert_eq!(indices(&frames(&mut source)), [1, 3]);
     assert_eq!(count(&source, "images_of_other_size"), 1);
 
@@ -329,7 +331,7 @@ fn images_of_another_size_are_refused() {
     log.colour_of(at(0.2), 20, 12);
     let saved = log.save();
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let error = FrameSource::open(&saved.path, &input, &limits, Needs::default()).err().unwrap();
+    let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
     assert!(matches!(error, LogError::Calibration { .. }));
     assert!(error.to_string().contains("16x12, but the images are 20x12"), "{error}");
 }
@@ -343,7 +345,7 @@ fn a_bad_calibration_names_topic_and_field() {
     log.colour(at(0.1));
     let saved = log.save();
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let error = FrameSource::open(&saved.path, &input, &limits, Needs::default()).err().unwrap();
+    let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
     assert!(error.to_string().contains("topic /camera/color/camera_info: K = NaN"), "{error}");
 }
 
@@ -379,8 +381,9 @@ fn the_given_pose_of_the_camera_goes_before_that_of_tf() {
     let mount = MountSettings { height_m: 0.7, ..MountSettings::default() };
     let height = |camera| {
         let input = InputSettings { camera, ..InputSettings::default() };
-        let needs = Needs::default();
-        let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), needs).unwrap();
+        let inputs = Inputs::ANY;
+        let mut source =
+            FrameSource::open(&saved.path, &input, &Limits::default(), inputs).unwrap();
         source.next_frame().unwrap().frame.camera.height_m()
     };
     assert!((height(Some(mount)) - 0.7).abs() < 1e-12);
@@ -460,7 +463,7 @@ fn a_log_of_depth_alone_gives_frames() {
     log.info("/camera/depth/camera_info", "depth", &camera(16, 12, 14.0));
     log.fixed("base_link", "depth", &level_pose());
     (0..6).for_each(|i| log.depth(at(f64::from(i) * 0.1), "depth", 3.0));
-    let (mut source, _saved) = open(log, Needs { depth: true, ..Needs::default() });
+    let (mut source, _saved) = open(log, Inputs::ANY.require(Input::Depth));
     let found = frames(&mut source);
     assert_eq!(found.len(), 6);
     assert!(found[0].frame.colour().is_err() && found[0].frame.depth().is_ok());
@@ -501,7 +504,7 @@ fn settings_that_cannot_work_name_their_key() {
     let saved = started().save();
     let input = InputSettings { pair_tolerance_s: f64::NAN, ..InputSettings::default() };
     let error =
-        FrameSource::open(&saved.path, &input, &Limits::default(), Needs::default()).err().unwrap();
+        FrameSource::open(&saved.path, &input, &Limits::default(), Inputs::ANY).err().unwrap();
     assert!(error.to_string().contains("pair_tolerance_s"), "{error}");
 }
 

@@ -10,7 +10,7 @@ use common::{LogWriter, SavedLog, at, compressions};
 use mcap::{Compression, WriteOptions};
 use tagalong_log::mcap_walk::Walker;
 use tagalong_log::msgs::StringMsg;
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, InputSettings, Inputs, Limits};
 
 const MESSAGES: usize = 120;
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -222,13 +222,9 @@ fn a_file_without_checksums_says_so() {
     let mut log = LogWriter::new(options);
     log.colour(at(0.0));
     let saved = log.save();
-    let source = FrameSource::open(
-        &saved.path,
-        &InputSettings::default(),
-        &Limits::default(),
-        Needs::default(),
-    )
-    .unwrap();
+    let source =
+        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), Inputs::ANY)
+            .unwrap();
     assert!(source.notes().iter().any(|note| note.starts_with("crc: absent")));
     assert!(!source.counters().contains_key("chunks_verified"));
 }
@@ -357,8 +353,7 @@ fn what_is_no_log_is_refused_in_one_line() {
     let open = |bytes: &[u8]| {
         let saved = SavedLog::new(bytes);
         let (input, limits) = (InputSettings::default(), Limits::default());
-        let error =
-            FrameSource::open(&saved.path, &input, &limits, Needs::default()).err().unwrap();
+        let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
         let error = error.to_string();
         assert!(error.contains("test.mcap"), "{error}");
         error
@@ -379,7 +374,7 @@ fn what_is_no_log_is_refused_in_one_line() {
 fn what_is_no_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let open = |path: &std::path::Path| {
-        FrameSource::open(path, &InputSettings::default(), &Limits::default(), Needs::default())
+        FrameSource::open(path, &InputSettings::default(), &Limits::default(), Inputs::ANY)
             .err()
             .unwrap()
             .to_string()

@@ -8,10 +8,10 @@ use std::io::Cursor;
 use common::{LogWriter, SavedLog, at, camera, level_pose};
 use tagalong_log::mcap_walk::Walker;
 use tagalong_log::{
-    FrameSource, InputSettings, Limits, Listening, LiveSource, LogError, LogFrame, Needs,
+    FrameSource, Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
 };
 
-const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
+const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 
 /// A log with a calibration and a fixed camera.
 fn started() -> LogWriter {
@@ -41,8 +41,8 @@ fn replay(log: &[u8], mut hear: impl FnMut(&str, &str, &[u8])) {
     }
 }
 
-fn listen(log: &[u8], input: &InputSettings, needs: Needs) -> Listening {
-    let mut listening = Listening::new("the robot", input, &Limits::default(), needs).unwrap();
+fn listen(log: &[u8], input: &InputSettings, inputs: Inputs) -> Listening {
+    let mut listening = Listening::new("the robot", input, &Limits::default(), inputs).unwrap();
     replay(log, |topic, kind, data| {
         listening.announce(topic, kind);
         listening.take(topic, data);
@@ -51,8 +51,8 @@ fn listen(log: &[u8], input: &InputSettings, needs: Needs) -> Listening {
 }
 
 /// Hears the log once to start, and then once more for the frames.
-fn live(log: &[u8], needs: Needs) -> (Vec<LogFrame>, LiveSource) {
-    let mut source = listen(log, &InputSettings::default(), needs).start().unwrap();
+fn live(log: &[u8], inputs: Inputs) -> (Vec<LogFrame>, LiveSource) {
+    let mut source = listen(log, &InputSettings::default(), inputs).start().unwrap();
     let mut frames = Vec::new();
     replay(log, |topic, _, data| {
         source.take(topic, data);

@@ -10,9 +10,9 @@ use nalgebra::Point3;
 use tagalong_core::{ConicalMirror, Panorama};
 use tagalong_log::camera_info::UNWRAPPED;
 use tagalong_log::msgs::{CameraInfo, Header, Image};
-use tagalong_log::{FrameSource, InputSettings, Limits, LogFrame, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 
-const NEEDS: Needs = Needs { colour: true, depth: false, right: false };
+const INPUTS: Inputs = Inputs::ANY.require(Input::Colour);
 const INFO: &str = "/camera/color/camera_info";
 const SIDE: u32 = 120;
 
@@ -71,7 +71,7 @@ fn first(
     log.message("/camera/color/image_raw", at(0.0), &image);
     let saved = log.save();
     let (input, limits) = (InputSettings::default(), Limits::default());
-    FrameSource::open(&saved.path, &input, &limits, NEEDS).unwrap().next_frame().unwrap()
+    FrameSource::open(&saved.path, &input, &limits, INPUTS).unwrap().next_frame().unwrap()
 }
 
 fn panorama(found: &LogFrame) -> Panorama {
@@ -119,7 +119,7 @@ fn numbers_of_no_mirror_are_refused() {
         log.colour_of(at(0.0), SIDE, SIDE);
         let saved = log.save();
         let (input, limits) = (InputSettings::default(), Limits::default());
-        let error = FrameSource::open(&saved.path, &input, &limits, NEEDS).err().unwrap();
+        let error = FrameSource::open(&saved.path, &input, &limits, INPUTS).err().unwrap();
         assert!(error.to_string().contains("conical_mirror"), "{error}");
     }
 }

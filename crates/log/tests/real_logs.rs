@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs, inspect};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, inspect};
 
 struct Expected {
     name: &'static str,
@@ -42,20 +42,22 @@ fn logs() -> Option<PathBuf> {
     None
 }
 
-fn open(folder: &Path, name: &str, input: &InputSettings, needs: Needs) -> FrameSource {
+fn open(folder: &Path, name: &str, input: &InputSettings, inputs: Inputs) -> FrameSource {
     let path = folder.join(name).with_extension("mcap");
-    FrameSource::open(&path, input, &Limits::default(), needs).unwrap()
+    FrameSource::open(&path, input, &Limits::default(), inputs).unwrap()
 }
 
-fn needs(expected: &Expected) -> Needs {
-    Needs { colour: true, depth: expected.depth, right: expected.name == "kitti-stereo" }
+fn inputs(expected: &Expected) -> Inputs {
+    let inputs = Inputs::ANY.require(Input::Colour);
+    let inputs = if expected.depth { inputs.require(Input::Depth) } else { inputs };
+    if expected.name == "kitti-stereo" { inputs.require(Input::Right) } else { inputs }
 }
 
 #[test]
 fn every_log_opens_and_yields_its_frames() {
     let Some(folder) = logs() else { return };
     for expected in &LOGS {
-        let mut source = open(&folder, expected.name, &InputSettings::default(), needs(expected));
+        let mut source = open(&folder, expected.name, &InputSettings::default(), inputs(expected));
         let mut count = 0;
         let mut last = None;
         while let Some(found) = source.next_frame() {
@@ -84,7 +86,7 @@ fn every_log_opens_and_yields_its_frames() {
 fn a_camera_that_moves_between_frames_is_followed() {
     let Some(folder) = logs() else { return };
     let input = InputSettings::default();
-    let mut source = open(&folder, "pcl-single-frames", &input, Needs::default());
+    let mut source = open(&folder, "pcl-single-frames", &input, Inputs::ANY);
     let heights: Vec<f64> = std::iter::from_fn(|| source.next_frame())
         .map(|found| found.frame.camera.height_m())
         .collect();
@@ -95,8 +97,8 @@ fn a_camera_that_moves_between_frames_is_followed() {
 #[test]
 fn the_baseline_of_a_stereo_pair_is_known() {
     let Some(folder) = logs() else { return };
-    let needs = Needs { right: true, ..Needs::default() };
-    let mut source = open(&folder, "kitti-stereo", &InputSettings::default(), needs);
+    let inputs = Inputs::ANY.require(Input::Right);
+    let mut source = open(&folder, "kitti-stereo", &InputSettings::default(), inputs);
     assert!((source.facts().baseline_m.unwrap() - 0.5327).abs() < 1e-3);
     let frame = source.next_frame().unwrap().frame;
     assert_eq!(frame.right().unwrap().image.width(), frame.colour().unwrap().width());
@@ -109,7 +111,7 @@ fn the_floor_gives_the_pose_of_the_camera() {
     let Some(folder) = logs() else { return };
     let input = InputSettings { base_frame: "no_such_frame".into(), ..InputSettings::default() };
     for expected in LOGS.iter().filter(|log| log.depth && !log.name.contains("single")) {
-        let source = open(&folder, expected.name, &input, needs(expected));
+        let source = open(&folder, expected.name, &input, inputs(expected));
         let facts = source.facts();
         eprintln!(
             "{}: {:.3} {:.2} {:.2} from {}; expected {:?}",
@@ -133,9 +135,9 @@ fn the_floor_gives_the_pose_of_the_camera() {
 #[test]
 fn missing_depth_is_told_before_the_first_frame() {
     let Some(folder) = logs() else { return };
-    let needs = Needs { depth: true, ..Needs::default() };
+    let inputs = Inputs::ANY.require(Input::Depth);
     let path = folder.join("TUD-Stadtmitte.mcap");
-    let error = FrameSource::open(&path, &InputSettings::default(), &Limits::default(), needs)
+    let error = FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs)
         .err()
         .unwrap()
         .to_string();
@@ -151,8 +153,7 @@ fn a_mistyped_topic_answers_with_the_right_one() {
         ..InputSettings::default()
     };
     let path = folder.join("um.mcap");
-    let error =
-        FrameSource::open(&path, &input, &Limits::default(), Needs::default()).err().unwrap();
+    let error = FrameSource::open(&path, &input, &Limits::default(), Inputs::ANY).err().unwrap();
     assert!(error.to_string().contains("did you mean `/camera/color/image_raw/compressed`?"));
 }
 

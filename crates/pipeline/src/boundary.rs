@@ -1,6 +1,6 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use tagalong_core::Error;
+use tagalong_core::{Error, Frame};
 
 /// Why a frame could not be processed. A pipeline that returned one is stopped.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -35,6 +35,20 @@ pub enum StepError {
 }
 
 impl StepError {
+    /// Tells an image that nothing declares from one that the log lacks; `frame` is the
+    /// one that came, with the images that were held back.
+    pub(crate) fn blame_declaration(self, frame: &Frame) -> Self {
+        match self {
+            Self::Plugin { plugin, frame: index, error: Error::MissingImage { input } }
+                if frame.holds(input) =>
+            {
+                let error = Error::UndeclaredImage { input };
+                Self::Plugin { plugin, frame: index, error }
+            }
+            other => other,
+        }
+    }
+
     /// The frame that failed.
     pub fn frame(&self) -> u64 {
         match self {

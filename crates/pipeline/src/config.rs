@@ -22,11 +22,13 @@ use crate::pipeline::{DetectorSlot, Pipeline, Slot};
 use crate::settings::{DetectorSettings, PipelineSettings, PluginSettings, RobotSettings, Role};
 
 mod checks;
+mod inputs;
 mod resolve;
 #[cfg(test)]
 mod tests;
 
 use checks::check;
+use inputs::{Declared, declared_inputs};
 use resolve::resolve;
 
 /// Longest config, bytes.
@@ -34,8 +36,9 @@ const MAX_BYTES: usize = 1 << 20;
 /// Deepest nesting of a config.
 const MAX_DEPTH: usize = 32;
 
-const OWN: [&str; 10] = [
+const OWN: [&str; 11] = [
     "seed",
+    "without",
     "robot",
     "stereo",
     "odometry",
@@ -120,12 +123,22 @@ impl Pipeline {
         check_detectors(&detectors, &places)?;
         check_weighing(&filter, &detectors, filter_span)?;
         let steering = builder.steering(root.remove("controller"))?;
+        let plugins: Vec<Declared<'_>> = detectors
+            .iter()
+            .map(|slot| (&*slot.settings.plugin, slot.plugin.capabilities().inputs))
+            .chain(verifiers.iter().map(|slot| (&*slot.name, slot.plugin.inputs())))
+            .chain([(&*filter.name, filter.plugin.inputs())])
+            .chain(steering.as_ref().map(Steering::inputs))
+            .collect();
+        let without_span = root.get("without").map(Spanned::span);
+        let inputs = declared_inputs(&settings, &plugins, steering.is_some(), without_span)?;
         let resolved = resolve(text, &settings, registry)?;
         let stereo = settings.stereo.clone().map(StereoDepth::new).transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let run =
             RunSettings { seed: settings.seed, robot: settings.robot.clone(), text: text.into() };
         let pipeline = Self {
+            inputs,
             clock: Clock::new(settings.clock.clone()),
             lifecycle: Lifecycle::new(settings.lifecycle.clone()),
             doubts: Doubts::default(),
@@ -363,8 +376,8 @@ fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), C
         } else if roles.is_empty() {
             let message = format!("`{plugin}` has no role: name discover, follow or weigh");
             (message, &place.roles)
-        } else if roles.contains(&Role::Weigh) && slot.plugin.likelihood().is_none() {
-            let message = format!("`{plugin}` cannot weigh scenes: remove the role weigh");
+        } else if let Some((role, cannot)) = missing_role(slot) {
+            let message = format!("`{plugin}` cannot {cannot}: remove the role {role}");
             (message, &place.roles)
         } else {
             continue;
@@ -380,6 +393,20 @@ fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), C
         });
     }
     Ok(())
+}
+
+/// Returns a role of the config that the detector does not offer, and the words for it.
+fn missing_role(slot: &DetectorSlot) -> Option<(&'static str, &'static str)> {
+    let offered = slot.plugin.capabilities();
+    let roles = [
+        (Role::Discover, offered.discovers, "discover", "discover people"),
+        (Role::Follow, offered.tracks, "follow", "find a tracked person again"),
+        (Role::Weigh, offered.weighs, "weigh", "weigh scenes"),
+    ];
+    let missing = roles
+        .into_iter()
+        .find(|(role, is_offered, ..)| slot.settings.roles.contains(role) && !is_offered);
+    missing.map(|(_, _, name, words)| (name, words))
 }
 
 fn check_weighing(

@@ -1,5 +1,5 @@
 use tagalong_core::{
-    Command, Controller, Frame, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
+    Command, Controller, Frame, Inputs, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
 };
 
 use crate::boundary::{StepError, contain};
@@ -67,6 +67,11 @@ impl Steering {
     /// The distance that the controller keeps, m, if it keeps one.
     pub(crate) fn stand_off_m(&self) -> Option<f64> {
         self.controller.stand_off_m()
+    }
+
+    /// The controller's name and its inputs.
+    pub(crate) fn inputs(&self) -> (&str, Inputs) {
+        (&self.name, self.controller.inputs())
     }
 
     pub(crate) fn governor(&self) -> &Governor {

@@ -51,7 +51,6 @@ mod control;
 mod doubts;
 mod governor;
 mod lifecycle;
-mod needs;
 mod now;
 mod occlusion;
 mod pipeline;
@@ -67,7 +66,6 @@ pub use assignment::assign;
 pub use boundary::StepError;
 pub use config::{Options, RunSettings};
 pub use governor::{CorridorSettings, GovernorSettings, Orders};
-pub use needs::needs;
 pub use pipeline::Pipeline;
 pub use report::{Candidate, Fate, FrameReport, Outcome};
 pub use settings::{

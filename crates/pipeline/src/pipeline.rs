@@ -2,8 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
 use tagalong_core::{
-    Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Likelihood, Matched,
-    Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
+    Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Inputs, Likelihood,
+    Matched, Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
 };
 use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
@@ -24,6 +24,7 @@ use crate::{
 /// Plugins and the rules by which they work together.
 pub struct Pipeline {
     pub(crate) settings: PipelineSettings,
+    pub(crate) inputs: Inputs,
     pub(crate) stereo: Option<StereoDepth>,
     pub(crate) odometry: Option<VisualOdometry>,
     pub(crate) detectors: Vec<DetectorSlot>,
@@ -79,7 +80,8 @@ const STAGES: [&str; 10] = [
 ];
 
 impl Pipeline {
-    /// Takes one frame through the pipeline.
+    /// Takes one frame through the pipeline. What the frame holds beside
+    /// [`Pipeline::inputs`] is not looked at.
     ///
     /// # Errors
     /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then:
@@ -88,12 +90,21 @@ impl Pipeline {
         if let Some(failed) = self.failed {
             return Err(StepError::Stopped { frame: failed });
         }
-        let report = self.process(frame);
+        let restricted = frame.restricted_to(&self.inputs);
+        let report = self
+            .process(restricted.as_ref().unwrap_or(frame))
+            .map_err(|error| error.blame_declaration(frame));
         if report.is_err() {
             self.failed = Some(frame.index);
             self.disarm("a plugin failed");
         }
         report
+    }
+
+    /// Returns the inputs that the plugins and the stages declare, but those that the
+    /// config does without: the program that makes frames need not read others.
+    pub fn inputs(&self) -> Inputs {
+        self.inputs
     }
 
     /// What the wheels may do at a time, by the clock of the frames' stamps: the

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::Wheels;
+use tagalong_core::{Input, Wheels};
 use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 
@@ -15,6 +15,9 @@ pub struct PipelineSettings {
     /// Seed of everything random. The same log, config and seed give the same
     /// bytes.
     pub seed: u64,
+    /// Inputs that the pipeline does without, even where the log has them: `colour`,
+    /// `depth`, `right`, `laser`, `detections`.
+    pub without: Vec<Input>,
     /// The robot.
     pub robot: RobotSettings,
     /// Depth from a stereo pair, for frames that have none. Left out: the log

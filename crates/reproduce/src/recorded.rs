@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use cpu_time::ThreadTime;
 use tagalong_eval::formats::people;
 use tagalong_eval::{Comparison, Frame, Sequence, SetDistance, Similarity, Tally, Truth};
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_trials::{Contender, Judge};
 
@@ -28,20 +28,19 @@ pub(crate) struct Recorded {
 }
 
 /// Takes all contenders over each annotated log of colour and depth images; for each
-/// contender what it said about each log. Without real data there are no logs. Without
-/// `depth` its images are left out.
+/// contender what it said about each log. Without real data there are no logs. A
+/// contender gets the images that it declares.
 pub(crate) fn recorded(
     lab: &Lab<'_>,
     contenders: &[Contender],
     judge: &Judge,
-    depth: bool,
 ) -> Result<Vec<Vec<Recorded>>, ReproduceError> {
     let logs = logs(lab)?;
     lab.progress.begin(logs.len() * contenders.len(), "annotated logs");
     let over_all = |contender: &Contender| {
         logs.iter()
             .map(|log| {
-                let recorded = log.take(lab, contender, judge, depth);
+                let recorded = log.take(lab, contender, judge);
                 lab.progress.step();
                 recorded
             })
@@ -85,13 +84,11 @@ impl Log {
         lab: &Lab<'_>,
         contender: &Contender,
         judge: &Judge,
-        depth: bool,
     ) -> Result<Recorded, ReproduceError> {
         let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline: Pipeline = contender.pipeline(lab.registry, 1)?;
-        let needs = Needs { colour: true, depth, right: false };
         let (input, limits) = (InputSettings::default(), Limits::default());
-        let mut source = FrameSource::open(&self.path, &input, &limits, needs)
+        let mut source = FrameSource::open(&self.path, &input, &limits, pipeline.inputs())
             .map_err(|error| failed(error.to_string()))?;
         let (mut reports, mut frames, mut worked_ms) = (Vec::new(), BTreeMap::new(), 0.0);
         while let Some(item) = source.next_frame() {

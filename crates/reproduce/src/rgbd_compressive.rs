@@ -4,7 +4,7 @@
 use tagalong_eval::{Similarity, Tally};
 use tagalong_pipeline::FrameReport;
 use tagalong_sim::Scene;
-use tagalong_trials::{Judge, Run, Trial, TrialError};
+use tagalong_trials::{Contender, Judge, Run, Trial, TrialError};
 
 use crate::given::given;
 use crate::recorded::{Recorded, recorded};
@@ -153,7 +153,7 @@ fn table(
     published_hz: f64,
 ) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&PIPELINES)?;
-    let real = recorded(lab, &contenders, &JUDGE, true)?;
+    let real = recorded(lab, &contenders, &JUDGE)?;
     let trials = lab.trials(title, scenes, &contenders, done)?;
     let mut rows = vec![published("P2", published_hz, 6), published("RJ-MCMC, on a GPU", 4.0, 6)];
     for (at, (name, real)) in PIPELINES.iter().zip(&real).enumerate() {
@@ -206,8 +206,9 @@ fn describe(real: &[Vec<Recorded>]) -> String {
 }
 
 fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
-    let contenders = lab.contenders(&WITHOUT_DEPTH)?;
-    let real = recorded(lab, &contenders, &JUDGE, false)?;
+    let contenders: Vec<Contender> =
+        lab.contenders(&WITHOUT_DEPTH)?.into_iter().map(without_depth).collect();
+    let real = recorded(lab, &contenders, &JUDGE)?;
     let row = |(name, logs): (&&str, &Vec<Recorded>)| {
         let mut cells = scores(logs.iter().map(|log| &log.tally)).to_vec();
         cells.push(
@@ -220,6 +221,15 @@ fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let columns = ["LAMR, real", "IDF1, real", "MOTA, real", WORK[0]].map(String::from).to_vec();
     let notes = vec![describe(&real), "Boxes, IoU 0.5; people within 6 m".into(), TIMES.into()];
     Ok(Table { title: "Without depth".into(), columns, rows, notes }.into())
+}
+
+/// The same pipeline, which does without the depth images of the logs.
+fn without_depth(contender: Contender) -> Contender {
+    let key = "without = [\"depth\"]";
+    if contender.config.contains(key) {
+        return contender;
+    }
+    Contender { config: format!("{key}\n{}", contender.config), ..contender }
 }
 
 fn done(trial: Trial) -> Result<Vec<Done>, TrialError> {

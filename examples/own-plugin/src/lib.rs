@@ -3,7 +3,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Detection, Frame, Registry, Result, Verifier};
+use tagalong_core::{Detection, Frame, Input, Inputs, Registry, Result, Verifier};
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "own-contrast";
@@ -35,6 +35,10 @@ pub struct OwnContrast {
 }
 
 impl Verifier for OwnContrast {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.require(Input::Colour)
+    }
+
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let grey = frame.grey()?;
         let inside = candidate.region.clipped(grey.width(), grey.height());

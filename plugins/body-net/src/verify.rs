@@ -1,4 +1,4 @@
-use tagalong_core::{Context, Detection, Frame, Result, Trust, Verifier};
+use tagalong_core::{Context, Detection, Frame, Input, Inputs, Result, Trust, Verifier};
 
 use crate::{Config, Model, Pass, View};
 
@@ -26,6 +26,10 @@ impl BodyNet {
 }
 
 impl Verifier for BodyNet {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.require(Input::Colour).accept(Input::Depth)
+    }
+
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let Some(view) = View::new(frame, candidate)? else { return Ok(0.0) };
         Ok(self.trust.margin(self.model.log_odds(&view, &mut self.pass)))

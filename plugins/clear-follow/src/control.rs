@@ -1,5 +1,5 @@
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{Controller, Motion, Scene, Sent, Track, WheelSpeeds};
+use tagalong_core::{Controller, Input, Inputs, Motion, Scene, Sent, Track, WheelSpeeds};
 
 use crate::around::Around;
 use crate::config::{Config, MOST};
@@ -23,6 +23,10 @@ pub struct ClearFollow {
 }
 
 impl Controller for ClearFollow {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.accept(Input::Depth)
+    }
+
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
         let motion = &scene.frame.motion;
         let dt = if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 };

@@ -1,4 +1,4 @@
-use tagalong_core::{Context, Detection, Frame, Result, Trust, Verifier};
+use tagalong_core::{Context, Detection, Frame, Input, Inputs, Result, Trust, Verifier};
 
 use crate::{Config, Features, Model};
 
@@ -27,6 +27,10 @@ impl ColorTexture {
 }
 
 impl Verifier for ColorTexture {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.require(Input::Colour).accept(Input::Depth)
+    }
+
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         self.features.look(frame, candidate)?;
         Ok(self.trust.margin(self.model.log_odds(&self.features)))

@@ -3,8 +3,8 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{
-    Camera, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result, Search,
-    Track, TrackId,
+    Camera, Capabilities, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Input,
+    Inputs, Rect, Result, Search, Track, TrackId,
 };
 use tagalong_vision::Integral;
 
@@ -409,6 +409,15 @@ fn sighting(
 }
 
 impl Detector for Compressive {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
+            discovers: false,
+            tracks: true,
+            weighs: false,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

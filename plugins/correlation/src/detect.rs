@@ -2,8 +2,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use tagalong_core::{
-    Camera, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, HEAD_RADIUS_M, Rect, Result,
-    Search, Stamp, Track, TrackId, UPPER_BODY_SIDE_M,
+    Camera, Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, HEAD_RADIUS_M,
+    Input, Inputs, Rect, Result, Search, Stamp, Track, TrackId, UPPER_BODY_SIDE_M,
 };
 
 use crate::picture::{Distance, SIDE};
@@ -162,6 +162,15 @@ fn sighting(
 }
 
 impl Detector for Correlation {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            inputs: Inputs::NONE.require(Input::Colour).require(Input::Depth),
+            discovers: false,
+            tracks: true,
+            weighs: false,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

@@ -2,8 +2,8 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use tagalong_core::{
-    DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Likelihood, Rect, Result,
-    Search, Track,
+    Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Input,
+    Inputs, Likelihood, Rect, Result, Search, Track,
 };
 use tagalong_vision::RowSums;
 
@@ -290,6 +290,15 @@ impl DepthTemplate {
 }
 
 impl Detector for DepthTemplate {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            inputs: Inputs::NONE.require(Input::Depth),
+            discovers: true,
+            tracks: true,
+            weighs: true,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

@@ -1,7 +1,7 @@
 use nalgebra::Point2;
 use tagalong_core::{
-    Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
-    Search,
+    Camera, Capabilities, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M,
+    Input, Inputs, Rect, Result, Search,
 };
 
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
@@ -101,6 +101,15 @@ impl FaceRgbd {
 }
 
 impl Detector for FaceRgbd {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
+            discovers: true,
+            tracks: true,
+            weighs: false,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

@@ -2,8 +2,8 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Matrix3;
 use tagalong_core::{
-    Camera, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Rect, Result,
-    Search, UPPER_BODY_SIDE_M,
+    Camera, Capabilities, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M,
+    Input, Inputs, Rect, Result, Search, UPPER_BODY_SIDE_M,
 };
 
 use crate::lattice::Lattice;
@@ -157,6 +157,16 @@ impl<'a> Proposer<'a> {
 }
 
 impl Detector for HogUpperBody {
+    fn capabilities(&self) -> Capabilities {
+        let grey = Inputs::NONE.require(Input::Colour);
+        Capabilities {
+            inputs: if self.config.depth_proposals { grey.accept(Input::Depth) } else { grey },
+            discovers: true,
+            tracks: true,
+            weighs: false,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

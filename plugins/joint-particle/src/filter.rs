@@ -2,7 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Sketch, Support, TrackId,
+    Camera, Detection, Estimate, Evidence, Filter, Input, Inputs, Motion, Person, Result, Sketch,
+    Support, TrackId,
 };
 
 use crate::config::{Config, Method};
@@ -185,6 +186,10 @@ fn ids(group: &Group) -> BTreeSet<TrackId> {
 }
 
 impl Filter for JointParticle {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.accept(Input::Colour)
+    }
+
     fn start(&mut self, id: TrackId, detection: &Detection) {
         let first = Particle::of(detection, &self.config);
         self.groups.push(Group::single(id, &first, self.seed, &self.config));

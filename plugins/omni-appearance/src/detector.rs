@@ -1,6 +1,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use tagalong_core::{
-    Camera, Context, Detection, Detector, Error, Frame, Funnel, Result, Search, Track,
+    Camera, Capabilities, Context, Detection, Detector, Error, Frame, Funnel, Input, Inputs,
+    Result, Search, Track,
 };
 
 use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, View};
@@ -117,6 +118,15 @@ impl OmniAppearance {
 }
 
 impl Detector for OmniAppearance {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            inputs: Inputs::NONE.require(Input::Colour),
+            discovers: true,
+            tracks: true,
+            weighs: false,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{
-    Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_BELOW_TOP_M,
-    HEAD_RADIUS_M, Recorded, Rect, Result, Search, Track, UPPER_BODY_SIDE_M,
+    Capabilities, Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_BELOW_TOP_M,
+    HEAD_RADIUS_M, Input, Inputs, Recorded, Rect, Result, Search, Track, UPPER_BODY_SIDE_M,
 };
 
 use crate::NAME;
@@ -142,6 +142,16 @@ fn face_depth(depth: &DepthImage, region: &Rect) -> Option<f64> {
 }
 
 impl Detector for RecordedDetections {
+    fn capabilities(&self) -> Capabilities {
+        let depth = Inputs::NONE.accept(Input::Depth);
+        Capabilities {
+            inputs: if self.boxes.is_some() { depth } else { depth.require(Input::Detections) },
+            discovers: true,
+            tracks: true,
+            weighs: false,
+        }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

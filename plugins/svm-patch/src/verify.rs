@@ -1,4 +1,4 @@
-use tagalong_core::{Context, Detection, Frame, Result, Trust, Verifier};
+use tagalong_core::{Context, Detection, Frame, Input, Inputs, Result, Trust, Verifier};
 
 use crate::{Config, Model};
 
@@ -25,6 +25,10 @@ impl SvmPatch {
 }
 
 impl Verifier for SvmPatch {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.require(Input::Colour)
+    }
+
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let patch = self.model.sampler.patch(frame.grey()?, &candidate.region);
         Ok(self.trust.margin(self.model.log_odds(&patch)))

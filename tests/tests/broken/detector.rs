@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use tagalong_core::{
-    Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Likelihood, Person, Registry, Result,
-    Search, Track,
+    Capabilities, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Input, Inputs,
+    Likelihood, Person, Registry, Result, Search, Track,
 };
 
 use super::{mood, register_with_fault};
@@ -85,6 +85,15 @@ impl Heads {
 }
 
 impl Detector for Heads {
+    fn capabilities(&self) -> Capabilities {
+        let inputs = match self.fault {
+            "secretive" => Inputs::NONE,
+            "easy-going" => Inputs::NONE.accept(Input::Depth),
+            _ => Inputs::NONE.require(Input::Depth),
+        };
+        Capabilities { inputs, discovers: true, tracks: self.fault != "modest", weighs: true }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,

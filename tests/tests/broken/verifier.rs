@@ -1,4 +1,4 @@
-use tagalong_core::{Detection, Error, Frame, Registry, Result, Verifier};
+use tagalong_core::{Detection, Error, Frame, Input, Inputs, Registry, Result, Verifier};
 
 use super::{mood, register_with_fault};
 
@@ -15,6 +15,14 @@ struct Brightness {
 }
 
 impl Verifier for Brightness {
+    fn inputs(&self) -> Inputs {
+        match self.fault {
+            "secretive" => Inputs::NONE,
+            "easy-going" => Inputs::NONE.accept(Input::Colour),
+            _ => Inputs::NONE.require(Input::Colour),
+        }
+    }
+
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         assert!(self.fault != "panics" || frame.camera.width > 1, "cannot see");
         if self.fault == "vague" && frame.colour().is_err() {

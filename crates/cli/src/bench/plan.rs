@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_core::Registry;
-use tagalong_log::{FrameSource, Limits, LogError, Needs, read_truth};
-use tagalong_pipeline::needs;
+use tagalong_log::{FrameSource, Inputs, Limits, LogError, read_truth};
 
 use super::args::PlanArgs;
 use crate::config_file::{ConfigFile, OuterSettings};
@@ -49,7 +48,7 @@ pub struct Task {
     pub skip: Option<String>,
 }
 
-/// A config that was read, and what it needs.
+/// A config that was read, and its inputs.
 pub struct Candidate {
     /// The config.
     pub file: ConfigFile,
@@ -57,8 +56,8 @@ pub struct Candidate {
     first_seed: u64,
     /// Its tables around the pipeline.
     pub outer: OuterSettings,
-    /// The images that its pipeline needs.
-    pub needs: Needs,
+    /// The inputs of its pipeline.
+    pub inputs: Inputs,
 }
 
 /// A log and its truth.
@@ -85,7 +84,7 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
     for log in &logs {
         let mut tried = BTreeMap::new();
         for config in &configs {
-            let key = format!("{:?}", (&config.outer.input, &config.outer.limits, config.needs));
+            let key = format!("{:?}", (&config.outer.input, &config.outer.limits, config.inputs));
             let skip = match tried.get(&key) {
                 Some(known) => Option::clone(known),
                 None => tried.entry(key).or_insert(why_not(config, log)?).clone(),
@@ -175,7 +174,7 @@ fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<Str
 /// Why the config cannot run on the log, if it cannot.
 fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Failure> {
     let outer = &config.outer;
-    match FrameSource::open(&log.log, &outer.input, &outer.limits, config.needs) {
+    match FrameSource::open(&log.log, &outer.input, &outer.limits, config.inputs) {
         Ok(_) => Ok(None),
         Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
             let text = error.to_string();
@@ -205,10 +204,10 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<Candidate>, Failu
 
 fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
     let file = ConfigFile::read(path)?;
-    let (_, settings) = file.pipeline(registry, None)?;
+    let (pipeline, settings) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let needs = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
-    Ok(Candidate { file, path: path.to_owned(), first_seed: settings.seed, outer, needs })
+    let (first_seed, inputs) = (settings.seed, pipeline.inputs());
+    Ok(Candidate { file, path: path.to_owned(), first_seed, outer, inputs })
 }
 
 fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::Registry;
-use tagalong_log::FrameSource;
+use tagalong_log::{FrameSource, Input, Inputs};
 use tagalong_pipeline::Pipeline;
 use tagalong_report::{Outcome, TaskResult};
 
@@ -107,7 +107,7 @@ fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {
 }
 
 /// Tasks that see the same frames: of one log, read the same way. Not those
-/// with other needs, or a result would depend on the company of its task.
+/// with other inputs, or a result would depend on the company of its task.
 fn groups(
     tasks: Vec<Task>,
     registry: &Registry,
@@ -118,7 +118,7 @@ fn groups(
     for task in tasks {
         let config = reread(&task, registry)?;
         let outer = &config.outer;
-        let mut key = format!("{:?}", (&task.log, &outer.input, &outer.limits, config.needs));
+        let mut key = format!("{:?}", (&task.log, &outer.input, &outer.limits, config.inputs));
         if alone {
             key += &task.hash;
         }
@@ -212,7 +212,7 @@ impl Desk<'_> {
         let first = &group[0].task;
         let options = TruthOptions { upper_body: first.whole_bodies, ..TruthOptions::default() };
         let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
-        let mut source = open(&group[0])?;
+        let mut source = open(&group[0], group[0].config.inputs)?;
         let mut lanes: Vec<Lane> =
             group.iter().map(|ready| Lane::new(ready, self.registry)).collect();
         let mut shots = Shots::default();
@@ -234,11 +234,10 @@ impl Desk<'_> {
 /// A result, and the times if all went well.
 type Kept = (Stored, Option<StoredTiming>);
 
-fn open(ready: &Ready) -> Result<FrameSource, String> {
+fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
     let outer = &ready.config.outer;
-    let source =
-        FrameSource::open(&ready.task.log, &outer.input, &outer.limits, ready.config.needs)
-            .map_err(|error| error.to_string())?;
+    let source = FrameSource::open(&ready.task.log, &outer.input, &outer.limits, inputs)
+        .map_err(|error| error.to_string())?;
     if ready.task.inputs.get("log") != Some(&source.facts().sha256) {
         return Err("the log changed since the task was planned; plan again".into());
     }
@@ -307,7 +306,7 @@ fn failed(task: &Task, why: &str) -> Kept {
 fn illustrate(ready: &Ready, stored: &mut [Stored]) -> Result<(), String> {
     let wanted = Wanted::of(stored);
     let Some(last) = wanted.last() else { return Ok(()) };
-    let mut source = open(ready)?;
+    let mut source = open(ready, ready.config.inputs.accept(Input::Colour))?;
     while let Some(item) = source.next_frame() {
         if item.frame.index > last {
             break;

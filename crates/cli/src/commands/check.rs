@@ -2,8 +2,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use tagalong_core::Registry;
-use tagalong_log::{FrameSource, Needs};
-use tagalong_pipeline::{Pipeline, needs};
+use tagalong_log::{FrameSource, Inputs, Usage};
+use tagalong_pipeline::Pipeline;
 
 use crate::args::Format;
 use crate::config_file::{ConfigFile, OuterSettings};
@@ -21,12 +21,12 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let wanted = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
-    let notes = log.map(|log| fits(pipeline, &outer, log, wanted)).transpose()?;
+    let inputs = pipeline.inputs();
+    let notes = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
     let config = config.display();
     print(&match format {
         Format::Text => {
-            let mut out = format!("{config}: right; needs {}\n", in_words(wanted));
+            let mut out = format!("{config}: right; {}\n", in_words(inputs));
             if let (Some(log), Some(notes)) = (log, notes) {
                 let _ = writeln!(out, "{}: fits", log.display());
                 notes.iter().for_each(|note| out += &format!("  {note}\n"));
@@ -34,9 +34,10 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             out
         }
         Format::Json => {
-            let needs = names(wanted);
+            let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
             let answer = serde_json::json!({
-                "config": config.to_string(), "needs": needs, "log": log, "notes": notes,
+                "config": config.to_string(), "needs": needs, "uses": uses, "log": log,
+                "notes": notes,
             });
             format!("{answer:#}\n")
         }
@@ -45,14 +46,9 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
 }
 
 /// Tries the first frames of the log; returns what the reader has to say.
-fn fits(
-    mut pipeline: Pipeline,
-    outer: &OuterSettings,
-    log: &Path,
-    wanted: Needs,
-) -> Result<Vec<String>, Failure> {
+fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Vec<String>, Failure> {
     check_log_path(log)?;
-    let mut source = FrameSource::open(log, &outer.input, &outer.limits, wanted)?;
+    let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     let mut tried = 0;
     while tried < FRAMES
         && let Some(item) = source.next_frame()
@@ -66,15 +62,19 @@ fn fits(
     Ok(source.notes().to_vec())
 }
 
-fn names(needs: Needs) -> Vec<&'static str> {
-    let named = [(needs.colour, "colour"), (needs.depth, "depth"), (needs.right, "right stereo")];
-    named.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect()
+fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {
+    inputs.of(usage).map(|input| input.name()).collect()
 }
 
-fn in_words(needs: Needs) -> String {
-    let names = names(needs);
-    match names.is_empty() {
+/// "needs colour and depth; uses laser where the log has it".
+fn in_words(inputs: Inputs) -> String {
+    let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
+    let needs = match needs.is_empty() {
         true => "no particular image".to_owned(),
-        false => format!("{} images", names.join(" and ")),
+        false => needs.join(" and "),
+    };
+    match uses.is_empty() {
+        true => format!("needs {needs}"),
+        false => format!("needs {needs}; uses {} where the log has it", uses.join(" and ")),
     }
 }

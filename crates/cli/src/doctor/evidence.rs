@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tagalong_core::{Camera, DepthImage};
-use tagalong_log::{InputSettings, Inspection, LogError, LogFrame, Needs};
+use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tagalong_vision::quality::Exposure;
 use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
@@ -20,12 +20,12 @@ const KEPT_DEPTHS: usize = 8;
 pub struct Evidence {
     /// What the log holds.
     pub inspection: Inspection,
-    /// Why the pipeline cannot have what it needs.
+    /// Why the pipeline cannot have what it requires.
     pub refusal: Option<LogError>,
     /// `[input]` of the config.
     pub input: InputSettings,
-    /// What the pipeline needs.
-    pub needs: Needs,
+    /// The inputs of the pipeline.
+    pub inputs: Inputs,
     /// What was measured in frames.
     pub samples: Samples,
     /// What the pipeline made of them.

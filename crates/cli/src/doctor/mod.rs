@@ -14,8 +14,8 @@ use clap::Args;
 use serde::Serialize;
 use tagalong_core::Registry;
 use tagalong_log::write::RunDir;
-use tagalong_log::{FrameSource, examine};
-use tagalong_pipeline::{Pipeline, needs};
+use tagalong_log::{FrameSource, Input, examine};
+use tagalong_pipeline::Pipeline;
 
 use self::evidence::{Evidence, Samples};
 use self::finding::{Finding, Severity};
@@ -84,14 +84,16 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     if let Some(folder) = &args.output {
         RunDir::check(folder, args.overwrite, &args.log).map_err(Failure::usage)?;
     }
-    let wanted = needs(|| config.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
-    let found = examine(&args.log, &outer.input, &outer.limits, wanted)?;
+    let inputs = pipeline.inputs();
+    // Light is judged, and pictures are drawn, of logs whose colour is not used, too.
+    let read = inputs.accept(Input::Colour);
+    let found = examine(&args.log, &outer.input, &outer.limits, read)?;
     let mut evidence = Evidence {
         samples: Samples::of(expected_frames(&found.inspection).min(args.frames)),
         inspection: found.inspection,
         refusal: found.refusal,
         input: outer.input.clone(),
-        needs: wanted,
+        inputs,
         trial: Trial::default(),
     };
     if let Some(frames) = found.frames {

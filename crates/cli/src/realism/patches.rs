@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{DMatrix, DVector};
 use tagalong_core::{DepthImage, Rect};
 use tagalong_eval::formats::people;
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_trials::TrialError;
 
 use super::{Check, drawn, mean, scene};
@@ -52,6 +52,9 @@ pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
     ])
 }
 
+/// Frames without depth are of no use; colour is not looked at.
+const DEPTH: Inputs = Inputs::NONE.require(Input::Depth);
+
 fn log(name: &str) -> PathBuf {
     Path::new(LOGS).join(format!("{name}.mcap"))
 }
@@ -60,9 +63,8 @@ fn log(name: &str) -> PathBuf {
 fn recording(log: &Path) -> Option<Vec<Sample>> {
     let text = std::fs::read_to_string(log.with_extension("people.csv")).ok()?;
     let rows = people::parse(&text, "people.csv").ok()?;
-    let needs = Needs { depth: true, ..Needs::default() };
     let mut source =
-        FrameSource::open(log, &InputSettings::default(), &Limits::default(), needs).ok()?;
+        FrameSource::open(log, &InputSettings::default(), &Limits::default(), DEPTH).ok()?;
     let mut samples = Vec::new();
     while let Some(item) = source.next_frame() {
         let Ok(depth) = item.frame.depth() else { continue };

@@ -16,9 +16,9 @@ use pictures::Pictures;
 use progress::Progress;
 use report::{FileFacts, RunReport, Tally};
 use tagalong_core::Registry;
-use tagalong_log::FrameSource;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
-use tagalong_pipeline::{FrameReport, Pipeline, StepError, needs};
+use tagalong_log::{FrameSource, Input};
+use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use timings::Timings;
 
 use crate::args::{Format, RunArgs};
@@ -77,8 +77,10 @@ impl Job {
         check_log_path(args.log())?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
-        let needs = needs(|| config.pipeline(registry, args.seed).map(|(pipeline, _)| pipeline))?;
-        let source = FrameSource::open(args.log(), &outer.input, &outer.limits, needs)?;
+        let inputs = pipeline.inputs();
+        // A picture shows colour, whether or not the pipeline looks at it.
+        let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
+        let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry2, Isometry3};
-use tagalong_log::{FrameSource, InputSettings, Limits, LogFrame, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 
 use super::Rate;
 use crate::outcome::Failure;
@@ -50,7 +50,8 @@ impl Shots {
     /// # Errors
     /// A log that cannot be used.
     pub fn read(path: &Path, input: &InputSettings, limits: &Limits) -> Result<Self, Failure> {
-        let mut source = FrameSource::open(path, input, limits, Needs::default())?;
+        let inputs = Inputs::ANY.without(Input::Right);
+        let mut source = FrameSource::open(path, input, limits, inputs)?;
         let mut shots = Self::default();
         while let Some(item) = source.next_frame() {
             shots.push(Shot::of(&item));

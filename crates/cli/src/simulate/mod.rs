@@ -156,7 +156,7 @@ pub fn record(
 
 #[cfg(test)]
 mod tests {
-    use tagalong_log::{FrameSource, InputSettings, Limits, Needs, inspect};
+    use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, inspect};
     use tagalong_trials::Draw;
 
     use super::*;
@@ -190,9 +190,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.mcap");
         record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
-        let needs = Needs { depth: true, ..Needs::default() };
+        let inputs = Inputs::ANY.require(Input::Depth);
         let mut source =
-            FrameSource::open(&path, &InputSettings::default(), &Limits::default(), needs).unwrap();
+            FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs)
+                .unwrap();
         let mut draw = Draw::new(&scene, 1);
         let mut frames = 0;
         while let Some(logged) = source.next_frame() {

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Point2;
 use tagalong_core::{Detection, Frame, Funnel, Rect};
 use tagalong_eval::{Role, Truth};
-use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_sim::Scene;
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::Draw;
@@ -118,11 +118,11 @@ fn known(truth: &tagalong_sim::Truth) -> Known {
 /// A log or a truth that cannot be used, and those of `see`.
 pub fn in_log(log: &Path, truth: &Path, see: See<'_>) -> Result<(), Failure> {
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let needs = Needs { colour: true, depth: true, right: false };
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     let truth = TruthFile::read(truth, TruthOptions::default())?;
     let shots = Shots::read(log, &input, &limits)?;
     let mut people = truth.frames(&shots);
-    let mut source = FrameSource::open(log, &input, &limits, needs)?;
+    let mut source = FrameSource::open(log, &input, &limits, inputs)?;
     while let Some(item) = source.next_frame() {
         let (truths, _) = people.remove(&LogShot::of(&item).number).unwrap_or_default();
         let people = truths.iter().filter_map(annotated).collect();

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use image::{ImageBuffer, Luma, Rgb};
-use tagalong_log::{FrameSource, InputSettings, Limits, LogFrame, Needs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 
 use crate::common::{code, tagalong, text};
 
@@ -26,13 +26,13 @@ fn import(home: &Path, args: &[&str]) -> (i32, String) {
     (code(&output), text(&output.stderr) + &text(&output.stdout))
 }
 
-fn frames(log: &Path, needs: Needs) -> Vec<LogFrame> {
+fn frames(log: &Path, inputs: Inputs) -> Vec<LogFrame> {
     let (input, limits) = (InputSettings::default(), Limits::default());
-    let mut source = FrameSource::open(log, &input, &limits, needs).unwrap();
+    let mut source = FrameSource::open(log, &input, &limits, inputs).unwrap();
     std::iter::from_fn(|| source.next_frame()).collect()
 }
 
-const DEPTH: Needs = Needs { colour: true, depth: true, right: false };
+const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 
 #[test]
 fn a_tum_folder_has_depth_and_a_camera_that_moves() {
@@ -93,8 +93,8 @@ fn a_kitti_sequence_is_a_pair_with_boxes_and_a_drive() {
     let args = ["kitti", "training", "--sequence", "0007", "-o", "k.mcap"];
     let (code, said) = import(home.path(), &args);
     assert_eq!(code, 0, "{said}");
-    let needs = Needs { colour: true, depth: false, right: true };
-    let found = frames(&home.path().join("k.mcap"), needs);
+    let inputs = Inputs::ANY.require(Input::Colour).require(Input::Right);
+    let found = frames(&home.path().join("k.mcap"), inputs);
     assert_eq!(found.len(), 2);
     let right = found[0].frame.right().unwrap();
     assert!((right.baseline_m - 0.5).abs() < 1e-9);
@@ -142,7 +142,7 @@ fn a_mot_sequence_brings_its_truth() {
     fs::write(folder.join("gt/gt.txt"), "1,1,2,3,10,20,1,1,1\n").unwrap();
     let (code, said) = import(home.path(), &["mot", "MOT17-99"]);
     assert_eq!(code, 0, "{said}");
-    let found = frames(&home.path().join("runs/MOT17-99.mcap"), Needs::default());
+    let found = frames(&home.path().join("runs/MOT17-99.mcap"), Inputs::ANY);
     assert!((found[1].frame.stamp.seconds_since(found[0].frame.stamp) - 0.04).abs() < 1e-9);
     let truth = fs::read_to_string(home.path().join("runs/MOT17-99.boxes.csv")).unwrap();
     assert_eq!(truth, "1,1,2,3,10,20,1,1,1\n");

@@ -12,6 +12,7 @@ mod doctor;
 mod eval;
 mod follow;
 mod import;
+mod inputs;
 mod missing_topics;
 mod mistakes;
 mod recorded;

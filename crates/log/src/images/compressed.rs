@@ -40,6 +40,41 @@ pub fn decode_compressed(
     }
 }
 
+/// Returns the columns and rows of a compressed image, of which it reads the header.
+///
+/// # Errors
+/// [`ImageError`]: a kind that is not known, a damaged header, a size beyond the limits.
+pub fn size_of_compressed(
+    image: &CompressedImage<'_>,
+    limits: &Limits,
+) -> Result<(usize, usize), ImageError> {
+    let is_depth = image.format.to_ascii_lowercase().contains("compresseddepth");
+    let data = match image.data.split_at_checked(DEPTH_HEADER) {
+        Some((_, body)) if is_depth => body,
+        _ => image.data,
+    };
+    match data {
+        [0xff, 0xd8, ..] => {
+            let mut decoder = JpegDecoder::new(ZCursor::new(data));
+            decoder.decode_headers().map_err(codec)?;
+            let info = decoder.info().ok_or_else(|| codec("no header"))?;
+            check_size(info.width.into(), info.height.into(), 3, limits)?;
+            Ok((info.width.into(), info.height.into()))
+        }
+        [0x89, b'P', b'N', b'G', ..] => {
+            let reader = png::Decoder::new(Cursor::new(data)).read_info().map_err(codec)?;
+            let (width, height) = (reader.info().width, reader.info().height);
+            check_size(width.into(), height.into(), 4, limits)?;
+            Ok((width as usize, height as usize))
+        }
+        _ if is_depth => {
+            let values = compressed_depth(image, None, limits)?;
+            Ok((values.width(), values.height()))
+        }
+        _ => Err(ImageError::Encoding(image.format.clone())),
+    }
+}
+
 fn codec(error: impl std::fmt::Debug) -> ImageError {
     ImageError::Codec(format!("{error:?}"))
 }

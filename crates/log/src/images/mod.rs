@@ -9,8 +9,8 @@ mod compressed;
 mod raw;
 mod rvl;
 
-pub use compressed::{decode_compressed, encode_rvl};
-pub use raw::decode_raw;
+pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
+pub use raw::{decode_raw, size_of_raw};
 use tagalong_core::{DepthImage, GreyImage, RgbImage};
 
 use crate::Limits;

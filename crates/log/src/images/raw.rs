@@ -6,6 +6,15 @@ use super::{ImageError, Pixels, check_size, metres, metres_of_float};
 use crate::Limits;
 use crate::msgs::Image;
 
+/// Returns the columns and rows of an uncompressed image.
+///
+/// # Errors
+/// [`ImageError`]: a size beyond the limits, or none.
+pub fn size_of_raw(image: &Image<'_>, limits: &Limits) -> Result<(usize, usize), ImageError> {
+    check_size(image.width.into(), image.height.into(), 3, limits)?;
+    Ok((image.width as usize, image.height as usize))
+}
+
 /// Decodes an uncompressed image. Depth is scaled by `depth_unit_m` (metres per
 /// unit), or by what the encoding stands for: 1 mm for `16UC1`, 1 m for `32FC1`.
 ///

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3, Point3};
 use tagalong_core::{
-    Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Lens, Motion, Panorama, Pinhole,
-    RightImage, Stamp, planar_pose,
+    Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Input, Lens, Motion, Panorama,
+    Pinhole, RightImage, Stamp, planar_pose,
 };
 use tagalong_vision::Unwrapping;
 
@@ -18,7 +18,9 @@ use super::plan::Plan;
 use super::recorded::recorded;
 use super::tally::Tally;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
-use crate::images::{ImageError, Pixels, decode_compressed, decode_raw};
+use crate::images::{
+    ImageError, Pixels, decode_compressed, decode_raw, size_of_compressed, size_of_raw,
+};
 use crate::msgs::{CompressedImage, Image, decode};
 use crate::odometry::{PoseAt, unknown_motion};
 use crate::register::Registration;
@@ -73,25 +75,21 @@ impl Assembler {
         if plan.chosen.right.is_some() && right.is_none() {
             tally.count("left_without_right");
         }
-        let lacks_depth = plan.needs.depth && plan.has_second_depth() && depth.is_none();
-        if lacks_depth || plan.needs.right && right.is_none() {
+        let requires = |input| plan.inputs.requires(input);
+        let lacks_depth = requires(Input::Depth) && plan.has_second_depth() && depth.is_none();
+        if lacks_depth || requires(Input::Right) && right.is_none() {
             return None;
         }
-        let mut images = self.primary(plan, image, tally)?;
-        if let Some(mirror) = plan.raw_mirror() {
-            images = self.unwrap(plan, mirror, &images, tally)?;
-        }
-        let size = size_of(&images)?;
+        let (mut images, size) = self.primary(plan, image, tally)?;
         let camera = self.camera_at(plan, image, size, intake, tally)?;
         if let Some(depth) = depth {
             images.depth = self.depth(plan, image, &depth, &camera, intake, tally);
         }
-        // A second picture to decode is only worth it for those who look at it.
-        if let Some(right) = right.filter(|_| plan.needs.right) {
+        if let Some(right) = right {
             images.right = right_image(plan, &right, size, tally).map(Arc::new);
         }
-        let lacks = plan.needs.depth && images.depth.is_none()
-            || plan.needs.right && images.right.is_none();
+        let lacks = requires(Input::Depth) && images.depth.is_none()
+            || requires(Input::Right) && images.right.is_none();
         if lacks {
             return None;
         }
@@ -102,36 +100,62 @@ impl Assembler {
         Some(item)
     }
 
-    /// The image that makes the frame.
-    fn primary(&mut self, plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<Images> {
-        let pixels = pixels(plan, plan.primary(), image, tally)?;
-        let size = pixels.size();
+    /// The image that makes the frame, as far as it is used, and the size of the frame.
+    fn primary(
+        &mut self,
+        plan: &Plan,
+        image: &Payload,
+        tally: &mut Tally,
+    ) -> Option<(Images, (usize, usize))> {
+        let seen = match plan.reads_primary() {
+            true => pixels(plan, plan.primary(), image, tally),
+            false => None,
+        };
+        let size = match &seen {
+            Some(pixels) => pixels.size(),
+            None if plan.requires_primary() => return None,
+            None => size_without_pixels(plan, image, tally)?,
+        };
+        self.check_calibration(plan, size, tally)?;
+        let images = seen.map_or_else(Images::default, images_of);
+        match plan.raw_mirror() {
+            None => Some((images, size)),
+            Some(mirror) => self.unwrap(plan, mirror, &images, tally),
+        }
+    }
+
+    /// `None`, counted, for an image of another size than the calibration is for.
+    fn check_calibration(
+        &mut self,
+        plan: &Plan,
+        size: (usize, usize),
+        tally: &mut Tally,
+    ) -> Option<()> {
         if let Some(Err(misfit)) = plan.lens.map(|lens| check_size(&lens, size.0, size.1)) {
             tally.lose("images_of_other_size", || format!("{}: {misfit}", plan.primary()));
             self.misfit.get_or_insert(misfit);
             return None;
         }
-        let mut images = Images::default();
-        match pixels {
-            Pixels::Colour(colour) => images.colour = Some(Arc::new(colour)),
-            Pixels::Grey(grey) => images.grey = Some(Arc::new(grey)),
-            Pixels::Depth(depth) => images.depth = Some(Arc::new(depth)),
-        }
-        Some(images)
+        Some(())
     }
 
-    /// The circular image of a mirror as a panorama.
+    /// The circular image of a mirror as a panorama, if there is one, and its size.
     fn unwrap(
         &mut self,
         plan: &Plan,
         mirror: ConicalMirror,
         raw: &Images,
         tally: &mut Tally,
-    ) -> Option<Images> {
+    ) -> Option<(Images, (usize, usize))> {
         let [columns, rows] = plan.input.panorama;
+        if raw.colour.is_none() && raw.grey.is_none() {
+            return Some((Images::default(), (columns, rows)));
+        }
         let panorama = Panorama { mirror, columns, rows };
         let unwrapped = self.unwrapping.apply(&panorama, raw);
-        unwrapped.map_err(|error| tally.lose("images_not_unwrapped", || error.to_string())).ok()
+        let unwrapped =
+            unwrapped.map_err(|error| tally.lose("images_not_unwrapped", || error.to_string()));
+        Some((unwrapped.ok()?, (columns, rows)))
     }
 
     /// The camera at the moment of an image; the last one while it stays.
@@ -331,11 +355,14 @@ fn shifted(depth: DepthImage, offset: [i32; 2]) -> DepthImage {
     })
 }
 
-fn size_of(images: &Images) -> Option<(usize, usize)> {
-    let colour = images.colour.as_ref().map(|image| (image.width(), image.height()));
-    let grey = images.grey.as_ref().map(|image| (image.width(), image.height()));
-    let depth = images.depth.as_ref().map(|image| (image.width(), image.height()));
-    colour.or(grey).or(depth)
+fn images_of(pixels: Pixels) -> Images {
+    let mut images = Images::default();
+    match pixels {
+        Pixels::Colour(colour) => images.colour = Some(Arc::new(colour)),
+        Pixels::Grey(grey) => images.grey = Some(Arc::new(grey)),
+        Pixels::Depth(depth) => images.depth = Some(Arc::new(depth)),
+    }
+    images
 }
 
 fn right_image(
@@ -370,17 +397,44 @@ fn lens_of(known: &Intrinsics, width: usize, height: usize) -> Lens {
 /// Decodes an image message; a failure is counted as lost.
 fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Option<Pixels> {
     let (unit, limits) = (plan.input.depth_unit_m, &plan.limits);
-    let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
-    let decoded = if kind == Some(Type::Image) {
-        decode::<Image<'_>>(&image.data)
-            .map_err(|error| ImageError::Codec(error.to_string()))
-            .and_then(|image| decode_raw(&image, unit, limits))
-    } else {
-        decode::<CompressedImage<'_>>(&image.data)
-            .map_err(|error| ImageError::Codec(error.to_string()))
-            .and_then(|image| decode_compressed(&image, unit, limits))
+    let of = |image: AnyImage<'_>| match image {
+        AnyImage::Raw(image) => decode_raw(&image, unit, limits),
+        AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),
     };
-    decoded
+    read(plan, topic, image, tally, of)
+}
+
+/// The size of an image that makes a frame, by its header; a failure is counted as lost.
+fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<(usize, usize)> {
+    let of = |image: AnyImage<'_>| match image {
+        AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
+        AnyImage::Compressed(image) => size_of_compressed(&image, &plan.limits),
+    };
+    read(plan, plan.primary(), image, tally, of)
+}
+
+/// An image message of one of the two types.
+enum AnyImage<'a> {
+    Raw(Image<'a>),
+    Compressed(CompressedImage<'a>),
+}
+
+/// Reads an image message with `of`; a failure is counted as lost.
+fn read<T>(
+    plan: &Plan,
+    topic: &str,
+    image: &Payload,
+    tally: &mut Tally,
+    of: impl Fn(AnyImage<'_>) -> Result<T, ImageError>,
+) -> Option<T> {
+    let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
+    let message = match kind {
+        Some(Type::Image) => decode(&image.data).map(AnyImage::Raw),
+        _ => decode(&image.data).map(AnyImage::Compressed),
+    };
+    message
+        .map_err(|error| ImageError::Codec(error.to_string()))
+        .and_then(of)
         .map_err(|error| {
             tally.lose(error.counter(), || format!("{topic} at {}: {error}", image.stamp));
         })

@@ -139,7 +139,7 @@ impl Intake {
         let Self { frames, depth, right, detections, chosen, .. } = self;
         frames.pop_newest(|stamp| {
             (!plan.has_second_depth() || depth.has(stamp, near))
-                && (!plan.needs.right || right.has(stamp, near))
+                && (chosen.right.is_none() || right.has(stamp, near))
                 && (chosen.detections.is_none() || detections.has(stamp, near))
         })
     }

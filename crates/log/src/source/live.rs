@@ -14,7 +14,7 @@ use super::plan::{plan, tally_of};
 use super::{LogFacts, LogFrame};
 use crate::mcap_walk::{Channel, Message};
 use crate::scan::{Gathering, Type};
-use crate::{InputSettings, Limits, LogError, Needs};
+use crate::{InputSettings, Inputs, Limits, LogError};
 
 /// Messages that are kept of each topic, to find the floor in.
 const KEPT: u64 = 16;
@@ -27,7 +27,7 @@ pub struct Listening {
     name: String,
     input: InputSettings,
     limits: Limits,
-    needs: Needs,
+    inputs: Inputs,
     gathering: Gathering,
     channels: BTreeMap<String, Arc<Channel>>,
     held: Vec<Held>,
@@ -48,14 +48,14 @@ impl Listening {
         name: &str,
         input: &InputSettings,
         limits: &Limits,
-        needs: Needs,
+        inputs: Inputs,
     ) -> Result<Self, LogError> {
         input.check()?;
         Ok(Self {
             name: name.to_owned(),
             input: input.clone(),
             limits: limits.clone(),
-            needs,
+            inputs,
             gathering: Gathering::new(input.depth_unit_m),
             channels: BTreeMap::new(),
             held: Vec::new(),
@@ -112,13 +112,13 @@ impl Listening {
     /// asked again after an error, which may pass as messages arrive.
     ///
     /// # Errors
-    /// [`LogError`]: something that the needs or the settings name is not there
+    /// [`LogError`]: something that the inputs or the settings name is not there
     /// (yet), or a calibration cannot be used.
     pub fn start(&self) -> Result<LiveSource, LogError> {
         let scan = Arc::new(self.gathering.scan(&self.name));
         let mut tally = tally_of(&scan);
         let reread = || Ok(Box::new(self.held.iter()) as Box<dyn Messages + '_>);
-        let plan = plan(scan, &self.input, &self.limits, self.needs, &mut tally, &reread)?;
+        let plan = plan(scan, &self.input, &self.limits, self.inputs, &mut tally, &reread)?;
         let assembly = Assembly::new(plan, tally);
         let channels = self.channels.clone().into_iter();
         let channels = channels.filter(|(_, channel)| assembly.reads(channel)).collect();

@@ -25,7 +25,7 @@ use tagalong_core::Frame;
 
 use crate::mcap_walk::{Message, Walker};
 use crate::scan::{Scan, open_file};
-use crate::{InputSettings, Limits, LogError, Needs};
+use crate::{InputSettings, Inputs, Limits, LogError};
 
 /// A frame, and where the robot was.
 pub struct LogFrame {
@@ -103,16 +103,16 @@ impl FrameSource {
     ///
     /// # Errors
     /// [`LogError`]: the file cannot be read, a calibration cannot be used, or
-    /// the log lacks something that `needs` or `input` name.
+    /// the log lacks something that `inputs` or `input` name.
     pub fn open(
         path: &Path,
         input: &InputSettings,
         limits: &Limits,
-        needs: Needs,
+        inputs: Inputs,
     ) -> Result<Self, LogError> {
         input.check()?;
         let scan = Arc::new(Scan::read(path, input.depth_unit_m, limits)?);
-        Self::of_scan(scan, input, limits, needs)
+        Self::of_scan(scan, input, limits, inputs)
     }
 
     /// Like [`FrameSource::open`], of a log that was scanned already.
@@ -120,11 +120,11 @@ impl FrameSource {
         scan: Arc<Scan>,
         input: &InputSettings,
         limits: &Limits,
-        needs: Needs,
+        inputs: Inputs,
     ) -> Result<Self, LogError> {
         let mut tally = tally_of(&scan);
         let reread = || Ok(Box::new(walk(&scan, limits)?) as Box<dyn Messages>);
-        let plan = plan(Arc::clone(&scan), input, limits, needs, &mut tally, &reread)?;
+        let plan = plan(Arc::clone(&scan), input, limits, inputs, &mut tally, &reread)?;
         let mut source = Self {
             walker: walk(&scan, limits)?,
             assembly: Assembly::new(plan, tally),

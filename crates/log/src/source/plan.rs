@@ -11,7 +11,7 @@ use super::tally::Tally;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::scan::Scan;
 use crate::topics::{Chosen, choose, missing};
-use crate::{InputSettings, Limits, LogError, MountSettings, Needs};
+use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
 /// Begins to read the same messages once more.
 pub(super) type Reread<'a> = &'a dyn Fn() -> Result<Box<dyn Messages + 'a>, LogError>;
@@ -22,7 +22,7 @@ pub(super) struct Plan {
     pub(super) chosen: Chosen,
     pub(super) input: InputSettings,
     pub(super) limits: Limits,
-    pub(super) needs: Needs,
+    pub(super) inputs: Inputs,
     pub(super) mount: Mount,
     pub(super) lens: Option<Intrinsics>,
     depth_lens: Option<Intrinsics>,
@@ -53,6 +53,21 @@ impl Plan {
     /// True if depth comes beside another image.
     pub(super) fn has_second_depth(&self) -> bool {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
+    }
+
+    /// True if the pixels of the images that make the frames are used, and not only
+    /// their stamps and their size.
+    pub(super) fn reads_primary(&self) -> bool {
+        self.inputs.uses(self.primary_input())
+    }
+
+    /// True if a frame is of no use whose image cannot be decoded.
+    pub(super) fn requires_primary(&self) -> bool {
+        self.inputs.requires(self.primary_input())
+    }
+
+    fn primary_input(&self) -> Input {
+        if self.chosen.colour.is_some() { Input::Colour } else { Input::Depth }
     }
 
     /// The mirror whose images are still circular.
@@ -106,17 +121,17 @@ pub(super) fn tally_of(scan: &Scan) -> Tally {
 /// Chooses topics, and settles calibration and the pose of the camera.
 ///
 /// # Errors
-/// A calibration that cannot be used, and what `needs` or `input` name and the
+/// A calibration that cannot be used, and what `inputs` or `input` name and the
 /// scan lacks.
 pub(super) fn plan(
     scan: Arc<Scan>,
     input: &InputSettings,
     limits: &Limits,
-    needs: Needs,
+    inputs: Inputs,
     tally: &mut Tally,
     reread: Reread<'_>,
 ) -> Result<Plan, LogError> {
-    let chosen = choose(&scan, input, needs)?;
+    let chosen = choose(&scan, input, inputs)?;
     let depth_lens = lens_of(&scan, chosen.depth.as_deref(), chosen.depth_info.as_deref())?;
     let lens = match chosen.colour {
         Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref())?,
@@ -133,7 +148,7 @@ pub(super) fn plan(
         chosen,
         input: input.clone(),
         limits: limits.clone(),
-        needs,
+        inputs,
     };
     check_calibration(&plan, tally)?;
     plan.mount = find_mount(&plan, reread)?;
@@ -166,8 +181,9 @@ fn lens_of(
 
 /// Positions in metres need a calibration; a mono pipeline may do without.
 fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
-    let metric = plan.needs.depth || plan.needs.right;
-    if plan.needs.right && plan.baseline_m.is_none_or(|baseline| baseline <= 0.0) {
+    let metric = plan.inputs.requires(Input::Depth) || plan.inputs.requires(Input::Right);
+    if plan.inputs.requires(Input::Right) && plan.baseline_m.is_none_or(|baseline| baseline <= 0.0)
+    {
         let wanted = "calibration of the right camera with a positive baseline (P[3] = -fx B)";
         let hint = "; name its camera_info as `right_info_topic` under [input]".to_owned();
         return Err(missing(&plan.scan, wanted.into(), hint));
@@ -206,7 +222,7 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     }
     match floor(plan, reread)? {
         Some(mount) => Ok(mount),
-        None if plan.needs.depth => {
+        None if plan.inputs.requires(Input::Depth) => {
             let wanted = "camera pose: tf does not connect the camera with the robot, and no \
                           floor is visible in the first depth images";
             let hint = "; give height and tilt in [input.camera]".to_owned();
@@ -229,7 +245,7 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
         chosen: plan.chosen.clone(),
         input: plan.input.clone(),
         limits: plan.limits.clone(),
-        needs: Needs { depth: true, ..Needs::default() },
+        inputs: Inputs::NONE.require(Input::Depth),
         mount: Mount::assumed(),
         odom_frames: None,
         ..*plan

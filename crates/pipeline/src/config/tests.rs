@@ -48,6 +48,27 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         (plain("roles = ['folow']"), &["a.toml:4:10", "did you mean `follow`?"]),
         (plain("roles = ['follow']"), &["a.toml:2:1", "give one of [[detectors]] the role"]),
         (plain("roles = ['discover', 'weigh']"), &["a.toml:4:9", "cannot weigh scenes"]),
+        (
+            plain("config = { how = 'track' }"),
+            &["a.toml:2:1", "`script` cannot discover people: remove the role discover"],
+        ),
+        (
+            plain("roles = ['discover', 'follow']\nconfig = { how = 'discover' }"),
+            &["a.toml:4:9", "cannot find a tracked person again: remove the role follow"],
+        ),
+        (own("without = ['dept']"), &["a.toml:1:12", "did you mean `depth`?"]),
+        (
+            format!("without = ['depth']\n{}config = {{ how = 'depth' }}", plain("")),
+            &["a.toml:1:11", "`script` requires depth images", "remove \"depth\" from `without`"],
+        ),
+        (
+            format!("without = ['depth']\nodometry = {{}}\n{}", plain("")),
+            &["a.toml:1:11", "`[odometry]` requires depth images"],
+        ),
+        (
+            format!("without = ['right']\nstereo = {{}}\n{}", plain("")),
+            &["a.toml:1:11", "`[stereo]` requires right images of a stereo pair"],
+        ),
         (plain("rolls = ['discover']"), &["a.toml:4:1", "did you mean `roles`?"]),
         (plain("config = { scrip = 1 }"), &["a.toml:4:12", "did you mean `script`?"]),
         (plain("[controller]\nplugin = 'script'"), &["a.toml:5:10", "not a controller"]),

@@ -8,9 +8,10 @@ use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Camera, Controller, Detection, Detector, Distortion, Error, Estimate, Evidence, Filter, Frame,
-    Funnel, Images, Likelihood, Motion, PerPerson, Person, PersonFilter, Pinhole, Registry, Result,
-    Scene, Search, Stamp, Support, TrackId, Verifier, WheelSpeeds,
+    Camera, Capabilities, Controller, Detection, Detector, Distortion, Error, Estimate, Evidence,
+    Filter, Frame, Funnel, Images, Input, Inputs, Likelihood, Motion, PerPerson, Person,
+    PersonFilter, Pinhole, Registry, Result, Scene, Search, Stamp, Support, TrackId, Verifier,
+    WheelSpeeds,
 };
 
 use crate::{FrameReport, Pipeline};
@@ -123,6 +124,16 @@ struct Script {
 }
 
 impl Detector for Script {
+    fn capabilities(&self) -> Capabilities {
+        let inputs = match self.config.how.as_str() {
+            "depth" => Inputs::NONE.require(Input::Depth),
+            "perhaps depth" => Inputs::NONE.accept(Input::Depth),
+            _ => Inputs::NONE,
+        };
+        let (discovers, tracks) = (self.config.how != "track", self.config.how != "discover");
+        Capabilities { inputs, discovers, tracks, weighs: self.config.how == "weigh" }
+    }
+
     fn detect(
         &mut self,
         frame: &Frame,
@@ -137,7 +148,8 @@ impl Detector for Script {
         self.world.asked.lock().unwrap().push((script, frame.index, track.map(|t| t.id)));
         match self.config.how.as_str() {
             "panic" => panic!("out of {}", "ideas"),
-            "depth" => drop(frame.depth()?),
+            "depth" | "forgets to declare" => drop(frame.depth()?),
+            "perhaps depth" if frame.depth().is_ok() => return Ok(Vec::new()),
             "picky" => funnel.drop_many("too small", 2),
             _ => {}
         }
@@ -165,6 +177,10 @@ impl Likelihood for Script {
 struct Choosy(Config);
 
 impl Verifier for Choosy {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE
+    }
+
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         match self.0.how.as_str() {
             "nan" => Ok(f64::NAN),

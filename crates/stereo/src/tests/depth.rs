@@ -152,9 +152,9 @@ fn what_is_missing_or_does_not_fit_is_an_error() {
     let whole = frame(left.clone(), right.clone());
     let bare = |images| Frame::new(1, whole.stamp, Arc::clone(&whole.camera), whole.motion, images);
     let only_left = Images { right: None, ..whole.images().clone() };
-    assert!(error(&bare(only_left)).contains("needs a right stereo image"));
+    assert!(error(&bare(only_left)).contains("needs right images"));
     let only_right = Images { grey: None, ..whole.images().clone() };
-    assert!(error(&bare(only_right)).contains("needs a grey or colour image"));
+    assert!(error(&bare(only_right)).contains("needs colour or grey images"));
     assert!(error(&frame(left.clone(), GreyImage::filled(64, 47, 0))).contains("64x47"));
     for baseline_m in [0.0, -0.1, f64::NAN] {
         let right = Some(Arc::new(RightImage { image: right.clone(), baseline_m }));

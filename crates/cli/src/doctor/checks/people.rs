@@ -1,6 +1,6 @@
 //! What the pipeline needs, gets, and finds.
 
-use tagalong_log::{LogError, Needs};
+use tagalong_log::{Inputs, LogError, Usage};
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
@@ -9,7 +9,7 @@ use super::super::finding::{Finding, Severity};
 pub fn needs(evidence: &Evidence) -> Option<Finding> {
     let usable = evidence.inspection.usable.join(", ");
     let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
-        let measured = format!("the config needs {}; the log has {usable}", words(evidence.needs));
+        let measured = format!("the config needs {}; the log has {usable}", words(evidence.inputs));
         return Some(Finding::new("needs", Severity::Ok, measured));
     };
     let hint = hint.trim_start_matches("; ");
@@ -23,9 +23,8 @@ pub fn needs(evidence: &Evidence) -> Option<Finding> {
     Some(finding.why("the pipeline cannot run on this log at all"))
 }
 
-fn words(needs: Needs) -> String {
-    let named = [(needs.colour, "colour"), (needs.depth, "depth"), (needs.right, "right")];
-    let names: Vec<&str> = named.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect();
+fn words(inputs: Inputs) -> String {
+    let names: Vec<&str> = inputs.of(Usage::Required).map(|input| input.name()).collect();
     if names.is_empty() { "any image".into() } else { names.join(", ") }
 }
 

@@ -1,0 +1,135 @@
+//! A pipeline receives exactly the images that it declares: one without depth gives the
+//! same bytes on a log with depth and on the same log without.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::broken::{self, Changes};
+use crate::common::{code, tagalong, text};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A folder with a log, and the same log without its topics of depth.
+struct Home(tempfile::TempDir);
+
+impl Home {
+    /// Somebody who crosses a small room, seen by an RGB-D camera.
+    fn simulated() -> Self {
+        let home = tempfile::tempdir().unwrap();
+        let scene = "seed = 3\nduration_s = 2.0\n[room]\nsize_m = [7.0, 5.0]\nclutter = 2\n\
+            [camera]\nwidth = 320\nheight = 240\nrate_hz = 10.0\n[robot]\nstart = [0.8, 2.5]\n\
+            [[people]]\npath = [[3.4, 1.8], [3.4, 3.4]]\nspeed_mps = 0.5\n";
+        fs::write(home.path().join("scene.toml"), scene).unwrap();
+        let home = Self(home);
+        let said = home.tell(&["simulate", "scene.toml", "-o", "with.mcap"]);
+        assert_eq!(said.0, 0, "{}", said.1);
+        home.strip()
+    }
+
+    /// A recording of the real world; `None`, said, where there is none.
+    fn real(log: &str) -> Option<Self> {
+        let log = root().join("../shared/data/logs").join(log);
+        if !log.exists() {
+            println!("skipped: {} is not here", log.display());
+            return None;
+        }
+        let home = tempfile::tempdir().unwrap();
+        fs::copy(&log, home.path().join("with.mcap")).unwrap();
+        Some(Self(home).strip())
+    }
+
+    fn strip(self) -> Self {
+        let changes = Changes { without: &["depth"], ..Changes::default() };
+        broken::write(&self.path("with.mcap"), &self.path("without.mcap"), &changes);
+        self
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn tell(&self, args: &[&str]) -> (i32, String) {
+        let output = tagalong().args(args).current_dir(self.0.path()).output().unwrap();
+        (code(&output), text(&output.stderr) + &text(&output.stdout))
+    }
+
+    /// Everything that a run with this config says of people in the log: its tracks in
+    /// both files, and all that its report says of candidates.
+    fn run(&self, config: &str, log: &str) -> [String; 3] {
+        fs::write(self.path("config.toml"), config).unwrap();
+        let (code, said) =
+            self.tell(&["run", "config.toml", log, "-o", "out", "--overwrite", "--quiet"]);
+        assert_eq!(code, 0, "{log}: {said}");
+        let read = |name: &str| fs::read_to_string(self.path("out").join(name)).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+        let found = ["frames", "persons", "candidates", "funnel"].map(|key| report[key].clone());
+        [read("tracks.csv"), read("tracks-metres.csv"), format!("{found:?}")]
+    }
+}
+
+fn config(name: &str) -> String {
+    fs::read_to_string(root().join("configs").join(format!("{name}.toml"))).unwrap()
+}
+
+/// One that never uses depth, and one that is told not to.
+fn without_depth() -> [String; 2] {
+    let told = format!("without = [\"depth\"]\n{}", config("rgbd-compressive"));
+    [config("mono"), told]
+}
+
+fn same_on_both(home: &Home) {
+    for config in without_depth() {
+        let (with, without) = (home.run(&config, "with.mcap"), home.run(&config, "without.mcap"));
+        assert!(with[0].lines().count() > 1, "nobody is tracked: {}", with[2]);
+        for (with, without) in with.iter().zip(&without) {
+            assert_eq!(with, without, "{config}");
+        }
+    }
+}
+
+#[test]
+fn a_pipeline_without_depth_is_the_same_on_a_log_that_has_it() {
+    let home = Home::simulated();
+    same_on_both(&home);
+    let uses = config("rgbd-compressive");
+    let (with, without) = (home.run(&uses, "with.mcap"), home.run(&uses, "without.mcap"));
+    assert_ne!(with[2], without[2], "one that uses depth sees the difference");
+}
+
+#[test]
+fn a_pipeline_without_depth_is_the_same_on_a_real_log_that_has_it() {
+    if let Some(home) = Home::real("lab2-camera2.mcap") {
+        same_on_both(&home);
+    }
+}
+
+#[test]
+fn a_pipeline_that_requires_depth_is_refused_without() {
+    let home = Home::simulated();
+    fs::write(home.path("config.toml"), config("depth-ekf")).unwrap();
+    let (code, said) = home.tell(&["run", "config.toml", "without.mcap", "-o", "out"]);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("has no depth images"), "{said}");
+    assert!(said.contains("as `depth_topic` under [input]"), "{said}");
+    assert!(!home.path("out").exists(), "a refused run leaves nothing behind");
+    let (code, said) = home.tell(&["check", "config.toml", "without.mcap"]);
+    assert_eq!(code, 1, "{said}");
+}
+
+#[test]
+fn check_says_what_is_needed_and_what_is_used() {
+    let home = tempfile::tempdir().unwrap();
+    let said = |config: &str| {
+        fs::write(home.path().join("config.toml"), config).unwrap();
+        let output = tagalong().arg("check").arg(home.path().join("config.toml")).output().unwrap();
+        text(&output.stdout) + &text(&output.stderr)
+    };
+    let mono = said(&config("mono"));
+    assert!(mono.contains("right; needs colour\n"), "{mono}");
+    let both = said(&config("rgbd-compressive"));
+    assert!(both.contains("needs colour; uses depth where the log has it"), "{both}");
+    let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-best")));
+    assert!(refused.contains("`depth-template` requires depth images"), "{refused}");
+}

@@ -1,0 +1,53 @@
+//! The inputs that a pipeline declares: those of its plugins and its own.
+
+use std::ops::Range;
+
+use tagalong_core::{ConfigError, Input, Inputs};
+
+use super::PipelineSettings;
+
+/// The inputs of the target lock and the governor, which every controller has.
+const STEERING: Inputs =
+    Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
+/// The inputs of `[odometry]`.
+const ODOMETRY: Inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+/// The inputs of `[stereo]`, which leaves a frame alone that has depth.
+const STEREO: Inputs =
+    Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
+
+/// A plugin or a stage by its name, and its inputs.
+pub(super) type Declared<'a> = (&'a str, Inputs);
+
+/// Adds up what the plugins and the stages declare.
+///
+/// # Errors
+/// If something requires an input that the setting `without` leaves out.
+pub(super) fn declared_inputs(
+    settings: &PipelineSettings,
+    plugins: &[Declared<'_>],
+    has_controller: bool,
+    without_span: Option<Range<usize>>,
+) -> Result<Inputs, ConfigError> {
+    let odometry = settings.odometry.is_some().then_some(("[odometry]", ODOMETRY));
+    let steering = has_controller.then_some(("[governor]", STEERING));
+    let users: Vec<Declared<'_>> =
+        plugins.iter().copied().chain(odometry).chain(steering).collect();
+    // Depth from the pair is the pipeline's own; that of the log is used where it is there.
+    let has_stereo = settings.stereo.is_some();
+    let of_log = |inputs: Inputs| if has_stereo { inputs.relax(Input::Depth) } else { inputs };
+    let stereo = has_stereo.then_some(("[stereo]", STEREO));
+    let all: Vec<Declared<'_>> =
+        users.into_iter().map(|(name, inputs)| (name, of_log(inputs))).chain(stereo).collect();
+    for input in &settings.without {
+        if let Some((name, _)) = all.iter().find(|(_, inputs)| inputs.requires(*input)) {
+            let message = format!(
+                "`{name}` requires {input}, which `without` leaves out: remove \"{}\" from \
+                 `without`, or `{name}` from the config",
+                input.name()
+            );
+            return Err(ConfigError { message, span: without_span });
+        }
+    }
+    let sum = all.into_iter().fold(Inputs::NONE, |sum, (_, inputs)| sum.union(inputs));
+    Ok(settings.without.iter().fold(sum, |sum, input| sum.without(*input)))
+}

@@ -1,0 +1,97 @@
+//! A pipeline receives the inputs that it declares, and no others.
+
+use std::sync::Arc;
+
+use tagalong_core::{DepthImage, Frame, GreyImage, Images, Input, Inputs, RgbImage, RightImage};
+
+use super::doubles::{PLAIN, World, frame, person};
+use crate::{FrameReport, Pipeline};
+
+fn world() -> World {
+    World::of((0..6).map(|_| vec![person(3.0, 0.0)]))
+}
+
+fn script(how: &str) -> String {
+    PLAIN.replace("'script'", &format!("'script'\nconfig = {{ how = '{how}' }}"))
+}
+
+fn with_depth(index: u64) -> Frame {
+    let depth = Arc::new(DepthImage::filled(640, 480, 2.0));
+    frame(index, index as f64 * 0.1).with_depth(depth)
+}
+
+/// The tracks of some frames, in all their digits.
+fn tracks(config: &str, frame: impl Fn(u64) -> Frame) -> String {
+    let mut pipeline = world().pipeline(config);
+    let reports: Vec<FrameReport> =
+        (1..=6).map(|index| pipeline.step(&frame(index)).unwrap()).collect();
+    format!("{:?}", reports.iter().map(|report| &report.tracks).collect::<Vec<_>>())
+}
+
+/// A detector that finds somebody only where there is no depth shows that there is none.
+#[test]
+fn what_a_config_does_without_is_not_there() {
+    let plain = |index: u64| frame(index, index as f64 * 0.1);
+    let config = script("perhaps depth");
+    assert_ne!(tracks(&config, with_depth), tracks(&config, plain), "depth makes a difference");
+    let without = format!("without = ['depth']\n{config}");
+    assert_eq!(tracks(&without, with_depth), tracks(&config, plain));
+    assert_eq!(tracks(&without, plain), tracks(&config, plain));
+}
+
+#[test]
+fn an_image_that_nothing_declares_is_told_from_one_that_the_log_lacks() {
+    let step = |frame: &Frame| {
+        let mut pipeline = world().pipeline(&script("forgets to declare"));
+        pipeline.step(frame).unwrap_err().to_string()
+    };
+    let undeclared = step(&with_depth(1));
+    assert!(undeclared.contains("`script` uses depth images without declaring"), "{undeclared}");
+    assert!(undeclared.contains("Input::Depth"), "{undeclared}");
+    let lacking = step(&frame(1, 0.1));
+    assert!(lacking.contains("which this log does not carry"), "{lacking}");
+}
+
+fn inputs(config: &str) -> Inputs {
+    Pipeline::inputs(&world().pipeline(config))
+}
+
+#[test]
+fn a_pipeline_declares_what_its_parts_declare() {
+    assert_eq!(inputs(PLAIN), Inputs::NONE);
+    let depth = inputs(&script("depth"));
+    assert_eq!(depth, Inputs::NONE.require(Input::Depth));
+    let controller = format!("{}\n[controller]\nplugin = 'drive'", script("depth"));
+    assert_eq!(inputs(&controller), depth.accept(Input::Colour).accept(Input::Laser));
+    let images = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+    assert_eq!(inputs(&format!("odometry = {{}}\n{PLAIN}")), images);
+}
+
+/// Depth is the pair's, but that of a log is taken where it is there.
+#[test]
+fn stereo_stands_in_for_depth() {
+    let pair = Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
+    for how in ["depth", "perhaps depth", ""] {
+        assert_eq!(inputs(&format!("stereo = {{}}\n{}", script(how))), pair, "{how}");
+    }
+    let without = format!("without = ['depth']\nstereo = {{}}\n{}", script("depth"));
+    assert_eq!(inputs(&without), pair.without(Input::Depth));
+}
+
+/// The detector refuses a frame without depth: what it gets is the pair's, not the log's.
+#[test]
+fn stereo_replaces_depth_that_the_config_does_without() {
+    let stereo = "without = ['depth']\nstereo = { method = 'block', speckle_pixels = 0 }\n";
+    let mut pipeline = world().pipeline(&format!("{stereo}{}", script("depth")));
+    let plain = frame(1, 0.1);
+    let grey = GreyImage::from_fn(640, 480, |x, y| (x * x * 31 + y * y * 17 + x * y) as u8);
+    let images = Images {
+        colour: Some(Arc::new(RgbImage::filled(640, 480, [9; 3]))),
+        right: Some(Arc::new(RightImage { image: grey.clone(), baseline_m: 0.1 })),
+        grey: Some(Arc::new(grey)),
+        depth: Some(Arc::new(DepthImage::filled(640, 480, 2.0))),
+    };
+    let frame = Frame::new(plain.index, plain.stamp, plain.camera, plain.motion, images);
+    let report = pipeline.step(&frame).unwrap();
+    assert!(report.funnel.entries().iter().any(|entry| entry.test.starts_with("stereo pixels: ")));
+}
