@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use tagalong_core::Registry;
-use tagalong_reproduce::{Lab, Progress, Table, system};
+use tagalong_reproduce::{DrawnScenes, Lab, Progress, Table, system};
 
 /// What SORT published for its six validation sequences together, per cent (its README).
 const SORT_MOTA: f64 = 34.0;
@@ -28,12 +28,14 @@ fn table() -> Table {
         data: Some(root.join("../shared/data")),
         quick: false,
         seeds: None,
+        first_seed: 0,
+        drawn: DrawnScenes::default(),
         jobs: 1,
         progress: &Silent,
     };
     let experiments = system("rgbd-compressive").unwrap().experiments;
     let given = experiments.iter().find(|experiment| experiment.name == "given").unwrap();
-    (given.run)(&lab).unwrap().tables.remove(0)
+    given.find(&lab).unwrap().findings.tables.remove(0)
 }
 
 #[test]

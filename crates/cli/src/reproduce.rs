@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
 use tagalong_core::Registry;
-use tagalong_reproduce::{Experiment, Findings, Lab, Progress, SYSTEMS, System, Table, system};
+use tagalong_reproduce::{
+    DrawnScenes, Experiment, Found, Lab, Progress, SYSTEMS, System, Table, system,
+};
+use tagalong_sim::Split;
 
 use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 use crate::simulate;
@@ -26,6 +28,10 @@ pub struct ReproduceArgs {
     /// Draws each scene with this many seeds of the test split.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: Option<u64>,
+    /// The first of these seeds, counted within the split: another one gives the
+    /// tables of other draws.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub first_seed: u64,
     /// Trials that run at once; apart from times, the results are the same
     /// [default: as many as there are cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
@@ -57,14 +63,6 @@ pub enum TableFormat {
     Json,
 }
 
-/// An experiment with what it found.
-#[derive(Serialize)]
-struct Found {
-    experiment: &'static str,
-    #[serde(flatten)]
-    findings: Findings,
-}
-
 /// Does the experiments and prints their tables.
 ///
 /// # Errors
@@ -73,16 +71,17 @@ pub fn reproduce(args: &ReproduceArgs, registry: &Registry) -> Outcome {
     let Some(name) = &args.system else { return list(args.format) };
     let system = system(name).ok_or_else(|| unknown(name, SYSTEMS.iter().map(|s| s.name)))?;
     let experiments = chosen(system, &args.only)?;
+    Split::Test.seeds(args.first_seed, args.seeds.unwrap_or(1)).map_err(Failure::usage)?;
     // Before the work of an hour, not after it.
     args.output.as_deref().map_or(Ok(()), make_folder)?;
     let bar = Bar::new();
     let lab = lab(args, registry, &bar);
     let mut all = Vec::new();
     for experiment in experiments {
-        let findings = (experiment.run)(&lab).map_err(Failure::failed)?;
+        let found = experiment.find(&lab).map_err(Failure::failed)?;
         bar.clear();
-        show(&findings.tables, args.format)?;
-        all.push(Found { experiment: experiment.name, findings });
+        show(&found.findings.tables, args.format)?;
+        all.push(found);
     }
     if let Some(folder) = &args.output {
         write(folder, &all)?;
@@ -100,6 +99,8 @@ fn lab<'a>(args: &ReproduceArgs, registry: &'a Registry, progress: &'a Bar) -> L
         data: args.data.is_dir().then(|| args.data.clone()),
         quick: args.quick,
         seeds: args.seeds,
+        first_seed: args.first_seed,
+        drawn: DrawnScenes::default(),
         jobs: simulate::threads(args.jobs),
         progress,
     }
@@ -200,6 +201,8 @@ impl Progress for Bar {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_reproduce::Findings;
+
     use super::*;
 
     fn system() -> &'static System {
@@ -227,7 +230,8 @@ mod tests {
         let table = Table { title: "A table".into(), ..Table::default() };
         let picture = tagalong_reproduce::Picture { name: "plot".into(), svg: "<svg/>".into() };
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
-        write(folder.path(), &[Found { experiment: "one", findings }]).unwrap();
+        let found = Found { experiment: "one", drawn: Vec::new(), findings };
+        write(folder.path(), &[found]).unwrap();
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
         assert!(read("tables.md").contains("**A table**"));
         assert!(read("tables.json").contains("\"experiment\": \"one\""));

@@ -28,14 +28,15 @@
 //! * [`PositionError`], [`Times`], [`Following`]: what a robot cares about.
 //! * [`events`]: when and where it went wrong, for a list to look through.
 //! * [`Consistency`]: whether a filter knows how wrong it is.
-//! * [`wilson`], [`Bootstrap`]: how far a figure can be trusted.
+//! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: how far a
+//!   figure can be trusted; [`paired_gain`], [`holm`]: how far a difference can.
 //!
 //! # Why similarities are computed once
 //!
 //! All families look at the same pairs. [`Prepared`] leaves out what must not
 //! count, numbers the ids densely and keeps only the pairs that are alike at
 //! all, some per person; everything after that works on short lists. Scoring is
-//! so cheap that it can stand inside a bootstrap or a parameter search.
+//! so cheap that it can stand inside a jackknife or a parameter search.
 
 mod assign;
 mod clear;
@@ -49,8 +50,10 @@ mod missrate;
 mod pairs;
 mod position;
 mod prepare;
+mod random;
 mod scores;
 mod sets;
+mod significance;
 mod statistics;
 mod times;
 mod types;
@@ -68,7 +71,10 @@ pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};
 pub use scores::{Scores, Tally};
 pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
-pub use statistics::{Bootstrap, Gain, Interval, percentile, wilson};
+pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
+pub use statistics::{
+    CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, percentile, wilson,
+};
 pub use times::{Following, Times};
 pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};
 

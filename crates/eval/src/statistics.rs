@@ -1,21 +1,77 @@
 //! Intervals: how far a figure can be trusted.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::function::erf::erf_inv;
 
-/// A figure and the interval in which it lies with some confidence.
+/// Confidence of all intervals.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// Draws that differ by less than this part of the figure do not differ.
+const ROUNDING: f64 = 1e-9;
+
+/// A figure and the interval in which it lies with some confidence. What a single
+/// draw, or draws that all say the same, tell of the spread is nothing: such an
+/// interval has no ends (minus and plus infinity; `null` in JSON).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Interval {
     /// The figure itself.
     pub estimate: f64,
     /// Lower end.
+    #[serde(deserialize_with = "open_below")]
     pub lower: f64,
     /// Upper end.
+    #[serde(deserialize_with = "open_above")]
     pub upper: f64,
 }
 
+impl Interval {
+    /// A figure of which nothing more is known.
+    pub const fn open(estimate: f64) -> Self {
+        Self { estimate, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
+    }
+
+    /// Both ends, if there are any.
+    pub fn ends(&self) -> Option<[f64; 2]> {
+        (self.lower.is_finite() && self.upper.is_finite()).then_some([self.lower, self.upper])
+    }
+
+    /// The part of the interval that a figure of this range can have; one without
+    /// ends stays so.
+    ///
+    /// ```
+    /// let interval = tagalong_eval::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
+    /// assert!(interval.upper > 1.0 && interval.within(0.0, 1.0).upper == 1.0);
+    /// ```
+    #[must_use]
+    pub fn within(self, least: f64, most: f64) -> Self {
+        match self.ends() {
+            None => self,
+            Some([lower, upper]) => {
+                Self { lower: lower.max(least), upper: upper.min(most), ..self }
+            }
+        }
+    }
+
+    fn around(estimate: f64, half: f64) -> Self {
+        if half <= ROUNDING * estimate.abs() || !half.is_finite() {
+            return Self::open(estimate);
+        }
+        Self { estimate, lower: estimate - half, upper: estimate + half }
+    }
+}
+
+fn open_below<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(end)?.unwrap_or(f64::NEG_INFINITY))
+}
+
+fn open_above<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(end)?.unwrap_or(f64::INFINITY))
+}
+
 /// The Wilson score interval of a success rate (Wilson, JASA 1927): sensible
-/// for few trials and for rates of 0 and 1. Nothing without trials.
+/// for few trials and for rates of 0 and 1. Nothing without trials. The trials
+/// have to be independent; [`clustered_share`] is for those that are not.
 ///
 /// `confidence` lies between 0 and 1, both excluded, for example 0.95.
 ///
@@ -25,21 +81,75 @@ pub struct Interval {
 /// assert!((rate.lower - 0.7225).abs() < 1e-4);
 /// ```
 pub fn wilson(successes: u64, trials: u64, confidence: f64) -> Option<Interval> {
-    if trials == 0 {
-        return None;
-    }
-    let n = trials as f64;
-    let estimate = successes.min(trials) as f64 / n;
-    let z = std::f64::consts::SQRT_2 * erf_inv(confidence);
-    let shrink = 1.0 + z * z / n;
-    let centre = (estimate + z * z / (2.0 * n)) / shrink;
-    let spread = (estimate * (1.0 - estimate) / n + z * z / (4.0 * n * n)).sqrt();
+    let rate = successes.min(trials) as f64 / trials as f64;
+    (trials > 0).then(|| score_interval(rate, trials as f64, confidence))
+}
+
+fn score_interval(estimate: f64, trials: f64, confidence: f64) -> Interval {
+    let z = normal_quantile(confidence);
+    let shrink = 1.0 + z * z / trials;
+    let centre = (estimate + z * z / (2.0 * trials)) / shrink;
+    let spread = (estimate * (1.0 - estimate) / trials + z * z / (4.0 * trials * trials)).sqrt();
     let half = z / shrink * spread;
-    Some(Interval {
+    Interval {
         estimate,
         lower: (centre - half).clamp(0.0, estimate),
         upper: (centre + half).clamp(estimate, 1.0),
-    })
+    }
+}
+
+/// How many standard errors lie on either side with so much confidence.
+fn normal_quantile(confidence: f64) -> f64 {
+    std::f64::consts::SQRT_2 * erf_inv(confidence)
+}
+
+/// As [`normal_quantile`], where the error is itself estimated from a few draws.
+fn student_quantile(freedom: usize) -> f64 {
+    let law = StudentsT::new(0.0, 1.0, freedom as f64);
+    law.map_or(f64::INFINITY, |law| law.inverse_cdf(0.5 + 0.5 * CONFIDENCE))
+}
+
+/// The interval of a success rate whose trials come in clusters, each `[successes,
+/// trials]`: the frames of a ride resemble each other, and a hundred of them say less
+/// than a hundred rides. The Wilson interval of as many independent trials as have the
+/// spread that the clusters show (never more than there are), with Student's quantile
+/// of the clusters (Korn and Graubard, Survey Methodology 1998; Dean and Pagano, J. of
+/// Survey Statistics and Methodology 2015). Where all succeed, or none, clusters show
+/// no spread, and each counts as one trial.
+///
+/// Nothing without trials; an interval without ends from one cluster of several.
+///
+/// ```
+/// use tagalong_eval::{clustered_share, wilson};
+/// let alone = clustered_share(&[[1, 1], [0, 1], [1, 1]]).unwrap();
+/// assert_eq!(Some(alone), wilson(2, 3, 0.95), "one trial each: independent");
+/// let rides = clustered_share(&[[90, 100], [95, 100], [40, 100]]).unwrap();
+/// assert!(rides.lower < 0.3, "three rides are not three hundred trials");
+/// ```
+pub fn clustered_share(clusters: &[[u64; 2]]) -> Option<Interval> {
+    let known: Vec<[u64; 2]> = clusters.iter().copied().filter(|[_, of]| *of > 0).collect();
+    let [successes, trials] = known.iter().fold([0, 0], |sum, one| [0, 1].map(|k| sum[k] + one[k]));
+    if known.iter().all(|[_, of]| *of == 1) {
+        return wilson(successes, trials, CONFIDENCE);
+    }
+    let rate = successes as f64 / trials as f64;
+    if known.len() < 2 {
+        return Some(Interval::open(rate));
+    }
+    let worth = independent_trials(&known, rate, trials as f64);
+    Some(score_interval(rate, worth, CONFIDENCE))
+}
+
+/// As many independent trials as say what these clusters do.
+fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
+    let count = clusters.len() as f64;
+    if rate <= 0.0 || rate >= 1.0 {
+        return count;
+    }
+    let off = |[successes, of]: &[u64; 2]| (*successes as f64 - rate * *of as f64).powi(2);
+    let square = clusters.iter().map(off).sum::<f64>() * count / (count - 1.0);
+    let alike = (rate * (1.0 - rate) * trials * trials / square).min(trials);
+    alike * (normal_quantile(CONFIDENCE) / student_quantile(clusters.len() - 1)).powi(2)
 }
 
 /// The value below which a fraction of the values lies, interpolated between
@@ -54,167 +164,57 @@ pub fn percentile(values: &[f64], fraction: f64) -> Option<f64> {
     Some(sorted[below] + (at - below as f64) * (sorted[above] - sorted[below]))
 }
 
-/// Settings of the bootstrap.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Bootstrap {
-    /// How many samples are drawn.
-    pub samples: usize,
-    /// Confidence of the interval, between 0 and 1.
-    pub confidence: f64,
-    /// Seed; the same seed gives the same interval.
-    pub seed: u64,
+/// The interval of a figure that is computed from `draws` draws (or logs, rides,
+/// blocks: not frames, because frames of one recording are not independent).
+/// `figure` is called with the indices of those that enter: first of all, then of
+/// all but one. What leaving one out changes tells the spread (the jackknife: Tukey,
+/// Ann. Math. Stat. 1958), and Student's quantile allows for how badly few draws
+/// tell it. Of a mean this is Student's interval.
+///
+/// Simulated, its 95 % cover 95 % of normal and of symmetric bounded differences from
+/// 3 draws on; of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A
+/// percentile bootstrap covers 75 % of normal ones with 3 draws, and a studentised
+/// one has ends without bounds there. Losses so rare that most handfuls of draws
+/// have none are beyond all of them.
+///
+/// Nothing without draws or a finite figure; an interval without ends from one draw,
+/// and from draws that say the same.
+///
+/// For a figure of all draws together combine their own tallies:
+///
+/// ```
+/// use tagalong_eval::{Clear, draws_interval};
+/// let runs = [Clear { tp: 8, fn_: 2, ..Clear::default() }, Clear { tp: 5, ..Clear::default() }];
+/// let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &runs[i])).mota();
+/// let interval = draws_interval(runs.len(), mota).unwrap();
+/// assert!((interval.estimate - 13.0 / 15.0).abs() < 1e-12);
+/// assert!(interval.lower < 0.0, "two draws say next to nothing");
+/// ```
+pub fn draws_interval(draws: usize, figure: impl Fn(&[usize]) -> f64) -> Option<Interval> {
+    let everything: Vec<usize> = (0..draws).collect();
+    let estimate = if draws == 0 { f64::NAN } else { figure(&everything) };
+    if !estimate.is_finite() {
+        return None;
+    }
+    if draws == 1 {
+        return Some(Interval::open(estimate));
+    }
+    let without = |out: usize| {
+        figure(&everything.iter().copied().filter(|draw| *draw != out).collect::<Vec<_>>())
+    };
+    let others: Vec<f64> = everything.iter().map(|&out| without(out)).collect();
+    let count = draws as f64;
+    let mean = others.iter().sum::<f64>() / count;
+    let square = others.iter().map(|other| (other - mean).powi(2)).sum::<f64>();
+    let error = (square * (count - 1.0) / count).sqrt();
+    Some(Interval::around(estimate, student_quantile(draws - 1) * error))
 }
 
-impl Default for Bootstrap {
-    fn default() -> Self {
-        Self { samples: 10_000, confidence: 0.95, seed: 1 }
-    }
-}
-
-impl Bootstrap {
-    /// Percentile interval of a figure that is computed from `sequences`
-    /// sequences: `figure` is called with the indices of those drawn (with
-    /// replacement; Efron and Tibshirani, 1993, chapter 13). Sequences are
-    /// drawn, not frames, because frames of one recording are not independent.
-    /// Nothing without sequences, samples or a finite figure.
-    ///
-    /// For a figure of all sequences together combine its own tallies:
-    ///
-    /// ```
-    /// use tagalong_eval::{Bootstrap, Clear};
-    /// let runs = [Clear { tp: 8, fn_: 2, ..Clear::default() }, Clear { tp: 5, ..Clear::default() }];
-    /// let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &runs[i])).mota();
-    /// let interval = Bootstrap::default().interval(runs.len(), mota).unwrap();
-    /// assert!((interval.estimate - 13.0 / 15.0).abs() < 1e-12);
-    /// assert_eq!((interval.lower, interval.upper), (0.8, 1.0));
-    /// ```
-    pub fn interval(&self, sequences: usize, figure: impl Fn(&[usize]) -> f64) -> Option<Interval> {
-        let drawn = self.draw(sequences, &figure);
-        let tail = 0.5 * (1.0 - self.confidence);
-        let everything: Vec<usize> = (0..sequences).collect();
-        let lower = percentile(&drawn, tail)?;
-        let upper = percentile(&drawn, 1.0 - tail)?;
-        let estimate = figure(&everything);
-        estimate.is_finite().then_some(Interval { estimate, lower, upper })
-    }
-
-    /// How much better `b` is than `a`, both scored on the same sequences: the
-    /// mean difference, its interval, and how probable it is that there is none
-    /// (two-sided). Drawing pairs removes what the sequences themselves differ in.
-    /// Nothing if the lists are empty or of different length.
-    ///
-    /// ```
-    /// use tagalong_eval::Bootstrap;
-    /// let gain = Bootstrap::default().paired(&[0.5, 0.2, 0.7], &[0.6, 0.3, 0.8]).unwrap();
-    /// assert!((gain.difference.estimate - 0.1).abs() < 1e-12);
-    /// assert!(gain.difference.lower > 0.0);
-    /// ```
-    pub fn paired(&self, a: &[f64], b: &[f64]) -> Option<Gain> {
-        if a.len() != b.len() {
-            return None;
-        }
-        let mean =
-            |drawn: &[usize]| drawn.iter().map(|&i| b[i] - a[i]).sum::<f64>() / drawn.len() as f64;
-        let difference = self.interval(a.len(), mean)?;
-        Some(Gain { difference, p_value: self.p_value(&self.draw(a.len(), &mean)) })
-    }
-
-    /// Twice the smaller tail beyond zero, never quite zero itself.
-    fn p_value(&self, drawn: &[f64]) -> f64 {
-        let not_above = drawn.iter().filter(|&&d| d <= 0.0).count();
-        let not_below = drawn.iter().filter(|&&d| d >= 0.0).count();
-        let tail = (not_above.min(not_below) + 1) as f64 / (drawn.len() + 1) as f64;
-        (2.0 * tail).min(1.0)
-    }
-
-    fn draw(&self, sequences: usize, figure: &impl Fn(&[usize]) -> f64) -> Vec<f64> {
-        if sequences == 0 {
-            return Vec::new();
-        }
-        let mut random = SplitMix(self.seed);
-        let mut drawn = vec![0; sequences];
-        let mut sample = || {
-            drawn.fill_with(|| random.below(sequences as u64) as usize);
-            figure(&drawn)
-        };
-        (0..self.samples).map(|_| sample()).filter(|value| value.is_finite()).collect()
-    }
-}
-
-/// The outcome of a paired comparison.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Gain {
-    /// Mean of the differences and its interval.
-    pub difference: Interval,
-    /// Two-sided probability of such a difference if there were none.
-    pub p_value: f64,
-}
-
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): small, seeded, the same everywhere.
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in `0..bound`; the remainder's bias is below 2^-32 for any
-    /// number of sequences that fits into memory.
-    fn below(&mut self, bound: u64) -> u64 {
-        ((u128::from(self.next()) * u128::from(bound)) >> 64) as u64
-    }
+/// The interval of the mean of one value a draw; as [`draws_interval`].
+pub fn mean_interval(values: &[f64]) -> Option<Interval> {
+    let mean = |drawn: &[usize]| drawn.iter().map(|&i| values[i]).sum::<f64>() / drawn.len() as f64;
+    draws_interval(values.len(), mean)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_generator_gives_the_published_stream() {
-        let mut random = SplitMix(1_234_567);
-        let stream: Vec<u64> = (0..3).map(|_| random.next()).collect();
-        assert_eq!(
-            stream,
-            [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423]
-        );
-    }
-
-    #[test]
-    fn percentiles_interpolate() {
-        assert_eq!(percentile(&[3.0, 1.0, 2.0], 0.5), Some(2.0));
-        assert_eq!(percentile(&[0.0, 10.0], 0.95), Some(9.5));
-        assert_eq!(percentile(&[], 0.5), None);
-    }
-
-    #[test]
-    fn no_difference_is_not_significant() {
-        let gain = Bootstrap::default().paired(&[0.1, 0.5, 0.4], &[0.1, 0.5, 0.4]).unwrap();
-        assert_eq!(gain.difference, Interval { estimate: 0.0, lower: 0.0, upper: 0.0 });
-        assert_eq!(gain.p_value, 1.0);
-        assert_eq!(Bootstrap::default().paired(&[], &[]), None);
-        assert_eq!(Bootstrap::default().paired(&[1.0], &[]), None);
-    }
-
-    #[test]
-    fn another_seed_draws_otherwise_and_the_same_seed_alike() {
-        let values = [0.1, 0.9, 0.3, 0.5, 0.2];
-        let mean = |drawn: &[usize]| drawn.iter().map(|&i| values[i]).sum::<f64>() / 5.0;
-        let with = |seed| Bootstrap { seed, samples: 51, ..Default::default() }.interval(5, mean);
-        assert_eq!(with(1), with(1));
-        assert_ne!(with(1), with(2));
-    }
-
-    #[test]
-    fn wilson_agrees_with_its_published_example() {
-        // Newcombe (1998), table I: 81 of 263 and 0 of 20.
-        let rate = wilson(81, 263, 0.95).unwrap();
-        assert!((rate.lower - 0.2553).abs() < 5e-5 && (rate.upper - 0.3662).abs() < 5e-5);
-        let none = wilson(0, 20, 0.95).unwrap();
-        assert!(none.lower == 0.0 && (none.upper - 0.1611).abs() < 5e-5);
-        assert_eq!(wilson(0, 0, 0.95), None);
-    }
-}
+mod tests;

@@ -38,6 +38,8 @@ pub struct Figure {
     pub unit: &'static str,
     pub decimals: usize,
     pub higher_is_better: bool,
+    /// Between these values it lies.
+    pub range: [f64; 2],
     /// What it says, in one line.
     pub meaning: &'static str,
     /// Where it is shown.
@@ -74,11 +76,15 @@ pub const MAIN: &Figure = &FIGURES[0];
 
 const BOTH: &[Place] = &Place::ALL;
 
+/// Of times, distances and counts.
+const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
+
 const RATE: Figure = Figure {
     name: "",
     unit: "",
     decimals: 3,
     higher_is_better: true,
+    range: [0.0, 1.0],
     meaning: "",
     places: BOTH,
     compared: false,
@@ -107,6 +113,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "MOTA",
+        range: [f64::NEG_INFINITY, 1.0],
         meaning: "1 less all misses, false reports and switches per person in view; may be negative.",
         compared: true,
         of: |s| s.mota,
@@ -130,6 +137,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "IDSW",
+        range: POSITIVE,
         decimals: 1,
         higher_is_better: false,
         meaning: "How often a person's number changes, per log.",
@@ -138,6 +146,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "fp_per_frame",
+        range: POSITIVE,
         decimals: 2,
         higher_is_better: false,
         meaning: "Reports where nobody is, per frame. Counts on empty logs too.",
@@ -147,6 +156,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "time_to_confirm_mean_s",
+        range: POSITIVE,
         unit: "s",
         decimals: 2,
         higher_is_better: false,
@@ -157,6 +167,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "wrong_person_s",
+        range: POSITIVE,
         unit: "s",
         decimals: 2,
         higher_is_better: false,
@@ -166,6 +177,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "position_error_mean_m",
+        range: POSITIVE,
         unit: "m",
         decimals: 3,
         higher_is_better: false,
@@ -176,6 +188,7 @@ const FIGURES: &[Figure] = &[
     },
     Figure {
         name: "OSPA",
+        range: POSITIVE,
         higher_is_better: false,
         meaning: "One distance for wrong places and wrong numbers of people.",
         of: |s| s.ospa,

@@ -37,4 +37,4 @@ pub use model::{
     Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
 };
 pub use page::html;
-pub use summary::{CONFIDENCE, Estimate, PairSummary, PipelineSummary, Summary};
+pub use summary::{Estimate, PairSummary, PipelineSummary, Summary};

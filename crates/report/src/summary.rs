@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use tagalong_eval::{Bootstrap, Interval, wilson};
+use tagalong_eval::{
+    Gain, Interval, clustered_share, holm, is_significant, mean_interval, paired_gain,
+};
 
 use crate::figures::{Figure, Place};
 use crate::model::{Benchmark, Outcome, TaskResult};
 use crate::view::View;
-
-/// Confidence of all intervals.
-pub const CONFIDENCE: f64 = 0.95;
 
 /// What a benchmark comes to.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
@@ -35,8 +34,8 @@ pub struct PipelineSummary {
     /// Figures by `image.NAME` or `metres.NAME`, as [`tagalong_eval::Scores`]
     /// names them.
     pub figures: BTreeMap<String, Estimate>,
-    /// Fraction of the people who were found at all, with its Wilson interval
-    /// (95 %); one seed per log, so that nobody counts twice.
+    /// Fraction of the people who were found at all, with an interval (95 %) by the
+    /// spread between logs; one seed per log, so that nobody counts twice.
     pub people_found: Option<Interval>,
     /// People in `people_found`.
     pub people: u64,
@@ -47,7 +46,8 @@ pub struct PipelineSummary {
 pub struct Estimate {
     /// The mean.
     pub mean: f64,
-    /// Its 95 % interval, from a bootstrap over logs; none for a single log.
+    /// Its 95 % interval over logs (Student); none for a single log, and for logs with
+    /// the same value.
     pub interval: Option<[f64; 2]>,
     /// Logs in the mean.
     pub logs: u64,
@@ -68,16 +68,20 @@ pub struct PairSummary {
     pub logs: u64,
     /// Mean of `b - a`.
     pub difference: f64,
-    /// Its 95 % interval, from a paired bootstrap over logs; none for one log.
+    /// Its 95 % interval over logs (Student); none for a single log, and for logs with
+    /// the same difference.
     pub interval: Option<[f64; 2]>,
-    /// Probability of a difference this large if there were none.
-    pub p_value: Option<f64>,
+    /// Probability of a difference this large if there were none, by the sign-flip
+    /// test over logs.
+    pub p_value: f64,
+    /// The same, corrected for all pairs that are compared by this figure (Holm).
+    pub p_corrected: f64,
 }
 
 impl PairSummary {
-    /// True if the interval excludes zero.
+    /// True if the corrected p-value is below 0.05, which takes six logs at least.
     pub fn is_clear(&self) -> bool {
-        self.interval.is_some_and(|[low, high]| low > 0.0 || high < 0.0)
+        is_significant(self.p_corrected)
     }
 }
 
@@ -129,48 +133,42 @@ fn pipeline(view: &View<'_>, name: &str) -> PipelineSummary {
     for place in Place::ALL {
         for figure in Figure::at(place) {
             let values: Vec<f64> = per_log(view, name, figure, place).into_values().collect();
-            if let Some(estimate) = estimate(&values) {
+            if let Some(estimate) = estimate(&values, figure) {
                 figures.insert(figure.key(place), estimate);
             }
         }
     }
-    let (found, people) = people(view, name);
+    let people = people(view, name);
     PipelineSummary {
         pipeline: name.to_owned(),
         done: count(|o| *o == Outcome::Done),
         failed: count(|o| matches!(o, Outcome::Failed { .. })),
         skipped: count(|o| matches!(o, Outcome::Skipped { .. })),
         figures,
-        people_found: wilson(found, people, CONFIDENCE),
-        people,
+        people: people.iter().map(|[_, all]| all).sum(),
+        people_found: clustered_share(&people),
     }
 }
 
-fn estimate(values: &[f64]) -> Option<Estimate> {
-    if values.is_empty() {
-        return None;
-    }
-    let drawn_mean =
-        |drawn: &[usize]| drawn.iter().map(|&i| values[i]).sum::<f64>() / drawn.len() as f64;
-    let several = values.len() >= 2;
-    let interval =
-        several.then(|| Bootstrap::default().interval(values.len(), drawn_mean)).flatten();
+fn estimate(values: &[f64], figure: &Figure) -> Option<Estimate> {
+    let [least, most] = figure.range;
+    let interval = mean_interval(values)?;
     Some(Estimate {
-        mean: mean(values),
-        interval: interval.map(|i| [i.lower, i.upper]),
+        mean: interval.estimate,
+        interval: interval.within(least, most).ends(),
         logs: values.len() as u64,
         best: false,
     })
 }
 
-/// People found and people there, over the logs.
-fn people(view: &View<'_>, pipeline: &str) -> (u64, u64) {
+/// People found and people there, for each log.
+fn people(view: &View<'_>, pipeline: &str) -> Vec<[u64; 2]> {
     let counts = |task: &TaskResult| {
         let scores = task.image.as_ref().or(task.metres.as_ref())?;
-        Some((scores.truth_ids.saturating_sub(scores.never_confirmed), scores.truth_ids))
+        Some([scores.truth_ids.saturating_sub(scores.never_confirmed), scores.truth_ids])
     };
     let tasks = view.logs.iter().filter_map(|log| view.drawn(pipeline, log));
-    tasks.filter_map(counts).fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1))
+    tasks.filter_map(counts).collect()
 }
 
 fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: Place) {
@@ -198,7 +196,23 @@ fn pairs(view: &View<'_>) -> Vec<PairSummary> {
             }
         }
     }
+    correct(&mut pairs);
     pairs
+}
+
+/// With many pairs some differ by chance: the p-values of each figure are corrected
+/// for that.
+fn correct(pairs: &mut [PairSummary]) {
+    let mut of_figure: BTreeMap<String, Vec<&mut PairSummary>> = BTreeMap::new();
+    for pair in pairs {
+        of_figure.entry(pair.figure.clone()).or_default().push(pair);
+    }
+    for pairs in of_figure.into_values() {
+        let p_values: Vec<f64> = pairs.iter().map(|pair| pair.p_value).collect();
+        for (pair, corrected) in pairs.into_iter().zip(holm(&p_values)) {
+            pair.p_corrected = corrected;
+        }
+    }
 }
 
 fn pair(view: &View<'_>, [a, b]: [&str; 2], figure: &Figure, place: Place) -> Option<PairSummary> {
@@ -206,19 +220,15 @@ fn pair(view: &View<'_>, [a, b]: [&str; 2], figure: &Figure, place: Place) -> Op
     let of_b = per_log(view, b, figure, place);
     let common = of_a.iter().filter_map(|(log, &a)| Some((a, *of_b.get(log)?)));
     let (in_a, in_b): (Vec<f64>, Vec<f64>) = common.unzip();
-    let differences: Vec<f64> = in_a.iter().zip(&in_b).map(|(a, b)| b - a).collect();
-    if differences.is_empty() {
-        return None;
-    }
-    let several = differences.len() >= 2;
-    let gain = several.then(|| Bootstrap::default().paired(&in_a, &in_b)).flatten();
+    let Gain { difference, p_value } = paired_gain(&in_a, &in_b)?;
     Some(PairSummary {
         a: a.to_owned(),
         b: b.to_owned(),
         figure: figure.key(place),
-        logs: differences.len() as u64,
-        difference: mean(&differences),
-        interval: gain.map(|g| [g.difference.lower, g.difference.upper]),
-        p_value: gain.map(|g| g.p_value),
+        logs: in_a.len() as u64,
+        difference: difference.estimate,
+        interval: difference.ends(),
+        p_value,
+        p_corrected: p_value,
     })
 }

@@ -1,5 +1,7 @@
 use serde::Serialize;
+use tagalong_sim::Seeds;
 
+use crate::lab::Drawn;
 use crate::{
     Lab, ReproduceError, Table, joint_particle, omni_appearance, rgbd_compressive, stereo,
 };
@@ -33,6 +35,47 @@ pub struct Experiment {
     pub about: &'static str,
     /// Does it.
     pub run: fn(&Lab) -> Result<Findings, ReproduceError>,
+}
+
+impl Experiment {
+    /// Does it, and names in each table the seeds of what was drawn for it.
+    ///
+    /// # Errors
+    /// As the experiment.
+    pub fn find(&self, lab: &Lab) -> Result<Found, ReproduceError> {
+        let mut findings = (self.run)(lab)?;
+        let drawn = lab.drawn.take();
+        if !drawn.is_empty() {
+            let note = seeds_note(&drawn);
+            findings.tables.iter_mut().for_each(|table| table.notes.push(note.clone()));
+        }
+        Ok(Found { experiment: self.name, drawn, findings })
+    }
+}
+
+/// Scenes with the same seeds stand together.
+fn seeds_note(drawn: &[Drawn]) -> String {
+    let mut groups: Vec<(Seeds, Vec<&str>)> = Vec::new();
+    for Drawn { scene, seeds } in drawn {
+        match groups.iter_mut().find(|(of, _)| of == seeds) {
+            Some((_, scenes)) => scenes.push(scene),
+            None => groups.push((*seeds, vec![scene])),
+        }
+    }
+    let group = |(seeds, scenes): &(Seeds, Vec<&str>)| format!("{}: {seeds}", scenes.join(", "));
+    format!("Drawn for this. {}.", groups.iter().map(group).collect::<Vec<_>>().join("; "))
+}
+
+/// An experiment with what it found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Found {
+    /// Its name.
+    pub experiment: &'static str,
+    /// The scenes that were drawn for it.
+    pub drawn: Vec<Drawn>,
+    /// What was found.
+    #[serde(flatten)]
+    pub findings: Findings,
 }
 
 /// What an experiment found.
@@ -69,7 +112,21 @@ pub fn system(name: &str) -> Option<&'static System> {
 mod tests {
     use std::collections::BTreeSet;
 
+    use tagalong_sim::Split;
+
     use super::*;
+
+    #[test]
+    fn scenes_with_the_same_seeds_are_named_together() {
+        let drawn = |scene: &str, first| Drawn {
+            scene: scene.into(),
+            seeds: Split::Test.seeds(first, 5).unwrap(),
+        };
+        let note = seeds_note(&[drawn("crowd", 0), drawn("turntable", 7), drawn("walk", 0)]);
+        let expected = "Drawn for this. crowd, walk: 5 seeds of the split test from 0 on; \
+                        turntable: 5 seeds of the split test from 7 on.";
+        assert_eq!(note, expected);
+    }
 
     #[test]
     fn every_name_means_one_thing() {

@@ -1,8 +1,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
+use serde::Serialize;
 use tagalong_core::Registry;
-use tagalong_sim::{Scene, Split, Variant};
+use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Trial, TrialError, each};
 
 /// Fewest seeds of a quick experiment.
@@ -41,6 +43,33 @@ pub trait Progress: Sync {
     fn step(&self);
 }
 
+/// A scene that was drawn, and with which seeds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Drawn {
+    /// The scene.
+    pub scene: String,
+    /// Its seeds.
+    pub seeds: Seeds,
+}
+
+/// The scenes that a lab has drawn.
+#[derive(Debug, Default)]
+pub struct DrawnScenes(Mutex<Vec<Drawn>>);
+
+impl DrawnScenes {
+    fn add(&self, drawn: Drawn) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if !all.contains(&drawn) {
+            all.push(drawn);
+        }
+    }
+
+    /// Those since the last time.
+    pub(crate) fn take(&self) -> Vec<Drawn> {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
 /// What experiments work with.
 pub struct Lab<'a> {
     /// All plugins.
@@ -53,6 +82,10 @@ pub struct Lab<'a> {
     pub quick: bool,
     /// As many seeds a scene, where the user says so.
     pub seeds: Option<u64>,
+    /// The first of them within the split: others are other draws.
+    pub first_seed: u64,
+    /// What was drawn.
+    pub drawn: DrawnScenes,
     /// Trials that run at once.
     pub jobs: usize,
     /// Who hears how far it is.
@@ -69,11 +102,12 @@ impl Lab<'_> {
         }
     }
 
-    /// A scene of the split `test` with the seeds `0..seeds`; `set` replaces
-    /// values by dotted keys, like `camera.kind=stereo`.
+    /// A scene of the split `test` with so many seeds from the first one on; `set`
+    /// replaces values by dotted keys, like `camera.kind=stereo`.
     ///
     /// # Errors
-    /// A scene that cannot be read, or a mistake in it or in `set`.
+    /// A scene that cannot be read, a mistake in it or in `set`, and seeds that the
+    /// split does not have.
     pub fn scenes(
         &self,
         name: &str,
@@ -84,13 +118,17 @@ impl Lab<'_> {
         let text = read(&path)?;
         let set: Vec<(String, String)> =
             set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let seeds = Split::Test
+            .seeds(self.first_seed, seeds)
+            .map_err(|error| ReproduceError::Other(error.to_string()))?;
+        self.drawn.add(Drawn { scene: name.to_owned(), seeds });
         let scene = |seed| {
             let variant = Variant { seed: Some(seed), split: Some(Split::Test), set: set.clone() };
             Scene::parse_with(&text, &variant).map_err(|error| {
                 ReproduceError::Scene(error.render(&path.display().to_string(), &text))
             })
         };
-        (0..seeds).map(scene).collect()
+        seeds.numbers().map(scene).collect()
     }
 
     /// The shipped configs of these names.
@@ -149,7 +187,9 @@ mod tests {
 
     fn lab<'a>(registry: &'a Registry, quick: bool, seeds: Option<u64>) -> Lab<'a> {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
-        Lab { registry, configs, data: None, quick, seeds, jobs: 1, progress: &Silent }
+        let (first_seed, drawn) = (0, DrawnScenes::default());
+        let (jobs, progress) = (1, &Silent);
+        Lab { registry, configs, data: None, quick, seeds, first_seed, drawn, jobs, progress }
     }
 
     #[test]
@@ -169,6 +209,28 @@ mod tests {
         let scenes = lab.scenes("full-occlusion", &[("people.1.hide_s", "0.5")], 2).unwrap();
         assert!(scenes.iter().all(|scene| scene.split() == Split::Test));
         assert_ne!(scenes[0].seed, scenes[1].seed);
+    }
+
+    #[test]
+    fn another_first_seed_draws_others_and_each_draw_is_noted_once() {
+        let registry = Registry::default();
+        let mut lab = lab(&registry, false, None);
+        let seeds = |lab: &Lab| -> Vec<u64> {
+            lab.scenes("crowd", &[], 2).unwrap().iter().map(|scene| scene.seed).collect()
+        };
+        assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
+        assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
+        lab.first_seed = 40;
+        assert_eq!(seeds(&lab), [2_000_000_040, 2_000_000_041]);
+        let of = |first| Drawn {
+            scene: "crowd".into(),
+            seeds: Split::Test.seeds(first, 2).unwrap(),
+        };
+        assert_eq!(lab.drawn.take(), [of(0), of(40)]);
+        assert_eq!(lab.drawn.take(), []);
+        lab.first_seed = 999_999_999;
+        let error = lab.scenes("crowd", &[], 2).unwrap_err().to_string();
+        assert!(error.contains("leave the split test"), "{error}");
     }
 
     #[test]

@@ -23,6 +23,6 @@ mod scatter;
 mod stereo;
 mod table;
 
-pub use findings::{Experiment, Findings, Picture, SYSTEMS, System, system};
-pub use lab::{Lab, Progress, ReproduceError};
+pub use findings::{Experiment, Findings, Found, Picture, SYSTEMS, System, system};
+pub use lab::{Drawn, DrawnScenes, Lab, Progress, ReproduceError};
 pub use table::{Cell, Row, Table};

@@ -1,8 +1,5 @@
 use serde::Serialize;
-use tagalong_eval::{Interval, wilson};
-
-/// Confidence of the intervals of shares.
-const CONFIDENCE: f64 = 0.95;
+use tagalong_eval::{CONFIDENCE, Interval, clustered_share, wilson};
 
 /// A table: published numbers and ours.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -62,16 +59,22 @@ impl Cell {
 
     /// An estimate with its interval, if there is one.
     pub fn estimate(interval: Option<Interval>, digits: usize) -> Self {
-        interval.map_or_else(Self::default, |Interval { estimate, lower, upper }| Self {
-            interval: Some([lower, upper]),
-            ..Self::number(estimate, digits)
+        interval.map_or_else(Self::default, |of| Self {
+            interval: of.ends(),
+            ..Self::number(of.estimate, digits)
         })
     }
 
     /// So many of so many in per cent, with its Wilson interval; nothing of
-    /// nothing.
+    /// nothing. For what is independent, like one answer a draw.
     pub fn share(count: u64, of: u64, digits: usize) -> Self {
         Self::estimate(wilson(count, of, CONFIDENCE), digits + 2).percent()
+    }
+
+    /// All of these `[so many, of so many]` in per cent, with the interval that their
+    /// spread gives: for what comes in clusters, like the frames of a draw.
+    pub fn clustered(clusters: &[[u64; 2]], digits: usize) -> Self {
+        Self::estimate(clustered_share(clusters), digits + 2).percent()
     }
 
     /// The same times a hundred: a fraction as per cent.
@@ -208,6 +211,14 @@ mod tests {
         assert_eq!(cell.text(), "2.0 \u{b1} 1.0");
         assert_eq!(Cell::mean(&[], 1), Cell::default());
         assert_eq!(Cell::number(f64::NAN, 1).text(), "-");
+    }
+
+    #[test]
+    fn figures_of_one_draw_stand_alone() {
+        assert_eq!(Cell::estimate(Some(Interval::open(0.25)), 2).text(), "0.25");
+        assert_eq!(Cell::estimate(None, 2).text(), "-");
+        assert_eq!(Cell::clustered(&[[3, 4]], 1).text(), "75.0");
+        assert_eq!(Cell::clustered(&[[1, 1], [0, 1]], 0).text(), Cell::share(1, 2, 0).text());
     }
 
     #[test]

@@ -71,6 +71,6 @@ pub use scene::{
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Trick,
 };
 pub use simulation::{Clearance, Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
-pub use split::Split;
+pub use split::{Seeds, Split};
 pub use variation::Variant;
 pub use webcam::WebcamSettings;

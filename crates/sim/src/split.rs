@@ -1,7 +1,10 @@
 //! What keeps training, validation and test apart.
 
+use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
+use serde::Serialize;
 use tagalong_core::{ConfigError, nearest};
 
 /// Seeds of one split.
@@ -21,7 +24,8 @@ const SLICES: u64 = 15;
 /// assert_eq!(Split::Test.seed(7).unwrap(), 2_000_000_007);
 /// assert_eq!(Split::of(2_000_000_007), Split::Test);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Split {
     /// To learn from: seeds from 0.
     Train,
@@ -65,6 +69,23 @@ impl Split {
         Err(ConfigError::new(message))
     }
 
+    /// So many seeds of the split, from `first` on.
+    ///
+    /// # Errors
+    /// Seeds that the split does not have.
+    pub fn seeds(self, first: u64, count: u64) -> Result<Seeds, ConfigError> {
+        let first = Self::number(self.seed(first)?);
+        if first.saturating_add(count) <= SEEDS {
+            return Ok(Seeds { split: self, first, count });
+        }
+        let (name, last) = (self.name(), SEEDS - 1);
+        let message = format!(
+            "{count} seeds from {first} on leave the split {name}, whose last one is {last}: \
+             begin earlier or take fewer"
+        );
+        Err(ConfigError::new(message))
+    }
+
     /// The number of a seed within its split.
     pub(crate) fn number(seed: u64) -> u64 {
         seed % SEEDS
@@ -89,6 +110,38 @@ impl Split {
 
     fn index(self) -> u64 {
         self as u64
+    }
+}
+
+/// Neighbouring seeds of a split: with the scene and what is set in it, all that
+/// others need to draw the same again, or something else.
+///
+/// ```
+/// use tagalong_sim::Split;
+/// let seeds = Split::Test.seeds(50, 10).unwrap();
+/// assert_eq!(seeds.numbers(), 2_000_000_050..2_000_000_060);
+/// assert_eq!(seeds.to_string(), "10 seeds of the split test from 50 on");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Seeds {
+    split: Split,
+    first: u64,
+    count: u64,
+}
+
+impl Seeds {
+    /// What a [`Variant`](crate::Variant) takes.
+    pub fn numbers(self) -> Range<u64> {
+        let start = self.split.index() * SEEDS + self.first;
+        start..start + self.count
+    }
+}
+
+impl fmt::Display for Seeds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { split, first, count } = self;
+        let seeds = if *count == 1 { "seed" } else { "seeds" };
+        write!(f, "{count} {seeds} of the split {} from {first} on", split.name())
     }
 }
 
@@ -119,6 +172,26 @@ mod tests {
         assert!(Split::Test.seed(Split::SEEDS_END).is_err());
         let error = "tests".parse::<Split>().unwrap_err().to_string();
         assert!(error.contains("did you mean `test`?"), "{error}");
+    }
+
+    #[test]
+    fn ranges_of_seeds_stay_in_the_split() {
+        let last = SEEDS - 1;
+        assert_eq!(Split::Train.seeds(last, 1).unwrap().numbers(), last..SEEDS);
+        let absolute = Split::Test.seeds(2_000_000_007, 2).unwrap();
+        assert_eq!(absolute, Split::Test.seeds(7, 2).unwrap());
+        for split in Split::ALL {
+            let error = split.seeds(last, 2).unwrap_err().to_string();
+            assert!(error.contains(split.name()) && error.contains("999999999"), "{error}");
+            assert!(split.seeds(1, u64::MAX).is_err());
+        }
+        assert!(Split::Validation.seeds(2_000_000_000, 1).is_err());
+    }
+
+    #[test]
+    fn seeds_are_named_for_programs() {
+        let seeds = toml::to_string(&Split::Validation.seeds(3, 1).unwrap()).unwrap();
+        assert_eq!(seeds, "split = \"validation\"\nfirst = 3\ncount = 1\n");
     }
 
     proptest! {

@@ -15,7 +15,7 @@ use serde::Serialize;
 use tagalong_core::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
-use tagalong_sim::{Scene, Split, Variant};
+use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
 use crate::config_file::ConfigFile;
@@ -44,8 +44,8 @@ pub struct FollowArgs {
           value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: u64,
     /// ... starting with this one of the split.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
+    #[arg(long, alias = "seed", value_name = "N", default_value_t = 0)]
+    pub first_seed: u64,
     /// The split that the seeds belong to; settings are chosen on `validation`.
     #[arg(long, value_name = "SPLIT", default_value = "test")]
     pub split: Split,
@@ -107,6 +107,7 @@ pub struct Followed {
 /// What the files and programs get.
 #[derive(Serialize)]
 struct Findings<'a> {
+    seeds: Seeds,
     tables: &'a [Table],
     #[serde(skip_serializing_if = "Option::is_none")]
     looks: Option<&'a LooksSettings>,
@@ -120,7 +121,8 @@ struct Findings<'a> {
 /// files that cannot be written are 1.
 pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
-    let jobs = jobs(args, registry)?;
+    let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
+    let jobs = jobs(args, seeds, registry)?;
     if let Some(folder) = &args.output {
         make_folder(folder)?;
     }
@@ -133,7 +135,7 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
         say("stopped; the logs that were written are whole, but end early");
         return Ok(Ended::BySignal(signal));
     }
-    report(args, &results)?;
+    report(args, seeds, &results)?;
     Ok(Ended::Well)
 }
 
@@ -145,13 +147,13 @@ fn failure(error: TrialError) -> Failure {
 }
 
 /// Every pipeline on every seed of every scene.
-fn jobs(args: &FollowArgs, registry: &Registry) -> Result<Vec<Job>, Failure> {
+fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>, Failure> {
     let mut jobs = Vec::new();
     let contenders = contenders(args, registry)?;
     for path in scenes(args)? {
         let suite = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for contender in &contenders {
-            for seed in args.seed..args.seed.saturating_add(args.seeds) {
+            for seed in seeds.numbers() {
                 let scene = simulate::read(&path, &variant(args, seed))?;
                 jobs.push(Job { suite: suite.clone(), scene, contender: contender.clone() });
             }
@@ -232,10 +234,10 @@ fn bar(rides: usize) -> ProgressBar {
     bar
 }
 
-fn report(args: &FollowArgs, results: &[Followed]) -> Result<(), Failure> {
-    let tables = table::tables(results);
+fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), Failure> {
+    let tables = table::tables(results, seeds);
     let looks = args.fit.then(|| fit::looks(results));
-    let findings = Findings { tables: &tables, looks: looks.as_ref(), rides: results };
+    let findings = Findings { seeds, tables: &tables, looks: looks.as_ref(), rides: results };
     let json = serde_json::to_string_pretty(&findings).unwrap_or_default() + "\n";
     let joined = |show: fn(&Table) -> String| -> String {
         tables.iter().map(show).collect::<Vec<_>>().join("\n")

@@ -1,19 +1,16 @@
-use tagalong_eval::{Bootstrap, percentile, wilson};
+use tagalong_eval::{draws_interval, percentile};
 use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_sim::Seeds;
 use tagalong_trials::{Ridden, RideJudge};
 
 use super::Followed;
 
-/// Confidence of all intervals.
-const CONFIDENCE: f64 = 0.95;
-/// Samples of the bootstrap: enough for two digits.
-const SAMPLES: usize = 2_000;
 /// Steps of the reliability curve.
 const BINS: usize = 10;
 
 /// How the rides went, scene by scene and over all scenes; and, where there was
 /// a lock, how far its probabilities can be believed.
-pub fn tables(results: &[Followed]) -> Vec<Table> {
+pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     let judge = RideJudge::default();
     let columns = [
         "rides",
@@ -49,16 +46,19 @@ pub fn tables(results: &[Followed]) -> Vec<Table> {
         title: "Following the first person of each scene".into(),
         columns: columns.map(str::to_owned).to_vec(),
         rows,
-        notes: notes(&judge),
+        notes: notes(&judge, seeds),
     };
     std::iter::once(following)
-        .chain(pipelines.iter().filter_map(|pipeline| reliability(results, pipeline)))
+        .chain(pipelines.iter().filter_map(|pipeline| reliability(results, pipeline, seeds)))
         .collect()
 }
 
-fn notes(judge: &RideJudge) -> Vec<String> {
+fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
     vec![
-        "intervals: 95 %, Wilson for counts, bootstrapped over rides otherwise".into(),
+        format!("each scene with {seeds}"),
+        "intervals: 95 %, over rides; Wilson for rides that were kept, and for what happens several \
+         times in a ride with the spread between rides; Student for times"
+            .into(),
         format!(
             "kept: the person was found, nobody else was followed for more than {} s in one go, and \
              at the end the person was followed or not in view for {} s",
@@ -85,18 +85,21 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let rides: Vec<&Ridden> = results.iter().map(|result| &result.ridden).collect();
     let count = rides.len() as u64;
     let times = |a: fn(&Ridden) -> f64, b: fn(&Ridden) -> f64| {
+        // Rides that have nothing of it say nothing about it.
+        let of: Vec<&Ridden> = rides.iter().copied().filter(|ride| b(ride) > 0.0).collect();
         let ratio = |drawn: &[usize]| {
-            let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(rides[i])).sum::<f64>();
+            let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(of[i])).sum::<f64>();
             sum(a) / sum(b)
         };
-        bootstrap().interval(rides.len(), ratio)
+        draws_interval(of.len(), ratio).map(|share| share.within(0.0, 1.0))
     };
-    let refound: Vec<bool> = rides
+    let refound: Vec<[u64; 2]> = rides
         .iter()
-        .flat_map(|ride| ride.episodes.iter().map(|e| judge.refound(e, ride.time_s)))
-        .flatten()
+        .map(|ride| {
+            let all = ride.episodes.iter().filter_map(|e| judge.refound(e, ride.time_s));
+            all.fold([0, 0], |[good, of], one| [good + u64::from(one), of + 1])
+        })
         .collect();
-    let good = refound.iter().filter(|good| **good).count() as u64;
     let least = |of: fn(&Ridden) -> Option<f64>| {
         let least = rides.iter().filter_map(|ride| of(ride)).min_by(f64::total_cmp);
         least.map_or_else(Cell::default, |least| Cell::number(least, 2))
@@ -110,10 +113,10 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let kept = rides.iter().filter(|ride| ride.kept).count() as u64;
     vec![
         Cell::number(count as f64, 0),
-        Cell::estimate(wilson(kept, count, CONFIDENCE), 3).percent(),
+        Cell::share(kept, count, 1),
         Cell::estimate(times(|r| r.wrong_s, |r| r.right_s + r.wrong_s), 4).percent(),
         Cell::number(rides.iter().map(|ride| ride.longest_wrong_s).fold(0.0, f64::max), 1),
-        Cell::estimate(wilson(good, refound.len() as u64, CONFIDENCE), 3).percent(),
+        Cell::clustered(&refound, 1),
         Cell::estimate(times(|r| r.in_view_s, |r| r.time_s), 3).percent(),
         Cell::estimate(times(|r| r.distance_kept_s, |r| r.slow_s), 3).percent(),
         Cell::mean(&farther, 2),
@@ -127,40 +130,41 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
 
 /// Of those whom the lock thought to be the person with some probability, how
 /// many were.
-fn reliability(results: &[Followed], pipeline: &str) -> Option<Table> {
+fn reliability(results: &[Followed], pipeline: &str, seeds: Seeds) -> Option<Table> {
     let of: Vec<&Ridden> =
         results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
-    let bin = |(p, _): &(f64, bool)| ((p * BINS as f64) as usize).min(BINS - 1);
-    let all: Vec<(f64, bool)> = of
-        .iter()
-        .flat_map(|ride| ride.likeness.iter().map(|(like, same)| (like.probability, *same)))
-        .collect();
+    let bin = |p: f64| ((p * BINS as f64) as usize).min(BINS - 1);
+    let within = |ride: &Ridden, at: usize| -> Vec<(f64, bool)> {
+        let all = ride.likeness.iter().map(|(like, same)| (like.probability, *same));
+        all.filter(|(p, _)| bin(*p) == at).collect()
+    };
     let row = |at: usize| {
-        let within: Vec<&(f64, bool)> = all.iter().filter(|one| bin(one) == at).collect();
-        let (count, same) =
-            (within.len() as u64, within.iter().filter(|(_, same)| *same).count() as u64);
-        let mean = within.iter().map(|(p, _)| p).sum::<f64>() / count as f64;
+        let rides: Vec<Vec<(f64, bool)>> = of.iter().map(|ride| within(ride, at)).collect();
+        let count = rides.iter().map(Vec::len).sum::<usize>() as f64;
+        let mean = rides.iter().flatten().map(|(p, _)| p).sum::<f64>() / count;
+        let same = |ride: &Vec<(f64, bool)>| {
+            [ride.iter().filter(|(_, same)| *same).count() as u64, ride.len() as u64]
+        };
         let low = at as f64 / BINS as f64;
         let cells = vec![
-            Cell::number(count as f64, 0),
+            Cell::number(count, 0),
             Cell::number(100.0 * mean, 1),
-            Cell::estimate(wilson(same, count, CONFIDENCE), 3).percent(),
+            Cell::clustered(&rides.iter().map(same).collect::<Vec<_>>(), 1),
         ];
         Row::ours(format!("{low:.1} to {:.1}", low + 1.0 / BINS as f64), cells)
     };
     let columns = ["sightings", "mean probability %", "were the person %"];
-    (!all.is_empty()).then(|| Table {
+    of.iter().any(|ride| !ride.likeness.is_empty()).then(|| Table {
         title: format!("How far the lock of {pipeline} can be believed"),
         columns: columns.map(str::to_owned).to_vec(),
         rows: (0..BINS).map(row).collect(),
         notes: vec![
-            "sightings of one ride are not independent: the intervals are too narrow".into(),
+            format!("each scene with {seeds}"),
+            "intervals: 95 %, with the spread between rides: sightings of one ride are not \
+             independent"
+                .into(),
         ],
     })
-}
-
-fn bootstrap() -> Bootstrap {
-    Bootstrap { samples: SAMPLES, confidence: CONFIDENCE, seed: 1 }
 }
 
 /// Each name once, in the order of its first place.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_core::Registry;
-use tagalong_sim::{Scene, Split, Variant};
+use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::Contender;
 
 use crate::args::Format;
@@ -48,6 +48,10 @@ pub struct TrialsArgs {
     #[arg(long, value_name = "N", default_value_t = 10,
           value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: u64,
+    /// The first of these seeds, counted within the split: another one gives other
+    /// draws.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub first_seed: u64,
     /// Trials that run at once; the results are the same [default: as many as
     /// there are cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
@@ -62,12 +66,13 @@ pub struct TrialsArgs {
 /// # Errors
 /// Scenes and configs that cannot be used are exit code 2; plugins that fail are 1.
 pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
+    let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
     let contenders = contenders(&args.configs, registry)?;
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
-    let suites = scenes.iter().map(|path| suite(path, args)).collect::<Result<Vec<_>, _>>()?;
+    let suites = scenes.iter().map(|path| suite(path, args, seeds)).collect::<Result<Vec<_>, _>>()?;
     let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
     let names = suites.iter().map(|(name, _)| name);
-    let mut table = table::Table::new(names, contenders.iter().map(|c| &c.name));
+    let mut table = table::Table::new(seeds, names, contenders.iter().map(|c| &c.name));
     let tell = |text: String| match args.format {
         Format::Text => bar.suspend(|| print(&text)),
         Format::Json => Ok(()),
@@ -110,12 +115,12 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
     paths.iter().map(read).collect()
 }
 
-/// A scene with as many seeds as wanted.
-fn suite(path: &Path, args: &TrialsArgs) -> Result<(String, Vec<Scene>), Failure> {
+/// A scene with the seeds.
+fn suite(path: &Path, args: &TrialsArgs, seeds: Seeds) -> Result<(String, Vec<Scene>), Failure> {
     let variant =
         |seed| Variant { seed: Some(seed), split: Some(args.split), set: args.set.clone() };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let scenes = (0..args.seeds).map(|seed| simulate::read(path, &variant(seed)));
+    let scenes = seeds.numbers().map(|seed| simulate::read(path, &variant(seed)));
     Ok((name, scenes.collect::<Result<_, _>>()?))
 }
 

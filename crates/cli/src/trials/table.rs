@@ -1,17 +1,20 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use tagalong_eval::{Bootstrap, Clear, Gain, Identity, Interval, PositionError, wilson};
+use tagalong_eval::{
+    CONFIDENCE, Clear, Gain, Identity, Interval, PositionError, draws_interval, holm,
+    is_significant, paired_gain, wilson,
+};
+use tagalong_sim::Seeds;
 use tagalong_trials::Contender;
 
 use super::contest::Result;
 
-/// Confidence of all intervals.
-const CONFIDENCE: f64 = 0.95;
-
 /// Contenders on suites.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Table {
+    /// With which each suite was drawn.
+    pub seeds: Seeds,
     /// One row a suite and contender.
     pub rows: Vec<Row>,
     /// Each contender against the baseline, the last one.
@@ -21,7 +24,7 @@ pub struct Table {
     widths: [usize; 2],
 }
 
-/// One contender on one suite; intervals have 95 % confidence.
+/// One contender on one suite; intervals have 95 % confidence and are over draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// The scene.
@@ -30,9 +33,9 @@ pub struct Row {
     pub pipeline: String,
     /// Draws.
     pub draws: usize,
-    /// Accuracy, bootstrapped over draws.
+    /// Accuracy.
     pub mota: Option<Interval>,
-    /// Identity F1, bootstrapped over draws.
+    /// Identity F1.
     pub idf1: Option<Interval>,
     /// Errors on the floor, robot frame.
     pub error: Option<PositionError>,
@@ -54,18 +57,21 @@ pub struct GainRow {
     pub baseline: String,
     /// Gain of IDF1.
     pub idf1: Gain,
+    /// Its p-value, corrected for all gains of the table (Holm).
+    pub p_corrected: f64,
 }
 
 impl Table {
     /// An empty table for these names.
     pub fn new<'a>(
+        seeds: Seeds,
         suites: impl Iterator<Item = &'a String>,
         contenders: impl Iterator<Item = &'a String>,
     ) -> Self {
         let widest = |lengths: Option<usize>| lengths.unwrap_or(0).max(8);
         let widths =
             [widest(suites.map(String::len).max()), widest(contenders.map(String::len).max())];
-        Self { widths, ..Self::default() }
+        Self { seeds, rows: Vec::new(), gains: Vec::new(), widths }
     }
 
     /// Adds a suite: for each draw one result a contender.
@@ -80,12 +86,17 @@ impl Table {
         };
         let base = idf1(others.len());
         for (at, contender) in others.iter().enumerate() {
-            self.gains.extend(Bootstrap::default().paired(&base, &idf1(at)).map(|gain| GainRow {
+            self.gains.extend(paired_gain(&base, &idf1(at)).map(|gain| GainRow {
                 suite: suite.to_owned(),
                 pipeline: contender.name.clone(),
                 baseline: baseline.name.clone(),
                 idf1: gain,
+                p_corrected: gain.p_value,
             }));
+        }
+        let p_values: Vec<f64> = self.gains.iter().map(|gain| gain.idf1.p_value).collect();
+        for (gain, corrected) in self.gains.iter_mut().zip(holm(&p_values)) {
+            gain.p_corrected = corrected;
         }
     }
 
@@ -127,17 +138,22 @@ impl Table {
 
     /// What follows from the rows.
     pub fn summary(&self) -> String {
-        let mut out = format!("\nintervals: 95 %, over draws; {}\n", self.perfection());
+        let mut out = format!(
+            "\n{}\nintervals: 95 %, over draws (Student; Wilson where all is right)\n\
+             p: sign-flip test over draws, corrected for the {} comparisons (Holm)\n{}\n",
+            self.seeds,
+            self.gains.len(),
+            self.perfection()
+        );
         for gain in &self.gains {
-            let Interval { estimate, lower, upper } = gain.idf1.difference;
+            let Interval { estimate, .. } = gain.idf1.difference;
+            let ends = gain.idf1.difference.ends();
+            let ends = ends.map_or(String::new(), |[a, b]| format!(" [{a:+.3}, {b:+.3}]"));
+            let luck = if is_significant(gain.p_corrected) { "" } else { ", which may be luck" };
             let _ = writeln!(
                 out,
-                "{}: {} gains {estimate:+.3} [{lower:+.3}, {upper:+.3}] IDF1 over {} on the same \
-                 draws{}",
-                gain.suite,
-                gain.pipeline,
-                gain.baseline,
-                if lower > 0.0 || upper < 0.0 { "" } else { ", which may be luck" }
+                "{}: {} gains {estimate:+.3}{ends} IDF1 over {} on the same draws (p = {:.3}){luck}",
+                gain.suite, gain.pipeline, gain.baseline, gain.p_corrected,
             );
         }
         out
@@ -166,8 +182,8 @@ fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {
         suite: suite.to_owned(),
         pipeline: pipeline.to_owned(),
         draws: results.len(),
-        mota: Bootstrap::default().interval(results.len(), mota),
-        idf1: Bootstrap::default().interval(results.len(), idf1),
+        mota: draws_interval(results.len(), mota).map(|of| of.within(f64::NEG_INFINITY, 1.0)),
+        idf1: draws_interval(results.len(), idf1).map(|of| of.within(0.0, 1.0)),
         error: PositionError::of(&errors),
         success: wilson(successes, results.len() as u64, CONFIDENCE),
         switches: results.iter().map(|result| result.clear.id_switches).sum(),
@@ -175,7 +191,9 @@ fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {
 }
 
 fn interval(interval: Option<Interval>) -> String {
-    interval.map_or(format!("{:^21}", "-"), |Interval { estimate, lower, upper }| {
-        format!("{estimate:>6.3} [{lower:.3}, {upper:.3}]")
-    })
+    let text = interval.map_or("-".to_owned(), |of| {
+        let ends = of.ends().map_or(String::new(), |[a, b]| format!(" [{a:.3}, {b:.3}]"));
+        format!("{:>6.3}{ends}", of.estimate)
+    });
+    format!("{text:<21}")
 }

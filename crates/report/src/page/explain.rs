@@ -13,10 +13,10 @@ impl Page<'_> {
             h3 { "What the intervals mean" }
             p {
                 "A figure is formed per log, over the seeds first, and then averaged over logs: each log counts once, however long it is. "
-                "Its 95 % interval comes from a bootstrap that draws logs, not frames, because frames of one recording resemble each other. "
-                "With few logs such an interval is too narrow rather than too wide: it cannot know places it has not seen. "
-                "A single log has none. Differences between two pipelines are drawn in pairs, log by log. "
-                "Rates of people found have Wilson intervals."
+                "Its 95 % interval is Student's, over logs, not frames, because frames of one recording resemble each other. "
+                "A single log has none, and neither have logs that all show the same: they do not tell how much others differ. "
+                "No interval knows places of a kind that no log shows. Differences between two pipelines are formed in pairs, log by log. "
+                "Rates of people found have Wilson intervals, widened by what the logs differ in."
             }
             h3 { "What is left out" }
             p {

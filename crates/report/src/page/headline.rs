@@ -1,5 +1,6 @@
 use maud::{Markup, html};
 
+use super::pairs::p_text;
 use super::{Page, amount, cell, column, no_cell, number, table};
 use crate::chart::{interval, key, series_class};
 use crate::figures::{Figure, MAIN, Place};
@@ -38,7 +39,6 @@ impl Page<'_> {
             .pairs
             .iter()
             .find(|p| p.figure == key && names.contains(&&p.a) && names.contains(&&p.b));
-        let clear = pair.is_some_and(|p| p.is_clear());
         let left_out = self
             .summary
             .pipelines
@@ -49,8 +49,12 @@ impl Page<'_> {
             strong { (first.0.pipeline) } " has the highest " (MAIN.name) " " (place_where(place)) ", "
             (number(first.1.mean, 3)) ", then " strong { (second.0.pipeline) } " with "
             (number(second.1.mean, 3)) ". "
-            @if clear { "The interval of their difference excludes zero." }
-            @else { "These logs do not tell the two apart: the interval of their difference includes zero or cannot be formed." }
+            @if let Some(pair) = pair.filter(|pair| pair.is_clear()) {
+                "The difference is clear (p " (p_equals(pair.p_corrected)) ")."
+            } @else if let Some(pair) = pair {
+                "These logs do not tell the two apart (p " (p_equals(pair.p_corrected)) ", "
+                (amount(pair.logs as usize, "log")) " in common; it takes at least six)."
+            } @else { "No log in common tells the two apart." }
         })
     }
 
@@ -206,7 +210,8 @@ fn people_cell(summary: &PipelineSummary) -> Markup {
     cell(
         found.estimate,
         &html! {
-            span class="value" { (count) " of " (summary.people) } " " (ends_of([found.lower, found.upper], 2))
+            span class="value" { (count) " of " (summary.people) }
+            @if let Some(ends) = found.ends() { " " (ends_of(ends, 2)) }
         },
     )
 }
@@ -219,6 +224,11 @@ pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
 pub(super) fn span_of([low, high]: [f64; 2], decimals: usize) -> String {
     let between = if low < 0.0 || high < 0.0 { " to " } else { "–" };
     format!("{}{between}{}", number(low, decimals), number(high, decimals))
+}
+
+fn p_equals(p: f64) -> String {
+    let text = p_text(p);
+    if text.starts_with('<') { text } else { format!("= {text}") }
 }
 
 /// From the lowest to the highest end of all.

@@ -22,7 +22,14 @@ impl Page<'_> {
         Some(html! {
             p {
                 "Each pair is compared on the logs that both finished, log by log, so that a hard log counts "
-                "the same for both. " strong { "Clear" } " means that the 95 % interval of the mean difference excludes zero."
+                "the same for both. p is how often a difference this large comes about if neither is better: of all ways to "
+                "give the difference of each log the one sign or the other, the part whose mean is as far from zero. "
+                strong { "Clear" } " means p below 0.05, which takes six logs at least"
+                @if self.view.pipelines.len() > 2 {
+                    ", after Holm's correction for all pairs that are compared by the same figure: "
+                    "of twenty pairs one is below 0.05 by chance"
+                }
+                ". The figures are not corrected for each other: choose the one that matters before looking."
             }
             @for (a, b) in self.pair_names().take(MOST_PAIRS) { (self.pair(a, b)) }
             @if self.pair_names().count() > MOST_PAIRS {
@@ -104,7 +111,9 @@ fn gain_table(a: &str, b: &str, rows: &[&PairSummary]) -> Markup {
     let head = html! {
         (column("Figure", None)) (column("Where", None)) (column("Logs", None))
         (column(&format!("{b} less {a}"), None)) (column("95 % interval", None))
-        (column("p", Some("Probability of such a difference by chance"))) (column("Better", None))
+        (column("p", Some("Probability of such a difference by chance, one pair alone")))
+        (column("p, all pairs", Some("Corrected for all pairs that are compared by this figure (Holm)")))
+        (column("Better", None))
     };
     let body = html! {
         @for place in Place::ALL {
@@ -136,12 +145,12 @@ fn gain_row(row: &PairSummary, figure: &Figure, place: Place) -> Markup {
             (cell(row.logs as f64, &html! { (row.logs) }))
             (cell(row.difference, &html! { (signed(row.difference, figure.decimals)) }))
             @if let Some(ends) = row.interval { (cell(ends[0], &ends_of(ends, figure.decimals))) } @else { (no_cell()) }
-            @if let Some(p) = row.p_value { (cell(p, &html! { (p_text(p)) })) } @else { (no_cell()) }
+            @for p in [row.p_value, row.p_corrected] { (cell(p, &html! { (p_text(p)) })) }
             td { (better) }
         }
     }
 }
 
-fn p_text(p: f64) -> String {
+pub(super) fn p_text(p: f64) -> String {
     if p < 0.001 { "< 0.001".to_owned() } else { number(p, 3) }
 }

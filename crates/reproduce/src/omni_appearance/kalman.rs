@@ -1,6 +1,6 @@
 //! Section 6.2: the filter against the appearance model alone.
 
-use tagalong_eval::Bootstrap;
+use tagalong_eval::paired_gain;
 use tagalong_trials::{Contender, Trial, TrialError};
 
 use super::{BLOCK, IMAGES, alone, mean};
@@ -76,7 +76,7 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
     Ok(Walk { errors })
 }
 
-/// Section 6.2, with the gain over the first row by a bootstrap of blocks; `first` is
+/// Section 6.2, with the gain over the first row, block by block; `first` is
 /// the number of the first filter among the contenders.
 fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
     let published = |mean, deviation| Cell { deviation: Some(deviation), ..Cell::number(mean, 3) };
@@ -92,7 +92,7 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
     };
     for (at, (name, _)) in FILTERS.iter().enumerate() {
         let all: Vec<f64> = walks.iter().flat_map(|walk| walk.errors[first + at].clone()).collect();
-        let gain = Bootstrap::default().paired(&blocks(0), &blocks(at));
+        let gain = paired_gain(&blocks(0), &blocks(at));
         let gain = gain.filter(|_| at > 0).map(|gain| gain.difference);
         rows.push(Row::ours(*name, vec![Cell::mean(&all, 3), Cell::estimate(gain, 3)]));
     }
@@ -105,8 +105,8 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
             format!(
                 "{images} images of two walks; the shipped model, fitted to another draw of this scene"
             ),
-            "Differences are paired, by a bootstrap of blocks of 5 s: neighbouring images are not \
-             independent, as the paper's t-test takes them to be."
+            "Differences are paired, with Student's 95 % interval over blocks of 5 s: neighbouring \
+             images are not independent, as the paper's t-test takes them to be."
                 .into(),
         ],
     }

@@ -1,6 +1,6 @@
 //! Printed, corrected and best on the same scenes.
 
-use tagalong_eval::Bootstrap;
+use tagalong_eval::{mean_interval, paired_gain};
 use tagalong_trials::{Judge, Judged, Trial, TrialError};
 
 use super::{PIPELINES, STEREO};
@@ -56,7 +56,7 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure)
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{} drawn stereo scenes; 95 % bootstrap over scenes, in pairs", all.len()),
+            format!("{} drawn stereo scenes; intervals: 95 %, over scenes, in pairs", all.len()),
             format!("printed, corrected, best: {}", PIPELINES.join(", ")),
         ],
     }
@@ -70,13 +70,9 @@ fn cells(draws: &[Vec<Judged>], digits: usize, figure: Figure) -> Vec<Cell> {
         scores.iter().filter(|draw| draw.iter().all(|v| v.is_finite())).collect();
     let of = |at: usize| known.iter().map(|draw| draw[at]).collect::<Vec<f64>>();
     let all = [of(0), of(1), of(2)];
-    let mean = |at: usize| {
-        let mean =
-            |drawn: &[usize]| drawn.iter().map(|&k| all[at][k]).sum::<f64>() / drawn.len() as f64;
-        Cell::estimate(Bootstrap::default().interval(known.len(), mean), digits)
-    };
+    let mean = |at: usize| Cell::estimate(mean_interval(&all[at]), digits);
     let step = |from: usize| {
-        let gain = Bootstrap::default().paired(&all[from], &all[from + 1]);
+        let gain = paired_gain(&all[from], &all[from + 1]);
         Cell::estimate(gain.map(|gain| gain.difference), digits)
     };
     vec![mean(0), mean(1), mean(2), step(0), step(1)]
@@ -98,7 +94,9 @@ mod tests {
         let values: Vec<f64> = cells.iter().map(|cell| cell.value.unwrap()).collect();
         let expected = [0.4, 0.3, 0.15, -0.1, -0.15];
         assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
-        let [lower, upper] = cells[3].interval.unwrap();
-        assert!((lower + 0.1).abs() < 1e-9 && (upper + 0.1).abs() < 1e-9);
+        assert_eq!(cells[3].interval, None, "both steps are the same");
+        let [lower, upper] = cells[4].interval.unwrap();
+        let half = 12.7062 * 0.05; // Student's with one degree of freedom
+        assert!((upper - lower - 2.0 * half).abs() < 1e-4, "{lower} {upper}");
     }
 }

@@ -111,7 +111,7 @@ fn sightings_table(rows: Vec<Row>, drawn: &str) -> Table {
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{drawn} intervals, over sightings"),
+            format!("{drawn} intervals take sightings as independent: they are too narrow"),
             "False sightings a frame: before the verifier. People's: of head and shoulders; \
              an arm is neither."
                 .into(),
@@ -154,7 +154,9 @@ fn tracks_table(rows: Vec<Row>, drawn: &str) -> Table {
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{drawn} intervals, over people and frames"),
+            format!(
+                "{drawn} intervals take people and frames as independent: they are too narrow"
+            ),
             "Lost: had a track in the same frame without the verifier.".into(),
         ],
     }

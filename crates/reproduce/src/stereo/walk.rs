@@ -1,7 +1,7 @@
 //! P4, Fig. 11: where is a person who walks along two edges of a square?
 
 use nalgebra::{Point2, Vector2};
-use tagalong_eval::{Bootstrap, PositionError, percentile};
+use tagalong_eval::{PositionError, draws_interval, percentile};
 use tagalong_trials::{Judge, Moment, Trial, TrialError};
 
 use super::{PIPELINES, STEREO};
@@ -134,8 +134,8 @@ fn table(walks: &[Walk]) -> Table {
     for (at, name) in PIPELINES.iter().enumerate() {
         let of =
             |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w.errors[at])).collect();
-        let count = |of: fn(&Errors) -> u64| walks.iter().map(|w| of(&w.errors[at])).sum();
-        let without = Cell::share(count(|e| e.without), count(|e| e.frames), 1);
+        let lost = |w: &Walk| [w.errors[at].without, w.errors[at].frames];
+        let without = Cell::clustered(&walks.iter().map(lost).collect::<Vec<_>>(), 1);
         let mut row = |frame: &str, errors: Walks<'_>| {
             let cells = cells(&errors).into_iter().chain([without.clone()]).collect();
             rows.push(Row::ours(format!("{name}, frame of the {frame}"), cells));
@@ -163,7 +163,7 @@ fn table(walks: &[Walk]) -> Table {
         rows,
         notes: vec![
             format!(
-                "{} drawn walks in front of a stereo camera; intervals over walks",
+                "{} drawn walks in front of a stereo camera; intervals: 95 %, over walks",
                 walks.len()
             ),
             "Predicted places count, too: the other person passes between. Without a place: \
@@ -191,7 +191,8 @@ fn cells(walks: &Walks<'_>) -> Vec<Cell> {
         walks.iter().filter_map(|walk| walk.iter().copied().reduce(f64::max)).collect();
     let error = PositionError::of(&all).unwrap_or_default();
     let millimetres = |metres: Option<f64>| Cell::number(1e3 * metres.unwrap_or(f64::NAN), 0);
-    let mean = Bootstrap::default().interval(walks.len(), |drawn| 1e3 * mean(drawn));
+    let mean = draws_interval(walks.len(), |drawn| 1e3 * mean(drawn));
+    let mean = mean.map(|mean| mean.within(0.0, f64::INFINITY));
     vec![
         Cell::estimate(mean, 0),
         millimetres(Some(error.p95_m)),
