@@ -25,9 +25,11 @@ fn sequence(mot: &Path, name: &str) -> Sequence {
     let folder = format!("gt/MOT17-train/{name}");
     let info = mot::parse_info(&text(&format!("{folder}/seqinfo.ini")), "seqinfo.ini");
     let truth = mot::parse_truth(&text(&format!("{folder}/gt/gt.txt")), "gt", mot::Rules::Mot17);
-    let tracks = mot::parse(&text(&format!("tracker-output/MOT17-train/{name}.txt")), "tracks");
+    let tracks =
+        mot::parse_tracks(&text(&format!("tracker-output/MOT17-train/{name}.txt")), "tracks");
     let mut timeline = Timeline::new();
-    timeline.add_truths(truth.expect("truth"));
+    let rules = mot::Rules::Mot17;
+    timeline.add_truths(truth.expect("truth").iter().map(|row| row.truth(rules)));
     timeline.add_reports(tracks.expect("tracks").iter().map(mot::Row::report));
     timeline.into_sequence(name, 1, info.expect("info").length, 30.0).0
 }
@@ -43,11 +45,7 @@ fn families(sequence: &Sequence) -> f64 {
 }
 
 fn scoring(c: &mut Criterion) {
-    let mot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/mot");
-    if !mot.exists() {
-        println!("skipped: {} is not here", mot.display());
-        return;
-    }
+    let Some(mot) = tagalong_testdata::find("mot") else { return };
     let read = || -> Vec<Sequence> { NAMES.iter().map(|name| sequence(&mot, name)).collect() };
     let sequences = read();
     c.bench_function("MOT17 train: read", |b| b.iter(read));

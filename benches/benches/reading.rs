@@ -44,12 +44,7 @@ fn walk(path: &Path, images: bool) -> usize {
 
 fn reading(c: &mut Criterion) {
     for name in ["um", "lab2-camera2"] {
-        let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/logs");
-        let path = logs.join(format!("{name}.mcap"));
-        if !path.exists() {
-            println!("skipped: {} is not here", path.display());
-            continue;
-        }
+        let Some(path) = tagalong_testdata::find(&format!("logs/{name}.mcap")) else { continue };
         let (input, limits) = (InputSettings::default(), Limits::default());
         let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
         c.bench_function(&format!("{name}: messages alone"), |b| b.iter(|| walk(&path, false)));

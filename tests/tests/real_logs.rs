@@ -25,13 +25,7 @@ struct Run {
 }
 
 fn data(file: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/logs");
-    let path = root.join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {} is not here", path.display());
-    None
+    tagalong_testdata::find(&format!("logs/{file}"))
 }
 
 fn run(path: &Path, config: &str) -> Run {

@@ -3,7 +3,7 @@
 //! that it skips.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a broken test may stop loudly")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tagalong_core::Registry;
 use tagalong_reproduce::{DrawnScenes, Lab, Progress, Table, system};
@@ -18,14 +18,14 @@ impl Progress for Silent {
     fn step(&self) {}
 }
 
-fn table() -> Table {
+fn table(data: PathBuf) -> Table {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let lab = Lab {
         registry: &registry,
         configs: root.join("configs"),
-        data: Some(root.join("../shared/data")),
+        data: Some(data),
         quick: false,
         seeds: None,
         first_seed: 0,
@@ -40,11 +40,8 @@ fn table() -> Table {
 
 #[test]
 fn with_the_detections_of_sort_it_is_at_least_as_accurate_as_sort() {
-    let table = table();
-    if table.rows.is_empty() {
-        println!("skipped: no data in ../shared/data/mot");
-        return;
-    }
+    let Some(mot) = tagalong_testdata::find("mot") else { return };
+    let table = table(mot.with_file_name(""));
     println!("{}", table.text());
     let ours: Vec<_> = table.rows.iter().filter(|row| !row.published).collect();
     assert_eq!(ours.len(), 11 + 2);

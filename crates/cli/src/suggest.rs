@@ -65,8 +65,9 @@ fn conversion(path: &Path, extension: &str) -> String {
     format!("{shown} is a {kind}, and only MCAP is read; convert it:\n{}", converter(path))
 }
 
-/// The commands that make an MCAP log of a bag, one a line: `rosbags-convert` is
-/// installed by `pip install rosbags`, the others come with ROS 2 and MCAP.
+/// The command that makes an MCAP log of a bag: `rosbags-convert`, of `pip install
+/// rosbags`. Bags older than ROS 2 Iron hold no message definitions, which then come from
+/// the distribution named, and which `mcap convert` cannot do without.
 pub fn converter(path: &Path) -> String {
     let stem = path.with_extension("");
     let (shown, stem) = (path.display(), stem.display());
@@ -79,8 +80,8 @@ pub fn converter(path: &Path) -> String {
     let folder = path.parent().filter(|folder| folder.join("metadata.yaml").exists());
     let source = folder.unwrap_or(path).display();
     format!(
-        "  rosbags-convert --src {source} --dst {stem}-mcap --dst-storage mcap\n  mcap convert \
-         {shown} {stem}.mcap"
+        "  rosbags-convert --src {source} --src-typestore ros2_humble --dst {stem}-mcap \
+         --dst-storage mcap"
     )
 }
 
@@ -126,7 +127,7 @@ mod tests {
     #[test]
     fn bags_of_other_formats_get_the_line_that_converts_them() {
         let home = tempfile::tempdir().unwrap();
-        for (name, expected) in [("a.bag", "rosbags-convert"), ("b.db3", "mcap convert")] {
+        for (name, expected) in [("a.bag", "rosbags-convert"), ("b.db3", "--src-typestore ros2_humble")] {
             let path = home.path().join(name);
             fs::write(&path, "x").unwrap();
             let failure = check_log_path(&path).unwrap_err();

@@ -110,6 +110,7 @@ impl<'a> Suite<'a> {
 
     /// Every broken promise of every plugin; a demand on a detector that is
     /// not registered is one, too.
+    #[must_use = "broken promises are returned, not asserted"]
     pub fn check_all(&self) -> Vec<Failure> {
         let mut failures = self.unmet_demands();
         for info in self.registry.plugins() {
@@ -119,11 +120,13 @@ impl<'a> Suite<'a> {
     }
 
     /// Every broken promise of one plugin.
+    #[must_use = "broken promises are returned, not asserted"]
     pub fn check(&self, plugin: &str) -> Vec<Failure> {
         self.check_where(plugin, |_| true)
     }
 
     /// The outcome of one check (see [`check_names`]) on one plugin.
+    #[must_use = "broken promises are returned, not asserted"]
     pub fn check_one(&self, plugin: &str, check: &str) -> Vec<Failure> {
         self.check_where(plugin, |name| name == check)
     }
@@ -165,6 +168,7 @@ impl<'a> Suite<'a> {
 }
 
 /// [`Suite::check_all`] without demands on single detectors.
+#[must_use = "broken promises are returned, not asserted"]
 pub fn check_all(registry: &Registry) -> Vec<Failure> {
     Suite::new(registry).check_all()
 }

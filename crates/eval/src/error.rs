@@ -34,10 +34,10 @@ pub enum EvalError {
         /// `image region` or `floor position`.
         what: &'static str,
     },
-    /// A region, position or score is not a number, or a size is negative.
+    /// A region, position or score is not a number.
     #[error(
         "sequence `{sequence}`, frame {frame} (1-based): {side} id {id} has a number that is not \
-         finite or a negative size; repair or drop the row"
+         finite; repair or drop the row"
     )]
     NotFinite {
         /// Name of the sequence.

@@ -126,6 +126,15 @@ impl DetectionTally {
         Some((sum / REFERENCE_FPPI.len() as f64).exp())
     }
 
+    /// Returns how many different scores there are. With a single one no threshold tells
+    /// some detections from others: the curve is a point, and its averages say nothing.
+    pub fn distinct_scores(&self) -> usize {
+        let mut scores: Vec<f64> = self.verdicts.iter().map(|verdict| verdict.score).collect();
+        scores.sort_by(f64::total_cmp);
+        scores.dedup();
+        scores.len()
+    }
+
     /// Precision and recall of all detections with at least this score.
     pub fn precision_recall(&self, least_score: f64) -> PrecisionRecall {
         let accepted = || self.verdicts.iter().filter(|v| v.score >= least_score);

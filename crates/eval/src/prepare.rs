@@ -262,7 +262,7 @@ struct Someone {
 
 impl From<&Truth> for Someone {
     fn from(truth: &Truth) -> Self {
-        let sane = truth.region.is_none_or(|r| r.is_sane())
+        let sane = truth.region.is_none_or(|r| r.is_finite())
             && truth.floor_m.is_none_or(|p| p.iter().all(|v| v.is_finite()));
         Self {
             id: truth.id,

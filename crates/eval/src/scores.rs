@@ -116,6 +116,7 @@ impl Tally {
             idtp: self.identity.tp,
             idfp: self.identity.fp,
             idfn: self.identity.fn_,
+            distinct_scores: self.detections.distinct_scores() as u64,
             ..Scores::default()
         }
     }
@@ -291,9 +292,18 @@ pub struct Scores {
     pub truth_ids: u64,
     /// Different tracks.
     pub track_ids: u64,
+    /// Different scores among single reports; 0 without any, or where it was not counted.
+    #[serde(default)]
+    pub distinct_scores: u64,
 }
 
 impl Scores {
+    /// True if all reports have the same score, so that LAMR and AP, which need an order
+    /// of them, say nothing.
+    pub fn has_constant_scores(&self) -> bool {
+        self.distinct_scores == 1 && self.reports > 1
+    }
+
     /// Scores one sequence with the usual settings.
     ///
     /// # Errors

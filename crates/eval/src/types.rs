@@ -48,11 +48,14 @@ impl Region {
         if area > f64::EPSILON { self.intersection(other) / area } else { 0.0 }
     }
 
-    /// True if all four numbers are finite and the size is not negative.
-    pub fn is_sane(&self) -> bool {
+    /// True if all four numbers are finite.
+    pub fn is_finite(&self) -> bool {
         [self.x, self.y, self.width, self.height].iter().all(|v| v.is_finite())
-            && self.width >= 0.0
-            && self.height >= 0.0
+    }
+
+    /// True if width and height are above 0; a rectangle without an area is like no other.
+    pub fn has_area(&self) -> bool {
+        self.width > 0.0 && self.height > 0.0
     }
 }
 

@@ -3,10 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::fs;
-use std::path::Path;
 
 use proptest::prelude::*;
-use tagalong_eval::formats::{FormatError, Timeline, kitti, metres, mot, people, trackeval};
+use tagalong_eval::formats::{
+    FormatError, OddLines, Timeline, kitti, metres, mot, people, trackeval,
+};
 use tagalong_eval::{
     Comparison, Frame, Region, Report, Role, Sequence, SetDistance, Similarity, Tally, Truth,
 };
@@ -41,18 +42,104 @@ fn a_bad_line_is_named_with_what_was_expected() {
     assert!(parse("1,1,1,inf,1,1").contains("finite"));
     assert!(parse("0,1,1,1,1,1").contains("numbered from 1"));
     assert!(parse("1,1.5,1,1,1,1").contains("`id` is `1.5`, expected a whole number"));
-    assert!(parse("1,1,1,1,-1,1").contains("negative size"));
-    assert!(
-        why(mot::parse_truth("1,1,1,1,1,1,1,14,1", "gt.txt", mot::Rules::Mot17))
-            .contains("class 14")
-    );
+}
+
+/// Two lines of truth, the second with this class.
+fn classed(class: &str) -> String {
+    format!("1,1,0,0,9,9,1,1,1\n2,1,0,0,9,9,1{class}\n")
+}
+
+#[test]
+fn a_truth_without_its_class_is_refused_and_changes_no_rules() {
+    for (class, said) in [(",0,1", "class 0"), (",-1,1", "class -1"), (",14,1", "class 14")] {
+        let text = classed(class);
+        for refused in [
+            why(mot::Rules::of_truth(&text, "gt.txt")),
+            why(mot::parse_truth(&text, "gt.txt", mot::Rules::Mot17)),
+        ] {
+            assert!(refused.starts_with(&format!("gt.txt, line 2: {said};")), "{refused}");
+        }
+        assert_eq!(mot::parse_truth(&text, "gt.txt", mot::Rules::Mot15).unwrap().len(), 2);
+    }
+    let short = why(mot::parse_truth(&classed(""), "gt.txt", mot::Rules::Mot20));
+    assert_eq!(short, "gt.txt, line 2: has no class (field 8)");
+}
+
+#[test]
+fn truth_says_whose_rules_it_follows() {
+    let rules = |text: &str| mot::Rules::of_truth(text, "gt.txt").unwrap();
+    assert_eq!(rules(&classed(",13,1")), mot::Rules::Mot17);
+    assert_eq!(rules("1,1,0,0,9,9,1,-1,-1,-1\n2,1,0,0,9,9,0,-1,-1,-1\n"), mot::Rules::Mot15);
+    assert_eq!(rules("1,1,0,0,9,9\n"), mot::Rules::Mot15);
+    assert_eq!(rules(""), mot::Rules::Mot15);
+    // Places in metres, one of which looks like a class.
+    assert_eq!(rules("1,1,0,0,9,9,1,4.25,5.5,0\n2,1,0,0,9,9,1,4,5.5,0\n"), mot::Rules::Mot15);
+    let mixed = why(mot::Rules::of_truth("1,1,0,0,9,9,1,1,1\n2,1,0,0,9,9,1,2.5,1\n", "gt.txt"));
+    assert!(mixed.starts_with("gt.txt, line 2: class 2.5;"), "{mixed}");
+    assert_eq!(mot::Rules::Mot20.name(), "MOT20");
+}
+
+#[test]
+fn tracks_of_no_person_or_of_a_car_are_refused() {
+    let tracks = |id: i64, class: &str| {
+        let text = format!("1,0,0,0,9,9,1,1\n2,{id},0,0,9,9,0.5,{class},-1,-1\n");
+        mot::parse_tracks(&text, "tracks.txt")
+    };
+    for class in ["-1", "0", "1"] {
+        assert_eq!(tracks(7, class).unwrap().len(), 2, "{class}");
+    }
+    let car = why(tracks(7, "3"));
+    assert!(car.starts_with("tracks.txt, line 2: class 3; only people"), "{car}");
+    let nobody = why(tracks(-1, "-1"));
+    assert!(nobody.starts_with("tracks.txt, line 2: id -1;"), "{nobody}");
+    let truth = why(mot::parse_truth("1,-1,0,0,9,9,1,1,1", "gt.txt", mot::Rules::Mot17));
+    assert!(truth.starts_with("gt.txt, line 1: id -1;"), "{truth}");
+}
+
+#[test]
+fn frames_beyond_the_length_are_refused_with_their_line() {
+    let rows = mot::parse("3,1,0,0,9,9\n4,1,0,0,9,9\n", "tracks.txt").unwrap();
+    assert!(mot::check_length(&rows, "tracks.txt", 4).is_ok());
+    let beyond = why(mot::check_length(&rows, "tracks.txt", 3));
+    assert_eq!(beyond, "tracks.txt, line 2: frame 4; the sequence has 3 (seqLength)");
+    let mut files = exported(&Sequence { name: "hall".into(), frames: vec![Frame::default()] });
+    for path in [
+        "gt/mot_challenge/Tagalong-train/hall/gt/gt.txt",
+        "trackers/mot_challenge/Tagalong-train/ours/data/hall.txt",
+    ] {
+        let kept = files.insert(path.into(), "1,1,0,0,9,9,1,1,1\n2,1,0,0,9,9,1,1,1\n".into());
+        let read = trackeval::read(&files, "Tagalong", "ours", mot::Rules::Mot17);
+        assert!(why(read).starts_with(&format!("{path}, line 2: frame 2;")));
+        files.insert(path.into(), kept.unwrap());
+    }
+}
+
+#[test]
+fn boxes_without_an_area_match_nobody() {
+    let rows =
+        mot::parse("1,1,10,10,20,20\n1,2,30,10,-20,20\n1,3,30,30,-20,-20\n1,4,9,9,0,9\n", "t");
+    let rows = rows.unwrap();
+    let odd = OddLines::among(rows.iter().map(|row| (row.line, !row.region.has_area())));
+    assert_eq!(odd, Some(OddLines { count: 3, first: 2, of: 4 }));
+    assert_eq!(OddLines::among([(1, false)]), None);
+    let mut timeline = Timeline::new();
+    timeline.add_truths([rows[0].truth(mot::Rules::Mot15)]);
+    timeline.add_reports(rows.iter().map(mot::Row::report));
+    let (sequence, _) = timeline.into_sequence("flat", 1, 1, 1.0);
+    let tally =
+        |comparison| Tally::measure(&sequence, &comparison, &SetDistance::default()).unwrap().clear;
+    let clear = tally(Comparison::default());
+    assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 3, 0));
+    // KITTI's rules leave out whatever is unmatched and not high.
+    let clear = tally(kitti::comparison(Similarity::Iou));
+    assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 0, 0));
 }
 
 #[test]
 fn classes_and_flags_mean_what_each_benchmark_says() {
     let role = |class: i64, flag: i64, rules| {
         let line = format!("1,1,0,0,9,9,{flag},{class},1");
-        mot::parse_truth(&line, "gt.txt", rules).unwrap()[0].1.role
+        mot::parse_truth(&line, "gt.txt", rules).unwrap()[0].role(rules)
     };
     use mot::Rules::{Mot15, Mot17, Mot20};
     assert_eq!(role(1, 1, Mot17), Role::Counts);
@@ -111,18 +198,30 @@ fn kitti_labels_survive_a_round_trip_and_mean_what_they_say() {
     let clear = tally(Similarity::Iou).clear;
     assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 0, 0));
     assert_eq!(tally(Similarity::Metres).clear.tp, 1);
-    let inside_out = source.replace("10 20 30 80", "30 20 10 80");
-    assert!(why(kitti::parse(&inside_out, "0000.txt")).contains("ends before it begins"));
+    // A box that ends before it begins is read, and a miss.
+    let inside_out = kitti::parse(&source.replace("10 20 30 80", "30 20 10 80"), "0000.txt");
+    assert!(!inside_out.unwrap()[0].region.has_area());
+}
+
+#[test]
+fn kitti_objects_that_are_not_told_apart_are_left_out() {
+    let label = |id: i64, class: &str| format!("0 {id} {class} 0 0 0 1 1 9 9 1 1 1 1 1 1 0\n");
+    let source = label(-1, "Pedestrian") + &label(-1, "DontCare") + &label(0, "Pedestrian");
+    let labels = kitti::parse(&source, "0000.txt").unwrap();
+    let odd = labels.iter().map(|label| (label.line, label.is_anonymous())).collect::<Vec<_>>();
+    assert_eq!(odd, [(1, true), (2, false), (3, false)]);
+    let mut timeline = Timeline::new();
+    kitti::add_truths(&mut timeline, &labels);
+    kitti::add_reports(&mut timeline, &labels);
+    let frame = timeline.frame(0);
+    assert_eq!((frame.truths.len(), frame.reports.len()), (1, 1));
+    assert_eq!((frame.truths[0].id, frame.ignore_regions.len()), (0, 1));
 }
 
 #[test]
 fn people_csv_survives_a_round_trip_in_any_order_of_columns() {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs/um.people.csv");
-    let Ok(source) = fs::read_to_string(&path) else {
-        eprintln!("skipped: no data in {}", path.display());
-        return;
-    };
+    let Some(path) = tagalong_testdata::find("logs/um.people.csv") else { return };
+    let source = fs::read_to_string(&path).unwrap();
     let rows = people::parse(&source, "um.people.csv").unwrap();
     assert_eq!(rows.len(), source.lines().count() - 1);
     let written = text(|out| people::write(out, &rows));
@@ -158,6 +257,8 @@ fn places_of_a_run_become_reports() {
     let (frame, report) = rows[0].report(metres::Floor::Robot);
     assert_eq!((frame, report.id, report.floor_m), (3, 12, Some([2.5, -0.5])));
     assert_eq!(rows[0].report(metres::Floor::Odometry).1.floor_m, Some([7.5, 1.5]));
+    assert!(metres::check_length(&rows, "t.csv", 3).is_ok());
+    assert!(why(metres::check_length(&rows, "t.csv", 2)).starts_with("t.csv, line 2: frame 3;"));
     let wrong = why(metres::parse(&source.replace("1700000000123456789", "soon"), "t.csv"));
     assert!(wrong.contains("`stamp_ns` is `soon`"), "{wrong}");
 }

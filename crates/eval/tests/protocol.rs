@@ -4,7 +4,7 @@
 
 use tagalong_eval::{
     Clear, Comparison, DetectionTally, EvalError, EventKind, Following, Frame, Prepared, Region,
-    Report, Role, Scores, Sequence, SetDistance, Similarity, Tally, Times, Truth, events,
+    Report, Role, Scores, Sequence, SetDistance, Similarity, Tally, Times, Truth, Verdict, events,
 };
 
 const SECOND_NS: i64 = 1_000_000_000;
@@ -129,6 +129,37 @@ fn the_miss_rate_is_read_left_of_each_reference() {
     assert!((tally.log_average_miss_rate().unwrap() - expected).abs() < 1e-12);
     // One right of two at recall one half, then two of three.
     assert!((tally.average_precision().unwrap() - 2.0 / 3.0).abs() < 1e-12);
+}
+
+#[test]
+fn each_reference_reads_the_last_point_that_is_not_beyond_it() {
+    let mut tally = DetectionTally { truths: 10, images: 1000, ..DetectionTally::default() };
+    let groups = [(5, 1), (15, 1), (30, 2), (50, 1), (400, 2), (1500, 2)];
+    for (step, (wrong, right)) in groups.into_iter().enumerate() {
+        let verdict = |right| Verdict { score: -(step as f64), right };
+        tally.verdicts.extend((0..wrong).map(|_| verdict(false)));
+        tally.verdicts.extend((0..right).map(|_| verdict(true)));
+    }
+    let fppi: Vec<f64> = tally.curve().iter().map(|point| point.fppi).collect();
+    assert_eq!(fppi, [0.005, 0.02, 0.05, 0.1, 0.5, 2.0]);
+    // The fourth point lies on a reference, and is read there; the last one is beyond all.
+    let read: [f64; 9] = [0.9, 0.9, 0.8, 0.6, 0.5, 0.5, 0.5, 0.3, 0.3];
+    let expected = (read.iter().map(|rate| rate.ln()).sum::<f64>() / 9.0).exp();
+    assert!((tally.log_average_miss_rate().unwrap() - expected).abs() < 1e-12);
+}
+
+#[test]
+fn constant_scores_are_told_from_an_order() {
+    let mut scene = sequence(&[(&[(1, 0.0)], &[(1, 0.0), (2, 5.0)]), (&[(1, 0.0)], &[(1, 0.0)])]);
+    let scores = |scene: &Sequence| Scores::measure(scene, Similarity::Iou).unwrap();
+    let constant = scores(&scene);
+    assert_eq!((constant.distinct_scores, constant.has_constant_scores()), (1, true));
+    scene.frames[1].reports[0].score = 0.4;
+    let ordered = scores(&scene);
+    assert_eq!((ordered.distinct_scores, ordered.has_constant_scores()), (2, false));
+    // A single report has an order of one.
+    let single = scores(&one_frame(vec![truth(1, 0.0)], vec![report(1, 0.0)]));
+    assert_eq!((single.distinct_scores, single.has_constant_scores()), (1, false));
 }
 
 #[test]
@@ -265,7 +296,7 @@ fn bad_input_is_named() {
 
     for bad in [
         Report { region: Some(Region::new(f64::NAN, 0.0, 1.0, 1.0)), ..report(4, 0.0) },
-        Report { region: Some(Region::new(0.0, 0.0, -1.0, 1.0)), ..report(4, 0.0) },
+        Report { region: Some(Region::new(0.0, 0.0, 1.0, f64::INFINITY)), ..report(4, 0.0) },
         Report { floor_m: Some([f64::INFINITY, 0.0]), ..report(4, 0.0) },
         Report { score: f64::NAN, ..report(4, 0.0) },
     ] {

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 use tagalong_eval::formats::{Timeline, mot};
@@ -13,16 +13,7 @@ use tagalong_eval::{
     Comparison, DetectionTally, Frame, HotaLevel, Region, Report, Role, Sequence, SetDistance,
     Similarity, Tally, Truth,
 };
-
-/// A folder of the shared data, or nothing and a message.
-fn data(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(folder);
-    if !path.is_dir() {
-        eprintln!("skipped: no data in {}", path.display());
-        return None;
-    }
-    Some(path)
-}
+use tagalong_testdata::find;
 
 fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
@@ -30,11 +21,16 @@ fn read(path: &Path) -> String {
 
 fn sequence(name: &str, truth: &Path, tracks: &Path, rules: mot::Rules, length: u32) -> Sequence {
     let mut timeline = Timeline::new();
-    timeline.add_truths(mot::parse_truth(&read(truth), "truth", rules).unwrap());
-    timeline.add_reports(mot::parse(&read(tracks), "tracks").unwrap().iter().map(mot::Row::report));
-    let (sequence, beyond) = timeline.into_sequence(name, 1, length, 30.0);
-    assert_eq!(beyond, 0, "frames beyond the length of {name}");
-    sequence
+    let truth = read(truth);
+    assert_eq!(mot::Rules::of_truth(&truth, "truth").unwrap(), rules, "{name}");
+    let truth = mot::parse_truth(&truth, "truth", rules).unwrap();
+    let tracks = mot::parse_tracks(&read(tracks), "tracks").unwrap();
+    for rows in [&truth, &tracks] {
+        mot::check_length(rows, name, length).unwrap();
+    }
+    timeline.add_truths(truth.iter().map(|row| row.truth(rules)));
+    timeline.add_reports(tracks.iter().map(mot::Row::report));
+    timeline.into_sequence(name, 1, length, 30.0).0
 }
 
 fn mot17(mot: &Path) -> Vec<Sequence> {
@@ -137,7 +133,7 @@ fn compare(sequence: &str, tally: &Tally, expected: &Value) -> usize {
 
 #[test]
 fn every_figure_equals_trackeval() {
-    let Some(mot) = data("mot") else { return };
+    let Some(mot) = find("mot") else { return };
     let expected: Value =
         serde_json::from_str(&read(&mot.join("expected-trackeval.json"))).unwrap();
     let mut compared = 0;
@@ -152,7 +148,7 @@ fn every_figure_equals_trackeval() {
 
 #[test]
 fn the_long_table_and_the_combined_line_equal_trackeval() {
-    let Some(mot) = data("mot") else { return };
+    let Some(mot) = find("mot") else { return };
     let text = read(&mot.join("tracker-output/MOT17-train/expected-trackeval.csv"));
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -175,7 +171,7 @@ fn the_long_table_and_the_combined_line_equal_trackeval() {
 
 #[test]
 fn combined_figures_come_from_the_summed_counts() {
-    let Some(mot) = data("mot") else { return };
+    let Some(mot) = find("mot") else { return };
     let tallies: Vec<Tally> = mot17(&mot).iter().map(tally).collect();
     let all = Tally::combine(&tallies);
     // (TP - FP - IDSW) / (TP + FN), and so on, from TrackEval's table.
@@ -199,7 +195,7 @@ fn combined_figures_come_from_the_summed_counts() {
 
 #[test]
 fn the_pair_of_py_motmetrics_gives_its_published_line() {
-    let Some(mot) = data("mot") else { return };
+    let Some(mot) = find("mot") else { return };
     let scores = tally(&tud_campus(&mot)).scores();
     let percent = |value: Option<f64>| (value.unwrap() * 1000.0).round() / 10.0;
     assert_eq!(percent(scores.idf1), 55.8);
@@ -248,7 +244,7 @@ fn kaist_truth(truth: &Value) -> Truth {
 
 #[test]
 fn log_average_miss_rates_equal_the_published_ones() {
-    let Some(folder) = data("lamr") else { return };
+    let Some(folder) = find("lamr") else { return };
     let frames = kaist(&folder);
     let rate = |frames: &[Frame]| {
         let sequence = Sequence { name: "KAIST".into(), frames: frames.to_vec() };

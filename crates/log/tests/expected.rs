@@ -11,12 +11,7 @@ use tagalong_log::mcap_walk::Walker;
 use tagalong_log::msgs::{CompressedImage, Image, StringMsg, decode};
 
 fn folder() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/mcap");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: {} is not there", folder.display());
-    None
+    tagalong_testdata::find("mcap")
 }
 
 fn walker(path: &Path) -> Walker<BufReader<std::fs::File>> {

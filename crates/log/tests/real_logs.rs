@@ -34,12 +34,7 @@ const LOGS: [Expected; 8] = [
 ];
 
 fn logs() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: {} is not there", folder.display());
-    None
+    tagalong_testdata::find("logs")
 }
 
 fn open(folder: &Path, name: &str, input: &InputSettings, inputs: Inputs) -> FrameSource {

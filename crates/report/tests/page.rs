@@ -127,6 +127,19 @@ fn what_is_no_number_is_left_out() {
 }
 
 #[test]
+fn a_miss_rate_from_constant_scores_says_that_it_means_nothing() {
+    let mut benchmark = two_by_three();
+    assert!(!html(&benchmark, None).contains("mean nothing"));
+    let task = &mut benchmark.tasks[0];
+    let scores = task.image.unwrap();
+    task.image = Some(Scores { distinct_scores: 1, reports: 9, ..scores });
+    let said = format!("{} on {}", task.pipeline, task.log);
+    let page = html(&benchmark, None);
+    let note = page.split("mean nothing").nth(1).unwrap();
+    assert!(note.split("</p>").next().unwrap().ends_with(&format!("{said}.")), "{said}");
+}
+
+#[test]
 fn every_anchor_leads_somewhere_and_ids_are_unique() {
     let mut benchmark = two_by_three();
     common::spoil(&mut benchmark, Outcome::Failed { why: "x".into() });

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a broken test may stop loudly")]
 #![allow(clippy::print_stdout, reason = "the figures are what one wants to see")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tagalong_core::GreyImage;
 use tagalong_stereo::{Matcher, Method, StereoSettings};
@@ -55,15 +55,6 @@ const PAIRS: [Pair; 4] = [
         sgbm_visible: [11.32, 8.90],
     },
 ];
-
-fn folder() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/stereo");
-    let there = folder.is_dir();
-    if !there {
-        eprintln!("skipped: no Middlebury pairs at {}", folder.display());
-    }
-    there.then_some(folder)
-}
 
 /// Grey as OpenCV makes it from colour.
 fn grey(path: &Path) -> GreyImage {
@@ -145,7 +136,7 @@ fn dense(method: Method) -> StereoSettings {
 
 #[test]
 fn semi_global_is_no_worse_than_opencv() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = tagalong_testdata::find("stereo") else { return };
     for pair in &PAIRS {
         let Judged { bad, .. } = judge(&folder, pair, &dense(Method::SemiGlobal));
         println!("    OpenCV's SGBM: all {:.2?}, visible {:.2?}", pair.sgbm, pair.sgbm_visible);
@@ -157,7 +148,7 @@ fn semi_global_is_no_worse_than_opencv() {
 /// and `StereoBM` with its larger window guesses.
 #[test]
 fn windows_fail_nowhere_as_badly_as_opencv_where_it_is_worst() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = tagalong_testdata::find("stereo") else { return };
     for pair in &PAIRS {
         let [_, all, ..] = judge(&folder, pair, &dense(Method::Block)).bad;
         println!("    OpenCV's BM: all {:.2?}", pair.bm);
@@ -168,7 +159,7 @@ fn windows_fail_nowhere_as_badly_as_opencv_where_it_is_worst() {
 /// What the test of texture drops is more often wrong than what it leaves.
 #[test]
 fn of_what_the_defaults_leave_less_is_wrong() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = tagalong_testdata::find("stereo") else { return };
     for pair in &PAIRS {
         let all = judge(&folder, pair, &dense(Method::SemiGlobal)).wrong;
         let left = judge(&folder, pair, &StereoSettings::default()).wrong;

@@ -60,7 +60,8 @@ fn prompt() -> Config {
 fn it_keeps_the_promises_of_controllers() {
     let mut registry = Registry::default();
     crate::register(&mut registry);
-    tagalong_conformance::check_all(&registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]

@@ -93,7 +93,9 @@ impl Grouping {
             *strength += f64::from(hit.margin);
         }
         for Group { region, count, .. } in &mut self.groups {
-            let mean = |sum: f64| (sum / *count as f64).round();
+            // As OpenCV: in 32 bits, by the reciprocal, and halves to the even number.
+            let part = 1.0 / *count as f32;
+            let mean = |sum: f64| f64::from((sum as f32 * part).round_ties_even());
             let Rect { x, y, width, height } = *region;
             *region = Rect::new(mean(x), mean(y), mean(width), mean(height));
         }
@@ -110,7 +112,7 @@ pub fn grouped(hits: &[Hit], fewest: usize) -> Vec<Group> {
 /// True if a group lies inside of a stronger one.
 fn outvotes(outer: &Group, inner: &Group) -> bool {
     let (r, o) = (&inner.region, &outer.region);
-    let (dx, dy) = ((o.width * ALIKE).floor(), (o.height * ALIKE).floor());
+    let [dx, dy] = [o.width, o.height].map(|size| (size * ALIKE).round_ties_even());
     let fits = r.x >= o.x - dx
         && r.y >= o.y - dy
         && r.right() <= o.right() + dx

@@ -273,6 +273,25 @@ fn like_windows_are_one_face_and_single_ones_none() {
     assert_eq!(grouped(&chain, 2).len(), 1);
 }
 
+/// What `cv2.groupRectangles(.., 3, 0.2)` of OpenCV 4.14 answers.
+#[test]
+fn groups_are_rounded_as_opencv_does() {
+    let hit = |x: f64, y: f64, side: f64| Hit { region: Rect::new(x, y, side, side), margin: 0.0 };
+    let mean = |a: Hit, b: Hit| grouped(&[a, b, a, b], 3)[0].region;
+    // Halves go to the even number: 10.5 to 10, 11.5 to 12.
+    let low = mean(hit(10.0, 11.0, 20.0), hit(11.0, 12.0, 21.0));
+    assert_eq!(low, Rect::new(10.0, 12.0, 20.0, 20.0));
+    let high = mean(hit(11.0, 10.0, 21.0), hit(12.0, 11.0, 22.0));
+    assert_eq!(high, Rect::new(12.0, 10.0, 22.0, 22.0));
+    // A fifth of the larger one's side is rounded, too: 5.6 to 6, 6.4 to 6.
+    let inside = |side: f64, off: f64| {
+        let groups = [&[hit(0.0, 0.0, side); 5][..], &[hit(-off, 0.0, 20.0); 4]].concat();
+        grouped(&groups, 3).len() == 1
+    };
+    assert!(inside(28.0, 6.0) && !inside(28.0, 7.0));
+    assert!(inside(32.0, 6.0) && !inside(32.0, 7.0));
+}
+
 #[test]
 fn a_smaller_group_inside_a_stronger_one_goes() {
     let hit = |x: f64, side: f64| Hit { region: Rect::new(x, x, side, side), margin: 0.1 };

@@ -21,13 +21,7 @@ const OFF_PX: f64 = 8.0;
 const UNPAIRED: f64 = 0.1;
 
 fn data(file: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/opencv");
-    let path = root.join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {} is not here", path.display());
-    None
+    tagalong_testdata::find(&format!("opencv/{file}"))
 }
 
 fn text(path: &Path) -> String {

@@ -92,6 +92,15 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
             Outcome::Skipped { why } => writeln!(out, "skipped: {}", first_line(why)),
         };
     }
+    for task in &benchmark.tasks {
+        if task.image.is_some_and(|scores| scores.has_constant_scores()) {
+            let _ = writeln!(
+                out,
+                "note: {} on {}: all reports have the same score; LAMR and AP mean nothing then",
+                task.pipeline, task.log
+            );
+        }
+    }
     let _ = writeln!(out, "report in {}", store.path("report.html").display());
     out
 }

@@ -212,6 +212,7 @@ impl Desk<'_> {
         let first = &group[0].task;
         let options = TruthOptions { upper_body: first.whole_bodies, ..TruthOptions::default() };
         let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
+        truth.notes.iter().for_each(|note| say(&format!("note: {note}")));
         let mut source = open(&group[0], group[0].config.inputs)?;
         let mut lanes: Vec<Lane> =
             group.iter().map(|ready| Lane::new(ready, self.registry)).collect();

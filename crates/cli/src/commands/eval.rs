@@ -2,11 +2,13 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use serde::Serialize;
+use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{Scores, Sequence, Similarity};
 
 use crate::args::Format;
 use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, print, say};
+use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
 };
@@ -71,24 +73,54 @@ impl From<SimilarityChoice> for Similarity {
 /// # Errors
 /// Files that cannot be read or do not fit together.
 pub fn eval(args: &EvalArgs) -> Outcome {
-    let (sequence, truth) = sequence(args)?;
+    let Judged { sequence, truth, mut notes } = judged(args)?;
     let similarity = args.similarity.into();
     let Some(sequence) = comparable(&sequence, similarity) else {
         return Err(no_place(args, &truth));
     };
     let scores = Scores::measure(&sequence, comparison(&truth, similarity))
         .map_err(|error| Failure::failed(format!("{}: {error}", args.tracks.display())))?;
+    if scores.has_constant_scores() {
+        notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
+    }
+    let said = Said { scores: &scores, rules: rules(&truth), notes: &notes };
     print(&match args.format {
-        Format::Json => serde_json::to_string_pretty(&scores).unwrap_or_default() + "\n",
-        Format::Text => as_text(&scores),
+        Format::Json => serde_json::to_string_pretty(&said).unwrap_or_default() + "\n",
+        Format::Text => as_text(&said),
     })?;
     Ok(Ended::Well)
 }
 
-fn sequence(args: &EvalArgs) -> Result<(Sequence, TruthFile), Failure> {
+/// Why LAMR and AP are no figures of such tracks.
+const CONSTANT_SCORES: &str = "all reports have the same score; LAMR and AP mean nothing then: \
+                               no threshold tells sure reports from unsure ones";
+
+/// What is printed: the figures, and how they came about.
+#[derive(Serialize)]
+struct Said<'a> {
+    #[serde(flatten)]
+    scores: &'a Scores,
+    /// Whose rules say what the truth means, where several are in use.
+    rules: Option<&'static str>,
+    notes: &'a [String],
+}
+
+fn rules(truth: &TruthFile) -> Option<&'static str> {
+    if truth.is_kitti() { Some("KITTI") } else { truth.rules.map(Rules::name) }
+}
+
+/// Truth and tracks side by side.
+struct Judged {
+    sequence: Sequence,
+    truth: TruthFile,
+    /// What was read in another way than the writers of the files may have thought.
+    notes: Vec<String>,
+}
+
+fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
     let options = TruthOptions { rules: args.rules, upper_body: args.upper_body };
-    let truth = TruthFile::read(&args.truth, options)?;
-    let tracks = Tracks::read(&args.tracks)?;
+    let mut truth = TruthFile::read(&args.truth, options)?;
+    let tracks = Tracks::read(&args.tracks, truth.info.as_ref().map(|info| info.length))?;
     let shots = shots(args, &truth, &tracks)?;
     if args.similarity == SimilarityChoice::Metres && truth.is_kitti() && tracks.in_robot_frame {
         return Err(Failure::usage(
@@ -96,14 +128,28 @@ fn sequence(args: &EvalArgs) -> Result<(Sequence, TruthFile), Failure> {
              compare boxes (--similarity iou), or give tracks as KITTI labels",
         ));
     }
+    let mut notes = std::mem::take(&mut truth.notes);
+    notes.extend(longer(args, truth.last(&shots).max(shots.last()), &tracks));
+    notes.extend(tracks.notes);
     let lost = truth.without_image(&shots);
     if lost > 0 {
         let shown = args.truth.display();
-        say(&format!("note: {lost} moments of {shown} have no image and are left out"));
+        notes.push(format!("{shown}: {lost} moments have no image and are left out"));
     }
     let rate = rate(args, &truth)?;
     let name = args.truth.display().to_string();
-    Ok((assemble(&name, &truth, &shots, tracks.reports, rate), truth))
+    let sequence = assemble(&name, &truth, &shots, tracks.reports, rate);
+    Ok(Judged { sequence, truth, notes })
+}
+
+/// Where no file states the length of a sequence, its last frame is the last one that
+/// anybody names.
+fn longer(args: &EvalArgs, known: u32, tracks: &Tracks) -> Option<String> {
+    let (&last, _) = tracks.reports.last_key_value()?;
+    let shown = args.tracks.display();
+    (last > known).then(|| {
+        format!("{shown}: goes on to frame {last}, and the last frame known is {known}; all count")
+    })
 }
 
 fn rate(args: &EvalArgs, truth: &TruthFile) -> Result<Rate, Failure> {
@@ -157,9 +203,9 @@ fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {
     })
 }
 
-/// One figure a line, in the order of the fields.
-fn as_text(scores: &Scores) -> String {
-    let json = serde_json::to_string(scores).unwrap_or_default();
+/// One figure a line, in the order of the fields, then the rules and the notes.
+fn as_text(said: &Said<'_>) -> String {
+    let json = serde_json::to_string(said.scores).unwrap_or_default();
     let mut out = String::new();
     let inside = json.trim_start_matches('{').trim_end_matches('}');
     for field in inside.split(',') {
@@ -170,6 +216,12 @@ fn as_text(scores: &Scores) -> String {
             (text, _) => text.to_owned(),
         };
         let _ = writeln!(out, "{:<24} {value:>10}", name.trim_matches('"'));
+    }
+    if let Some(rules) = said.rules {
+        let _ = writeln!(out, "{:<24} {rules:>10}", "rules");
+    }
+    for note in said.notes {
+        let _ = writeln!(out, "note: {note}");
     }
     out
 }

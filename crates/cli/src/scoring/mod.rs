@@ -9,6 +9,7 @@ use std::fs;
 use std::path::Path;
 
 pub use shots::{Shot, Shots};
+use tagalong_eval::formats::{OddLines, kitti};
 use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
 pub use truth::{RulesChoice, TruthFile, TruthOptions};
@@ -76,9 +77,37 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
 /// The comparison that the truth's protocol asks for.
 pub fn comparison(truth: &TruthFile, similarity: Similarity) -> Comparison {
     match truth.is_kitti() && similarity == Similarity::Iou {
-        true => tagalong_eval::formats::kitti::comparison(similarity),
+        true => kitti::comparison(similarity),
         false => similarity.into(),
     }
+}
+
+/// Returns a note on the boxes of a file, each with its line, that have no area, if any.
+fn without_area<'a>(
+    name: &str,
+    boxes: impl Iterator<Item = (usize, &'a Region)>,
+) -> Option<String> {
+    OddLines::among(boxes.map(|(line, region)| (line, !region.has_area()))).map(
+        |OddLines { count, first, of }| {
+            format!(
+                "{name}: {count} of {of} boxes have no area (the first in line {first}); as in \
+                 TrackEval they match nobody"
+            )
+        },
+    )
+}
+
+/// Returns notes on KITTI labels that are read in another way than they may be meant.
+fn odd_labels(name: &str, labels: &[kitti::Label]) -> Vec<String> {
+    let anonymous = OddLines::among(labels.iter().map(|label| (label.line, label.is_anonymous())));
+    let left_out = anonymous.map(|OddLines { count, first, of }| {
+        format!(
+            "{name}: {count} of {of} lines have an id below 0 (the first is line {first}); as in \
+             TrackEval they are left out"
+        )
+    });
+    let boxes = labels.iter().map(|label| (label.line, &label.region));
+    without_area(name, boxes).into_iter().chain(left_out).collect()
 }
 
 /// A text file.

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use tagalong_eval::Report;
 use tagalong_eval::formats::{Timeline, kitti, metres, mot};
 
-use super::{Reports, read_text};
+use super::{Reports, odd_labels, read_text, without_area};
 use crate::outcome::Failure;
 
 /// Tracks as a tracker wrote them.
@@ -17,6 +17,8 @@ pub struct Tracks {
     pub log_name: Option<String>,
     /// Positions are in the robot frame.
     pub in_robot_frame: bool,
+    /// What was read in another way than its writer may have thought.
+    pub notes: Vec<String>,
 }
 
 /// The part of a run's `report.json` that is looked at.
@@ -32,43 +34,61 @@ struct LogName {
 
 impl Tracks {
     /// Reads tracks: MOTChallenge or KITTI text, `tracks-metres.csv`, or the
-    /// folder of a run.
+    /// folder of a run; `length` is how many frames the sequence has, if that is known.
     ///
     /// # Errors
-    /// A file that cannot be read; names the file and the line.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    /// A file that cannot be read, or that TrackEval would refuse; names the file and the
+    /// line.
+    pub fn read(path: &Path, length: Option<u32>) -> Result<Self, Failure> {
         if path.is_dir() {
-            return Self::of_run(path);
+            return Self::of_run(path, length);
         }
         let (text, name) = (read_text(path)?, path.display().to_string());
         let first = text.lines().next().unwrap_or_default();
-        let reports = if first.starts_with("stamp_ns") {
-            return Ok(Self { in_robot_frame: true, ..Self::of(places(&text, &name)?) });
-        } else if is_kitti(first) {
-            kitti_reports(&text, &name)?
-        } else {
-            boxes(&text, &name)?
-        };
-        Ok(Self::of(reports))
+        if first.starts_with("stamp_ns") {
+            let reports = places(&text, &name, length)?;
+            return Ok(Self { reports, in_robot_frame: true, ..Self::default() });
+        }
+        match is_kitti(first) {
+            true => Self::of_kitti(&text, &name),
+            false => Self::of_boxes(&text, &name, length),
+        }
     }
 
-    fn of(reports: Reports) -> Self {
-        Self { reports, ..Self::default() }
+    fn of_boxes(text: &str, name: &str, length: Option<u32>) -> Result<Self, Failure> {
+        let rows = mot::parse_tracks(text, name).map_err(Failure::failed)?;
+        if let Some(length) = length {
+            mot::check_length(&rows, name, length).map_err(Failure::failed)?;
+        }
+        let notes = without_area(name, rows.iter().map(|row| (row.line, &row.region)));
+        let reports = gather(rows.iter().map(mot::Row::report));
+        Ok(Self { reports, notes: notes.into_iter().collect(), ..Self::default() })
     }
 
-    fn of_run(folder: &Path) -> Result<Self, Failure> {
+    /// KITTI counts frames from 0, everybody else from 1.
+    fn of_kitti(text: &str, name: &str) -> Result<Self, Failure> {
+        let labels = kitti::parse(text, name).map_err(Failure::failed)?;
+        let mut timeline = Timeline::new();
+        kitti::add_reports(&mut timeline, &labels);
+        let numbers = 0..=timeline.last().unwrap_or(0);
+        let frames = numbers.map(|number| (number + 1, timeline.frame(number).reports.clone()));
+        let (reports, notes) = (frames.collect(), odd_labels(name, &labels));
+        Ok(Self { reports, notes, ..Self::default() })
+    }
+
+    fn of_run(folder: &Path, length: Option<u32>) -> Result<Self, Failure> {
         let file = |name: &str| -> Result<(String, String), Failure> {
             let path: PathBuf = folder.join(name);
             Ok((read_text(&path)?, path.display().to_string()))
         };
         let (text, name) = file("tracks.csv")?;
-        let mut reports = boxes(&text, &name)?;
+        let mut tracks = Self::of_boxes(&text, &name, length)?;
         let (text, name) = file("tracks-metres.csv")?;
-        merge(&mut reports, places(&text, &name)?);
+        merge(&mut tracks.reports, places(&text, &name, length)?);
         let (text, name) = file("report.json")?;
         let facts: RunFacts = serde_json::from_str(&text)
             .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
-        Ok(Self { reports, log_name: Some(facts.log.name), in_robot_frame: true })
+        Ok(Self { log_name: Some(facts.log.name), in_robot_frame: true, ..tracks })
     }
 }
 
@@ -85,24 +105,14 @@ fn gather(rows: impl IntoIterator<Item = (u32, Report)>) -> Reports {
     reports
 }
 
-fn boxes(text: &str, name: &str) -> Result<Reports, Failure> {
-    let rows = mot::parse(text, name).map_err(Failure::failed)?;
-    Ok(gather(rows.iter().map(mot::Row::report)))
-}
-
 /// Only tracks that were seen: a box is written of no other.
-fn places(text: &str, name: &str) -> Result<Reports, Failure> {
+fn places(text: &str, name: &str, length: Option<u32>) -> Result<Reports, Failure> {
     let rows = metres::parse(text, name).map_err(Failure::failed)?;
+    if let Some(length) = length {
+        metres::check_length(&rows, name, length).map_err(Failure::failed)?;
+    }
     let seen = rows.iter().filter(|row| row.seen);
     Ok(gather(seen.map(|row| row.report(metres::Floor::Robot))))
-}
-
-fn kitti_reports(text: &str, name: &str) -> Result<Reports, Failure> {
-    let labels = kitti::parse(text, name).map_err(Failure::failed)?;
-    let mut timeline = Timeline::new();
-    kitti::add_reports(&mut timeline, &labels);
-    let numbers = 0..=timeline.last().unwrap_or(0);
-    Ok(numbers.map(|number| (number + 1, timeline.frame(number).reports.clone())).collect())
 }
 
 /// Gives boxes their places, and adds tracks that have a place but no box.

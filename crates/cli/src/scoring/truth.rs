@@ -9,7 +9,7 @@ use tagalong_eval::formats::{Timeline, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
 
-use super::{Shots, read_text, region};
+use super::{Shots, odd_labels, read_text, region, without_area};
 use crate::outcome::Failure;
 
 /// Truth of a log belongs to the image whose stamp is this near, ns.
@@ -24,7 +24,7 @@ pub type People = (Vec<Truth>, Vec<Region>);
 /// Whose rules say what MOTChallenge truth means.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum RulesChoice {
-    /// MOT17 if all boxes have a class of it, else MOT15.
+    /// MOT17 if all boxes have a class of it, MOT15 if none has; a mixture is refused.
     #[default]
     Auto,
     /// No classes; confidence 0 does not count.
@@ -78,6 +78,10 @@ pub struct TruthFile {
     frames: BTreeMap<u64, Annotated>,
     /// The `seqinfo.ini` beside it.
     pub info: Option<SequenceInfo>,
+    /// The rules that its rows were read with, if it is MOTChallenge text.
+    pub rules: Option<mot::Rules>,
+    /// What was read in another way than its writer may have thought.
+    pub notes: Vec<String>,
 }
 
 impl TruthFile {
@@ -100,7 +104,7 @@ impl TruthFile {
     }
 
     fn empty(kind: Kind) -> Self {
-        Self { kind, frames: BTreeMap::new(), info: None }
+        Self { kind, frames: BTreeMap::new(), info: None, rules: None, notes: Vec::new() }
     }
 
     fn add(&mut self, key: u64, truth: Truth, place: Place) {
@@ -110,15 +114,24 @@ impl TruthFile {
     fn of_mot(path: &Path, rules: RulesChoice) -> Result<Self, Failure> {
         let (text, name) = (read_text(path)?, path.display().to_string());
         let rules = match rules {
-            RulesChoice::Auto => guess(&mot::parse(&text, &name).map_err(Failure::failed)?),
+            RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
+                Failure::failed(format!("{error} (--rules mot15, mot17 or mot20)"))
+            })?,
             RulesChoice::Mot15 => mot::Rules::Mot15,
             RulesChoice::Mot17 => mot::Rules::Mot17,
             RulesChoice::Mot20 => mot::Rules::Mot20,
         };
         let mut file = Self::empty(Kind::Mot);
-        let rows = mot::parse_truth(&text, &name, rules).map_err(Failure::failed)?;
-        rows.into_iter().for_each(|(n, truth)| file.add(u64::from(n), truth, Place::Unknown));
+        file.rules = Some(rules);
         file.info = sequence_info(path)?;
+        let rows = mot::parse_truth(&text, &name, rules).map_err(Failure::failed)?;
+        if let Some(info) = &file.info {
+            mot::check_length(&rows, &name, info.length).map_err(Failure::failed)?;
+        }
+        file.notes.extend(without_area(&name, rows.iter().map(|row| (row.line, &row.region))));
+        for (number, truth) in rows.iter().map(|row| row.truth(rules)) {
+            file.add(u64::from(number), truth, Place::Unknown);
+        }
         Ok(file)
     }
 
@@ -135,11 +148,12 @@ impl TruthFile {
 
     /// KITTI counts frames from 0, everybody else from 1.
     fn of_kitti(path: &Path) -> Result<Self, Failure> {
-        let text = read_text(path)?;
-        let labels = kitti::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let (text, name) = (read_text(path)?, path.display().to_string());
+        let labels = kitti::parse(&text, &name).map_err(Failure::failed)?;
         let mut timeline = Timeline::new();
         kitti::add_truths(&mut timeline, &labels);
         let mut file = Self::empty(Kind::Kitti);
+        file.notes = odd_labels(&name, &labels);
         for number in 0..=timeline.last().unwrap_or(0) {
             let frame = timeline.frame(number).clone();
             let annotated = file.frames.entry(u64::from(number) + 1).or_default();
@@ -259,12 +273,6 @@ fn of_person(person: &TruthPerson) -> (Truth, Place) {
         role: if person.ignore { Role::Ignored } else { Role::Counts },
     };
     (truth, person.head_in_robot_m.map_or(Place::Unknown, |[x, y, _]| Place::Floor([x, y])))
-}
-
-/// Boxes without a proper class follow the rules that have none.
-fn guess(rows: &[mot::Row]) -> mot::Rules {
-    let has_class = |row: &mot::Row| row.class.is_some_and(|class| (1..=13).contains(&class));
-    if rows.iter().all(has_class) { mot::Rules::Mot17 } else { mot::Rules::Mot15 }
 }
 
 /// Tells formats apart by how they begin.

@@ -1,9 +1,10 @@
 //! Do pictures that are tested look like pictures that are trained with?
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tagalong_core::{Detection, Example, Frame, GreyImage};
 use tagalong_learn::{CALIBRATION, Use, use_of};
+use tagalong_testdata::find;
 
 use super::faces;
 use super::photos::{Photo, Take, mean_cells, photos, to_unit_length};
@@ -14,15 +15,6 @@ const SMALL: (usize, usize) = (10, 20);
 /// Pictures with a larger correlation show the same; different people on one meadow reach
 /// 0.904.
 const SAME: f32 = 0.92;
-
-/// The real data, where there is some.
-fn data() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if !path.exists() {
-        eprintln!("skipped: {} is not here", path.display());
-    }
-    path.exists().then_some(path)
-}
 
 /// A small picture of unit length and without its mean.
 fn small(grey: &GreyImage) -> Vec<f32> {
@@ -74,21 +66,21 @@ fn most_alike_photos(data: &Path, kind: impl Fn(&Photo) -> bool) -> f32 {
 
 #[test]
 fn tested_people_are_not_trained_with() {
-    let Some(data) = data() else { return };
+    let Some(data) = find("") else { return };
     let most = most_alike_photos(&data, Photo::is_body);
     assert!(most < SAME, "{most}");
 }
 
 #[test]
 fn tested_heads_and_shoulders_are_not_trained_with() {
-    let Some(data) = data() else { return };
+    let Some(data) = find("") else { return };
     let most = most_alike_photos(&data, |photo| photo.is_person() && !photo.is_body());
     assert!(most < SAME, "{most}");
 }
 
 #[test]
 fn tested_pictures_of_faces_are_not_trained_with() {
-    let Some(data) = data() else { return };
+    let Some(data) = find("") else { return };
     let most = most_alike(&with_people(|take| faces::fddb(&data, 1, take).map(drop)));
     assert!(most < SAME, "{most}");
 }

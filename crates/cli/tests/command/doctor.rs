@@ -308,12 +308,7 @@ fn each_test_of_the_funnel_has_its_settings_and_its_pictures() {
 /// depth moved back by 9 pixels are not.
 #[test]
 fn real_logs_are_registered_and_moved_ones_are_not() {
-    let logs = root().join("../shared/data/logs");
-    let um = logs.join("um.mcap");
-    if !um.exists() {
-        eprintln!("skipped: there is no {}", um.display());
-        return;
-    }
+    let Some(um) = tagalong_testdata::find("logs/um.mcap") else { return };
     let (_, said) = doctor(&config(), &um, &[]);
     assert_eq!(finding(&said, "registration")["severity"], "ok", "{said:#}");
     let home = tempfile::tempdir().unwrap();

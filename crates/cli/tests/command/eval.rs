@@ -1,7 +1,7 @@
 //! `tagalong eval` as a user calls it.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Output;
 
 use serde_json::Value;
@@ -15,15 +15,6 @@ fn eval(arguments: &[&str]) -> Output {
 fn json(output: &Output) -> Value {
     assert_eq!(code(output), 0, "{}", text(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not here", path.display());
-    None
 }
 
 fn shown(path: &Path) -> &str {
@@ -151,9 +142,102 @@ fn kitti_labels_count_frames_from_zero() {
     assert_eq!(scores["HOTA"].as_f64(), Some(1.0), "{scores}");
 }
 
+/// Truth of two frames, the second row with this class.
+fn truth_with(class: &str) -> String {
+    format!("1,1,0,0,40,90,1,1,1\n2,1,0,0,40,90,1,{class},1\n")
+}
+
+/// Scores two texts, as files of a sequence of two frames.
+fn scored(truth: &str, tracks: &str, more: &[&str]) -> Output {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("gt.txt", truth);
+    write("tracks.txt", tracks);
+    write("seqinfo.ini", "name=two\nframeRate=10\nseqLength=2\n");
+    let files = ["--truth", "gt.txt", "--tracks", "tracks.txt"];
+    in_home(folder.path(), &[&files[..], more].concat())
+}
+
+const TRACKS: &str = "1,1,0,0,40,90,1,-1,-1,-1\n2,1,0,0,40,90,1,-1,-1,-1\n";
+
+#[test]
+fn what_trackeval_refuses_is_refused_with_its_line() {
+    let second = |line: &str| format!("1,1,0,0,40,90,1,-1,-1,-1\n{line}\n");
+    let cases = [
+        (truth_with("0"), TRACKS.to_owned(), "gt.txt, line 2: class 0"),
+        (truth_with("-1"), TRACKS.to_owned(), "gt.txt, line 2: class -1"),
+        (truth_with("14"), TRACKS.to_owned(), "gt.txt, line 2: class 14"),
+        (truth_with("1").replace("2,1", "3,1"), TRACKS.to_owned(), "gt.txt, line 2: frame 3"),
+        (truth_with("1"), second("2,1,0,0,40,90,1,3,-1,-1"), "tracks.txt, line 2: class 3"),
+        (truth_with("1"), second("2,-1,0,0,40,90,1,-1,-1,-1"), "tracks.txt, line 2: id -1"),
+        (truth_with("1"), second("3,1,0,0,40,90,1,-1,-1,-1"), "tracks.txt, line 2: frame 3"),
+    ];
+    for (truth, tracks, expected) in cases {
+        let output = scored(&truth, &tracks, &[]);
+        let said = text(&output.stderr);
+        assert!(code(&output) == 1 && said.contains(expected), "{expected}: {said}");
+    }
+    let said = scored(&truth_with("14"), TRACKS, &["--rules", "mot15", "--format", "json"]);
+    let said = json(&said);
+    assert_eq!((said["rules"].as_str(), said["TP"].as_u64()), (Some("MOT15"), Some(2)), "{said}");
+}
+
+#[test]
+fn rules_odd_boxes_and_constant_scores_are_said() {
+    let tracks = TRACKS.to_owned() + "2,2,0,0,-40,90,1,-1,-1,-1\n";
+    let said = json(&scored(&truth_with("1"), &tracks, &["--format", "json"]));
+    assert_eq!((said["TP"].as_u64(), said["FP"].as_u64()), (Some(2), Some(1)), "{said}");
+    assert_eq!(said["rules"].as_str(), Some("MOT17"));
+    let notes = said["notes"].as_array().unwrap();
+    let has = |words: &str| notes.iter().any(|note| note.as_str().unwrap().contains(words));
+    assert!(has("1 of 3 boxes have no area (the first in line 3)"), "{notes:?}");
+    assert!(has("LAMR and AP mean nothing") && notes.len() == 2, "{notes:?}");
+    let printed = scored(&truth_with("1"), &tracks, &[]);
+    let printed = text(&printed.stdout);
+    assert!(printed.contains("\nnote: tracks.txt: 1 of 3 boxes have no area"), "{printed}");
+    assert!(printed.contains("LAMR and AP mean nothing") && printed.contains("MOT17"), "{printed}");
+    // Scores with an order: nothing to say.
+    let ordered = TRACKS.replacen("90,1,", "90,0.5,", 1);
+    let said = json(&scored(&truth_with("1"), &ordered, &["--format", "json"]));
+    assert!(said["notes"].as_array().unwrap().is_empty(), "{said}");
+}
+
+#[test]
+fn a_car_of_a_kitti_tracker_that_ends_before_it_begins_refuses_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = |id: i64, class: &str, right: u32| {
+        format!("0 {id} {class} 0 0 0 100 100 {right} 220 1.7 0.5 0.5 1 1.6 8 0 0.9\n")
+    };
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    write("gt.txt", line(1, "Pedestrian", 150));
+    write(
+        "tracks.txt",
+        line(7, "Pedestrian", 150) + &line(8, "Car", 90) + &line(-1, "Pedestrian", 150),
+    );
+    let files = ["--truth", "gt.txt", "--tracks", "tracks.txt", "--format", "json"];
+    let said = json(&in_home(folder.path(), &files));
+    assert_eq!((said["TP"].as_u64(), said["FP"].as_u64()), (Some(1), Some(0)), "{said}");
+    assert_eq!(said["rules"].as_str(), Some("KITTI"));
+    let notes = said["notes"].to_string();
+    assert!(notes.contains("1 of 3 boxes have no area (the first in line 2)"), "{notes}");
+    assert!(notes.contains("1 of 3 lines have an id below 0 (the first is line 3)"), "{notes}");
+}
+
+#[test]
+fn tracks_that_go_on_without_a_known_end_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("gt.txt"), truth_with("1")).unwrap();
+    fs::write(folder.path().join("tracks.txt"), TRACKS.replace("2,1", "9,1")).unwrap();
+    let files = ["--truth", "gt.txt", "--tracks", "tracks.txt", "--format", "json"];
+    let said = json(&in_home(folder.path(), &files));
+    assert_eq!(said["frames"].as_u64(), Some(9));
+    let notes = said["notes"].to_string();
+    assert!(notes.contains("goes on to frame 9, and the last frame known is 2"), "{notes}");
+}
+
 #[test]
 fn mot17_figures_equal_those_of_trackeval() {
-    let Some(mot) = shared("mot") else { return };
+    let Some(mot) = tagalong_testdata::find("mot") else { return };
     let expected: Value =
         serde_json::from_slice(&fs::read(mot.join("expected-trackeval.json")).unwrap()).unwrap();
     for (name, figures) in expected["MOT17-train"].as_object().unwrap() {

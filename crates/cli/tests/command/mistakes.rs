@@ -74,7 +74,7 @@ fn mistakes() -> Vec<Mistake> {
         m("an empty log", "run nearest.toml empty.mcap", 1, &["empty.mcap"]),
         m("a log of words", "run nearest.toml words.mcap", 1, &["words.mcap"]),
         m("a ROS 1 bag", "run nearest.toml old.bag", 1, &["rosbags-convert --src old.bag"]),
-        m("a SQLite bag", "inspect bag.db3", 1, &["mcap convert bag.db3"]),
+        m("a SQLite bag", "inspect bag.db3", 1, &["--src bag.db3 --src-typestore ros2_humble"]),
         m("no depth", "run nearest.toml no-depth.mcap", 1, &["depth"]),
         m("a log that does not fit", "check nearest.toml no-depth.mcap", 1, &["depth"]),
         m("results in a full folder", "run nearest.toml good.mcap -o full", 2, &["--overwrite"]),

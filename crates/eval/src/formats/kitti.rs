@@ -19,6 +19,8 @@ pub fn comparison(similarity: Similarity) -> Comparison {
 /// One line of a label file.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Label {
+    /// Line of the file, from 1.
+    pub line: usize,
     /// Number of the frame, from 0.
     pub frame: u32,
     /// The object; -1 for `DontCare`.
@@ -67,13 +69,19 @@ impl Label {
     fn is_dont_care(&self) -> bool {
         self.class.eq_ignore_ascii_case("dontcare")
     }
+
+    /// True for an object that is not told apart from others: TrackEval leaves it out.
+    pub fn is_anonymous(&self) -> bool {
+        self.id < 0 && !self.is_dont_care()
+    }
 }
 
-/// Reads label lines; `file` names the text in errors.
+/// Reads label lines; `file` names the text in errors. Boxes without an area stay, as in
+/// TrackEval: they match nobody.
 ///
 /// # Errors
 ///
-/// Fewer than 17 fields, something that is no number, a box turned inside out.
+/// Fewer than 17 fields, something that is no number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Label>, FormatError> {
     lines(text, file).map(|line| label(&line)).collect()
 }
@@ -83,10 +91,8 @@ fn label(line: &Line<'_>) -> Result<Label, FormatError> {
     let (left, top) = (number(6, "left")?, number(7, "top")?);
     let (right, bottom) = (number(8, "right")?, number(9, "bottom")?);
     let region = Region::new(left, top, right - left, bottom - top);
-    if !region.is_sane() {
-        return Err(line.error("the box ends before it begins"));
-    }
     Ok(Label {
+        line: line.number,
         frame: line.frame(0, 0)?,
         id: line.whole(1, "id")?,
         class: line.text(2, "type")?.to_owned(),
@@ -102,9 +108,9 @@ fn label(line: &Line<'_>) -> Result<Label, FormatError> {
 }
 
 /// Adds labels to a timeline as truth for pedestrians; `DontCare` becomes an
-/// ignore region. Frames keep KITTI's numbers, from 0.
+/// ignore region, and who is anonymous is left out. Frames keep KITTI's numbers, from 0.
 pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
-    for label in labels {
+    for label in labels.iter().filter(|label| !label.is_anonymous()) {
         let frame = timeline.frame(label.frame);
         if label.is_dont_care() {
             frame.ignore_regions.push(label.region);
@@ -115,10 +121,10 @@ pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
     }
 }
 
-/// Adds the pedestrians among labels to a timeline as reports.
+/// Adds the pedestrians among labels to a timeline as reports, without the anonymous.
 pub fn add_reports(timeline: &mut Timeline, labels: &[Label]) {
-    let reported = labels.iter().filter(|label| label.class.eq_ignore_ascii_case("pedestrian"));
-    for label in reported {
+    let is_pedestrian = |label: &&Label| label.class.eq_ignore_ascii_case("pedestrian");
+    for label in labels.iter().filter(is_pedestrian).filter(|label| !label.is_anonymous()) {
         timeline.frame(label.frame).reports.push(Report {
             id: label.id,
             region: Some(label.region),

@@ -7,6 +7,8 @@ use crate::types::Report;
 /// One track in one frame.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Row {
+    /// Line of the file, from 1.
+    pub line: usize,
     /// When, in nanoseconds.
     pub stamp_ns: i64,
     /// Number of the colour image, from 1.
@@ -63,6 +65,7 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
         };
         let stamp = line.text(stamp, "stamp_ns")?;
         rows.push(Row {
+            line: line.number,
             stamp_ns: stamp.parse().map_err(|_| {
                 line.error(format!("`stamp_ns` is `{stamp}`, expected whole nanoseconds"))
             })?,
@@ -74,4 +77,13 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
         });
     }
     Ok(rows)
+}
+
+/// Refuses frames beyond the end of a sequence.
+///
+/// # Errors
+///
+/// The first row whose frame is above `length`.
+pub fn check_length(rows: &[Row], file: &str, length: u32) -> Result<(), FormatError> {
+    super::check_length(rows.iter().map(|row| (row.line, row.frame)), file, length)
 }

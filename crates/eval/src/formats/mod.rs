@@ -31,8 +31,45 @@ pub struct FormatError {
     pub why: String,
 }
 
+/// Lines of a file that were read and mean less than their writer thought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OddLines {
+    /// How many there are.
+    pub count: usize,
+    /// The first of them, from 1.
+    pub first: usize,
+    /// Lines of the file that hold something.
+    pub of: usize,
+}
+
+impl OddLines {
+    /// Returns those of all lines, given as numbers, that are odd; `None` without any.
+    pub fn among(lines: impl IntoIterator<Item = (usize, bool)>) -> Option<Self> {
+        let (mut odd, mut of) = (Vec::new(), 0);
+        for (line, is_odd) in lines {
+            of += 1;
+            odd.extend(is_odd.then_some(line));
+        }
+        odd.first().map(|&first| Self { count: odd.len(), first, of })
+    }
+}
+
 fn place(line: usize) -> String {
     if line == 0 { String::new() } else { format!(", line {line}") }
+}
+
+fn check_length(
+    frames: impl IntoIterator<Item = (usize, u32)>,
+    file: &str,
+    length: u32,
+) -> Result<(), FormatError> {
+    match frames.into_iter().find(|(_, frame)| *frame > length) {
+        Some((line, frame)) => {
+            let why = format!("frame {frame}; the sequence has {length} (seqLength)");
+            Err(FormatError { file: file.to_owned(), line, why })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Frames by number, to be filled from rows in any order.

@@ -10,6 +10,8 @@ use crate::types::{Region, Report, Role, Truth};
 /// One line of a MOTChallenge file.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Row {
+    /// Line of the file, from 1.
+    pub line: usize,
     /// Number of the frame, from 1.
     pub frame: u32,
     /// The person or track; -1 for plain detections.
@@ -18,8 +20,9 @@ pub struct Row {
     pub region: Region,
     /// Score of a report; in truth 0 marks a box that does not count.
     pub confidence: f64,
-    /// Class number of a truth (1 = pedestrian), if the line is long enough.
-    pub class: Option<i64>,
+    /// What stands in the field of the class, if the line is long enough: from MOT16
+    /// on the class of a truth (1 = pedestrian); in MOT15 -1, or a place in metres.
+    pub class: Option<f64>,
     /// Visible fraction of a truth, if the line is long enough.
     pub visibility: Option<f64>,
 }
@@ -38,6 +41,47 @@ pub enum Rules {
     Mot20,
 }
 
+/// Lines of MOT15 end with a place in metres, or -1 three times.
+const MOT15_FIELDS: usize = 10;
+
+impl Rules {
+    /// Returns the rules that truth is written for: those of MOT17 where every line has a
+    /// class of it, those of MOT15 where none has, or where lines end with places.
+    ///
+    /// # Errors
+    ///
+    /// As [`parse`]; lines with and without a class in one file: the first without.
+    pub fn of_truth(text: &str, file: &str) -> Result<Self, FormatError> {
+        let rows = parse(text, file)?;
+        let has_class = |row: &Row| row.known_class().is_some();
+        let has_places = || {
+            lines(text, file).all(|line| line.fields.len() >= MOT15_FIELDS)
+                && rows.iter().any(|row| row.class.is_some_and(|class| class.fract() != 0.0))
+        };
+        match rows.iter().find(|row| !has_class(row)) {
+            None if !rows.is_empty() => Ok(Self::Mot17),
+            Some(row) if rows.iter().any(has_class) && !has_places() => Err(row.error(
+                file,
+                format!(
+                    "{}, and other lines have one; correct the line, or say whose rules the file \
+                     follows: those of MOT15 know no classes",
+                    row.class_fault()
+                ),
+            )),
+            _ => Ok(Self::Mot15),
+        }
+    }
+
+    /// Returns the benchmark that the rules are named after.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mot15 => "MOT15",
+            Self::Mot17 => "MOT17",
+            Self::Mot20 => "MOT20",
+        }
+    }
+}
+
 const PEDESTRIAN: i64 = 1;
 /// Person on vehicle, static person, distractor, reflection.
 const DISTRACTORS: [i64; 4] = [2, 7, 8, 12];
@@ -50,7 +94,7 @@ impl Row {
     pub fn role(&self, rules: Rules) -> Role {
         // The confidence of truth is a flag, read as a whole number.
         let counts = self.confidence.trunc() != 0.0;
-        let class = self.class.unwrap_or(PEDESTRIAN);
+        let class = self.known_class().unwrap_or(PEDESTRIAN);
         let excuses = DISTRACTORS.contains(&class)
             || (rules == Rules::Mot20 && class == NON_MOTORISED_VEHICLE);
         match rules {
@@ -73,34 +117,82 @@ impl Row {
         let region = Some(self.region);
         (self.frame, Report { id: self.id, region, floor_m: None, score: self.confidence })
     }
+
+    fn known_class(&self) -> Option<i64> {
+        let class = self.class.filter(|class| class.fract() == 0.0)?;
+        Some(class as i64).filter(|class| (1..=LAST_CLASS).contains(class))
+    }
+
+    fn class_fault(&self) -> String {
+        match self.class {
+            Some(class) => format!("class {class}; the classes are 1 to {LAST_CLASS}"),
+            None => "has no class (field 8)".to_owned(),
+        }
+    }
+
+    fn error(&self, file: &str, why: impl Into<String>) -> FormatError {
+        FormatError { file: file.to_owned(), line: self.line, why: why.into() }
+    }
 }
 
-/// Reads truth, tracks or detections; `file` names the text in errors.
+/// Reads truth, tracks or detections; `file` names the text in errors. Boxes without an
+/// area stay, as in TrackEval: they match nobody.
 ///
 /// # Errors
 ///
-/// A line with fewer than six fields, something that is no number, a frame
-/// below 1, a negative size.
+/// A line with fewer than six fields, something that is no number, a frame below 1.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     lines(text, file).map(|line| row(&line)).collect()
 }
 
-/// Reads truth; as [`parse`], but a class that the rules do not know is an error.
+/// Reads truth; as [`parse`], but refuses what TrackEval refuses.
 ///
 /// # Errors
 ///
-/// As [`parse`]; a class outside 1 to 13 under rules with classes.
-pub fn parse_truth(text: &str, file: &str, rules: Rules) -> Result<Vec<(u32, Truth)>, FormatError> {
-    let read = |line: Line<'_>| {
-        let row = row(&line)?;
-        match row.class {
-            Some(class) if rules != Rules::Mot15 && !(1..=LAST_CLASS).contains(&class) => {
-                Err(line.error(format!("class {class}; the classes are 1 to {LAST_CLASS}")))
-            }
-            _ => Ok(row.truth(rules)),
+/// As [`parse`]; an id below 0; no class, or one outside 1 to 13, under rules with classes.
+pub fn parse_truth(text: &str, file: &str, rules: Rules) -> Result<Vec<Row>, FormatError> {
+    let rows = parse(text, file)?;
+    for row in &rows {
+        row.check_id(file)?;
+        if rules != Rules::Mot15 && row.known_class().is_none() {
+            return Err(row.error(file, row.class_fault()));
         }
-    };
-    lines(text, file).map(read).collect()
+    }
+    Ok(rows)
+}
+
+/// Reads tracks; as [`parse`], but refuses what TrackEval refuses.
+///
+/// # Errors
+///
+/// As [`parse`]; an id below 0, a class other than that of people.
+pub fn parse_tracks(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
+    let rows = parse(text, file)?;
+    for row in &rows {
+        row.check_id(file)?;
+        if let Some(class) = row.class.filter(|class| class.trunc() > PEDESTRIAN as f64) {
+            let why = format!("class {class}; only people (1, or -1 for none) can be scored");
+            return Err(row.error(file, why));
+        }
+    }
+    Ok(rows)
+}
+
+/// Refuses frames beyond the end of a sequence.
+///
+/// # Errors
+///
+/// The first row whose frame is above `length`.
+pub fn check_length(rows: &[Row], file: &str, length: u32) -> Result<(), FormatError> {
+    super::check_length(rows.iter().map(|row| (row.line, row.frame)), file, length)
+}
+
+impl Row {
+    /// One id for whoever has none would be one person in many places.
+    fn check_id(&self, file: &str) -> Result<(), FormatError> {
+        let why = || format!("id {}; who is told apart has an id from 0 on", self.id);
+        if self.id >= 0 { Ok(()) } else { Err(self.error(file, why())) }
+    }
 }
 
 fn row(line: &Line<'_>) -> Result<Row, FormatError> {
@@ -111,16 +203,14 @@ fn row(line: &Line<'_>) -> Result<Row, FormatError> {
         width: number(4, "width")?,
         height: number(5, "height")?,
     };
-    if !region.is_sane() {
-        return Err(line.error("the box has a negative size"));
-    }
     let more = |index| line.fields.len() > index;
     Ok(Row {
+        line: line.number,
         frame: line.frame(0, 1)?,
         id: line.whole(1, "id")?,
         region,
         confidence: if more(6) { number(6, "confidence")? } else { 1.0 },
-        class: if more(7) { Some(number(7, "class")? as i64) } else { None },
+        class: if more(7) { Some(number(7, "class")?) } else { None },
         visibility: if more(8) { Some(number(8, "visibility")?) } else { None },
     })
 }

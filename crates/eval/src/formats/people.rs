@@ -83,7 +83,7 @@ impl Cells<'_> {
             height: self.number(first + 3)?,
         };
         let wrong = || self.line.error("a box has a negative size");
-        if region.is_sane() { Ok(region) } else { Err(wrong()) }
+        if region.width < 0.0 || region.height < 0.0 { Err(wrong()) } else { Ok(region) }
     }
 
     fn row(&self) -> Result<Row, FormatError> {

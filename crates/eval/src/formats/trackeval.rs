@@ -77,15 +77,15 @@ fn read_sequence(
     let info = mot::parse_info(text, path)?;
     let mut timeline = Timeline::new();
     let (path, text) = file(files, format!("{truth}/gt/gt.txt"))?;
-    timeline.add_truths(mot::parse_truth(text, path, rules)?);
+    let rows = mot::parse_truth(text, path, rules)?;
+    mot::check_length(&rows, path, info.length)?;
+    timeline.add_truths(rows.iter().map(|row| row.truth(rules)));
     let (path, text) =
         file(files, format!("trackers/mot_challenge/{set}/{tracker}/data/{name}.txt"))?;
-    timeline.add_reports(mot::parse(text, path)?.iter().map(mot::Row::report));
-    let (sequence, beyond) = timeline.into_sequence(name, 1, info.length, info.rate_hz);
-    if beyond > 0 {
-        let why = format!("{beyond} frames lie beyond the stated length of {}", info.length);
-        return Err(FormatError { file: path.to_owned(), line: 0, why });
-    }
+    let rows = mot::parse_tracks(text, path)?;
+    mot::check_length(&rows, path, info.length)?;
+    timeline.add_reports(rows.iter().map(mot::Row::report));
+    let (sequence, _) = timeline.into_sequence(name, 1, info.length, info.rate_hz);
     Ok((info, sequence))
 }
 

@@ -93,7 +93,11 @@ impl Page<'_> {
             body.map(|body| Section { anchor, heading, body })
         };
         [
-            section("results", "Results", self.headline()),
+            section(
+                "results",
+                "Results",
+                html! { (self.headline()) @if let Some(note) = self.constant_scores() { (note) } },
+            ),
             some("failed", "Failed and skipped", self.failed()),
             some("pairs", "Pipelines side by side", self.pairs()),
             section("speed", "Accuracy and time", self.speed()),

@@ -38,6 +38,23 @@ impl Page<'_> {
         })
     }
 
+    /// Says which LAMR is none.
+    pub(super) fn constant_scores(&self) -> Option<Markup> {
+        let constant: Vec<&TaskResult> = self
+            .view
+            .tasks
+            .iter()
+            .copied()
+            .filter(|task| task.image.is_some_and(|scores| scores.has_constant_scores()))
+            .collect();
+        (!constant.is_empty()).then(|| html! {
+            p {
+                "LAMR and AP mean nothing where all reports have the same score, since no threshold tells sure reports from unsure ones: "
+                @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
+            }
+        })
+    }
+
     pub(super) fn all_tasks(&self) -> Option<Markup> {
         if self.view.tasks.is_empty() {
             return None;

@@ -59,6 +59,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "learn",
         ],
     ),
+    ("testdata", &[]),
     ("xtask", &[]),
 ];
 
@@ -66,7 +67,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 const OF_PLUGINS: &[&str] = &["core", "vision", "learn"];
 
 /// What the tests of any crate may lean on in addition.
-const FOR_TESTS: &[&str] = &["core", "vision", "learn", "sim", "conformance"];
+const FOR_TESTS: &[&str] = &["core", "vision", "learn", "sim", "conformance", "testdata"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {
