@@ -2,6 +2,7 @@ mod clock;
 mod commands;
 pub(crate) mod doubles;
 mod faults;
+mod memo;
 mod odometry;
 mod stereo;
 mod target;

@@ -125,4 +125,8 @@ impl Detector for FaceRgbd {
         }
         Ok(found)
     }
+
+    fn remembers(&self) -> bool {
+        false
+    }
 }

@@ -191,6 +191,10 @@ impl Detector for HogUpperBody {
         }
         Ok(found)
     }
+
+    fn remembers(&self) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

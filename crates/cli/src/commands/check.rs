@@ -20,6 +20,7 @@ const FRAMES: u64 = 3;
 pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: Format) -> Outcome {
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
+    file.check_tuning(registry)?;
     let outer = file.outer()?;
     let wanted = needs(|| file.pipeline(registry, None).map(|(pipeline, _)| pipeline))?;
     let notes = log.map(|log| fits(pipeline, &outer, log, wanted)).transpose()?;
