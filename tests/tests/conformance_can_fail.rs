@@ -56,6 +56,7 @@ fn every_check_of_detectors_can_fail() {
         ("panics", "never panics on odd frames"),
         ("vague", "a missing image is an error that names it"),
         ("moody", "same seed, same output"),
+        ("denies", "who does not remember answers the question alone"),
         ("beside-the-image", "regions lie in the image"),
         ("lopsided", "covariance is symmetric and positive"),
         ("wanders", "near results lie in the window"),

@@ -130,7 +130,7 @@ fn question_alone(subject: &Subject<'_>) -> Verdict {
     for frame in frames.iter().rev() {
         for search in [EVERYWHERE, Search::Near(&followed)] {
             let mut fresh = subject.detector(From::Nothing)?;
-            let mut answer = |detector: &mut dyn Detector| {
+            let answer = |detector: &mut dyn Detector| {
                 let mut funnel = Funnel::default();
                 (detector.detect(frame, &search, &mut funnel).map_err(|e| e.to_string()), funnel)
             };

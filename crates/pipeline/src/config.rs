@@ -180,7 +180,8 @@ fn depth(value: &DeValue<'_>) -> usize {
 
 fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigError> {
     let foreign = options.foreign.iter().map(String::as_str);
-    let known: Vec<&str> = PLUGINS.into_iter().chain(OWN).chain([tune::TABLE]).chain(foreign).collect();
+    let known: Vec<&str> =
+        PLUGINS.into_iter().chain(OWN).chain([tune::TABLE]).chain(foreign).collect();
     for key in root.keys() {
         let name: &str = key.get_ref();
         if !known.contains(&name) {

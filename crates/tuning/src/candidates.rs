@@ -12,8 +12,8 @@ const ROUNDS: usize = 64;
 
 /// Returns the settings to be tried, at most `budget`, as they are in the config first. All
 /// combinations where they are few enough; otherwise a sample of them in which each value
-/// of a setting comes equally often (a Latin hypercube: McKay, Beckman and Conover,
-/// Technometrics 1979), the same for the same seed.
+/// of a setting comes equally often (in the manner of a Latin hypercube: McKay, Beckman and
+/// Conover, Technometrics 1979), the same for the same seed.
 pub fn candidates(tunables: &[Tunable], budget: usize, seed: u64) -> Vec<Candidate> {
     let shipped: Candidate = tunables.iter().map(|tunable| tunable.now.clone()).collect();
     let others = budget.saturating_sub(1);
@@ -42,19 +42,16 @@ fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Ca
     (all.len() <= most).then_some(all)
 }
 
-fn sample(
-    tunables: &[Tunable],
-    shipped: &Candidate,
-    count: usize,
-    seed: u64,
-) -> Vec<Candidate> {
+/// Settings are dealt in blocks, so that a larger budget adds to what a smaller one tries.
+fn sample(tunables: &[Tunable], shipped: &Candidate, count: usize, seed: u64) -> Vec<Candidate> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut seen = BTreeSet::from([shown(shipped)]);
     let mut chosen = Vec::new();
-    for _ in 0..ROUNDS {
+    let block = tunables.iter().map(|tunable| tunable.values.len()).max().unwrap_or(0);
+    for _ in 0..ROUNDS * count {
         let columns: Vec<Candidate> =
-            tunables.iter().map(|tunable| dealt(&tunable.values, count, &mut random)).collect();
-        for row in 0..count {
+            tunables.iter().map(|tunable| dealt(&tunable.values, block, &mut random)).collect();
+        for row in 0..block {
             let candidate: Candidate = columns.iter().map(|column| column[row].clone()).collect();
             if chosen.len() < count && seen.insert(shown(&candidate)) {
                 chosen.push(candidate);
@@ -66,12 +63,17 @@ fn sample(
 
 /// So many values in random order, each as often as the others, or once more.
 fn dealt(values: &[toml::Value], count: usize, random: &mut ChaCha8Rng) -> Candidate {
-    let mut pack: Candidate = values.iter().cycle().take(count).cloned().collect();
-    for end in (1..pack.len()).rev() {
+    let order = shuffled(values.to_vec(), random);
+    shuffled(order.into_iter().cycle().take(count).collect(), random)
+}
+
+/// The shuffle of Fisher and Yates.
+fn shuffled(mut values: Candidate, random: &mut ChaCha8Rng) -> Candidate {
+    for end in (1..values.len()).rev() {
         let at = (random.next_u64() % (end as u64 + 1)) as usize;
-        pack.swap(at, end);
+        values.swap(at, end);
     }
-    pack
+    values
 }
 
 fn shown(candidate: &Candidate) -> String {
@@ -124,6 +126,11 @@ mod tests {
         assert_eq!(candidates(&three(), 21, 1), candidates(&three(), 21, 1));
         assert_ne!(candidates(&three(), 21, 1), candidates(&three(), 21, 2));
         assert_eq!(candidates(&three(), 21, 1)[0], candidates(&three(), 21, 2)[0]);
+    }
+
+    #[test]
+    fn a_larger_budget_adds_to_a_smaller_one() {
+        assert_eq!(candidates(&three(), 9, 1), candidates(&three(), 30, 1)[..9]);
     }
 
     #[test]

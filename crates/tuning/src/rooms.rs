@@ -151,10 +151,10 @@ mod tests {
         let cases: &[(&str, &[&str])] = &[
             ("[rooms.A]\nlogs = [\"a.mcap\"]", &["1 room", "two are needed"]),
             ("[rooms.A]\nlogs = []\n[rooms.B]\nlogs = ['b']", &["rooms.toml:2:8", "`A` has no"]),
-            ("[rooms.A]\nlogs = ['x/a.mcap']\n[rooms.B]\nlogs = ['a.mcap']", &[
-                "rooms.toml:4:9",
-                "in room `A` already",
-            ]),
+            (
+                "[rooms.A]\nlogs = ['x/a.mcap']\n[rooms.B]\nlogs = ['a.mcap']",
+                &["rooms.toml:4:9", "in room `A` already"],
+            ),
             ("[rooms.A]\nlog = ['a']", &["rooms.toml:2:1", "did you mean `logs`?"]),
             ("[room.A]\nlogs = ['a']", &["rooms.toml:1:2", "did you mean `rooms`?"]),
             ("folder = 'x'", &["missing field `rooms`"]),

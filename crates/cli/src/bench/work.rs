@@ -217,8 +217,7 @@ impl Desk<'_> {
         let build = |ready: &Ready| {
             ready.config.file.pipeline(self.registry, Some(ready.task.seed)).map(|built| built.0)
         };
-        let mut lanes: Vec<Lane> =
-            group.iter().map(|ready| Lane::new(|| build(ready))).collect();
+        let mut lanes: Vec<Lane> = group.iter().map(|ready| Lane::new(|| build(ready))).collect();
         let mut shots = Shots::default();
         while let Some(item) = source.next_frame() {
             if self.signals.received().is_some() {

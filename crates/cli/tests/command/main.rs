@@ -15,6 +15,7 @@ mod import;
 mod missing_topics;
 mod mistakes;
 mod recorded;
+mod rooms;
 mod runs;
 mod shell;
 #[cfg(unix)]

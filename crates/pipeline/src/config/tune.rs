@@ -81,10 +81,7 @@ pub fn check_tuning(
 ///
 /// # Errors
 /// A setting that the config does not have.
-pub fn with_values(
-    resolved: &str,
-    values: &[(&str, &toml::Value)],
-) -> Result<String, ConfigError> {
+pub fn with_values(resolved: &str, values: &[(&str, &toml::Value)]) -> Result<String, ConfigError> {
     let mut root = toml::Value::Table(toml::from_str(resolved)?);
     for (key, value) in values {
         let place = key.split('.').try_fold(&mut root, |inner, part| match inner {
@@ -150,11 +147,7 @@ fn add_leaves<'a>(path: String, value: &'a toml::Value, out: &mut Vec<Leaf<'a>>)
     }
 }
 
-fn tunable(
-    named: Named,
-    value: Value<'_>,
-    leaves: &[Leaf<'_>],
-) -> Result<Tunable, ConfigError> {
+fn tunable(named: Named, value: Value<'_>, leaves: &[Leaf<'_>]) -> Result<Tunable, ConfigError> {
     let Named { key, place } = named;
     let Some((_, now)) = leaves.iter().find(|(name, _)| *name == key) else {
         let known = leaves.iter().map(|(name, _)| name.as_str());

@@ -78,7 +78,9 @@ fn contestants(args: &RoomsArgs, registry: &Registry) -> Result<Vec<Contestant>,
     let named = &args.configs;
     let mut configs = match named.is_empty() {
         true => plan::shipped(registry)?,
-        false => named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?,
+        false => {
+            named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?
+        }
     };
     if named.is_empty() {
         configs.retain(|config| !config.tune.is_empty());

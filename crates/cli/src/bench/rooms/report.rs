@@ -87,9 +87,10 @@ impl Report {
             about: location.about.clone(),
             logs: location.logs.iter().map(|log| log.name.clone()).collect(),
         };
-        let fitted = contestants.iter().enumerate().map(|(at, contestant)| {
-            Scorer { locations, desk, at, contestant }.fitted(objective)
-        });
+        let fitted = contestants
+            .iter()
+            .enumerate()
+            .map(|(at, contestant)| Scorer { locations, desk, at, contestant }.fitted(objective));
         Ok(Self {
             objective,
             budget: args.budget,
@@ -157,7 +158,12 @@ impl Report {
         notes.extend(too_few);
         let columns = ["rooms"].into_iter().map(String::from).chain(columns()).collect();
         let title = "Chosen without the room that is scored, and with all: means over the rooms";
-        Table { title: title.into(), columns, rows: self.pipelines.iter().map(row).collect(), notes }
+        Table {
+            title: title.into(),
+            columns,
+            rows: self.pipelines.iter().map(row).collect(),
+            notes,
+        }
     }
 }
 
@@ -281,9 +287,9 @@ impl Fitted {
         if !self.rooms.is_empty() {
             notes.push(format!("With all: {}.", self.changes(&self.chosen_with_all)));
         }
-        let without = chosen.iter().map(|(values, rooms)| {
-            format!("Without {}: {values}.", rooms.join(", without "))
-        });
+        let without = chosen
+            .iter()
+            .map(|(values, rooms)| format!("Without {}: {values}.", rooms.join(", without ")));
         notes.extend(without);
         notes.extend(self.skipped.iter().map(|s| format!("Not read: {}: {}.", s.log, s.why)));
         notes
