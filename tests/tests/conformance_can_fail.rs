@@ -59,6 +59,7 @@ fn every_check_of_detectors_can_fail() {
         ("easy-going", "it does without what it does not require"),
         ("modest", "it has the roles that it declares and no others"),
         ("moody", "same seed, same output"),
+        ("denies", "who does not remember answers the question alone"),
         ("beside-the-image", "regions lie in the image"),
         ("lopsided", "covariance is symmetric and positive"),
         ("wanders", "near results lie in the window"),

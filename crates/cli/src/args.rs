@@ -246,6 +246,7 @@ Examples:
   tagalong bench --configs a.toml b.toml --logs walk.mcap --seeds 5
   tagalong bench --logs-dir logs --baseline old/report.json --fail-if 'HOTA<-0.01'
   tagalong bench plan --logs-dir logs -o bench | jq .hash
+  tagalong bench --leave-one-room-out benches/rooms.toml
   tagalong bench export -o bench --trackeval tree";
 
 const EVAL_HELP: &str = "\

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use tagalong_core::{ConfigError, Registry, Settings, parse_settings};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits};
-use tagalong_pipeline::{Options, Pipeline, RunSettings};
+use tagalong_pipeline::{Options, Pipeline, RunSettings, check_tuning};
 use tagalong_trials::Contender;
 use toml::de::DeTable;
 
@@ -80,6 +80,26 @@ impl ConfigFile {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
+    /// The config with another text, at the same place: files that it names are the same.
+    pub fn with_text(&self, text: String) -> Self {
+        Self { path: self.path.clone(), text }
+    }
+
+    /// Checks the values of `[tune]`: the pipeline is built with each of them.
+    ///
+    /// # Errors
+    /// A value that its setting does not allow, shown with its line: exit code 2.
+    pub fn check_tuning(&self, registry: &Registry) -> Result<(), Failure> {
+        let (pipeline, settings) = self.pipeline(registry, None)?;
+        check_tuning(&settings.tune, &pipeline, self.folder(), registry, &options(None))
+            .map_err(|error| self.mistake(&error))
+    }
+
+    /// Where relative paths start.
+    fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
     /// SHA-256 of its bytes.
     pub fn sha256(&self) -> String {
         let digest = Sha256::digest(self.text.as_bytes());
@@ -89,7 +109,7 @@ impl ConfigFile {
     /// The files that its settings name, such as models, by the name used there.
     pub fn files(&self) -> Vec<(String, PathBuf)> {
         let Ok(table) = self.text.parse::<toml::Table>() else { return Vec::new() };
-        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let folder = self.folder();
         let mut names = Vec::new();
         strings(&toml::Value::Table(table), &mut names);
         let named = names.into_iter().map(|name| (folder.join(&name), name));
@@ -105,15 +125,13 @@ impl ConfigFile {
         registry: &Registry,
         seed: Option<u64>,
     ) -> Result<(Pipeline, RunSettings), Failure> {
-        let folder = self.path.parent().unwrap_or(Path::new(""));
-        let foreign = OuterSettings::TABLES.map(str::to_owned).to_vec();
-        Pipeline::from_toml_with(&self.text, folder, registry, &Options { foreign, seed })
+        Pipeline::from_toml_with(&self.text, self.folder(), registry, &options(seed))
             .map_err(|error| self.mistake(&error))
     }
 
     /// The config as it takes part in trials.
     pub fn contender(&self) -> Contender {
-        let folder = self.path.parent().unwrap_or(Path::new("")).to_owned();
+        let folder = self.folder().to_owned();
         Contender { folder, ..Contender::new(self.stem(), self.text.clone()) }
     }
 
@@ -143,6 +161,10 @@ impl ConfigFile {
     fn mistake(&self, error: &ConfigError) -> Failure {
         Failure::usage(error.render(&self.path.display().to_string(), &self.text))
     }
+}
+
+fn options(seed: Option<u64>) -> Options {
+    Options { foreign: OuterSettings::TABLES.map(str::to_owned).to_vec(), seed }
 }
 
 /// All texts in a value.

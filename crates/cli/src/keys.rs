@@ -23,7 +23,34 @@ pub fn around_schema() -> Value {
         let part = lifted(part, name, &mut definitions);
         properties.extend(part["properties"].as_object().cloned().unwrap_or_default());
     }
+    properties.insert("tune".into(), tune_schema());
     json!({ "type": "object", "properties": properties, "$defs": definitions })
+}
+
+/// `[tune]`: its keys are the dotted names of all others.
+fn tune_schema() -> Value {
+    let spread = json!({
+        "type": "object",
+        "required": ["between", "steps"],
+        "additionalProperties": false,
+        "properties": {
+            "between": {
+                "description": "The lowest and the highest value.",
+                "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2,
+            },
+            "steps": {
+                "description": "How many equally spaced values are tried.",
+                "type": "integer", "minimum": 2, "maximum": 64,
+            },
+        },
+    });
+    let nested = json!({ "type": "object" });
+    json!({
+        "description": "Settings that `tagalong bench --leave-one-room-out` fits, by their \
+            dotted names, each with the values to try. A run takes no notice of them.",
+        "type": "object",
+        "additionalProperties": { "anyOf": [{ "type": "array", "minItems": 1 }, spread, nested] },
+    })
 }
 
 /// The plugins, by kind and name.

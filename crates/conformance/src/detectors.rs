@@ -17,6 +17,7 @@ pub(crate) const CHECKS: &[Check] = &[
     ("it does without what it does not require", required_suffice),
     ("it has the roles that it declares and no others", roles_are_declared),
     ("same seed, same output", repeatable),
+    ("who does not remember answers the question alone", question_alone),
     ("regions lie in the image", regions_are_in_the_image),
     ("covariance is symmetric and positive", covariance_is_positive),
     ("near results lie in the window", near_stays_near),
@@ -181,6 +182,31 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     demand(first == second, || {
         format!("two runs differ: {} and {} detections", first.len(), second.len())
     })
+}
+
+/// What one says that has seen the whole walk, and one that has seen nothing.
+fn question_alone(subject: &Subject<'_>) -> Verdict {
+    let mut seasoned = subject.detector(From::Nothing)?;
+    if seasoned.remembers() {
+        return Ok(());
+    }
+    let frames = walk(&level());
+    record(&mut *seasoned, &frames)?;
+    let followed = track(1, Figure::at(3.0, -0.6).head, 0.15, &level());
+    for frame in frames.iter().rev() {
+        for search in [EVERYWHERE, Search::Near(&followed)] {
+            let mut fresh = subject.detector(From::Nothing)?;
+            let answer = |detector: &mut dyn Detector| {
+                let mut funnel = Funnel::default();
+                (detector.detect(frame, &search, &mut funnel).map_err(|e| e.to_string()), funnel)
+            };
+            let (then, now) = (answer(&mut *fresh), answer(&mut *seasoned));
+            demand(then == now, || {
+                format!("frame {}: a fresh one says {then:?}, after the walk {now:?}", frame.index)
+            })?;
+        }
+    }
+    Ok(())
 }
 
 /// All detections of the walk under each mounting.

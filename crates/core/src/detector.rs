@@ -47,6 +47,13 @@ pub trait Detector: Send {
         Ok(())
     }
 
+    /// Returns true if what it finds may depend on more than its settings, the frame and
+    /// the search: on earlier frames, on what it learned, on its own draws. What one that
+    /// does not remember found serves whoever asks the same of the same frame.
+    fn remembers(&self) -> bool {
+        true
+    }
+
     /// The scene likelihood that goes with this detector, if it has one.
     fn likelihood(&self) -> Option<&dyn Likelihood> {
         None

@@ -26,10 +26,12 @@ mod inputs;
 mod resolve;
 #[cfg(test)]
 mod tests;
+mod tune;
 
 use checks::check;
 use inputs::{Declared, declared_inputs};
 use resolve::resolve;
+pub use tune::{Tunable, check_tuning, with_values};
 
 /// Longest config, bytes.
 const MAX_BYTES: usize = 1 << 20;
@@ -74,6 +76,8 @@ pub struct RunSettings {
     pub seed: u64,
     /// The robot.
     pub robot: RobotSettings,
+    /// `[tune]`: the settings that may be fitted. A run takes no notice of them.
+    pub tune: Vec<Tunable>,
     text: String,
 }
 
@@ -133,10 +137,13 @@ impl Pipeline {
         let without_span = root.get("without").map(Spanned::span);
         let inputs = declared_inputs(&settings, &plugins, steering.is_some(), without_span)?;
         let resolved = resolve(text, &settings, registry)?;
+        let tune = tune::read(root.remove(tune::TABLE), &resolved)?;
+        let resolved =
+            toml::to_string(&resolved).map_err(|error| ConfigError::new(error.to_string()))?;
         let stereo = settings.stereo.clone().map(StereoDepth::new).transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
-        let run =
-            RunSettings { seed: settings.seed, robot: settings.robot.clone(), text: text.into() };
+        let (seed, robot) = (settings.seed, settings.robot.clone());
+        let run = RunSettings { seed, robot, tune, text: text.into() };
         let pipeline = Self {
             inputs,
             clock: Clock::new(settings.clock.clone()),
@@ -153,6 +160,8 @@ impl Pipeline {
             frames: 0,
             failed: None,
             sketches: false,
+            base_dir: base_dir.to_owned(),
+            shared: None,
         };
         Ok((pipeline, run))
     }
@@ -184,7 +193,8 @@ fn depth(value: &DeValue<'_>) -> usize {
 
 fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigError> {
     let foreign = options.foreign.iter().map(String::as_str);
-    let known: Vec<&str> = PLUGINS.into_iter().chain(OWN).chain(foreign).collect();
+    let known: Vec<&str> =
+        PLUGINS.into_iter().chain(OWN).chain([tune::TABLE]).chain(foreign).collect();
     for key in root.keys() {
         let name: &str = key.get_ref();
         if !known.contains(&name) {

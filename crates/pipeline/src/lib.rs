@@ -51,6 +51,7 @@ mod control;
 mod doubts;
 mod governor;
 mod lifecycle;
+mod memo;
 mod now;
 mod occlusion;
 mod pipeline;
@@ -64,7 +65,7 @@ mod weighing;
 
 pub use assignment::assign;
 pub use boundary::StepError;
-pub use config::{Options, RunSettings};
+pub use config::{Options, RunSettings, Tunable, check_tuning, with_values};
 pub use governor::{CorridorSettings, GovernorSettings, Orders};
 pub use pipeline::Pipeline;
 pub use report::{Candidate, Fate, FrameReport, Outcome};

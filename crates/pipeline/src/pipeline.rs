@@ -1,4 +1,5 @@
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 use nalgebra::Point3;
 use tagalong_core::{
@@ -13,6 +14,7 @@ use crate::clock::{Clock, Tick};
 use crate::control::{Steered, Steering};
 use crate::doubts::Doubts;
 use crate::lifecycle::{Lifecycle, Sight};
+use crate::memo::{self, Identities};
 use crate::now::Now;
 use crate::occlusion::{Cover, Visibility, aside, part_shown, range_m, visibility};
 use crate::sightings::{Rules, Sighting};
@@ -39,6 +41,10 @@ pub struct Pipeline {
     pub(crate) frames: u64,
     pub(crate) failed: Option<u64>,
     pub(crate) sketches: bool,
+    /// Where relative paths of the config start.
+    pub(crate) base_dir: PathBuf,
+    /// Set where answers are shared with other pipelines.
+    pub(crate) shared: Option<Identities>,
 }
 
 /// A plugin under its name.
@@ -164,6 +170,32 @@ impl Pipeline {
     /// which counts as that of the stage `update`, and changes nothing else.
     pub fn sketch(&mut self, wanted: bool) {
         self.sketches = wanted;
+    }
+
+    /// Shares what detectors and verifiers say of a frame with other pipelines that are
+    /// shown the very same frame and share, too: what was answered once is not worked out
+    /// again. The reports are the same; a search for settings takes less time.
+    pub fn share_findings(&mut self) {
+        let resolved: toml::Table = toml::from_str(&self.resolved).unwrap_or_default();
+        let around = format!(
+            "{} {} {:?}",
+            self.base_dir.display(),
+            self.settings.seed,
+            resolved.get("robot")
+        );
+        let identity = |kind: &str, at: usize| {
+            let section = resolved.get(kind).and_then(|sections| sections.get(at));
+            let part = |name: &str| section.and_then(|section| section.get(name));
+            format!("{kind} {at} {around} {:?} {:?}", part("plugin"), part("config"))
+        };
+        let detectors = self.detectors.iter().enumerate().map(|(at, slot)| {
+            let forgets = !slot.plugin.remembers();
+            forgets.then(|| identity("detectors", at))
+        });
+        self.shared = Some(Identities {
+            detectors: detectors.collect(),
+            verifiers: (0..self.verifiers.len()).map(|at| identity("verifiers", at)).collect(),
+        });
     }
 
     /// The stages that [`FrameReport::timings`] names, in their order.
@@ -549,8 +581,12 @@ impl Pipeline {
     ) -> Result<Vec<Sighting>, StepError> {
         let (frame, slot) = (now.frame, &mut self.detectors[index]);
         let funnel = &mut now.report.funnel;
-        let found = guard(&slot.settings.plugin, frame.index, || {
-            slot.plugin.detect(frame, search, funnel)
+        let identity = self.shared.as_ref().and_then(|shared| shared.detectors[index].as_deref());
+        let found = guard(&slot.settings.plugin, frame.index, || match identity {
+            Some(identity) => memo::found(identity, frame, search, funnel, |funnel| {
+                slot.plugin.detect(frame, search, funnel)
+            }),
+            None => slot.plugin.detect(frame, search, funnel),
         })?;
         let is_discovery = matches!(search, Search::Everywhere { .. });
         let mut sightings = Vec::new();
@@ -577,8 +613,14 @@ impl Pipeline {
         funnel: &mut Funnel,
     ) -> Result<Option<Sighting>, StepError> {
         let mut sum = 0.0;
-        for Slot { name, plugin: verifier } in &mut self.verifiers {
-            sum += guard(name, frame.index, || verifier.margin(frame, &sighting.detection))?;
+        for (at, Slot { name, plugin: verifier }) in self.verifiers.iter_mut().enumerate() {
+            let candidate = &sighting.detection;
+            sum += guard(name, frame.index, || match &self.shared {
+                Some(shared) => memo::margin(&shared.verifiers[at], frame, candidate, || {
+                    verifier.margin(frame, candidate)
+                }),
+                None => verifier.margin(frame, candidate),
+            })?;
         }
         if !sum.is_finite() {
             funnel.drop_at("verifier not finite", sighting.detection.region);

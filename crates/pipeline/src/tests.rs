@@ -3,6 +3,7 @@ mod commands;
 pub(crate) mod doubles;
 mod faults;
 mod inputs;
+mod memo;
 mod odometry;
 mod stereo;
 mod target;

@@ -3,7 +3,7 @@
 //! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands what that
 //! command prints. `cargo xtask docs` fills these parts, and `cargo xtask tidy`
 //! complains about those that have become stale. What takes long, the tables of
-//! `reproduce` and `follow`, is filled only when it is asked for.
+//! `reproduce`, `follow` and `bench`, is filled only when it is asked for.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -16,7 +16,7 @@ const BEGIN: &str = "<!-- begin: ";
 const END: &str = "<!-- end -->";
 
 /// Commands that take minutes to hours.
-const SLOW: &[&str] = &["tagalong reproduce", "tagalong follow"];
+const SLOW: &[&str] = &["tagalong reproduce", "tagalong follow", "tagalong bench"];
 
 /// A document with parts to fill.
 struct Document {

@@ -321,6 +321,10 @@ impl Detector for DepthTemplate {
         }
     }
 
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn likelihood(&self) -> Option<&dyn Likelihood> {
         Some(&self.weigher)
     }

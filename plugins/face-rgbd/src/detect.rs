@@ -134,4 +134,8 @@ impl Detector for FaceRgbd {
         }
         Ok(found)
     }
+
+    fn remembers(&self) -> bool {
+        false
+    }
 }

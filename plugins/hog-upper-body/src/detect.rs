@@ -201,6 +201,10 @@ impl Detector for HogUpperBody {
         }
         Ok(found)
     }
+
+    fn remembers(&self) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

@@ -109,10 +109,14 @@ impl Detector for Heads {
     }
 
     fn learn(&mut self, _: &Frame, tracks: &[Track]) -> Result<()> {
-        if self.fault == "remembers" {
+        if ["remembers", "denies"].contains(&self.fault) {
             self.remembered.extend(tracks.iter().map(|t| t.estimate.person.position));
         }
         Ok(())
+    }
+
+    fn remembers(&self) -> bool {
+        self.fault == "remembers"
     }
 
     fn likelihood(&self) -> Option<&dyn Likelihood> {

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+pub use super::rooms::RoomsArgs;
 use crate::args::Format;
 
 /// The arguments of `tagalong bench`.
@@ -50,6 +51,9 @@ pub enum Step {
         #[command(flatten)]
         folder: FolderArgs,
     },
+    /// Chooses settings by all rooms but one, and scores them in that one
+    #[command(long_flag = "leave-one-room-out", after_help = super::rooms::HELP)]
+    Rooms(RoomsArgs),
     /// Writes the results as the folder tree that TrackEval scores
     #[command(after_help = "Example:\n  tagalong bench export -o bench --trackeval tree")]
     Export {

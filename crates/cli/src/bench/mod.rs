@@ -12,6 +12,7 @@ mod gate;
 mod pictures;
 mod plan;
 mod report;
+mod rooms;
 mod store;
 mod watch;
 mod work;
@@ -47,6 +48,7 @@ pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
             make_report(folder, report.format, gate.as_ref())?;
             Ok(Ended::Well)
         }
+        Some(Step::Rooms(args)) => rooms::rooms(args, registry),
         Some(Step::Export { trackeval, folder }) => {
             let (trackers, sequences) = export::export(&store(folder), trackeval)?;
             say(&format!(

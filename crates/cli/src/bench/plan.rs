@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_core::Registry;
 use tagalong_log::{FrameSource, Inputs, Limits, LogError, read_truth};
+use tagalong_pipeline::Tunable;
 
 use super::args::PlanArgs;
 use crate::config_file::{ConfigFile, OuterSettings};
@@ -52,22 +53,31 @@ pub struct Task {
 pub struct Candidate {
     /// The config.
     pub file: ConfigFile,
-    path: PathBuf,
+    /// Where it lies.
+    pub path: PathBuf,
     first_seed: u64,
     /// Its tables around the pipeline.
     pub outer: OuterSettings,
     /// The inputs of its pipeline.
     pub inputs: Inputs,
+    /// Its settings that may be fitted.
+    pub tune: Vec<Tunable>,
 }
 
 /// A log and its truth.
-struct Annotated {
-    log: PathBuf,
-    name: String,
-    sha256: String,
-    truth: PathBuf,
-    truth_sha256: String,
-    whole_bodies: bool,
+pub struct Annotated {
+    /// The log.
+    pub log: PathBuf,
+    /// Its name in tables.
+    pub name: String,
+    /// Of the log.
+    pub sha256: String,
+    /// Its truth.
+    pub truth: PathBuf,
+    /// Of the truth.
+    pub truth_sha256: String,
+    /// The boxes of the truth are whole bodies.
+    pub whole_bodies: bool,
 }
 
 /// Plans a benchmark.
@@ -119,7 +129,15 @@ pub fn reread(task: &Task, registry: &Registry) -> Result<Candidate, Failure> {
 }
 
 fn files(candidate: &Candidate) -> Result<BTreeMap<String, String>, Failure> {
-    let named = candidate.file.files().into_iter();
+    file_hashes(&candidate.file)
+}
+
+/// Hashes the files that a config names, such as models.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn file_hashes(config: &ConfigFile) -> Result<BTreeMap<String, String>, Failure> {
+    let named = config.files().into_iter();
     named.map(|(name, path)| Ok((format!("{FILE}{name}"), sha256_of_file(&path)?))).collect()
 }
 
@@ -171,8 +189,11 @@ fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<Str
     Ok(sha256(text.as_bytes()))
 }
 
-/// Why the config cannot run on the log, if it cannot.
-fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Failure> {
+/// Says why the config cannot run on the log, if it cannot.
+///
+/// # Errors
+/// A log that cannot be read at all.
+pub fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Failure> {
     let outer = &config.outer;
     match FrameSource::open(&log.log, &outer.input, &outer.limits, config.inputs) {
         Ok(_) => Ok(None),
@@ -189,6 +210,14 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<Candidate>, Failu
     if !args.configs.is_empty() {
         return args.configs.iter().map(|path| candidate(path, registry)).collect();
     }
+    shipped(registry)
+}
+
+/// Reads every config in configs.
+///
+/// # Errors
+/// If there is none.
+pub fn shipped(registry: &Registry) -> Result<Vec<Candidate>, Failure> {
     let mut found = Vec::new();
     for path in toml_files(Path::new("configs")) {
         match candidate(&path, registry) {
@@ -202,29 +231,23 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<Candidate>, Failu
     Ok(found)
 }
 
-fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
+/// Reads a config.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
     let file = ConfigFile::read(path)?;
     let (pipeline, settings) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let (first_seed, inputs) = (settings.seed, pipeline.inputs());
-    Ok(Candidate { file, path: path.to_owned(), first_seed, outer, inputs })
+    let (first_seed, tune, inputs) = (settings.seed, settings.tune, pipeline.inputs());
+    Ok(Candidate { file, path: path.to_owned(), first_seed, outer, inputs, tune })
 }
 
 fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
     let mut found = Vec::new();
     for log in &args.logs {
         check_log_path(log)?;
-        let annotated = annotated(log)?;
-        found.push(annotated.ok_or_else(|| {
-            let stem = log.with_extension("");
-            let stem = stem.display();
-            Failure::usage(format!(
-                "{} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
-                 {stem}.boxes.csv nor a channel {} in it",
-                log.display(),
-                tagalong_log::TRUTH_TOPIC
-            ))
-        })?);
+        found.push(with_truth(log)?);
     }
     for log in args.logs_dir.as_deref().map_or(Ok(Vec::new()), mcap_files)? {
         match annotated(&log)? {
@@ -241,6 +264,23 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
 fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     suggest::mcap_files(folder)
         .map_err(|error| Failure::usage(format!("cannot read {}: {error}", folder.display())))
+}
+
+/// Returns the log with its truth.
+///
+/// # Errors
+/// A log without truth, or one that cannot be read.
+pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
+    annotated(log)?.ok_or_else(|| {
+        let stem = log.with_extension("");
+        let stem = stem.display();
+        Failure::usage(format!(
+            "{} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
+             {stem}.boxes.csv nor a channel {} in it",
+            log.display(),
+            tagalong_log::TRUTH_TOPIC
+        ))
+    })
 }
 
 /// The log with its truth, if it has any.
@@ -263,8 +303,11 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
     }))
 }
 
-/// Names stand in tables, so they must tell things apart.
-fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Failure> {
+/// Refuses a name that stands for two things: names stand in tables.
+///
+/// # Errors
+/// The name.
+pub fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Failure> {
     let mut seen = std::collections::BTreeSet::new();
     for name in names {
         if !seen.insert(name.clone()) {

@@ -118,7 +118,8 @@ impl Store {
         self.put(&timing_name(hash), &json)
     }
 
-    fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
+    /// A file of the benchmark as JSON, if it is there and whole.
+    pub fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
         serde_json::from_slice(&fs::read(self.path(name)).ok()?).ok()
     }
 }

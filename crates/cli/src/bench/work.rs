@@ -128,7 +128,7 @@ fn groups(
 }
 
 /// Halves the largest groups until every job has one.
-fn spread(mut groups: Vec<Group>, jobs: usize) -> VecDeque<Group> {
+pub fn spread<T>(mut groups: Vec<Vec<T>>, jobs: usize) -> VecDeque<Vec<T>> {
     while groups.len() < jobs {
         let Some(largest) = groups.iter_mut().max_by_key(|group| group.len()) else { break };
         if largest.len() < 2 {
@@ -140,7 +140,8 @@ fn spread(mut groups: Vec<Group>, jobs: usize) -> VecDeque<Group> {
     groups.into()
 }
 
-fn bar(tasks: usize) -> ProgressBar {
+/// Shows how many tasks are done, where somebody looks on.
+pub fn bar(tasks: usize) -> ProgressBar {
     let bar = ProgressBar::new(tasks as u64);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} tasks {msg} {eta}") {
         bar.set_style(style);
@@ -214,8 +215,10 @@ impl Desk<'_> {
         let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
         truth.notes.iter().for_each(|note| say(&format!("note: {note}")));
         let mut source = open(&group[0], group[0].config.inputs)?;
-        let mut lanes: Vec<Lane> =
-            group.iter().map(|ready| Lane::new(ready, self.registry)).collect();
+        let build = |ready: &Ready| {
+            ready.config.file.pipeline(self.registry, Some(ready.task.seed)).map(|built| built.0)
+        };
+        let mut lanes: Vec<Lane> = group.iter().map(|ready| Lane::new(|| build(ready))).collect();
         let mut shots = Shots::default();
         while let Some(item) = source.next_frame() {
             if self.signals.received().is_some() {
@@ -246,24 +249,26 @@ fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
 }
 
 /// One pipeline on its way through the frames.
-struct Lane {
-    pipeline: Result<Pipeline, String>,
-    watch: Watch,
+pub struct Lane {
+    /// The pipeline, or why there is none any more.
+    pub pipeline: Result<Pipeline, String>,
+    /// What it said so far.
+    pub watch: Watch,
 }
 
 impl Lane {
-    fn new(ready: &Ready, registry: &Registry) -> Self {
-        let build = || ready.config.file.pipeline(registry, Some(ready.task.seed));
+    /// Takes the pipeline that `build` makes.
+    pub fn new(build: impl FnOnce() -> Result<Pipeline, Failure>) -> Self {
         let pipeline = match catch_unwind(AssertUnwindSafe(build)) {
-            Ok(Ok((pipeline, _))) => Ok(pipeline),
+            Ok(Ok(pipeline)) => Ok(pipeline),
             Ok(Err(failure)) => Err(failure.message),
             Err(_) => Err("a plugin panicked while the pipeline was built".into()),
         };
         Self { pipeline, watch: Watch::default() }
     }
 
-    /// A pipeline that fails takes no more frames.
-    fn step(&mut self, item: &tagalong_log::LogFrame) {
+    /// Shows it the next frame. A pipeline that fails takes no more of them.
+    pub fn step(&mut self, item: &tagalong_log::LogFrame) {
         let Ok(pipeline) = &mut self.pipeline else { return };
         match pipeline.step(&item.frame) {
             Ok(report) => self.watch.take(item, &report),

@@ -20,6 +20,7 @@ const FRAMES: u64 = 3;
 pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: Format) -> Outcome {
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
+    file.check_tuning(registry)?;
     let outer = file.outer()?;
     let inputs = pipeline.inputs();
     let notes = log.map(|log| fits(pipeline, &outer, log)).transpose()?;

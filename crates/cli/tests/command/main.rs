@@ -16,6 +16,7 @@ mod inputs;
 mod missing_topics;
 mod mistakes;
 mod recorded;
+mod rooms;
 mod runs;
 mod shell;
 #[cfg(unix)]

@@ -3,13 +3,15 @@ use toml::{Table, Value};
 
 use crate::settings::{DetectorSettings, PipelineSettings};
 
-/// The config with every default filled in, of the plugins too.
+/// Returns the config with every default filled in, of the plugins too. What may be tuned
+/// is no part of it.
 pub(super) fn resolve(
     text: &str,
     settings: &PipelineSettings,
     registry: &Registry,
-) -> Result<String, ConfigError> {
+) -> Result<Table, ConfigError> {
     let mut root: Table = toml::from_str(text)?;
+    root.remove(super::tune::TABLE);
     root.extend(table_of(settings)?);
     for (name, value) in &mut root {
         match (name.as_str(), value) {
@@ -28,7 +30,7 @@ pub(super) fn resolve(
             _ => {}
         }
     }
-    toml::to_string(&root).map_err(|error| ConfigError::new(error.to_string()))
+    Ok(root)
 }
 
 fn fill_config(section: &mut Value, registry: &Registry) -> Result<(), ConfigError> {

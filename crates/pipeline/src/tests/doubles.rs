@@ -162,6 +162,10 @@ impl Detector for Script {
         Ok(found)
     }
 
+    fn remembers(&self) -> bool {
+        self.config.how != "picky"
+    }
+
     fn likelihood(&self) -> Option<&dyn Likelihood> {
         (self.config.how == "weigh").then_some(self as &dyn Likelihood)
     }

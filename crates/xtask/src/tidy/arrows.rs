@@ -20,6 +20,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
     ("trials", &["core", "vision", "pipeline", "sim", "eval"]),
+    ("tuning", &["core", "pipeline", "eval"]),
     // What is reproduced may be the learning of a plugin.
     (
         "reproduce",
@@ -54,6 +55,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "trials",
             "reproduce",
             "triangulate",
+            "tuning",
             "catalog",
             // `follow --fit`: weights of the lock, fitted to rides.
             "learn",

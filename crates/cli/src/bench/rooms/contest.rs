@@ -1,0 +1,106 @@
+use tagalong_core::Registry;
+use tagalong_pipeline::{Tunable, with_values};
+use tagalong_tuning::candidates;
+
+use super::RoomsArgs;
+use crate::bench::plan::{self, Annotated, Candidate, sha256};
+use crate::config_file::ConfigFile;
+use crate::outcome::Failure;
+
+/// A room with its logs.
+pub struct Location {
+    pub name: String,
+    pub about: String,
+    pub logs: Vec<Annotated>,
+}
+
+/// A pipeline with all settings that are tried.
+pub struct Contestant {
+    /// As it is shipped.
+    pub config: Candidate,
+    /// What is tried, the shipped settings first.
+    pub settings: Vec<Setting>,
+    /// Combinations that contradict themselves.
+    pub refused: usize,
+}
+
+/// Values of the tunable settings, and the config that has them.
+pub struct Setting {
+    /// In the order of the tunables.
+    pub values: Vec<toml::Value>,
+    /// The config.
+    pub file: ConfigFile,
+    /// Of the config with all defaults, and of the files that it names.
+    hash: String,
+}
+
+impl Contestant {
+    /// Builds every pipeline once.
+    ///
+    /// # Errors
+    /// Values that a setting does not allow, with their line.
+    pub fn new(config: Candidate, args: &RoomsArgs, registry: &Registry) -> Result<Self, Failure> {
+        config.file.check_tuning(registry)?;
+        let (pipeline, _) = config.file.pipeline(registry, None)?;
+        let (resolved, budget) = (pipeline.resolved(), usize::from(args.budget));
+        let (mut settings, mut refused) = (Vec::new(), 0);
+        for values in candidates(&config.tune, budget, args.seed) {
+            match Setting::new(&config, &resolved, values, registry)? {
+                Some(setting) => settings.push(setting),
+                None => refused += 1,
+            }
+        }
+        Ok(Self { config, settings, refused })
+    }
+
+    /// Returns its name in tables.
+    pub fn name(&self) -> String {
+        self.config.file.stem()
+    }
+
+    /// Returns the settings in words: `lifecycle.confirm_hits = 2, ...`.
+    pub fn words(&self, setting: usize) -> String {
+        let word = |(tunable, value): (&Tunable, &toml::Value)| {
+            format!("{} = {}", tunable.key, shown(value))
+        };
+        let words: Vec<String> =
+            self.config.tune.iter().zip(&self.settings[setting].values).map(word).collect();
+        if words.is_empty() { "nothing to tune".to_owned() } else { words.join(", ") }
+    }
+}
+
+/// A number without the digits that come of dividing a range.
+pub fn shown(value: &toml::Value) -> String {
+    match value {
+        toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),
+        other => other.to_string(),
+    }
+}
+
+impl Setting {
+    /// `None` if each value is allowed, but not all of them together.
+    fn new(
+        config: &Candidate,
+        resolved: &str,
+        values: Vec<toml::Value>,
+        registry: &Registry,
+    ) -> Result<Option<Self>, Failure> {
+        let keys = config.tune.iter().map(|tunable| tunable.key.as_str());
+        let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
+        let text = with_values(resolved, &named).map_err(|error| Failure::usage(error.message))?;
+        let file = config.file.with_text(text);
+        let Ok((pipeline, _)) = file.pipeline(registry, None) else { return Ok(None) };
+        let outer = config.outer.resolved();
+        let files = plan::file_hashes(&file)?;
+        let everything = format!("{}\n{outer}\n{files:?}", pipeline.resolved());
+        let hash = sha256(everything.as_bytes());
+        Ok(Some(Self { values, file, hash }))
+    }
+
+    /// Returns the name of its result on a log: a hash of all that it depends on.
+    pub fn run_hash(&self, log: &Annotated, version: &str) -> String {
+        let Annotated { sha256: log, truth_sha256, whole_bodies, .. } = log;
+        let everything = format!("{version}\n{}\n{log}\n{truth_sha256}\n{whole_bodies}", self.hash);
+        sha256(everything.as_bytes())[..32].to_owned()
+    }
+}

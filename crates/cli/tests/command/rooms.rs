@@ -1,0 +1,246 @@
+//! `tagalong bench --leave-one-room-out` over drawn logs: a room has no say in what is
+//! chosen for it, and nothing is computed twice.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::common::{Drawn, code, own_plugin, people, text};
+
+/// The detector of the config sees nobody; one value of two lets it see the walker.
+const TUNE: &str = "config = { max_depth_m = 2.0 }";
+const VALUES: &str = "\"detectors.0.config.max_depth_m\" = [2.0, 4.0]";
+const KEY: &str = "detectors.0.config.max_depth_m";
+
+/// Two rooms with a log each.
+struct Home {
+    folder: tempfile::TempDir,
+}
+
+impl Home {
+    fn new() -> Self {
+        let home = Self { folder: tempfile::tempdir().unwrap() };
+        for (name, frames) in [("a", 12), ("b", 9)] {
+            Drawn::of(frames).write(&home.path(&format!("logs/{name}.mcap")));
+            home.write(&format!("logs/{name}.people.csv"), &people(frames));
+        }
+        home.write(
+            "rooms.toml",
+            "folder = \"logs\"\n[rooms.A]\nlogs = [\"a.mcap\"]\n[rooms.B]\nlogs = [\"b.mcap\"]\n",
+        );
+        home.config("near", TUNE, VALUES);
+        home
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        let path = self.folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        path
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn config(&self, name: &str, extra: &str, tune: &str) {
+        let written = crate::common::config(self.folder.path(), extra);
+        let text = fs::read_to_string(&written).unwrap() + "[tune]\n" + tune + "\n";
+        fs::remove_file(written).unwrap();
+        self.write(&format!("configs/{name}.toml"), &text);
+    }
+
+    fn command(&self, arguments: &[&str]) -> std::process::Command {
+        let mut command = own_plugin();
+        command.current_dir(self.folder.path()).args(["bench", "--leave-one-room-out"]);
+        command.arg("rooms.toml").args(arguments);
+        command
+    }
+
+    fn rooms(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    /// What is said of the first pipeline.
+    fn fitted(&self, arguments: &[&str]) -> Value {
+        let output = self.rooms(&[&["--format", "json"], arguments].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["pipelines"][0].clone()
+    }
+
+    fn results(&self, out: &str) -> BTreeMap<String, Vec<u8>> {
+        let entries = fs::read_dir(self.path(out).join("rooms")).unwrap().map(Result::unwrap);
+        let name = |entry: &fs::DirEntry| entry.file_name().into_string().unwrap();
+        entries.map(|entry| (name(&entry), fs::read(entry.path()).unwrap())).collect()
+    }
+}
+
+fn chosen(fitted: &Value) -> [f64; 3] {
+    let of = |values: &Value| values[KEY].as_f64().unwrap();
+    let without = |room: usize| of(&fitted["rooms"][room]["chosen_without"]);
+    [without(0), without(1), of(&fitted["chosen_with_all"])]
+}
+
+fn mota(fitted: &Value, room: usize, which: &str) -> f64 {
+    fitted["rooms"][room][which]["MOTA"].as_f64().unwrap()
+}
+
+#[test]
+fn a_room_has_no_say_in_what_is_chosen_without_it() {
+    let home = Home::new();
+    let before = home.fitted(&["--objective", "MOTA"]);
+    assert_eq!(chosen(&before), [4.0, 4.0, 4.0]);
+    assert!(mota(&before, 0, "without") > 0.5 && mota(&before, 1, "with_all") > 0.5, "{before}");
+    assert_eq!(mota(&before, 0, "shipped"), 0.0, "nobody is seen");
+    // Another truth of room A: whoever sees the walker is wrong nine times in twelve.
+    home.write(
+        "logs/a.people.csv",
+        &people(12).lines().take(4).map(|l| format!("{l}\n")).collect::<String>(),
+    );
+    let after = home.fitted(&["--objective", "MOTA"]);
+    assert_eq!(chosen(&after), [4.0, 2.0, 2.0], "{after}");
+    assert!(mota(&after, 0, "without") < -1.0, "{after}");
+    assert_eq!(mota(&after, 0, "with_all"), 0.0);
+    assert_eq!(mota(&after, 1, "without"), 0.0);
+}
+
+#[test]
+fn a_second_time_computes_nothing_and_jobs_change_no_byte() {
+    let home = Home::new();
+    let first = home.rooms(&["-o", "one"]);
+    assert!(text(&first.stderr).contains("4 runs done, 0 had"), "{}", text(&first.stderr));
+    let second = home.rooms(&["-o", "one"]);
+    assert!(text(&second.stderr).contains("0 runs done, 4 had"), "{}", text(&second.stderr));
+    let third = home.rooms(&["-o", "two", "--jobs", "3"]);
+    assert!(first.stdout == second.stdout && first.stdout == third.stdout);
+    assert_eq!(home.results("one").len(), 4);
+    assert!(home.results("one") == home.results("two"));
+    let json = |out: &str| fs::read(home.path(out).join("rooms.json")).unwrap();
+    assert!(json("one") == json("two"));
+    let lost = home.results("two").into_keys().next().unwrap();
+    fs::write(home.path("two").join("rooms").join(lost), "{\"figures\":").unwrap();
+    let repaired = home.rooms(&["-o", "two"]);
+    assert!(text(&repaired.stderr).contains("1 runs done, 3 had"), "{}", text(&repaired.stderr));
+    assert!(first.stdout == repaired.stdout && home.results("one") == home.results("two"));
+}
+
+#[test]
+fn tables_name_figures_and_choices() {
+    let home = Home::new();
+    let shown = text(&home.rooms(&[]).stdout);
+    for words in ["HOTA without", "near", "means over the rooms", "A (a)", "With all: `detectors"] {
+        assert!(shown.contains(words), "{words} in\n{shown}");
+    }
+    let page = text(&home.rooms(&["--format", "markdown"]).stdout);
+    assert!(page.contains("| near | 2 | "), "{page}");
+    assert!(page.contains("* Without A, without B: `detectors.0.config.max_depth_m` = 4.0."));
+    let mut step = own_plugin();
+    step.current_dir(home.folder.path()).args(["bench", "rooms", "rooms.toml"]);
+    assert_eq!(text(&step.output().unwrap().stdout), shown, "a step by another name");
+}
+
+#[test]
+fn logs_that_cannot_be_read_are_listed_with_the_reason() {
+    let home = Home::new();
+    Drawn { depth: false, ..Drawn::of(5) }.write(&home.path("logs/mono.mcap"));
+    home.write("logs/mono.boxes.csv", "1,1,60,40,26,80,1,1,1\n");
+    let rooms = fs::read_to_string(home.path("rooms.toml")).unwrap();
+    home.write("rooms.toml", &format!("{rooms}[rooms.C]\nlogs = [\"mono.mcap\"]\n"));
+    let fitted = home.fitted(&[]);
+    assert_eq!(fitted["rooms"].as_array().unwrap().len(), 2, "{fitted}");
+    assert_eq!(fitted["skipped"][0]["log"], "mono");
+    assert!(fitted["skipped"][0]["why"].as_str().unwrap().contains("depth"), "{fitted}");
+    home.write("rooms.toml", &rooms.replace("b.mcap", "mono.mcap"));
+    let shown = text(&home.rooms(&[]).stdout);
+    assert!(shown.contains("can read logs of 1 room, and two are needed"), "{shown}");
+}
+
+#[test]
+fn a_setting_that_fails_is_named() {
+    let home = Home::new();
+    let tune = "\"detectors.0.config.panic_after_frames\" = [0, 4]";
+    home.config("near", "", tune);
+    let output = home.rooms(&[]);
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 1, "{told}");
+    for words in ["2 runs failed", "near on a", "panic_after_frames = 4", "frame 5"] {
+        assert!(told.contains(words), "{words} in {told}");
+    }
+    assert_eq!(home.results("bench").len(), 2, "the others are kept");
+}
+
+#[test]
+fn settings_that_contradict_each_other_are_left_out_and_counted() {
+    let home = Home::new();
+    let tune = "lifecycle.confirm_hits = [3, 4]\nlifecycle.confirm_within = [3, 5]";
+    home.config("near", "[lifecycle]\nconfirm_within = 4\n", tune);
+    let text = fs::read_to_string(home.path("configs/near.toml")).unwrap();
+    // The section of the detector ends before that of the life cycle.
+    assert!(text.contains("[lifecycle]"));
+    let fitted = home.fitted(&[]);
+    assert_eq!((fitted["settings"].as_u64(), fitted["refused"].as_u64()), (Some(4), Some(1)));
+}
+
+#[test]
+fn mistakes_are_told_with_file_and_line() {
+    let home = Home::new();
+    let tell = |code_wanted: i32, words: &[&str]| {
+        let output = home.rooms(&[]);
+        let told = text(&output.stderr);
+        assert_eq!(code(&output), code_wanted, "{told}");
+        words.iter().for_each(|word| assert!(told.contains(word), "{word} in {told}"));
+    };
+    home.config("near", "", "\"lifecycle.confirm_hit\" = [1]");
+    tell(2, &["near.toml:9:1", "did you mean `lifecycle.confirm_hits`?"]);
+    home.config("near", "", "lifecycle.confirm_hits = [1, 99]");
+    tell(2, &["configs/near.toml:9:30", "= 99 is not allowed", "`lifecycle.confirm_within`"]);
+    let mut check = own_plugin();
+    let checked = check.current_dir(home.folder.path()).args(["check", "configs/near.toml"]);
+    let checked = checked.output().unwrap();
+    assert!(code(&checked) == 2 && text(&checked.stderr).contains("= 99 is not allowed"));
+    home.config("near", "", "");
+    tell(2, &["no config in the folder configs", "--configs"]);
+    home.config("near", TUNE, VALUES);
+    let rooms = fs::read_to_string(home.path("rooms.toml")).unwrap();
+    home.write("rooms.toml", &rooms.replace("b.mcap", "c.mcap"));
+    tell(2, &["rooms.toml:5:9", "c.mcap"]);
+    Drawn::of(3).write(&home.path("logs/c.mcap"));
+    tell(2, &["rooms.toml:5:9", "has no truth"]);
+    home.write("rooms.toml", "[rooms.A]\nlogs = [\"logs/a.mcap\"]\n");
+    tell(2, &["rooms.toml:1:", "two are needed"]);
+    fs::remove_file(home.path("rooms.toml")).unwrap();
+    tell(2, &["rooms.toml"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_leaves_whole_files_and_a_second_run_goes_on() {
+    let home = Home::new();
+    Drawn::of(60).write(&home.path("logs/b.mcap"));
+    home.config("near", "config = { max_depth_m = 2.0, delay_ms = 50 }", VALUES);
+    let child = home
+        .command(&[])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let waited = std::time::Instant::now();
+    let kept = || fs::read_dir(home.folder.path().join("bench/rooms")).map_or(0, Iterator::count);
+    while kept() < 2 && waited.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let pid = child.id().to_string();
+    let kill = std::process::Command::new("kill").args(["-s", "INT", &pid]).status().unwrap();
+    assert!(kill.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(code(&output), 130, "{}", text(&output.stderr));
+    let results = home.results("bench");
+    assert_eq!(results.len(), 2, "{:?}", results.keys());
+    for bytes in results.values() {
+        assert!(serde_json::from_slice::<Value>(bytes).is_ok());
+    }
+    let told = text(&home.rooms(&[]).stderr);
+    assert!(told.contains("2 runs done, 2 had their results"), "{told}");
+}

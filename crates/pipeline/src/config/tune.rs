@@ -1,0 +1,338 @@
+//! `[tune]`: which settings of a config may be fitted, and what is tried for each.
+
+use std::ops::Range;
+use std::path::Path;
+
+use serde::Deserialize;
+use tagalong_core::{ConfigError, Registry, Value, nearest};
+use toml::de::{DeArray, DeValue};
+
+use super::{OWN, Options, PLUGINS};
+use crate::Pipeline;
+
+/// The table of a config that this is about.
+pub(super) const TABLE: &str = "tune";
+
+/// Most values of one setting.
+const MAX_VALUES: usize = 64;
+
+/// A setting that may be fitted, and the values that may be tried for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tunable {
+    /// Its place in the config: `lifecycle.confirm_hits`, `detectors.0.config.min_cells`.
+    pub key: String,
+    /// The value that the config has.
+    pub now: toml::Value,
+    /// The values to try, in the order of the config.
+    pub values: Vec<toml::Value>,
+    /// Where each of them stands in the text.
+    pub places: Vec<Range<usize>>,
+}
+
+/// Equally spaced values, as a config writes them.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Spread {
+    between: [f64; 2],
+    steps: usize,
+}
+
+/// A setting as the config has it, by its place.
+type Leaf<'a> = (String, &'a toml::Value);
+
+/// Reads `[tune]`. `resolved` is the config with every default.
+pub(super) fn read(
+    table: Option<Value<'_>>,
+    resolved: &toml::Table,
+) -> Result<Vec<Tunable>, ConfigError> {
+    let Some(table) = table else { return Ok(Vec::new()) };
+    let mut named = Vec::new();
+    flatten(String::new(), table, &mut named);
+    let leaves = leaves_of(resolved);
+    let read_one = |(key, value): (Named, Value<'_>)| tunable(key, value, &leaves);
+    named.into_iter().map(read_one).collect()
+}
+
+/// Builds the pipeline with each value of each setting in turn, the others as they are.
+///
+/// # Errors
+/// A value that the setting does not allow, with its place in the text.
+pub fn check_tuning(
+    tunables: &[Tunable],
+    pipeline: &Pipeline,
+    base_dir: &Path,
+    registry: &Registry,
+    options: &Options,
+) -> Result<(), ConfigError> {
+    for Tunable { key, values, places, .. } in tunables {
+        for (value, place) in values.iter().zip(places) {
+            let text = with_values(&pipeline.resolved, &[(key, value)])?;
+            if let Err(error) = Pipeline::from_toml_with(&text, base_dir, registry, options) {
+                let message = format!("`{key}` = {value} is not allowed: {}", error.message);
+                return Err(ConfigError { message, span: Some(place.clone()) });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns a config in which settings have other values. `resolved` is what
+/// [`Pipeline::resolved`] says, so that each setting stands somewhere.
+///
+/// # Errors
+/// A setting that the config does not have.
+pub fn with_values(resolved: &str, values: &[(&str, &toml::Value)]) -> Result<String, ConfigError> {
+    let mut root = toml::Value::Table(toml::from_str(resolved)?);
+    for (key, value) in values {
+        let place = key.split('.').try_fold(&mut root, |inner, part| match inner {
+            toml::Value::Array(items) => items.get_mut(part.parse::<usize>().ok()?),
+            inner => inner.get_mut(part),
+        });
+        let unknown = || ConfigError::new(format!("the config has no setting `{key}`"));
+        *place.ok_or_else(unknown)? = (*value).clone();
+    }
+    toml::to_string(&root).map_err(|error| ConfigError::new(error.to_string()))
+}
+
+/// A dotted key and where it stands.
+struct Named {
+    key: String,
+    place: Range<usize>,
+}
+
+/// Tables within the table are dotted keys, too: quotes around a key change nothing.
+fn flatten<'a>(path: String, value: Value<'a>, out: &mut Vec<(Named, Value<'a>)>) {
+    let span = value.span();
+    match value.into_inner() {
+        DeValue::Table(table) if !table.contains_key("between") => {
+            for (name, inner) in table {
+                let place = name.span();
+                let name = name.into_inner();
+                let key = if path.is_empty() { name.into() } else { format!("{path}.{name}") };
+                match inner.get_ref() {
+                    DeValue::Table(_) => flatten(key, inner, out),
+                    _ => out.push((Named { key, place }, inner)),
+                }
+            }
+        }
+        other => {
+            out.push((Named { key: path, place: span.clone() }, toml::Spanned::new(span, other)));
+        }
+    }
+}
+
+/// What may be tuned: single settings of the pipeline and of its plugins.
+fn leaves_of(resolved: &toml::Table) -> Vec<Leaf<'_>> {
+    let mut leaves = Vec::new();
+    for (name, value) in resolved {
+        let is_setting = OWN.contains(&name.as_str()) || PLUGINS.contains(&name.as_str());
+        if is_setting && name != "seed" {
+            add_leaves(name.clone(), value, &mut leaves);
+        }
+    }
+    leaves
+}
+
+fn add_leaves<'a>(path: String, value: &'a toml::Value, out: &mut Vec<Leaf<'a>>) {
+    match value {
+        toml::Value::Table(table) => {
+            let inner = table.iter().filter(|(name, _)| *name != "plugin");
+            inner.for_each(|(name, value)| add_leaves(format!("{path}.{name}"), value, out));
+        }
+        toml::Value::Array(items) if items.iter().any(toml::Value::is_table) => {
+            let inner = items.iter().enumerate();
+            inner.for_each(|(at, value)| add_leaves(format!("{path}.{at}"), value, out));
+        }
+        _ => out.push((path, value)),
+    }
+}
+
+fn tunable(named: Named, value: Value<'_>, leaves: &[Leaf<'_>]) -> Result<Tunable, ConfigError> {
+    let Named { key, place } = named;
+    let Some((_, now)) = leaves.iter().find(|(name, _)| *name == key) else {
+        let known = leaves.iter().map(|(name, _)| name.as_str());
+        let hint = nearest(&key, known).map(|name| format!("; did you mean `{name}`?"));
+        let remedy = "name a single setting that has a default or stands in the config";
+        let message =
+            format!("nothing to tune is called `{key}`{}; {remedy}", hint.unwrap_or_default());
+        return Err(ConfigError { message, span: Some(place) });
+    };
+    let whole = value.span();
+    let (values, places): (Vec<_>, Vec<_>) = match value.into_inner() {
+        DeValue::Array(items) => listed(&key, items, now)?,
+        DeValue::Table(table) => spread(&key, toml::Spanned::new(whole.clone(), table), now)?,
+        _ => (Vec::new(), Vec::new()),
+    };
+    let mistake = match values.len() {
+        0 => "needs a list of values, or `{ between = [low, high], steps = n }`".to_owned(),
+        count if count > MAX_VALUES => format!("has {count} values; at most {MAX_VALUES}"),
+        _ => return Ok(Tunable { key, now: (*now).clone(), values, places }),
+    };
+    Err(ConfigError { message: format!("`{key}` {mistake}"), span: Some(whole) })
+}
+
+type Values = (Vec<toml::Value>, Vec<Range<usize>>);
+
+fn listed(key: &str, items: DeArray<'_>, now: &toml::Value) -> Result<Values, ConfigError> {
+    let (mut values, mut places) = (Vec::new(), Vec::new());
+    for item in items {
+        let place = item.span();
+        let value = toml::Value::deserialize(toml::de::ValueDeserializer::from(item))?;
+        let value = as_now(key, value, now).map_err(|error| error.or_at(Some(place.clone())))?;
+        if values.contains(&value) {
+            let message = format!("`{key}` lists {value} twice");
+            return Err(ConfigError { message, span: Some(place) });
+        }
+        values.push(value);
+        places.push(place);
+    }
+    Ok((values, places))
+}
+
+fn spread(
+    key: &str,
+    table: toml::Spanned<toml::de::DeTable<'_>>,
+    now: &toml::Value,
+) -> Result<Values, ConfigError> {
+    let span = table.span();
+    let at = |message: String| ConfigError { message, span: Some(span.clone()) };
+    let table = toml::Spanned::new(span.clone(), DeValue::Table(table.into_inner()));
+    let Spread { between: [low, high], steps } =
+        Spread::deserialize(toml::de::ValueDeserializer::from(table))?;
+    if !(low.is_finite() && high.is_finite() && low < high) {
+        return Err(at(format!("`{key}` lies between {low} and {high}: the lower number first")));
+    }
+    if !(2..=MAX_VALUES).contains(&steps) {
+        return Err(at(format!("`{key}`: `steps` must be from 2 to {MAX_VALUES}, not {steps}")));
+    }
+    let step = |i: usize| low + (high - low) * i as f64 / (steps - 1) as f64;
+    let mut values: Vec<toml::Value> = Vec::new();
+    for value in (0..steps).map(step) {
+        let value = match now {
+            toml::Value::Integer(_) => toml::Value::Integer(value.round() as i64),
+            _ => as_now(key, toml::Value::Float(value), now).map_err(|e| at(e.message))?,
+        };
+        if !values.contains(&value) {
+            values.push(value);
+        }
+    }
+    let places = vec![span.clone(); values.len()];
+    Ok((values, places))
+}
+
+/// The value as the setting's own type; whole numbers are numbers, too.
+fn as_now(key: &str, value: toml::Value, now: &toml::Value) -> Result<toml::Value, ConfigError> {
+    match (&value, now) {
+        (toml::Value::Integer(whole), toml::Value::Float(_)) => {
+            Ok(toml::Value::Float(*whole as f64))
+        }
+        (value, now) if value.same_type(now) => Ok(value.clone()),
+        _ => {
+            let (is, wanted) = (value.type_str(), now.type_str());
+            Err(ConfigError::new(format!("`{key}` = {value} is of type {is}, not {wanted}")))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::doubles::{PLAIN, World};
+
+    fn build(tune: &str) -> Result<(Pipeline, Vec<Tunable>), String> {
+        let text = format!("{PLAIN}[tune]\n{tune}\n");
+        Pipeline::from_toml(&text, Path::new("."), &World::default().registry())
+            .map(|(pipeline, run)| (pipeline, run.tune))
+            .map_err(|error| error.render("a.toml", &text))
+    }
+
+    fn check(tune: &str) -> Result<(), String> {
+        let (pipeline, tunables) = build(tune)?;
+        let (registry, options) = (World::default().registry(), Options::default());
+        check_tuning(&tunables, &pipeline, Path::new("."), &registry, &options)
+            .map_err(|error| error.render("a.toml", &format!("{PLAIN}[tune]\n{tune}\n")))
+    }
+
+    #[test]
+    fn lists_and_spreads_take_the_type_of_their_setting() {
+        let lines = [
+            "\"lifecycle.confirm_hits\" = [1, 2]",
+            "lifecycle.drop_after_s = [1, 2.5]",
+            "\"detectors.0.config.script\" = { between = [0, 2], steps = 5 }",
+            "association.gate_m = { between = [0.5, 1.0], steps = 3 }",
+            "association.cost = [\"overlap\", \"mahalanobis\"]",
+        ];
+        let (_, tunables) = build(&lines.join("\n")).unwrap();
+        let shown: Vec<String> = tunables
+            .iter()
+            .map(|t| format!("{} {}", t.key, toml::Value::Array(t.values.clone())))
+            .collect();
+        for line in [
+            "lifecycle.confirm_hits [1, 2]",
+            "lifecycle.drop_after_s [1.0, 2.5]",
+            "detectors.0.config.script [0, 1, 2]",
+            "association.gate_m [0.5, 0.75, 1.0]",
+            "association.cost [\"overlap\", \"mahalanobis\"]",
+        ] {
+            assert!(shown.iter().any(|s| s == line), "{line} in {shown:#?}");
+        }
+        check(&lines.join("\n")).unwrap();
+    }
+
+    #[test]
+    fn mistakes_are_shown_with_their_line() {
+        let cases: &[(&str, &[&str])] = &[
+            ("\"lifecycle.confirm_hit\" = [1]", &["a.toml:7:1", "`lifecycle.confirm_hits`?"]),
+            ("lifecycle.confirm_hit = [1]", &["a.toml:7:11", "`lifecycle.confirm_hits`?"]),
+            ("\"detectors.1.config.script\" = [1]", &["`detectors.0.config.script`?"]),
+            ("seed = [1, 2]", &["a.toml:7:1", "nothing to tune is called `seed`"]),
+            ("\"filter.plugin\" = ['odd']", &["nothing to tune is called `filter.plugin`"]),
+            ("lifecycle = [1]", &["nothing to tune is called `lifecycle`"]),
+            ("lifecycle.confirm_hits = 2", &["a.toml:7:26", "needs a list of values"]),
+            ("lifecycle.confirm_hits = []", &["a.toml:7:26", "needs a list of values"]),
+            ("lifecycle.confirm_hits = [1, 2.5]", &["a.toml:7:30", "float, not integer"]),
+            ("lifecycle.confirm_hits = ['x']", &["a.toml:7:27", "string, not integer"]),
+            ("lifecycle.confirm_hits = [1, 1]", &["a.toml:7:30", "twice"]),
+            ("association.gate = { between = [2, 1], steps = 3 }", &["the lower number first"]),
+            ("association.gate = { between = [1, 2], steps = 1 }", &["`steps` must be from 2"]),
+            ("association.gate = { between = [1, 2] }", &["a.toml:7", "missing field `steps`"]),
+            ("association.gate = { between = [1, 2], stps = 3 }", &["did you mean `steps`?"]),
+            ("association.cost = { between = [1, 2], steps = 2 }", &["float, not string"]),
+        ];
+        for (tune, expected) in cases {
+            let shown = build(tune).map(|_| ()).expect_err(tune);
+            for words in *expected {
+                assert!(shown.contains(words), "{tune}\n{shown}\nlacks {words}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_that_a_setting_does_not_allow_are_shown_with_their_line() {
+        let shown = check("lifecycle.confirm_hits = [1, 2, 9]").unwrap_err();
+        assert!(shown.contains("a.toml:7:33") && shown.contains("must be at least 9"), "{shown}");
+        let shown = check("\"association.cost\" = ['overlap', 'far']").unwrap_err();
+        assert!(shown.contains("a.toml:7:34") && shown.contains("unknown variant"), "{shown}");
+    }
+
+    #[test]
+    fn the_table_leaves_the_pipeline_as_it_is() {
+        let plain = World::default().pipeline(PLAIN).resolved();
+        let (tuned, _) = build("lifecycle.confirm_hits = [1, 2]").unwrap();
+        assert_eq!(tuned.resolved(), plain);
+    }
+
+    #[test]
+    fn values_are_put_where_they_belong() {
+        let resolved = World::default().pipeline(PLAIN).resolved();
+        let (two, script) = (toml::Value::Integer(2), toml::Value::Integer(7));
+        let values = [("lifecycle.confirm_hits", &two), ("detectors.0.config.script", &script)];
+        let text = with_values(&resolved, &values).unwrap();
+        let changed = World::default().pipeline(&text).resolved();
+        assert!(changed.contains("confirm_hits = 2\n") && changed.contains("script = 7\n"));
+        let count = |text: &str| text.lines().count();
+        assert_eq!(count(&changed), count(&resolved));
+        assert!(with_values(&resolved, &[("lifecycle.no_such", &two)]).is_err());
+        assert!(with_values(&resolved, &[("detectors.9.every", &two)]).is_err());
+    }
+}

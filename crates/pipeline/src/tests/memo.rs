@@ -1,0 +1,92 @@
+//! Pipelines that share what they find say the same as those that do not.
+
+use tagalong_core::Frame;
+
+use super::doubles::{World, frame, person};
+use crate::{FrameReport, Pipeline};
+
+/// Of two scripts the first forgets; verifiers and thresholds differ.
+const CONFIGS: [&str; 4] = [
+    "",
+    "lifecycle.drop_after_s = 0.3\nlifecycle.drop_after_misses = 1",
+    "[[verifiers]]\nplugin = 'choosy'",
+    "[[verifiers]]\nplugin = 'choosy'\nconfig = { how = 'once' }",
+];
+
+fn config(around: &str, script: &str) -> String {
+    format!(
+        "filter.plugin = 'steady'\n{around}\n[[detectors]]\nplugin = 'script'\n\
+         roles = ['follow', 'discover']\nconfig = {{ {script} }}"
+    )
+}
+
+fn world() -> World {
+    let walk = |i: u32| {
+        let aside = 0.05 * f64::from(i);
+        let all = [person(3.0, 0.4 + aside), person(2.0, -0.8 - aside), person(4.0, 1.5)];
+        all.into_iter().take(if i % 5 == 4 { 1 } else { 3 }).collect()
+    };
+    World::of((0..20).map(walk))
+}
+
+/// A report without its times.
+fn untimed(report: FrameReport) -> String {
+    format!("{:?}", FrameReport { timings: Vec::new(), ..report })
+}
+
+/// What pipelines say of the same frames, step by step side by side.
+fn together(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
+    let frames: Vec<Frame> = (1..=20).map(|i| frame(i, i as f64 * 0.1)).collect();
+    let of = |frame| -> Vec<String> {
+        pipelines.iter_mut().map(|p| untimed(p.step(frame).unwrap())).collect()
+    };
+    frames.iter().map(of).collect()
+}
+
+fn texts() -> Vec<String> {
+    let scripts = ["how = 'picky'", "how = 'picky', script = 1", "how = ''"];
+    let of = |script| CONFIGS.map(|around| config(around, script));
+    scripts.into_iter().flat_map(of).collect()
+}
+
+#[test]
+fn what_is_shared_is_what_would_have_been_found() {
+    let world = world();
+    world.show(1, 7, vec![person(2.5, 0.0)]);
+    let build = || -> Vec<Pipeline> { texts().iter().map(|text| world.pipeline(text)).collect() };
+    let alone = together(&mut build());
+    let asked_alone = std::mem::take(&mut *world.asked.lock().unwrap()).len();
+    let mut sharing = build();
+    sharing.iter_mut().for_each(Pipeline::share_findings);
+    let shared = together(&mut sharing);
+    assert_eq!(alone, shared);
+    let asked = world.asked.lock().unwrap().len();
+    assert!(4 * asked < 3 * asked_alone, "{asked} of {asked_alone} questions");
+    let sights = alone.iter().map(|all| all.iter().collect::<std::collections::BTreeSet<_>>());
+    assert!(sights.map(|all| all.len()).max() > Some(5), "the configs differ in what they say");
+}
+
+#[test]
+fn who_remembers_is_asked_each_time() {
+    for (how, questions) in [("picky", 20), ("", 40)] {
+        let world = world();
+        let text = format!(
+            "filter.plugin = 'steady'\n[[detectors]]\nplugin = 'script'\nconfig.how = '{how}'"
+        );
+        let mut pair = [world.pipeline(&text), world.pipeline(&text)];
+        pair.iter_mut().for_each(Pipeline::share_findings);
+        together(&mut pair);
+        assert_eq!(world.asked.lock().unwrap().len(), questions, "{how}");
+    }
+}
+
+#[test]
+fn another_frame_is_looked_at_anew() {
+    let world = world();
+    let mut pair = [world.pipeline(&texts()[0]), world.pipeline(&texts()[0])];
+    pair.iter_mut().for_each(Pipeline::share_findings);
+    for pipeline in &mut pair {
+        pipeline.step(&frame(1, 0.1)).unwrap();
+    }
+    assert_eq!(world.asked.lock().unwrap().len(), 2);
+}

@@ -1,0 +1,169 @@
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use tagalong_core::ConfigError;
+use toml::Spanned;
+
+/// Fewest rooms: one is left out, and one has to remain.
+const FEWEST: usize = 2;
+
+/// Logs by the room in which they were taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rooms {
+    /// The rooms by name.
+    pub rooms: Vec<Room>,
+}
+
+/// A room.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Room {
+    /// How it is called in tables.
+    pub name: String,
+    /// What it is.
+    pub about: String,
+    /// Its logs.
+    pub logs: Vec<RoomLog>,
+}
+
+/// A log, and where the text names it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoomLog {
+    /// The log.
+    pub path: PathBuf,
+    /// Its place in the text.
+    pub place: Range<usize>,
+}
+
+/// The file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    folder: PathBuf,
+    rooms: Spanned<BTreeMap<String, Entry>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    #[serde(default)]
+    about: String,
+    logs: Spanned<Vec<Spanned<PathBuf>>>,
+}
+
+impl Rooms {
+    /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`;
+    /// or at `logs_dir`, if there is one.
+    ///
+    /// # Errors
+    /// What is wrong with the text, with its place.
+    pub fn parse(
+        text: &str,
+        base_dir: &Path,
+        logs_dir: Option<&Path>,
+    ) -> Result<Self, ConfigError> {
+        let File { folder, rooms } = toml::from_str(text)?;
+        let folder = logs_dir.map_or_else(|| base_dir.join(folder), Path::to_owned);
+        let whole = rooms.span();
+        let room = |(name, entry): (String, Entry)| Room::read(name, entry, &folder);
+        let rooms: Vec<Room> =
+            rooms.into_inner().into_iter().map(room).collect::<Result<_, _>>()?;
+        if rooms.len() < FEWEST {
+            let message = format!("{} room: one is left out, so two are needed", rooms.len());
+            return Err(ConfigError { message, span: Some(whole) });
+        }
+        refuse_twins(&rooms)?;
+        Ok(Self { rooms })
+    }
+}
+
+impl Room {
+    fn read(name: String, entry: Entry, folder: &Path) -> Result<Self, ConfigError> {
+        let place = entry.logs.span();
+        let log = |log: Spanned<PathBuf>| {
+            let place = log.span();
+            RoomLog { path: folder.join(log.into_inner()), place }
+        };
+        let logs: Vec<RoomLog> = entry.logs.into_inner().into_iter().map(log).collect();
+        if logs.is_empty() {
+            let message = format!("room `{name}` has no log");
+            return Err(ConfigError { message, span: Some(place) });
+        }
+        Ok(Self { name, about: entry.about, logs })
+    }
+}
+
+impl RoomLog {
+    /// Returns its name, as tables have it.
+    pub fn name(&self) -> String {
+        self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
+/// A log in two rooms would be left out and left in.
+fn refuse_twins(rooms: &[Room]) -> Result<(), ConfigError> {
+    let mut seen: BTreeMap<String, &str> = BTreeMap::new();
+    for room in rooms {
+        for log in &room.logs {
+            if let Some(other) = seen.insert(log.name(), &room.name) {
+                let message = format!(
+                    "a log called `{}` is in room `{other}` already; each has one room",
+                    log.name()
+                );
+                return Err(ConfigError { message, span: Some(log.place.clone()) });
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TWO: &str = "folder = \"logs\"\n[rooms.B]\nlogs = [\"b.mcap\"]\n\
+        [rooms.A]\nabout = \"a hall\"\nlogs = [\"a1.mcap\", \"a2.mcap\"]\n";
+
+    fn parse(text: &str) -> Result<Rooms, String> {
+        Rooms::parse(text, Path::new("home"), None).map_err(|e| e.render("rooms.toml", text))
+    }
+
+    #[test]
+    fn rooms_are_in_the_order_of_their_names() {
+        let rooms = parse(TWO).unwrap().rooms;
+        let names: Vec<&str> = rooms.iter().map(|room| room.name.as_str()).collect();
+        assert_eq!((names, rooms[0].about.as_str()), (vec!["A", "B"], "a hall"));
+        let paths: Vec<&Path> = rooms[0].logs.iter().map(|log| log.path.as_path()).collect();
+        assert_eq!(paths, [Path::new("home/logs/a1.mcap"), Path::new("home/logs/a2.mcap")]);
+        assert_eq!(&TWO[rooms[1].logs[0].place.clone()], "\"b.mcap\"");
+    }
+
+    #[test]
+    fn logs_may_lie_elsewhere() {
+        let rooms = Rooms::parse(TWO, Path::new("home"), Some(Path::new("there"))).unwrap();
+        assert_eq!(rooms.rooms[1].logs[0].path, Path::new("there/b.mcap"));
+    }
+
+    #[test]
+    fn mistakes_are_shown_with_their_line() {
+        let cases: &[(&str, &[&str])] = &[
+            ("[rooms.A]\nlogs = [\"a.mcap\"]", &["1 room", "two are needed"]),
+            ("[rooms.A]\nlogs = []\n[rooms.B]\nlogs = ['b']", &["rooms.toml:2:8", "`A` has no"]),
+            (
+                "[rooms.A]\nlogs = ['x/a.mcap']\n[rooms.B]\nlogs = ['a.mcap']",
+                &["rooms.toml:4:9", "in room `A` already"],
+            ),
+            ("[rooms.A]\nlog = ['a']", &["rooms.toml:2:1", "did you mean `logs`?"]),
+            ("[room.A]\nlogs = ['a']", &["rooms.toml:1:2", "did you mean `rooms`?"]),
+            ("folder = 'x'", &["missing field `rooms`"]),
+        ];
+        for (text, expected) in cases {
+            let shown = parse(text).unwrap_err();
+            for words in *expected {
+                assert!(shown.contains(words), "{text}\n{shown}\nlacks {words}");
+            }
+        }
+    }
+}
