@@ -2,8 +2,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tagalong_core::Registry;
+use tagalong_pipeline::StereoSettings;
 use tagalong_sim::{Scene, Split, Variant};
-use tagalong_trials::{Contender, Trial, TrialError, each};
+use tagalong_trials::{Contender, Trial, TrialError, each, in_order};
 
 /// Fewest seeds of a quick experiment.
 const FEWEST: u64 = 1;
@@ -80,12 +81,26 @@ impl Lab<'_> {
         set: &[(&str, &str)],
         seeds: u64,
     ) -> Result<Vec<Scene>, ReproduceError> {
+        self.scenes_of(Split::Test, name, set, seeds)
+    }
+
+    /// The same of another split.
+    ///
+    /// # Errors
+    /// As [`Lab::scenes`].
+    pub fn scenes_of(
+        &self,
+        split: Split,
+        name: &str,
+        set: &[(&str, &str)],
+        seeds: u64,
+    ) -> Result<Vec<Scene>, ReproduceError> {
         let path = self.configs.join("scenes").join(format!("{name}.toml"));
         let text = read(&path)?;
         let set: Vec<(String, String)> =
             set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let scene = |seed| {
-            let variant = Variant { seed: Some(seed), split: Some(Split::Test), set: set.clone() };
+            let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
             Scene::parse_with(&text, &variant).map_err(|error| {
                 ReproduceError::Scene(error.render(&path.display().to_string(), &text))
             })
@@ -125,6 +140,28 @@ impl Lab<'_> {
         self.progress.begin(scenes.len(), what);
         let done = |_| self.progress.step();
         Ok(each(scenes, contenders, self.registry, self.jobs, keep, done)?)
+    }
+}
+
+impl Lab<'_> {
+    /// As [`Lab::trials`], with depth from the scenes' stereo pairs by these settings,
+    /// computed once for all contenders.
+    ///
+    /// # Errors
+    /// As [`in_order`].
+    pub fn pair_trials<T: Send>(
+        &self,
+        what: &str,
+        scenes: &[Scene],
+        contenders: &[Contender],
+        stereo: &StereoSettings,
+        keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
+    ) -> Result<Vec<T>, ReproduceError> {
+        self.progress.begin(scenes.len(), what);
+        let trial = |scene: &Scene| {
+            Trial::of_pairs(scene, contenders, self.registry, stereo).and_then(&keep)
+        };
+        Ok(in_order(scenes, self.jobs, trial, |_| self.progress.step())?)
     }
 }
 
