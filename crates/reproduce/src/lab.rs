@@ -4,8 +4,9 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use tagalong_core::Registry;
+use tagalong_pipeline::StereoSettings;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
-use tagalong_trials::{Contender, Trial, TrialError, each};
+use tagalong_trials::{Contender, Trial, TrialError, each, in_order};
 
 /// Fewest seeds of a quick experiment.
 const FEWEST: u64 = 1;
@@ -114,16 +115,30 @@ impl Lab<'_> {
         set: &[(&str, &str)],
         seeds: u64,
     ) -> Result<Vec<Scene>, ReproduceError> {
+        self.scenes_of(Split::Test, name, set, seeds)
+    }
+
+    /// The same of another split.
+    ///
+    /// # Errors
+    /// As [`Lab::scenes`].
+    pub fn scenes_of(
+        &self,
+        split: Split,
+        name: &str,
+        set: &[(&str, &str)],
+        seeds: u64,
+    ) -> Result<Vec<Scene>, ReproduceError> {
         let path = self.configs.join("scenes").join(format!("{name}.toml"));
         let text = read(&path)?;
         let set: Vec<(String, String)> =
             set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-        let seeds = Split::Test
+        let seeds = split
             .seeds(self.first_seed, seeds)
             .map_err(|error| ReproduceError::Other(error.to_string()))?;
         self.drawn.add(Drawn { scene: name.to_owned(), seeds });
         let scene = |seed| {
-            let variant = Variant { seed: Some(seed), split: Some(Split::Test), set: set.clone() };
+            let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
             Scene::parse_with(&text, &variant).map_err(|error| {
                 ReproduceError::Scene(error.render(&path.display().to_string(), &text))
             })
@@ -163,6 +178,28 @@ impl Lab<'_> {
         self.progress.begin(scenes.len(), what);
         let done = |_| self.progress.step();
         Ok(each(scenes, contenders, self.registry, self.jobs, keep, done)?)
+    }
+}
+
+impl Lab<'_> {
+    /// As [`Lab::trials`], with depth from the scenes' stereo pairs by these settings,
+    /// computed once for all contenders.
+    ///
+    /// # Errors
+    /// As [`in_order`].
+    pub fn pair_trials<T: Send>(
+        &self,
+        what: &str,
+        scenes: &[Scene],
+        contenders: &[Contender],
+        stereo: &StereoSettings,
+        keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
+    ) -> Result<Vec<T>, ReproduceError> {
+        self.progress.begin(scenes.len(), what);
+        let trial = |scene: &Scene| {
+            Trial::of_pairs(scene, contenders, self.registry, stereo).and_then(&keep)
+        };
+        Ok(in_order(scenes, self.jobs, trial, |_| self.progress.step())?)
     }
 }
 

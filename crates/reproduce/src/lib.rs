@@ -22,6 +22,7 @@ mod rgbd_compressive;
 mod scatter;
 mod stereo;
 mod table;
+mod variant;
 
 pub use findings::{Experiment, Findings, Found, Picture, SYSTEMS, System, system};
 pub use lab::{Drawn, DrawnScenes, Lab, Progress, ReproduceError};

@@ -1,9 +1,10 @@
 use cpu_time::ThreadTime;
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, Registry, Stamp};
+use tagalong_core::{Camera, Funnel, Registry, Stamp};
 use tagalong_eval::EvalError;
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_sim::{Furniture, Scene, Truth};
+use tagalong_stereo::{StereoDepth, StereoSettings};
 
 use crate::{Contender, Draw, Drawn};
 
@@ -24,6 +25,9 @@ pub enum TrialError {
         /// What happened.
         error: StepError,
     },
+    /// A frame whose stereo pair gives no depth.
+    #[error("no depth from the stereo pair: {0}")]
+    Pair(String),
     /// Tracks that cannot be scored.
     #[error(transparent)]
     Eval(#[from] EvalError),
@@ -85,12 +89,45 @@ impl Trial {
         registry: &Registry,
         threads: usize,
     ) -> Result<Self, TrialError> {
+        Self::prepared(scene, contenders, registry, threads, Ok)
+    }
+
+    /// As [`Trial::new`], with depth from a scene's stereo pairs that is computed once
+    /// for all contenders: their own `[stereo]` stages have nothing to do.
+    ///
+    /// # Errors
+    /// Also [`TrialError::Config`] for settings that cannot work, and
+    /// [`TrialError::Pair`] for a frame without a pair.
+    pub fn of_pairs(
+        scene: &Scene,
+        contenders: &[Contender],
+        registry: &Registry,
+        stereo: &StereoSettings,
+    ) -> Result<Self, TrialError> {
+        let settings = StereoSettings { threads: 1, ..stereo.clone() };
+        let stereo = StereoDepth::new(settings);
+        let mut stereo = stereo.map_err(|error| TrialError::Config(error.to_string()))?;
+        Self::prepared(scene, contenders, registry, 1, |drawn: Drawn| {
+            let depth = stereo.depth(&drawn.frame, &mut Funnel::default());
+            let depth = depth.map_err(|error| TrialError::Pair(error.to_string()))?;
+            Ok(Drawn { frame: drawn.frame.with_depth(depth), ..drawn })
+        })
+    }
+
+    fn prepared(
+        scene: &Scene,
+        contenders: &[Contender],
+        registry: &Registry,
+        threads: usize,
+        mut prepare: impl FnMut(Drawn) -> Result<Drawn, TrialError>,
+    ) -> Result<Self, TrialError> {
         let mut draw = Draw::new(scene, threads);
         let furniture = draw.simulation().furniture().to_vec();
         let camera = draw.camera().clone();
         let mut lanes = Lane::all(scene, contenders, registry)?;
         let mut moments = Vec::new();
         while let Some(drawn) = draw.next_frame() {
+            let drawn = prepare(drawn)?;
             lanes.iter_mut().try_for_each(|lane| lane.step(&drawn))?;
             moments.push(Moment::of(drawn));
         }

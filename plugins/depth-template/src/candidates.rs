@@ -130,6 +130,98 @@ mod tests {
         RowSums::new(&depth, 1)
     }
 
+    /// A head 3 m away in front of a wall, and things a few pixels wide.
+    fn with_things(things: &[(i64, i64, f32)]) -> RowSums {
+        let depth = DepthImage::from_fn(100, 100, |x, y| {
+            let (x, y) = (x as i64, y as i64);
+            let thing =
+                things.iter().find(|(at, row, _)| (x - at).abs() < 2 && (y - row).abs() < 2);
+            match (thing, (x - 50).pow(2) + (y - 40).pow(2) < 81) {
+                (Some((.., depth_m)), _) => *depth_m,
+                (None, true) => 3.0,
+                _ => 6.0,
+            }
+        });
+        RowSums::new(&depth, 1)
+    }
+
+    fn passes(things: &[(i64, i64, f32)], boundary_min_passed: u32) -> bool {
+        let config = DepthTemplateConfig { boundary_min_passed, ..Default::default() };
+        boundary(&with_things(things), &Local::upright(50, 40, 3.0, 100.0), &config)
+    }
+
+    #[test]
+    fn boundary_points_lie_left_right_and_above_at_their_distance() {
+        let [left, right, above] = [(28, 40), (72, 40), (50, 18)];
+        let at = |(x, y): (i64, i64), depth_m| (x, y, depth_m);
+        assert!(passes(&[], 3));
+        for side in [left, right] {
+            assert!(!passes(&[at(side, 3.0)], 3), "{side:?} contradicts");
+            assert!(passes(&[at(side, 3.0)], 2), "somebody may stand on one side");
+            for beside in [(side.0 - 4, 40), (side.0 + 4, 40), (side.0, 36), (side.0, 44)] {
+                assert!(passes(&[at(beside, 3.0)], 3), "{beside:?} is not asked");
+            }
+        }
+        assert!(!passes(&[at(left, 3.0), at(right, 3.0)], 2));
+        assert!(!passes(&[at(above, 3.0)], 2), "what goes on above is no head");
+        let aslant = [(38, 18), (62, 18)];
+        assert!(aslant.iter().all(|point| !passes(&[at(*point, 3.0)], 2)));
+    }
+
+    #[test]
+    fn a_boundary_point_in_front_or_without_a_reading_says_nothing() {
+        let [left, right] = [(28, 40), (72, 40)];
+        for depth_m in [1.5, f32::NAN] {
+            assert!(passes(&[(left.0, left.1, depth_m), (right.0, right.1, depth_m)], 2));
+            assert!(!passes(&[(left.0, left.1, depth_m), (right.0, right.1, 3.0)], 2));
+        }
+        // The margin is 0.35 m, both ways.
+        for (depth_m, contradicts) in [(3.3, true), (3.4, false), (2.7, true), (2.6, false)] {
+            let things = [(left.0, left.1, depth_m), (right.0, right.1, depth_m)];
+            assert_eq!(!passes(&things, 2), contradicts, "{depth_m} m");
+        }
+    }
+
+    #[test]
+    fn a_head_is_as_wide_as_what_goes_on_at_its_depth() {
+        let width = |things: &[(i64, i64, f32)]| {
+            head_width_m(&with_things(things), &Local::upright(50, 40, 3.0, 100.0))
+        };
+        // 17 pixels of 1 cm.
+        assert!((width(&[]) - 0.17).abs() < 1e-9, "{}", width(&[]));
+        // A piece beside it at its depth, behind a gap that shows the wall, is apart;
+        assert!((width(&[(62, 40, 3.0)]) - 0.17).abs() < 1e-9);
+        // one that touches is not, unless it is much nearer or farther.
+        assert!((width(&[(60, 40, 3.1)]) - 0.20).abs() < 1e-9, "{}", width(&[(60, 40, 3.1)]));
+        assert!((width(&[(40, 40, 2.9)]) - 0.20).abs() < 1e-9);
+        assert!((width(&[(60, 40, 2.7)]) - 0.17).abs() < 1e-9);
+        // A hole of 3 pixels is passed over.
+        assert!((width(&[(55, 40, f32::NAN)]) - 0.17).abs() < 1e-9);
+        let edge = Local::upright(99, 40, 6.0, 100.0);
+        assert!((head_width_m(&with_things(&[]), &edge) - (0.31 + 0.1 + 0.01)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_body_is_what_most_probes_below_a_head_meet() {
+        let below = |legs_m: f32, from: usize| {
+            let depth = DepthImage::from_fn(100, 140, |x, y| {
+                let is_body = (35..65).contains(&x) && y >= from;
+                if is_body { legs_m } else { 6.0 }
+            });
+            body_below(&RowSums::new(&depth, 1), &Local::upright(50, 40, 3.0, 100.0))
+        };
+        assert_eq!(below(3.0, 50), 1.0);
+        assert_eq!(below(3.2, 50), 1.0, "a body is deep");
+        assert_eq!(below(3.4, 50), 0.0, "a wall behind");
+        assert_eq!(below(2.5, 50), 1.0, "hidden: nothing to tell");
+        // Probes lie 30 to 72 cm below, 6 cm apart: rows 70 to 112.
+        assert!((below(3.0, 89) - 4.0 / 8.0).abs() < 1e-9, "{}", below(3.0, 89));
+        let dark = DepthImage::filled(100, 140, f32::NAN);
+        assert_eq!(body_below(&RowSums::new(&dark, 1), &Local::upright(50, 40, 3.0, 100.0)), 0.0);
+        let low = Local::upright(50, 120, 3.0, 100.0);
+        assert_eq!(body_below(&RowSums::new(&dark, 1), &low), 1.0, "out of the image");
+    }
+
     #[test]
     fn a_shoulder_has_the_head_aslant_above_it_and_a_head_has_nothing() {
         let (rows, config) = (from_the_side(), DepthTemplateConfig::default());

@@ -19,6 +19,20 @@ pub enum Cost {
     Printed,
 }
 
+/// How imagined scenes are weighed (role `weigh`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weighing {
+    /// A log-likelihood ratio against a scene without people.
+    Ratio,
+    /// P3's likelihood with its printed dissimilarity: the size of the window stands
+    /// outside of the root. One person is compared with all templates, several
+    /// people with those of their directions of motion.
+    Printed,
+    /// As `printed` with the size inside of the root: the error of a pixel, m.
+    Rms,
+}
+
 /// Settings of `depth-template`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -86,6 +100,11 @@ pub struct DepthTemplateConfig {
     /// Background of the frame as a percentile of its depths, for the costs
     /// `squared` and `printed` (P3, P4: 90).
     pub background_percentile: f64,
+    /// How imagined scenes are weighed.
+    pub weighing: Weighing,
+    /// Standard deviation of the dissimilarity of a scene that is as imagined, for the
+    /// weighings `printed` and `rms`, m. P3 sets it "experientially".
+    pub likelihood_sigma: f64,
     /// Log-likelihood of a person in an imagined scene who fits perfectly and
     /// is wholly visible (role `weigh`), nats. Neighbouring pixels err alike, so
     /// that this is far below the number of pixels.
@@ -142,6 +161,8 @@ impl Default for DepthTemplateConfig {
             min_cells: 2,
             follow_radius_m: 0.6,
             background_percentile: 90.0,
+            weighing: Weighing::Ratio,
+            likelihood_sigma: 0.005,
             likelihood_nats: 12.0,
             likelihood_tolerance_m: 0.3,
             likelihood_one_sided: 0.3,

@@ -65,6 +65,10 @@ impl DepthTemplate {
                 return Err(Error::Settings(format!("`{low}` = {a} must be below `{high}` = {b}")));
             }
         }
+        if !(config.likelihood_sigma.is_finite() && config.likelihood_sigma > 0.0) {
+            let message = "`likelihood_sigma` must be greater than 0";
+            return Err(Error::Settings(message.into()));
+        }
         if config.directions.is_empty() {
             return Err(Error::Settings("`directions` must name one at least".into()));
         }
@@ -371,7 +375,7 @@ impl Tests {
 
 /// The inverse depth of the background: a percentile of the valid depths
 /// (P3, P4: the 90th).
-fn background(depth: &DepthImage, percentile: f64) -> f64 {
+pub(crate) fn background(depth: &DepthImage, percentile: f64) -> f64 {
     let mut valid: Vec<f32> = depth.pixels().iter().copied().filter(|z| z.is_finite()).collect();
     if valid.is_empty() {
         return 0.0;
@@ -398,4 +402,46 @@ fn head_depth_m(depth: &DepthImage, x: f64, y: f64, px_per_m: f64, about_m: f64)
     let middle = readings.len() / 2;
     let (_, median, _) = readings.select_nth_unstable_by(middle, f32::total_cmp);
     f64::from(*median)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_background_is_a_percentile_of_the_readings() {
+        let depth = DepthImage::from_fn(20, 10, |x, y| match 20 * y + x {
+            n if n < 101 => 1.0 + n as f32,
+            _ => f32::NAN,
+        });
+        let depth_m = |percentile| RowSums::UNITS / background(&depth, percentile);
+        assert!((depth_m(90.0) - 91.0).abs() < 1e-6, "{}", depth_m(90.0));
+        assert!((depth_m(10.0) - 11.0).abs() < 1e-6 && (depth_m(200.0) - 101.0).abs() < 1e-6);
+        assert_eq!(background(&DepthImage::filled(4, 4, f32::NAN), 90.0), 0.0);
+    }
+
+    #[test]
+    fn the_depth_of_a_head_is_the_median_of_the_readings_near_it() {
+        // 100 pixels a metre: a patch of 12 cm is 13 pixels wide.
+        let depth = |face: &dyn Fn(usize) -> f32| {
+            DepthImage::from_fn(60, 60, |x, y| {
+                let inside = (24..=36).contains(&x) && (24..=36).contains(&y);
+                if inside { face(x) } else { 2.2 }
+            })
+        };
+        let of = |image: &DepthImage| head_depth_m(image, 30.0, 30.0, 100.0, 2.0);
+        assert!((of(&depth(&|_| 2.1)) - 2.1).abs() < 1e-6);
+        let nose = |x: usize| if x == 30 { 1.9 } else { 2.0 };
+        assert!((of(&depth(&nose)) - 2.0).abs() < 1e-6);
+        let beside = |x: usize| if x < 33 { 3.0 } else { 1.8 };
+        assert!((of(&depth(&beside)) - 1.8).abs() < 1e-6, "what is 0.25 m off is no face");
+        assert_eq!(of(&depth(&|_| f32::NAN)), 2.0);
+    }
+
+    #[test]
+    fn cells_are_about_three_centimetres_apart() {
+        let spacings = [20.0, 100.0, 133.0, 134.0, 266.0, 267.0, 900.0].map(spacing);
+        assert_eq!(spacings, [2, 2, 2, 4, 4, 8, 8]);
+        assert_eq!([0.0, 1.9, 2.0, 7.5].map(on_grid), [0, 0, 2, 6]);
+    }
 }

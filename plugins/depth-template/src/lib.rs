@@ -20,13 +20,14 @@ mod config;
 mod detector;
 mod matching;
 mod people;
+mod printed;
 mod scores;
 mod view;
 mod weigher;
 
 pub use bank::{Bank, Direction, Pose, Template, TemplateRow};
 pub use body::{Part, Relief, body_parts, render};
-pub use config::{Cost, DepthTemplateConfig};
+pub use config::{Cost, DepthTemplateConfig, Weighing};
 pub use detector::DepthTemplate;
 pub use matching::{Match, Matcher};
 pub use weigher::Weigher;

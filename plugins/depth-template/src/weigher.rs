@@ -5,6 +5,7 @@ use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Rect, Resu
 
 use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;
+use crate::printed::Printed;
 use crate::scores::{Levels, ONE, Scores};
 use crate::view::{View, Working};
 
@@ -17,6 +18,7 @@ use crate::view::{View, Working};
 /// any range; who is hidden weighs nothing.
 pub struct Weigher {
     nats: f64,
+    printed: Option<Printed>,
     tools: Mutex<Tools>,
 }
 
@@ -33,7 +35,7 @@ struct Tools {
 }
 
 /// A run of pixels of a row: from, to.
-type Span = (i64, i64);
+pub(crate) type Span = (i64, i64);
 
 /// A silhouette at a place: all that matters for somebody who is alone. Scenes
 /// that combine few people ask for the same ones again and again.
@@ -67,11 +69,11 @@ struct Silhouette {
 
 /// Somebody in a scene.
 #[derive(Clone)]
-struct Placed {
+pub(crate) struct Placed {
     silhouette: Arc<Silhouette>,
-    x: i64,
+    pub(crate) x: i64,
     y: i64,
-    depth_m: f64,
+    pub(crate) depth_m: f64,
     /// Who is nearer than this may be what is seen where this person is, m.
     reach_m: f64,
     levels: Levels,
@@ -90,7 +92,40 @@ impl Weigher {
             alone: HashMap::new(),
             masks: Vec::new(),
         };
-        Self { nats: config.likelihood_nats, tools: Mutex::new(tools) }
+        let (nats, printed) = (config.likelihood_nats, Printed::new(config));
+        Self { nats, printed, tools: Mutex::new(tools) }
+    }
+
+    /// P3's likelihood; where a scene has one person, of the template that fits best.
+    fn printed_logs(
+        &self,
+        printed: &Printed,
+        frame: &Frame,
+        scenes: std::slice::Chunks<'_, Person>,
+    ) -> Result<Vec<f64>> {
+        let image = frame.derived::<Working>()?;
+        let canvas = printed.canvas(frame)?;
+        let mut tools = self.tools();
+        let view = tools.view_of(frame, &image);
+        let log = |scene: &[Person]| {
+            let mut cast = |way: Option<Direction>| {
+                let placed = |p: &Person| {
+                    let way = way.unwrap_or_else(|| direction(p, &frame.camera));
+                    tools.place(p, way, &frame.camera, &view)
+                };
+                let mut cast: Vec<Placed> = scene.iter().filter_map(placed).collect();
+                cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
+                printed.log(&canvas, &cast)
+            };
+            match scene {
+                [] => 0.0,
+                [_] => {
+                    Direction::ALL.map(|way| cast(Some(way))).into_iter().fold(f64::MIN, f64::max)
+                }
+                _ => cast(None),
+            }
+        };
+        Ok(scenes.map(log).collect())
     }
 
     fn tools(&self) -> MutexGuard<'_, Tools> {
@@ -113,6 +148,11 @@ impl Likelihood for Weigher {
         out: &mut Vec<f64>,
     ) -> Result<()> {
         out.clear();
+        if let Some(printed) = &self.printed {
+            let scenes = people.chunks(people_per_scene.max(1));
+            out.extend(self.printed_logs(printed, frame, scenes)?);
+            return Ok(());
+        }
         let image = frame.derived::<Working>()?;
         let mut tools = self.tools();
         let tools = &mut *tools;
@@ -122,7 +162,8 @@ impl Likelihood for Weigher {
         cast.clear();
         for scene in people.chunks(people_per_scene.max(1)) {
             let before = cast.len();
-            cast.extend(scene.iter().filter_map(|p| tools.place(p, &frame.camera, &view)));
+            let placed = |p| tools.place(p, direction(p, &frame.camera), &frame.camera, &view);
+            cast.extend(scene.iter().filter_map(placed));
             cast[before..].sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
             counts.push(cast.len() - before);
         }
@@ -152,8 +193,10 @@ impl Tools {
     /// The bodies of a scene where nobody nearer is, as runs in the image.
     fn silhouettes(&mut self, frame: &Frame, image: &Working, scene: &[Person]) -> Vec<Vec<Rect>> {
         let view = self.view_of(frame, image);
-        let cast: Vec<Option<Placed>> =
-            scene.iter().map(|person| self.place(person, &frame.camera, &view)).collect();
+        let cast: Vec<Option<Placed>> = scene
+            .iter()
+            .map(|p| self.place(p, direction(p, &frame.camera), &frame.camera, &view))
+            .collect();
         let visible = |person: &Placed| -> Vec<Rect> {
             let rows = person.rows(image.0.height() as i64);
             let runs = rows.flat_map(|(line, row)| {
@@ -177,7 +220,13 @@ impl Tools {
 
     /// Where a person's silhouette is in the image; `None` for who is behind
     /// the camera, or so far aside that nothing can be seen.
-    fn place(&mut self, person: &Person, camera: &Camera, view: &View) -> Option<Placed> {
+    fn place(
+        &mut self,
+        person: &Person,
+        direction: Direction,
+        camera: &Camera,
+        view: &View,
+    ) -> Option<Placed> {
         let depth_m = camera.depth_of(&person.position) - HEAD_RADIUS_M;
         if !(MIN_DEPTH_M..MAX_DEPTH_M).contains(&depth_m) {
             return None;
@@ -189,7 +238,6 @@ impl Tools {
         let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
         let (inside_x, inside_y) = view.nearest_inside(x, y);
         let local = view.local(inside_x, inside_y, depth_m);
-        let direction = direction(person, camera);
         let pose = Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
         let silhouette = self.silhouettes.of(pose);
         let reach_m = depth_m + self.tolerance_m;
@@ -344,6 +392,25 @@ impl Placed {
         (self.silhouette.number, self.x, self.y, self.depth_m.to_bits())
     }
 
+    /// The columns of the window.
+    pub(crate) fn columns(&self) -> Span {
+        let half = self.silhouette.half_width;
+        (self.x - half, self.x + half + 1)
+    }
+
+    /// The lines of the window.
+    pub(crate) fn lines(&self) -> Span {
+        let rows = &self.silhouette.rows;
+        let dy = |row: Option<&TemplateRow>| self.y + row.map_or(0, |row| row.dy);
+        (dy(rows.first()), dy(rows.last()) + 1)
+    }
+
+    /// The row of the silhouette in a line of the image; `None` outside of the window.
+    pub(crate) fn row(&self, line: i64) -> Option<&TemplateRow> {
+        let index = line - self.lines().0;
+        self.silhouette.rows.get(usize::try_from(index).ok()?)
+    }
+
     /// The body without its edges.
     fn inside(&self, row: &TemplateRow) -> Span {
         (self.x + row.from, self.x + row.to)
@@ -409,7 +476,7 @@ fn union_of(masks: &mut Vec<Span>, spans: impl Iterator<Item = Span>) {
 }
 
 /// The parts of a span that no mask covers.
-fn outside(span: Span, mut masks: Vec<Span>) -> Vec<Span> {
+pub(crate) fn outside(span: Span, mut masks: Vec<Span>) -> Vec<Span> {
     masks.sort_unstable();
     let mut left = Vec::new();
     let mut from = span.0;
@@ -471,8 +538,10 @@ mod tests {
         let image = frame.derived::<Working>().unwrap();
         let mut tools = weigher.tools();
         let view = tools.view_of(frame, &image);
-        let mut cast: Vec<Placed> =
-            scene.iter().filter_map(|p| tools.place(p, &frame.camera, &view)).collect();
+        let mut cast: Vec<Placed> = scene
+            .iter()
+            .filter_map(|p| tools.place(p, direction(p, &frame.camera), &frame.camera, &view))
+            .collect();
         cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
         let inside = |span: Option<Span>, x: i64| span.is_some_and(|(a, b)| a <= x && x < b);
         let mut weight = 0.0;
@@ -549,8 +618,10 @@ mod tests {
         let image = empty.derived::<Working>().unwrap();
         let mut tools = weigher.tools();
         let view = tools.view_of(&empty, &image);
-        let cast: Vec<Placed> =
-            people.iter().filter_map(|p| tools.place(p, &empty.camera, &view)).collect();
+        let cast: Vec<Placed> = people
+            .iter()
+            .filter_map(|p| tools.place(p, direction(p, &empty.camera), &empty.camera, &view))
+            .collect();
         let depth = DepthImage::from_fn(80, 60, |x, y| {
             let (x, y) = (x as i64, y as i64);
             let here = |p: &&Placed| p.body(y).is_some_and(|(a, b)| a <= x && x < b);

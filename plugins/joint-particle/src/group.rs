@@ -82,21 +82,18 @@ impl Group {
         for particle in column {
             if config.marginalise {
                 particle.draw_across(eye, random);
-            } else if config.compat_condensation {
-                let of_person = &mut dimensions[5 * person..5 * person + 5];
-                let noise = Vector5::from_fn(|i, _| of_person[i].flat());
-                particle.draw_all(&noise);
             } else {
-                particle.draw_all(&Vector5::from_fn(|_, _| random.normal()));
+                particle.draw_all(&noise(random, &mut dimensions[5 * person..], config));
             }
         }
     }
 
     /// As printed in P3: everybody in a particle is moved by the same noise.
-    pub(crate) fn draw_shared(&mut self) {
+    pub(crate) fn draw_shared(&mut self, config: &Config) {
         let people = self.people();
-        for row in self.parts.chunks_mut(people) {
-            let noise = Vector5::from_fn(|_, _| self.random.normal());
+        let Self { parts, random, dimensions, .. } = self;
+        for row in parts.chunks_mut(people) {
+            let noise = noise(random, dimensions, config);
             row.iter_mut().for_each(|particle| particle.draw_all(&noise));
         }
     }
@@ -234,7 +231,135 @@ impl Group {
 /// Side of the cells by which the spread of particles is measured, m.
 const CELL_M: f64 = 0.1;
 
+/// Noise of variance one for the five numbers of a person: normal, or, as OpenCV's
+/// ConDensation has it, uniform from one generator a dimension.
+fn noise(random: &mut Random, dimensions: &mut [Random], config: &Config) -> Vector5<f64> {
+    match config.compat_condensation {
+        true => Vector5::from_fn(|i, _| dimensions[i].flat()),
+        false => Vector5::from_fn(|_, _| random.normal()),
+    }
+}
+
 /// One generator for each dimension, the same ones for everybody (OpenCV).
 fn dimensions(people: usize) -> Vec<Random> {
     (0..5 * people as u64).map(|dimension| Random::new(dimension, 0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3};
+
+    use super::*;
+
+    /// Somebody at places along Y that are as heavy as said.
+    fn at_places(id: u32, places: &[f64], weights: &[f64]) -> Group {
+        let particle = |y: &f64| Particle {
+            mean: Vector5::new(2.0, *y, 1.6, 0.0, 0.1),
+            covariance: Matrix5::identity() * 0.01,
+        };
+        Group {
+            ids: vec![TrackId(id)],
+            parts: places.iter().map(particle).collect(),
+            weights: weights.to_vec(),
+            likelihoods: weights.to_vec(),
+            random: Random::new(1, u64::from(id)),
+            dimensions: dimensions(1),
+        }
+    }
+
+    fn places(group: &Group, person: usize) -> Vec<f64> {
+        (0..group.rows()).map(|row| group.row(row)[person].mean[1]).collect()
+    }
+
+    #[test]
+    fn moments_are_those_of_the_mixture() {
+        let group = at_places(1, &[0.0, 1.0], &[0.25, 0.75]);
+        let moments = group.moments(0);
+        assert_eq!(moments.mean, Vector5::new(2.0, 0.75, 1.6, 0.0, 0.1));
+        assert!((moments.covariance[(1, 1)] - (0.01 + 0.1875)).abs() < 1e-12);
+        assert!((moments.covariance[(0, 0)] - 0.01).abs() < 1e-12);
+        assert_eq!(group.best(), 1);
+        assert_eq!(at_places(1, &[0.0, 1.0, 2.0], &[0.5, 0.5, 0.0]).best(), 0);
+    }
+
+    #[test]
+    fn as_printed_the_likeliest_are_kept_when_groups_form_and_part() {
+        let config = Config {
+            method: Method::All,
+            joint_side: 2,
+            particles: 3,
+            compat_top: true,
+            ..Config::default()
+        };
+        let one = at_places(1, &[0.1, 0.2, 0.3], &[0.2, 0.5, 0.3]);
+        let other = at_places(2, &[1.0, 2.0, 3.0], &[0.6, 0.1, 0.3]);
+        let mut merged = one.clone().merge(other.clone(), &config);
+        assert_eq!(places(&merged, 0), [0.2, 0.2, 0.3, 0.3]);
+        assert_eq!(places(&merged, 1), [1.0, 3.0, 1.0, 3.0]);
+        let expected = [0.30, 0.15, 0.18, 0.09].map(|product| product / 0.72);
+        let close = |a: &[f64]| a.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(close(&merged.weights), "{:?}", merged.weights);
+        assert!((merged.likelihoods[2] - 0.3 * 0.6).abs() < 1e-12);
+        let far = merged.part(&[1], 1, &config);
+        assert_eq!((places(&far, 0), far.ids.clone()), (vec![1.0, 1.0, 3.0], vec![TrackId(2)]));
+        assert_eq!(far.weights, [1.0 / 3.0; 3]);
+        // Otherwise all are drawn from, by their weights.
+        let drawn = Config { joint_side: 10, compat_top: false, ..config };
+        let merged = one.merge(other, &drawn);
+        let count = |person, y| places(&merged, person).iter().filter(|at| **at == y).count();
+        assert_eq!([0.1, 0.2, 0.3].map(|y| count(0, y)), [20, 50, 30]);
+        assert_eq!([1.0, 2.0, 3.0].map(|y| count(1, y)), [60, 10, 30]);
+        assert!(merged.weights.iter().all(|weight| (weight - 0.01).abs() < 1e-12));
+    }
+
+    #[test]
+    fn pairs_of_two_groups_are_at_random() {
+        let evenly: Vec<f64> = (0..400).map(f64::from).collect();
+        let one = at_places(1, &evenly, &[1.0 / 400.0; 400]);
+        let merged =
+            one.clone().merge(at_places(2, &evenly, &[1.0 / 400.0; 400]), &Config::default());
+        let (a, b) = (places(&merged, 0), places(&merged, 1));
+        let product: f64 = a.iter().zip(&b).map(|(a, b)| (a - 199.5) * (b - 199.5)).sum();
+        let square: f64 = a.iter().map(|a| (a - 199.5).powi(2)).sum();
+        assert!((product / square).abs() < 0.15 && merged.rows() == 400, "{}", product / square);
+    }
+
+    #[test]
+    fn condensation_resamples_without_an_offset_and_others_with_one() {
+        let weights = [0.1, 0.1, 0.4, 0.4];
+        let drawn = |compat_condensation| {
+            let mut group = at_places(1, &[0.0, 1.0, 2.0, 3.0], &weights);
+            let config = Config { compat_condensation, ..Config::default() };
+            (0..200)
+                .filter(|seed| {
+                    group.random = Random::new(*seed, 0);
+                    group.clone().resample(4, &config)[0] == 0
+                })
+                .count()
+        };
+        assert_eq!(drawn(true), 200);
+        assert!((50..110).contains(&drawn(false)), "0.4 of 200: {}", drawn(false));
+    }
+
+    #[test]
+    fn who_starts_again_is_at_the_sighting_and_keeps_the_velocity() {
+        let mut group = at_places(1, &[0.0; 10], &[0.1; 10]);
+        let at = Particle {
+            mean: Vector5::new(1.0, 3.0, 1.5, 9.0, 9.0),
+            covariance: Matrix5::identity(),
+        };
+        group.restart(0, &at, 0.2);
+        let moved: Vec<usize> = (0..10).filter(|row| group.row(*row)[0].mean[1] == 3.0).collect();
+        assert_eq!(moved, [0, 5]);
+        let first = &group.row(0)[0];
+        assert_eq!(first.person().position, Point3::new(1.0, 3.0, 1.5));
+        assert_eq!(first.mean[4], 0.1);
+        assert_eq!(first.covariance.fixed_view::<3, 3>(0, 0), Matrix3::identity());
+    }
+
+    #[test]
+    fn cells_are_counted_where_particles_have_weight() {
+        let group = at_places(1, &[0.01, 0.09, 0.11, 0.5], &[0.4, 0.3, 0.3, 0.0]);
+        assert_eq!(group.occupied(), 2);
+    }
 }

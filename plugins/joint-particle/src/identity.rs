@@ -154,6 +154,45 @@ mod tests {
     }
 
     #[test]
+    fn the_margin_is_asked_and_each_pair_once() {
+        let mut wardrobe = learned();
+        assert!(wardrobe.look(&frame(true, true), &people(), 2.0).is_empty(), "2 is never");
+        assert!(wardrobe.look(&frame(true, true), &people(), 0.15).is_empty(), "asked already");
+        let mut forgotten = learned();
+        forgotten.forget(IDS[0]);
+        assert!(forgotten.look(&frame(true, true), &people(), 0.15).is_empty());
+    }
+
+    #[test]
+    fn colours_are_those_of_the_chest_and_are_learned_slowly() {
+        let head = people()[&IDS[0]];
+        let of = |mirrored| {
+            let frame = frame(mirrored, true);
+            colours(&frame, frame.colour().unwrap(), &head).unwrap()
+        };
+        let (red, blue) = (of(false), of(true));
+        assert!((red.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        // 200 and 20 of 256 in six shades are 4 and 0.
+        assert_eq!((red[4 * 36], blue[4]), (1.0, 1.0));
+        assert_eq!((coefficient(&red, &red), coefficient(&red, &blue)), (1.0, 0.0));
+        let mut wardrobe = Wardrobe::default();
+        wardrobe.learn(IDS[0], red);
+        wardrobe.learn(IDS[0], blue);
+        let known = &wardrobe.known[&IDS[0]];
+        assert!((known[4 * 36] - 0.8).abs() < 1e-12 && (known[4] - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn where_the_chest_is_out_of_the_image_there_is_no_colour() {
+        let frame = frame(false, true);
+        let image = frame.colour().unwrap();
+        let of = |place| colours(&frame, image, &place).is_some();
+        assert!(of(Point3::new(2.0, 0.6, 1.6)));
+        assert!(!of(Point3::new(2.0, 3.0, 1.6)) && !of(Point3::new(-2.0, 0.0, 1.6)));
+        assert!(!of(Point3::new(2.0, 0.0, 0.2)), "below");
+    }
+
+    #[test]
     fn without_colour_nobody_is_swapped() {
         assert!(learned().look(&frame(true, false), &people(), 0.15).is_empty());
     }

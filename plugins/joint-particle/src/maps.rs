@@ -197,6 +197,50 @@ mod tests {
     }
 
     #[test]
+    fn kernels_fall_by_the_root_of_e_at_40_and_100_mm_and_sooner_as_printed() {
+        let at = |config: &Config, place| Kernel::new(config).at(&[0.0, 0.0], &place);
+        let right = Config::default();
+        for place in [[0.04, 0.0], [0.0, 0.1]] {
+            assert!((at(&right, place) - (-0.5f64).exp()).abs() < 1e-12);
+        }
+        // exp(-d² / (2 sigma)) in millimetres.
+        let printed = Config { compat_printed_kernel: true, ..Config::default() };
+        assert!((at(&printed, [0.008, 0.0]) - (-64.0 / 80.0f64).exp()).abs() < 1e-9);
+        assert!((at(&printed, [0.0, 0.02]) - (-400.0 / 200.0f64).exp()).abs() < 1e-9);
+        let wider = Config { kernel_near_m: 0.08, kernel_far_m: 0.3, ..Config::default() };
+        assert!((at(&wider, [0.08, 0.3]) - (-1f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sum_of_kernels_is_as_high_as_the_likelihoods() {
+        let kernel = Kernel::new(&Config::default());
+        let places = [[0.0, 0.0], [0.04, 0.0]];
+        let half = (-0.5f64).exp();
+        assert!(
+            (parzen(&places, &[2.0, 3.0], kernel, &[0.0, 0.0]) - (2.0 + 3.0 * half)).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn the_nugget_says_how_closely_the_process_follows() {
+        let places = vec![[0.0, 0.0], [0.2, 0.5]];
+        let at = |nugget| {
+            let config = Config { nugget, ..Config::default() };
+            let map = LikelihoodMap::new(Method::Gp, places.clone(), vec![1.0, 0.0], &config);
+            map.at(&[0.0, 0.0])
+        };
+        assert!((at(1e-6) - 1.0).abs() < 1e-3, "{}", at(1e-6));
+        assert!((at(1.0) - 0.5).abs() < 1e-3, "{}", at(1.0));
+    }
+
+    #[test]
+    fn a_process_is_never_negative() {
+        let places = vec![[0.0, 0.0], [0.03, 0.0]];
+        let gp = Gp::fit(places, &[0.0, 1.0], Kernel::new(&Config::default()), 0.001).unwrap();
+        assert_eq!(gp.at(&[-0.03, 0.0]), 0.0);
+    }
+
+    #[test]
     fn the_printed_kernel_makes_spikes_and_interpolation_follows_the_ridge() {
         let [printed, right, gp] = correlations();
         assert!((0.25..0.65).contains(&printed), "printed {printed}");

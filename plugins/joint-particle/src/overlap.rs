@@ -99,6 +99,34 @@ mod tests {
     }
 
     #[test]
+    fn hysteresis_asks_for_frames_and_metres() {
+        let frames = |config: &Config, y: f64| {
+            let mut overlaps = Overlaps::default();
+            let mut together =
+                |y| overlaps.groups(&people(&[(2.0, 0.0), (2.1, y)]), config).len() == 1;
+            assert!(together(0.1));
+            (0..20).filter(|_| together(y)).count()
+        };
+        let usual = Config { split_frames: 3, split_m: 0.8, ..Config::default() };
+        assert_eq!(frames(&usual, 1.2), 2);
+        assert_eq!(frames(&usual, 0.75), 20, "still near");
+        assert_eq!(frames(&Config { split_m: 0.7, ..usual.clone() }, 0.75), 2);
+        assert_eq!(frames(&Config { split_frames: 6, ..usual }, 1.2), 5);
+    }
+
+    #[test]
+    fn squares_are_enlarged_before_they_are_asked() {
+        // Squares of 75 pixels, their left edges 80 pixels apart.
+        let meet = |inflate| {
+            let config = Config { inflate, ..Config::default() };
+            Overlaps::default().groups(&people(&[(2.0, 0.0), (2.0, 0.64)]), &config).len() == 1
+        };
+        assert_eq!([0.0, 0.06, 0.07, 0.1].map(meet), [false, false, true, true]);
+        let up = inflated(&Rect::new(10.0, 20.0, 40.0, 60.0), 0.1);
+        assert_eq!(up, Rect::new(8.0, 17.0, 44.0, 66.0));
+    }
+
+    #[test]
     fn a_chain_is_one_group() {
         let mut overlaps = Overlaps::default();
         let line = people(&[(2.0, 0.0), (3.0, 0.6), (2.0, 0.8), (3.0, -2.0)]);

@@ -225,6 +225,46 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_known_of_the_robots_motion_spreads_the_place() {
+        let sigmas = nalgebra::Vector3::new(0.03, 0.02, 0.01);
+        let covariance = Matrix3::from_diagonal(&sigmas.map(|s| s * s));
+        let motion = Motion { forward: 0.3, left: 0.1, turn: 0.4, covariance, dt: 0.1 };
+        let standing =
+            Particle { mean: Vector5::new(3.0, 0.5, 1.6, 0.0, 0.0), covariance: Matrix5::zeros() };
+        let quiet = Config {
+            acceleration_noise: 0.0,
+            position_noise: 0.0,
+            height_noise: 0.0,
+            ..Config::default()
+        };
+        let mut particle = standing.clone();
+        Transition::new(&motion, &quiet).apply(&mut particle);
+        let mut random = Random::new(1, 0);
+        let mut spread = Matrix2::zeros();
+        for _ in 0..4000 {
+            let mut draw = |mean: f64, sigma: f64| mean + sigma * random.normal();
+            let moved = Motion {
+                forward: draw(motion.forward, sigmas[0]),
+                left: draw(motion.left, sigmas[1]),
+                turn: draw(motion.turn, sigmas[2]),
+                ..motion
+            };
+            let off = moved.apply_to_point(standing.floor()) - particle.floor();
+            spread += off * off.transpose() / 4000.0;
+        }
+        let found = particle.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        assert!((found - spread).norm() < 0.1 * spread.norm(), "{found} {spread}");
+        assert_eq!(particle.covariance[(2, 2)], 0.0);
+    }
+
+    #[test]
+    fn left_of_a_viewing_ray_is_left() {
+        assert_eq!(across(&Vector2::new(2.0, 0.0)), Vector2::y());
+        assert_eq!(across(&Vector2::new(0.0, 3.0)), -Vector2::x());
+        assert_eq!(across(&Vector2::zeros()), Vector2::y());
+    }
+
+    #[test]
     fn a_place_fixed_in_the_world_moves_as_the_robot_sees_it() {
         let motion = Motion { forward: 0.3, left: 0.1, turn: 0.2, ..Motion::at_rest(0.1) };
         let mut particle = gaussian([0.0; 25]);

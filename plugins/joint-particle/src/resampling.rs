@@ -109,6 +109,20 @@ mod tests {
     }
 
     #[test]
+    fn with_a_random_offset_no_index_is_preferred() {
+        let weights = [0.1, 0.1, 0.4, 0.4];
+        let mut counts = [0u32; 4];
+        for seed in 0..2000 {
+            let drawn = systematic(&weights, 4, &mut Random::new(seed, 0));
+            drawn.into_iter().for_each(|index| counts[index] += 1);
+        }
+        for (count, weight) in counts.iter().zip(weights) {
+            let share = f64::from(*count) / 8000.0;
+            assert!((share - weight).abs() < 0.015, "{counts:?}");
+        }
+    }
+
+    #[test]
     fn useless_weights_become_even() {
         let mut logs = [f64::NAN, f64::NEG_INFINITY];
         from_logs(&mut logs);

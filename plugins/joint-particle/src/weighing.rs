@@ -120,7 +120,7 @@ impl<'a> Look<'a> {
 
     fn draw_everybody(&self, group: &mut Group) {
         if self.config.compat_shared_noise {
-            group.draw_shared();
+            group.draw_shared(self.config);
             return;
         }
         (0..group.people()).for_each(|person| self.draw(group, person));
@@ -482,6 +482,41 @@ mod tests {
             prop_assert!((found - value).abs() < 0.03 * sigma + 0.1 * value.abs());
             prop_assert!((variance / spread - 1.0).abs() < 0.15, "{} {}", variance, spread);
         }
+    }
+
+    #[test]
+    fn likelihoods_multiply_what_was_believed_before() {
+        let detection = crate::tests::rig::sighting(nalgebra::Point3::new(2.0, 0.0, 1.6), [0.1; 3]);
+        let config = Config { particles: 3, ..Config::default() };
+        let first = Particle::of(&detection, &config);
+        let mut group = Group::single(TrackId(1), &first, 1, &config);
+        group.weights = vec![0.6, 0.3, 0.1];
+        take_in(&mut group, &[0.0, 4f64.ln(), 2f64.ln()]);
+        let expected = [0.3, 0.6, 0.1];
+        let off = |(a, b): (&f64, &f64)| (a - b).abs();
+        assert!(group.weights.iter().zip(&expected).map(off).all(|off| off < 1e-12));
+        assert!(group.likelihoods.iter().zip(&[0.25, 1.0, 0.5]).map(off).all(|off| off < 1e-12));
+    }
+
+    #[test]
+    fn the_likeliest_places_are_compared_or_places_all_over() {
+        let all: Vec<Place> =
+            (0..100).map(|i| [0.01 * f64::from(i), -0.01 * f64::from(i)]).collect();
+        let before: Vec<f64> = (0..100).map(|i| f64::from((i * 37) % 100)).collect();
+        let of = |chosen, points| {
+            super::chosen(&all, &before, &Config { chosen, points, ..Config::default() })
+        };
+        // 37 times 27, 54 and 81 leave 99, 98 and 97.
+        assert_eq!(of(Chosen::PreviousBest, 3), [all[27], all[54], all[81]]);
+        let spread = of(Chosen::Spread, 29);
+        let coarse: Vec<Place> = [-0.15, 0.0, 0.15]
+            .into_iter()
+            .flat_map(|near| [-0.45, 0.0, 0.45].map(|far| [near, far]))
+            .collect();
+        assert_eq!(spread[..9], coarse[..]);
+        let fifth: Vec<Place> = all.iter().copied().step_by(5).collect();
+        assert_eq!(spread[9..], fifth[..]);
+        assert_eq!(of(Chosen::Spread, 4), coarse[..4]);
     }
 
     #[test]

@@ -1,0 +1,75 @@
+//! Contenders whose configs have other values.
+
+use tagalong_trials::Contender;
+use toml::{Table, Value};
+
+use crate::ReproduceError;
+
+/// The config of a contender as a table.
+///
+/// # Errors
+/// A config that is no TOML.
+pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
+    let unreadable = |error| ReproduceError::Other(format!("{}: {error}", contender.name));
+    contender.config.parse().map_err(unreadable)
+}
+
+/// The contender under another name, with other values, TOML, at dotted keys; a number
+/// is a place in an array. Tables on the way are made where they are missing.
+///
+/// # Errors
+/// A config or a value that is no TOML, or a key whose way is barred.
+pub(crate) fn with_values(
+    contender: &Contender,
+    name: &str,
+    values: &[(&str, &str)],
+) -> Result<Contender, ReproduceError> {
+    let mut config = Value::Table(parsed(contender)?);
+    for (key, text) in values {
+        let fails = |why: &str| ReproduceError::Other(format!("{name}: {key} = {text}: {why}"));
+        let value = format!("value = {text}").parse::<Table>();
+        let value = value.map_err(|error| fails(&error.to_string()))?.remove("value");
+        let slot = slot(&mut config, key).ok_or_else(|| fails("there is no such place"))?;
+        *slot = value.ok_or_else(|| fails("there is no value"))?;
+    }
+    Ok(Contender { name: name.to_owned(), config: config.to_string(), ..contender.clone() })
+}
+
+fn slot<'a>(config: &'a mut Value, key: &str) -> Option<&'a mut Value> {
+    key.split('.').try_fold(config, |at, part| match at {
+        Value::Array(values) => values.get_mut(part.parse::<usize>().ok()?),
+        Value::Table(table) => {
+            Some(table.entry(part).or_insert_with(|| Value::Table(Table::new())))
+        }
+        _ => None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_replaced_and_added() {
+        let config =
+            "[[detectors]]\nplugin = \"a\"\nconfig = { size = 1 }\n[filter]\nplugin = \"b\"\n";
+        let contender = Contender::new("old", config);
+        let values = [("detectors.0.config.size", "2.5"), ("filter.config.kind", "\"round\"")];
+        let table = parsed(&with_values(&contender, "new", &values).unwrap()).unwrap();
+        let expected = "[[detectors]]\nplugin = \"a\"\nconfig = { size = 2.5 }\n\
+                        [filter]\nplugin = \"b\"\nconfig = { kind = \"round\" }\n";
+        assert_eq!(table, expected.parse::<Table>().unwrap());
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let contender = Contender::new("old", "[filter]\nplugin = \"b\"\n");
+        let fails =
+            |key, text| with_values(&contender, "new", &[(key, text)]).unwrap_err().to_string();
+        assert!(
+            fails("filter.plugin.size", "1")
+                .contains("filter.plugin.size = 1: there is no such place")
+        );
+        assert!(fails("filter.size", "1 2").contains("filter.size = 1 2"));
+    }
+}

@@ -1,0 +1,125 @@
+use std::sync::{Arc, Mutex};
+
+use nalgebra::{Matrix3, Point3, Vector2, Vector3};
+use tagalong_core::{
+    Camera, Detection, Distortion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched,
+    Motion, Person, Pinhole, Rect, Result, RgbImage, Sketch, Stamp, Support, TrackId,
+};
+
+use crate::{Config, JointParticle};
+
+type Log = dyn Fn(&[Person]) -> f64 + Send + Sync;
+
+/// A likelihood that is a formula; it remembers what it was asked.
+pub struct Formula {
+    log: Box<Log>,
+    asked: Mutex<Vec<Vec<Person>>>,
+}
+
+impl Formula {
+    pub fn new(log: impl Fn(&[Person]) -> f64 + Send + Sync + 'static) -> Self {
+        Self { log: Box::new(log), asked: Mutex::default() }
+    }
+
+    /// Says nothing of where people are, and this much of their being there, nats.
+    pub fn flat(nats: f64) -> Self {
+        Self::new(move |scene| nats * scene.len() as f64)
+    }
+
+    /// The scenes that were asked for since the last call.
+    pub fn asked(&self) -> Vec<Vec<Person>> {
+        std::mem::take(&mut *self.asked.lock().unwrap())
+    }
+}
+
+impl Likelihood for Formula {
+    fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> Result<f64> {
+        self.asked.lock().unwrap().push(scene.to_vec());
+        Ok((self.log)(scene))
+    }
+}
+
+/// A frame of a level camera 1.5 m above the robot's origin.
+pub fn frame(motion: Motion, colour: Option<RgbImage>) -> Frame {
+    let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
+    let images = Images { colour: colour.map(Arc::new), ..Images::default() };
+    Frame::new(1, Stamp::default(), camera, motion, images)
+}
+
+/// A sighting with standard deviations along x, y and z, m.
+pub fn sighting(position: Point3<f64>, sigmas: [f64; 3]) -> Detection {
+    let covariance = Matrix3::from_diagonal(&Vector3::from(sigmas).map(|s| s * s));
+    let region = Rect::new(40.0, 30.0, 20.0, 20.0);
+    Detection { region, position, covariance, score: 3.0, source: "drawn" }
+}
+
+/// A filter and its frames.
+pub struct Rig {
+    pub filter: JointParticle,
+}
+
+impl Rig {
+    pub fn new(config: Config, seed: u64) -> Self {
+        Self { filter: JointParticle::new(config, seed).unwrap() }
+    }
+
+    pub fn start(&mut self, id: u32, position: [f64; 3], sigmas: [f64; 3]) {
+        self.filter.start(TrackId(id), &sighting(Point3::from(position), sigmas));
+    }
+
+    /// One frame without sightings, the robot at rest, a tenth of a second later.
+    pub fn look(&mut self, likelihood: &Formula) -> Vec<u32> {
+        self.look_after(Motion::at_rest(0.1), likelihood, &[], None)
+    }
+
+    /// One frame; returns who is seen.
+    pub fn look_after(
+        &mut self,
+        motion: Motion,
+        likelihood: &Formula,
+        sightings: &[(u32, Detection)],
+        colour: Option<RgbImage>,
+    ) -> Vec<u32> {
+        let frame = frame(motion, colour);
+        let matched: Vec<Matched<'_>> = sightings
+            .iter()
+            .map(|(id, detection)| Matched { id: TrackId(*id), detection })
+            .collect();
+        self.filter.predict(&motion);
+        let likelihood: Option<&dyn Likelihood> = Some(likelihood);
+        let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood };
+        let seen: std::collections::BTreeMap<TrackId, Support> =
+            self.filter.update(&evidence).unwrap();
+        seen.into_keys().map(|id| id.0).collect()
+    }
+
+    pub fn estimate(&self, id: u32) -> Estimate {
+        let frame = frame(Motion::at_rest(0.1), None);
+        self.filter.estimates(&frame.camera).remove(&TrackId(id)).unwrap()
+    }
+
+    pub fn place(&self, id: u32) -> Point3<f64> {
+        self.estimate(id).person.position
+    }
+
+    pub fn velocity(&self, id: u32) -> Vector2<f64> {
+        self.estimate(id).person.velocity
+    }
+
+    pub fn sketch(&self, likelihood: &Formula) -> Sketch {
+        let frame = frame(Motion::at_rest(0.1), None);
+        let likelihood: Option<&dyn Likelihood> = Some(likelihood);
+        let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+        self.filter.sketch(&evidence).unwrap()
+    }
+
+    /// The columns of the image in which the particles of a person are.
+    pub fn columns(&self, id: u32) -> Vec<f64> {
+        let points = self.sketch(&Formula::flat(0.0)).points.into_iter();
+        points.filter(|point| point.id == TrackId(id)).map(|point| point.pixel.x).collect()
+    }
+}
+
+/// Standard deviations with which a sighting tells all but the place across the view.
+pub const EXACT: f64 = 1e-6;
