@@ -16,6 +16,7 @@ mod missing_topics;
 mod mistakes;
 mod recorded;
 mod runs;
+mod seeds;
 mod shell;
 #[cfg(unix)]
 mod signals;
