@@ -1,4 +1,5 @@
 //! The page and the files beside it, on made-up results.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 mod common;
 
