@@ -1,10 +1,12 @@
 //! The page and the files beside it, on made-up results.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 mod common;
 
 use tagalong_eval::Scores;
 use tagalong_report::{
-    Benchmark, EventRow, Outcome, Summary, TaskResult, Timings, Trajectory, csv, html, json,
+    Benchmark, EventRow, Outcome, PairSummary, Summary, TaskResult, Timings, Trajectory, csv, html,
+    json,
 };
 
 const HOSTILE: &str = "<script>alert(1)</script>\"'&";
@@ -209,28 +211,90 @@ fn means_are_over_logs_and_the_best_needs_all_of_them() {
     let hota = |name: &str| summary.pipeline(name).unwrap().figures["image.HOTA"];
     assert!((hota("a").mean - 0.6).abs() < 1e-12, "two runs of y are one log");
     let [low, high] = hota("a").interval.unwrap();
-    assert!((low - 0.5).abs() < 1e-12 && (high - 0.7).abs() < 1e-12);
+    assert_eq!([low, high], [0.0, 1.0], "two logs, and no rate beyond its range");
     assert_eq!((hota("a").best, hota("b").best, hota("c").best), (false, true, false));
     assert_eq!((hota("c").logs, hota("c").interval), (1, None));
-    let pair = |a: &str, b: &str| {
-        summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == "image.HOTA").unwrap()
+    let pair = |a: &str, b: &str| pair_of(&summary, a, b);
+    let (two, one) = (pair("a", "b"), pair("a", "c"));
+    assert!((two.difference - 0.1).abs() < 1e-12);
+    assert_eq!((two.logs, two.interval, two.p_value, two.is_clear()), (2, None, 0.5, false));
+    assert_eq!((one.logs, one.interval, one.p_value, one.is_clear()), (1, None, 1.0, false));
+}
+
+fn pair_of<'a>(summary: &'a Summary, a: &str, b: &str) -> &'a PairSummary {
+    summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == "image.HOTA").unwrap()
+}
+
+/// Each of `pipelines` with a level on so many logs of which none is like another.
+fn on_logs(count: usize, pipelines: &[(&str, f64)]) -> Benchmark {
+    let names: Vec<String> = (0..count).map(|log| format!("log {log}")).collect();
+    let of_log = |(at, log)| {
+        let hota = move |level: f64| level + 0.01 * level * (at as f64 + 1.0);
+        pipelines.iter().map(move |(name, level)| (*name, log, hota(*level)))
     };
-    assert!((pair("a", "b").difference - 0.1).abs() < 1e-12 && pair("a", "b").is_clear());
-    assert_eq!((pair("a", "c").logs, pair("a", "c").is_clear()), (1, false));
+    let logs = names.iter().map(String::as_str).enumerate();
+    with_hota(&logs.flat_map(of_log).collect::<Vec<_>>())
+}
+
+#[test]
+fn a_difference_on_fewer_than_six_logs_is_never_clear() {
+    for (logs, clear) in [(2, false), (5, false), (6, true)] {
+        let benchmark = on_logs(logs, &[("a", 0.3), ("b", 0.6)]);
+        let summary = Summary::new(&benchmark);
+        let pair = pair_of(&summary, "a", "b");
+        assert_eq!(pair.p_value, 2.0 / f64::from(1 << logs));
+        assert_eq!((pair.is_clear(), pair.interval.unwrap()[0] > 0.0), (clear, true));
+        let page = html(&benchmark, None);
+        assert_eq!(page.contains("The difference is clear (p = 0.031)."), clear);
+        assert_eq!(page.contains("<strong>b</strong>, clear"), clear, "{logs} logs");
+        assert_eq!(page.contains("b, not clear"), !clear);
+        assert_eq!(page.contains("These logs do not tell the two apart (p = "), !clear);
+    }
+}
+
+#[test]
+fn the_verdict_of_a_pair_allows_for_the_other_pairs() {
+    let three = [("a", 0.3), ("b", 0.6), ("c", 0.9)];
+    let summary = Summary::new(&on_logs(6, &three));
+    let pair = pair_of(&summary, "a", "b");
+    assert_eq!((pair.p_value, pair.p_corrected), (2.0 / 64.0, 6.0 / 64.0));
+    assert!(!pair.is_clear());
+    let more = Summary::new(&on_logs(8, &three));
+    assert!(pair_of(&more, "a", "b").is_clear());
+    let (two, three) = (html(&on_logs(6, &three[..2]), None), html(&on_logs(6, &three), None));
+    assert!(!two.contains("Holm's correction") && three.contains("Holm's correction"));
+}
+
+#[test]
+fn one_log_shows_no_interval() {
+    let benchmark = with_hota(&[("a", "x", 0.25), ("b", "x", 0.75)]);
+    let page = html(&benchmark, None);
+    assert!(page.contains("0.750") && !page.contains("class=\"ends\">0.750"), "{page}");
+    assert!(page.contains("These logs do not tell the two apart (p = 1.000, 1 log in common"));
 }
 
 #[test]
 fn people_are_counted_once_whatever_the_number_of_seeds() {
-    let scores = Scores { truth_ids: 4, never_confirmed: 1, ..Scores::default() };
-    let task = |seed| TaskResult {
+    let task = |log: &str, seed, never_confirmed| TaskResult {
         pipeline: "a".into(),
+        log: log.into(),
         seed,
-        image: Some(scores),
+        image: Some(Scores { truth_ids: 4, never_confirmed, ..Scores::default() }),
         ..TaskResult::default()
     };
-    let benchmark = Benchmark { version: String::new(), tasks: vec![task(1), task(2)] };
-    let summary = Summary::new(&benchmark);
-    let found = summary.pipelines[0].people_found.unwrap();
-    assert_eq!((found.estimate, summary.pipelines[0].people), (0.75, 4));
-    assert!(found.lower < 0.75 && found.upper > 0.75);
+    let mut tasks = vec![task("x", 1, 1), task("x", 2, 1)];
+    let summary = |tasks: &[TaskResult]| {
+        Summary::new(&Benchmark { version: String::new(), tasks: tasks.to_vec() })
+    };
+    let one = summary(&tasks);
+    let found = one.pipelines[0].people_found.unwrap();
+    assert_eq!((found.estimate, one.pipelines[0].people), (0.75, 4));
+    assert_eq!(found.ends(), None, "one log does not tell how much others differ");
+    let text = serde_json::to_string(&one).unwrap();
+    assert_eq!(serde_json::from_str::<Summary>(&text).unwrap(), one);
+    tasks.push(task("y", 1, 3));
+    let two = summary(&tasks);
+    let found = two.pipelines[0].people_found.unwrap();
+    assert_eq!((found.estimate, two.pipelines[0].people), (0.5, 8));
+    assert!(found.lower < 0.1 && found.upper > 0.9, "logs differ more than people: {found:?}");
 }

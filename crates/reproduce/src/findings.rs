@@ -128,6 +128,36 @@ mod tests {
         assert_eq!(note, expected);
     }
 
+    /// One table with the seeds of the scenes, and one of nothing.
+    fn drawing(lab: &Lab) -> Result<Findings, ReproduceError> {
+        let scenes = lab.scenes("turntable", &[], lab.seeds(2))?;
+        let cells = scenes.iter().map(|scene| crate::Cell::number(scene.seed as f64, 0)).collect();
+        let rows = vec![crate::Row::ours("seeds", cells)];
+        let tables = vec![Table { rows, ..Table::default() }, Table::default()];
+        Ok(Findings { tables, pictures: Vec::new() })
+    }
+
+    #[test]
+    fn every_table_of_an_experiment_names_the_seeds_of_its_draws() {
+        let registry = tagalong_core::Registry::default();
+        let mut lab = crate::lab::testing::lab(&registry, false, None);
+        let experiment = Experiment { name: "draws", about: "", run: drawing };
+        let mut find = |first_seed| {
+            lab.first_seed = first_seed;
+            experiment.find(&lab).unwrap()
+        };
+        let (here, again, there) = (find(30), find(30), find(31));
+        assert_eq!(here, again);
+        assert_ne!(here.findings.tables[0].rows, there.findings.tables[0].rows);
+        let note = "Drawn for this. turntable: 2 seeds of the split test from 30 on.";
+        assert!(here.findings.tables.iter().all(|table| table.notes == [note]));
+        let json = serde_json::to_value(&here).unwrap();
+        assert_eq!(json["drawn"][0]["scene"], "turntable");
+        assert_eq!(json["drawn"][0]["seeds"]["first"], 30);
+        let none = Experiment { run: |_| Ok(Table::default().into()), ..experiment };
+        assert_eq!(none.find(&lab).unwrap().findings.tables[0].notes, [""; 0]);
+    }
+
     #[test]
     fn every_name_means_one_thing() {
         let names: BTreeSet<&str> = SYSTEMS.iter().map(|system| system.name).collect();

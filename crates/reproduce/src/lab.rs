@@ -212,7 +212,7 @@ pub(crate) fn read(path: &Path) -> Result<String, ReproduceError> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod testing {
     use super::*;
 
     struct Silent;
@@ -222,12 +222,18 @@ mod tests {
         fn step(&self) {}
     }
 
-    fn lab<'a>(registry: &'a Registry, quick: bool, seeds: Option<u64>) -> Lab<'a> {
+    pub(crate) fn lab(registry: &Registry, quick: bool, seeds: Option<u64>) -> Lab<'_> {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
         let (first_seed, drawn) = (0, DrawnScenes::default());
         let (jobs, progress) = (1, &Silent);
         Lab { registry, configs, data: None, quick, seeds, first_seed, drawn, jobs, progress }
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::lab;
+    use super::*;
 
     #[test]
     fn seeds_are_as_asked_or_few_when_quick() {
@@ -259,10 +265,8 @@ mod tests {
         assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
         lab.first_seed = 40;
         assert_eq!(seeds(&lab), [2_000_000_040, 2_000_000_041]);
-        let of = |first| Drawn {
-            scene: "crowd".into(),
-            seeds: Split::Test.seeds(first, 2).unwrap(),
-        };
+        let of =
+            |first| Drawn { scene: "crowd".into(), seeds: Split::Test.seeds(first, 2).unwrap() };
         assert_eq!(lab.drawn.take(), [of(0), of(40)]);
         assert_eq!(lab.drawn.take(), []);
         lab.first_seed = 999_999_999;

@@ -63,7 +63,9 @@ impl Card {
     /// The card as TOML.
     pub fn to_text(&self) -> String {
         let text = toml::to_string(self).unwrap_or_default();
-        format!("# Shares come with 95 % intervals (Wilson).\n{text}")
+        format!(
+            "# Shares come with 95 % intervals (Wilson), too narrow for sightings, which are not independent.\n{text}"
+        )
     }
 
     /// The figures that matter most, for people.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Point2;
 use serde::Serialize;
 use tagalong_core::{Detection, Registry, Track, Verifier};
-use tagalong_eval::wilson;
+use tagalong_eval::{CONFIDENCE, wilson};
 use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 
 use super::seen::{Known, Label, Seen, label};
@@ -16,7 +16,8 @@ const TRACKED_M: f64 = 0.5;
 /// ... and false if nobody is within this, m.
 const FALSE_M: f64 = 0.9;
 
-/// A share with its 95 % interval (Wilson).
+/// A share with its 95 % interval (Wilson), as if all of it were independent: for
+/// sightings, which are not, it is too narrow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Share {
     /// So many ...
@@ -32,8 +33,8 @@ pub struct Share {
 impl Share {
     fn new(count: u64, of: u64) -> Self {
         let rounded = |v: f64| (v * 1e5).round() / 1e5;
-        let (lower, upper) =
-            wilson(count, of, 0.95).map_or((0.0, 1.0), |i| (rounded(i.lower), rounded(i.upper)));
+        let (lower, upper) = wilson(count, of, CONFIDENCE)
+            .map_or((0.0, 1.0), |i| (rounded(i.lower), rounded(i.upper)));
         Self { count, of, lower, upper }
     }
 }

@@ -69,7 +69,8 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
     let contenders = contenders(&args.configs, registry)?;
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
-    let suites = scenes.iter().map(|path| suite(path, args, seeds)).collect::<Result<Vec<_>, _>>()?;
+    let suites =
+        scenes.iter().map(|path| suite(path, args, seeds)).collect::<Result<Vec<_>, _>>()?;
     let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
     let names = suites.iter().map(|(name, _)| name);
     let mut table = table::Table::new(seeds, names, contenders.iter().map(|c| &c.name));

@@ -139,12 +139,14 @@ impl Table {
     /// What follows from the rows.
     pub fn summary(&self) -> String {
         let mut out = format!(
-            "\n{}\nintervals: 95 %, over draws (Student; Wilson where all is right)\n\
-             p: sign-flip test over draws, corrected for the {} comparisons (Holm)\n{}\n",
+            "\n{}\nintervals: 95 %, over draws (Student; Wilson where all is right)\n{}\n",
             self.seeds,
-            self.gains.len(),
             self.perfection()
         );
+        if !self.gains.is_empty() {
+            let count = self.gains.len();
+            let _ = writeln!(out, "p: sign-flip test over draws, Holm's correction for {count}");
+        }
         for gain in &self.gains {
             let Interval { estimate, .. } = gain.idf1.difference;
             let ends = gain.idf1.difference.ends();

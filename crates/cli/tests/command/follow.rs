@@ -45,6 +45,29 @@ fn a_person_who_walks_is_followed_the_same_way_on_any_number_of_threads() {
 }
 
 #[test]
+fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let ride = |first| {
+        let more = ["--seeds", "1", "--first-seed", first, "--format", "json"];
+        json(&follow(folder.path(), "follow-best.toml", &more))
+    };
+    let (near, far) = (ride("3"), ride("4"));
+    assert_eq!(near["seeds"], serde_json::json!({ "split": "test", "first": 3, "count": 1 }));
+    assert_eq!(
+        (&near["rides"][0]["seed"], &far["rides"][0]["seed"]),
+        (&2_000_000_003_u64.into(), &2_000_000_004_u64.into())
+    );
+    for table in near["tables"].as_array().unwrap() {
+        let notes = table["notes"].to_string();
+        assert!(notes.contains("each scene with 1 seed of the split test from 3 on"), "{notes}");
+    }
+    // Of one ride only whether it was kept has an interval.
+    let cells = near["tables"][0]["rows"][0]["cells"].as_array().unwrap();
+    let with: Vec<usize> = (0..cells.len()).filter(|&k| !cells[k]["interval"].is_null()).collect();
+    assert_eq!(with, [1], "{cells:?}");
+}
+
+#[test]
 fn the_log_of_a_ride_has_commands_and_their_reasons() {
     let folder = tempfile::tempdir().unwrap();
     let output = follow(folder.path(), "follow-as-printed.toml", &["-o", "rides"]);

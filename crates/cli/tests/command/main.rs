@@ -18,6 +18,7 @@ mod mistakes;
 mod recorded;
 mod rooms;
 mod runs;
+mod seeds;
 mod shell;
 #[cfg(unix)]
 mod signals;

@@ -97,8 +97,8 @@ fn one_draw_and_draws_that_agree_tell_no_spread() {
     assert_eq!(mean_interval(&[0.1; 7]).unwrap().ends(), None);
     assert_eq!(mean_interval(&[]), None);
     assert_eq!(mean_interval(&[0.1, f64::NAN]), None);
-    assert_eq!(clustered_share(&[[7, 9]]).unwrap().ends(), None);
-    assert_eq!(clustered_share(&[[7, 9], [0, 0]]).unwrap().ends(), None);
+    assert_eq!(clustered_share(&[[7, 9]]), Some(Interval::open(7.0 / 9.0)));
+    assert_eq!(clustered_share(&[[7, 9], [0, 0]]), Some(Interval::open(7.0 / 9.0)));
     assert_eq!(clustered_share(&[[0, 0]]), None);
     assert_eq!(Interval::open(0.5).within(0.0, 1.0).ends(), None);
     // Without one of them there is no figure: nothing tells its spread.
@@ -107,11 +107,34 @@ fn one_draw_and_draws_that_agree_tell_no_spread() {
 }
 
 #[test]
+fn one_trial_each_is_independent_and_two_are_not() {
+    assert_eq!(clustered_share(&[[1, 1], [0, 1], [1, 1]]), wilson(2, 3, CONFIDENCE));
+    assert_ne!(clustered_share(&[[1, 2], [0, 2], [1, 1]]), wilson(2, 5, CONFIDENCE));
+}
+
+#[test]
+fn no_end_is_beyond_the_range_of_the_figure() {
+    let wide = Interval { estimate: 0.5, lower: -0.2, upper: 1.3 };
+    assert_eq!(wide.within(0.0, 1.0), Interval { estimate: 0.5, lower: 0.0, upper: 1.0 });
+    assert_eq!(wide.within(-1.0, f64::INFINITY), wide);
+    assert_eq!(wilson(5, 3, CONFIDENCE), wilson(3, 3, CONFIDENCE));
+}
+
+#[test]
 fn clusters_that_all_succeed_count_once_each() {
     let all = clustered_share(&[[40, 40], [50, 50], [9, 9]]).unwrap();
     assert_eq!(Some(all), wilson(3, 3, CONFIDENCE));
     let none = clustered_share(&[[0, 40], [0, 50]]).unwrap();
     assert_eq!(Some(none), wilson(0, 2, CONFIDENCE));
+}
+
+#[test]
+fn clusters_are_worth_as_many_trials_as_have_their_spread() {
+    // Squares off half of 4: 1 and 1, doubled for the one degree of freedom: 4. Of 8
+    // independent trials they would be 2, so that 4 are what these 8 are worth.
+    let two = [[1, 4], [3, 4]];
+    let few = 4.0 * (normal_quantile(CONFIDENCE) / student_quantile(1)).powi(2);
+    assert!((independent_trials(&two, 0.5, 8.0) - few).abs() < 1e-12);
 }
 
 #[test]

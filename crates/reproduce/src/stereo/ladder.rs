@@ -57,6 +57,7 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure)
         rows,
         notes: vec![
             format!("{} drawn stereo scenes; intervals: 95 %, over scenes, in pairs", all.len()),
+            "Each interval stands for itself: of twenty, one misses what it is of.".into(),
             format!("printed, corrected, best: {}", PIPELINES.join(", ")),
         ],
     }

@@ -154,9 +154,7 @@ fn tracks_table(rows: Vec<Row>, drawn: &str) -> Table {
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!(
-                "{drawn} intervals take people and frames as independent: they are too narrow"
-            ),
+            format!("{drawn} intervals take people and frames as independent: they are too narrow"),
             "Lost: had a track in the same frame without the verifier.".into(),
         ],
     }
