@@ -250,8 +250,11 @@ Examples:
   tagalong bench export -o bench --trackeval tree";
 
 const EVAL_HELP: &str = "\
-Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors); --format json
-prints one flat object.
+Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors), whose rules the
+truth was read with, and notes on what was read in another way than it may be meant; --format json
+prints one flat object. Of MOTChallenge text is refused, with its line, what TrackEval refuses: a
+class that is none in truth, tracks of other classes than people, ids below 0, frames beyond
+seqLength. Boxes without an area match nobody, and are counted.
 
 Examples:
   tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf

@@ -121,5 +121,20 @@ mod tests {
         assert!(judge(&scaled(1.5)).mean > judge(&scaled(1.5)).upper);
         assert!(judge(&scaled(0.5)).mean < judge(&scaled(0.5)).lower);
         assert_eq!(Consistency::of(&[], 2, 0.95), None);
+        assert_eq!(Consistency::of(&[1.0], 0, 0.95), None);
+    }
+
+    #[test]
+    fn bounds_are_those_of_the_sum_of_all_values() {
+        let of = Consistency::of(&[1.0, 2.0, 6.0], 1, 0.95).unwrap();
+        assert_eq!((of.mean, of.expected, of.count), (3.0, 1.0, 3));
+        // Three degrees of freedom at 2.5 and 97.5 %.
+        assert!((of.lower - 0.215_795_282_6 / 3.0).abs() < 1e-9, "{of:?}");
+        assert!((of.upper - 9.348_403_604 / 3.0).abs() < 1e-8, "{of:?}");
+        assert!((of.inside - 2.0 / 3.0).abs() < 1e-12 && of.is_consistent(), "{of:?}");
+        assert!(!Consistency { mean: of.upper + 1e-9, ..of }.is_consistent());
+        assert!(Consistency { mean: of.upper, ..of }.is_consistent());
+        assert!(!Consistency { mean: of.lower - 1e-9, ..of }.is_consistent());
+        assert!(Consistency { mean: of.lower, ..of }.is_consistent());
     }
 }

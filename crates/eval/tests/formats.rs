@@ -204,6 +204,89 @@ fn kitti_labels_survive_a_round_trip_and_mean_what_they_say() {
 }
 
 #[test]
+fn kitti_pedestrians_count_as_far_as_they_are_seen() {
+    let role = |class: &str, truncated: &str, occluded: &str| {
+        let line = format!("0 1 {class} {truncated} {occluded} 0 1 1 9 9 1 1 1 1 1 1 0\n");
+        kitti::parse(&line, "0000.txt").unwrap()[0].pedestrian_role()
+    };
+    assert_eq!(role("pedestrian", "0", "2"), Some(Role::Counts));
+    assert_eq!(role("Pedestrian", "-1", "-1"), Some(Role::Counts));
+    assert_eq!(role("Pedestrian", "0", "3"), Some(Role::Ignored));
+    assert_eq!(role("Pedestrian", "0.5", "0"), Some(Role::Ignored));
+    assert_eq!(role("Person", "0", "0"), Some(Role::Ignored));
+    assert_eq!(role("Cyclist", "0", "0"), None);
+    let place = |x: &str, z: &str| {
+        let line = format!("0 1 Pedestrian 0 0 0 1 1 9 9 1 1 1 {x} 1 {z} 0\n");
+        kitti::parse(&line, "0000.txt").unwrap()[0].floor_m()
+    };
+    assert_eq!(place("-3", "7"), Some([-3.0, 7.0]));
+    assert_eq!((place("-1000", "7"), place("-3", "-1000")), (None, None));
+    let metres = kitti::comparison(Similarity::Metres);
+    assert_eq!(
+        (metres.similarity, metres.ignore_unmatched_below_px),
+        (Similarity::Metres, Some(25.0))
+    );
+}
+
+#[test]
+fn numbers_of_a_line_are_whole_where_they_have_to_be() {
+    let id = |id: &str| mot::parse(&format!("\u{feff}1,{id},0,0,9,9"), "t").map(|rows| rows[0].id);
+    assert_eq!((id("12.0").unwrap(), id("-3").unwrap()), (12, -3));
+    assert_eq!(id("8999999999999999").unwrap(), 8_999_999_999_999_999);
+    assert!(why(id("9e15")).contains("expected a whole number"));
+    assert!(why(id("0.5")).contains("expected a whole number"));
+    let frame =
+        |frame: &str| mot::parse(&format!("{frame},1,0,0,9,9"), "t").map(|rows| rows[0].frame);
+    assert_eq!((frame("1").unwrap(), frame("4294967295").unwrap()), (1, u32::MAX));
+    assert!(frame("0").is_err() && frame("-1").is_err() && frame("4294967296").is_err());
+    let whole_file = FormatError { file: "a".into(), line: 0, why: "is empty".into() };
+    assert_eq!(whole_file.to_string(), "a: is empty");
+    let short = |text: &str| {
+        let row = mot::parse(text, "t").unwrap()[0];
+        (row.confidence, row.class, row.visibility)
+    };
+    assert_eq!(short("1,1,0,0,9,9"), (1.0, None, None));
+    assert_eq!(short("1,1,0,0,9,9,0.5"), (0.5, None, None));
+    assert_eq!(short("1,1,0,0,9,9,0.5,7"), (0.5, Some(7.0), None));
+    assert_eq!(short("1,1,0,0,9,9,0.5,7,0.25"), (0.5, Some(7.0), Some(0.25)));
+}
+
+#[test]
+fn places_that_are_broken_are_named_by_line_and_column() {
+    let source = "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,y_odom_m,z_odom_m,seen\n\
+                  1,1,12,2.5,-0.5,1.6,7.5,1.5,1.7,0\n";
+    let rows = metres::parse(source, "t.csv").unwrap();
+    assert_eq!((rows[0].line, rows[0].seen, rows[0].frame), (2, false, 1));
+    assert_eq!(
+        (rows[0].head_in_robot_m, rows[0].head_in_odom_m),
+        ([2.5, -0.5, 1.6], [7.5, 1.5, 1.7])
+    );
+    let broken = why(metres::parse(&source.replace("1.6", "high"), "t.csv"));
+    assert!(broken.starts_with("t.csv, line 2: `z` is `high`"), "{broken}");
+    let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,visible,\
+                  occluder,ignore,interpolated\n";
+    let row = |text: &str| people::parse(&format!("{header}{text}"), "p.csv");
+    let read = row("1,4,1,2,3,4,5,6,7,8,0.5,-0.3,2.5,0.75,0,0,300").unwrap()[0].clone();
+    assert_eq!((read.ignore, read.interpolated, read.occluder.as_str()), (false, 255, "0"));
+    assert_eq!(read.visible_body, Region::new(5.0, 6.0, 7.0, 8.0));
+    for negative in ["1,4,1,2,-3,4,5,6,7,8,0,0,1,1,0,0,0", "1,4,1,2,3,4,5,6,7,-8,0,0,1,1,0,0,0"] {
+        assert!(why(row(negative)).contains("p.csv, line 2: a box has a negative size"));
+    }
+    assert!(row("1,4,1,2,0,0,5,6,0,0,0,0,1,1,0,0,0").is_ok(), "who is out of the image has no box");
+}
+
+#[test]
+fn sequence_info_has_limits_and_may_leave_out_the_size() {
+    let info = |text: &str| mot::parse_info(text, "seqinfo.ini");
+    let plain = info("[Sequence]\nNAME = hall \nframerate=14\nseqLength=1000000").unwrap();
+    assert_eq!((plain.name.as_str(), plain.rate_hz, plain.length), ("hall", 14.0, 1_000_000));
+    assert_eq!((plain.width, plain.height), (0, 0));
+    assert!(why(info("name=x\nframeRate=-1\nseqLength=1")).contains("expected a number"));
+    assert!(why(info("name=x\nframeRate=inf\nseqLength=1")).contains("expected a number"));
+    assert!(why(info("frameRate=1\nseqLength=1")).contains("has no `name=`"));
+}
+
+#[test]
 fn kitti_objects_that_are_not_told_apart_are_left_out() {
     let label = |id: i64, class: &str| format!("0 {id} {class} 0 0 0 1 1 9 9 1 1 1 1 1 1 0\n");
     let source = label(-1, "Pedestrian") + &label(-1, "DontCare") + &label(0, "Pedestrian");

@@ -3,8 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use tagalong_eval::{
-    Clear, Comparison, DetectionTally, EvalError, EventKind, Following, Frame, Prepared, Region,
-    Report, Role, Scores, Sequence, SetDistance, Similarity, Tally, Times, Truth, Verdict, events,
+    Clear, Comparison, DetectionTally, EvalError, EventKind, Following, Frame, GospaParts, Hota,
+    HotaLevel, Identity, Prepared, Region, Report, Role, Scores, Sequence, SetDistance, SetTally,
+    Similarity, Tally, Times, Truth, Verdict, events,
 };
 
 const SECOND_NS: i64 = 1_000_000_000;
@@ -341,4 +342,169 @@ fn the_flat_object_carries_the_names_of_the_field() {
         assert!(object.contains_key(name), "{name}");
     }
     assert!(object.values().all(|value| value.is_number() || value.is_null()));
+}
+
+#[test]
+fn what_is_counted_adds_up_field_by_field() {
+    let clear = |n: u64| Clear {
+        tp: n,
+        fn_: 2 * n,
+        fp: 3 * n,
+        id_switches: 5 * n,
+        fragmentations: 7 * n,
+        mostly_tracked: 11 * n,
+        partly_tracked: 13 * n,
+        mostly_lost: 17 * n,
+        similarity_sum: n as f64,
+        frames: 19 * n,
+    };
+    assert_eq!(Clear::combine([&clear(1), &clear(2)]), clear(3));
+    let identity = |n: u64| Identity { tp: n, fn_: 2 * n, fp: 3 * n };
+    assert_eq!(Identity::combine([&identity(1), &identity(2)]), identity(3));
+    let sets = |n: u64| {
+        let of = |factor: f64| factor * n as f64;
+        let parts = GospaParts { location: of(3.0), missed: of(4.0), false_: of(5.0) };
+        SetTally { ospa_sum: of(1.0), gospa_sum: of(2.0), parts, frames: n }
+    };
+    let both = SetTally::combine([&sets(1), &sets(2)]);
+    assert_eq!(both, sets(3));
+    assert_eq!((both.ospa(), both.gospa()), (Some(1.0), Some(2.0)));
+    let mut hota = [Hota::default(), Hota::default(), Hota::default()];
+    for (n, of) in (1_u64..).zip(&mut hota) {
+        for (step, level) in (1..).zip(&mut of.levels) {
+            let by = |factor: u64| factor * step * n;
+            *level = HotaLevel {
+                tp: by(1),
+                fn_: by(2),
+                fp: by(3),
+                similarity_sum: by(4) as f64,
+                association_sum: by(5) as f64,
+                association_recall_sum: by(6) as f64,
+                association_precision_sum: by(7) as f64,
+            };
+        }
+    }
+    assert_eq!(Hota::combine([&hota[0], &hota[1]]), hota[2]);
+    let times = |numbers: &[f64], n: u64| Times {
+        confirm_s: numbers.to_vec(),
+        never_confirmed: n,
+        reacquire_s: numbers.iter().map(|t| -t).collect(),
+        never_reacquired: 2 * n,
+        wrong_person_s: 3.0 * n as f64,
+        duration_s: 4.0 * n as f64,
+    };
+    assert_eq!(Times::combine([&times(&[1.0], 1), &times(&[2.0], 2)]), times(&[1.0, 2.0], 3));
+    let detections = |scores: &[f64], n: u64| DetectionTally {
+        verdicts: scores.iter().map(|&score| Verdict { score, right: true }).collect(),
+        truths: n,
+        images: 3 * n,
+    };
+    let both = DetectionTally::combine([&detections(&[0.5], 1), &detections(&[0.6], 2)]);
+    assert_eq!(both, detections(&[0.5, 0.6], 3));
+    let tally = |n: u64| Tally {
+        truths: n,
+        reports: 2 * n,
+        truth_ids: 3 * n,
+        track_ids: 5 * n,
+        ..Tally::default()
+    };
+    assert_eq!(Tally::combine([&tally(1), &tally(2)]), tally(3));
+}
+
+#[test]
+fn four_fifths_are_partly_tracked_and_so_is_one_fifth() {
+    // Of five people each in five frames, person n is found in n frames.
+    let truths: Vec<(i64, f64)> = (0..6).map(|id| (id, 5.0 * id as f64)).collect();
+    let frames: Vec<Vec<(i64, f64)>> = (0..5)
+        .map(|frame| truths.iter().copied().filter(|(id, _)| *id > frame).collect())
+        .collect();
+    let scene: Vec<(Places<'_>, Places<'_>)> =
+        frames.iter().map(|reports| (&truths[..], &reports[..])).collect();
+    let (clear, _) = Clear::measure(&prepared(&sequence(&scene)));
+    assert_eq!((clear.mostly_tracked, clear.partly_tracked, clear.mostly_lost), (1, 4, 1));
+    assert_eq!((clear.recall(), clear.precision(), clear.fp_per_frame()), (0.5, 1.0, 0.0));
+}
+
+#[test]
+fn rectangles_meet_cover_and_have_areas() {
+    let a = Region::new(0.0, 2.0, 10.0, 20.0);
+    let b = Region::new(5.0, 12.0, 10.0, 30.0);
+    assert_eq!((a.area(), b.area(), a.intersection(&b)), (200.0, 300.0, 50.0));
+    assert_eq!((a.iou(&b), a.covered_by(&b), b.covered_by(&a)), (50.0 / 450.0, 0.25, 50.0 / 300.0));
+    let beside = Region::new(10.0, 2.0, 10.0, 20.0);
+    assert_eq!((a.intersection(&beside), a.iou(&beside), a.iou(&a)), (0.0, 0.0, 1.0));
+    let flat = Region::new(1.0, 3.0, 0.0, 5.0);
+    assert_eq!((flat.iou(&a), flat.covered_by(&a), flat.iou(&flat)), (0.0, 0.0, 0.0));
+    let has_area = |width, height| Region::new(0.0, 0.0, width, height).has_area();
+    assert!(has_area(1.0, 1.0));
+    assert!(!has_area(0.0, 1.0) && !has_area(1.0, 0.0) && !has_area(-1.0, -1.0));
+}
+
+#[test]
+fn alike_on_the_floor_is_what_is_left_of_a_metre() {
+    let alike = |x: f64, y: f64| {
+        let there = Report { floor_m: Some([x, y]), ..report(1, 0.0) };
+        Similarity::Metres.between(&truth(1, 0.0), &there)
+    };
+    assert_eq!((alike(0.0, 0.0), alike(0.0, 0.25), alike(3.0, 4.0)), (1.0, 0.75, 0.0));
+    assert!((alike(0.3, 0.4) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn what_makes_no_sense_is_absent() {
+    let scores =
+        |truths, reports| Scores::measure(&one_frame(truths, reports), Similarity::Iou).unwrap();
+    let unseen = scores(vec![truth(1, 0.0)], vec![]);
+    assert_eq!((unseen.mota, unseen.recall, unseen.lamr), (Some(0.0), Some(0.0), Some(1.0)));
+    assert_eq!((unseen.precision, unseen.motp, unseen.fp_per_frame), (None, None, Some(0.0)));
+    let invented = scores(vec![], vec![report(1, 0.0)]);
+    assert_eq!((invented.mota, invented.idf1, invented.lamr), (None, None, None));
+    assert_eq!((invented.precision, invented.fp_per_frame), (Some(0.0), Some(1.0)));
+    assert_eq!((invented.average_precision, invented.hota, invented.recall), (None, None, None));
+}
+
+#[test]
+fn a_detection_takes_the_truth_it_fits_best() {
+    // The surer one fits both people; the other one only the first.
+    let mut scene =
+        one_frame(vec![truth(1, 0.0), truth(2, 0.3)], vec![report(1, 0.3), report(2, -0.2)]);
+    scene.frames[0].reports[0].score = 0.9;
+    let tally = DetectionTally::measure(&scene, Similarity::Iou, 0.5);
+    assert_eq!(tally.verdicts.iter().filter(|verdict| verdict.right).count(), 2);
+    assert_eq!((tally.truths, tally.images), (2, 1));
+    // Half a metre away is near enough, and excuses on the floor, too.
+    let half = one_frame(vec![truth(1, 0.0)], vec![report(1, 0.5)]);
+    assert!(DetectionTally::measure(&half, Similarity::Metres, 0.5).verdicts[0].right);
+    let ignored = Truth { role: Role::Ignored, ..truth(1, 0.0) };
+    for (place, left) in [(0.5, 0), (0.6, 1)] {
+        let scene = one_frame(vec![ignored], vec![report(1, place)]);
+        let tally = DetectionTally::measure(&scene, Similarity::Metres, 0.5);
+        assert_eq!((tally.verdicts.len(), tally.truths), (left, 0));
+    }
+}
+
+#[test]
+fn who_is_followed_by_nothing_known_is_idle() {
+    let scene = sequence(&[(&[(1, 0.0)], &[(7, 0.0)]), (&[(1, 0.0)], &[(7, 0.0)])]);
+    let prepared = prepared(&scene);
+    let (_, matches) = Clear::measure(&prepared);
+    let following = Following::measure(&prepared, &matches, 1, &[Some(7)]);
+    assert_eq!((following.on_target_s, following.idle_s, following.losses), (1.0, 1.0, 1));
+}
+
+#[test]
+fn reports_at_the_limits_of_what_is_excused() {
+    let kept = |truth_x: f64, ignored: Option<Region>, report_x: f64| {
+        let mut scene = one_frame(
+            vec![Truth { role: Role::Ignored, ..truth(1, truth_x) }],
+            vec![report(1, report_x)],
+        );
+        scene.frames[0].ignore_regions.extend(ignored);
+        prepared(&scene).report_count()
+    };
+    // Intersection over union: 0.5 and a little less.
+    assert_eq!((kept(0.0, None, 1.0 / 3.0), kept(0.0, None, 0.34)), (0, 1));
+    // Half inside of a region that is not annotated, and a little more.
+    let region = |x: f64| Some(Region::new(x, 0.0, 100.0, 100.0));
+    assert_eq!((kept(50.0, region(5.0), 0.0), kept(50.0, region(4.9), 0.0)), (1, 0));
 }
