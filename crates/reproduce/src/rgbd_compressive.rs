@@ -87,7 +87,7 @@ const GROWING: [&str; 2] = ["rgbd-compressive", "rgbd-best"];
 
 /// Logs of one person each, in which boxes around the person are counted, and how long
 /// they last.
-const BOXED_LOGS: u64 = 3;
+const BOXED_LOGS: u64 = 2;
 const BOXED_S: &str = "3";
 /// How far around the expected place boxes are searched, widths. The papers' boxes are
 /// some 64 pixels wide and searched pixel by pixel: 0.75 widths are 48 pixels and 7,200
@@ -271,34 +271,33 @@ fn length(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
 
 /// For each contender the tallies of the first seconds, longest first, and last that of
 /// the second half.
-fn growing(mut trial: Trial) -> Result<Vec<Vec<Tally>>, TrialError> {
+fn growing(trial: Trial) -> Result<Vec<Vec<Tally>>, TrialError> {
     let frames = trial.moments.len();
+    let first = |seconds: f64| 0..(frames as f64 * seconds / LENGTHS_S[0]).round() as usize;
     let mut tallies = vec![Vec::new(); trial.runs.len()];
-    let second_half = part(&trial, frames / 2..frames);
-    for seconds in LENGTHS_S {
-        let count = (frames as f64 * seconds / LENGTHS_S[0]).round() as usize;
-        trial.moments.truncate(count);
-        for (run, tallies) in trial.runs.iter_mut().zip(&mut tallies) {
-            run.reports.truncate(count);
+    for frames in LENGTHS_S.map(first).into_iter().chain([frames / 2..frames]) {
+        let part = part(&trial, frames);
+        for (run, tallies) in part.runs.iter().zip(&mut tallies) {
+            tallies.push(JUDGE.judge(&part, run)?.tally);
         }
-        for (run, tallies) in trial.runs.iter().zip(&mut tallies) {
-            tallies.push(JUDGE.judge(&trial, run)?.tally);
-        }
-    }
-    for (run, tallies) in second_half.runs.iter().zip(&mut tallies) {
-        tallies.push(JUDGE.judge(&second_half, run)?.tally);
     }
     Ok(tallies)
 }
 
 /// Some frames of a trial.
 fn part(trial: &Trial, frames: Range<usize>) -> Trial {
-    let mut part = trial.clone();
-    part.moments = trial.moments[frames.clone()].to_vec();
-    for (part, whole) in part.runs.iter_mut().zip(&trial.runs) {
-        part.reports = whole.reports[frames.clone()].to_vec();
+    let of = |run: &Run| Run {
+        pipeline: run.pipeline.clone(),
+        reports: run.reports[frames.clone()].to_vec(),
+        worked_ms: run.worked_ms,
+    };
+    Trial {
+        moments: trial.moments[frames.clone()].to_vec(),
+        runs: trial.runs.iter().map(of).collect(),
+        furniture: trial.furniture.clone(),
+        camera: trial.camera.clone(),
+        seed: trial.seed,
     }
-    part
 }
 
 /// Boxes around one person, pixel by pixel.
