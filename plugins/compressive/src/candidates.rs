@@ -37,3 +37,51 @@ pub(crate) fn ring(from: f64, to: f64, count: usize) -> impl Iterator<Item = (i6
         ((radius * cos).round() as i64, (radius * sin).round() as i64)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_disc_is_every_place_within_the_radius_on_its_grid() {
+        for (radius, step) in [(2.0, 1), (5.0, 2), (7.3, 3), (0.5, 1), (3.0, 0), (-1.0, 1)] {
+            let apart = step.max(1);
+            let is_on_grid = |v: &i64| v % apart == 0;
+            let mut expected = Vec::new();
+            for y in (-20..=20_i64).filter(is_on_grid) {
+                for x in (-20..=20_i64).filter(is_on_grid) {
+                    if ((x * x + y * y) as f64) <= f64::max(radius, 0.0).powi(2) {
+                        expected.push((x, y));
+                    }
+                }
+            }
+            let found: Vec<_> = disc(radius, step).collect();
+            assert_eq!(found, expected, "radius {radius}, step {step}");
+        }
+    }
+
+    #[test]
+    fn a_ring_is_filled_evenly() {
+        let (from, to, count) = (40.0, 100.0, 400);
+        let all: Vec<(f64, f64)> =
+            ring(from, to, count).map(|(x, y)| (x as f64, y as f64)).collect();
+        assert_eq!(all.len(), count);
+        let radius = |(x, y): &(f64, f64)| x.hypot(*y);
+        assert!(all.iter().all(|at| (from - 1.0..to + 1.0).contains(&radius(at))));
+        // Half of the area lies within the root of the mean square of the two radii.
+        let half = (0.5 * (from * from + to * to)).sqrt();
+        let within = all.iter().filter(|at| radius(at) < half).count();
+        assert!((180..220).contains(&within), "{within} of {count}");
+        for (right, below) in [(true, true), (true, false), (false, true), (false, false)] {
+            let quarter = all.iter().filter(|(x, y)| (*x > 0.0) == right && (*y > 0.0) == below);
+            let quarter = quarter.count();
+            assert!((85..115).contains(&quarter), "{quarter} of {count}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_a_box() {
+        let pixels = Pixels { x: -3, y: 7, width: 11, height: 13 };
+        assert_eq!(pixels.rect(), Rect::new(-3.0, 7.0, 11.0, 13.0));
+    }
+}

@@ -440,3 +440,125 @@ impl Detector for Compressive {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, SMatrix, Vector2};
+    use tagalong_core::{Distortion, Estimate, Person, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 262.0, fy: 262.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+        Camera::mounted(lens, 320, 240, 1.3, 0.0, 0.0)
+    }
+
+    fn track(seen: bool, occluded: bool) -> Track {
+        let position = Point3::new(3.0, 0.0, 1.35);
+        let person = Person { position, velocity: Vector2::zeros() };
+        let region = camera().upper_body(&position);
+        Track {
+            id: TrackId(1),
+            estimate: Estimate { person, covariance: SMatrix::identity(), region },
+            seen,
+            occluded,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    /// The weight of the past after a sighting so sure and so far aside, widths.
+    fn after(config: &Config, track: &Track, found: Option<(f64, f32)>) -> Option<f64> {
+        let region = track.estimate.region;
+        let aside = |widths: f64| Rect { x: region.x + widths * region.width, ..region };
+        memory(config, track, found.map(|(off, sure)| (aside(off), sure)), false)
+    }
+
+    #[test]
+    fn nothing_is_learnt_of_who_is_hidden_or_not_seen() {
+        let config = Config::default();
+        let sure = Some((0.0, 1.0));
+        for (seen, occluded) in [(false, false), (true, true), (false, true)] {
+            let track = track(seen, occluded);
+            for found in [None, sure] {
+                assert_eq!(after(&config, &track, found), None, "{seen} {occluded}");
+            }
+            assert_eq!(memory(&config, &track, None, true), None, "a model does not begin there");
+        }
+        let printed = Config { compat_always_learn: true, ..Config::default() };
+        assert_eq!(after(&printed, &track(false, true), None), Some(config.memory));
+        assert_eq!(memory(&printed, &track(false, true), None, true), None);
+    }
+
+    #[test]
+    fn the_past_weighs_by_who_saw_the_person_and_how_surely() {
+        let config = Config::default();
+        let track = track(true, false);
+        assert_eq!(memory(&config, &track, None, true), Some(0.0), "the first frame counts fully");
+        let printed = Config { compat_blank_start: true, ..Config::default() };
+        assert_eq!(memory(&printed, &track, None, true), Some(config.memory));
+        // Another detector found the person: alone, or elsewhere.
+        assert_eq!(after(&config, &track, None), Some(config.anchored_memory));
+        assert_eq!(after(&config, &track, Some((0.5, 9.0))), Some(config.anchored_memory));
+        // The overlap of a box that is off by a tenth of its width is 0.82, by a fifth 0.67.
+        let least = config.learn_confidence as f32;
+        assert_eq!(after(&config, &track, Some((0.1, least + 0.01))), Some(config.memory));
+        assert_eq!(after(&config, &track, Some((0.1, least - 0.01))), None);
+        assert_eq!(after(&config, &track, Some((0.2, 0.0))), Some(config.anchored_memory));
+    }
+
+    #[test]
+    fn the_place_of_a_box_moves_and_grows_with_it() {
+        let (config, camera) = (Config::default(), camera());
+        let track = track(true, false);
+        let before = track.estimate.region;
+        let expected = track.estimate.person.position;
+        let face_m = camera.depth_of(&expected) - HEAD_RADIUS_M;
+        let there = sighting(&config, &camera, &track, before, Some(face_m));
+        assert!((there.position - expected).norm() < 1e-9, "{}", there.position);
+        assert_eq!((there.region, there.score), (before, config.score));
+        // Half a width to the right in the image, and 0.3 m farther away.
+        let aside = Rect { x: before.x + 0.5 * before.width, ..before };
+        let moved = sighting(&config, &camera, &track, aside, Some(face_m + 0.3));
+        let pixel = camera.project(&moved.position).unwrap();
+        let from = camera.project(&expected).unwrap();
+        assert!((pixel.x - from.x - 0.5 * before.width).abs() < 1e-6, "{pixel}");
+        assert!((camera.depth_of(&moved.position) - face_m - 0.3 - HEAD_RADIUS_M).abs() < 1e-9);
+        // Twice as large about the same middle: the head is twice as far above it.
+        let twice = Rect::new(
+            before.x - 0.5 * before.width,
+            before.y - 0.5 * before.height,
+            2.0 * before.width,
+            2.0 * before.height,
+        );
+        let grown = sighting(&config, &camera, &track, twice, Some(face_m));
+        let up = |pixel: nalgebra::Point2<f64>| before.centre().y - pixel.y;
+        let ratio = up(camera.project(&grown.position).unwrap()) / up(from);
+        assert!((ratio - 2.0).abs() < 1e-6, "{ratio}");
+        // Depth that is measured is known better than one that is expected.
+        let spread = |at: &Detection| at.covariance[(0, 0)].sqrt();
+        let guessed = sighting(&config, &camera, &track, before, None);
+        assert!((guessed.position - expected).norm() < 1e-9);
+        assert!((spread(&there) - config.sigma_depth_m).abs() < 0.02, "{}", spread(&there));
+        let half_m = SIGMA_EXPECTED * camera.depth_of(&expected);
+        assert!((spread(&guessed) - half_m).abs() < 0.02, "{}", spread(&guessed));
+        let across = there.covariance[(1, 1)].sqrt();
+        let expected = config.sigma_box * before.width / 262.0 * camera.depth_of(&expected);
+        assert!((across - expected).abs() < 0.1 * expected, "{across} {expected}");
+    }
+
+    #[test]
+    fn a_search_without_boxes_says_why() {
+        let reason = |nearer, farther, outside| Dropped { outside, nearer, farther }.reason();
+        assert_eq!(reason(3, 2, 6), "appearance: outside the image");
+        assert_eq!(reason(3, 2, 5), "appearance: hidden by something nearer");
+        assert_eq!(reason(2, 3, 5), "appearance: gone, something farther is seen");
+        assert_eq!(reason(2, 2, 0), "appearance: gone, something farther is seen");
+        let mut funnel = Funnel::default();
+        Dropped { outside: 5, nearer: 3, farther: 1 }.count(&mut funnel);
+        assert_eq!((funnel.count("box: outside"), funnel.count("box: depth")), (5, 4));
+    }
+}

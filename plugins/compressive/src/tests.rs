@@ -171,6 +171,100 @@ fn depth_leaves_few_boxes_of_a_wide_search() {
     assert!(found.is_some() && funnel.count("box: depth") == 0);
 }
 
+/// What is found of somebody who stands still, and the test that failed if nothing is.
+fn answer(config: Config) -> (bool, Vec<&'static str>) {
+    let head = place(3.0, 0.0);
+    let (found, funnel) = near(&mut taught(config, head), &World::at(head).frame(), head);
+    let failed = funnel.entries().iter().map(|entry| entry.test);
+    (found.is_some(), failed.filter(|test| test.starts_with("appearance: ")).collect())
+}
+
+#[test]
+fn the_best_box_has_to_be_sure_and_ahead_of_other_places() {
+    let config = |search_radius, min_confidence, min_lead| Config {
+        search_radius,
+        min_confidence,
+        min_lead,
+        ..Config::default()
+    };
+    assert_eq!(answer(config(0.4, -1e6, 0.0)), (true, vec![]));
+    assert_eq!(answer(config(0.4, 1e6, 0.0)), (false, vec!["appearance: confidence"]));
+    // Within 0.4 widths there is no other place; within a whole one there are some.
+    assert_eq!(answer(config(0.4, -1e6, 1e6)), (true, vec![]));
+    assert_eq!(answer(config(1.0, -1e6, 1e6)).0, true, "depth leaves no other place");
+    let blind = Config { depth_filter: false, ..config(1.0, -1e6, 1e6) };
+    assert_eq!(answer(blind.clone()), (false, vec!["appearance: two places"]));
+    assert_eq!(answer(Config { min_lead: -1e6, ..blind }), (true, vec![]));
+}
+
+/// The width of the box that is found where somebody is expected, who was learnt 3 m
+/// away, in parts of the width there.
+fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
+    let (before, now) = (place(3.0, 0.0), place(expected_m, 0.0));
+    let mut detector = taught(config, before);
+    let mut expected = track(now, true);
+    let region = expected.estimate.region;
+    let (width, height) = (widened * region.width, widened * region.height);
+    let centre = region.centre();
+    expected.estimate.region =
+        Rect::new(centre.x - 0.5 * width, centre.y - 0.5 * height, width, height);
+    let frame = World::at(now).frame();
+    let search = Search::Near(&expected);
+    let found = detector.detect(&frame, &search, &mut Funnel::default()).unwrap();
+    found[0].region.width / camera().upper_body(&before).width
+}
+
+#[test]
+fn the_size_goes_by_the_distance_and_does_not_jump() {
+    let config = Config { min_confidence: -1e6, ..Config::default() };
+    let by_box = Config { scale_from_depth: false, ..config.clone() };
+    // The box is some 50 pixels wide: whole pixels are 2 % of it.
+    let near = |found: f64, expected: f64| (found - expected).abs() < 0.021;
+    let cases = [
+        (&config, 2.9, 1.0, 3.0 / 2.9),
+        (&config, 2.0, 1.0, 1.08),
+        (&config, 4.5, 1.0, 0.92),
+        (&config, 3.0, 1.06, 1.0),
+        (&by_box, 3.0, 1.06, 1.06),
+        (&by_box, 3.0, 1.3, 1.08),
+    ];
+    for (config, expected_m, widened, ratio) in cases {
+        let found = grown(config.clone(), expected_m, widened);
+        assert!(near(found, ratio), "{expected_m} m, {widened}: {found} instead of {ratio}");
+    }
+}
+
+#[test]
+fn who_is_too_small_or_beyond_the_image_is_not_learnt() {
+    for head in [place(15.0, 0.0), place(3.0, 1.8)] {
+        let mut detector = taught(Config::default(), head);
+        let (found, funnel) = near(&mut detector, &World::at(head).frame(), head);
+        assert_eq!((found, funnel.count("appearance: not learnt yet")), (None, 1), "{head}");
+    }
+}
+
+#[test]
+fn a_number_that_never_changed_does_not_decide_alone() {
+    let samples = |value: f32| {
+        let mut samples = Samples::default();
+        samples.clear(1);
+        (0..10).for_each(|_| samples.add(&[value]));
+        samples
+    };
+    let confidence = |min_sigma: f64, at: f32| {
+        let mut appearance = Appearance::blank(1);
+        appearance.learn(&samples(40.0), &samples(10.0), 0.0, min_sigma);
+        appearance.confidence(&[at])
+    };
+    // Both deviations are the least one: ((v - 10)^2 - (v - 40)^2) / (2 sigma^2).
+    for (min_sigma, at) in [(1.0, 39.0_f32), (5.0, 39.0), (5.0, 20.0)] {
+        let [other, person] = [10.0, 40.0].map(|mean| (at - mean).powi(2));
+        let expected = (other - person) / (2.0 * (min_sigma as f32).powi(2));
+        let found = confidence(min_sigma, at);
+        assert!((found - expected).abs() < 1e-3 * expected.abs(), "{found} {expected}");
+    }
+}
+
 #[test]
 fn nobody_learns_from_the_board_that_hides_a_person_but_in_print() {
     let head = place(3.0, 0.0);

@@ -139,3 +139,159 @@ impl Detector for FaceRgbd {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Point3, SMatrix, Vector2};
+    use tagalong_core::{
+        Distortion, Estimate, Images, Motion, Person, Pinhole, Stamp, Track, TrackId,
+    };
+
+    use super::*;
+    use crate::tests::{noise, small};
+
+    const FOCAL_PX: f64 = 262.0;
+
+    fn camera() -> Camera {
+        let lens = Pinhole {
+            fx: FOCAL_PX,
+            fy: FOCAL_PX,
+            cx: 79.5,
+            cy: 59.5,
+            distortion: Distortion::None,
+        };
+        Camera::mounted(lens, 160, 120, 1.5, 0.0, 0.0)
+    }
+
+    /// A detector whose cascade passes some of the noise.
+    fn detector(config: Config) -> FaceRgbd {
+        let cascade = small();
+        FaceRgbd {
+            config,
+            line: cascade.calibration.unwrap(),
+            cascade,
+            scanner: Scanner::default(),
+            proposals: Proposals::default(),
+            hits: Vec::new(),
+            grouping: Grouping::default(),
+        }
+    }
+
+    fn frame(depth_m: Option<f32>) -> Frame {
+        let images = Images {
+            grey: Some(Arc::new(noise(160, 120, 5))),
+            depth: depth_m.map(|metres| Arc::new(DepthImage::filled(160, 120, metres))),
+            ..Images::default()
+        };
+        Frame::new(1, Stamp::default(), Arc::new(camera()), Motion::at_rest(0.1), images)
+    }
+
+    fn track(region: Rect) -> Track {
+        let person = Person { position: Point3::new(2.0, 0.0, 1.5), velocity: Vector2::zeros() };
+        Track {
+            id: TrackId(1),
+            estimate: Estimate { person, covariance: SMatrix::identity(), region },
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    /// Low enough for noise.
+    fn eager() -> Config {
+        Config { min_score: -99.0, min_side_px: 12.0, max_side: 0.3, ..Config::default() }
+    }
+
+    fn detect(
+        detector: &mut FaceRgbd,
+        frame: &Frame,
+        search: &Search<'_>,
+    ) -> (Vec<Detection>, Funnel) {
+        let mut funnel = Funnel::default();
+        (detector.detect(frame, search, &mut funnel).unwrap(), funnel)
+    }
+
+    const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
+
+    #[test]
+    fn a_face_is_as_far_away_as_depth_says_else_as_its_size_does() {
+        let detector = detector(Config::default());
+        let config = &detector.config;
+        let group = Group { region: Rect::new(69.5, 51.5, 20.0, 20.0), count: 5, strength: 3.0 };
+        let (camera, depth) = (camera(), DepthImage::filled(160, 120, 1.5));
+        let by_depth = detector.detection(&camera, Some(&depth), &group).unwrap();
+        let by_size = detector.detection(&camera, None, &group).unwrap();
+        let size_m = FOCAL_PX * config.face_m / 20.0;
+        for (found, face_m, sigma_m) in [
+            (&by_depth, 1.5, config.sigma_depth_m),
+            (&by_size, size_m, config.sigma_distance * size_m),
+        ] {
+            assert!((camera.depth_of(&found.position) - face_m - HEAD_RADIUS_M).abs() < 1e-9);
+            let pixel = camera.project(&found.position).unwrap();
+            assert!((pixel.x - 79.5).abs() < 1e-6);
+            assert!((pixel.y - (61.5 - 20.0 * config.head_above)).abs() < 1e-6, "{pixel}");
+            assert!((found.covariance[(0, 0)].sqrt() / sigma_m - 1.0).abs() < 0.05);
+            let aside = config.sigma_place * 20.0 / FOCAL_PX * (face_m + HEAD_RADIUS_M);
+            assert!((found.covariance[(2, 2)].sqrt() / aside - 1.0).abs() < 0.05);
+            assert_eq!(found.region, camera.upper_body(&found.position));
+            assert!((found.score - (1.5 * 3.0_f64.ln() - 2.0)).abs() < 1e-9);
+        }
+        let sure = Group { strength: 1e9, ..group };
+        let found = detector.detection(&camera, None, &sure).unwrap();
+        assert_eq!(found.score, config.max_score);
+        let doubtful = Group { strength: 0.0, ..sure };
+        let found = detector.detection(&camera, None, &doubtful).unwrap();
+        assert!((found.score - (1.5 * 1e-3_f64.ln() - 2.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_surest_face_comes_first_and_doubtful_ones_are_counted() {
+        let (found, funnel) = detect(&mut detector(eager()), &frame(None), &EVERYWHERE);
+        assert!(found.len() > 3, "{}", found.len());
+        assert!(found.windows(2).all(|pair| pair[0].score >= pair[1].score));
+        assert!(funnel.count("window: no face") > 100);
+        assert_eq!(funnel.count("face: log-odds"), 0);
+        let least = found[2].score;
+        let strict = Config { min_score: least, ..eager() };
+        let (kept, funnel) = detect(&mut detector(strict), &frame(None), &EVERYWHERE);
+        let expected = found.iter().filter(|face| face.score >= least).count();
+        assert_eq!(kept.len(), expected);
+        assert_eq!(funnel.count("face: log-odds"), (found.len() - expected) as u64);
+    }
+
+    #[test]
+    fn a_search_near_a_track_finds_one_face_within_its_box() {
+        let (all, whole) = detect(&mut detector(eager()), &frame(None), &EVERYWHERE);
+        let upper_body = Rect::new(40.0, 30.0, 60.0, 60.0);
+        let (found, part) =
+            detect(&mut detector(eager()), &frame(None), &Search::Near(&track(upper_body)));
+        assert_eq!(found.len(), 1);
+        assert!(all.len() > 1);
+        let face = camera().project(&found[0].position).unwrap();
+        assert!(upper_body.inflated(0.1).contains(face), "{face}");
+        let looked_at = |funnel: &Funnel| funnel.count("window: no face");
+        assert!(looked_at(&part) > 0 && 3 * looked_at(&part) < looked_at(&whole));
+    }
+
+    #[test]
+    fn depth_says_where_faces_are_looked_for_unless_it_is_told_not_to() {
+        let looked_at = |config: Config, depth_m: Option<f32>| {
+            let (_, funnel) = detect(&mut detector(config), &frame(depth_m), &EVERYWHERE);
+            let points = funnel.count("point: depth and height");
+            (funnel.count("window: no face"), points)
+        };
+        let (everywhere, no_points) = looked_at(eager(), None);
+        let (here, points) = looked_at(eager(), Some(2.0));
+        let (nowhere, all_points) = looked_at(eager(), Some(9.0));
+        assert_eq!((no_points, points), (0, 0));
+        assert!(0 < here && here < everywhere, "{here} of {everywhere}");
+        assert_eq!((nowhere, all_points), (0, 300));
+        let off = Config { depth_proposals: false, ..eager() };
+        assert_eq!(looked_at(off, Some(9.0)), (everywhere, 0));
+    }
+}

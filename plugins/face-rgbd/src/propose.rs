@@ -208,3 +208,182 @@ fn skin(image: &RgbImage, x: i64, y: i64) -> bool {
         r > 95 && g > 40 && b > 20 && most - least > 15 && r > b && r > g && r - g > 15
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tagalong_core::{Distortion, Images, Motion, Pinhole, Stamp};
+
+    use super::*;
+
+    /// Columns and rows of sampling points.
+    const POINTS: (usize, usize) = (20, 15);
+    const FOCAL_PX: f64 = 131.0;
+    const SKIN: [u8; 3] = [200, 140, 110];
+
+    fn camera() -> Camera {
+        let lens = Pinhole {
+            fx: FOCAL_PX,
+            fy: FOCAL_PX,
+            cx: 79.5,
+            cy: 59.5,
+            distortion: Distortion::None,
+        };
+        Camera::mounted(lens, 160, 120, 1.3, 0.0, 0.0)
+    }
+
+    /// Sampling points, by their columns and rows, that show something.
+    struct Block {
+        columns: std::ops::Range<usize>,
+        rows: std::ops::Range<usize>,
+        metres: f32,
+        is_skin: bool,
+    }
+
+    fn block(columns: std::ops::Range<usize>, metres: f32, is_skin: bool) -> Block {
+        Block { columns, rows: 6..9, metres, is_skin }
+    }
+
+    fn frame(blocks: &[Block]) -> Frame {
+        let at = |x: usize, y: usize| {
+            let shows =
+                |b: &&Block| b.columns.contains(&(x / GRID_PX)) && b.rows.contains(&(y / GRID_PX));
+            blocks.iter().find(shows)
+        };
+        let depth = DepthImage::from_fn(160, 120, |x, y| at(x, y).map_or(f32::NAN, |b| b.metres));
+        let colour = RgbImage::from_fn(160, 120, |x, y| match at(x, y) {
+            Some(block) if block.is_skin => SKIN,
+            _ => [90, 90, 90],
+        });
+        let images = Images {
+            colour: Some(Arc::new(colour)),
+            depth: Some(Arc::new(depth)),
+            ..Images::default()
+        };
+        Frame::new(1, Stamp::default(), Arc::new(camera()), Motion::at_rest(0.1), images)
+    }
+
+    fn sampled(blocks: &[Block], config: &Config) -> (Proposals, [u64; 3]) {
+        let (mut proposals, frame) = (Proposals::default(), frame(blocks));
+        let counts = proposals.sample(&frame, frame.depth().unwrap(), config);
+        (proposals, counts)
+    }
+
+    /// The cells in which windows of a size may have their centre.
+    fn allowed(proposals: &Proposals) -> Vec<(usize, usize)> {
+        let cells = (0..POINTS.1).flat_map(|y| (0..POINTS.0).map(move |x| (x, y)));
+        let window = |(x, y): &(usize, usize)| {
+            let corner = |cell: usize| (cell * GRID_PX) as f64;
+            Rect::new(corner(*x), corner(*y), GRID_PX as f64, GRID_PX as f64)
+        };
+        cells.filter(|cell| proposals.allows(&window(cell))).collect()
+    }
+
+    fn cells(columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> Vec<(usize, usize)> {
+        rows.flat_map(|y| columns.clone().map(move |x| (x, y))).collect()
+    }
+
+    #[test]
+    fn windows_may_be_where_a_face_would_be_so_large_and_beside_that() {
+        let config = Config::default();
+        let (mut proposals, counts) = sampled(&[block(5..9, 2.0, false)], &config);
+        assert_eq!(counts, [(POINTS.0 * POINTS.1) as u64, 12, 12]);
+        let side = |metres: f64| metres * FOCAL_PX / 2.0;
+        for metres in [config.min_face_m + 0.001, config.max_face_m - 0.001] {
+            proposals.for_side(&camera(), side(metres), &config);
+            assert_eq!(allowed(&proposals), cells(4..10, 5..10), "{metres}");
+            assert_eq!(proposals.areas(), [Rect::new(32.0, 40.0, 48.0, 40.0)]);
+        }
+        for metres in [config.min_face_m - 0.001, config.max_face_m + 0.001] {
+            proposals.for_side(&camera(), side(metres), &config);
+            assert!(allowed(&proposals).is_empty() && proposals.areas().is_empty(), "{metres}");
+        }
+        // At the borders of the image there are fewer neighbours.
+        let corner = Block { rows: 0..1, ..block(0..1, 2.0, false) };
+        let low = Config { max_height_m: 9.0, ..config };
+        let (mut proposals, _) = sampled(&[corner], &low);
+        proposals.for_side(&camera(), side(0.15), &low);
+        assert_eq!(allowed(&proposals), cells(0..2, 0..2));
+        let corner = Block { rows: 14..15, ..block(19..20, 2.0, false) };
+        let (mut proposals, _) = sampled(&[corner], &Config { min_height_m: -9.0, ..low.clone() });
+        proposals.for_side(&camera(), side(0.15), &low);
+        assert_eq!(allowed(&proposals), cells(18..20, 13..15));
+        let outside = Rect::new(400.0, 100.0, 8.0, 8.0);
+        let below = Rect::new(100.0, 400.0, 8.0, 8.0);
+        assert!(!proposals.allows(&outside) && !proposals.allows(&below));
+    }
+
+    #[test]
+    fn regions_with_skin_are_searched_first_and_one_always() {
+        let blocks =
+            || [block(2..6, 2.0, false), block(8..12, 2.0, true), block(14..18, 2.0, false)];
+        let searched = |max_points: usize| {
+            let config = Config { max_points, ..Config::default() };
+            let (mut proposals, counts) = sampled(&blocks(), &config);
+            assert_eq!(counts[1], 36);
+            proposals.for_side(&camera(), 0.15 * FOCAL_PX / 2.0, &config);
+            let columns: Vec<bool> =
+                [3, 9, 15].map(|column| allowed(&proposals).contains(&(column, 7))).to_vec();
+            (counts[2], columns)
+        };
+        assert_eq!(searched(36), (36, vec![true, true, true]));
+        assert_eq!(searched(35), (24, vec![true, true, false]), "of equals the first");
+        assert_eq!(searched(24), (24, vec![true, true, false]));
+        assert_eq!(searched(23), (12, vec![false, true, false]));
+        assert_eq!(searched(1), (12, vec![false, true, false]));
+    }
+
+    #[test]
+    fn regions_end_where_depth_jumps() {
+        let counts = |apart_m: f32| {
+            let config = Config { max_points: 1, ..Config::default() };
+            sampled(&[block(4..8, 2.0, true), block(8..12, 2.0 + apart_m, false)], &config).1
+        };
+        assert_eq!(counts(0.1), [300, 24, 24], "one surface");
+        assert_eq!(counts(0.2), [300, 24, 12], "two");
+        // One above the other is one surface as well.
+        let above = Block { rows: 3..6, ..block(4..8, 2.05, false) };
+        let config = Config { max_points: 1, ..Config::default() };
+        assert_eq!(sampled(&[above, block(4..8, 2.0, true)], &config).1, [300, 24, 24]);
+    }
+
+    #[test]
+    fn points_are_possible_by_their_distance_and_height() {
+        let config = Config { min_depth_m: 1.0, max_depth_m: 3.0, ..Config::default() };
+        let possible = |metres: f32, height_m: f64| {
+            let row = 59.5 - (height_m - 1.3) * FOCAL_PX / f64::from(metres);
+            is_possible(&camera(), 80, row.round() as i64, metres, &config)
+        };
+        for (metres, is) in [(0.98, false), (1.02, true), (2.98, true), (3.02, false)] {
+            assert_eq!(possible(metres, 1.3), is, "{metres} m away");
+        }
+        for (height_m, is) in [(0.75, false), (0.85, true), (2.05, true), (2.15, false)] {
+            assert_eq!(possible(2.0, height_m), is, "{height_m} m high");
+        }
+        assert!(!possible(f32::NAN, 1.3));
+    }
+
+    #[test]
+    fn skin_is_that_of_the_rule() {
+        let is_skin = |colour: [u8; 3]| skin(&RgbImage::filled(1, 1, colour), 0, 0);
+        let cases = [
+            (SKIN, true),
+            ([96, 41, 21], true),
+            ([95, 41, 21], false),
+            ([96, 40, 21], false),
+            ([96, 41, 20], false),
+            ([120, 110, 100], false),
+            ([120, 104, 100], true),
+            ([120, 105, 100], false),
+            ([200, 60, 200], false),
+            ([200, 210, 100], false),
+            ([116, 100, 101], true),
+            ([115, 100, 100], false),
+        ];
+        for (colour, is) in cases {
+            assert_eq!(is_skin(colour), is, "{colour:?}");
+        }
+        assert!(!skin(&RgbImage::filled(1, 1, SKIN), 1, 0), "outside of the image");
+    }
+}

@@ -5,7 +5,7 @@ use crate::{
     Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Seen, Split, Stage, grouped, whole,
 };
 
-fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
+pub(crate) fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
     let mut state = seed | 1;
     GreyImage::from_fn(width, height, |_, _| {
         state ^= state << 13;
@@ -20,7 +20,7 @@ fn part(x: usize, y: usize, width: usize, height: usize) -> Part {
 }
 
 /// Two stages: a stump and a tree, with numbers that pass some of the noise.
-fn small() -> Cascade {
+pub(crate) fn small() -> Cascade {
     let pair = |at: Part, half: Part| Feature::Haar(vec![(at, -1.0), (half, 2.0)]);
     let features = vec![
         pair(part(1, 1, 8, 6), part(1, 1, 4, 6)),

@@ -209,23 +209,159 @@ impl Detector for HogUpperBody {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Point3;
-    use tagalong_core::{Distortion, Pinhole};
+    use std::sync::Arc;
+
+    use nalgebra::{Point3, SMatrix, Vector2};
+    use tagalong_core::{
+        Distortion, Estimate, GreyImage, Images, Motion, Person, Pinhole, Stamp, Track, TrackId,
+    };
 
     use super::*;
 
     /// Whether the square of somebody 3 m away whose surroundings are at `depth` shows a
     /// head, and how many squares do not because what they show goes on above.
     fn is_head(depth: impl Fn(f64) -> f32) -> (bool, u64) {
-        let lens =
-            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let camera = Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0);
+        let camera = camera();
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
         let above = |y: usize| (square.y - y as f64) / square.height;
         let depth = DepthImage::from_fn(640, 480, |_, y| depth(above(y)));
         let (config, mut lattice) = (Config::default(), Lattice::default());
         let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
         (proposer.is_head(&depth, &square, 2.9), proposer.goes_on)
+    }
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0)
+    }
+
+    #[test]
+    fn sizes_grow_by_a_step_and_near_a_track_are_like_its_own() {
+        let config =
+            Config { min_side_px: 40.0, max_side: 0.5, scale_step: 1.5, ..Config::default() };
+        let all: Vec<f64> = sides(&config, &camera(), None).collect();
+        assert_eq!(all, [40.0, 60.0, 90.0, 135.0, 202.5], "up to half of 480 pixels");
+        let near = |width: f64| {
+            let expected = Rect::new(10.0, 10.0, width, width);
+            sides(&config, &camera(), Some(expected)).collect::<Vec<f64>>()
+        };
+        assert_eq!(near(65.0), [60.0, 90.0], "from 45.5 to 91");
+        assert_eq!(near(150.0), [135.0, 202.5]);
+        assert_eq!(near(20.0), [0.0; 0]);
+    }
+
+    #[test]
+    fn near_is_within_half_a_width_of_the_expected_middle() {
+        let (config, camera) = (Config::default(), camera());
+        let expected = Rect::new(100.0, 100.0, 60.0, 60.0);
+        let is_near = |near: Option<Rect>, dx: f64, dy: f64| {
+            let mut lattice = Lattice::default();
+            let proposer = Proposer::new(&config, &camera, None, &mut lattice, near);
+            // A smaller square with the same middle, moved.
+            proposer.is_near(&Rect::new(110.0 + dx, 110.0 + dy, 40.0, 40.0))
+        };
+        for (dx, dy, is) in [(29.0, 0.0, true), (0.0, -29.0, true), (31.0, 0.0, false)] {
+            assert_eq!(is_near(Some(expected), dx, dy), is, "{dx} {dy}");
+        }
+        assert!(!is_near(Some(expected), 25.0, 25.0), "round, not square");
+        assert!(is_near(None, 400.0, 0.0), "everything is near where nobody is expected");
+    }
+
+    #[test]
+    fn heads_are_at_heights_of_heads() {
+        let (config, camera) = (Config::default(), camera());
+        let depth = DepthImage::filled(640, 480, f32::NAN);
+        let mut lattice = Lattice::default();
+        let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
+        let mut is_head = |height_m: f64| {
+            let head = Point3::new(4.0, 0.0, height_m);
+            let face_m = camera.depth_of(&head) - HEAD_RADIUS_M;
+            proposer.is_head(&depth, &camera.upper_body(&head), face_m)
+        };
+        let [low, high] = [config.min_head_height_m, config.max_head_height_m];
+        let heights = [low - 0.05, low + 0.05, high - 0.05, high + 0.05];
+        assert_eq!(heights.map(&mut is_head), [false, true, true, false]);
+        assert_eq!((proposer.out_of_place, proposer.goes_on, proposer.unfit), (2, 0, 0));
+    }
+
+    fn detector(config: Config) -> HogUpperBody {
+        let wheels = tagalong_core::Wheels { half_separation_m: 0.2, slip: 0.0 };
+        let context = Context { seed: 1, base_dir: ".".into(), wheels };
+        HogUpperBody::new(config, &context).unwrap()
+    }
+
+    #[test]
+    fn a_window_is_a_head_at_its_distance() {
+        let (detector, camera) = (detector(Config::default()), camera());
+        let config = &detector.config;
+        let side = 525.0 * UPPER_BODY_SIDE_M / 4.0;
+        let region = Rect::new(319.5 - 0.5 * side, 239.5 - 0.5 * side, side, side);
+        let sum = detector.model.sum_at(1.0);
+        let window = |depth_m| Window { region, depth_m, sum };
+        let by_depth = detector.detection(&camera, &window(Some(3.0))).unwrap();
+        let by_size = detector.detection(&camera, &window(None)).unwrap();
+        for (found, face_m, sigma_m) in
+            [(&by_depth, 3.0, config.sigma_depth_m), (&by_size, 4.0, 4.0 * config.sigma_distance)]
+        {
+            assert!((found.position - camera.head_of(&region, face_m)).norm() < 1e-9);
+            assert!((found.covariance[(0, 0)].sqrt() / sigma_m - 1.0).abs() < 0.02);
+            let aside = config.sigma_place * side / 525.0 * (face_m + HEAD_RADIUS_M);
+            assert!((found.covariance[(1, 1)].sqrt() / aside - 1.0).abs() < 0.02);
+            assert!((found.score - 1.0).abs() < 1e-4 && found.region == region);
+        }
+        let sure = Window { sum: detector.model.sum_at(99.0), ..window(None) };
+        assert_eq!(detector.detection(&camera, &sure).unwrap().score, config.max_score);
+    }
+
+    /// A frame of noise, and how many windows were dropped by depth and by gradients.
+    fn dropped(config: Config, depth_m: Option<f32>, near: Option<&Track>) -> ([u64; 2], usize) {
+        let lens =
+            Pinhole { fx: 131.0, fy: 131.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 160, 120, 1.3, 0.0, 0.0));
+        let grey = GreyImage::from_fn(160, 120, |x, y| (x * x * 31 + y * y * 17 + x * y) as u8);
+        let images = Images {
+            grey: Some(Arc::new(grey)),
+            depth: depth_m.map(|metres| Arc::new(DepthImage::filled(160, 120, metres))),
+            ..Images::default()
+        };
+        let frame = Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images);
+        let search = near.map_or(Search::Everywhere { occupied: &[] }, Search::Near);
+        let mut funnel = Funnel::default();
+        let found = detector(config).detect(&frame, &search, &mut funnel).unwrap();
+        let count = |test: &str| funnel.count(test);
+        ([count("window: size and depth"), count("window: gradients")], found.len())
+    }
+
+    #[test]
+    fn windows_that_depth_rules_out_are_not_looked_at() {
+        let config = Config { min_score: -50.0, overlap: 0.0, ..Config::default() };
+        let ([unfit, _], found) = dropped(config.clone(), None, None);
+        assert!(unfit == 0 && found > 0, "{unfit} {found}");
+        let ([unfit, looked_at], found) = dropped(config.clone(), Some(9.0), None);
+        assert!(unfit > 100 && looked_at == 0 && found == 0, "{unfit} {looked_at} {found}");
+        let off = Config { depth_proposals: false, ..config };
+        assert_eq!(dropped(off.clone(), Some(9.0), None), dropped(off, None, None));
+    }
+
+    #[test]
+    fn a_search_near_a_track_finds_one() {
+        let config =
+            Config { min_score: -50.0, min_side_px: 20.0, overlap: 0.0, ..Config::default() };
+        let region = Rect::new(30.0, 30.0, 40.0, 40.0);
+        let person = Person { position: Point3::new(2.0, 0.0, 1.3), velocity: Vector2::zeros() };
+        let track = Track {
+            id: TrackId(1),
+            estimate: Estimate { person, covariance: SMatrix::identity(), region },
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 1.0,
+        };
+        assert!(dropped(config.clone(), None, None).1 > 1);
+        assert_eq!(dropped(config, None, Some(&track)).1, 1);
     }
 
     #[test]

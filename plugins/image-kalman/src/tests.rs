@@ -176,8 +176,225 @@ fn settings_that_cannot_work_are_refused() {
         Config { sigma_scale: 0.0, ..Config::default() },
         Config { acceleration_noise: f64::NAN, ..Config::default() },
         Config { shape_weight: 1.5, ..Config::default() },
+        Config { shape_weight: -0.1, ..Config::default() },
+        Config { scale_noise: 0.0, ..Config::default() },
+        Config { range_noise: -1.0, ..Config::default() },
+        Config { initial_speed: 0.0, ..Config::default() },
+        Config { initial_range_speed_mps: 0.0, ..Config::default() },
+        Config { sigma_centre: 0.0, ..Config::default() },
+        Config { sigma_range_m: 0.0, ..Config::default() },
     ];
     assert!(wrong.into_iter().all(|config| ImageKalman::new(config).is_err()));
+}
+
+/// A level camera, and somebody right ahead of it whose place is known exactly.
+fn ahead(range_m: f64) -> (Camera, Detection) {
+    let lens = Pinhole { fx: 525.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    let camera = Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0);
+    let eye = camera.robot_from_camera.translation.vector;
+    let position = Point3::from(eye + Vector3::new(range_m, 0.0, 0.0));
+    let region = camera.upper_body(&position);
+    let covariance = Matrix3::zeros();
+    (camera, Detection { region, position, covariance, score: 1.0, source: "test" })
+}
+
+/// A place and its rate, by the equations of a textbook.
+struct Line {
+    mean: [f64; 2],
+    covariance: [[f64; 2]; 2],
+}
+
+impl Line {
+    fn start(at: f64, place: f64, rate: f64) -> Self {
+        Self { mean: [at, 0.0], covariance: [[place, 0.0], [0.0, rate]] }
+    }
+
+    fn predict(&mut self, density: f64, dt: f64) {
+        let [[a, b], [_, d]] = self.covariance;
+        let cross = b + dt * d + density * dt * dt / 2.0;
+        let place = a + 2.0 * dt * b + dt * dt * d + density * dt * dt * dt / 3.0;
+        self.mean[0] += dt * self.mean[1];
+        self.covariance = [[place, cross], [cross, d + density * dt]];
+    }
+
+    /// The normalised innovation squared.
+    fn correct(&mut self, measured: f64, noise: f64) -> f64 {
+        let [[a, b], [_, d]] = self.covariance;
+        let (spread, innovation) = (a + noise, measured - self.mean[0]);
+        self.mean =
+            [self.mean[0] + a / spread * innovation, self.mean[1] + b / spread * innovation];
+        let cross = b - a * b / spread;
+        self.covariance = [[a - a * a / spread, cross], [cross, d - b * b / spread]];
+        innovation * innovation / spread
+    }
+
+    fn agrees(&self, mean: [f64; 2], covariance: [f64; 3]) {
+        let [[a, b], [_, d]] = self.covariance;
+        let numbers = [self.mean[0], self.mean[1], a, b, d];
+        let [p, r] = mean;
+        let [x, y, z] = covariance;
+        for (expected, found) in numbers.into_iter().zip([p, r, x, y, z]) {
+            let near = 1e-9 * expected.abs().max(1.0);
+            assert!((expected - found).abs() < near, "{expected} {found}");
+        }
+    }
+}
+
+#[test]
+fn a_step_is_that_of_the_textbook() {
+    let ((camera, first), config, dt) = (ahead(4.0), Config::default(), 0.1);
+    let (_, farther) = ahead(4.2);
+    let Rect { x, y, width, height } = first.region;
+    let second = Detection { region: Rect::new(x + 5.0, y - 3.0, width + 4.0, height), ..farther };
+    let mut belief = Belief::start(&config, &first, &camera);
+    let noise = |width: f64| (config.sigma_centre * width).powi(2);
+    let speed = (config.initial_speed * width).powi(2);
+    let centre = first.region.centre();
+    let mut lines = [centre.x, centre.y].map(|at| Line::start(at, noise(width), speed));
+    let rate = config.initial_range_speed_mps.powi(2);
+    let mut range = Line::start(4.0, config.sigma_range_m.powi(2), rate);
+    let scale = (config.sigma_scale * width).powi(2);
+    assert_eq!((belief.image[4], belief.image_covariance[(4, 4)]), (width, scale));
+
+    belief.predict(&config, &Motion::at_rest(dt), &camera);
+    lines.iter_mut().for_each(|line| line.predict(config.acceleration_noise * width * width, dt));
+    range.predict(config.range_noise, dt);
+    let wandered = scale + (config.scale_noise * width).powi(2) * dt;
+    assert!((belief.image_covariance[(4, 4)] - wandered).abs() < 1e-9);
+
+    let support = belief.correct(&config, &second, &camera);
+    let seen = second.region.centre();
+    let mut nis = lines[0].correct(seen.x, noise(width)) + lines[1].correct(seen.y, noise(width));
+    nis += range.correct(4.2, config.sigma_range_m.powi(2));
+    nis += 16.0 / (wandered + scale);
+    let (found, freedom) = support.nis.unwrap();
+    assert!((found - nis).abs() < 1e-6 && freedom == 4, "{found} {nis} {freedom}");
+    for (axis, line) in lines.iter().enumerate() {
+        let p = &belief.image_covariance;
+        let rate = axis + 2;
+        let covariance = [p[(axis, axis)], p[(axis, rate)], p[(rate, rate)]];
+        line.agrees([belief.image[axis], belief.image[rate]], covariance);
+    }
+    let p = &belief.range_covariance;
+    range.agrees([belief.range.x, belief.range.y], [p[(0, 0)], p[(0, 1)], p[(1, 1)]]);
+    let kept = wandered * scale / (wandered + scale);
+    assert!((belief.image_covariance[(4, 4)] - kept).abs() < 1e-9);
+    let widened = width + 4.0 * wandered / (wandered + scale);
+    assert!((belief.image[4] - widened).abs() < 1e-9);
+}
+
+/// What is added to the variances of x and y in the image and of the range by errors of
+/// the robot's motion of this covariance, when it does not move.
+fn doubts(range_m: f64, [forward, left, turn]: [f64; 3]) -> [f64; 3] {
+    let ((camera, seen), config) = (ahead(range_m), Config::default());
+    let sigmas = Vector3::new(forward, left, turn);
+    let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
+    let after = |covariance| {
+        let mut belief = Belief::start(&config, &seen, &camera);
+        belief.predict(&config, &Motion { covariance, ..Motion::at_rest(0.1) }, &camera);
+        let p = &belief.image_covariance;
+        [p[(0, 0)], p[(1, 1)], belief.range_covariance[(0, 0)]]
+    };
+    let (with, without) = (after(covariance), after(Matrix3::zeros()));
+    std::array::from_fn(|i| with[i] - without[i])
+}
+
+#[test]
+fn errors_of_the_odometry_add_to_what_they_move() {
+    let near = |found: [f64; 3], expected: [f64; 3]| {
+        let off = |i: usize| (found[i] - expected[i]).abs() < 1e-3 * expected[i].max(0.01);
+        assert!((0..3).all(off), "{found:?} {expected:?}");
+    };
+    near(doubts(4.0, [0.0, 0.0, 0.02]), [(525.0 * 0.02f64).powi(2), 0.0, 0.0]);
+    near(doubts(4.0, [0.0, 0.1, 0.0]), [(525.0 * 0.1 / 4.0f64).powi(2), 0.0, 0.0]);
+    near(doubts(4.0, [0.1, 0.0, 0.0]), [0.0, 0.0, 0.01]);
+}
+
+#[test]
+fn a_box_grows_as_the_robot_comes_near() {
+    let ((camera, seen), config) = (ahead(4.0), Config::default());
+    let mut belief = Belief::start(&config, &seen, &camera);
+    belief.predict(&config, &Motion { forward: 1.0, ..Motion::at_rest(0.1) }, &camera);
+    assert!((belief.image[4] / seen.region.width - 4.0 / 3.0).abs() < 1e-9);
+    assert!((belief.range.x - 3.0).abs() < 1e-9);
+    let mut still = Belief::start(&config, &seen, &camera);
+    still.predict(&config, &Motion::at_rest(0.1), &camera);
+    assert_eq!((still.image[4], still.range.x), (seen.region.width, 4.0));
+}
+
+/// A sideways step moves a near person farther in the image than a far one: how far is
+/// as uncertain as the range is.
+#[test]
+fn a_range_that_is_a_guess_makes_the_place_after_a_step_one() {
+    let ((camera, sure), config) = (ahead(4.0), Config::default());
+    let guess = Detection {
+        covariance: Matrix3::from_diagonal(&Vector3::new(1.0, 0.0, 0.0)),
+        ..sure.clone()
+    };
+    let step = Motion { left: 0.4, ..Motion::at_rest(1e-3) };
+    let sigma = |seen: &Detection| {
+        let mut belief = Belief::start(&config, seen, &camera);
+        let before = belief.image_covariance[(0, 0)];
+        belief.predict(&config, &step, &camera);
+        (belief.image_covariance[(0, 0)] - before).max(0.0).sqrt()
+    };
+    let expected = 525.0 * 0.4 * (1.0 / 4.0 - 1.0 / 5.0);
+    assert!((sigma(&guess) - expected).abs() < 0.5, "{} {expected}", sigma(&guess));
+    assert!(sigma(&sure) < 0.5, "{}", sigma(&sure));
+}
+
+#[test]
+fn a_range_that_cannot_be_is_left_out() {
+    let ((camera, seen), config) = (ahead(4.0), Config::default());
+    let mut belief = Belief::start(&config, &seen, &camera);
+    let eye = Point3::from(camera.robot_from_camera.translation.vector);
+    let here = Detection { position: eye + Vector3::new(0.1, 0.0, 0.0), ..seen.clone() };
+    assert_eq!(belief.correct(&config, &here, &camera).nis.unwrap().1, 3);
+    assert_eq!(belief.range.x, 4.0);
+    let near = Detection { position: eye + Vector3::new(0.2, 0.0, 0.0), ..seen };
+    assert_eq!(belief.correct(&config, &near, &camera).nis.unwrap().1, 4);
+    assert!(belief.range.x < 4.0);
+}
+
+#[test]
+fn the_shape_follows_what_is_seen_by_its_weight() {
+    let (camera, seen) = ahead(4.0);
+    let Rect { x, y, width, height } = seen.region;
+    let tall = Detection { region: Rect::new(x, y, width, 2.0 * height), ..seen.clone() };
+    for (shape_weight, aspect) in [(0.0, 1.0), (0.25, 1.25), (1.0, 2.0)] {
+        let config = Config { shape_weight, ..Config::default() };
+        let mut belief = Belief::start(&config, &seen, &camera);
+        belief.correct(&config, &tall, &camera);
+        let Rect { width, height, .. } = belief.estimate(&camera).region;
+        assert!((height / width - aspect).abs() < 1e-9, "{shape_weight}: {}", height / width);
+    }
+    // A box without area has no shape: that of an upper body stays.
+    let config = Config { shape_weight: 1.0, ..Config::default() };
+    for flat in [Rect::new(x, y, width, 0.5), Rect::new(x, y, 0.5, height)] {
+        let mut belief = Belief::start(&config, &seen, &camera);
+        belief.correct(&config, &Detection { region: flat, ..seen.clone() }, &camera);
+        let Rect { width, height, .. } = belief.estimate(&camera).region;
+        assert!((height / width - 1.0).abs() < 1e-9, "{width} {height}");
+    }
+}
+
+#[test]
+fn only_whoever_is_tracked_is_supported_and_a_stopped_one_is_gone() {
+    let (camera, seen) = ahead(4.0);
+    let mut filter = ImageKalman::new(Config::default()).unwrap();
+    filter.start(TrackId(1), &seen);
+    let camera = Arc::new(camera);
+    let frame = |camera: &Arc<Camera>| {
+        let motion = Motion::at_rest(0.1);
+        Frame::new(1, Stamp::default(), Arc::clone(camera), motion, Images::default())
+    };
+    let frame = frame(&camera);
+    let matched = [1, 2].map(|id| Matched { id: TrackId(id), detection: &seen });
+    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let supports = filter.update(&evidence).unwrap();
+    assert_eq!(supports.keys().collect::<Vec<_>>(), [&TrackId(1)]);
+    filter.stop(TrackId(1));
+    assert!(filter.estimates(&camera).is_empty());
 }
 
 proptest! {

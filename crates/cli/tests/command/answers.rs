@@ -39,7 +39,7 @@ fn printed_defaults_are_accepted_as_they_are() {
     );
     fs::write(home.path().join("all.toml"), around + &plugins).unwrap();
     let told = answer(&["check", "all.toml"], home.path());
-    assert!(told.contains("right; needs depth images"), "{told}");
+    assert!(told.contains("right; needs depth\n"), "{told}");
 }
 
 #[test]
