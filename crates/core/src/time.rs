@@ -54,6 +54,12 @@ mod tests {
     }
 
     #[test]
+    fn the_time_between_stamps_has_a_sign() {
+        let [early, late] = [1_000_000_000, 1_250_000_000].map(Stamp::from_nanos);
+        assert_eq!((late.seconds_since(early), early.seconds_since(late)), (0.25, -0.25));
+    }
+
+    #[test]
     fn stamps_are_shown_in_seconds_to_the_nanosecond() {
         assert_eq!(Stamp::from_nanos(12_000_000_345).to_string(), "12.000000345");
     }
