@@ -405,4 +405,91 @@ mod tests {
             prop_assert!(c.cholesky().is_some());
         }
     }
+
+    fn level(height_m: f64) -> Camera {
+        let lens = Pinhole { fx: 500.0, fy: 400.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, height_m, 0.0, 0.0)
+    }
+
+    #[test]
+    fn left_is_left_and_up_is_up_in_the_image() {
+        let camera = level(1.2);
+        let pixel = camera.project(&Point3::new(2.0, 0.4, 1.7)).unwrap();
+        assert!((pixel - Point2::new(220.0, 140.0)).norm() < 1e-9, "{pixel}");
+        assert_eq!(camera.project(&Point3::new(-2.0, 0.0, 1.2)), None, "behind");
+        assert_eq!(camera.project(&Point3::new(0.0, 0.0, 1.2)), None, "in the lens");
+        assert_eq!((camera.focal_px(), camera.height_m()), (500.0, 1.2));
+        assert_eq!(camera.panorama(), None);
+    }
+
+    /// By hand, for one direction: OpenCV's rational model of `calib3d`.
+    #[test]
+    fn distortion_is_that_of_the_calibration_message() {
+        let (x, y) = (0.3, -0.2);
+        let r2: f64 = 0.13;
+        let (p1, p2) = (0.002, -0.003);
+        let bent = |radial: f64| {
+            let along = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
+            (along, y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)
+        };
+        let above = 1.0 + 0.1 * r2 - 0.2 * r2.powi(2) + 0.05 * r2.powi(3);
+        let below = 1.0 + 0.03 * r2 + 0.4 * r2.powi(2) - 0.6 * r2.powi(3);
+        let plumb_bob = Distortion::PlumbBob([0.1, -0.2, p1, p2, 0.05]);
+        let rational = Distortion::Rational([0.1, -0.2, p1, p2, 0.05, 0.03, 0.4, -0.6]);
+        for (lens, expected) in [(plumb_bob, bent(above)), (rational, bent(above / below))] {
+            let found = lens.apply(x, y);
+            assert!((found.0 - expected.0).abs() < 1e-12 && (found.1 - expected.1).abs() < 1e-12);
+            let back = lens.remove(found.0, found.1);
+            assert!((back.0 - x).abs() < 1e-9 && (back.1 - y).abs() < 1e-9, "{back:?}");
+        }
+    }
+
+    /// A head 3.08 m ahead has its face at 3 m, where a metre is 500 / 3 pixels wide.
+    #[test]
+    fn the_upper_body_square_is_that_of_the_template() {
+        let camera = level(1.6);
+        let square = camera.upper_body(&Point3::new(3.0 + HEAD_RADIUS_M, 0.0, 1.6));
+        let px_per_m = 500.0 / 3.0;
+        assert!((square.width - 0.57 * px_per_m).abs() < 1e-9 && square.width == square.height);
+        assert!((square.centre().x - 320.0).abs() < 1e-9, "{square:?}");
+        assert!((square.y - (240.0 - 0.14 * px_per_m)).abs() < 1e-9, "{square:?}");
+        for too_near in [Point3::new(0.1, 0.0, 1.6), Point3::new(-1.0, 0.0, 1.6)] {
+            assert_eq!(camera.upper_body(&too_near), Rect::default());
+        }
+        let just_far_enough = camera.upper_body(&Point3::new(0.14, 0.0, 1.6));
+        assert!(just_far_enough.area() > 0.0);
+    }
+
+    /// The middle of the shoulders, not that of the head, is that of the square.
+    #[test]
+    fn in_a_rolled_camera_the_square_is_above_the_shoulders() {
+        let camera = tilted(0.0, 0.2, Distortion::None);
+        let head = Point3::new(3.0, 0.0, 1.6);
+        let chest = Point3::new(3.0, 0.0, 1.35);
+        let middle = camera.upper_body(&head).centre().x;
+        assert!((middle - camera.project(&chest).unwrap().x).abs() < 1e-9);
+        assert!((middle - camera.project(&head).unwrap().x).abs() > 3.0);
+    }
+
+    #[test]
+    fn a_sighting_is_uncertain_along_the_ray_by_its_depth_and_across_by_its_pixels() {
+        let camera = level(1.2);
+        let c = camera.covariance(Point2::new(320.0, 240.0), 4.0, 2.0, 0.3);
+        let (across, along) = (4.0 * 2.0 / 500.0_f64, 0.3);
+        for (axis, sigma) in [(0, along), (1, across), (2, across)] {
+            assert!((c[(axis, axis)].sqrt() - sigma).abs() < 1e-9, "{c}");
+        }
+        // A metre to the left for each two ahead.
+        let aside = camera.covariance(Point2::new(70.0, 240.0), 4.0, 0.0, 0.3);
+        assert!((aside[(0, 1)] - 0.5 * 0.09).abs() < 1e-9, "{aside}");
+        assert!((aside[(1, 1)] - 0.25 * 0.09).abs() < 1e-9, "{aside}");
+    }
+
+    #[test]
+    fn a_panorama_sees_all_around_and_has_pixels_for_each_radian() {
+        let camera = around();
+        assert!((camera.focal_px() - 480.0 / TAU).abs() < 1e-9);
+        assert_eq!(camera.panorama().map(|lens| lens.columns), Some(480));
+        assert!(camera.project(&Point3::new(-3.0, 0.1, 1.0)).is_some());
+    }
 }

@@ -137,3 +137,52 @@ pub trait Controller: Send {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [Reason; 14] = [
+        Reason::Follow,
+        Reason::Limited,
+        Reason::Unsure,
+        Reason::Search,
+        Reason::Obstacle,
+        Reason::Slow,
+        Reason::Blocked,
+        Reason::Blind,
+        Reason::NoTarget,
+        Reason::Settling,
+        Reason::Stalled,
+        Reason::NotFinite,
+        Reason::Expired,
+        Reason::Fault,
+    ];
+
+    #[test]
+    fn the_robot_moves_for_six_reasons_and_stands_for_the_others() {
+        let (moves, stands) = ALL.split_at(6);
+        assert!(moves.iter().all(|reason| reason.moves()));
+        assert!(stands.iter().all(|reason| !reason.moves()));
+    }
+
+    #[test]
+    fn each_reason_has_a_word_of_its_own() {
+        let words: std::collections::BTreeSet<String> =
+            ALL.iter().map(ToString::to_string).collect();
+        assert_eq!(words.len(), ALL.len());
+        assert!(words.iter().all(|word| !word.is_empty() && !word.contains([' ', ','])));
+        assert_eq!(Reason::NotFinite.name(), "not-finite");
+    }
+
+    #[test]
+    fn a_controller_keeps_no_distance_unless_it_says_so() {
+        struct Still;
+        impl Controller for Still {
+            fn command(&mut self, _: &Scene<'_>) -> WheelSpeeds {
+                WheelSpeeds::STOP
+            }
+        }
+        assert_eq!(Still.stand_off_m(), None);
+    }
+}

@@ -28,3 +28,34 @@ impl Detection {
             && self.score.is_finite()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_of_a_detection_is_looked_at() {
+        let fine = Detection {
+            region: Rect::new(1.0, 2.0, 3.0, 3.0),
+            position: Point3::new(3.0, 0.0, 1.6),
+            covariance: Matrix3::zeros(),
+            score: 0.5,
+            source: "test",
+        };
+        assert!(fine.is_sane());
+        let odd = f64::NAN;
+        let mut negative = Matrix3::identity();
+        negative[(1, 1)] = -0.1;
+        let mut endless = Matrix3::identity();
+        endless[(0, 1)] = f64::INFINITY;
+        for broken in [
+            Detection { region: Rect::new(odd, 0.0, 1.0, 1.0), ..fine.clone() },
+            Detection { position: Point3::new(0.0, odd, 0.0), ..fine.clone() },
+            Detection { covariance: negative, ..fine.clone() },
+            Detection { covariance: endless, ..fine.clone() },
+            Detection { score: odd, ..fine.clone() },
+        ] {
+            assert!(!broken.is_sane(), "{broken:?}");
+        }
+    }
+}

@@ -179,4 +179,54 @@ mod tests {
             assert!(error.contains(word), "{error}");
         }
     }
+
+    fn seen(x: f64, y: f64, z: f64) -> Detection {
+        Detection {
+            region: Rect::default(),
+            position: Point3::new(x, y, z),
+            covariance: nalgebra::Matrix3::identity(),
+            score: 1.0,
+            source: "test",
+        }
+    }
+
+    #[test]
+    fn a_place_is_taken_by_whoever_was_found_near_it_on_the_floor() {
+        let occupied = [seen(3.0, 0.0, 1.6)];
+        let search = Search::Everywhere { occupied: &occupied };
+        assert!(search.is_occupied(&Point3::new(3.2, 0.1, 0.0), 0.3), "whatever the height");
+        assert!(!search.is_occupied(&Point3::new(3.31, 0.0, 1.6), 0.3));
+        assert!(!search.is_occupied(&Point3::new(0.3, 0.0, 1.6), 0.3));
+        assert!(!Search::Everywhere { occupied: &[] }.is_occupied(&Point3::origin(), 9.0));
+    }
+
+    /// Answers with the number of people, and refuses three.
+    struct Count;
+
+    impl Likelihood for Count {
+        fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> Result<f64> {
+            match scene.len() {
+                3 => Err(Error::Other("three are a crowd".into())),
+                people => Ok(people as f64),
+            }
+        }
+    }
+
+    #[test]
+    fn many_scenes_are_weighed_one_after_the_other() {
+        let lens = crate::Distortion::None;
+        let lens = crate::Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: lens };
+        let camera = std::sync::Arc::new(crate::Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
+        let motion = crate::Motion::at_rest(0.0);
+        let frame =
+            Frame::new(1, crate::Stamp::default(), camera, motion, crate::Images::default());
+        let somebody = Person { position: Point3::origin(), velocity: nalgebra::zero() };
+        let (people, mut out) = ([somebody; 5], vec![9.0]);
+        Count.log_likelihoods(&frame, &people, 2, &mut out).unwrap();
+        assert_eq!(out, [2.0, 2.0, 1.0], "and what was there before is gone");
+        Count.log_likelihoods(&frame, &people[..1], 0, &mut out).unwrap();
+        assert_eq!(out, [1.0]);
+        assert!(Count.log_likelihoods(&frame, &people, 3, &mut out).is_err());
+        assert_eq!(Count.silhouettes(&frame, &people[..2]), Ok(vec![vec![]; 2]));
+    }
 }

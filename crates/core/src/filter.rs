@@ -174,3 +174,103 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
         self.beliefs.remove(&id);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::{Distortion, Images, Pinhole, Stamp};
+
+    /// Believes the last place, moved along by the robot.
+    struct Last;
+
+    impl PersonFilter for Last {
+        type Belief = Point3<f64>;
+
+        fn start(&self, detection: &Detection) -> Point3<f64> {
+            detection.position
+        }
+
+        fn predict(&self, belief: &mut Point3<f64>, motion: &Motion) {
+            belief.x -= motion.forward;
+        }
+
+        fn correct(&self, belief: &mut Point3<f64>, seen: &Detection, _: &Camera) -> Support {
+            let off = seen.position - *belief;
+            *belief = seen.position;
+            Support { nis: Some((off.norm_squared(), 3)) }
+        }
+
+        fn estimate(&self, belief: &Point3<f64>, camera: &Camera) -> Estimate {
+            let person = Person { position: *belief, velocity: Vector2::zeros() };
+            let region = camera.upper_body(belief);
+            Estimate { person, covariance: SMatrix::identity(), region }
+        }
+    }
+
+    fn frame() -> Frame {
+        let lens = Pinhole { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 64, 48, 1.2, 0.0, 0.0));
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+    }
+
+    fn seen(x: f64) -> Detection {
+        let position = Point3::new(x, 0.0, 1.6);
+        let (region, covariance) = (Rect::default(), Matrix3::identity());
+        Detection { region, position, covariance, score: 1.0, source: "test" }
+    }
+
+    #[test]
+    fn a_filter_of_one_person_is_lifted_to_all() {
+        let (frame, mut filter) = (frame(), PerPerson::new(Last));
+        let places = |filter: &PerPerson<Last>| {
+            let estimates = filter.estimates(&frame.camera).into_iter();
+            estimates.map(|(id, e)| (id.0, e.person.position.x)).collect::<Vec<_>>()
+        };
+        filter.start(TrackId(1), &seen(2.0));
+        filter.start(TrackId(2), &seen(5.0));
+        filter.predict(&Motion { forward: 0.5, ..Motion::at_rest(0.1) });
+        assert_eq!(places(&filter), [(1, 1.5), (2, 4.5)]);
+        let (detection, stranger) = (seen(4.0), seen(9.0));
+        let matched = [
+            Matched { id: TrackId(2), detection: &detection },
+            Matched { id: TrackId(7), detection: &stranger },
+        ];
+        let evidence =
+            Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+        let supported = filter.update(&evidence).unwrap();
+        let expected = [(TrackId(2), Support { nis: Some((0.25, 3)) })];
+        assert_eq!(supported, BTreeMap::from(expected), "and nobody else");
+        assert_eq!(places(&filter), [(1, 1.5), (2, 4.0)]);
+        filter.stop(TrackId(1));
+        assert_eq!(places(&filter), [(2, 4.0)]);
+        assert!(!filter.weighs_scenes());
+        assert_eq!(filter.sketch(&evidence), Ok(Sketch::default()));
+    }
+
+    #[test]
+    fn every_number_of_an_estimate_is_looked_at() {
+        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
+        let covariance = SMatrix::<f64, 5, 5>::zeros();
+        let fine = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 1.0, 1.0) };
+        assert!(fine.is_sane());
+        let mut endless = covariance;
+        endless[(4, 0)] = f64::INFINITY;
+        let mut negative = covariance;
+        negative[(3, 3)] = -1e-9;
+        let position = Point3::new(f64::NAN, 0.0, 0.0);
+        let velocity = Vector2::new(0.0, f64::NAN);
+        for broken in [
+            Estimate { person: Person { position, ..person }, ..fine.clone() },
+            Estimate { person: Person { velocity, ..person }, ..fine.clone() },
+            Estimate { covariance: endless, ..fine.clone() },
+            Estimate { covariance: negative, ..fine.clone() },
+            Estimate { region: Rect::new(0.0, 0.0, -1.0, 1.0), ..fine.clone() },
+        ] {
+            assert!(!broken.is_sane(), "{broken:?}");
+        }
+    }
+}

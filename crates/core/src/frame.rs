@@ -246,8 +246,9 @@ mod tests {
         let frame = frame(Images::default()).with_laser(Some(laser)).with_recorded(Some(vec![]));
         let with_depth = frame.with_depth(Arc::new(DepthImage::filled(4, 4, 2.0)));
         assert!(with_depth.depth().is_ok());
-        assert_eq!(with_depth.laser(), frame.laser());
+        assert_eq!(with_depth.laser(), Some(&[Point3::new(1.0, 0.5, 0.2)][..]));
         assert_eq!(with_depth.recorded().map(<[_]>::len), Some(0));
+        assert!(with_depth.images().depth.is_some() && with_depth.images().colour.is_none());
     }
 
     #[test]

@@ -61,3 +61,37 @@ impl Funnel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64) -> Rect {
+        Rect::new(x, 0.0, 1.0, 1.0)
+    }
+
+    #[test]
+    fn drops_are_counted_by_test_in_the_order_of_the_stages() {
+        let mut funnel = Funnel::default();
+        funnel.drop_at("small", at(1.0));
+        funnel.drop_many("dark", 3);
+        funnel.drop_at("small", at(2.0));
+        funnel.drop_many("never", 0);
+        let tests: Vec<_> = funnel.entries().iter().map(|e| (e.test, e.count)).collect();
+        assert_eq!(tests, [("small", 2), ("dark", 3)]);
+        assert_eq!((funnel.count("small"), funnel.count("never")), (2, 0));
+        assert_eq!(funnel.entries()[0].example, Some(at(2.0)), "the last one that was dropped");
+    }
+
+    #[test]
+    fn funnels_of_several_frames_add_up() {
+        let (mut sum, mut frame) = (Funnel::default(), Funnel::default());
+        sum.drop_at("small", at(1.0));
+        frame.drop_many("small", 4);
+        frame.drop_at("dark", at(5.0));
+        sum.merge(&frame);
+        assert_eq!((sum.count("small"), sum.count("dark")), (5, 1));
+        assert_eq!(sum.entries()[0].example, Some(at(1.0)), "an example is kept");
+        assert_eq!(sum.entries()[1].example, Some(at(5.0)));
+    }
+}

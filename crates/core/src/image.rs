@@ -159,4 +159,33 @@ mod tests {
             prop_assert_eq!(depth.surface_m(&of), slow_surface_m(&depth, &of));
         }
     }
+
+    #[test]
+    fn pixels_lie_row_by_row() {
+        let mut image = GreyImage::from_fn(3, 2, |x, y| (10 * y + x) as u8);
+        assert_eq!((image.width(), image.height()), (3, 2));
+        assert_eq!(image.pixels(), [0, 1, 2, 10, 11, 12]);
+        assert_eq!(image.row(1), [10, 11, 12]);
+        let at = [(2, 1), (0, 0), (3, 0), (0, 2), (-1, 0), (0, -1)].map(|(x, y)| image.get(x, y));
+        assert_eq!(at, [Some(12), Some(0), None, None, None, None]);
+        image.pixels_mut()[5] = 7;
+        assert_eq!(image.get(2, 1), Some(7));
+        let doubled = image.map(|value| u16::from(value) * 2);
+        assert_eq!(doubled.row(1), [20, 22, 14]);
+    }
+
+    #[test]
+    fn pixels_that_do_not_fill_the_image_are_no_image() {
+        assert!(GreyImage::from_pixels(3, 2, vec![0; 6]).is_some());
+        assert!(GreyImage::from_pixels(3, 2, vec![0; 5]).is_none());
+        assert!(GreyImage::from_pixels(usize::MAX, 2, vec![]).is_none());
+        assert_eq!(GreyImage::filled(2, 3, 9).pixels(), [9; 6]);
+    }
+
+    #[test]
+    fn grey_is_the_luma_of_the_colour_rounded() {
+        let colours = vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [255; 3], [1, 1, 0], [10, 20, 30]];
+        let grey = RgbImage::from_pixels(6, 1, colours).unwrap().to_grey();
+        assert_eq!(grey.pixels(), [76, 150, 29, 255, 1, 18]);
+    }
 }

@@ -142,4 +142,82 @@ mod tests {
             prop_assert!((motion.isometry() * seen - Point2::new(x, y)).norm() < 1e-12);
         }
     }
+
+    /// Only the left wheel turns, and slips by 2 % of its way: so far ahead or back, and
+    /// half of that over the half separation to the side.
+    #[test]
+    fn what_a_wheel_slips_is_uncertain_ahead_and_in_heading() {
+        let d = WHEELS.half_separation_m;
+        let slipped = 0.02 * 0.5 * 0.1;
+        let of = |left, right| Motion::from_wheels(left, right, &WHEELS, 0.1).covariance;
+        let (left, right) = (of(0.5, 0.0), of(0.0, 0.5));
+        for covariance in [left, right] {
+            assert!((covariance[(0, 0)].sqrt() - 0.5 * slipped).abs() < 1e-12);
+            assert!((covariance[(2, 2)].sqrt() - 0.5 * slipped / d).abs() < 1e-12);
+            assert_eq!(covariance[(1, 1)], 0.0);
+        }
+        let both = 0.25 * slipped * slipped / d;
+        assert!((left[(0, 2)] + both).abs() < 1e-12 && (right[(0, 2)] - both).abs() < 1e-12);
+        assert!((of(0.5, 0.5) - left - right).amax() < 1e-15, "the wheels slip by themselves");
+        assert!((of(0.5, 0.5)[(0, 2)]).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_small_turn_is_driven_as_its_neighbours_are() {
+        assert_eq!((sinc(0.0), sinc(2.0)), (1.0, 2.0_f64.sin() / 2.0));
+        for x in [9e-5_f64, -9e-5, 2e-4] {
+            let off = 1.0 - sinc(x);
+            assert!((off / (x * x / 6.0) - 1.0).abs() < 1e-6, "{x}: {off}");
+        }
+    }
+
+    /// 3 ahead and 4 aside in the axes of the first pose, which looks to the left.
+    #[test]
+    fn odometry_poses_give_the_way_between_them_and_how_sure_it_is() {
+        let before = Isometry2::new(Vector2::new(1.0, 2.0), std::f64::consts::FRAC_PI_2);
+        let after = before * Isometry2::new(Vector2::new(0.3, 0.4), -0.2);
+        let motion = Motion::between(&before, &after, 0.25, 0.1);
+        let way = [motion.dt, motion.forward, motion.left, motion.turn];
+        for (found, expected) in way.iter().zip([0.25, 0.3, 0.4, -0.2]) {
+            assert!((found - expected).abs() < 1e-12, "{way:?}");
+        }
+        let travel = 0.1 * 0.5;
+        let expected = [travel * travel, travel * travel, 0.02 * 0.02 + 0.01 * travel * travel];
+        for (found, expected) in motion.covariance.diagonal().iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{}", motion.covariance);
+        }
+        assert_eq!(motion.covariance, Matrix3::from_diagonal(&motion.covariance.diagonal()));
+    }
+
+    #[test]
+    fn one_motion_after_another_is_one_motion() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let covariance = Matrix3::identity() * 0.01;
+        let first =
+            Motion { forward: 1.0, left: 0.5, turn: quarter, covariance, ..Motion::at_rest(0.1) };
+        let next = Motion { forward: 2.0, turn: 0.3, covariance, ..Motion::at_rest(0.2) };
+        let whole = first.then(&next);
+        let found = [whole.dt, whole.forward, whole.left, whole.turn];
+        for (found, expected) in found.iter().zip([0.3, 1.0, 2.5, quarter + 0.3]) {
+            assert!((found - expected).abs() < 1e-12, "{whole:?}");
+        }
+        assert_eq!(whole.covariance, Matrix3::identity() * 0.02);
+    }
+
+    #[test]
+    fn a_velocity_over_ground_is_turned_and_not_moved() {
+        let turn = std::f64::consts::FRAC_PI_2;
+        let motion = Motion { forward: 5.0, left: 1.0, turn, ..Motion::at_rest(0.1) };
+        let seen = motion.apply_to_velocity(Vector2::new(1.0, 0.0));
+        assert!((seen - Vector2::new(0.0, -1.0)).norm() < 1e-12, "{seen}");
+    }
+
+    #[test]
+    fn the_pose_on_the_floor_has_the_heading_of_the_front() {
+        let tilted = nalgebra::UnitQuaternion::from_euler_angles(0.1, -0.2, 0.7);
+        let pose = Isometry3::from_parts(Vector3::new(1.0, 2.0, 3.0).into(), tilted);
+        let flat = planar_pose(&pose);
+        assert_eq!(flat.translation.vector, Vector2::new(1.0, 2.0));
+        assert!((flat.rotation.angle() - 0.7).abs() < 1e-12, "{flat}");
+    }
 }

@@ -31,3 +31,21 @@ fn edit_distance(a: &str, b: &str) -> usize {
     }
     row[b.len()]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_as_far_apart_as_letters_have_to_be_changed() {
+        let apart = [("", "abc"), ("abc", "abc"), ("abc", ""), ("kitten", "sitting"), ("ab", "ba")];
+        assert_eq!(apart.map(|(a, b)| edit_distance(a, b)), [3, 0, 3, 3, 2]);
+    }
+
+    #[test]
+    fn a_name_of_which_half_is_wrong_was_not_meant() {
+        assert_eq!(nearest("abxx", ["abcd"]), None);
+        assert_eq!(nearest("abxxe", ["abcde"]), Some("abcde"));
+        assert_eq!(nearest("EKF", ["ekf"]), Some("ekf"), "however it is written");
+    }
+}

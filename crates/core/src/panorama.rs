@@ -324,4 +324,92 @@ mod tests {
             prop_assert!((panorama.row(panorama.elevation(row)) - row).abs() < 1e-9);
         }
     }
+
+    #[test]
+    fn a_mirror_survives_its_calibration_message() {
+        let mirror = mirror(67.5);
+        let again = ConicalMirror::from_coefficients(
+            mirror.focal_px,
+            [mirror.centre_px.x, mirror.centre_px.y],
+            &mirror.coefficients(),
+        );
+        assert_eq!(again, Some(mirror));
+    }
+
+    #[test]
+    fn each_number_of_a_mirror_has_its_bounds() {
+        let fine = mirror(67.5);
+        assert!(fine.is_sane());
+        assert!(ConicalMirror { inner_px: 0.0, ..fine }.is_sane());
+        // Light that leaves the cone along its side does not get into the camera.
+        let outermost = fine.focal_px * fine.half_angle_rad.tan();
+        for broken in [
+            ConicalMirror { focal_px: 0.0, ..fine },
+            ConicalMirror { focal_px: f64::INFINITY, ..fine },
+            ConicalMirror { centre_px: Point2::new(f64::NAN, 0.0), ..fine },
+            ConicalMirror { apex_m: 0.0, ..fine },
+            ConicalMirror { apex_m: f64::INFINITY, ..fine },
+            ConicalMirror { half_angle_rad: FRAC_PI_4, ..fine },
+            ConicalMirror { half_angle_rad: FRAC_PI_2, ..fine },
+            ConicalMirror { inner_px: -1.0, ..fine },
+            ConicalMirror { outer_px: fine.inner_px, ..fine },
+            ConicalMirror { outer_px: 1.01 * outermost, ..fine },
+        ] {
+            assert!(!broken.is_sane(), "{broken:?}");
+        }
+        assert!(ConicalMirror { outer_px: 0.99 * outermost, ..fine }.is_sane());
+    }
+
+    /// At half a right angle the mirror images of the pinhole lie on a ring as high as
+    /// the apex and as wide.
+    #[test]
+    fn the_ring_of_viewpoints_is_the_mirror_image_of_the_pinhole() {
+        let mirror = ConicalMirror { half_angle_rad: FRAC_PI_4, ..mirror(67.5) };
+        let (ring, height) = mirror.ring_m();
+        assert!((ring - 0.05).abs() < 1e-12 && (height - 0.05).abs() < 1e-12, "{ring} {height}");
+        let steep = ConicalMirror { half_angle_rad: 60_f64.to_radians(), ..mirror };
+        let (ring, height) = steep.ring_m();
+        assert!((ring - 0.05 * 0.75_f64.sqrt()).abs() < 1e-12, "{ring}");
+        assert!((height - 0.075).abs() < 1e-12, "{height}");
+    }
+
+    #[test]
+    fn circles_and_elevations_are_inverted() {
+        let mirror = mirror(67.5);
+        for radius in [8.0, 60.0, 120.0, 230.0] {
+            let elevation = mirror.elevation(radius);
+            assert!((mirror.radius_px(elevation) - radius).abs() < 1e-9);
+            assert!((elevation - ((radius / 175.0).atan() - FRAC_PI_4)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_top_of_the_unwrapped_image_is_the_outer_circle() {
+        let panorama = panorama();
+        let [top, bottom] = panorama.elevations();
+        assert!(top > bottom);
+        assert!((panorama.elevation(-0.5) - top).abs() < 1e-12);
+        assert!((panorama.elevation(119.5) - bottom).abs() < 1e-12);
+        let pixel = panorama.raw_pixel(239.5, -0.5);
+        assert!((pixel - Point2::new(241.3, 238.0 - 230.0)).norm() < 1e-9, "{pixel}");
+        let pixel = panorama.raw_pixel(119.5, 119.5);
+        assert!((pixel - Point2::new(241.3 + 8.0, 238.0)).norm() < 1e-9, "{pixel}");
+    }
+
+    /// The face of somebody 2.08 m away is at 2 m, where the square is 0.57 m wide.
+    #[test]
+    fn the_square_is_as_wide_as_the_template_at_the_face() {
+        let panorama = panorama();
+        let head = ConicalMirror::upright(1.5).inverse() * Point3::new(2.08, 0.0, 1.6);
+        let square = panorama.upper_body(&head);
+        let width = 2.0 * (0.285_f64 / 2.0).atan() / TAU * 480.0;
+        assert!((square.width - width).abs() < 1e-9, "{square:?}");
+        assert!((square.centre().x - 239.5).abs() < 1e-9, "{square:?}");
+        let row = |z: f64| {
+            let mount = ConicalMirror::upright(1.5).inverse();
+            panorama.pixel(&(mount * Point3::new(2.0, 0.0, z))).y
+        };
+        assert!((square.y - row(1.74)).abs() < 1e-9, "{square:?}");
+        assert!((square.bottom() - row(1.17)).abs() < 1e-9, "{square:?}");
+    }
 }

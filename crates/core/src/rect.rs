@@ -102,3 +102,83 @@ impl Rect {
             && self.height >= 0.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn edges_area_and_centre_are_those_of_the_corners() {
+        let rect = Rect::new(1.0, 2.0, 3.0, 5.0);
+        assert_eq!((rect.right(), rect.bottom(), rect.area()), (4.0, 7.0, 15.0));
+        assert_eq!(rect.centre(), Point2::new(2.5, 4.5));
+    }
+
+    #[test]
+    fn the_left_and_upper_edge_are_inside_and_the_others_are_not() {
+        let rect = Rect::new(1.0, 2.0, 3.0, 5.0);
+        let inside = |x: f64, y: f64| rect.contains(Point2::new(x, y));
+        assert!(inside(1.0, 2.0) && inside(3.9, 6.9));
+        for (x, y) in [(0.9, 3.0), (4.0, 3.0), (2.0, 1.9), (2.0, 7.0)] {
+            assert!(!inside(x, y), "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn what_is_apart_has_nothing_in_common() {
+        let (a, b) = (Rect::new(0.0, 0.0, 4.0, 4.0), Rect::new(3.0, 1.0, 4.0, 2.0));
+        assert_eq!(a.intersection(&b), Rect::new(3.0, 1.0, 1.0, 2.0));
+        let aside = a.intersection(&Rect::new(6.0, 1.0, 1.0, 1.0));
+        let below = a.intersection(&Rect::new(1.0, 6.0, 1.0, 1.0));
+        assert_eq!((aside.width, aside.area(), below.height, below.area()), (0.0, 0.0, 0.0, 0.0));
+        assert_eq!(Rect::default().iou(&Rect::default()), 0.0);
+    }
+
+    #[test]
+    fn an_image_cuts_off_what_is_outside() {
+        let rect = Rect::new(-2.0, -3.0, 10.0, 20.0);
+        assert_eq!(rect.clipped(6, 8), Rect::new(0.0, 0.0, 6.0, 8.0));
+    }
+
+    #[test]
+    fn growing_keeps_the_centre() {
+        let grown = Rect::new(1.0, 2.0, 4.0, 8.0).inflated(0.5);
+        assert_eq!(grown, Rect::new(0.0, 0.0, 6.0, 12.0));
+    }
+
+    #[test]
+    fn the_upper_body_of_a_whole_body_has_its_scale_and_middle() {
+        let whole = Rect::new(100.0, 50.0, 60.0, 170.0);
+        let upper = whole.upper_body_of_standing(1.7);
+        assert!((upper.width - 57.0).abs() < 1e-9 && upper.width == upper.height, "{upper:?}");
+        assert!((upper.centre().x - 130.0).abs() < 1e-9, "{upper:?}");
+        assert!((upper.y - 47.5).abs() < 1e-9, "2.5 cm of air above the head: {upper:?}");
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_are_found() {
+        assert!(Rect::new(-1.0, 0.0, 0.0, 0.0).is_sane());
+        for odd in [f64::NAN, f64::INFINITY] {
+            assert!(!Rect::new(odd, 0.0, 1.0, 1.0).is_sane());
+            assert!(!Rect::new(0.0, 0.0, 1.0, odd).is_sane());
+        }
+        assert!(!Rect::new(0.0, 0.0, -1.0, 1.0).is_sane());
+        assert!(!Rect::new(0.0, 0.0, 1.0, -1.0).is_sane());
+    }
+
+    proptest! {
+        #[test]
+        fn overlap_is_symmetric_and_a_share(
+            x in -5.0..5.0f64, y in -5.0..5.0f64, width in 0.1..6.0f64, height in 0.1..6.0f64,
+        ) {
+            let (a, b) = (Rect::new(0.0, 0.0, 3.0, 4.0), Rect::new(x, y, width, height));
+            let common = a.intersection(&b).area();
+            let expected = common / (12.0 + width * height - common);
+            prop_assert!((a.iou(&b) - expected).abs() < 1e-12);
+            prop_assert!((a.iou(&b) - b.iou(&a)).abs() < 1e-12);
+            prop_assert!((0.0..=1.0).contains(&a.iou(&b)));
+        }
+    }
+}

@@ -429,4 +429,138 @@ mod tests {
         assert_eq!(refusal("fixed"), fixed);
         assert!(refusal("countng").contains("did you mean `counting`?"));
     }
+
+    fn context() -> Context {
+        let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+        Context { seed: 0, base_dir: PathBuf::new(), wheels }
+    }
+
+    /// A plugin of each kind, which finds, believes and moves nothing.
+    struct Idle;
+
+    impl Detector for Idle {
+        fn detect(
+            &mut self,
+            _: &Frame,
+            _: &crate::Search<'_>,
+            _: &mut crate::Funnel,
+        ) -> Result<Vec<Detection>> {
+            Ok(Vec::new())
+        }
+    }
+
+    impl Filter for Idle {
+        fn start(&mut self, _: crate::TrackId, _: &Detection) {}
+
+        fn predict(&mut self, _: &crate::Motion) {}
+
+        fn update(
+            &mut self,
+            _: &crate::Evidence<'_>,
+        ) -> Result<BTreeMap<crate::TrackId, crate::Support>> {
+            Ok(BTreeMap::new())
+        }
+
+        fn estimates(&self, _: &crate::Camera) -> BTreeMap<crate::TrackId, crate::Estimate> {
+            BTreeMap::new()
+        }
+
+        fn stop(&mut self, _: crate::TrackId) {}
+    }
+
+    impl Controller for Idle {
+        fn command(&mut self, _: &crate::Scene<'_>) -> crate::WheelSpeeds {
+            crate::WheelSpeeds::STOP
+        }
+    }
+
+    fn all_kinds() -> Registry {
+        let mut registry = registry();
+        registry.detector("finder", "finds", |_: Config, _| Ok(Idle));
+        registry.filter("believer", "believes", |_: Config, _| Ok(Idle));
+        registry.controller("driver", "drives", |_: Config, _| Ok(Idle));
+        registry
+    }
+
+    #[test]
+    fn a_plugin_is_built_as_what_it_is_and_as_nothing_else() {
+        let registry = all_kinds();
+        let builds = |name: &str| {
+            [
+                registry.build_detector(name, None, &context()).is_ok(),
+                registry.build_verifier(name, None, &context()).is_ok(),
+                registry.build_filter(name, None, &context()).is_ok(),
+                registry.build_controller(name, None, &context()).is_ok(),
+            ]
+        };
+        assert_eq!(builds("finder"), [true, false, false, false]);
+        assert_eq!(builds("fixed"), [false, true, false, false]);
+        assert_eq!(builds("believer"), [false, false, true, false]);
+        assert_eq!(builds("driver"), [false, false, false, true]);
+        let kinds: Vec<_> = registry.plugins().map(|p| format!("{} {}", p.kind, p.name)).collect();
+        let expected =
+            ["filter believer", "verifier counting", "controller driver", "detector finder"];
+        assert_eq!(kinds[..4], expected);
+    }
+
+    #[test]
+    fn who_names_a_plugin_of_another_kind_is_told_which_there_are() {
+        let registry = all_kinds();
+        let refused = registry.build_verifier("finder", None, &context()).err().unwrap();
+        let expected =
+            "`finder` is a detector, not a verifier; available verifiers: counting, fixed";
+        assert_eq!(refused.to_string(), expected);
+        let refused = registry.build_filter("beleiver", None, &context()).err().unwrap();
+        let expected =
+            "unknown filter plugin `beleiver`; did you mean `believer`? available: believer";
+        assert_eq!(refused.to_string(), expected);
+        let unknown = registry.find("zzzzzzzz").err().unwrap().to_string();
+        assert!(unknown.starts_with("unknown plugin `zzzzzzzz`; available: believer"), "{unknown}");
+        assert_eq!(registry.find("driver").map(|info| info.kind), Ok(Kind::Controller));
+    }
+
+    #[test]
+    fn settings_of_a_plugin_are_documented_and_checked() {
+        #[derive(Default, Serialize, Deserialize, JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        struct Height {
+            /// How tall, m.
+            height_m: f64,
+        }
+        let mut registry = Registry::default();
+        registry.verifier("tall", "doubts the small", |config: Height, _| match config.height_m {
+            height if height < 0.0 => Err(Error::Settings("nobody is that small".into())),
+            _ => Ok(Counting),
+        });
+        let info = registry.find("tall").unwrap();
+        assert_eq!(info.defaults(), "# How tall, m.\nheight_m = 0.0\n");
+        assert_eq!(info.schema()["properties"]["height_m"]["description"], "How tall, m.");
+        let text = "{ height_m = -1.0 }";
+        let value = toml::de::DeValue::parse(text).unwrap();
+        let error = registry.build_verifier("tall", Some(value), &context()).err().unwrap();
+        assert_eq!(error.render("a.toml", text).lines().next(), Some("a.toml:1:1: nobody is that small"));
+    }
+
+    #[test]
+    #[should_panic(expected = "two plugins are called `fixed`")]
+    fn a_name_is_taken_once() {
+        registry().verifier("fixed", "again", |_: Config, _| Ok(Counting));
+    }
+
+    #[test]
+    #[should_panic(expected = "two trainers for `counting`")]
+    fn a_model_is_trained_in_one_way() {
+        registry().trainer("counting", |_: Config, _| Ok(Counting));
+    }
+
+    #[test]
+    fn a_model_is_the_built_in_one_or_that_of_the_file() {
+        let context = Context { base_dir: env!("CARGO_MANIFEST_DIR").into(), ..context() };
+        let first = |text: &str| text.lines().next().map(str::to_owned).ok_or("empty".to_owned());
+        assert_eq!(context.model("", "built in", first), Ok("built in".into()));
+        assert_eq!(context.model("Cargo.toml", "built in", first), Ok("[package]".into()));
+        let refused = |file: &str, built_in| context.model(file, built_in, first).unwrap_err();
+        assert_eq!(refused("", "").to_string(), "model file ``: empty");
+        assert!(refused("nowhere.toml", "x").to_string().starts_with("model file `nowhere.toml`: "));
+    }
 }

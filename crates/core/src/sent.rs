@@ -51,3 +51,59 @@ impl Sent {
         Motion { dt: self.latency_s, ..to_come }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHEELS: Wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+
+    fn ahead(speed: f64) -> WheelSpeeds {
+        WheelSpeeds { left: speed, right: speed }
+    }
+
+    /// Commands that were each held for a tenth of a second, oldest first.
+    fn sent(latency_s: f64, speeds: &[f64]) -> Sent {
+        let mut sent = Sent::new(latency_s);
+        for speed in speeds {
+            sent.add(ahead(*speed));
+            sent.grow_older(0.1);
+        }
+        sent
+    }
+
+    #[test]
+    fn what_the_wheels_have_not_answered_to_is_still_to_come() {
+        for (latency_s, forward) in [(0.0, 0.0), (0.1, 0.03), (0.15, 0.04), (0.3, 0.06)] {
+            let motion = sent(latency_s, &[0.1, 0.2, 0.3]).forecast(&WHEELS);
+            assert!((motion.forward - forward).abs() < 1e-12, "{latency_s} s: {motion:?}");
+            assert_eq!(motion.dt, latency_s);
+        }
+    }
+
+    #[test]
+    fn before_the_first_command_the_robot_was_at_rest() {
+        let motion = sent(0.5, &[0.4]).forecast(&WHEELS);
+        assert!((motion.forward - 0.04).abs() < 1e-12, "{motion:?}");
+        assert_eq!(Sent::new(0.3).forecast(&WHEELS), Motion::at_rest(0.3));
+    }
+
+    /// First ahead, then a turn on the spot: the order decides where the robot is.
+    #[test]
+    fn older_commands_are_driven_first() {
+        let mut sent = sent(0.2, &[1.0]);
+        sent.add(WheelSpeeds { left: -0.2, right: 0.2 });
+        sent.grow_older(0.1);
+        let motion = sent.forecast(&WHEELS);
+        assert!((motion.forward - 0.1).abs() < 1e-12 && motion.left.abs() < 1e-12, "{motion:?}");
+        assert!((motion.turn - 0.1).abs() < 1e-12, "{motion:?}");
+    }
+
+    #[test]
+    fn what_has_been_driven_is_forgotten_and_no_more_than_so_many_are_kept() {
+        let mut long = sent(0.2, &[0.1; 50]);
+        long.forecast(&WHEELS);
+        assert_eq!(long.commands.len(), 2);
+        assert_eq!(sent(1e3, &[0.1; MOST + 9]).commands.len(), MOST);
+    }
+}

@@ -275,4 +275,47 @@ mod tests {
         assert!(text.contains(optional), "{text}");
         assert_eq!(toml::from_str::<Example>(&text).unwrap().min_depth_m, 0.5);
     }
+
+    #[test]
+    fn the_place_of_a_mistake_is_marked_in_its_line() {
+        let text = "one = 1\ntwo = true\n";
+        let at = |span| ConfigError { message: "wrong".into(), span }.render("a.toml", text);
+        assert_eq!(at(None), "a.toml: wrong");
+        assert_eq!(at(Some(99..100)), "a.toml: wrong", "beyond the end");
+        assert_eq!(at(Some(14..18)), "a.toml:2:7: wrong\n  |\n2 | two = true\n  |       ^^^^");
+        assert_eq!(at(Some(14..90)).lines().last(), Some("  |       ^"));
+        assert_eq!(at(Some(8..19)).lines().last(), Some("  | ^^^^^^^^^^"), "no longer than the line");
+        assert_eq!(at(Some(19..19)).lines().next(), Some("a.toml:3:1: wrong"), "at the end");
+    }
+
+    #[test]
+    fn a_mistake_that_has_a_place_keeps_it() {
+        let placed = ConfigError::new("wrong").or_at(Some(1..2));
+        assert_eq!(placed.span, Some(1..2));
+        assert_eq!(placed.or_at(Some(5..6)).span, Some(1..2));
+    }
+
+    #[test]
+    fn the_first_setting_out_of_its_range_is_named() {
+        let check = |settings: &[(&str, f64, RangeInclusive<f64>)]| {
+            check_ranges(settings).map_err(|error| error.to_string())
+        };
+        let fine = [("a", 0.0, NOT_NEGATIVE), ("b", -1e6, ANY), ("c", 1e6, POSITIVE)];
+        assert_eq!(check(&fine), Ok(()));
+        let wrong = |value, range| check(&[("a", 1.0, ANY), ("b", value, range)]).unwrap_err();
+        assert_eq!(wrong(0.0, POSITIVE), "`b` must be positive and at most 1e6, not 0");
+        assert_eq!(wrong(2.0, 0.0..=1.0), "`b` must lie between 0.0 and 1.0, not 2");
+        assert_eq!(wrong(f64::NAN, ANY), "`b` must lie between -1000000.0 and 1000000.0, not NaN");
+        assert!(check(&[("a", -0.1, NOT_NEGATIVE)]).is_err());
+    }
+
+    #[test]
+    fn keys_are_printed_in_the_order_of_their_declaration() {
+        let text = commented_defaults::<Example>();
+        let places: Vec<usize> = ["min_depth_m =", "names =", "# topic =", "[inner]", "# [wanted]"]
+            .map(|key| text.find(key).unwrap())
+            .into();
+        assert!(places.is_sorted(), "{text}");
+        assert!(text.contains("names = [\"a\"]"), "{text}");
+    }
 }

@@ -39,3 +39,28 @@ impl fmt::Display for Stamp {
         write!(f, "{}.{:09}", self.0 / 1_000_000_000, self.0 % 1_000_000_000)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_are_added_and_taken_away_and_end_at_the_ends() {
+        let stamp = Stamp::from_nanos(2_000_000_000);
+        assert_eq!(stamp.plus_seconds(0.5).nanos(), 2_500_000_000);
+        assert_eq!(stamp.plus_seconds(-1.5).nanos(), 500_000_000);
+        assert_eq!(stamp.plus_seconds(-9.0), Stamp::default());
+        assert_eq!(stamp.plus_seconds(1e12).nanos(), u64::MAX);
+    }
+
+    #[test]
+    fn the_time_between_stamps_has_a_sign() {
+        let [early, late] = [1_000_000_000, 1_250_000_000].map(Stamp::from_nanos);
+        assert_eq!((late.seconds_since(early), early.seconds_since(late)), (0.25, -0.25));
+    }
+
+    #[test]
+    fn stamps_are_shown_in_seconds_to_the_nanosecond() {
+        assert_eq!(Stamp::from_nanos(12_000_000_345).to_string(), "12.000000345");
+    }
+}

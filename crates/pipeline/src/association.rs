@@ -202,4 +202,86 @@ mod tests {
         let vague = |d: Detection| Detection { covariance: Matrix3::identity() * 4.0, ..d };
         assert!(is_same_person(&vague(near), &vague(far), &settings));
     }
+
+    #[test]
+    fn nobody_is_found_outside_the_gate_or_farther_than_they_can_have_walked() {
+        let settings = AssociationSettings { gate: 4.0, ..AssociationSettings::default() };
+        let fits = |off_m: f64, variance: f64, dt_s: f64| {
+            let detection = Detection { covariance: Matrix3::zeros(), ..person(3.0, 0.0) };
+            let at = detection.position - nalgebra::Vector3::new(off_m, 0.0, 0.0);
+            let track = track(at, SMatrix::identity() * variance);
+            fit(&track, &detection, dt_s, &settings).is_some()
+        };
+        assert!(fits(0.19, 0.01, 0.1) && !fits(0.21, 0.01, 0.1), "two standard deviations");
+        // One metre, and 1.5 m for each second.
+        assert!(fits(1.14, 1.0, 0.1) && !fits(1.16, 1.0, 0.1));
+        assert!(fits(1.74, 1.0, 0.5) && !fits(1.76, 1.0, 0.5));
+        assert!(!fits(0.0, 0.0, 0.1), "a place without any uncertainty can be held against none");
+    }
+
+    /// Two people far apart; one was not seen for long and may be anywhere.
+    #[test]
+    fn a_vague_track_takes_its_own_detection_as_well_as_a_certain_one_does() {
+        let settings = AssociationSettings::default();
+        let detections = [person(3.0, 0.0), person(5.0, 2.0)];
+        let certain = track(detections[0].position, SMatrix::identity() * 1e-4);
+        let off = detections[1].position + nalgebra::Vector3::new(0.9, 0.0, 0.0);
+        let vague = track(off, SMatrix::identity() * 0.5);
+        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+        let seen = [&detections[0], &detections[1]];
+        let given = associate(&[&certain, &vague], &seen, fit, &settings);
+        assert_eq!(given, [Some(0), Some(1)]);
+        let alone = associate(&[&vague], &seen[1..], fit, &settings);
+        assert_eq!(alone, [Some(0)]);
+    }
+
+    /// The price of leaving a track alone decides whether a poor pair is better than none.
+    #[test]
+    fn a_track_is_rather_left_alone_where_a_miss_is_cheap() {
+        let detection = person(3.0, 0.0);
+        let off = detection.position + nalgebra::Vector3::new(0.42, 0.0, 0.0);
+        let track = track(off, SMatrix::identity() * 0.01);
+        let given = |miss_factor: f64| {
+            let settings = AssociationSettings { miss_factor, ..AssociationSettings::default() };
+            let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+            associate(&[&track], &[&detection], fit, &settings)
+        };
+        // The squared distance is 0.42² / 0.02 = 8.8, the gate 11.34.
+        assert_eq!((given(1.0), given(0.5)), (vec![Some(0)], vec![None]));
+    }
+
+    #[test]
+    fn regions_that_overlap_enough_fit_the_better_the_more_they_overlap() {
+        let settings = AssociationSettings { cost: Cost::Overlap, ..AssociationSettings::default() };
+        let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
+        track.estimate.region = Rect::new(0.0, 0.0, 10.0, 10.0);
+        let cost = |x: f64| {
+            let region = Rect::new(x, 0.0, 10.0, 10.0);
+            fit(&track, &Detection { region, ..person(9.0, 9.0) }, 0.1, &settings).map(|f| f.cost)
+        };
+        assert_eq!(cost(0.0), Some(0.0));
+        assert!((cost(5.0).unwrap() - 3.0_f64.ln()).abs() < 1e-12, "a third");
+        assert_eq!(cost(5.5), None, "less than 0.3");
+        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+        let detection = Detection { region: Rect::new(5.0, 0.0, 10.0, 10.0), ..person(3.0, 0.0) };
+        let cheap = AssociationSettings { miss_factor: 0.9, ..settings.clone() };
+        let given = |s: &AssociationSettings| associate(&[&track], &[&detection], fit, s);
+        assert_eq!((given(&settings), given(&cheap)), (vec![Some(0)], vec![None]));
+    }
+
+    #[test]
+    fn sightings_at_one_place_are_of_one_person_whatever_the_image_says() {
+        let settings = AssociationSettings::default();
+        let at = |x: f64, y: f64, region_x: f64| {
+            let region = Rect::new(region_x, 0.0, 100.0, 100.0);
+            Detection { region, covariance: Matrix3::identity() * 0.02, ..person(x, y) }
+        };
+        let first = at(3.0, 0.0, 0.0);
+        assert!(is_same_person(&first, &at(3.0, 0.24, 500.0), &settings));
+        assert!(!is_same_person(&first, &at(3.0, 0.26, 500.0), &settings));
+        // 0.6 m are three standard deviations of the difference: squared 9, of 9.21.
+        assert!(is_same_person(&first, &at(3.0, 0.6, 30.0), &settings));
+        assert!(!is_same_person(&first, &at(3.0, 0.61, 30.0), &settings));
+        assert!(!is_same_person(&first, &at(3.0, 0.6, 34.0), &settings), "they overlap by less");
+    }
 }

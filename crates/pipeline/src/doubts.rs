@@ -114,4 +114,33 @@ mod tests {
         doubts.predict(&Motion::at_rest(20.0), &settings());
         assert!(doubts.places.is_empty());
     }
+
+    #[test]
+    fn each_place_is_doubted_by_itself() {
+        let mut doubts = Doubts::default();
+        doubts.hear(&scored(-4.0, person(3.0, 0.0)), &settings());
+        doubts.hear(&scored(-2.0, person(3.0, 0.5)), &settings());
+        let at = |y: f64| doubts.clone().hear(&person(3.0, y), &settings());
+        assert_eq!([0.0, 0.2, 0.29, 0.81].map(at), [-3.0, -3.0, -1.0, 1.0], "the nearest counts");
+        doubts.clear();
+        assert_eq!(doubts.hear(&person(3.0, 0.0), &settings()), 1.0);
+    }
+
+    #[test]
+    fn who_is_believed_after_all_leaves_no_doubt() {
+        let mut doubts = Doubts::default();
+        doubts.hear(&scored(-1.0, person(3.0, 0.0)), &settings());
+        assert_eq!(doubts.hear(&scored(1.0, person(3.0, 0.0)), &settings()), 0.0);
+        assert_eq!(doubts.hear(&scored(1.0, person(3.0, 0.0)), &settings()), 1.0);
+    }
+
+    #[test]
+    fn faint_doubts_are_forgotten() {
+        let mut doubts = Doubts::default();
+        doubts.hear(&scored(-0.06, person(3.0, 0.0)), &settings());
+        doubts.predict(&Motion::at_rest(0.1), &settings());
+        assert_eq!(doubts.places.len(), 1);
+        doubts.predict(&Motion::at_rest(0.5), &settings());
+        assert!(doubts.places.is_empty());
+    }
 }

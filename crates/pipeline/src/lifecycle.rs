@@ -276,4 +276,172 @@ mod tests {
             assert_eq!(lifecycle.duplicates(&estimates), []);
         }
     }
+
+    /// One track of a score, and what becomes of it in frames an eighth of a second apart.
+    fn live(settings: LifecycleSettings, score: f64, sights: &[Sight]) -> (Life, Vec<&'static str>) {
+        let mut lifecycle = Lifecycle::new(settings);
+        let id = lifecycle.start(score, 0).unwrap();
+        let mut ends = Vec::new();
+        for sight in sights {
+            lifecycle.grow_older(0.125);
+            ends.extend(lifecycle.advance(id, *sight));
+        }
+        (lifecycle.get(id).unwrap().clone(), ends)
+    }
+
+    const SEEN: Sight = Sight::Seen(Some((1.0, 0)));
+
+    fn confirmed(settings: LifecycleSettings, score: f64, sights: &[Sight]) -> bool {
+        live(settings, score, sights).0.confirmed
+    }
+
+    #[test]
+    fn hits_confirm_only_if_they_are_close_to_each_other() {
+        let settings = || LifecycleSettings { tentative_misses: 9, ..LifecycleSettings::default() };
+        let hits = |sights: &[Sight]| confirmed(settings(), 1.0, sights);
+        assert!(!hits(&[SEEN]) && hits(&[SEEN, SEEN]), "the first sighting counts");
+        assert!(hits(&[Sight::Missed, SEEN, Sight::Missed, SEEN]), "three of five");
+        assert!(!hits(&[Sight::Missed, Sight::Missed, SEEN, Sight::Missed, SEEN]), "of six");
+        let hidden = [Sight::Hidden, Sight::Outside, Sight::NotAsked, Sight::Hidden];
+        assert!(hits(&[&hidden[..], &[SEEN, SEEN]].concat()), "what could not be seen is no miss");
+        let once = LifecycleSettings { confirm_hits: 1, ..settings() };
+        assert!(confirmed(once, 1.0, &[]));
+    }
+
+    #[test]
+    fn hits_that_are_probably_no_person_confirm_nobody() {
+        let doubtful = Sight::Seen(Some((-0.5, 0)));
+        let settings = LifecycleSettings { drop_score: -9.0, ..LifecycleSettings::default() };
+        assert!(!confirmed(settings.clone(), 0.1, &[doubtful; 6]));
+        assert!(confirmed(settings.clone(), 0.1, &[Sight::Seen(None); 2]), "no score, no doubt");
+        let sure = Sight::Seen(Some((4.0, 0)));
+        assert!(confirmed(settings.clone(), 0.1, &[sure]), "at once");
+        assert!(confirmed(settings, 4.0, &[]), "at once");
+    }
+
+    #[test]
+    fn scores_are_smoothed_and_misses_speak_against_a_person() {
+        let score = |sights: &[Sight]| live(LifecycleSettings::default(), 1.0, sights).0.score;
+        assert!((score(&[Sight::Seen(Some((3.0, 0)))]) - 1.6).abs() < 1e-12, "0.3 of the way");
+        assert!((score(&[Sight::Missed]) - 0.4).abs() < 1e-12, "0.3 of the way to -1");
+        assert_eq!(score(&[Sight::Seen(None), Sight::Hidden, Sight::Outside, Sight::NotAsked]), 1.0);
+        let settings = LifecycleSettings { tentative_misses: 99, ..LifecycleSettings::default() };
+        let low = live(settings, -1.5, &[Sight::Missed]).0.score;
+        assert_eq!(low, -1.5, "a miss never speaks for a person");
+    }
+
+    #[test]
+    fn a_track_ends_by_its_score_only_below_the_limit() {
+        let ends = |score: f64| {
+            let settings =
+                LifecycleSettings { score_weight: 1.0, ..LifecycleSettings::default() };
+            live(settings, 5.0, &[Sight::Seen(Some((score, 0)))]).1
+        };
+        assert_eq!((ends(-2.0), ends(-2.1)), (vec![], vec!["track: score"]));
+    }
+
+    #[test]
+    fn who_is_hidden_is_kept_longer_than_who_should_be_seen() {
+        let after = |sight: Sight, frames: usize| {
+            live(LifecycleSettings::default(), 5.0, &vec![sight; frames]).1
+        };
+        assert_eq!(after(Sight::Missed, 8), Vec::<&str>::new());
+        assert_eq!(after(Sight::Missed, 9), ["track: not seen"]);
+        assert_eq!(after(Sight::Outside, 16), Vec::<&str>::new());
+        assert_eq!(after(Sight::Outside, 17), ["track: left the image"]);
+        assert_eq!(after(Sight::Hidden, 24), Vec::<&str>::new());
+        assert_eq!(after(Sight::Hidden, 25), ["track: hidden too long"]);
+        assert_eq!(after(Sight::NotAsked, 99), Vec::<&str>::new(), "nobody missed them");
+    }
+
+    #[test]
+    fn misses_before_an_occlusion_are_forgiven() {
+        let mut sights = vec![Sight::Missed; 8];
+        sights.push(Sight::Hidden);
+        sights.extend([Sight::Missed; 8]);
+        let (life, ends) = live(LifecycleSettings::default(), 5.0, &sights);
+        assert_eq!(ends, Vec::<&str>::new());
+        assert_eq!((life.unseen_s, life.missed_s, life.misses), (2.125, 1.0, 8));
+        let (life, _) = live(LifecycleSettings::default(), 5.0, &[Sight::Missed, SEEN]);
+        assert_eq!((life.unseen_s, life.missed_s, life.misses, life.age), (0.0, 0.0, 0, 2));
+    }
+
+    #[test]
+    fn time_without_a_look_counts_once_there_are_misses() {
+        let settings = LifecycleSettings::default;
+        let few = [&[Sight::Missed; 2][..], &[Sight::NotAsked; 20]].concat();
+        assert_eq!(live(settings(), 5.0, &few).1, Vec::<&str>::new(), "three are needed");
+        let enough = [&[Sight::Missed; 2][..], &[Sight::NotAsked; 9], &[Sight::Missed]].concat();
+        assert_eq!(live(settings(), 5.0, &enough).1, ["track: not seen"]);
+    }
+
+    #[test]
+    fn the_lowest_scores_are_too_many_and_of_equals_the_youngest() {
+        let mut lifecycle =
+            Lifecycle::new(LifecycleSettings { max_tracks: 2, ..LifecycleSettings::default() });
+        for score in [1.0, 3.0, 1.0, 2.0] {
+            lifecycle.start(score, 0).unwrap();
+        }
+        assert_eq!(lifecycle.too_many(), [TrackId(3), TrackId(1)]);
+        lifecycle.end(TrackId(2));
+        lifecycle.end(TrackId(4));
+        assert_eq!(lifecycle.too_many(), []);
+        assert_eq!(lifecycle.ids(), [TrackId(1), TrackId(3)]);
+        assert_eq!(lifecycle.start(1.0, 0), Some(TrackId(5)), "no number twice");
+    }
+
+    #[test]
+    fn only_tracks_that_are_not_confirmed_are_tentative() {
+        let mut lifecycle = Lifecycle::new(LifecycleSettings::default());
+        lifecycle.start(5.0, 0).unwrap();
+        lifecycle.start(1.0, 0).unwrap();
+        assert_eq!(lifecycle.tentative_ids(), [TrackId(2)]);
+    }
+
+    /// Near in every third frame only, then in three of five.
+    #[test]
+    fn two_people_who_pass_each_other_are_not_one() {
+        let (mut lifecycle, together) = two_at_one_place();
+        let mut apart = together.clone();
+        apart.entry(TrackId(2)).and_modify(|e| e.person.position.y += 0.21);
+        for _ in 0..4 {
+            assert_eq!(lifecycle.duplicates(&together), []);
+            assert_eq!(lifecycle.duplicates(&apart), []);
+            assert_eq!(lifecycle.duplicates(&apart), []);
+        }
+        assert_eq!(lifecycle.duplicates(&together), []);
+        assert_eq!(lifecycle.duplicates(&apart), []);
+        assert_eq!(lifecycle.duplicates(&together), []);
+        assert_eq!(lifecycle.duplicates(&together), [TrackId(2)], "three of four");
+    }
+
+    #[test]
+    fn who_came_just_now_is_no_duplicate_yet() {
+        let (mut lifecycle, estimates) = two_at_one_place();
+        lifecycle.duplicates(&estimates);
+        lifecycle.duplicates(&estimates);
+        let third = lifecycle.start(1.0, 0).unwrap();
+        let mut estimates = estimates;
+        let place = estimates[&TrackId(1)].clone();
+        estimates.insert(third, place);
+        assert_eq!(lifecycle.duplicates(&estimates), [TrackId(2)], "the third came just now");
+    }
+
+    #[test]
+    fn a_track_tells_what_its_last_frame_said() {
+        let mut lifecycle = Lifecycle::new(LifecycleSettings::default());
+        let estimate = two_at_one_place().1.remove(&TrackId(1)).unwrap();
+        let id = lifecycle.start(5.0, 3).unwrap();
+        let mut after = |sight| {
+            lifecycle.grow_older(0.1);
+            lifecycle.advance(id, sight);
+            let track = lifecycle.track(id, estimate.clone()).unwrap();
+            (track.seen, track.occluded, track.age, (track.unseen_s * 10.0).round())
+        };
+        assert_eq!(after(Sight::Hidden), (false, true, 1, 1.0));
+        assert_eq!(after(Sight::Outside), (false, false, 2, 2.0));
+        assert_eq!(after(Sight::Seen(Some((1.0, 7)))), (true, false, 3, 0.0));
+        assert_eq!(lifecycle.get(id).unwrap().detector, Some(7));
+        assert!(lifecycle.track(TrackId(9), estimate).is_none());
+    }
 }

@@ -272,4 +272,86 @@ mod tests {
         assert_eq!(behind(near, 0.05, Point3::new(3.0, 3.0, 1.6)), Visibility::Outside);
         assert_eq!(behind(near, 0.05, Point3::new(-2.0, 0.0, 1.6)), Visibility::Outside);
     }
+
+    /// Head, neck, shoulders and trunk of somebody whose square is one unit wide.
+    #[test]
+    fn a_silhouette_is_a_head_on_shoulders_over_a_trunk() {
+        let square = Rect::new(10.0, 20.0, 1.0, 1.0);
+        let on = |across: f64, down: f64| {
+            let both = [across, -across];
+            let hits = both.map(|x| is_on_body(&square, Point2::new(10.5 + x, 20.0 + down)));
+            assert_eq!(hits[0], hits[1], "left and right are the same");
+            hits[0]
+        };
+        assert!(!on(0.0, -0.1) && !on(0.0, 0.04) && on(0.0, 0.06), "air above the head");
+        assert!(on(0.16, 0.3) && !on(0.17, 0.3), "the head");
+        assert!(on(0.24, 0.6) && !on(0.26, 0.6), "shoulders fall away");
+        assert!(on(0.41, 0.9) && !on(0.43, 0.9) && on(0.41, 2.4), "the trunk");
+        assert!(!on(0.0, 2.6), "and there it ends");
+    }
+
+    /// A screen before somebody 4 m ahead, from some column on: how much of them shows.
+    fn half_hidden(from_column: f64) -> (f64, Visibility) {
+        let camera = camera();
+        let far = Point3::new(4.0, 0.0, 1.6);
+        let region = camera.upper_body(&far);
+        let near = Point3::new(2.0, 0.0, 1.6);
+        let screen = Rect::new(from_column, region.y - 900.0, 900.0, 900.0);
+        let cover = || Cover::new(screen, &near, &Matrix3::zeros(), &camera);
+        let settings = OcclusionSettings::default();
+        (
+            part_shown(&region, &far, &[cover()], &camera, &settings),
+            visibility(&region, &far, &[cover()], &camera, &settings),
+        )
+    }
+
+    #[test]
+    fn of_whom_enough_shows_is_visible() {
+        let camera = camera();
+        let square = camera.upper_body(&Point3::new(4.0, 0.0, 1.6));
+        // The silhouette of the screen is its trunk: 0.42 of its width to both sides.
+        let edge = |part: f64| square.x + part * square.width - 0.08 * 900.0;
+        let (half, seen) = half_hidden(edge(0.5));
+        assert!((half - 0.5).abs() < 0.05, "{half}");
+        assert_eq!(seen, Visibility::Visible);
+        let (little, hidden) = half_hidden(edge(0.4));
+        assert!((0.2..0.4).contains(&little), "{little}");
+        assert_eq!(hidden, Visibility::Hidden);
+        assert_eq!(half_hidden(edge(2.0)).0, 1.0);
+        assert_eq!(half_hidden(edge(-0.2)).0, 0.0);
+    }
+
+    #[test]
+    fn what_is_outside_of_the_image_is_not_hidden() {
+        let camera = camera();
+        let settings = OcclusionSettings::default();
+        let head = Point3::new(2.0, 1.28, 1.6);
+        let region = camera.upper_body(&head);
+        assert!(region.x < 0.0 && region.right() > 0.0, "half of them is outside: {region:?}");
+        assert_eq!(part_shown(&region, &head, &[], &camera, &settings), 1.0);
+        let gone = Rect::new(-500.0, 0.0, 100.0, 100.0);
+        assert_eq!(part_shown(&gone, &head, &[], &camera, &settings), 1.0);
+        let seen = |x: f64| {
+            let region = Rect { x, ..region };
+            visibility(&region, &head, &[], &camera, &settings)
+        };
+        assert_eq!(seen(-0.5 * region.width), Visibility::Visible);
+        assert_eq!(seen(-0.7 * region.width), Visibility::Outside);
+        assert_eq!(seen(640.0 - 0.3 * region.width), Visibility::Outside);
+    }
+
+    #[test]
+    fn who_hides_somebody_is_nearer_by_a_gap() {
+        let hides = |gap_m: f64, sigma_m: f64| {
+            let near = Point3::new(2.0, 0.0, 1.2);
+            behind(near, sigma_m, Point3::new(2.0 + gap_m, 0.0, 1.2)) == Visibility::Hidden
+        };
+        assert!(hides(0.31, 0.0) && !hides(0.29, 0.0), "0.3 m");
+        assert!(hides(0.61, 0.2) && !hides(0.59, 0.2), "three standard deviations");
+    }
+
+    #[test]
+    fn ranges_are_those_from_the_camera() {
+        assert!((range_m(&Point3::new(3.0, 0.0, 5.2), &camera()) - 5.0).abs() < 1e-12);
+    }
 }

@@ -84,4 +84,22 @@ mod tests {
         assert_eq!(metered.log_likelihood(&frame, &people), Ok(5.0));
         assert_eq!(metered.weighing().scenes, 4);
     }
+
+    #[test]
+    fn silhouettes_are_those_of_the_likelihood() {
+        struct Round;
+        impl Likelihood for Round {
+            fn log_likelihood(&self, _: &Frame, _: &[Person]) -> Result<f64> {
+                Ok(0.0)
+            }
+
+            fn silhouettes(&self, _: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
+                Ok(vec![vec![Rect::new(1.0, 2.0, 3.0, 4.0)]; scene.len()])
+            }
+        }
+        let velocity = nalgebra::Vector2::zeros();
+        let people = [Person { position: person(3.0, 0.0).position, velocity }; 2];
+        let shapes = Metered::new(&Round).silhouettes(&frame(1, 0.0), &people).unwrap();
+        assert_eq!(shapes, vec![vec![Rect::new(1.0, 2.0, 3.0, 4.0)]; 2]);
+    }
 }

@@ -125,4 +125,37 @@ mod tests {
         }
         assert_eq!(around.places().map(|p| p.x).collect::<Vec<_>>(), [1.0]);
     }
+
+    #[test]
+    fn each_thing_has_its_direction_all_around() {
+        let all = [(1.0, 0.01), (0.01, 1.0), (-1.0, 0.01), (-0.01, -1.0), (1.0, -0.01)];
+        let found = all.map(|(x, y)| direction(&Point2::new(x, y)));
+        assert_eq!(found, [Some(0), Some(22), Some(44), Some(67), Some(89)]);
+        assert_eq!(direction(&Point2::new(2.0, 3.0)), Some(14));
+        assert_eq!(direction(&Point2::new(2.4, 3.3)), None, "too far away");
+    }
+
+    /// A camera 1 m above the floor that sees a board 1 m ahead, to the left.
+    #[test]
+    fn what_is_looked_at_replaces_what_was_remembered_there() {
+        use tagalong_core::{Distortion, Pinhole};
+        let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
+        let board = |to: usize| {
+            DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 })
+        };
+        let mut around = Around::new();
+        let mut least = |depth: &DepthImage, heights, is_thing: &dyn Fn(&Point2<f64>) -> bool| {
+            around.look(&camera, depth, heights, is_thing);
+            around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)
+        };
+        let all = |_: &Point2<f64>| true;
+        assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
+        assert!((least(&board(0), [0.1, 1.5], &all) - 3.0).abs() < 0.1, "the board is gone");
+        let unknown = DepthImage::filled(40, 30, f32::NAN);
+        assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
+        assert!(least(&unknown, [0.1, 1.5], &all) < 1.2, "nothing is seen, so it is still there");
+        assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [1.6, 1.9], &all), 9.0, "overhead");
+        assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [0.1, 1.5], &|_| false), 9.0, "people");
+    }
 }

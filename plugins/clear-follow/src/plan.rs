@@ -149,6 +149,7 @@ mod tests {
         let comes = Walker { at: Point2::new(0.9, -1.2), velocity: Vector2::new(0.0, 1.0) };
         let stays = Walker { velocity: Vector2::zeros(), ..leaves };
         let speed = |walker| planned(&[], &[walker]).speed_mps;
+        assert_eq!(planned(&[], &[leaves]), AHEAD, "gone by then");
         assert!(speed(comes) < 0.8 || planned(&[], &[comes]).turn_rate != 0.0);
         assert!(speed(stays) < 0.8 || planned(&[], &[stays]).turn_rate != 0.0);
     }
@@ -160,5 +161,82 @@ mod tests {
         let steps = (0..1500).fold(Isometry2::identity(), |pose, _| pose * step);
         let whole = twist.after(1.5);
         assert!((steps.translation.vector - whole.translation.vector).norm() < 1e-6);
+    }
+
+    const STILL: Twist = Twist { speed_mps: 0.0, turn_rate: 0.0 };
+
+    fn stands(x: f64, y: f64) -> Walker {
+        Walker { at: Point2::new(x, y), velocity: Vector2::zeros() }
+    }
+
+    /// With the person 3 m ahead.
+    fn around<'a>(things: &'a [Point2<f64>], others: &'a [Walker]) -> Surroundings<'a> {
+        Surroundings { things, others, person: stands(3.0, 0.0), max_mps: 0.9 }
+    }
+
+    #[test]
+    fn room_is_what_is_left_between_the_robot_and_things_on_its_way() {
+        let config = Config::default();
+        let room = |twist, things: &[Point2<f64>], others: &[Walker]| {
+            clearance(&config, twist, &around(things, others))
+        };
+        // In a second and a half it comes to 1.2 m, and looks at every 0.2 m.
+        let beside = [Point2::new(0.8, 0.5)];
+        assert!((room(AHEAD, &beside, &[]) - 0.25).abs() < 1e-9, "its own radius");
+        assert!((room(AHEAD, &[Point2::new(2.0, 0.0)], &[]) - 0.55).abs() < 1e-9);
+        assert!((room(AHEAD, &[], &[stands(0.8, -0.9)]) - 0.4).abs() < 1e-9, "and that of people");
+        assert!((room(AHEAD, &beside, &[stands(0.8, -0.6)]) - 0.1).abs() < 1e-9, "the least");
+        let crosses = Walker { velocity: Vector2::new(0.0, 1.0), ..stands(0.8, -1.0) };
+        assert!((room(AHEAD, &[], &[crosses]) + 0.5).abs() < 1e-9, "they meet after a second");
+        assert_eq!(room(STILL, &beside, &[]), f64::INFINITY);
+        assert_eq!(room(AHEAD, &[], &[]), f64::INFINITY);
+    }
+
+    #[test]
+    fn who_stands_before_the_person_hides_them_the_more_the_less_aside() {
+        let config = Config::default();
+        let by = |x: f64, y: f64| hidden(&config, STILL, &around(&[], &[stands(x, y)]));
+        assert_eq!((by(1.5, 0.0), by(1.5, 0.4), by(1.5, -0.4)), (1.0, 0.0, 0.0));
+        assert!((by(1.5, 0.175) - 0.5).abs() < 1e-9 && (by(1.5, -0.07) - 0.8).abs() < 1e-9);
+        assert_eq!((by(2.74, 0.0), by(2.76, 0.0), by(-1.0, 0.0)), (1.0, 0.0, 0.0));
+        let two = [stands(1.5, 0.175), stands(1.0, 0.07)];
+        assert!((hidden(&config, STILL, &around(&[], &two)) - 0.8).abs() < 1e-9, "the worst");
+        let leaves = Walker { velocity: Vector2::new(0.0, 1.0), ..stands(1.5, 0.0) };
+        assert_eq!(hidden(&config, STILL, &around(&[], &[leaves])), 0.0, "gone by then");
+        let turns = Twist { speed_mps: 0.0, turn_rate: 1.0 };
+        let turned = hidden(&config, turns, &around(&[], &[stands(1.5, 0.0)]));
+        assert!((turned - 1.0).abs() < 1e-9, "a turn in place changes nothing: {turned}");
+    }
+
+    #[test]
+    fn each_change_has_its_price() {
+        let config = Config::default();
+        let price = |twist, things: &[Point2<f64>], others: &[Walker]| {
+            cost(&config, AHEAD, twist, &around(things, others))
+        };
+        let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found}");
+        near(price(AHEAD, &[], &[]), 0.0);
+        near(price(Twist { speed_mps: 0.35, ..AHEAD }, &[], &[]), 0.5);
+        near(price(Twist { turn_rate: -0.6, ..AHEAD }, &[], &[]), 0.15);
+        // 0.1 m of room where 0.2 m are wanted: half of it, squared, twice.
+        near(price(AHEAD, &[Point2::new(0.8, 0.35)], &[]), 0.5);
+        near(price(AHEAD, &[Point2::new(0.8, 0.5)], &[]), 0.0);
+        near(price(AHEAD, &[Point2::new(0.8, 0.0)], &[]), 2.0 * 4.0);
+        near(price(STILL, &[], &[stands(1.5, 0.0)]), 0.8 / 0.9 + 0.05);
+    }
+
+    #[test]
+    fn it_turns_on_rather_than_back_and_no_faster_than_it_may() {
+        let config = Config::default();
+        let wall: Vec<_> = (-9..=9).map(|i| Point2::new(0.7, 0.2 * f64::from(i))).collect();
+        let person = stands(0.0, 3.0);
+        for turn_rate in [1.0, -1.0] {
+            let nominal = Twist { speed_mps: 0.6, turn_rate };
+            let scene = Surroundings { things: &wall, others: &[], person, max_mps: 0.9 };
+            let planned = plan(&config, nominal, &scene);
+            assert!(planned.turn_rate.abs() <= 1.2 && planned != nominal, "{planned:?}");
+            let mirrored = plan(&config, Twist { turn_rate: -turn_rate, ..nominal }, &scene);
+            assert_eq!(planned.turn_rate, -mirrored.turn_rate);
+        }
     }
 }

@@ -97,6 +97,109 @@ fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
 }
 
 #[test]
+fn it_speeds_up_and_slows_down_no_faster_than_it_may() {
+    let mut controller = ClearFollow::new(prompt()).unwrap();
+    let still = Motion::at_rest(0.1);
+    let mut speed = |x: f64| {
+        let person = target(x, 0.0, Vector2::zeros());
+        let WheelSpeeds { left, right } = command(&mut controller, still, None, Some(&person));
+        0.5 * (left + right)
+    };
+    let faster: Vec<f64> = (0..3).map(|_| speed(4.0)).collect();
+    for (found, expected) in faster.iter().zip([0.05, 0.1, 0.15]) {
+        assert!((found - expected).abs() < 1e-9, "{faster:?}");
+    }
+    assert!((speed(1.4) - 0.09).abs() < 1e-9, "0.6 m/s²");
+    assert_eq!(ClearFollow::new(prompt()).unwrap().stand_off_m(), Some(1.4));
+}
+
+#[test]
+fn it_turns_by_the_bearing_and_as_fast_as_the_person_walks_around_it() {
+    let turn = |x: f64, y: f64, velocity: Vector2<f64>| {
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let person = target(x, y, velocity);
+        let wheels = command(&mut controller, Motion::at_rest(0.0), None, Some(&person));
+        (wheels.right - wheels.left) / (2.0 * WHEELS.half_separation_m)
+    };
+    assert!((turn(2.0, 1.0, Vector2::zeros()) - 0.5_f64.atan()).abs() < 1e-9);
+    assert!((turn(2.0, 0.0, Vector2::new(0.0, 0.8)) - 0.4).abs() < 1e-9);
+    assert!((turn(2.0, 0.0, Vector2::new(0.8, 0.0))).abs() < 1e-9);
+    assert!((turn(0.2, 0.0, Vector2::new(0.0, -0.3)) + 0.6).abs() < 1e-9, "as if at half a metre");
+    assert!((turn(-2.0, 0.3, Vector2::zeros()) - 1.2).abs() < 1e-9, "no faster than it may");
+}
+
+#[test]
+fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
+    let speed = |unseen_s: f64| {
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let person = Track { seen: false, unseen_s, ..target(4.0, 0.0, Vector2::zeros()) };
+        let still = Motion::at_rest(0.1);
+        let steps = (0..30).map(|_| command(&mut controller, still, None, Some(&person)).left);
+        steps.last().unwrap()
+    };
+    assert!((speed(0.5) - 0.9).abs() < 1e-9 && (speed(0.75) - 0.45).abs() < 1e-9);
+    for unseen_s in [1.0, 30.0, f64::NAN] {
+        assert_eq!(speed(unseen_s), 0.0);
+    }
+}
+
+#[test]
+fn the_person_is_no_obstacle_and_others_are() {
+    let person = target(1.6, 0.0, Vector2::new(0.8, 0.0));
+    let settled = |depth: Option<DepthImage>, other: Option<Track>| {
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let images = Images { depth: depth.map(Arc::new), ..Images::default() };
+        let tracks: Vec<Track> = other.into_iter().chain([person.clone()]).collect();
+        let frame = Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), images);
+        let (target, tracks) = (Some(&person), &tracks[..]);
+        let scene =
+            Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+        (0..30).map(|_| controller.command(&scene)).last().unwrap()
+    };
+    let free = settled(None, None);
+    let body = |x, _| if (17..23).contains(&x) { 1.5 } else { 6.0 };
+    assert_eq!(settled(Some(DepthImage::from_fn(40, 30, body)), None), free);
+    let mut other = target(0.9, 0.1, Vector2::zeros());
+    other.id = tagalong_core::TrackId(2);
+    assert_ne!(settled(None, Some(other)), free);
+}
+
+#[test]
+fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
+    let after = |seconds: f64| {
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let person = target(4.0, 0.0, Vector2::zeros());
+        let still = Motion::at_rest(0.1);
+        let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
+        let depth = DepthImage::from_fn(40, 30, post);
+        command(&mut controller, still, Some(depth), Some(&person));
+        let steps = (0..(seconds / 0.1) as u32)
+            .map(|_| command(&mut controller, still, None, Some(&person)));
+        let wheels = steps.last().unwrap();
+        (wheels.left - wheels.right).abs() > 0.05
+    };
+    assert!(after(4.0) && !after(8.0));
+}
+
+#[test]
+fn a_drive_that_cannot_be_is_not_steered() {
+    let person = target(3.0, 0.5, Vector2::zeros());
+    let frame =
+        Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), Images::default());
+    let drives = |half_separation_m, max_speed_mps| {
+        let wheels = Wheels { half_separation_m, slip: 0.0 };
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let (target, tracks) = (Some(&person), &[][..]);
+        let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
+        controller.command(&scene) != WheelSpeeds::STOP
+    };
+    assert!(drives(0.167, 0.9));
+    for odd in [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX] {
+        assert!(!drives(odd, 0.9) && !drives(0.167, odd), "{odd}");
+    }
+}
+
+#[test]
 fn wrong_settings_are_refused_by_name() {
     for (config, key) in [
         (Config { horizon_s: f64::NAN, ..Config::default() }, "horizon_s"),

@@ -28,10 +28,10 @@ pub struct Correlation {
 
 /// A picture laid somewhere, in cells from the expected place.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
-    aside: i64,
-    down: i64,
-    fit: Fit,
+pub(crate) struct Placed {
+    pub(crate) aside: i64,
+    pub(crate) down: i64,
+    pub(crate) fit: Fit,
 }
 
 /// The images of a frame that this detector looks at.
@@ -101,7 +101,7 @@ fn distance(config: &Config, camera: &Camera, track: &Track) -> Distance {
 }
 
 /// How far around the expected place people are searched, in cells aside and down.
-fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i64) {
+pub(crate) fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i64) {
     let estimate = &track.estimate;
     let ray = estimate.person.position.coords - camera.robot_from_camera.translation.vector;
     let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
@@ -126,7 +126,7 @@ fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut
 }
 
 /// The best place, or the test that it failed.
-fn choose(config: &Config, fits: &[Placed]) -> Found<Placed> {
+pub(crate) fn choose(config: &Config, fits: &[Placed]) -> Found<Placed> {
     let shown = || fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown);
     let by_correlation = |a: &Placed, b: &Placed| a.fit.correlation.total_cmp(&b.fit.correlation);
     let best = shown().max_by(by_correlation).ok_or("correlation: hidden")?;
@@ -143,7 +143,7 @@ fn choose(config: &Config, fits: &[Placed]) -> Found<Placed> {
 }
 
 /// The head moves in the image with its square, at the distance that was expected.
-fn sighting(
+pub(crate) fn sighting(
     config: &Config,
     camera: &Camera,
     track: &Track,

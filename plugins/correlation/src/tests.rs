@@ -237,3 +237,140 @@ fn it_conforms() {
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }
+
+/// A picture laid somewhere, so many cells from the expected place.
+fn placed(aside: i64, correlation: f64, shown: f64, known: f64) -> crate::detect::Placed {
+    crate::detect::Placed { aside, down: 0, fit: Fit { correlation, shown, known } }
+}
+
+fn chosen(fits: &[crate::detect::Placed]) -> Result<i64, &'static str> {
+    crate::detect::choose(&Config::default(), fits).map(|best| best.aside)
+}
+
+/// Eleven cells are 0.26 m, ten are 0.24 m.
+#[test]
+fn the_best_place_must_be_good_and_better_than_all_others() {
+    let best = placed(3, 0.9, 1.0, 0.0);
+    assert_eq!(chosen(&[placed(0, 0.5, 1.0, 0.0), best]), Ok(3));
+    assert_eq!(chosen(&[placed(-7, 0.89, 1.0, 0.0), best]), Ok(3), "that is the same place");
+    assert_eq!(chosen(&[placed(-8, 0.82, 1.0, 0.0), best]), Err("correlation: two places"));
+    assert_eq!(chosen(&[placed(14, 0.82, 1.0, 0.0), best]), Err("correlation: two places"));
+    assert_eq!(chosen(&[placed(-8, 0.79, 1.0, 0.0), best]), Ok(3), "0.1 worse");
+    assert_eq!(chosen(&[placed(-8, 0.95, 0.3, 0.0), best]), Ok(3), "that place is hidden");
+    assert_eq!(chosen(&[placed(0, 0.77, 1.0, 0.0)]), Err("correlation: too low"));
+    assert_eq!(chosen(&[placed(0, 0.9, 0.39, 0.0)]), Err("correlation: hidden"));
+    assert_eq!(chosen(&[placed(0, 0.9, 0.4, 0.5)]), Ok(0));
+    assert_eq!(chosen(&[placed(0, 0.9, 1.0, 0.51)]), Err("correlation: depth knows better"));
+    assert_eq!(chosen(&[]), Err("correlation: hidden"));
+}
+
+#[test]
+fn people_are_searched_as_far_as_they_can_have_got_but_not_farther() {
+    let reach = |aside: f64, up: f64| {
+        let mut track = track(HEAD, false);
+        track.estimate.covariance = SMatrix::zeros();
+        // Ahead of the camera, aside is to the left; the distance does not count.
+        for (axis, sigma) in [(0, 9.0), (1, aside), (2, up)] {
+            track.estimate.covariance[(axis, axis)] = sigma * sigma;
+        }
+        crate::detect::reach(&Config::default(), &camera(), &track)
+    };
+    // Three standard deviations in cells of 2.375 cm.
+    assert_eq!(reach(0.1, 0.05), (13, 7));
+    assert_eq!(reach(1.0, 1.0), (26, 9), "0.6 m aside, 0.2 m up and down");
+    assert_eq!(reach(0.0, 0.0), (0, 0));
+}
+
+#[test]
+fn who_is_not_in_plain_view_is_not_remembered() {
+    let learned = |track: Track, config: Config| {
+        let mut detector = Correlation::new(config).unwrap();
+        detector.learn(&World::at(HEAD).frame(), std::slice::from_ref(&track)).unwrap();
+        let mut funnel = Funnel::default();
+        let expected = self::track(HEAD, false);
+        let search = Search::Near(&expected);
+        detector.detect(&in_shadow().frame(), &search, &mut funnel).unwrap();
+        funnel.count("correlation: not seen well yet") == 0
+    };
+    let seen = || track(HEAD, true);
+    assert!(learned(seen(), Config::default()));
+    assert!(!learned(track(HEAD, false), Config::default()), "nobody is seen");
+    assert!(!learned(Track { occluded: true, ..seen() }, Config::default()));
+    for width in [11.0, 1001.0] {
+        let mut track = seen();
+        track.estimate.region.width = width;
+        assert!(!learned(track, Config::default()), "{width} pixels");
+    }
+    let mut beside = seen();
+    beside.estimate.region.x += 0.7 * beside.estimate.region.width;
+    assert!(!learned(beside.clone(), Config::default()), "30 % of a body");
+    assert!(learned(beside, Config { min_body: 0.25, ..Config::default() }));
+    let mut cut = seen();
+    cut.estimate.region.x = -1.0;
+    assert!(!learned(cut, Config { min_body: 0.0, ..Config::default() }), "cut off");
+}
+
+#[test]
+fn a_sighting_says_where_by_its_cells_and_how_sure_it_is() {
+    let config = Config { score: 0.7, ..Config::default() };
+    let (camera, expected) = (camera(), track(HEAD, false));
+    let square = expected.estimate.region;
+    let best = crate::detect::Placed { down: -6, ..placed(12, 0.9, 1.0, 0.0) };
+    let found = crate::detect::sighting(&config, &camera, &expected, &square, best);
+    assert!((found.region.x - square.x - 0.5 * square.width).abs() < 1e-9);
+    assert!((found.region.y - square.y + 0.25 * square.width).abs() < 1e-9);
+    assert_eq!((found.region.width, found.score), (square.width, 0.7));
+    assert!((camera.depth_of(&found.position) - 2.5).abs() < 1e-9, "as far as expected");
+    assert!(camera.upper_body(&found.position).iou(&found.region) > 0.99);
+    let middle = crate::detect::sighting(&config, &camera, &expected, &square, placed(0, 0.9, 1.0, 0.0));
+    assert!((middle.covariance[(1, 1)].sqrt() - 0.05).abs() < 0.005, "{}", middle.covariance);
+    assert!((middle.covariance[(0, 0)].sqrt() - 3.0).abs() < 0.05, "{}", middle.covariance);
+}
+
+#[test]
+fn brightness_is_that_between_four_pixels_and_depth_that_of_the_nearest() {
+    use crate::picture::{brightness, nearest};
+    let grey = GreyImage::from_pixels(2, 2, vec![128, 138, 148, 178]).unwrap();
+    let at = |x: f64, y: f64| brightness(&grey, Point2::new(x, y));
+    assert_eq!((at(0.5, 0.5), at(0.9, 0.5), at(0.5, 0.75)), (Some(0.0), Some(4.0), Some(5.0)));
+    assert_eq!(at(1.0, 1.0), Some(20.0), "the mean of all");
+    assert_eq!((at(0.4, 0.6), at(0.6, 1.6), at(1.6, 0.6)), (None, None, None));
+    let depth = DepthImage::from_pixels(2, 1, vec![1.0, 2.0]).unwrap();
+    let at = |x: f64| nearest(&depth, Point2::new(x, 0.9));
+    assert_eq!([-0.1, 0.0, 0.9, 1.1, 2.0].map(at), [None, Some(1.0), Some(1.0), Some(2.0), None]);
+}
+
+#[test]
+fn depth_says_whether_somebody_else_is_before_or_behind() {
+    use crate::picture::Shows;
+    let distance = Distance { ahead_m: 2.5, tolerance_m: 0.5 };
+    let shows = [1.9, 2.1, 2.9, 3.1].map(|metres| distance.shows(metres));
+    assert_eq!(shows, [Shows::Nearer, Shows::Body, Shows::Body, Shows::Farther]);
+    for nothing in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(distance.shows(nothing), Shows::Nothing);
+    }
+}
+
+#[test]
+fn the_lattice_goes_on_around_the_square() {
+    let square = tagalong_core::Rect::new(100.0, 50.0, 48.0, 48.0);
+    let lattice = Lattice::around(&square, 2, 1);
+    assert_eq!((lattice.columns, lattice.rows, lattice.step), (SIDE + 4, SIDE + 2, 2.0));
+    let middles: Vec<_> = lattice.middles().collect();
+    assert_eq!((middles[0], middles[1]), (Point2::new(97.0, 49.0), Point2::new(99.0, 49.0)));
+    assert_eq!(middles[SIDE + 4], Point2::new(97.0, 51.0));
+    assert_eq!(middles.len(), (SIDE + 4) * (SIDE + 2));
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    for (key, config) in [
+        ("min_correlation", Config { min_correlation: 1.1, ..Config::default() }),
+        ("elsewhere_m", Config { elsewhere_m: 0.0, ..Config::default() }),
+        ("search_aside_m", Config { search_aside_m: 2.1, ..Config::default() }),
+        ("score", Config { score: f64::NAN, ..Config::default() }),
+    ] {
+        let error = Correlation::new(config).err().unwrap().to_string();
+        assert!(error.contains(&format!("`{key}`")), "{error}");
+    }
+}

@@ -109,6 +109,8 @@ fn turn_back(motion: &Motion) -> Matrix2<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
     use tagalong_core::{Distortion, Pinhole, Rect};
 
     use super::*;
@@ -160,5 +162,76 @@ mod tests {
     fn settings_that_cannot_work_are_refused() {
         assert!(LastSeen::new(Config { wander: 0.0, ..Config::default() }).is_err());
         assert!(LastSeen::new(Config { velocity_over_s: f64::NAN, ..Config::default() }).is_err());
+    }
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+        Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0)
+    }
+
+    /// Somebody seen each half second at these places, by a robot that moves like that.
+    fn seen_at(config: Config, motion: Motion, places: &[(f64, f64)]) -> Estimate {
+        let filter = LastSeen::new(config).unwrap();
+        let mut belief = filter.start(&sighting(places[0].0, places[0].1));
+        for (x, y) in &places[1..] {
+            filter.predict(&mut belief, &motion);
+            filter.correct(&mut belief, &sighting(*x, *y), &camera());
+        }
+        filter.estimate(&belief, &camera())
+    }
+
+    #[test]
+    fn the_velocity_is_the_way_of_the_last_second() {
+        let still = Motion::at_rest(0.5);
+        let velocity = |places: &[(f64, f64)]| {
+            seen_at(Config::default(), still, places).person.velocity
+        };
+        assert_eq!(velocity(&[(3.0, 0.0)]), Vector2::zeros());
+        assert_eq!(velocity(&[(3.0, 0.0), (3.0, 0.4)]), Vector2::new(0.0, 0.8));
+        // Two seconds ago is too long ago.
+        let places = [(9.0, 0.0), (9.0, 1.0), (3.0, 0.0), (3.0, 0.4), (2.0, 1.0)];
+        assert_eq!(velocity(&places), Vector2::new(-1.0, 1.0));
+    }
+
+    #[test]
+    fn who_stands_does_not_walk_because_the_robot_drives() {
+        let motion = Motion { forward: 0.5, turn: 0.1, ..Motion::at_rest(0.5) };
+        let first = Point2::new(3.0, 1.0);
+        let next = motion.apply_to_point(first);
+        let places = [(first.x, first.y), (next.x, next.y)];
+        let velocity = |ego_motion| {
+            let config = Config { ego_motion, ..Config::default() };
+            seen_at(config, motion, &places).person.velocity.norm()
+        };
+        assert!(velocity(true) < 1e-9 && velocity(false) > 0.5);
+    }
+
+    #[test]
+    fn who_is_unseen_may_have_gone_anywhere_ever_farther() {
+        let filter = LastSeen::new(Config { wander: 0.4, ..Config::default() }).unwrap();
+        let mut seen = sighting(3.0, 0.0);
+        seen.covariance = Matrix3::from_diagonal(&[0.04, 0.01, 0.02].into());
+        let mut belief = filter.start(&seen);
+        filter.predict(&mut belief, &Motion { turn: FRAC_PI_2, ..Motion::at_rest(0.5) });
+        let estimate = filter.estimate(&belief, &camera());
+        // What was ahead is to the right now.
+        let expected = [0.01 + 0.08, 0.04 + 0.08, 0.02 + 0.005, 1.0, 1.0];
+        for (found, expected) in estimate.covariance.diagonal().iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{}", estimate.covariance);
+        }
+        assert_eq!(estimate.region, camera().upper_body(&estimate.person.position));
+    }
+
+    #[test]
+    fn no_more_sightings_are_kept_than_needed() {
+        let filter = LastSeen::new(Config { velocity_over_s: 100.0, ..Config::default() }).unwrap();
+        let mut belief = filter.start(&sighting(3.0, 0.0));
+        for _ in 0..99 {
+            filter.correct(&mut belief, &sighting(3.0, 0.0), &camera());
+        }
+        assert_eq!(belief.sightings.len(), MOST_SIGHTINGS);
+        assert!(LastSeen::new(Config { wander: 100.0, ..Config::default() }).is_ok());
+        assert!(LastSeen::new(Config { wander: 100.1, ..Config::default() }).is_err());
     }
 }

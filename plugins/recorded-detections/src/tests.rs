@@ -163,3 +163,128 @@ fn mistakes_are_named_by_file_and_line() {
     assert!(RecordedDetections::new(wrong, &context(".".as_ref())).is_err());
     assert_eq!(Rect::default().area(), 0.0);
 }
+
+fn track_at(head: Point3<f64>) -> Track {
+    let person = Person { position: head, velocity: Vector2::zeros() };
+    let region = camera().upper_body(&head);
+    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
+    Track {
+        id: TrackId(1),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 3,
+        unseen_s: 0.0,
+        score: 2.0,
+    }
+}
+
+/// Whether a search near somebody 3 m ahead finds a position that the log tells.
+fn finds_near(at: Point3<f64>, config: Config) -> bool {
+    let mut detector = RecordedDetections::new(config, &context(".".as_ref())).unwrap();
+    let recorded = Recorded { region: None, head: Some(at), score: 0.9 };
+    let frame = frame(1, None).with_recorded(Some(vec![recorded]));
+    let track = track_at(Point3::new(3.0, 0.0, 1.6));
+    !detector.detect(&frame, &Search::Near(&track), &mut Funnel::default()).unwrap().is_empty()
+}
+
+#[test]
+fn near_a_track_is_what_is_near_on_the_floor() {
+    let at = |x: f64, y: f64| finds_near(Point3::new(x, y, 1.6), Config::default());
+    assert!(at(3.79, 0.0) && at(3.0, -0.79) && !at(3.81, 0.0) && !at(3.6, 0.6));
+    assert!(finds_near(Point3::new(3.0, 0.0, 1.2), Config::default()), "whatever the height");
+    // The same direction, and so the same place in the image, a metre behind.
+    assert!(!at(4.0, 0.0), "a place that is told is no guess");
+    let vague = Config { sigma_position_m: 0.5, ..Config::default() };
+    assert!(finds_near(Point3::new(4.0, 0.0, 1.6), vague.clone()), "it overlaps");
+    assert!(!finds_near(Point3::new(4.0, 1.0, 1.6), vague));
+}
+
+#[test]
+fn the_most_like_of_several_near_a_track_comes_first() {
+    let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
+    let heads = [3.5, 3.1, 3.3].map(|x| Point3::new(x, 0.0, 1.6));
+    let recorded = heads.map(|head| Recorded { region: None, head: Some(head), score: 0.9 });
+    let frame = frame(1, None).with_recorded(Some(recorded.to_vec()));
+    let track = track_at(Point3::new(3.0, 0.0, 1.6));
+    let found =
+        detector.detect(&frame, &Search::Near(&track), &mut Funnel::default()).unwrap();
+    assert_eq!(found.iter().map(|d| d.position.x).collect::<Vec<_>>(), [3.1, 3.3, 3.5]);
+}
+
+#[test]
+fn boxes_without_a_score_are_certain_and_blank_lines_are_none() {
+    let text = "\n 1 , -1, 100, 100, 50, 170\n\n1,-1,300,100,50,170,0.8\n";
+    let mut detector = of_file(text, Config::default()).unwrap();
+    let found = detect(&mut detector, &frame(1, None));
+    let scores: Vec<f64> = found.iter().map(|d| d.score).collect();
+    let sure = (0.999_f64 / 0.001).ln();
+    assert!((scores[0] - sure).abs() < 1e-9 && (scores[1] - 4.0_f64.ln()).abs() < 1e-9);
+    let refused = |text: &str| of_file(text, Config::default()).is_err();
+    assert!(refused("1.5,-1,5,5,9,9,1") && refused("1,-1,5,5,-9,9,1") && refused("1,-1,5,5,9,-9,1"));
+    assert!(refused("1,-1,5,5,9,inf,1") && refused("-1,-1,5,5,9,9,1"));
+}
+
+#[test]
+fn who_is_outside_of_the_image_is_dropped_and_counted() {
+    let text = "1,-1,-400,100,50,170,0.9\n1,-1,300,100,50,170,0.3\n1,-1,-20,100,50,170,0.9\n";
+    let mut detector = of_file(text, Config::default()).unwrap();
+    let mut funnel = Funnel::default();
+    let found = detector.detect(&frame(1, None), &EVERYWHERE, &mut funnel).unwrap();
+    assert_eq!((found.len(), funnel.count("outside")), (2, 1), "0.3 is enough");
+    assert_eq!(funnel.entries()[0].example, Some(Rect::new(-400.0, 100.0, 50.0, 170.0)));
+}
+
+#[test]
+fn a_square_of_head_and_shoulders_is_taken_as_it_is() {
+    let head = Point3::new(3.0, 0.4, 1.585);
+    let square = camera().upper_body(&head);
+    let text = format!("1,-1,{},{},{},{},0.9", square.x, square.y, square.width, square.height);
+    let mut detector = of_file(&text, Config { body: Body::Upper, ..Config::default() }).unwrap();
+    let found = detect(&mut detector, &frame(1, None)).remove(0);
+    assert_eq!(found.region, square);
+    assert!((found.position - head).norm() < 1e-3, "{}", found.position);
+    let ahead_m = camera().depth_of(&found.position);
+    let sigma = found.covariance[(0, 0)].sqrt();
+    assert!((sigma - 0.2 * (ahead_m - HEAD_RADIUS_M)).abs() < 1e-3, "a fifth: {sigma}");
+}
+
+/// The face is 14 cm high and wide, its middle 14 cm below the upper edge of the square.
+#[test]
+fn the_depth_is_that_of_the_face_alone() {
+    let head = Point3::new(3.0, 0.0, 1.585);
+    let mut detector = of_file(&whole_body(head), Config::default()).unwrap();
+    let square = camera().upper_body(&head);
+    let px_per_m = square.width / 0.57;
+    let (x, y) = (square.centre().x, square.y + 0.14 * px_per_m);
+    let mut seen = |half_m: f64, inside: f32, outside: f32| {
+        let half = half_m * px_per_m;
+        let depth = DepthImage::from_fn(640, 480, |u, v| {
+            let (u, v) = (u as f64 + 0.5 - x, v as f64 + 0.5 - y);
+            if u.abs() < half && v.abs() < half { inside } else { outside }
+        });
+        let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
+        let frame =
+            Frame::new(2, Stamp::from_nanos(200), camera(), Motion::at_rest(0.1), images);
+        detect(&mut detector, &frame).remove(0).position.x
+    };
+    assert!((seen(0.085, 2.0, 5.0) - 2.08).abs() < 0.02, "nothing beside it is looked at");
+    assert!((seen(0.03, f32::NAN, 2.0) - 2.08).abs() < 0.02, "and its edge is");
+    assert!((seen(0.06, 5.0, 2.0) - 5.08).abs() < 0.02, "most of it counts");
+    assert!((seen(0.085, f32::NAN, 2.0) - 3.0).abs() < 0.05, "holes do not count");
+}
+
+#[test]
+fn each_setting_that_cannot_work_is_named() {
+    for (key, config) in [
+        ("height_m", Config { height_m: f64::INFINITY, ..Config::default() }),
+        ("sigma_px", Config { sigma_px: 0.0, ..Config::default() }),
+        ("sigma_depth_m", Config { sigma_depth_m: -1.0, ..Config::default() }),
+        ("sigma_distance", Config { sigma_distance: f64::NAN, ..Config::default() }),
+        ("sigma_position_m", Config { sigma_position_m: 0.0, ..Config::default() }),
+    ] {
+        let error = RecordedDetections::new(config, &context(".".as_ref())).err().unwrap();
+        assert!(error.to_string().starts_with(key), "{error}");
+    }
+}

@@ -142,4 +142,71 @@ mod tests {
         assert_eq!(nearest(&settings, &[0, 1, 0, 1]), Ahead::Free);
         assert_eq!(nearest(&settings, &[0, 1, 0, 2]), Ahead::Something(3.0 * BIN_M));
     }
+
+    #[test]
+    fn the_floor_grows_rougher_with_the_distance_and_hanging_lamps_are_passed_below() {
+        let settings = CorridorSettings::default();
+        let is = |x: f64, z: f64| is_thing(&settings, &Point3::new(x, 0.0, z));
+        assert!(!is(0.0, 0.07) && is(0.0, 0.09), "8 cm");
+        assert!(!is(2.0, 0.13) && is(2.0, 0.15) && is(-2.0, 0.15), "and 3 cm a metre");
+        assert!(is(1.0, 1.49) && !is(1.0, 1.51));
+    }
+
+    #[test]
+    fn what_is_beside_the_front_is_reached_at_once_and_what_is_behind_never() {
+        let settings = CorridorSettings::default();
+        let at = |x: f64, y: f64, steps_in_m: f64| {
+            let sign = Sign { at: Point2::new(x, y), points: 1, steps_in_m };
+            in_the_way(&settings, &sign, 0.0, None)
+        };
+        assert_eq!((at(0.1, 0.0, 0.0), at(0.0, 0.0, 0.0)), (Some(0.0), None));
+        assert!(at(3.19, 0.0, 0.0).is_some() && at(3.21, 0.0, 0.0).is_none(), "3 m from the front");
+        assert!(at(1.0, 0.33, 0.0).is_some() && at(1.0, 0.35, 0.0).is_none());
+        assert!(at(1.0, -0.58, 0.25).is_some() && at(1.0, -0.6, 0.25).is_none(), "steps in");
+    }
+
+    #[test]
+    fn what_is_near_the_person_is_the_person() {
+        let settings = CorridorSettings::default();
+        let at = |x: f64| {
+            let sign = Sign { at: Point2::new(x, 0.0), points: 1, steps_in_m: 0.0 };
+            in_the_way(&settings, &sign, 0.0, Some(Point2::new(2.0, 0.0))).is_some()
+        };
+        assert_eq!([1.54, 1.56, 2.44, 2.46].map(at), [true, false, false, true]);
+    }
+
+    #[test]
+    fn the_nearest_place_with_enough_points_before_it_is_told() {
+        let settings = CorridorSettings::default();
+        let seen = |signs: &[(f64, u32)]| {
+            let at = |(x, points): &(f64, u32)| Sign {
+                at: Point2::new(*x, 0.0),
+                points: *points,
+                steps_in_m: 0.0,
+            };
+            ahead(&settings, signs.iter().map(at), 0.0, None)
+        };
+        assert_eq!(seen(&[(1.22, 5)]), Ahead::Free);
+        assert_eq!(seen(&[(2.02, 9), (1.22, 6)]), Ahead::Something(20.0 * BIN_M));
+        assert_eq!(seen(&[(0.72, 3), (1.22, 3)]), Ahead::Something(20.0 * BIN_M), "both together");
+        assert_eq!(seen(&[(3.199, 6)]), Ahead::Something(59.0 * BIN_M), "the last one");
+        assert_eq!(seen(&[(9.0, 99)]), Ahead::Free);
+    }
+
+    #[test]
+    fn two_rays_are_something_and_one_may_be_dust() {
+        for (min_points, rays) in [(6, 3), (5, 3), (1, 1)] {
+            let settings = CorridorSettings { min_points, ..CorridorSettings::default() };
+            assert_eq!(settings.ray_points(), rays);
+        }
+    }
+
+    /// In a bend to the left, one metre to the left of it and one to the right.
+    #[test]
+    fn what_is_aside_of_a_bend_is_as_far_aside_as_it_is_from_the_path() {
+        for (point, aside) in [(Point2::new(0.0, 1.0), 1.0), (Point2::new(3.0, 2.0), -1.0)] {
+            let (_, found) = on_arc(point, 0.5);
+            assert!((found - aside).abs() < 1e-9, "{point}: {found}");
+        }
+    }
 }

@@ -274,10 +274,8 @@ impl Governor {
         let dt = dt.clamp(0.0, LONGEST_STEP_S);
         let GovernorSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
         // Away from standing still is faster, towards it is slower.
-        let (up, down) = match before.forward >= 0.0 {
-            true => (max_accel_mps2, max_decel_mps2),
-            false => (max_decel_mps2, max_accel_mps2),
-        };
+        let up = if before.forward < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
+        let down = if before.forward > 0.0 { max_decel_mps2 } else { max_accel_mps2 };
         let forward = wanted.forward.clamp(before.forward - down * dt, before.forward + up * dt);
         if forward == wanted.forward {
             return wanted;

@@ -170,6 +170,135 @@ fn stopping_takes_what_physics_says() {
     assert!((settings.stopping_m(0.9) - 0.855).abs() < 1e-9);
 }
 
+#[test]
+fn who_turns_too_fast_turns_slower_on_the_same_arc() {
+    let (_, command) = at_speed(-0.9, 0.9);
+    let rim = 1.5 * DRIVE.half_separation_m;
+    assert_eq!(command.reason, Reason::Limited);
+    assert!((command.wheels.right - rim).abs() < 1e-9, "{command:?}");
+    assert!((command.wheels.left + rim).abs() < 1e-9, "{command:?}");
+    let (_, bend) = at_speed(0.1, 0.9);
+    let WheelSpeeds { left, right } = bend.wheels;
+    assert!((right / left - 9.0).abs() < 1e-9, "{bend:?}");
+    assert!((right - left - 2.0 * rim).abs() < 1e-9, "{bend:?}");
+}
+
+#[test]
+fn while_it_speeds_up_the_robot_is_on_the_arc_that_was_wished_for() {
+    let mut governor = governor();
+    for frame in 1..6 {
+        let command = governor.govern(&wish(frame, 0.4, 0.8), free);
+        let WheelSpeeds { left, right } = command.wheels;
+        assert!((right / left - 2.0).abs() < 1e-9, "{command:?}");
+        assert_eq!(command.reason, Reason::Limited);
+    }
+}
+
+#[test]
+fn what_is_ahead_is_looked_for_on_the_arc_and_only_if_the_robot_drives_ahead() {
+    let mut asked = None;
+    governor().govern(&wish(1, 0.3, 0.4), |corridor, curvature| {
+        asked = Some((corridor.clone(), curvature));
+        None
+    });
+    let (corridor, curvature) = asked.unwrap();
+    assert_eq!(corridor, CorridorSettings::default());
+    assert!((curvature - 0.05 / DRIVE.half_separation_m / 0.35).abs() < 1e-9, "{curvature}");
+    let nobody_asks = |_: &CorridorSettings, _: f64| -> Option<Ahead> { panic!("asked") };
+    governor().govern(&wish(1, -0.2, 0.2), nobody_asks);
+    let settings = GovernorSettings { reverse: true, ..GovernorSettings::default() };
+    Governor::new(settings, DRIVE, MAX_MPS).govern(&wish(1, -0.2, -0.2), nobody_asks);
+}
+
+#[test]
+fn of_several_limits_the_lowest_holds_and_is_named() {
+    let command = |aim, pause_s, at_m| {
+        let (mut governor, _) = at_speed(0.8, 0.8);
+        let wish = Wish { aim, pause_s, ..wish(40, 0.8, 0.8) };
+        let command = governor.govern(&wish, |_, _| Some(Ahead::Something(at_m)));
+        (command.reason, (command.wheels.left * 100.0).round())
+    };
+    assert_eq!(command(Aim::Perhaps, 0.1, 2.0), (Reason::Unsure, 45.0));
+    assert_eq!(command(Aim::Perhaps, 0.3, 2.0), (Reason::Slow, 45.0), "and not a quarter");
+    assert_eq!(command(Aim::Perhaps, 0.1, 0.45), (Reason::Obstacle, 32.0));
+    assert_eq!(command(Aim::Person, 0.1, 0.7), (Reason::Obstacle, 77.0));
+    assert_eq!(command(Aim::Person, 0.25, 2.0), (Reason::Follow, 80.0), "just in time");
+    assert_eq!(command(Aim::Person, 0.5, 2.0), (Reason::Slow, 45.0), "just not stopped");
+}
+
+#[test]
+fn a_pause_gives_no_licence_for_a_leap() {
+    let (mut governor, _) = at_speed(0.1, 0.1);
+    let late = Wish { stamp: Stamp::from_nanos(4_900_000_000), ..wish(0, 0.9, 0.9) };
+    let command = governor.govern(&late, free);
+    assert!((command.wheels.left - (0.1 + 0.5 * LONGEST_STEP_S)).abs() < 1e-9, "{command:?}");
+}
+
+#[test]
+fn backwards_it_speeds_up_and_slows_down_as_it_does_ahead() {
+    let settings = GovernorSettings { reverse: true, ..GovernorSettings::default() };
+    let mut governor = Governor::new(settings, DRIVE, MAX_MPS);
+    let mut speed = |frame, wished| governor.govern(&wish(frame, wished, wished), free).wheels.left;
+    let faster: Vec<f64> = (1..4).map(|frame| speed(frame, -0.9)).collect();
+    for (found, expected) in faster.iter().zip([-0.1, -0.15, -0.2]) {
+        assert!((found - expected).abs() < 1e-9, "{faster:?}");
+    }
+    let slower = speed(4, 0.0);
+    assert!((slower + 0.1).abs() < 1e-9, "{slower}");
+}
+
+#[test]
+fn commands_say_until_when_they_hold_and_what_they_answer_to() {
+    let (_, command) = at_speed(0.5, 0.5);
+    assert_eq!(command.stamp, wish(39, 0.0, 0.0).stamp);
+    assert_eq!(command.valid_until, command.stamp.plus_seconds(0.25));
+}
+
+#[test]
+fn odometry_may_be_as_fast_as_the_setting_says_in_all_directions() {
+    let is_fault = |forward: f64, left: f64, dt: f64| {
+        let mut governor = governor();
+        governor.check_odometry(&Motion { forward, left, ..Motion::at_rest(dt) });
+        governor.fault().is_some()
+    };
+    assert!(!is_fault(0.29, 0.0, 0.1) && is_fault(0.31, 0.0, 0.1), "3 m/s");
+    assert!(!is_fault(0.0, -0.29, 0.1) && is_fault(0.0, -0.31, 0.1) && is_fault(-0.31, 0.0, 0.1));
+    assert!(!is_fault(0.2, 0.2, 0.1) && is_fault(0.22, 0.22, 0.1), "both at once");
+    assert!(!is_fault(0.14, 0.0, 0.0) && is_fault(0.16, 0.0, 0.0), "stamps are never so exact");
+}
+
+#[test]
+fn the_first_fault_is_told_and_after_it_the_robot_starts_anew() {
+    let (mut governor, _) = at_speed(0.8, 0.8);
+    governor.latch("a button");
+    governor.latch("odometry jumped");
+    assert_eq!(governor.fault(), Some("a button"));
+    governor.arm();
+    assert_eq!((governor.fault(), governor.orders().last), (None, None));
+    let command = governor.govern(&wish(41, 0.8, 0.8), free);
+    assert!((command.wheels.left - 0.5 * LONGEST_STEP_S).abs() < 1e-9, "{command:?}");
+}
+
+#[test]
+fn a_wish_of_either_wheel_that_is_no_number_stops() {
+    for (left, right) in [(0.1, f64::NAN), (f64::INFINITY, 0.1), (0.1, f64::NEG_INFINITY)] {
+        let (mut governor, _) = at_speed(0.5, 0.5);
+        let command = governor.govern(&wish(40, left, right), free);
+        assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::NotFinite));
+    }
+}
+
+#[test]
+fn stopping_takes_reaction_braking_and_a_margin() {
+    let settings = GovernorSettings {
+        reaction_s: 0.4,
+        max_decel_mps2: 2.0,
+        margin_m: 0.25,
+        ..GovernorSettings::default()
+    };
+    assert!((settings.stopping_m(2.0) - (0.8 + 1.0 + 0.25)).abs() < 1e-12);
+}
+
 /// Any number at all, the strange ones often.
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![

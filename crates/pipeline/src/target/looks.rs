@@ -67,6 +67,13 @@ impl Looks {
         }
     }
 
+    /// Of somebody whose upper body is of one colour of the histogram's.
+    #[cfg(test)]
+    pub(crate) fn in_one_colour(height_m: f64, colour: Option<usize>) -> Self {
+        let torso = colour.map(|bin| std::array::from_fn(|i| f64::from(i == bin)));
+        Self { height_m, torso, legs: None, texture: None }
+    }
+
     pub(crate) fn difference(&self, other: &Self) -> Difference {
         Difference {
             torso: both(&self.torso, &other.torso),
@@ -247,6 +254,208 @@ mod tests {
         fn every_slope_has_a_bin(across in -255.0..255.0f64, down in -255.0..255.0f64) {
             prop_assert!(edge(across, down) < EDGES);
             prop_assert_eq!(edge(across, down), edge(across, down));
+        }
+    }
+
+    const SURE: f64 = 1e-9;
+
+    /// Where the votes of a colour go: bins and their shares.
+    fn votes(colour: [f64; 3]) -> Vec<(usize, f64)> {
+        let mut histogram = [0.0; COLOURS];
+        vote(&mut histogram, colour);
+        histogram.iter().copied().enumerate().filter(|(_, share)| *share > SURE).collect()
+    }
+
+    fn assert_votes(colour: [f64; 3], expected: &[(usize, f64)]) {
+        let found = votes(colour);
+        let fits = found.len() == expected.len()
+            && found.iter().zip(expected).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < SURE);
+        assert!(fits, "{colour:?}: {found:?}, not {expected:?}");
+    }
+
+    /// Twelve hues dark, twelve bright, four greys.
+    #[test]
+    fn colours_fall_into_bins_by_hue_and_brightness() {
+        assert_votes([1.0, 0.0, 0.0], &[(HUES, 1.0)]);
+        assert_votes([0.0, 1.0, 0.0], &[(HUES + 4, 1.0)]);
+        assert_votes([0.0, 0.0, 1.0], &[(HUES + 8, 1.0)]);
+        assert_votes([0.2, 0.0, 0.0], &[(0, 1.0)]);
+        assert_votes([0.0, 0.4, 0.0], &[(4, 0.5), (HUES + 4, 0.5)]);
+        // An eighth of the way from red to yellow is a quarter of a bin.
+        assert_votes([1.0, 0.125, 0.0], &[(HUES, 0.75), (HUES + 1, 0.25)]);
+        assert_votes([1.0, 0.0, 0.125], &[(HUES, 0.75), (2 * HUES - 1, 0.25)]);
+    }
+
+    #[test]
+    fn what_has_no_hue_falls_into_a_grey_by_its_brightness() {
+        assert_votes([0.0; 3], &[(2 * HUES, 1.0)]);
+        assert_votes([1.0; 3], &[(2 * HUES + 3, 1.0)]);
+        assert_votes([0.25; 3], &[(2 * HUES + 1, 0.5), (2 * HUES + 2, 0.5)]);
+        assert_votes([1.0, 0.95, 0.95], &[(2 * HUES + 3, 1.0)]);
+        // Of a pale red, half is red and half is grey.
+        assert_votes([1.0, 0.81, 0.81], &[(HUES, 0.5), (2 * HUES + 3, 0.5)]);
+    }
+
+    #[test]
+    fn edges_fall_into_eight_directions_whatever_their_sign() {
+        let bins = [(9.0, 0.1), (9.0, 4.0), (0.1, 9.0), (-0.1, 9.0), (-9.0, 0.1)];
+        let found = bins.map(|(across, down)| edge(across, down));
+        assert_eq!(found, [0, 1, 3, 4, 7]);
+        for (across, down) in bins {
+            assert_eq!(edge(across, down), edge(-across, -down));
+        }
+        assert_eq!([edge(6.1, 0.0), edge(3.0, -5.0), edge(5.9, 0.0)], [0, EDGES - 1, EDGES - 1]);
+    }
+
+    #[test]
+    fn distributions_that_share_a_quarter_are_so_far_apart() {
+        let (a, b) = ([0.75, 0.25], [0.25, 0.75]);
+        let overlap = 2.0 * (0.75_f64 * 0.25).sqrt();
+        assert!((hellinger(&a, &b) - (1.0 - overlap).sqrt()).abs() < 1e-12);
+        assert_eq!(normalised([3.0, 1.0], LEAST_PIXELS), Some([0.75, 0.25]));
+        assert_eq!(normalised([3.0, 1.0], LEAST_PIXELS - 1), None);
+        assert_eq!(normalised([0.0, 0.0], 99), None);
+    }
+
+    #[test]
+    fn the_mean_difference_is_that_of_what_is_known() {
+        let none = Difference::default();
+        assert_eq!(none.mean(), None);
+        let some = Difference { torso: Some(0.2), texture: Some(0.6), ..none };
+        assert!((some.mean().unwrap() - 0.4).abs() < 1e-12);
+        assert_eq!(Difference { legs: Some(0.3), ..none }.mean(), Some(0.3));
+    }
+
+    mod pictures {
+        use std::sync::Arc;
+
+        use nalgebra::{Point3, Vector2};
+        use tagalong_conformance::target;
+        use tagalong_core::{
+            Camera, DepthImage, Distortion, Images, Motion, Pinhole, RgbImage, Stamp,
+        };
+
+        use super::*;
+
+        const GREEN: [u8; 3] = [0, 255, 0];
+        const RED: [u8; 3] = [255, 0, 0];
+        const BLUE: [u8; 3] = [0, 0, 255];
+
+        fn camera() -> Camera {
+            let lens = Pinhole {
+                fx: 200.0,
+                fy: 200.0,
+                cx: 160.0,
+                cy: 60.0,
+                distortion: Distortion::None,
+            };
+            Camera::mounted(lens, 320, 240, 1.6, 0.0, 0.0)
+        }
+
+        /// Somebody whose face is 2 m away, where a metre is 100 pixels: a head at row 60,
+        /// a shirt from row 85 to 125, trousers from row 150 to 190.
+        fn somebody(y_m: f64) -> Track {
+            let mut track = target(2.08, y_m, Vector2::zeros());
+            track.estimate.person.position = Point3::new(2.08, y_m, 1.6);
+            track.estimate.region = camera().upper_body(&track.estimate.person.position);
+            track
+        }
+
+        fn frame(colour: impl Fn(usize, usize) -> [u8; 3], depth: Option<DepthImage>) -> Frame {
+            let images = Images {
+                colour: Some(Arc::new(RgbImage::from_fn(320, 240, colour))),
+                depth: depth.map(Arc::new),
+                ..Images::default()
+            };
+            let motion = Motion::at_rest(0.1);
+            Frame::new(1, Stamp::default(), Arc::new(camera()), motion, images)
+        }
+
+        fn dressed(x: usize, y: usize) -> [u8; 3] {
+            match (x, y) {
+                (143..=176, 85..125) => RED,
+                (145..=174, 150..190) => BLUE,
+                _ => GREEN,
+            }
+        }
+
+        /// The share of a bright hue.
+        fn share(histogram: &Option<Histogram<COLOURS>>, hue: usize) -> f64 {
+            histogram.unwrap()[HUES + hue]
+        }
+
+        #[test]
+        fn a_shirt_and_trousers_are_looked_at_and_nothing_beside_them() {
+            let looks = Looks::of(&somebody(0.0), &frame(dressed, None));
+            assert!((share(&looks.torso, 0) - 1.0).abs() < 1e-9, "{looks:?}");
+            assert!((share(&looks.legs, 8) - 1.0).abs() < 1e-9, "{looks:?}");
+            assert_eq!(looks.height_m, 1.6);
+            let naked = |x: usize, y: usize| match (x, y) {
+                (144..=175, 86..124) | (146..=173, 151..189) => GREEN,
+                _ => RED,
+            };
+            let looks = Looks::of(&somebody(0.0), &frame(naked, None));
+            let part = share(&looks.torso, 0);
+            assert!((0.01..0.3).contains(&part), "nor is less looked at: {part}");
+            let part = share(&looks.legs, 0);
+            assert!((0.01..0.3).contains(&part), "nor is less looked at: {part}");
+        }
+
+        #[test]
+        fn what_is_before_or_behind_the_person_is_not_the_person() {
+            // To the left of the middle there is a wall, and something near to the right.
+            let depth = |metres: f32| {
+                DepthImage::from_fn(320, 240, move |x, _| match x {
+                    0..155 => 4.0,
+                    155..165 => metres,
+                    _ => 1.5,
+                })
+            };
+            let striped = |x: usize, _: usize| if (155..165).contains(&x) { RED } else { GREEN };
+            let looks = |metres| Looks::of(&somebody(0.0), &frame(striped, Some(depth(metres))));
+            assert!((share(&looks(2.0).torso, 0) - 1.0).abs() < 1e-9);
+            assert!(looks(2.4).torso.is_some() && looks(1.75).torso.is_some());
+            assert!(looks(2.45).torso.is_none() && looks(1.7).torso.is_none());
+            assert!(looks(f32::NAN).torso.is_none());
+        }
+
+        #[test]
+        fn who_is_half_outside_of_the_image_is_not_looked_at() {
+            let plain = frame(|_, _| RED, None);
+            // A metre to the left is 96 pixels: the shirt reaches 17 to both sides.
+            assert!(Looks::of(&somebody(1.6), &plain).torso.is_some());
+            assert!(Looks::of(&somebody(1.7), &plain).torso.is_none());
+            let seen = Looks::of(&somebody(0.0), &plain);
+            assert_eq!(seen.difference(&seen), Difference {
+                torso: Some(0.0),
+                legs: Some(0.0),
+                texture: Some(0.0),
+            });
+        }
+
+        #[test]
+        fn stripes_are_told_from_hoops() {
+            let grey = |value: usize| [(value % 256) as u8; 3];
+            let across = frame(|x, _| grey(16 * (x % 8)), None);
+            let down = frame(|_, y| grey(16 * (y % 8)), None);
+            let [across, down, even] = [across, down, frame(|_, _| GREEN, None)]
+                .map(|frame| Looks::of(&somebody(0.0), &frame).texture.unwrap());
+            assert!(across[0] > 0.99, "{across:?}");
+            assert!(down[4] > 0.99, "{down:?}");
+            assert!(even[EDGES - 1] > 0.99, "{even:?}");
+        }
+
+        #[test]
+        fn without_colour_nothing_is_seen() {
+            let bare = Frame::new(
+                1,
+                Stamp::default(),
+                Arc::new(camera()),
+                Motion::at_rest(0.1),
+                Images::default(),
+            );
+            let looks = Looks::of(&somebody(0.0), &bare);
+            assert_eq!((looks.torso, looks.legs, looks.texture), (None, None, None));
         }
     }
 }

@@ -95,3 +95,80 @@ fn nearest(all: &VecDeque<Looks>, looks: &Looks) -> Option<Difference> {
     let mean = |d: &Difference| d.mean().unwrap_or(0.0);
     differences.min_by(|a, b| mean(a).total_cmp(&mean(b)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Looks of a height, and of a shirt of this colour.
+    fn looks(height_m: f64, colour: Option<usize>) -> Looks {
+        Looks::in_one_colour(height_m, colour)
+    }
+
+    #[test]
+    fn without_a_memory_there_is_nothing_to_differ_from() {
+        let mut memory = Memory::default();
+        memory.learn_other(looks(1.6, Some(1)));
+        assert_eq!(memory.differences(&looks(1.6, Some(1))), None);
+    }
+
+    #[test]
+    fn the_most_like_of_what_is_remembered_counts_and_the_mean_height() {
+        let mut memory = Memory::default();
+        memory.learn(looks(1.5, Some(1)));
+        memory.learn(looks(1.6, Some(2)));
+        let found = memory.differences(&looks(1.75, Some(2))).unwrap();
+        assert!((found.height_m - 0.2).abs() < 1e-12, "{found:?}");
+        assert_eq!((found.torso, found.legs, found.rivals), (Some(0.0), None, None));
+        let other = memory.differences(&looks(1.35, Some(3))).unwrap();
+        assert!((other.height_m - 0.2).abs() < 1e-12, "lower is as different as higher");
+        assert_eq!(other.torso, Some(1.0));
+    }
+
+    #[test]
+    fn looks_are_held_against_those_of_others() {
+        let mut memory = Memory::default();
+        memory.learn(looks(1.6, Some(1)));
+        memory.learn_other(looks(1.6, Some(2)));
+        let rivals = |colour| memory.differences(&looks(1.6, Some(colour))).unwrap().rivals;
+        assert_eq!([1, 2, 3].map(rivals), [Some(1.0), Some(-1.0), Some(0.0)]);
+    }
+
+    #[test]
+    fn only_news_are_remembered_and_the_first_looks_are_never_forgotten() {
+        let mut all = VecDeque::new();
+        for colour in [1, 1, 2, 1, 2] {
+            remember(&mut all, looks(1.6, Some(colour)), KEPT);
+        }
+        assert_eq!(all.len(), 2);
+        let mut all = VecDeque::new();
+        (0..26).for_each(|colour| remember(&mut all, looks(1.6, Some(colour)), KEPT));
+        assert_eq!(all.len(), MOST);
+        let known = |colour| all.contains(&looks(1.6, Some(colour)));
+        assert!((0..8).all(known) && !known(8) && !known(9) && (10..26).all(known));
+    }
+
+    #[test]
+    fn each_difference_speaks_for_or_against_by_its_weight() {
+        let settings = LooksSettings {
+            torso: [0.2, 10.0],
+            legs: [0.3, 4.0],
+            texture: [0.4, 2.0],
+            height: [0.1, 20.0],
+            rivals: 3.0,
+        };
+        let none = Differences { torso: None, legs: None, texture: None, height_m: 0.1, rivals: None };
+        for (differences, log_odds) in [
+            (none, 0.0),
+            (Differences { torso: Some(0.5), ..none }, -3.0),
+            (Differences { legs: Some(0.05), ..none }, 1.0),
+            (Differences { texture: Some(0.9), ..none }, -1.0),
+            (Differences { height_m: 0.15, ..none }, -1.0),
+            (Differences { rivals: Some(0.5), ..none }, 1.5),
+            (Differences { torso: Some(0.1), legs: Some(0.8), ..none }, -1.0),
+        ] {
+            let found = differences.log_odds(&settings);
+            assert!((found - log_odds).abs() < 1e-12, "{differences:?}: {found}");
+        }
+    }
+}
