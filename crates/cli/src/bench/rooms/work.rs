@@ -70,12 +70,16 @@ impl<'a> Desk<'a> {
         contestants: &'a [Contestant],
         logs: &'a [&'a Annotated],
     ) -> Result<Self, Failure> {
-        let mut skips = BTreeMap::new();
+        let (mut skips, mut tried) = (BTreeMap::new(), BTreeMap::new());
         for (contestant, about) in contestants.iter().enumerate() {
             for (log, annotated) in logs.iter().enumerate() {
-                if let Some(why) = plan::why_not(&about.config, annotated)? {
-                    skips.insert((contestant, log), why);
-                }
+                let key = (log, about.config.reading());
+                let why = match tried.get(&key) {
+                    Some(known) => Option::clone(known),
+                    None => plan::why_not(&about.config, annotated)?,
+                };
+                tried.insert(key, why.clone());
+                skips.extend(why.map(|why| ((contestant, log), why)));
             }
         }
         Ok(Self { store, registry, contestants, logs, version: version()?, skips })
