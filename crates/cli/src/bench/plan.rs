@@ -64,6 +64,21 @@ pub struct Candidate {
     pub tune: Vec<Tunable>,
 }
 
+impl Candidate {
+    /// Opens a log as this pipeline reads it.
+    ///
+    /// # Errors
+    /// A log that lacks what the pipeline needs, or that cannot be read.
+    pub fn open(&self, log: &Path) -> Result<FrameSource, LogError> {
+        FrameSource::open(log, &self.outer.input, &self.outer.limits, self.inputs)
+    }
+
+    /// Returns how it reads logs: pipelines of which this is equal see the same frames.
+    pub fn reading(&self) -> String {
+        format!("{:?}", (&self.outer.input, &self.outer.limits, self.inputs))
+    }
+}
+
 /// A log and its truth.
 pub struct Annotated {
     /// The log.
@@ -94,7 +109,7 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
     for log in &logs {
         let mut tried = BTreeMap::new();
         for config in &configs {
-            let key = format!("{:?}", (&config.outer.input, &config.outer.limits, config.inputs));
+            let key = config.reading();
             let skip = match tried.get(&key) {
                 Some(known) => Option::clone(known),
                 None => tried.entry(key).or_insert(why_not(config, log)?).clone(),
@@ -194,8 +209,7 @@ fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<Str
 /// # Errors
 /// A log that cannot be read at all.
 pub fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Failure> {
-    let outer = &config.outer;
-    match FrameSource::open(&log.log, &outer.input, &outer.limits, config.inputs) {
+    match config.open(&log.log) {
         Ok(_) => Ok(None),
         Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
             let text = error.to_string();

@@ -130,7 +130,7 @@ fn a_second_time_computes_nothing_and_jobs_change_no_byte() {
 fn tables_name_figures_and_choices() {
     let home = Home::new();
     let shown = text(&home.rooms(&[]).stdout);
-    for words in ["HOTA without", "near", "means over the rooms", "A (a)", "With all: `detectors"] {
+    for words in ["HOTA w/o", "near", "means over the rooms", "A (a)", "With all: `detectors"] {
         assert!(shown.contains(words), "{words} in\n{shown}");
     }
     let page = text(&home.rooms(&["--format", "markdown"]).stdout);

@@ -61,7 +61,7 @@ fn what_is_shared_is_what_would_have_been_found() {
     let shared = together(&mut sharing);
     assert_eq!(alone, shared);
     let asked = world.asked.lock().unwrap().len();
-    assert!(4 * asked < 3 * asked_alone, "{asked} of {asked_alone} questions");
+    assert!(5 * asked < 4 * asked_alone, "{asked} of {asked_alone} questions");
     let sights = alone.iter().map(|all| all.iter().collect::<std::collections::BTreeSet<_>>());
     assert!(sights.map(|all| all.len()).max() > Some(5), "the configs differ in what they say");
 }

@@ -140,10 +140,10 @@ impl Report {
         let rooms: Vec<String> = self.rooms.iter().map(About::words).collect();
         let mut notes = vec![
             format!("Rooms: {}.", rooms.join("; ")),
-            "\"without\": in each room, the settings that the other rooms chose; \"with all\": \
-             those that all rooms chose, this one among them; \"gap\": how much of HOTA the second \
-             has over the first; \"shipped\": the settings of the config. A room's figure is the \
-             mean over its logs, and the means here are over rooms."
+            "w/o: in each room, with the settings that the other rooms chose; all: with those \
+             that all rooms chose, this one among them; gap: HOTA of all less that of w/o; as is: \
+             with the settings of the config; false: false people in a frame. A room's figure is \
+             the mean over its logs, and the means here are over rooms."
                 .to_owned(),
             format!(
                 "Chosen by the mean of {objective} over rooms, among at most {} settings a \
@@ -308,22 +308,22 @@ impl Fitted {
 /// The columns of all tables.
 fn columns() -> impl Iterator<Item = String> {
     [
-        "HOTA without",
-        "with all",
+        "HOTA w/o",
+        "all",
         "gap",
-        "shipped",
-        "IDF1 without",
-        "with all",
-        "shipped",
-        "MOTA without",
-        "with all",
-        "shipped",
-        "false a frame without",
-        "with all",
-        "shipped",
-        "recall without",
-        "with all",
-        "shipped",
+        "as is",
+        "IDF1 w/o",
+        "all",
+        "as is",
+        "MOTA w/o",
+        "all",
+        "as is",
+        "false w/o",
+        "all",
+        "as is",
+        "recall w/o",
+        "all",
+        "as is",
     ]
     .into_iter()
     .map(String::from)

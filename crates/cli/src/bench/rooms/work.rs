@@ -8,7 +8,6 @@ use std::sync::{Mutex, PoisonError};
 use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
 use tagalong_core::Registry;
-use tagalong_log::FrameSource;
 use tagalong_report::TaskResult;
 use tagalong_tuning::Figures;
 
@@ -71,12 +70,16 @@ impl<'a> Desk<'a> {
         contestants: &'a [Contestant],
         logs: &'a [&'a Annotated],
     ) -> Result<Self, Failure> {
-        let mut skips = BTreeMap::new();
+        let (mut skips, mut tried) = (BTreeMap::new(), BTreeMap::new());
         for (contestant, about) in contestants.iter().enumerate() {
             for (log, annotated) in logs.iter().enumerate() {
-                if let Some(why) = plan::why_not(&about.config, annotated)? {
-                    skips.insert((contestant, log), why);
-                }
+                let key = (log, about.config.reading());
+                let why = match tried.get(&key) {
+                    Some(known) => Option::clone(known),
+                    None => plan::why_not(&about.config, annotated)?,
+                };
+                tried.insert(key, why.clone());
+                skips.extend(why.map(|why| ((contestant, log), why)));
             }
         }
         Ok(Self { store, registry, contestants, logs, version: version()?, skips })
@@ -140,9 +143,8 @@ impl<'a> Desk<'a> {
     fn passes(&self, due: Vec<Run>, jobs: usize) -> VecDeque<Vec<Run>> {
         let mut groups: BTreeMap<(usize, String), Vec<Run>> = BTreeMap::new();
         for run in due {
-            let config = &self.contestants[run.contestant].config;
-            let read = format!("{:?}", (&config.outer.input, &config.outer.limits, config.inputs));
-            groups.entry((run.log, read)).or_default().push(run);
+            let reading = self.contestants[run.contestant].config.reading();
+            groups.entry((run.log, reading)).or_default().push(run);
         }
         let passes = groups.values().flat_map(|group| group.chunks(LANES)).map(<[Run]>::to_vec);
         spread(passes.collect(), jobs)
@@ -199,9 +201,7 @@ impl Shift<'_> {
         self.bar.set_message(log.name.clone());
         let options = TruthOptions { upper_body: log.whole_bodies, ..TruthOptions::default() };
         let truth = TruthFile::read(&log.truth, options)?;
-        let config = &contestants[first.contestant].config;
-        let outer = &config.outer;
-        let mut source = FrameSource::open(&log.log, &outer.input, &outer.limits, config.inputs)?;
+        let mut source = contestants[first.contestant].config.open(&log.log)?;
         let mut lanes: Vec<Lane> =
             pass.iter().map(|run| Lane::new(|| self.pipeline(*run))).collect();
         let mut shots = Shots::default();
