@@ -10,7 +10,8 @@ use crate::ReproduceError;
 /// # Errors
 /// A config that is no TOML.
 pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
-    let unreadable = |error| ReproduceError::Other(format!("{}: {error}", contender.name));
+    let unreadable =
+        |error: toml::de::Error| ReproduceError::Other(format!("{}: {error}", contender.name));
     contender.config.parse().map_err(unreadable)
 }
 
@@ -27,12 +28,12 @@ pub(crate) fn with_values(
     let mut config = Value::Table(parsed(contender)?);
     for (key, text) in values {
         let fails = |why: &str| ReproduceError::Other(format!("{name}: {key} = {text}: {why}"));
-        let value = format!("value = {text}").parse::<Table>();
-        let value = value.map_err(|error| fails(&error.to_string()))?.remove("value");
-        let slot = slot(&mut config, key).ok_or_else(|| fails("there is no such place"))?;
-        *slot = value.ok_or_else(|| fails("there is no value"))?;
+        let value = text.parse().map_err(|error: toml::de::Error| fails(error.message()))?;
+        *slot(&mut config, key).ok_or_else(|| fails("there is no such place"))? = value;
     }
-    Ok(Contender { name: name.to_owned(), config: config.to_string(), ..contender.clone() })
+    let fails = |error| ReproduceError::Other(format!("{name}: {error}"));
+    let config = toml::to_string(&config).map_err(fails)?;
+    Ok(Contender { name: name.to_owned(), config, ..contender.clone() })
 }
 
 fn slot<'a>(config: &'a mut Value, key: &str) -> Option<&'a mut Value> {

@@ -177,3 +177,27 @@ impl Lane {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_pairs(kind: &str, stereo: &StereoSettings) -> Result<Trial, TrialError> {
+        let text = format!(
+            "duration_s = 0.3\n[camera]\nkind = \"{kind}\"\nwidth = 64\nheight = 48\n\
+             [[people]]\npath = [[3.0, 4.0]]\n"
+        );
+        Trial::of_pairs(&Scene::parse(&text).unwrap(), &[], &Registry::default(), stereo)
+    }
+
+    #[test]
+    fn depth_comes_from_pairs_and_from_nothing_else() {
+        let stereo = StereoSettings::default();
+        assert!(!of_pairs("stereo", &stereo).unwrap().moments.is_empty());
+        let error = of_pairs("rgbd", &stereo).unwrap_err();
+        assert!(matches!(error, TrialError::Pair(_)), "{error}");
+        let wrong = StereoSettings { window: 4, ..stereo };
+        let error = of_pairs("stereo", &wrong).unwrap_err();
+        assert!(matches!(error, TrialError::Config(_)), "{error}");
+    }
+}

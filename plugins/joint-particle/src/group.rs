@@ -313,6 +313,14 @@ mod tests {
     }
 
     #[test]
+    fn each_part_of_a_group_has_numbers_of_its_own() {
+        let config = Config { particles: 2, ..Config::default() };
+        let mut group = at_places(1, &[0.1, 0.2], &[0.5, 0.5]);
+        let numbers = [0; 3].map(|column| group.part(&[column], 7, &config).random.uniform());
+        assert!(numbers[0] != numbers[1] && numbers[1] != numbers[2] && numbers[0] != numbers[2]);
+    }
+
+    #[test]
     fn pairs_of_two_groups_are_at_random() {
         let evenly: Vec<f64> = (0..400).map(f64::from).collect();
         let one = at_places(1, &evenly, &[1.0 / 400.0; 400]);

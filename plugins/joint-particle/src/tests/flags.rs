@@ -369,7 +369,7 @@ fn walked(swap_margin: f64, mirrored: bool) -> Rig {
         let shade = |x: usize, _| if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] };
         Some(RgbImage::from_fn(100, 80, shade))
     };
-    // The second person faces left, the first one right.
+    // The second person faces left, the first one towards the robot.
     let facing = |scene: &[Person]| {
         let fits = |p: &&Person| (p.velocity.y > 0.3) == (p.position.y < 0.0);
         5.0 * scene.len() as f64 + 2.0 * scene.iter().filter(fits).count() as f64
@@ -391,6 +391,15 @@ fn people_who_come_out_with_each_others_colours_get_each_others_names() {
     assert!(straight.place(1).y > 0.5 && straight.place(2).y < -0.5);
     assert!(crossed.place(1).y < -0.5 && crossed.place(2).y > 0.5, "{}", crossed.place(1));
     assert!(walked(2.0, true).place(1).y > 0.5, "2 is never");
+    // The headings were exchanged with the names.
+    let mut crossed = crossed;
+    let likelihood = Formula::flat(5.0);
+    crossed.look(&likelihood);
+    let asked = likelihood.asked();
+    let faces = |left: bool| {
+        asked.iter().flatten().find(|p| (p.position.y > 0.0) == left).unwrap().velocity.y
+    };
+    assert!(faces(true).abs() < 1e-9 && faces(false) > 0.9, "{} {}", faces(true), faces(false));
 }
 
 #[test]
@@ -406,6 +415,14 @@ fn who_is_forgotten_leaves_the_others_as_they_were() {
     assert_eq!(rig.columns(2).len(), Config::default().particles);
     rig.filter.stop(TrackId(2));
     assert!(!rig.columns(3).is_empty() && rig.columns(2).is_empty());
+    // A number that is given again has no heading from before.
+    let left = |scene: &[Person]| 5.0 * scene.iter().filter(|p| p.velocity.y > 0.3).count() as f64;
+    rig.look(&Formula::new(left));
+    rig.filter.stop(TrackId(3));
+    rig.start(3, [2.5, 0.0, 1.6], [0.05; 3]);
+    let likelihood = Formula::flat(3.0);
+    rig.look(&likelihood);
+    assert_eq!(likelihood.asked()[0][0].velocity, Vector2::zeros());
 }
 
 #[test]
