@@ -49,8 +49,8 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// The scenes are seen by a stereo pair without colour.
-const SEEN_BY: [(&str, &str); 2] = [("camera.kind", "stereo"), ("camera.colour", "false")];
+/// The scenes are seen by a stereo pair, which has no colour.
+const SEEN_BY: [(&str, &str); 1] = [("camera.kind", "stereo")];
 /// The config whose `[stereo]` stage gives all their depth, and whose settings of the
 /// detector are made for it.
 const STEREO: &str = "stereo-ekf";

@@ -90,12 +90,10 @@ fn follows_kalman(config: Config, tolerance: f64) {
         let spread = estimate.covariance[(axis, axis)].sqrt();
         assert!((spread / expected - 1.0).abs() < 0.3 * tolerance, "{axis}: {spread} {expected}");
     }
-    for axis in 0..2 {
-        let (spread, expected) = (
-            estimate.covariance[(3 + axis, 3 + axis)].sqrt(),
-            axes[axis].covariance[(1, 1)].sqrt(),
-        );
-        assert!((spread / expected - 1.0).abs() < 0.3 * tolerance, "{axis}: {spread} {expected}");
+    for (n, axis) in axes.iter().enumerate().take(2) {
+        let spread = estimate.covariance[(3 + n, 3 + n)].sqrt();
+        let expected = axis.covariance[(1, 1)].sqrt();
+        assert!((spread / expected - 1.0).abs() < 0.3 * tolerance, "{n}: {spread} {expected}");
     }
 }
 
