@@ -72,6 +72,8 @@ fn a_mean_has_the_interval_of_student() {
     let [lower, upper] = interval.ends().unwrap();
     assert!((interval.estimate - 1.58).abs() < 1e-12);
     assert!((lower - 0.7001).abs() < 1e-3 && (upper - 2.4599).abs() < 1e-3, "{lower} {upper}");
+    let [lower, upper] = mean_interval(&[0.0, 1.0]).unwrap().ends().unwrap();
+    assert!((lower + 5.8531).abs() < 1e-4 && (upper - 6.8531).abs() < 1e-4, "{lower} {upper}");
     for (freedom, quantile) in [(1, 12.7062), (2, 4.3027), (5, 2.5706), (19, 2.0930)] {
         assert!((student_quantile(freedom) - quantile).abs() < 1e-4, "{freedom}");
     }
@@ -101,6 +103,8 @@ fn one_draw_and_draws_that_agree_tell_no_spread() {
     assert_eq!(clustered_share(&[[7, 9], [0, 0]]), Some(Interval::open(7.0 / 9.0)));
     assert_eq!(clustered_share(&[[0, 0]]), None);
     assert_eq!(Interval::open(0.5).within(0.0, 1.0).ends(), None);
+    let first = |drawn: &[usize]| [0.3][drawn[0]];
+    assert_eq!(draws_interval(1, first), Some(Interval::open(0.3)), "asked of no draws");
     // Without one of them there is no figure: nothing tells its spread.
     let ratio = |drawn: &[usize]| if drawn.contains(&0) { 0.5 } else { f64::NAN };
     assert_eq!(draws_interval(2, ratio), Some(Interval::open(0.5)));
