@@ -127,7 +127,9 @@ mod tests {
     #[test]
     fn bags_of_other_formats_get_the_line_that_converts_them() {
         let home = tempfile::tempdir().unwrap();
-        for (name, expected) in [("a.bag", "rosbags-convert"), ("b.db3", "--src-typestore ros2_humble")] {
+        for (name, expected) in
+            [("a.bag", "rosbags-convert"), ("b.db3", "--src-typestore ros2_humble")]
+        {
             let path = home.path().join(name);
             fs::write(&path, "x").unwrap();
             let failure = check_log_path(&path).unwrap_err();
