@@ -407,7 +407,8 @@ mod tests {
     }
 
     fn level(height_m: f64) -> Camera {
-        let lens = Pinhole { fx: 500.0, fy: 400.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        let lens =
+            Pinhole { fx: 500.0, fy: 400.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
         Camera::mounted(lens, 640, 480, height_m, 0.0, 0.0)
     }
 

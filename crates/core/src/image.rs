@@ -184,7 +184,8 @@ mod tests {
 
     #[test]
     fn grey_is_the_luma_of_the_colour_rounded() {
-        let colours = vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [255; 3], [1, 1, 0], [10, 20, 30]];
+        let colours =
+            vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [255; 3], [1, 1, 0], [10, 20, 30]];
         let grey = RgbImage::from_pixels(6, 1, colours).unwrap().to_grey();
         assert_eq!(grey.pixels(), [76, 150, 29, 255, 1, 18]);
     }

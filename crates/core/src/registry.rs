@@ -538,7 +538,10 @@ mod tests {
         let text = "{ height_m = -1.0 }";
         let value = toml::de::DeValue::parse(text).unwrap();
         let error = registry.build_verifier("tall", Some(value), &context()).err().unwrap();
-        assert_eq!(error.render("a.toml", text).lines().next(), Some("a.toml:1:1: nobody is that small"));
+        assert_eq!(
+            error.render("a.toml", text).lines().next(),
+            Some("a.toml:1:1: nobody is that small")
+        );
     }
 
     #[test]
@@ -561,6 +564,8 @@ mod tests {
         assert_eq!(context.model("Cargo.toml", "built in", first), Ok("[package]".into()));
         let refused = |file: &str, built_in| context.model(file, built_in, first).unwrap_err();
         assert_eq!(refused("", "").to_string(), "model file ``: empty");
-        assert!(refused("nowhere.toml", "x").to_string().starts_with("model file `nowhere.toml`: "));
+        assert!(
+            refused("nowhere.toml", "x").to_string().starts_with("model file `nowhere.toml`: ")
+        );
     }
 }

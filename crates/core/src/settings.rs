@@ -284,7 +284,11 @@ mod tests {
         assert_eq!(at(Some(99..100)), "a.toml: wrong", "beyond the end");
         assert_eq!(at(Some(14..18)), "a.toml:2:7: wrong\n  |\n2 | two = true\n  |       ^^^^");
         assert_eq!(at(Some(14..90)).lines().last(), Some("  |       ^"));
-        assert_eq!(at(Some(8..19)).lines().last(), Some("  | ^^^^^^^^^^"), "no longer than the line");
+        assert_eq!(
+            at(Some(8..19)).lines().last(),
+            Some("  | ^^^^^^^^^^"),
+            "no longer than the line"
+        );
         assert_eq!(at(Some(19..19)).lines().next(), Some("a.toml:3:1: wrong"), "at the end");
     }
 

@@ -252,7 +252,8 @@ mod tests {
 
     #[test]
     fn regions_that_overlap_enough_fit_the_better_the_more_they_overlap() {
-        let settings = AssociationSettings { cost: Cost::Overlap, ..AssociationSettings::default() };
+        let settings =
+            AssociationSettings { cost: Cost::Overlap, ..AssociationSettings::default() };
         let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
         track.estimate.region = Rect::new(0.0, 0.0, 10.0, 10.0);
         let cost = |x: f64| {

@@ -278,7 +278,11 @@ mod tests {
     }
 
     /// One track of a score, and what becomes of it in frames an eighth of a second apart.
-    fn live(settings: LifecycleSettings, score: f64, sights: &[Sight]) -> (Life, Vec<&'static str>) {
+    fn live(
+        settings: LifecycleSettings,
+        score: f64,
+        sights: &[Sight],
+    ) -> (Life, Vec<&'static str>) {
         let mut lifecycle = Lifecycle::new(settings);
         let id = lifecycle.start(score, 0).unwrap();
         let mut ends = Vec::new();
@@ -324,7 +328,10 @@ mod tests {
         let score = |sights: &[Sight]| live(LifecycleSettings::default(), 1.0, sights).0.score;
         assert!((score(&[Sight::Seen(Some((3.0, 0)))]) - 1.6).abs() < 1e-12, "0.3 of the way");
         assert!((score(&[Sight::Missed]) - 0.4).abs() < 1e-12, "0.3 of the way to -1");
-        assert_eq!(score(&[Sight::Seen(None), Sight::Hidden, Sight::Outside, Sight::NotAsked]), 1.0);
+        assert_eq!(
+            score(&[Sight::Seen(None), Sight::Hidden, Sight::Outside, Sight::NotAsked]),
+            1.0
+        );
         let settings = LifecycleSettings { tentative_misses: 99, ..LifecycleSettings::default() };
         let low = live(settings, -1.5, &[Sight::Missed]).0.score;
         assert_eq!(low, -1.5, "a miss never speaks for a person");
@@ -333,8 +340,7 @@ mod tests {
     #[test]
     fn a_track_ends_by_its_score_only_below_the_limit() {
         let ends = |score: f64| {
-            let settings =
-                LifecycleSettings { score_weight: 1.0, ..LifecycleSettings::default() };
+            let settings = LifecycleSettings { score_weight: 1.0, ..LifecycleSettings::default() };
             live(settings, 5.0, &[Sight::Seen(Some((score, 0)))]).1
         };
         assert_eq!((ends(-2.0), ends(-2.1)), (vec![], vec!["track: score"]));

@@ -141,9 +141,8 @@ mod tests {
         use tagalong_core::{Distortion, Pinhole};
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
-        let board = |to: usize| {
-            DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 })
-        };
+        let board =
+            |to: usize| DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 });
         let mut around = Around::new();
         let mut least = |depth: &DepthImage, heights, is_thing: &dyn Fn(&Point2<f64>) -> bool| {
             around.look(&camera, depth, heights, is_thing);

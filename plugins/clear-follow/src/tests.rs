@@ -152,8 +152,7 @@ fn the_person_is_no_obstacle_and_others_are() {
         let tracks: Vec<Track> = other.into_iter().chain([person.clone()]).collect();
         let frame = Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), images);
         let (target, tracks) = (Some(&person), &tracks[..]);
-        let scene =
-            Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+        let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
     };
     let free = settled(None, None);
@@ -184,8 +183,7 @@ fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
 #[test]
 fn a_drive_that_cannot_be_is_not_steered() {
     let person = target(3.0, 0.5, Vector2::zeros());
-    let frame =
-        Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), Images::default());
+    let frame = Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), Images::default());
     let drives = |half_separation_m, max_speed_mps| {
         let wheels = Wheels { half_separation_m, slip: 0.0 };
         let mut controller = ClearFollow::new(prompt()).unwrap();

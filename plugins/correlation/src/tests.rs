@@ -322,7 +322,8 @@ fn a_sighting_says_where_by_its_cells_and_how_sure_it_is() {
     assert_eq!((found.region.width, found.score), (square.width, 0.7));
     assert!((camera.depth_of(&found.position) - 2.5).abs() < 1e-9, "as far as expected");
     assert!(camera.upper_body(&found.position).iou(&found.region) > 0.99);
-    let middle = crate::detect::sighting(&config, &camera, &expected, &square, placed(0, 0.9, 1.0, 0.0));
+    let middle =
+        crate::detect::sighting(&config, &camera, &expected, &square, placed(0, 0.9, 1.0, 0.0));
     assert!((middle.covariance[(1, 1)].sqrt() - 0.05).abs() < 0.005, "{}", middle.covariance);
     assert!((middle.covariance[(0, 0)].sqrt() - 3.0).abs() < 0.05, "{}", middle.covariance);
 }

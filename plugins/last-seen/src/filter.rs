@@ -184,9 +184,8 @@ mod tests {
     #[test]
     fn the_velocity_is_the_way_of_the_last_second() {
         let still = Motion::at_rest(0.5);
-        let velocity = |places: &[(f64, f64)]| {
-            seen_at(Config::default(), still, places).person.velocity
-        };
+        let velocity =
+            |places: &[(f64, f64)]| seen_at(Config::default(), still, places).person.velocity;
         assert_eq!(velocity(&[(3.0, 0.0)]), Vector2::zeros());
         assert_eq!(velocity(&[(3.0, 0.0), (3.0, 0.4)]), Vector2::new(0.0, 0.8));
         // Two seconds ago is too long ago.

@@ -208,8 +208,7 @@ fn the_most_like_of_several_near_a_track_comes_first() {
     let recorded = heads.map(|head| Recorded { region: None, head: Some(head), score: 0.9 });
     let frame = frame(1, None).with_recorded(Some(recorded.to_vec()));
     let track = track_at(Point3::new(3.0, 0.0, 1.6));
-    let found =
-        detector.detect(&frame, &Search::Near(&track), &mut Funnel::default()).unwrap();
+    let found = detector.detect(&frame, &Search::Near(&track), &mut Funnel::default()).unwrap();
     assert_eq!(found.iter().map(|d| d.position.x).collect::<Vec<_>>(), [3.1, 3.3, 3.5]);
 }
 
@@ -222,7 +221,9 @@ fn boxes_without_a_score_are_certain_and_blank_lines_are_none() {
     let sure = (0.999_f64 / 0.001).ln();
     assert!((scores[0] - sure).abs() < 1e-9 && (scores[1] - 4.0_f64.ln()).abs() < 1e-9);
     let refused = |text: &str| of_file(text, Config::default()).is_err();
-    assert!(refused("1.5,-1,5,5,9,9,1") && refused("1,-1,5,5,-9,9,1") && refused("1,-1,5,5,9,-9,1"));
+    assert!(
+        refused("1.5,-1,5,5,9,9,1") && refused("1,-1,5,5,-9,9,1") && refused("1,-1,5,5,9,-9,1")
+    );
     assert!(refused("1,-1,5,5,9,inf,1") && refused("-1,-1,5,5,9,9,1"));
 }
 
@@ -265,8 +266,7 @@ fn the_depth_is_that_of_the_face_alone() {
             if u.abs() < half && v.abs() < half { inside } else { outside }
         });
         let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
-        let frame =
-            Frame::new(2, Stamp::from_nanos(200), camera(), Motion::at_rest(0.1), images);
+        let frame = Frame::new(2, Stamp::from_nanos(200), camera(), Motion::at_rest(0.1), images);
         detect(&mut detector, &frame).remove(0).position.x
     };
     assert!((seen(0.085, 2.0, 5.0) - 2.08).abs() < 0.02, "nothing beside it is looked at");

@@ -169,6 +169,136 @@ fn a_pipeline_built_from_text_tracks() {
     assert_eq!(report.tracks.len(), 1);
 }
 
+/// A line for each number of a table that makes it no number.
+fn without_a_number(table: &toml::Table, path: &str) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (key, value) in table {
+        let name = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match value {
+            toml::Value::Float(_) => lines.push(format!("{name} = nan")),
+            toml::Value::Array(_) => {
+                lines.extend([format!("{name} = [nan, 1.0]"), format!("{name} = [1.0, nan]")]);
+            }
+            toml::Value::Table(inner) => lines.extend(without_a_number(inner, &name)),
+            _ => {}
+        }
+    }
+    lines
+}
+
+/// What compares with a number that is none is never true: a robot would drive on.
+#[test]
+fn no_setting_may_be_no_number() {
+    let defaults = toml::Table::try_from(PipelineSettings::default()).unwrap();
+    let lines = without_a_number(&defaults, "");
+    assert!(lines.len() > 60, "{}", lines.len());
+    for line in lines {
+        let shown = build(&format!("{line}\n{PLAIN}")).map(|_| ()).expect_err(&line);
+        assert!(shown.starts_with("a.toml:1:"), "{line}: {shown}");
+    }
+}
+
+#[test]
+fn settings_may_be_at_their_bounds_and_not_beyond() {
+    for (line, fits) in [
+        ("association.gate = 0.0", false),
+        ("association.gate = inf", false),
+        ("robot.wheel_slip = 0.0", true),
+        ("robot.wheel_slip = -0.01", false),
+        ("robot.wheel_slip = inf", false),
+        ("occlusion.min_visible = 1.0", true),
+        ("occlusion.min_visible = 0.0", false),
+        ("target.again_from = 0.99", true),
+        ("target.again_from = 1.0", false),
+        ("target.again_from = 0.0", false),
+        ("target.refuse_below = 0.4", true),
+        ("target.refuse_below = 0.41", false),
+        ("lifecycle.miss_score = -inf", false),
+        ("lifecycle.drop_score = -inf", true),
+        ("lifecycle.drop_score = 0.0", true),
+        ("lifecycle.drop_score = 0.1", false),
+        ("lifecycle.confirm_within = 3", true),
+        ("lifecycle.confirm_within = 2", false),
+        ("lifecycle.confirm_within = 32", true),
+        ("lifecycle.max_tracks = 0", false),
+        ("clock = { max_gap_s = 2.0, reset_gap_s = 2.0 }", true),
+        ("clock = { max_gap_s = 2.0, reset_gap_s = 1.9 }", false),
+        ("governor.corridor.range_m = 100.0", true),
+        ("governor.corridor.range_m = 100.1", false),
+    ] {
+        assert_eq!(build(&format!("{line}\n{PLAIN}")).is_ok(), fits, "{line}");
+    }
+}
+
+#[test]
+fn a_robot_that_cannot_stop_before_the_person_is_refused() {
+    let with = |keeps_m: f64| {
+        let config = format!("config = {{ how = 'keeps {keeps_m}' }}");
+        build(&format!("{PLAIN}[controller]\nplugin = 'drive'\n{config}\n")).map(|_| ())
+    };
+    // 0.45 m of reaction, 0.405 m of braking and a margin of 0.3 m.
+    assert_eq!(with(1.16), Ok(()));
+    let refused = with(1.15).unwrap_err();
+    for words in
+        ["0.9 m/s needs 1.16 m to stop", "follows at 1.15 m", "plugin = 'drive'", "^^^^^^^"]
+    {
+        assert!(refused.contains(words), "{refused}");
+    }
+}
+
+/// Seeds of plugins, by their place in a config.
+fn seeds(run: u64) -> Vec<u64> {
+    let seen = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+    let mut registry = World::default().registry();
+    let list = seen.clone();
+    registry.controller("draws", "", move |_: Input, context| {
+        list.lock().unwrap().push(context.seed);
+        Ok(Still)
+    });
+    for name in ["one", "other"] {
+        let list = seen.clone();
+        registry.verifier(name, "", move |_: Input, context| {
+            list.lock().unwrap().push(context.seed);
+            Ok(Still)
+        });
+    }
+    let verifiers =
+        ["one", "other", "one"].map(|name| format!("[[verifiers]]\nplugin = '{name}'\n"));
+    let text = format!("{PLAIN}{}[controller]\nplugin = 'draws'\n", verifiers.concat());
+    let options = Options { seed: Some(run), ..Options::default() };
+    Pipeline::from_toml_with(&text, Path::new("."), &registry, &options).unwrap();
+    seen.lock().unwrap().clone()
+}
+
+struct Still;
+
+impl tagalong_core::Controller for Still {
+    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::WheelSpeeds {
+        tagalong_core::WheelSpeeds::STOP
+    }
+}
+
+impl tagalong_core::Verifier for Still {
+    fn margin(
+        &mut self,
+        _: &tagalong_core::Frame,
+        _: &tagalong_core::Detection,
+    ) -> tagalong_core::Result<f64> {
+        Ok(0.0)
+    }
+}
+
+#[test]
+fn each_plugin_draws_from_a_seed_of_its_own_that_the_run_decides() {
+    let (first, again, other) = (seeds(1), seeds(1), seeds(2));
+    assert_eq!((first.len(), &first), (4, &again));
+    let all: std::collections::BTreeSet<u64> = first.iter().chain(&other).copied().collect();
+    assert_eq!(all.len(), 8, "{first:?} {other:?}");
+    // The first numbers of SplitMix64 from these seeds.
+    assert_eq!(super::mix(0), 0xE220_A839_7B1D_CDAF);
+    assert_eq!(super::mix(0x9E37_79B9_7F4A_7C15), 0x6E78_9E6A_A1B9_65F4);
+}
+
 const WHOLE: &str = "seed = 1
 [[detectors]]
 plugin = 'script'

@@ -342,13 +342,8 @@ mod tests {
         const BLUE: [u8; 3] = [0, 0, 255];
 
         fn camera() -> Camera {
-            let lens = Pinhole {
-                fx: 200.0,
-                fy: 200.0,
-                cx: 160.0,
-                cy: 60.0,
-                distortion: Distortion::None,
-            };
+            let lens =
+                Pinhole { fx: 200.0, fy: 200.0, cx: 160.0, cy: 60.0, distortion: Distortion::None };
             Camera::mounted(lens, 320, 240, 1.6, 0.0, 0.0)
         }
 
@@ -426,11 +421,10 @@ mod tests {
             assert!(Looks::of(&somebody(1.6), &plain).torso.is_some());
             assert!(Looks::of(&somebody(1.7), &plain).torso.is_none());
             let seen = Looks::of(&somebody(0.0), &plain);
-            assert_eq!(seen.difference(&seen), Difference {
-                torso: Some(0.0),
-                legs: Some(0.0),
-                texture: Some(0.0),
-            });
+            assert_eq!(
+                seen.difference(&seen),
+                Difference { torso: Some(0.0), legs: Some(0.0), texture: Some(0.0) }
+            );
         }
 
         #[test]

@@ -157,7 +157,8 @@ mod tests {
             height: [0.1, 20.0],
             rivals: 3.0,
         };
-        let none = Differences { torso: None, legs: None, texture: None, height_m: 0.1, rivals: None };
+        let none =
+            Differences { torso: None, legs: None, texture: None, height_m: 0.1, rivals: None };
         for (differences, log_odds) in [
             (none, 0.0),
             (Differences { torso: Some(0.5), ..none }, -3.0),

@@ -150,7 +150,10 @@ mod tests {
 
     #[test]
     fn it_waits_first_and_is_there_when_near_or_after_a_while() {
-        assert_eq!((wish(&last(3.0, 0.0), 0.99), wish(&last(3.0, 0.0), 1.0).is_some()), (None, true));
+        assert_eq!(
+            (wish(&last(3.0, 0.0), 0.99), wish(&last(3.0, 0.0), 1.0).is_some()),
+            (None, true)
+        );
         assert!(wish(&last(3.0, 0.0), 20.0).is_some());
         let looks_round = |x: f64, lost_s: f64| wished(x, 0.0, lost_s) == (0.0, -0.5);
         assert!(looks_round(0.59, 1.5) && !looks_round(0.61, 1.5), "as near as 0.6 m");

@@ -292,4 +292,8 @@ impl Controller for Drive {
             _ => WheelSpeeds { left: 2.0, right: 4.0 },
         }
     }
+
+    fn stand_off_m(&self) -> Option<f64> {
+        self.0.how.strip_prefix("keeps ")?.parse().ok()
+    }
 }
