@@ -80,12 +80,26 @@ impl Lab<'_> {
         set: &[(&str, &str)],
         seeds: u64,
     ) -> Result<Vec<Scene>, ReproduceError> {
+        self.scenes_of(Split::Test, name, set, seeds)
+    }
+
+    /// As [`Lab::scenes`], of another split: settings are chosen on `validation`.
+    ///
+    /// # Errors
+    /// As [`Lab::scenes`].
+    pub fn scenes_of(
+        &self,
+        split: Split,
+        name: &str,
+        set: &[(&str, &str)],
+        seeds: u64,
+    ) -> Result<Vec<Scene>, ReproduceError> {
         let path = self.configs.join("scenes").join(format!("{name}.toml"));
         let text = read(&path)?;
         let set: Vec<(String, String)> =
             set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let scene = |seed| {
-            let variant = Variant { seed: Some(seed), split: Some(Split::Test), set: set.clone() };
+            let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
             Scene::parse_with(&text, &variant).map_err(|error| {
                 ReproduceError::Scene(error.render(&path.display().to_string(), &text))
             })

@@ -20,6 +20,7 @@ mod config;
 mod detector;
 mod matching;
 mod people;
+mod printed;
 mod scores;
 mod view;
 mod weigher;
