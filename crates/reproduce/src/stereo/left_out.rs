@@ -12,8 +12,8 @@ use tagalong_pipeline::{Fate, Pipeline};
 use tagalong_sim::{Furniture, FurnitureKind, Scene, Split, Truth};
 use tagalong_stereo::StereoDepth;
 use tagalong_trials::{Contender, Draw};
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Table};
 
 use super::verifier::{Whose, share, what_stands_at, whose};
 use super::{STEREO, variants};
@@ -247,7 +247,7 @@ fn is_person(detection: &Detection, people: &[Truth]) -> Option<bool> {
 }
 
 fn without_verifiers(contender: &Contender) -> Result<Contender, ReproduceError> {
-    let mut config: Table = contender.config.parse().map_err(other)?;
+    let mut config = variants::table(contender)?;
     config.retain(|key, _| key != "verifiers" && key != "odometry");
     Ok(Contender { config: config.to_string(), ..contender.clone() })
 }

@@ -10,8 +10,8 @@ use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::Truth;
 use tagalong_trials::{Contender, Moment, Run, Trial};
-use toml::{Table, Value};
 
+use super::variants::table;
 use crate::lab::read;
 use crate::{Lab, ReproduceError};
 
@@ -31,15 +31,9 @@ pub fn contender(
 ) -> Result<Contender, ReproduceError> {
     let plain = lab.contender(DETECTS)?;
     let Some(of) = verifiers else { return Ok(Contender { name: name.into(), ..plain }) };
-    let [mut config, with] = [plain.config.clone(), lab.contender(of)?.config].map(|text| {
-        text.parse::<Table>().map_err(|error| ReproduceError::Other(format!("{of}: {error}")))
-    });
-    if let (Ok(config), Ok(with)) = (&mut config, &with) {
-        let said = OF_VERIFIERS.iter().filter_map(|key| Some((*key, with.get(*key)?)));
-        config.extend(said.map(|(key, value)| (key.to_owned(), value.clone())));
-    }
-    with?;
-    Ok(Contender { name: name.into(), config: Value::Table(config?).to_string(), ..plain })
+    let (mut config, mut with) = (table(&plain)?, table(&lab.contender(of)?)?);
+    config.extend(OF_VERIFIERS.iter().filter_map(|key| with.remove_entry(*key)));
+    Ok(Contender { name: name.into(), config: config.to_string(), ..plain })
 }
 
 /// The contenders on an annotated log; nothing where there is no such log.

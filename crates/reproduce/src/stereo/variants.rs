@@ -85,14 +85,22 @@ impl Variant {
     }
 }
 
+/// What a contender's config says.
+///
+/// # Errors
+/// A config that is no TOML.
+pub fn table(contender: &Contender) -> Result<Table, ReproduceError> {
+    let wrong = |e: toml::de::Error| ReproduceError::Other(format!("{}: {e}", contender.name));
+    contender.config.parse().map_err(wrong)
+}
+
 /// How a config makes depth of a pair.
 ///
 /// # Errors
 /// A config that is none.
 pub fn stereo_settings(contender: &Contender) -> Result<StereoSettings, ReproduceError> {
+    let settings = table(contender)?.remove("stereo").unwrap_or_else(|| Table::new().into());
     let wrong = |e: toml::de::Error| ReproduceError::Other(format!("{}: {e}", contender.name));
-    let config: Table = contender.config.parse().map_err(wrong)?;
-    let settings = config.get("stereo").cloned().unwrap_or_else(|| Table::new().into());
     settings.try_into().map_err(wrong)
 }
 
@@ -108,23 +116,22 @@ fn replaced<'a>(
     contender: &Contender,
     set: impl Iterator<Item = (&'a str, Value)>,
 ) -> Result<Contender, ReproduceError> {
-    let wrong = |why: String| ReproduceError::Other(format!("{}: {why}", contender.name));
-    let table: Table =
-        contender.config.parse().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
-    let mut config = Value::Table(table);
+    let wrong = |key: &str| {
+        ReproduceError::Other(format!("{}: nothing can be set at `{key}`", contender.name))
+    };
+    let mut config = table(contender)?;
     for (key, value) in set {
-        let place = find(&mut config, key);
-        *place.ok_or_else(|| wrong(format!("nothing can be set at `{key}`")))? = value;
+        *find(&mut config, key).ok_or_else(|| wrong(key))? = value;
     }
     Ok(Contender { config: config.to_string(), ..contender.clone() })
 }
 
 /// The place of a dotted key; tables are made where there are none, lists are not.
-fn find<'a>(config: &'a mut Value, key: &str) -> Option<&'a mut Value> {
-    key.split('.').try_fold(config, |at, name| match at {
-        Value::Table(table) => {
-            Some(table.entry(name).or_insert_with(|| Value::Table(Table::new())))
-        }
+fn find<'a>(config: &'a mut Table, key: &str) -> Option<&'a mut Value> {
+    let mut names = key.split('.');
+    let first = config.entry(names.next()?).or_insert_with(|| Table::new().into());
+    names.try_fold(first, |at, name| match at {
+        Value::Table(table) => Some(table.entry(name).or_insert_with(|| Table::new().into())),
         Value::Array(list) => list.get_mut(name.parse::<usize>().ok()?),
         _ => None,
     })
