@@ -118,7 +118,7 @@ impl Lab<'_> {
         self.scenes_of(Split::Test, name, set, seeds)
     }
 
-    /// The same of another split.
+    /// As [`Lab::scenes`], of another split: settings are chosen on `validation`.
     ///
     /// # Errors
     /// As [`Lab::scenes`].

@@ -212,13 +212,15 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     }
 }
 
-/// The solids of a piece of furniture. Its cloth, tone and size are by chance.
+/// The solids of a piece of furniture. Its cloth, tone, size, proportions and parts are by
+/// chance: who has seen one of a kind has not seen the next one.
 pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Object {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), piece.heading_deg.to_radians());
     let cloth = random.pick(CLOTHS);
     let wood = scaled(WOOD, random.between(0.5, 1.6));
     let size = random.between(0.93, 1.07);
-    let mut maker = Maker { at: piece.at, turn, cloth, wood, size, shapes: Vec::new() };
+    let form = Random::new(random.below(u64::MAX), 0);
+    let mut maker = Maker { at: piece.at, turn, cloth, wood, size, form, shapes: Vec::new() };
     match piece.kind {
         FurnitureKind::CoatStand => maker.coat_stand(),
         FurnitureKind::DrapedChair => maker.draped_chair(),
@@ -245,10 +247,22 @@ struct Maker {
     wood: Colour,
     /// Height as a multiple of the ordinary one.
     size: f64,
+    /// The chance that proportions and parts depend on.
+    form: Random,
     shapes: Vec<Shape>,
 }
 
 impl Maker {
+    /// A proportion between two others.
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.form.between(low, high)
+    }
+
+    /// True for a part that is there with this probability.
+    fn has(&mut self, probability: f64) -> bool {
+        self.form.chance(probability)
+    }
+
     fn place(&self, p: [f64; 3]) -> Point3<f64> {
         Point3::new(self.at[0], self.at[1], 0.0) + self.turn * Vector3::from(p)
     }
@@ -269,25 +283,51 @@ impl Maker {
         self.shapes.push(Shape::limb(ends, (radii[0], radii[1]), forward, of));
     }
 
+    /// A pole with a coat, which hangs as it was hung, or a second one, and a hat or none.
     fn coat_stand(&mut self) {
-        let (wood, cloth) = (Material::plain(self.wood), Material::plain(self.cloth));
-        let z = self.size;
-        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, 1.72 * z], [0.025, 0.02], wood);
+        let wood = Material::plain(self.wood);
+        let top = 1.72 * self.size * self.between(0.94, 1.12);
+        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, top], [0.025, 0.02], wood);
         self.ellipsoid([0.0, 0.0, 0.02], [0.22, 0.22, 0.03], wood);
-        self.limb([0.02, -0.17, 1.42 * z], [0.02, 0.17, 1.42 * z], [0.07, 0.07], cloth);
-        self.ellipsoid([0.03, 0.0, 1.08 * z], [0.12, 0.22, 0.42 * z], cloth);
-        for y in [-1.0, 1.0] {
-            let (top, hem) = ([0.03, y * 0.21, 1.38 * z], [0.04, y * 0.25, 0.85 * z]);
-            self.limb(top, hem, [0.06, 0.05], cloth);
+        self.coat(0.0, top - 0.30);
+        if self.has(0.35) {
+            let (aside, below) = (self.between(-0.16, 0.16), self.between(0.05, 0.25));
+            self.coat(aside, top - 0.30 - below);
         }
-        let felt = Material::plain([0.07, 0.05, 0.04]);
-        self.ellipsoid([0.0, 0.0, 1.70 * z], [0.10, 0.09, 0.10], felt);
-        self.ellipsoid([0.0, 0.0, 1.65 * z], [0.16, 0.15, 0.012], felt);
+        if self.has(0.7) {
+            let (felt, brim) = (Material::plain([0.07, 0.05, 0.04]), self.between(0.11, 0.19));
+            let (crown, aside) = (self.between(0.08, 0.12), self.between(-0.05, 0.05));
+            self.ellipsoid([0.0, aside, top - 0.02], [crown, 0.9 * crown, crown], felt);
+            self.ellipsoid([0.0, aside, top - 0.07], [brim, 0.94 * brim, 0.012], felt);
+        }
     }
 
+    /// A coat that hangs from a height: shoulders aslant, sleeves of their own.
+    fn coat(&mut self, aside: f64, shoulder: f64) {
+        let cloth = Material::plain(self.cloth);
+        let (broad, slant) = (self.between(0.75, 1.2), self.between(-0.05, 0.05));
+        let (long, deep) = (self.between(0.28, 0.50), self.between(0.09, 0.16));
+        let half = 0.17 * broad;
+        let [left, right] = [-1.0, 1.0].map(|y| [0.02, aside + y * half, shoulder + y * slant]);
+        self.limb(left, right, [0.07, 0.07], cloth);
+        let middle = [0.03, aside, shoulder - 0.8 * long];
+        self.ellipsoid(middle, [deep, 0.22 * broad, long], cloth);
+        for y in [-1.0, 1.0] {
+            let (sleeve, out) = (self.between(0.25, 0.60), self.between(0.20, 0.30));
+            let from = [0.03, aside + y * 0.21 * broad, shoulder + y * slant - 0.04];
+            let hem = [0.04, aside + y * out * broad, shoulder - 0.04 - sleeve];
+            self.limb(from, hem, [0.06, 0.05], cloth);
+        }
+    }
+
+    /// Round or square.
     fn pillar(&mut self, ceiling_m: f64) {
-        let stone = Material::plain([0.55; 3]);
-        self.limb([0.0, 0.0, -0.1], [0.0, 0.0, ceiling_m], [0.21 * self.size; 2], stone);
+        let (stone, half) = (Material::plain([0.55; 3]), 0.21 * self.size * self.between(0.7, 1.3));
+        if self.has(0.7) {
+            self.limb([0.0, 0.0, -0.1], [0.0, 0.0, ceiling_m], [half; 2], stone);
+        } else {
+            self.block([0.0, 0.0, 0.5 * ceiling_m], [0.85 * half, half, 0.5 * ceiling_m], stone);
+        }
     }
 
     fn chair(&mut self) {
@@ -299,23 +339,39 @@ impl Maker {
         self.block([-0.2, 0.0, 0.68], [0.02, 0.2, 0.24], wood);
     }
 
+    /// The jacket hangs over all of the back, or slips to one side.
     fn draped_chair(&mut self) {
         let jacket =
             Material::patterned(self.cloth, scaled(self.cloth, 0.7), Pattern::Mottled(0.05));
         self.chair();
-        self.block([-0.21, 0.0, 0.75], [0.02, 0.2, 0.28], Material::plain(self.wood));
-        self.limb([-0.21, -0.2, 1.02], [-0.21, 0.2, 1.02], [0.06, 0.06], jacket);
-        self.ellipsoid([-0.23, 0.0, 0.78], [0.08, 0.25, 0.32], jacket);
+        let (back, broad) = (self.between(0.92, 1.12), self.between(0.85, 1.2));
+        let (slip, long) = (self.between(-0.08, 0.08), self.between(0.22, 0.36));
+        let half = 0.5 * (back - 0.47);
+        self.block([-0.21, 0.0, back - half], [0.02, 0.2, half], Material::plain(self.wood));
+        let side = 0.2 * broad;
+        let (left, right) = ([-0.21, slip - side, back], [-0.21, slip + side, back]);
+        self.limb(left, right, [0.06, 0.06], jacket);
+        self.ellipsoid([-0.23, slip, back - 0.75 * long], [0.08, 0.25 * broad, long], jacket);
     }
 
+    /// A bin with a round lid, or an open one.
     fn bin_on_table(&mut self) {
         let (wood, tin) = (Material::plain(self.wood), Material::plain(self.cloth));
-        self.block([0.0, 0.0, 0.74], [0.3, 0.3, 0.015], wood);
-        for (x, y) in [(-0.27, -0.27), (-0.27, 0.27), (0.27, -0.27), (0.27, 0.27)] {
-            self.limb([x, y, 0.0], [x, y, 0.74], [0.02, 0.02], wood);
+        let (half, table) = (self.between(0.24, 0.38), self.between(0.62, 0.80));
+        self.block([0.0, 0.0, table], [half, half, 0.015], wood);
+        let leg = half - 0.03;
+        for (x, y) in [(-leg, -leg), (-leg, leg), (leg, -leg), (leg, leg)] {
+            self.limb([x, y, 0.0], [x, y, table], [0.02, 0.02], wood);
         }
-        self.limb([0.0, 0.0, 0.92], [0.0, 0.0, 1.2 * self.size], [0.15, 0.18], tin);
-        self.ellipsoid([0.0, 0.0, 1.42 * self.size], [0.1, 0.1, 0.13], Material::plain([0.35; 3]));
+        let (below, above) = (self.between(0.12, 0.18), self.between(0.14, 0.21));
+        let (tall, aside) = (self.between(0.24, 0.40) * self.size, self.between(-0.06, 0.06));
+        let top = table + below + tall;
+        self.limb([0.0, aside, table + below], [0.0, aside, top], [below, above], tin);
+        if self.has(0.7) {
+            let lid = self.between(0.08, 0.13);
+            let at = [0.0, aside, top + above + 0.6 * lid];
+            self.ellipsoid(at, [lid, lid, 1.3 * lid], Material::plain([0.35; 3]));
+        }
     }
 
     fn doorway(&mut self, ceiling_m: f64) {
@@ -339,58 +395,89 @@ impl Maker {
         }
     }
 
+    /// A shade or a globe, above the foot or on an arm beside it.
     fn floor_lamp(&mut self) {
-        let top = 1.66 * self.size;
-        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, top - 0.1], [0.014, 0.014], Material::plain(METAL));
-        self.ellipsoid([0.0, 0.0, 0.015], [0.15, 0.15, 0.02], Material::plain(METAL));
-        self.limb(
-            [0.0, 0.0, top - 0.18],
-            [0.0, 0.0, top],
-            [0.15, 0.09],
-            Material::plain([0.75, 0.66, 0.45]),
-        );
+        let (metal, cloth) = (Material::plain(METAL), Material::plain([0.75, 0.66, 0.45]));
+        let top = 1.66 * self.size * self.between(0.9, 1.1);
+        let arm = if self.has(0.3) { self.between(0.12, 0.35) } else { 0.0 };
+        self.limb([0.0, -arm, 0.0], [0.0, -arm, top - 0.1], [0.014, 0.014], metal);
+        self.ellipsoid([0.0, -arm, 0.015], [0.15, 0.15, 0.02], metal);
+        if arm > 0.0 {
+            self.limb([0.0, -arm, top - 0.1], [0.0, 0.0, top - 0.05], [0.014, 0.014], metal);
+        }
+        let (wide, tall) = (self.between(0.11, 0.20), self.between(0.12, 0.26));
+        if self.has(0.7) {
+            let narrow = wide * self.between(0.45, 0.95);
+            self.limb([0.0, 0.0, top - tall], [0.0, 0.0, top], [wide, narrow], cloth);
+        } else {
+            self.ellipsoid([0.0, 0.0, top - wide], [wide, wide, 0.5 * (wide + tall)], cloth);
+        }
     }
 
+    /// Leaves all around a stem, more or fewer, up or out.
     fn plant(&mut self) {
         let pot = Material::plain([0.40, 0.18, 0.10]);
         let leaf =
             Material::patterned([0.08, 0.22, 0.06], [0.04, 0.12, 0.04], Pattern::Mottled(0.06));
-        self.limb([0.0, 0.0, 0.16], [0.0, 0.0, 0.30], [0.15, 0.19], pot);
-        self.limb([0.0, 0.0, 0.3], [0.0, 0.0, 1.2], [0.03, 0.02], Material::plain(WOOD));
-        for i in 0..14 {
-            let angle = 2.4 * f64::from(i);
-            let (rise, out) = (0.75 + 0.065 * f64::from(i), 0.24 - 0.012 * f64::from(i));
-            let tip = [out * 1.5 * angle.cos(), out * 1.5 * angle.sin(), rise + 0.1];
-            self.limb([0.0, 0.0, rise - 0.1], tip, [0.035, 0.075], leaf);
+        let (wide, tall) = (self.between(0.8, 1.25), self.between(0.85, 1.2));
+        let (count, thick) = (self.between(9.0, 19.0) as usize, self.between(0.055, 0.09));
+        self.limb([0.0, 0.0, 0.16], [0.0, 0.0, 0.30], [0.15 * wide, 0.19 * wide], pot);
+        self.limb([0.0, 0.0, 0.3], [0.0, 0.0, 1.2 * tall], [0.03, 0.02], Material::plain(WOOD));
+        for i in 0..count {
+            let part = i as f64 / count as f64;
+            let angle = 2.4 * i as f64 + self.between(-0.4, 0.4);
+            let rise = tall * (0.75 + 0.91 * part);
+            let out = 1.5 * wide * (0.24 - 0.17 * part) * self.between(0.8, 1.2);
+            let tip = [out * angle.cos(), out * angle.sin(), rise + 0.1];
+            self.limb([0.0, 0.0, rise - 0.1], tip, [0.035, thick], leaf);
         }
     }
 
     fn poster(&mut self) {
+        let (wide, tall) = (0.4 * self.between(0.75, 1.2), 0.6 * self.between(0.75, 1.15));
+        let middle = self.between(1.05, 1.3);
         let print =
-            Material::patterned([0.65, 0.62, 0.5], [0.12, 0.16, 0.35], Pattern::Print(0.4, 0.6));
-        self.block([0.0, 0.0, 1.2], [0.015, 0.4, 0.6], print);
-        self.limb([-0.03, 0.0, 0.0], [-0.03, 0.0, 1.2], [0.02, 0.02], Material::plain(METAL));
+            Material::patterned([0.65, 0.62, 0.5], [0.12, 0.16, 0.35], Pattern::Print(wide, tall));
+        self.block([0.0, 0.0, middle], [0.015, wide, tall], print);
+        let foot = Material::plain(METAL);
+        self.limb([-0.03, 0.0, 0.0], [-0.03, 0.0, middle], [0.02, 0.02], foot);
     }
 
-    /// The outline of a person, a centimetre thick, as tall as one.
+    /// The outline of a person, a centimetre thick, as tall as one; an arm may be held out.
     fn cardboard_figure(&mut self) {
         let (shirt, legs) = (Material::plain(self.cloth), Material::plain([0.05, 0.05, 0.07]));
-        let (skin, z) = (Material::plain([0.52, 0.33, 0.25]), self.size);
-        let half = Vector3::new(0.012, 0.080, 0.112);
+        let skin = Material::plain([0.52, 0.33, 0.25]);
+        let z = self.size * self.between(0.94, 1.06);
+        let (broad, head) = (self.between(0.85, 1.15), self.between(0.9, 1.15));
+        let half = Vector3::new(0.012, 0.080 * head, 0.112 * head);
         let pattern = Pattern::Head { half, hairline: 0.62 };
         let face = Material { second: [0.04, 0.03, 0.02], pattern, ..skin };
-        self.ellipsoid([0.0, 0.0, 1.60 * z], half.into(), face);
+        let tilt = self.between(-0.03, 0.03);
+        self.ellipsoid([0.0, tilt, 1.60 * z], half.into(), face);
         self.block([0.0, 0.0, 1.46 * z], [0.006, 0.052, 0.05], skin);
-        self.ellipsoid([0.0, 0.0, 1.36 * z], [0.007, 0.235, 0.075], shirt);
-        self.block([0.0, 0.0, 1.16 * z], [0.006, 0.165, 0.22], shirt);
-        self.ellipsoid([0.0, 0.0, 0.97 * z], [0.006, 0.170, 0.13], legs);
+        self.ellipsoid([0.0, 0.0, 1.36 * z], [0.007, 0.235 * broad, 0.075], shirt);
+        self.block([0.0, 0.0, 1.16 * z], [0.006, 0.165 * broad, 0.22], shirt);
+        self.ellipsoid([0.0, 0.0, 0.97 * z], [0.006, 0.170 * broad, 0.13], legs);
         for y in [-1.0, 1.0] {
-            self.ellipsoid([0.001, y * 0.215, 1.13 * z], [0.006, 0.048, 0.27], shirt);
-            self.ellipsoid([0.002, y * 0.225, 0.86 * z], [0.006, 0.035, 0.07], skin);
-            self.block([0.0, y * 0.088, 0.48 * z], [0.006, 0.075, 0.46 * z], legs);
+            let out = if self.has(0.25) { self.between(0.05, 0.3) } else { 0.0 };
+            let shoulder = [0.001, y * 0.2 * broad, 1.34 * z];
+            let hand = [0.002, y * (0.225 * broad + out), (0.86 + 0.6 * out) * z];
+            self.slat(shoulder, hand, 0.048, shirt);
+            self.ellipsoid(hand, [0.006, 0.035, 0.07], skin);
+            self.block([0.0, y * 0.088 * broad, 0.48 * z], [0.006, 0.075, 0.46 * z], legs);
         }
         // It leans on a strut.
         self.limb([-0.3, 0.0, 0.0], [-0.01, 0.0, 0.8], [0.01, 0.01], Material::plain(METAL));
+    }
+
+    /// A flat ellipse across the front, between two points.
+    fn slat(&mut self, from: [f64; 3], to: [f64; 3], half_m: f64, of: Material) {
+        let (from, to) = (Vector3::from(from), Vector3::from(to));
+        let way = to - from;
+        let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), -way.y.atan2(way.z));
+        let form = Form::Ellipsoid(Vector3::new(0.006, half_m, 0.5 * way.norm() + 0.02));
+        let at = self.place(((from + to) * 0.5).into());
+        self.shapes.push(Shape::new(form, at, self.turn * turn, of));
     }
 
     fn desk(&mut self) {
@@ -448,6 +535,64 @@ mod tests {
                 layouts.push(pieces);
             }
         }
+    }
+
+    /// Half sides, half axes and radii of all solids of a piece, and their heights.
+    fn forms(kind: FurnitureKind, seed: u64) -> Vec<(Form, f64)> {
+        let piece = Furniture { kind, at: [3.0, 2.0], heading_deg: 20.0 };
+        let made = furniture(&piece, 2.8, &mut Random::new(seed, 8));
+        made.shapes.iter().map(|shape| (shape.form, shape.origin.z)).collect()
+    }
+
+    #[test]
+    fn what_looks_like_people_looks_different_each_time() {
+        use FurnitureKind as K;
+        let kinds = [
+            K::CoatStand,
+            K::DrapedChair,
+            K::FloorLamp,
+            K::Plant,
+            K::Pillar,
+            K::Poster,
+            K::CardboardFigure,
+            K::BinOnTable,
+        ];
+        for kind in kinds {
+            assert_eq!(forms(kind, 1), forms(kind, 1), "the seed decides");
+            let all: Vec<_> = (0..20).map(|seed| forms(kind, seed)).collect();
+            for (i, one) in all.iter().enumerate() {
+                assert!(!all[..i].contains(one), "{kind:?}");
+            }
+            let is_sane = |(form, z): &(Form, f64)| {
+                let sizes = match *form {
+                    Form::Ellipsoid(half) | Form::Block(half) => half,
+                    Form::Capsule { length, first, second } => Vector3::new(length, first, second),
+                };
+                sizes.min() > 0.0 && sizes.max() < 3.0 && (-0.2..2.1).contains(z)
+            };
+            assert!(all.iter().flatten().all(is_sane), "{kind:?}");
+        }
+        let parts = |kind| (0..20).map(|seed| forms(kind, seed).len()).collect::<Vec<_>>();
+        for kind in [K::CoatStand, K::FloorLamp, K::Plant, K::BinOnTable] {
+            let parts = parts(kind);
+            assert!(parts.iter().max() > parts.iter().min(), "{kind:?}: {parts:?}");
+        }
+    }
+
+    #[test]
+    fn an_arm_of_cardboard_reaches_from_the_shoulder_to_the_hand() {
+        let (at, turn) = ([0.0, 0.0], Rotation3::identity());
+        let form = Random::new(1, 0);
+        let mut maker =
+            Maker { at, turn, cloth: [0.1; 3], wood: WOOD, size: 1.0, form, shapes: vec![] };
+        let (from, to) = ([0.0, 0.2, 1.3], [0.0, 0.5, 0.9]);
+        maker.slat(from, to, 0.05, Material::plain([0.5; 3]));
+        let arm = maker.shapes[0];
+        let (from, to) = (Point3::from(from), Point3::from(to));
+        let along = (to - from).normalize();
+        let reach = arm.extent(&along);
+        assert!((reach - 0.27).abs() < 1e-9, "{reach}");
+        assert!((arm.origin - nalgebra::center(&from, &to)).norm() < 1e-12);
     }
 
     #[test]

@@ -65,6 +65,10 @@ pub struct DepthTemplateConfig {
     pub directions: Vec<Direction>,
     /// How silhouettes are compared.
     pub cost: Cost,
+    /// As P4 prints it: the plain sum of the squared differences of depth over the window,
+    /// against the depth of the face and one background depth (`background_percentile` of
+    /// the frame), m². `cost` is not asked then, and all costs are in m².
+    pub compat_printed_dissimilarity: bool,
     /// Weight of the person's pixels against those beside the person, 0 to 1.
     pub foreground_weight: f64,
     /// Depth error of the person that costs nothing, m.
@@ -98,7 +102,7 @@ pub struct DepthTemplateConfig {
     /// or three standard deviations, whichever is smaller.
     pub follow_radius_m: f64,
     /// Background of the frame as a percentile of its depths, for the costs
-    /// `squared` and `printed` (P3, P4: 90).
+    /// `squared` and `printed` and for `compat_printed_dissimilarity` (P3, P4: 90).
     pub background_percentile: f64,
     /// How imagined scenes are weighed.
     pub weighing: Weighing,
@@ -146,6 +150,7 @@ impl Default for DepthTemplateConfig {
             min_body: 0.7,
             directions: Direction::ALL.to_vec(),
             cost: Cost::Robust,
+            compat_printed_dissimilarity: false,
             foreground_weight: 0.3,
             relief_free_m: 0.15,
             relief_full_m: 0.30,

@@ -13,6 +13,7 @@ use crate::candidates::{body_below, boundary, head_width_m, is_below_something, 
 use crate::config::{Cost, DepthTemplateConfig};
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
+use crate::dissimilarity::Dissimilarity;
 use crate::view::{Local, View, Working};
 use crate::weigher::Weigher;
 
@@ -42,6 +43,8 @@ struct Scene<'a> {
     rows: &'a RowSums,
     view: Arc<View>,
     matcher: Matcher,
+    /// What is compared in place of what the matcher compares, where a config asks for it.
+    printed: Option<Dissimilarity>,
 }
 
 impl DepthTemplate {
@@ -195,7 +198,12 @@ impl DepthTemplate {
                     Pose::nearest(*direction, local.pitch_rad, local.roll_rad, local.px_per_m);
                 let template = bank.template(pose);
                 let at = (local.x, local.y);
-                let fit = scene.matcher.fit_up_to(most, scene.rows, template, at, local.depth_m)?;
+                let fit = match &scene.printed {
+                    Some(printed) => printed.fit(scene.rows, template, at, local.depth_m)?,
+                    None => {
+                        scene.matcher.fit_up_to(most, scene.rows, template, at, local.depth_m)?
+                    }
+                };
                 most = most.min(fit.cost);
                 Some(fit)
             })
@@ -312,13 +320,22 @@ impl Detector for DepthTemplate {
         let depth = frame.depth()?;
         let working = frame.derived::<Working>()?;
         let rows = &working.0;
+        let is_printed = self.config.compat_printed_dissimilarity;
         let background = match self.config.cost {
-            Cost::Robust => 0.0,
+            Cost::Robust if !is_printed => 0.0,
             _ => background(depth, self.config.background_percentile),
+        };
+        let printed = match is_printed {
+            true => Some(Dissimilarity {
+                sums: frame.derived()?,
+                background_m: RowSums::UNITS / background,
+                min_foreground_valid: self.config.min_foreground_valid,
+            }),
+            false => None,
         };
         let view = self.view(frame, rows);
         let matcher = Matcher::new(&self.config, background);
-        let scene = Scene { rows, view, matcher };
+        let scene = Scene { rows, view, matcher, printed };
         match search {
             Search::Everywhere { .. } => self.discover(frame, &scene, search, funnel),
             Search::Near(track) => self.follow(frame, &scene, track, funnel),

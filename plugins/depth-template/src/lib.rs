@@ -20,6 +20,7 @@ mod config;
 mod detector;
 mod matching;
 mod people;
+mod dissimilarity;
 mod printed;
 mod scores;
 mod view;

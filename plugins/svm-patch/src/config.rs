@@ -13,6 +13,9 @@ pub enum Scaling {
     /// Triggs, CVPR 2005): 5x5 cells of 16 directions with sign, each divided
     /// by the strength around it; then the length becomes 1.
     Gradients,
+    /// Grey values are divided by their largest, so that they are 0 to 1. With the
+    /// paper's gamma nearly all patches are far from each other.
+    Fraction,
     /// Nothing; grey values are 0 to 255. This is what the paper prints, and
     /// with its gamma every patch is infinitely far from every other.
     Raw,
@@ -43,7 +46,7 @@ impl Default for Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
-    /// What is done to the grey values: `unit`, `gradients` or `raw`.
+    /// What is done to the grey values: `unit`, `gradients`, `fraction` or `raw`.
     pub scaling: Scaling,
     /// The square of a candidate is enlarged by this fraction of its side.
     pub grow: f64,
@@ -60,6 +63,10 @@ pub struct Training {
     pub max_samples: usize,
     /// Support vectors in the model file at most; each takes half a kilobyte.
     pub max_vectors: usize,
+    /// Examples of people that are used at most, by chance (P4: 438); 0: all.
+    pub people: usize,
+    /// Examples of others that are used at most, by chance (P4: 146); 0: all.
+    pub others: usize,
 }
 
 impl Default for Training {
@@ -73,6 +80,8 @@ impl Default for Training {
             max_tried: 1000,
             max_samples: 4000,
             max_vectors: 1200,
+            people: 0,
+            others: 0,
         }
     }
 }

@@ -44,6 +44,7 @@ impl Sampler {
         match self.scaling {
             Scaling::Unit => normalise(&mut patch),
             Scaling::Gradients => patch = gradients::of(&patch),
+            Scaling::Fraction => patch.iter_mut().for_each(|v| *v /= f32::from(u8::MAX)),
             Scaling::Raw => {}
         }
         patch
@@ -134,6 +135,14 @@ mod tests {
         let patch = UNIT.patch(&noise(50, 50, 7), &Rect::new(5.5, 4.2, 30.0, 30.0));
         assert!(patch.iter().sum::<f32>().abs() < 1e-4);
         assert!((patch.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_fraction_is_of_the_largest_grey_value() {
+        let fraction = Sampler { grow: 0.0, scaling: Scaling::Fraction };
+        let (grey, square) = (noise(50, 50, 7), Rect::new(5.5, 4.2, 30.0, 30.0));
+        let both = fraction.patch(&grey, &square).into_iter().zip(RAW.patch(&grey, &square));
+        both.for_each(|(part, raw)| assert!((255.0 * part - raw).abs() < 1e-3));
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! The pipelines that a verifier is trained for: one for colour and depth, one for
 //! stereo pairs.
 
+use std::fs;
+use std::path::Path;
+
 use tagalong_sim::CameraKind;
 use tagalong_stereo::StereoSettings;
 use toml::{Table, Value};
@@ -13,7 +16,11 @@ const STEREO: &str = include_str!("../../../../configs/stereo-best.toml");
 const HARVEST: &str = include_str!("harvest.toml");
 
 /// A config in use, without verifiers and controller.
-pub struct InUse(Table);
+pub struct InUse {
+    config: Table,
+    /// Candidates are wanted that this config would not propose.
+    is_lowered: bool,
+}
 
 impl InUse {
     /// The one for a kind of camera.
@@ -22,9 +29,19 @@ impl InUse {
     /// A config that is no TOML.
     pub fn of(kind: CameraKind) -> Result<Self, Failure> {
         let text = if kind == CameraKind::Stereo { STEREO } else { RGBD };
-        let mut config: Table = text.parse().map_err(Failure::failed)?;
-        config.retain(|key, _| key != "verifiers" && key != "controller");
-        Ok(Self(config))
+        let config = text.parse().map_err(Failure::failed)?;
+        Ok(Self { config: without_verifiers(config), is_lowered: true })
+    }
+
+    /// A config of a file, which proposes what it proposes, whatever the camera.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no TOML.
+    pub fn as_it_is(path: &Path) -> Result<Self, Failure> {
+        let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
+        let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let config = text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
+        Ok(Self { config: without_verifiers(config), is_lowered: false })
     }
 
     /// How depth is made of a pair.
@@ -32,13 +49,13 @@ impl InUse {
     /// # Errors
     /// Settings that are none.
     pub fn stereo(&self) -> Result<StereoSettings, Failure> {
-        let settings = self.0.get("stereo").cloned().unwrap_or_else(|| Table::new().into());
+        let settings = self.config.get("stereo").cloned().unwrap_or_else(|| Table::new().into());
         settings.try_into().map_err(Failure::failed)
     }
 
     /// The config as it is in use.
     pub fn plain(&self) -> String {
-        self.0.to_string()
+        self.config.to_string()
     }
 
     /// The config with a verifier.
@@ -47,7 +64,7 @@ impl InUse {
             ("plugin".to_owned(), Value::from(plugin)),
             ("config".to_owned(), settings.into()),
         ]);
-        let mut config = self.0.clone();
+        let mut config = self.config.clone();
         config.insert("verifiers".to_owned(), vec![verifier].into());
         config.to_string()
     }
@@ -58,7 +75,10 @@ impl InUse {
     /// A config whose first detector is none.
     pub fn proposing(&self) -> Result<String, Failure> {
         let mut harvest: Table = HARVEST.parse().map_err(Failure::failed)?;
-        let mut config = self.0.clone();
+        let mut config = self.config.clone();
+        if !self.is_lowered {
+            harvest.remove("detector");
+        }
         let detector = config
             .get_mut("detectors")
             .and_then(|all| all.get_mut(0))
@@ -75,9 +95,30 @@ impl InUse {
     }
 }
 
+fn without_verifiers(mut config: Table) -> Table {
+    config.retain(|key, _| key != "verifiers" && key != "controller");
+    config
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_config_of_a_file_proposes_what_it_proposes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("own.toml");
+        let text = "[[detectors]]\nplugin = \"depth-template\"\n\
+            config = { discover_cost = 0.1 }\n[[verifiers]]\nplugin = \"svm-patch\"\n";
+        fs::write(&path, text).unwrap();
+        let proposing: Table =
+            InUse::as_it_is(&path).unwrap().proposing().unwrap().parse().unwrap();
+        let cost = proposing["detectors"][0]["config"]["discover_cost"].as_float();
+        assert_eq!(cost, Some(0.1));
+        assert!(!proposing.contains_key("verifiers") && proposing.contains_key("lifecycle"));
+        let failure = InUse::as_it_is(&folder.path().join("none.toml")).err().unwrap();
+        assert!(failure.message.contains("none.toml"), "{}", failure.message);
+    }
 
     #[test]
     fn what_proposes_is_the_detector_in_use_with_lower_thresholds() {

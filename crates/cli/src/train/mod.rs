@@ -72,6 +72,14 @@ pub struct TrainArgs {
     /// them take longer, and help a model that has much to learn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(4..=900))]
     pub scenes: Option<u64>,
+    /// Further rounds of a verifier, in which what the model gets wrong is added
+    /// [default: 2].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=8))]
+    pub rounds: Option<u64>,
+    /// A config whose detector proposes the candidates of a verifier, as it is, instead
+    /// of those of `depth-ekf` and `stereo-best` with low thresholds.
+    #[arg(long, value_name = "CONFIG")]
+    pub proposes: Option<PathBuf>,
     /// Everything random depends on it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -90,16 +98,18 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(quick: bool, scenes: Option<u64>) -> Self {
+    fn new(args: &TrainArgs) -> Self {
+        let (scenes, rounds) = (args.scenes, args.rounds.map(|rounds| rounds as usize));
         let look = Look { rate_hz: 1.0, duration_s: 7.0 };
-        if quick {
+        if args.quick {
             let test_look = Look { rate_hz: 4.0, duration_s: 2.0 };
-            Self { scenes: [scenes.unwrap_or(6), 4], rounds: 1, test_scenes: 4, look, test_look }
+            let rounds = rounds.unwrap_or(1);
+            Self { scenes: [scenes.unwrap_or(6), 4], rounds, test_scenes: 4, look, test_look }
         } else {
             let test_look = Look { rate_hz: 5.0, duration_s: 4.0 };
             Self {
                 scenes: [scenes.unwrap_or(256), 64],
-                rounds: 2,
+                rounds: rounds.unwrap_or(2),
                 test_scenes: 36,
                 look,
                 test_look,
@@ -178,7 +188,7 @@ impl<'a> Session<'a> {
             bar.set_style(style);
         }
         let settings = settings(args.settings.as_deref())?;
-        Ok(Self { args, registry, plan: Plan::new(args.quick, args.scenes), settings, model, bar })
+        Ok(Self { args, registry, plan: Plan::new(args), settings, model, bar })
     }
 
     fn tell(&self, round: usize, what: &str) {
@@ -255,7 +265,7 @@ impl<'a> Session<'a> {
         for number in numbers {
             let scene =
                 rooms::scene(Split::Train, number, self.plan.look).map_err(Failure::failed)?;
-            let in_use = InUse::of(scene.camera.kind)?;
+            let in_use = self.in_use(scene.camera.kind)?;
             let mut pipeline = pipeline(&in_use.proposing()?, self.registry)?;
             in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
                 propose(&mut pipeline, seen, |_| number, &mut show)
@@ -265,7 +275,7 @@ impl<'a> Session<'a> {
         let Some(data) = &self.args.data else { return Ok(harvest) };
         self.tell(round, "reading logs and photographs");
         if round == 0 {
-            let proposing = InUse::of(CameraKind::Rgbd)?.proposing()?;
+            let proposing = self.in_use(CameraKind::Rgbd)?.proposing()?;
             for log in TRAIN_LOGS {
                 let mut pipeline = pipeline(&proposing, self.registry)?;
                 let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
@@ -280,6 +290,14 @@ impl<'a> Session<'a> {
             self.bar.inc(1);
         }
         Ok(harvest)
+    }
+
+    /// The pipeline that a verifier is trained for.
+    fn in_use(&self, kind: CameraKind) -> Result<InUse, Failure> {
+        match &self.args.proposes {
+            Some(path) => InUse::as_it_is(path),
+            None => InUse::of(kind),
+        }
     }
 
     fn in_log(&self, data: &Path, log: &str, see: seen::See<'_>) -> Result<(), Failure> {
@@ -302,7 +320,7 @@ impl<'a> Session<'a> {
         for number in 0..self.plan.test_scenes {
             let scene =
                 rooms::scene(Split::Test, number, self.plan.test_look).map_err(Failure::failed)?;
-            let in_use = InUse::of(scene.camera.kind)?;
+            let in_use = self.in_use(scene.camera.kind)?;
             let mut comparison = self.comparison(&in_use)?;
             tally.next_scene();
             in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
@@ -317,7 +335,7 @@ impl<'a> Session<'a> {
         let Some(data) = &self.args.data else { return Ok(None) };
         let mut tally = Tally::default();
         for log in TEST_LOGS {
-            let mut comparison = self.comparison(&InUse::of(CameraKind::Rgbd)?)?;
+            let mut comparison = self.comparison(&self.in_use(CameraKind::Rgbd)?)?;
             tally.next_scene();
             self.in_log(data, log, &mut |seen| comparison.step(seen, &mut tally))?;
         }

@@ -1,9 +1,13 @@
 //! The stereo systems of Satake and Miura: P1 without and P4 with a verifier.
 
+mod fit;
 mod ladder;
+mod left_out;
 mod occlusion;
+mod real;
 mod times;
 mod turntable;
+mod variants;
 mod verifier;
 mod walk;
 
@@ -29,6 +33,16 @@ pub const STEREO_EKF: System = System {
             about: "Fig. 5: objects with the silhouette of a person are rejected",
             run: verifier::verifier,
         },
+        Experiment {
+            name: "walk",
+            about: "not in the paper: P4's walk, by the forms of the filter",
+            run: walk::of_p1,
+        },
+        Experiment {
+            name: "fit-printed",
+            about: "what the paper does not print, fitted for its printed form (validation)",
+            run: fit::of_p1,
+        },
     ],
 };
 
@@ -48,9 +62,14 @@ pub const STEREO_SVM_EKF: System = System {
             run: verifier::verifier,
         },
         Experiment {
+            name: "left-out",
+            about: "not in the paper: verifiers trained without a kind of furniture",
+            run: left_out::left_out,
+        },
+        Experiment {
             name: "walk",
             about: "Fig. 11: error along two edges of a square, 125 mm on average",
-            run: walk::walk,
+            run: walk::of_p4,
         },
         Experiment {
             name: "occlusion",
@@ -71,6 +90,11 @@ pub const STEREO_SVM_EKF: System = System {
             name: "ladder",
             about: "not in the paper: printed, corrected and best on the same scenes",
             run: ladder::ladder,
+        },
+        Experiment {
+            name: "fit-printed",
+            about: "what the paper does not print, fitted for its printed form (validation)",
+            run: fit::of_p4,
         },
     ],
 };

@@ -4,7 +4,8 @@ use nalgebra::{Point2, Vector2};
 use tagalong_eval::{PositionError, draws_interval, percentile};
 use tagalong_trials::{Judge, Moment, Trial, TrialError};
 
-use super::{PIPELINES, STEREO};
+use super::STEREO;
+use super::variants::{OF_P1, OF_P4, Variant};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Errors of one contender on one walk, m.
@@ -42,26 +43,50 @@ const PACE_S: f64 = 1.0;
 type Walks<'a> = Vec<&'a [f64]>;
 
 /// The robot keeps behind whom it follows, as the paper's does, and so in view.
-const FOLLOWED: [(&str, &str); 3] = [STEREO, ("robot.behind_m", "2.0"), ("robot.speed_mps", "0.7")];
+pub const FOLLOWED: [(&str, &str); 3] =
+    [STEREO, ("robot.behind_m", "2.0"), ("robot.speed_mps", "0.7")];
 
-/// The error of the one who walks ahead.
+/// The error of the one who walks ahead, by the forms of P1's filter.
 ///
 /// # Errors
 /// As [`Lab::trials`].
-pub fn walk(lab: &Lab) -> Result<Findings, ReproduceError> {
-    let scenes = lab.scenes("square-walk", &FOLLOWED, lab.seeds(50))?;
-    let contenders = lab.contenders(&PIPELINES)?;
-    let walks = lab.trials("walks along two edges", &scenes, &contenders, errors)?;
-    Ok(table(&walks).into())
+pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
+    walk(lab, &OF_P1)
 }
 
-/// The other person is nobody's miss and nobody's false alarm.
-fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
-    let walker = trial.moments.iter().flat_map(|m| &m.truth).map(|truth| truth.id).min();
-    let drift = drift(&trial.moments, walker);
-    let pace = kept_pace(&trial.moments, walker);
+/// The error of the one who walks ahead, by the forms of P4.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
+    walk(lab, &OF_P4)
+}
+
+fn walk(lab: &Lab, variants: &[Variant]) -> Result<Findings, ReproduceError> {
+    let scenes = lab.scenes("square-walk", &FOLLOWED, lab.seeds(50))?;
+    let contenders =
+        variants.iter().map(|variant| variant.contender(lab)).collect::<Result<Vec<_>, _>>()?;
+    let walks = lab.trials("walks along two edges", &scenes, &contenders, errors)?;
+    Ok(table(&walks, variants).into())
+}
+
+/// The one who walks ahead.
+fn walker(trial: &Trial) -> Option<u16> {
+    trial.moments.iter().flat_map(|m| &m.truth).map(|truth| truth.id).min()
+}
+
+/// The other person is nobody's miss and nobody's false alarm from now on.
+pub fn only_the_walker_counts(trial: &mut Trial) {
+    let walker = walker(trial);
     let everybody = trial.moments.iter_mut().flat_map(|moment| &mut moment.truth);
     everybody.filter(|truth| Some(truth.id) != walker).for_each(|truth| truth.ignore = true);
+}
+
+fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
+    let walker = walker(&trial);
+    let drift = drift(&trial.moments, walker);
+    let pace = kept_pace(&trial.moments, walker);
+    only_the_walker_counts(&mut trial);
     let judge = Judge { coasting: true, ..Judge::default() };
     let of_run = |run| {
         let judged = judge.judge(&trial, run)?;
@@ -127,11 +152,11 @@ fn straight_on(known: &[(f64, Point2<f64>)], now_s: f64) -> Option<Point2<f64>> 
     Some(Point2::from(mean + pace * (now_s - mean_s)))
 }
 
-fn table(walks: &[Walk]) -> Table {
+fn table(walks: &[Walk], variants: &[Variant]) -> Table {
     let nan = f64::NAN;
     let published = [125.0, nan, nan, 336.0, nan].map(|mm| Cell::number(mm, 0)).to_vec();
     let mut rows = vec![Row::published("one walk, frame of the start", published)];
-    for (at, name) in PIPELINES.iter().enumerate() {
+    for (at, Variant { name, .. }) in variants.iter().enumerate() {
         let of =
             |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w.errors[at])).collect();
         let lost = |w: &Walk| [w.errors[at].without, w.errors[at].frames];

@@ -303,3 +303,103 @@ fn by_students_t_an_outlier_pulls_less_and_a_good_detection_as_much() {
     assert!((pull(4.0, 0.6) - expected).abs() < 1e-9, "{} {expected}", pull(4.0, 0.6));
     assert!(expected < 0.75 * pull(0.0, 0.6));
 }
+
+#[test]
+fn a_newcomer_is_where_the_detection_is_and_may_go_anywhere() {
+    let filter = filter(Config { initial_velocity_variance: 3.0, ..Config::default() });
+    let belief = filter.start(&detection(Point3::new(3.0, 0.4, 1.6), 0.1));
+    assert_eq!(belief.mean, Vector5::new(3.0, 0.4, 1.6, 0.0, 0.0));
+    let place = 0.1f64.powi(2) + Config::default().extra_sigma_m.powi(2);
+    let expected = SMatrix::from_diagonal(&Vector5::new(place, place, place, 3.0, 3.0));
+    assert!((belief.covariance - expected).norm() < 1e-12, "{}", belief.covariance);
+}
+
+#[test]
+fn who_backs_up_is_subtracted_the_other_way_and_who_waits_not_at_all() {
+    let filter = filter(Config { compat_printed_velocity: true, ..Config::default() });
+    let still = Vector5::new(3.0, 0.0, 1.6, 0.0, 0.0);
+    let of = |forward: f64| filter.transition(&still, &Motion { forward, ..Motion::at_rest(0.1) });
+    assert!((of(-0.05)[3] - 0.5).abs() < 1e-12 && (of(0.05)[3] + 0.5).abs() < 1e-12);
+    let no_time = Motion { forward: 0.05, ..Motion::at_rest(0.0) };
+    assert_eq!(filter.transition(&still, &no_time)[3], 0.0);
+}
+
+#[test]
+fn the_printed_noise_knows_neither_height_nor_ego_motion() {
+    let filter =
+        filter(Config { compat_printed_noise: true, printed_sigma_w: 4.0, ..Config::default() });
+    let mut belief = belief_at(Point3::new(5.0, 0.0, 1.6));
+    let before = belief.covariance;
+    let mut motion = Motion::at_rest(0.1);
+    motion.covariance = Matrix3::identity() * 0.01;
+    filter.predict(&mut belief, &motion);
+    let added = belief.covariance - before;
+    assert!((added[(3, 3)] - 0.16).abs() < 1e-12 && (added[(4, 4)] - 0.16).abs() < 1e-12);
+    assert_eq!(added[(2, 2)], 0.0);
+    let moved = before[(3, 3)] * 0.01;
+    assert!((added[(0, 0)] - moved).abs() < 1e-12 && (added[(1, 1)] - moved).abs() < 1e-12);
+}
+
+/// The belief after a sighting half a metre away, by hand where all is diagonal.
+#[test]
+fn both_updates_are_those_of_the_textbook() {
+    for printed in [false, true] {
+        let filter = filter(Config {
+            compat_printed_update: printed,
+            compat_printed_measurement: true,
+            printed_sigma_v_m: 0.3,
+            ..Config::default()
+        });
+        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let p = belief.covariance[(0, 0)];
+        let seen = detection(Point3::new(3.5, 0.0, 1.6), 0.01);
+        let support = filter.correct(&mut belief, &seen, &camera());
+        let gain = p / (p + 0.09);
+        assert!((belief.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12, "{printed}");
+        assert!((belief.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12, "{printed}");
+        let (nis, measured) = support.nis.unwrap();
+        assert!((nis - 0.25 / (p + 0.09)).abs() < 1e-12 && measured == 3);
+    }
+}
+
+#[test]
+fn every_number_has_its_bound_and_zero_is_allowed_where_it_means_none() {
+    type Key = (&'static str, fn(&mut Config) -> &mut f64, bool);
+    let keys: [Key; 7] = [
+        ("acceleration_noise", |c| &mut c.acceleration_noise, false),
+        ("height_noise", |c| &mut c.height_noise, true),
+        ("initial_velocity_variance", |c| &mut c.initial_velocity_variance, false),
+        ("extra_sigma_m", |c| &mut c.extra_sigma_m, true),
+        ("student_dof", |c| &mut c.student_dof, true),
+        ("printed_sigma_w", |c| &mut c.printed_sigma_w, false),
+        ("printed_sigma_v_m", |c| &mut c.printed_sigma_v_m, false),
+    ];
+    for (key, of, may_be_zero) in keys {
+        let refusal = |value: f64| {
+            let mut config = Config::default();
+            *of(&mut config) = value;
+            Ekf::new(config).err().map(|error| error.to_string())
+        };
+        assert_eq!(refusal(0.5), None);
+        let bound = if may_be_zero { "at least 0" } else { "positive" };
+        assert_eq!(refusal(0.0).is_none(), may_be_zero, "{key}");
+        for wrong in [-1.0, f64::NAN, f64::INFINITY] {
+            let message = refusal(wrong).unwrap();
+            assert_eq!(message, format!("`{key}` must be {bound}, not {wrong}"));
+        }
+    }
+}
+
+#[test]
+fn the_weight_of_an_outlier_depends_on_how_much_was_measured() {
+    let pull = |covariance_of_height: f64| {
+        let filter = filter(Config { student_dof: 4.0, ..Config::default() });
+        let mut belief = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
+        let mut seen = detection(Point3::new(3.6, 0.0, 1.6), 0.1);
+        seen.covariance[(2, 2)] = covariance_of_height;
+        filter.correct(&mut belief, &seen, &camera());
+        belief.mean[0] - 3.0
+    };
+    // With three coordinates right, an error in one of them says less of the detection.
+    assert!(pull(0.01) > pull(1e6) + 1e-3, "{} {}", pull(0.01), pull(1e6));
+}

@@ -92,6 +92,23 @@ pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
     people
 }
 
+/// Leaves so many of the others and of the people at most, in the order of a hash; 0
+/// leaves all.
+pub fn keep(samples: &mut Vec<Sample>, most: [usize; 2], seed: u64) {
+    let mut of_class = [Vec::new(), Vec::new()];
+    for (k, sample) in samples.iter().enumerate() {
+        of_class[usize::from(sample.example.is_person)].push((mix(k as u64 ^ seed), k));
+    }
+    let mut kept = vec![true; samples.len()];
+    for (mut class, most) in of_class.into_iter().zip(most) {
+        class.sort_unstable();
+        let spare = if most == 0 { 0 } else { class.len().saturating_sub(most) };
+        class.iter().rev().take(spare).for_each(|(_, k)| kept[*k] = false);
+    }
+    let mut kept = kept.into_iter();
+    samples.retain(|_| kept.next().unwrap_or(true));
+}
+
 #[cfg(test)]
 mod tests {
     use tagalong_core::Example;
@@ -109,5 +126,22 @@ mod tests {
         let chosen = subset(&samples, 40, 1);
         assert_eq!(chosen.len(), 40);
         assert_eq!(chosen.iter().filter(|s| s.example.is_person).count(), 10);
+    }
+
+    #[test]
+    fn so_many_of_each_class_are_left_by_chance() {
+        let samples: Vec<Sample> = (0..100).map(|k| sample(k, k < 40)).collect();
+        let left = |most, seed| {
+            let mut left = samples.clone();
+            keep(&mut left, most, seed);
+            left.iter().map(|s| s.example.group).collect::<Vec<u64>>()
+        };
+        let some = left([10, 25], 1);
+        assert_eq!(some.iter().filter(|k| **k < 40).count(), 25);
+        assert_eq!(some.len(), 35);
+        assert!(some.is_sorted(), "the order stays");
+        assert_ne!(some, left([10, 25], 2));
+        assert_eq!(left([0, 5], 1).len(), 65, "0 is all");
+        assert_eq!(left([1000, 1000], 1).len(), 100);
     }
 }

@@ -98,6 +98,8 @@ impl Trainer for PatchTrainer {
     }
 
     fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        let Training { people, others, .. } = self.training;
+        choose::keep(&mut self.samples, [others, people], self.seed);
         let trials = self.trials(&mut |part| progress((1.0 - LAST_FIT) * part))?;
         let best = trials
             .iter()

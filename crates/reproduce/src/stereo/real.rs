@@ -1,0 +1,140 @@
+//! Annotated logs of real rooms as trials: the same frames for every verifier, with the
+//! depth of the log.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry2, Isometry3, Point3};
+use tagalong_core::{Frame, HEAD_RADIUS_M, Rect};
+use tagalong_eval::formats::people::{self, Row as Annotated};
+use tagalong_log::{FrameSource, InputSettings, Limits, Needs};
+use tagalong_pipeline::Pipeline;
+use tagalong_sim::Truth;
+use tagalong_trials::{Contender, Moment, Run, Trial};
+
+use super::variants::table;
+use crate::lab::read;
+use crate::{Lab, ReproduceError};
+
+/// What detects in depth images of real rooms.
+const DETECTS: &str = "depth-ekf";
+/// What a config says of verifiers, and of what becomes of those whom they reject.
+const OF_VERIFIERS: [&str; 2] = ["verifiers", "lifecycle"];
+
+/// The detector of `depth-ekf` with the verifiers of another config, or without any.
+///
+/// # Errors
+/// A config that cannot be read.
+pub fn contender(
+    lab: &Lab,
+    name: &str,
+    verifiers: Option<&str>,
+) -> Result<Contender, ReproduceError> {
+    let plain = lab.contender(DETECTS)?;
+    let Some(of) = verifiers else { return Ok(Contender { name: name.into(), ..plain }) };
+    let (mut config, mut with) = (table(&plain)?, table(&lab.contender(of)?)?);
+    config.extend(OF_VERIFIERS.iter().filter_map(|key| with.remove_entry(*key)));
+    Ok(Contender { name: name.into(), config: config.to_string(), ..plain })
+}
+
+/// The contenders on an annotated log; nothing where there is no such log.
+///
+/// # Errors
+/// A log or annotations that cannot be used, and a plugin that fails.
+pub fn trial(
+    lab: &Lab,
+    log: &str,
+    contenders: &[Contender],
+) -> Result<Option<Trial>, ReproduceError> {
+    let Some(folder) = lab.data.as_ref().map(|data| data.join("logs")) else { return Ok(None) };
+    let (path, truth) = (folder.join(log), folder.join(log).with_extension("people.csv"));
+    if !truth.exists() {
+        return Ok(None);
+    }
+    let failed =
+        |error: &dyn ToString| ReproduceError::Other(format!("{log}: {}", error.to_string()));
+    let rows = people::parse(&read(&truth)?, &truth.display().to_string());
+    let rows = rows.map_err(|error| failed(&error))?;
+    let mut people: BTreeMap<u64, Vec<Annotated>> = BTreeMap::new();
+    rows.into_iter().for_each(|row| people.entry(u64::from(row.frame)).or_default().push(row));
+    let needs = Needs { colour: true, depth: true, right: false };
+    let path = path.with_extension("mcap");
+    let source = FrameSource::open(&path, &InputSettings::default(), &Limits::default(), needs);
+    let mut source = source.map_err(|error| failed(&error))?;
+    let pipelines = contenders.iter().map(|contender| contender.pipeline(lab.registry, 1));
+    let mut pipelines = pipelines.collect::<Result<Vec<Pipeline>, _>>()?;
+    let run = |of: &Contender| Run { pipeline: of.name.clone(), reports: vec![], worked_ms: 0.0 };
+    let mut runs: Vec<Run> = contenders.iter().map(run).collect();
+    let (mut moments, mut camera) = (Vec::new(), None);
+    while let Some(item) = source.next_frame() {
+        for (pipeline, run) in pipelines.iter_mut().zip(&mut runs) {
+            run.reports.push(pipeline.step(&item.frame).map_err(|error| failed(&error))?);
+        }
+        let known = people.get(&item.frame.index).map_or(&[][..], Vec::as_slice);
+        moments.push(moment(&item.frame, known));
+        camera = Some((*item.frame.camera).clone());
+    }
+    let whole = |camera| Trial { seed: 0, camera, furniture: Vec::new(), moments, runs };
+    Ok(camera.map(whole))
+}
+
+/// Who is annotated in a frame. Nothing here asks where the robot is.
+fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
+    let pose = &frame.camera.robot_from_camera;
+    Moment {
+        stamp: frame.stamp,
+        truth: known.iter().map(|row| somebody(row, pose)).collect(),
+        odom_from_robot: Isometry2::identity(),
+        world_from_robot: Isometry2::identity(),
+    }
+}
+
+/// Heads are annotated at their surface.
+fn somebody(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Truth {
+    let surface = Point3::from(row.head_in_camera_m);
+    let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
+    let head = robot_from_camera * (surface + ray * HEAD_RADIUS_M);
+    let rect = |r: &tagalong_eval::Region| Rect::new(r.x, r.y, r.width, r.height);
+    Truth {
+        id: u16::try_from(row.id).unwrap_or(u16::MAX),
+        head_in_robot: head,
+        torso_in_robot: head,
+        upper_body: Some(rect(&row.upper_body)),
+        visible: Some(rect(&row.visible_body)),
+        visible_fraction: row.visible,
+        occluder: None,
+        ignore: row.ignore,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn a_head_is_annotated_at_its_surface_and_known_by_its_centre() {
+        let row = Annotated {
+            frame: 1,
+            id: 3,
+            upper_body: tagalong_eval::Region::new(10.0, 20.0, 30.0, 40.0),
+            visible_body: tagalong_eval::Region::default(),
+            head_in_camera_m: [0.0, 0.0, 2.0],
+            visible: 0.5,
+            occluder: "0".into(),
+            ignore: true,
+            interpolated: 0,
+        };
+        // The camera looks along the robot's X from 1 m above the floor.
+        let forward = Vector3::new(0.0, -1.0, 0.0);
+        let turn =
+            nalgebra::Rotation3::from_basis_unchecked(&[forward, -Vector3::z(), Vector3::x()]);
+        let turn = UnitQuaternion::from_rotation_matrix(&turn);
+        let pose = Isometry3::from_parts(Translation3::new(0.1, 0.0, 1.0), turn);
+        let found = somebody(&row, &pose);
+        let expected = Point3::new(2.1 + HEAD_RADIUS_M, 0.0, 1.0);
+        assert!((found.head_in_robot - expected).norm() < 1e-9, "{}", found.head_in_robot);
+        assert!(found.ignore && found.id == 3);
+        assert_eq!(found.upper_body, Some(Rect::new(10.0, 20.0, 30.0, 40.0)));
+    }
+}

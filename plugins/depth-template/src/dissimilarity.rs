@@ -1,0 +1,186 @@
+use std::sync::Arc;
+
+use tagalong_core::{Derived, Frame, Result};
+use tagalong_vision::RowSums;
+
+use crate::bank::Template;
+use crate::matching::Match;
+use crate::view::Working;
+
+/// Running sums of depths and of their squares along the rows of a reduced image, m and
+/// m². The papers compare depths; everything else here compares inverse depths.
+#[derive(Clone, Debug)]
+pub struct DepthSums {
+    width: usize,
+    sums: Vec<[f64; 2]>,
+}
+
+impl DepthSums {
+    /// The sums of a reduced image.
+    pub fn new(rows: &RowSums) -> Self {
+        let mut sums = Vec::with_capacity((rows.width() + 1) * rows.height());
+        for y in 0..rows.height() {
+            let mut running = [0.0; 2];
+            sums.push(running);
+            for value in rows.values(y) {
+                if *value > 0 {
+                    let depth_m = RowSums::UNITS / f64::from(*value);
+                    running = [running[0] + depth_m, running[1] + depth_m * depth_m];
+                }
+                sums.push(running);
+            }
+        }
+        Self { width: rows.width(), sums }
+    }
+
+    /// Sum of `(depth - t)²` over the `count` readings among the pixels `from..to` of row
+    /// `y`, m².
+    fn squared_error(&self, (y, from, to): (usize, usize, usize), count: f64, t: f64) -> f64 {
+        let row = &self.sums[y * (self.width + 1)..(y + 1) * (self.width + 1)];
+        let [sum, squares] = [row[to][0] - row[from][0], row[to][1] - row[from][1]];
+        (count * t * t - 2.0 * t * sum + squares).max(0.0)
+    }
+}
+
+impl Derived for DepthSums {
+    fn derive(frame: &Frame) -> Result<Self> {
+        Ok(Self::new(&frame.derived::<Working>()?.0))
+    }
+}
+
+/// P4's dissimilarity: the plain sum of squared differences between the depths of a
+/// binary template and those of the image, over the whole window, m².
+#[derive(Clone, Debug)]
+pub struct Dissimilarity {
+    /// The depths of the frame.
+    pub sums: Arc<DepthSums>,
+    /// The one depth of all that is not the person, m.
+    pub background_m: f64,
+    /// Fraction of the person's pixels that must have a reading.
+    pub min_foreground_valid: f64,
+}
+
+impl Dissimilarity {
+    /// Compares `template` with its head centre on the reduced pixel (`x`, `y`) and the
+    /// foreground at `depth_m`. Where there is no reading, of which the papers say
+    /// nothing, the mean of the other pixels stands. `None` if too little of the person
+    /// has one.
+    pub fn fit(
+        &self,
+        rows: &RowSums,
+        template: &Template,
+        (x, y): (i64, i64),
+        depth_m: f64,
+    ) -> Option<Match> {
+        let (mut read, mut person, mut person_read, mut sum) = (0.0, 0.0, 0.0, 0.0);
+        let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
+        for row in &template.rows {
+            // The outline lies in the middle of the guard.
+            let (from, to) = ((row.from + row.guard_from) / 2, (row.to + row.guard_to) / 2);
+            person += (to - from) as f64;
+            let Some(line) = usize::try_from(y + row.dy).ok().filter(|l| *l < rows.height()) else {
+                continue;
+            };
+            let ends = [-template.half_width, from, to, template.half_width + 1];
+            let ends = ends.map(|end| inside(x + end));
+            let depths = [self.background_m, depth_m, self.background_m];
+            for (k, expected_m) in depths.into_iter().enumerate() {
+                let run = (line, ends[k], ends[k + 1].max(ends[k]));
+                let count = f64::from(rows.run(run.0, run.1, run.2).count);
+                sum += self.sums.squared_error(run, count, expected_m);
+                read += count;
+                person_read += if k == 1 { count } else { 0.0 };
+            }
+        }
+        let foreground_valid = person_read / f64::max(person, 1.0);
+        let is_seen = foreground_valid >= self.min_foreground_valid && read > 0.0;
+        is_seen.then(|| Match { cost: sum / read * window(template), foreground_valid })
+    }
+}
+
+/// Pixels of the window, those of rows that are left out included.
+fn window(template: &Template) -> f64 {
+    let [first, last] =
+        [template.rows.first(), template.rows.last()].map(|row| row.map_or(0, |row| row.dy));
+    ((last - first + 1) * (2 * template.half_width + 1)) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use tagalong_core::DepthImage;
+
+    use super::*;
+    use crate::bank::{Bank, Direction, Pose};
+
+    const BACKGROUND_M: f64 = 7.0;
+
+    fn dissimilarity(rows: &RowSums) -> Dissimilarity {
+        let sums = Arc::new(DepthSums::new(rows));
+        Dissimilarity { sums, background_m: BACKGROUND_M, min_foreground_valid: 0.2 }
+    }
+
+    /// The sum over every pixel of the window.
+    fn slow(rows: &RowSums, t: &Template, (x, y): (i64, i64), z: f64) -> (f64, f64) {
+        let (mut sum, mut read) = (0.0, 0.0);
+        for row in &t.rows {
+            let person = (row.from + row.guard_from) / 2..(row.to + row.guard_to) / 2;
+            for dx in -t.half_width..=t.half_width {
+                let Some(seen) = rows.depth_m(x + dx, y + row.dy) else { continue };
+                let expected = if person.contains(&dx) { z } else { BACKGROUND_M };
+                sum += (seen - expected).powi(2);
+                read += 1.0;
+            }
+        }
+        (sum, read)
+    }
+
+    proptest! {
+        #[test]
+        fn runs_equal_pixels(
+            pixels in prop::collection::vec(prop_oneof![Just(f32::NAN), 1.5f32..2.5, 3.0f32..9.0], 48 * 40),
+            x in -4i64..52, y in -4i64..44, z in 1.5f64..4.0, which in 0usize..3,
+        ) {
+            let rows = RowSums::new(&DepthImage::from_pixels(48, 40, pixels).unwrap(), 1);
+            let mut bank = Bank::new(100);
+            let template = bank.template(Pose::nearest(Direction::ALL[which], 0.0, 0.0, 40.0));
+            let fast = dissimilarity(&rows).fit(&rows, template, (x, y), z);
+            let (sum, read) = slow(&rows, template, (x, y), z);
+            let pixels = (template.rows.len() as i64 * (2 * template.half_width + 1)) as f64;
+            if let Some(fast) = fast {
+                prop_assert!((fast.cost - sum * pixels / read).abs() < 1e-6, "{} {}", fast.cost, sum);
+            }
+        }
+    }
+
+    /// The cost of somebody who fits, 2 m behind whom is a wall.
+    fn cost_at(z: f64, max_rows: usize) -> f64 {
+        let pose = Pose::nearest(Direction::Along, 0.0, 0.0, 250.0 / z);
+        let shape = Bank::new(10_000).template(pose).clone();
+        let depth = DepthImage::from_fn(220, 220, |x, y| {
+            let row = shape.rows.iter().find(|r| r.dy == y as i64 - 100);
+            let dx = x as i64 - 110;
+            let is_person = row.is_some_and(|r| r.from <= dx && dx < r.to);
+            if is_person { z as f32 } else { z as f32 + 2.0 }
+        });
+        let rows = RowSums::new(&depth, 1);
+        let mut bank = Bank::new(max_rows);
+        let found = dissimilarity(&rows).fit(&rows, bank.template(pose), (110, 100), z);
+        found.unwrap().cost
+    }
+
+    #[test]
+    fn a_wall_between_the_person_and_the_one_background_costs_and_the_sum_shrinks_with_range() {
+        // 3 m between the wall and the background, 1 m farther away; the window has a
+        // quarter of the pixels.
+        let (near, far) = (cost_at(2.0, 1000), cost_at(4.0, 1000));
+        let ratio = near / far;
+        assert!((ratio / (4.0 * 9.0) - 1.0).abs() < 0.2, "{near} {far}: {ratio}");
+    }
+
+    #[test]
+    fn thinned_rows_stand_for_all_of_them() {
+        let (all, some) = (cost_at(2.0, 1000), cost_at(2.0, 20));
+        assert!((some / all - 1.0).abs() < 0.05, "{all} {some}");
+    }
+}
