@@ -439,6 +439,10 @@ mod tests {
     struct Idle;
 
     impl Detector for Idle {
+        fn capabilities(&self) -> crate::Capabilities {
+            crate::Capabilities::default()
+        }
+
         fn detect(
             &mut self,
             _: &Frame,

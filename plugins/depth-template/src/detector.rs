@@ -11,9 +11,9 @@ use crate::NAME;
 use crate::bank::{Bank, Pose};
 use crate::candidates::{body_below, boundary, head_width_m, is_below_something, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
+use crate::dissimilarity::Dissimilarity;
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
-use crate::dissimilarity::Dissimilarity;
 use crate::view::{Local, View, Working};
 use crate::weigher::Weigher;
 

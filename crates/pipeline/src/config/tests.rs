@@ -279,6 +279,10 @@ impl tagalong_core::Controller for Still {
 }
 
 impl tagalong_core::Verifier for Still {
+    fn inputs(&self) -> tagalong_core::Inputs {
+        tagalong_core::Inputs::NONE
+    }
+
     fn margin(
         &mut self,
         _: &tagalong_core::Frame,
