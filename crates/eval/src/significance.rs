@@ -21,7 +21,7 @@ pub struct Gain {
     pub p_value: f64,
 }
 
-/// How much better `b` is than `a`, both scored on the same draws: the mean
+/// Returns how much better `b` is than `a`, both scored on the same draws: the mean
 /// difference with its interval ([`mean_interval`]), and how probable it is that there
 /// is none ([`sign_flip`]). Pairs remove what the draws themselves differ in.
 /// Nothing if the lists are empty or of different length, or hold what is no number.
@@ -37,13 +37,13 @@ pub fn paired_gain(a: &[f64], b: &[f64]) -> Option<Gain> {
     Some(Gain { difference, p_value: sign_flip(&differences)? })
 }
 
-/// Whether a p-value is below what chance alone may do with the confidence of the
-/// intervals. That of fewer than six draws never is: 2 of 2^5 patterns are 6 %.
+/// Returns true if a p-value is below what chance alone may do with the confidence of
+/// the intervals. That of fewer than six draws never is: 2 of 2^5 patterns are 6 %.
 pub fn is_significant(p_value: f64) -> bool {
     p_value < 1.0 - CONFIDENCE
 }
 
-/// The two-sided p-value of the hypothesis that differences lie symmetrically about
+/// Returns the two-sided p-value of the hypothesis that differences lie symmetrically about
 /// zero (the sign-flip or permutation test: Fisher, 1935, section 21): the part of all
 /// 2^n patterns of signs whose sum is at least as far from zero. Exact up to 20
 /// differences; of more, from 99,999 drawn patterns and the given one (Phipson and
@@ -91,8 +91,8 @@ fn drawn_sum(sizes: &[f64], random: &mut SplitMix) -> f64 {
     sizes.chunks(u64::BITS as usize).map(of_word).sum()
 }
 
-/// P-values of several comparisons as large as they have to be for any of them to
-/// count, in their order (Holm, Scand. J. Statist. 1979): with twenty comparisons one
+/// Returns the p-values of several comparisons as large as they have to be for any of
+/// them to count, in their order (Holm, Scand. J. Statist. 1979): with twenty comparisons one
 /// in twenty is below 0.05 by chance. One alone stays as it is.
 ///
 /// ```

@@ -26,18 +26,18 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// A figure of which nothing more is known.
+    /// Returns a figure of which nothing more is known.
     pub const fn open(estimate: f64) -> Self {
         Self { estimate, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
     }
 
-    /// Both ends, if there are any.
+    /// Returns both ends, if there are any.
     pub fn ends(&self) -> Option<[f64; 2]> {
         (self.lower.is_finite() && self.upper.is_finite()).then_some([self.lower, self.upper])
     }
 
-    /// The part of the interval that a figure of this range can have; one without
-    /// ends stays so.
+    /// Returns the part of the interval that a figure of this range can have; one
+    /// without ends stays so.
     ///
     /// ```
     /// let interval = tagalong_eval::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
@@ -109,7 +109,7 @@ fn student_quantile(freedom: usize) -> f64 {
     law.map_or(f64::INFINITY, |law| law.inverse_cdf(0.5 + 0.5 * CONFIDENCE))
 }
 
-/// The interval of a success rate whose trials come in clusters, each `[successes,
+/// Returns the interval of a success rate whose trials come in clusters, each `[successes,
 /// trials]`: the frames of a ride resemble each other, and a hundred of them say less
 /// than a hundred rides. The Wilson interval of as many independent trials as have the
 /// spread that the clusters show (never more than there are), with Student's quantile
@@ -164,7 +164,7 @@ pub fn percentile(values: &[f64], fraction: f64) -> Option<f64> {
     Some(sorted[below] + (at - below as f64) * (sorted[above] - sorted[below]))
 }
 
-/// The interval of a figure that is computed from `draws` draws (or logs, rides,
+/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides,
 /// blocks: not frames, because frames of one recording are not independent).
 /// `figure` is called with the indices of those that enter: first of all, then of
 /// all but one. What leaving one out changes tells the spread (the jackknife: Tukey,
@@ -210,7 +210,7 @@ pub fn draws_interval(draws: usize, figure: impl Fn(&[usize]) -> f64) -> Option<
     Some(Interval::around(estimate, student_quantile(draws - 1) * error))
 }
 
-/// The interval of the mean of one value a draw; as [`draws_interval`].
+/// Returns the interval of the mean of one value a draw; as [`draws_interval`].
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     let mean = |drawn: &[usize]| drawn.iter().map(|&i| values[i]).sum::<f64>() / drawn.len() as f64;
     draws_interval(values.len(), mean)

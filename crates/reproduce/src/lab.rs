@@ -65,7 +65,7 @@ impl DrawnScenes {
         }
     }
 
-    /// Those since the last time.
+    /// Returns those drawn since the last call.
     pub(crate) fn take(&self) -> Vec<Drawn> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -85,7 +85,7 @@ pub struct Lab<'a> {
     pub seeds: Option<u64>,
     /// The first of them within the split: others are other draws.
     pub first_seed: u64,
-    /// What was drawn.
+    /// The scenes drawn so far.
     pub drawn: DrawnScenes,
     /// Trials that run at once.
     pub jobs: usize,

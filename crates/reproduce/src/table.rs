@@ -71,7 +71,7 @@ impl Cell {
         Self::estimate(wilson(count, of, CONFIDENCE), digits + 2).percent()
     }
 
-    /// All of these `[so many, of so many]` in per cent, with the interval that their
+    /// Returns all of these `[so many, of so many]` in per cent, with the interval that their
     /// spread gives: for what comes in clusters, like the frames of a draw.
     pub fn clustered(clusters: &[[u64; 2]], digits: usize) -> Self {
         Self::estimate(clustered_share(clusters), digits + 2).percent()

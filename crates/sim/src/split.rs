@@ -69,7 +69,7 @@ impl Split {
         Err(ConfigError::new(message))
     }
 
-    /// So many seeds of the split, from `first` on.
+    /// Returns so many seeds of the split, from `first` on.
     ///
     /// # Errors
     /// Seeds that the split does not have.
@@ -130,7 +130,7 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// What a [`Variant`](crate::Variant) takes.
+    /// Returns them as a [`Variant`](crate::Variant) takes them.
     pub fn numbers(self) -> Range<u64> {
         let start = self.split.index() * SEEDS + self.first;
         start..start + self.count
