@@ -128,7 +128,7 @@ mod tests {
     fn after_a_turn(ego_motion: bool) -> Belief {
         let filter = LastSeen::new(Config { ego_motion, ..Config::default() }).unwrap();
         let mut belief = filter.start(&sighting(3.0, 0.0));
-        let turn = std::f64::consts::FRAC_PI_2;
+        let turn = FRAC_PI_2;
         filter.predict(&mut belief, &Motion { forward: 1.0, turn, ..Motion::at_rest(0.5) });
         belief
     }
