@@ -525,3 +525,51 @@ fn a_file_that_shrinks_while_it_is_read_is_noticed() {
     assert!(source.data_lost());
     assert_eq!(count(&source, "log_changed_while_read"), 1);
 }
+
+/// A log of colour and depth, whose second colour image is damaged behind its header.
+fn with_damage() -> LogWriter {
+    let mut log = started();
+    for i in 0..3 {
+        let stamp = at(f64::from(i) * 0.1);
+        if i == 1 {
+            let short = Image {
+                header: Header::new(stamp, "colour"),
+                height: 12,
+                width: 16,
+                encoding: "rgb8".into(),
+                is_bigendian: 0,
+                step: 48,
+                data: &[7; 48],
+            };
+            log.message("/camera/color/image_raw", stamp, &short);
+        } else {
+            log.colour(stamp);
+        }
+        log.depth(stamp, "colour", 2.0);
+    }
+    log
+}
+
+#[test]
+fn images_that_are_not_declared_are_not_read() {
+    let depth = Inputs::NONE.require(Input::Depth);
+    let (mut source, _saved) = open(with_damage(), depth);
+    let found = frames(&mut source);
+    assert_eq!(indices(&found), [1, 2, 3], "colour counts the frames, and is not decoded");
+    assert!(found.iter().all(|item| item.frame.depth().is_ok() && item.frame.colour().is_err()));
+    assert_eq!((found[1].frame.camera.width, found[1].frame.camera.height), (16, 12));
+    assert!(!source.data_lost());
+
+    let (mut source, _saved) = open(with_damage(), Inputs::NONE.require(Input::Colour));
+    let found = frames(&mut source);
+    assert_eq!(indices(&found), [1, 3], "what is required and damaged is lost");
+    assert!(found.iter().all(|item| item.frame.depth().is_err() && item.frame.colour().is_ok()));
+    assert!(source.data_lost() && source.facts().depth_topic.is_none());
+    assert_eq!(count(&source, "colour_without_depth"), 0);
+
+    let (mut source, _saved) = open(with_damage(), depth.accept(Input::Colour));
+    let found = frames(&mut source);
+    assert_eq!(indices(&found), [1, 2, 3], "what is only accepted is missing where damaged");
+    assert!(found[1].frame.colour().is_err() && found[2].frame.colour().is_ok());
+    assert!(source.data_lost());
+}

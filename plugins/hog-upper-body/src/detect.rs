@@ -335,7 +335,7 @@ mod tests {
 
     #[test]
     fn windows_that_depth_rules_out_are_not_looked_at() {
-        let config = Config { min_score: -50.0, overlap: 0.0, ..Config::default() };
+        let config = Config { machine: Kind::Linear, min_score: -99.0, ..Config::default() };
         let ([unfit, _], found) = dropped(config.clone(), None, None);
         assert!(unfit == 0 && found > 0, "{unfit} {found}");
         let ([unfit, looked_at], found) = dropped(config.clone(), Some(9.0), None);
@@ -346,8 +346,12 @@ mod tests {
 
     #[test]
     fn a_search_near_a_track_finds_one() {
-        let config =
-            Config { min_score: -50.0, min_side_px: 20.0, overlap: 0.0, ..Config::default() };
+        let config = Config {
+            machine: Kind::Linear,
+            min_score: -99.0,
+            min_side_px: 20.0,
+            ..Config::default()
+        };
         let region = Rect::new(30.0, 30.0, 40.0, 40.0);
         let person = Person { position: Point3::new(2.0, 0.0, 1.3), velocity: Vector2::zeros() };
         let track = Track {
