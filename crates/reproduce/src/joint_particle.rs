@@ -55,9 +55,8 @@ const SEEN_BY: [(&str, &str); 1] = [("camera.kind", "stereo")];
 /// detector are made for it.
 const STEREO: &str = "stereo-ekf";
 const PRINTED: &str = "joint-particle-as-printed";
-/// Sigma for the dissimilarity with the size of the window inside of the root, m: the
-/// best of the experiment `fit`.
-const RMS_SIGMA: &str = "0.15";
+/// Sigma for the dissimilarity with the size of the window inside of the root, m.
+const RMS_SIGMA: &str = "0.07";
 /// An estimate farther from a head than this on the floor is no estimate of it, m.
 const FAR_M: f64 = 1.0;
 /// Who is seen less than this is hidden (the default of `[occlusion]`).
@@ -178,19 +177,19 @@ fn misprints(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
 /// Values that are tried for the printed form, one change at a time.
 const TRIED: [&[(&str, &str)]; 14] = [
     &[],
-    &[("detectors.0.config.likelihood_sigma", "0.001")],
+    &[("detectors.0.config.likelihood_sigma", "0.00025")],
+    &[("detectors.0.config.likelihood_sigma", "0.0005")],
     &[("detectors.0.config.likelihood_sigma", "0.002")],
     &[("detectors.0.config.likelihood_sigma", "0.004")],
     &[("detectors.0.config.likelihood_sigma", "0.008")],
-    &[("detectors.0.config.likelihood_sigma", "0.016")],
     &[("filter.config.position_noise", "0.08")],
     &[("filter.config.position_noise", "0.3")],
     &[("filter.config.velocity_noise", "0.1")],
     &[("filter.config.velocity_noise", "1.0")],
     &[("filter.config.height_noise", "0.06")],
-    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.075")],
+    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.035")],
+    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.07")],
     &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.15")],
-    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.3")],
 ];
 
 /// How the printed form does with other values of what P3 does not print.

@@ -432,7 +432,8 @@ mod tests {
             _ => f32::NAN,
         });
         let depth_m = |percentile| RowSums::UNITS / background(&depth, percentile);
-        assert!((depth_m(90.0) - 91.0).abs() < 1e-6, "{}", depth_m(90.0));
+        let usual = DepthTemplateConfig::default().background_percentile;
+        assert!((depth_m(usual) - 91.0).abs() < 1e-6, "{}", depth_m(usual));
         assert!((depth_m(10.0) - 11.0).abs() < 1e-6 && (depth_m(200.0) - 101.0).abs() < 1e-6);
         assert_eq!(background(&DepthImage::filled(4, 4, f32::NAN), 90.0), 0.0);
     }

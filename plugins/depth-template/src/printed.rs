@@ -94,11 +94,15 @@ impl Printed {
         })
     }
 
-    /// What the scenes of a frame are compared with.
-    pub fn canvas(&self, frame: &Frame) -> Result<Canvas> {
+    /// What the scenes of a frame are compared with; `kept` is that of the last frame.
+    pub fn canvas(&self, frame: &Frame, kept: &mut Option<Arc<Canvas>>) -> Result<Arc<Canvas>> {
+        let metres = frame.derived::<Metres>()?;
+        if let Some(canvas) = kept.as_ref().filter(|kept| Arc::ptr_eq(&kept.metres, &metres)) {
+            return Ok(Arc::clone(canvas));
+        }
         let inverse = background(frame.depth()?, self.percentile);
         let background_m = RowSums::UNITS / inverse.max(f64::MIN_POSITIVE);
-        Ok(Canvas { metres: frame.derived::<Metres>()?, background_m })
+        Ok(Arc::clone(kept.insert(Arc::new(Canvas { metres, background_m }))))
     }
 
     /// Log-likelihood of a scene, near to far.
@@ -249,7 +253,7 @@ mod tests {
             let frame = frame(DepthImage::from_pixels(80, 60, pixels).unwrap());
             let config = config(if is_rms { Weighing::Rms } else { Weighing::Printed });
             let printed = Printed::new(&config).unwrap();
-            let background_m = printed.canvas(&frame).unwrap().background_m;
+            let background_m = printed.canvas(&frame, &mut None).unwrap().background_m;
             let scene = [standing(3.0, far), standing(1.8, near)];
             let cast = [&scene[0], &scene[1]].map(|p| Painted::new(p, Direction::Along));
             let d = slow(&frame, &cast, background_m, is_rms).unwrap();

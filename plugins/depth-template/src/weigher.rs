@@ -5,7 +5,7 @@ use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Rect, Resu
 
 use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;
-use crate::printed::Printed;
+use crate::printed::{Canvas, Printed};
 use crate::scores::{Levels, ONE, Scores};
 use crate::view::{View, Working};
 
@@ -28,6 +28,7 @@ struct Tools {
     one_sided: f64,
     silhouettes: Silhouettes,
     view: Option<Arc<View>>,
+    canvas: Option<Arc<Canvas>>,
     scores: Scores,
     cast: Vec<Placed>,
     alone: HashMap<Spot, Found>,
@@ -87,6 +88,7 @@ impl Weigher {
             one_sided: config.likelihood_one_sided,
             silhouettes: Silhouettes { bank: Bank::new(usize::MAX), kept: Vec::new() },
             view: None,
+            canvas: None,
             scores: Scores::new(config),
             cast: Vec::new(),
             alone: HashMap::new(),
@@ -104,8 +106,8 @@ impl Weigher {
         scenes: std::slice::Chunks<'_, Person>,
     ) -> Result<Vec<f64>> {
         let image = frame.derived::<Working>()?;
-        let canvas = printed.canvas(frame)?;
         let mut tools = self.tools();
+        let canvas = printed.canvas(frame, &mut tools.canvas)?;
         let view = tools.view_of(frame, &image);
         let log = |scene: &[Person]| {
             let mut cast = |way: Option<Direction>| {

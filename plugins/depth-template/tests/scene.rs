@@ -8,7 +8,7 @@ use tagalong_core::{
     Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, HEAD_RADIUS_M,
     Images, Motion, Person, Pinhole, Search, Stamp, Track, TrackId,
 };
-use tagalong_depth_template::{DepthTemplate, DepthTemplateConfig, render};
+use tagalong_depth_template::{Cost, DepthTemplate, DepthTemplateConfig, render};
 
 const CAMERA_HEIGHT_M: f64 = 1.2;
 
@@ -187,4 +187,24 @@ fn the_printed_dissimilarity_finds_people_in_front_of_the_one_background_alone()
     let (found, funnel) = discover(printed(2.0), &scene);
     assert!(found.is_empty() && funnel.count("template cost") > 0, "{funnel:?}");
     assert_eq!(discover(DepthTemplateConfig::default(), &scene).0.len(), 1);
+}
+
+#[test]
+fn the_papers_background_is_the_wall_where_the_percentile_is_high() {
+    let head = Point3::new(2.5, 0.0, 1.6);
+    let scene = frame(320, 6.0, &[head]);
+    let score = |background_percentile| {
+        let config = DepthTemplateConfig {
+            cost: Cost::Squared,
+            background_percentile,
+            discover_cost: 1e3,
+            refine_cost: 1e3,
+            ..Default::default()
+        };
+        let (found, _) = discover(config, &scene);
+        let here = found.iter().filter(|d| (d.position - head).norm() < 0.3).map(|d| d.score);
+        here.fold(f64::MIN, f64::max)
+    };
+    let usual = score(DepthTemplateConfig::default().background_percentile);
+    assert!(usual > score(10.0) + 0.5, "{usual} {}", score(10.0));
 }

@@ -468,6 +468,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::tests::rig::{Formula, frame, sighting};
 
     proptest! {
         /// A Gaussian likelihood along the line is the measurement itself.
@@ -486,7 +487,7 @@ mod tests {
 
     #[test]
     fn likelihoods_multiply_what_was_believed_before() {
-        let detection = crate::tests::rig::sighting(nalgebra::Point3::new(2.0, 0.0, 1.6), [0.1; 3]);
+        let detection = sighting(nalgebra::Point3::new(2.0, 0.0, 1.6), [0.1; 3]);
         let config = Config { particles: 3, ..Config::default() };
         let first = Particle::of(&detection, &config);
         let mut group = Group::single(TrackId(1), &first, 1, &config);
@@ -496,6 +497,82 @@ mod tests {
         let off = |(a, b): (&f64, &f64)| (a - b).abs();
         assert!(group.weights.iter().zip(&expected).map(off).all(|off| off < 1e-12));
         assert!(group.likelihoods.iter().zip(&[0.25, 1.0, 0.5]).map(off).all(|off| off < 1e-12));
+    }
+
+    /// What `work` makes of two people one behind the other, seen with a likelihood.
+    fn looking<T>(
+        config: &Config,
+        likelihood: &Formula,
+        work: impl FnOnce(&mut Group, &mut Look<'_>) -> T,
+    ) -> T {
+        let single = |id, x| {
+            let detection = sighting(nalgebra::Point3::new(x, 0.0, 1.6), [0.01; 3]);
+            Group::single(TrackId(id), &Particle::of(&detection, config), 1, config)
+        };
+        let mut group = single(1, 2.0).merge(single(2, 3.0), config);
+        let frame = frame(tagalong_core::Motion::at_rest(0.1), None);
+        let (headings, sightings) = (BTreeMap::new(), BTreeMap::new());
+        let mut look = Look::new(&frame, likelihood, config, &headings, &sightings);
+        work(&mut group, &mut look)
+    }
+
+    #[test]
+    fn a_map_that_says_nothing_leaves_the_weights_as_they_were() {
+        for method in [Method::Table, Method::All, Method::Partitioned] {
+            let config = Config { method, joint_side: 2, particles: 4, ..Config::default() };
+            let weights = looking(&config, &Formula::flat(3.0), |group, look| {
+                group.weights = vec![0.4, 0.3, 0.2, 0.1];
+                weigh(group, look).unwrap();
+                group.weights.clone()
+            });
+            let off = weights.iter().zip([0.4, 0.3, 0.2, 0.1]).map(|(a, b)| (a - b).abs());
+            assert!(off.into_iter().all(|off| off < 1e-9), "{method:?}: {weights:?}");
+        }
+    }
+
+    #[test]
+    fn a_body_faces_where_a_template_fits_unless_all_fit_alike() {
+        let way = |likelihood: &Formula| {
+            looking(&Config::default(), likelihood, |group, look| facing(group, 0, look).unwrap())
+        };
+        assert_eq!(way(&Formula::flat(3.0)), None);
+        let of = |fits: fn(f64) -> bool| {
+            let nats = move |p: &Person| if fits(p.velocity.y) { 5.0 } else { 0.0 };
+            way(&Formula::new(move |scene| scene.iter().map(nats).sum())).map(|way| way.y.round())
+        };
+        assert_eq!(of(|vy| vy > 0.3), Some(1.0));
+        assert_eq!(of(|vy| vy < -0.3), Some(-1.0));
+        assert_eq!(of(|vy| vy > -0.3), Some(0.0), "one of the three does not fit");
+    }
+
+    #[test]
+    fn no_look_tells_depth_or_height_better_than_it_can() {
+        let mut rig = crate::tests::rig::Rig::new(Config::default(), 1);
+        rig.start(1, [2.0, 0.0, 1.6], [0.2, 1e-6, 0.2]);
+        let sharp = |p: &Person| {
+            let off = [p.position.x - 2.0, p.position.z - 1.6].map(|off| (off / 0.004).powi(2));
+            -0.5 * (off[0] + off[1])
+        };
+        rig.look(&Formula::new(move |scene| scene.iter().map(sharp).sum()));
+        let covariance = rig.estimate(1).covariance;
+        let [along, up] = [0, 2].map(|i| covariance[(i, i)].sqrt());
+        assert!((along - 0.03).abs() < 0.002, "1.5 % of 2 m: {along}");
+        assert!((up - 0.02).abs() < 0.002, "{up}");
+    }
+
+    #[test]
+    fn the_heaviest_particle_is_drawn_darkest() {
+        let shown = looking(
+            &Config { particles: 4, ..Config::default() },
+            &Formula::flat(3.0),
+            |group, look| {
+                group.weights = vec![0.125, 0.5, 0.25, 0.375];
+                let mut shown = Sketch::default();
+                sketch(group, look, &mut shown).unwrap();
+                shown.points.iter().map(|point| point.weight).collect::<Vec<_>>()
+            },
+        );
+        assert_eq!(shown, [0.25, 0.25, 1.0, 1.0, 0.5, 0.5, 0.75, 0.75]);
     }
 
     #[test]
