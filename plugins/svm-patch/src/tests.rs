@@ -98,6 +98,38 @@ mod training {
         assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("both are needed"));
     }
 
+    #[test]
+    fn settings_that_cannot_work_are_refused_and_those_at_the_bounds_are_not() {
+        type Change = fn(&mut Training, bool);
+        let changes: [(&str, Change); 7] = [
+            ("gammas", |t, ok| t.gammas = if ok { vec![0.1] } else { vec![1.0, 0.0] }),
+            ("penalties", |t, ok| t.penalties = if ok { vec![0.1] } else { vec![] }),
+            ("folds", |t, ok| t.folds = if ok { 2 } else { 1 }),
+            ("max_samples", |t, ok| t.max_samples = if ok { 5000 } else { 5001 }),
+            ("max_tried", |t, ok| t.max_tried = if ok { 5000 } else { 5001 }),
+            ("max_vectors", |t, ok| t.max_vectors = if ok { 2 } else { 1 }),
+            ("grow", |t, ok| t.grow = if ok { 2.0 } else { 2.01 }),
+        ];
+        for (key, change) in changes {
+            let refusal = |ok| {
+                let mut training = small();
+                change(&mut training, ok);
+                PatchTrainer::new(training, 1).err().map(|error| error.to_string())
+            };
+            assert_eq!(refusal(true), None);
+            assert!(refusal(false).unwrap().contains(&format!("`{key}`")), "{key}");
+        }
+    }
+
+    #[test]
+    fn as_many_examples_are_used_as_asked_for() {
+        let training = Training { people: 12, others: 9, ..small() };
+        let fitted = trainer(training, 60).fit(&mut |_| {}).unwrap();
+        assert_eq!(fitted.figures["people"].as_integer(), Some(12));
+        assert_eq!(fitted.figures["others"].as_integer(), Some(9));
+        assert_eq!(fitted.figures["fitted"].as_integer(), Some(21));
+    }
+
     fn spread(trial: &Trial) -> f64 {
         let values = || trial.held_out.iter().map(|(f, _)| *f);
         values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)

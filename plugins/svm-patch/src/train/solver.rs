@@ -53,3 +53,24 @@ fn penalties(samples: &[&Sample], penalty: f64) -> Result<(f64, f64)> {
     let half = 0.5 * samples.len() as f64;
     Ok((penalty * half / people as f64, penalty * half / others as f64))
 }
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::Example;
+
+    use super::*;
+
+    #[test]
+    fn a_class_weighs_as_much_as_the_other_one_whatever_its_share() {
+        let sample = |is_person| Sample {
+            patch: Box::new([0.0; PIXELS]),
+            example: Example { is_person, group: 1 },
+        };
+        let all: Vec<Sample> = (0..40).map(|k| sample(k < 10)).collect();
+        let all: Vec<&Sample> = all.iter().collect();
+        let (for_people, for_others) = penalties(&all, 3.0).unwrap();
+        assert!((for_people - 6.0).abs() < 1e-12 && (for_others - 2.0).abs() < 1e-12);
+        assert!((10.0 * for_people - 30.0 * for_others).abs() < 1e-9);
+        assert!(penalties(&all[..10], 1.0).unwrap_err().to_string().starts_with("10 people and 0"));
+    }
+}
