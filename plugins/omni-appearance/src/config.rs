@@ -10,6 +10,8 @@ use tagalong_core::{Error, Result};
 pub enum Distance {
     /// The network of the paper: three features, four hidden units.
     Network,
+    /// The same network as the paper trains it: by back-propagation at a rate of 0.3.
+    Printed,
     /// A network of all features that are measured.
     Rich,
     /// A straight line in the lower edge, its square, its inverse, width and area.
@@ -24,7 +26,8 @@ pub enum Distance {
 pub struct Config {
     /// Model file, relative to the config; empty: the model that is built in.
     pub model: String,
-    /// How the distance is found: `network`, `rich`, `ridge` or `analytic`.
+    /// How the distance is found: `network`, `printed`, `rich`, `ridge` or
+    /// `analytic`.
     pub distance: Distance,
     /// Name of the person in the model whose head is used; `general` for
     /// everybody's, `nearest` for the one whose looks fit best.

@@ -63,12 +63,16 @@ pub struct Head {
     pub ridge_sigma: Line,
     /// Of the network.
     pub network_sigma: Line,
+    /// Of the network that was trained by back-propagation.
+    pub printed_sigma: Line,
     /// Of the rich network.
     pub rich_sigma: Line,
     /// The ridge.
     pub ridge: Ridge,
     /// Of three features.
     pub network: Network,
+    /// The same, trained by back-propagation.
+    pub printed: Network,
     /// Of all features.
     pub rich: Network,
 }
@@ -127,6 +131,7 @@ impl Head {
     pub fn distance(&self, features: &Features, camera: &View<'_>, how: Distance) -> (f64, f64) {
         let (distance, sigma) = match how {
             Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
+            Distance::Printed => (self.printed.answer(&features.values()), self.printed_sigma),
             Distance::Rich => (self.rich.answer(&camera.inputs(features)), self.rich_sigma),
             Distance::Ridge => (self.ridge.answer(features), self.ridge_sigma),
             Distance::Analytic => {
@@ -137,8 +142,15 @@ impl Head {
     }
 
     fn is_sane(&self) -> bool {
-        let lines = [self.analytic_sigma, self.ridge_sigma, self.network_sigma, self.rich_sigma];
+        let lines = [
+            self.analytic_sigma,
+            self.ridge_sigma,
+            self.network_sigma,
+            self.printed_sigma,
+            self.rich_sigma,
+        ];
         self.network.is_sane(3)
+            && self.printed.is_sane(3)
             && self.rich.is_sane(INPUTS)
             && self.ridge.is_sane()
             && self.floor_offset_m.is_finite()
@@ -237,7 +249,7 @@ struct File {
     people: Vec<Person>,
 }
 
-const FORMAT: &str = "omni-distance 1";
+const FORMAT: &str = "omni-distance 2";
 
 impl Model {
     /// The head for somebody: by name, everybody's for `general`, and for

@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector, Point3};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, Funnel, Result, Trainer};
 use tagalong_learn::mix;
 
-pub use crate::fit::Fit;
 use crate::fit::mean_and_scale;
+pub use crate::fit::{Descent, Fit};
 use crate::model::INPUTS;
 use crate::{
     Blob, Config, Distance, Eyes, Features, Geometry, Head, Line, Model, Person, Ridge, Signature,
@@ -19,6 +19,8 @@ use crate::{
 pub struct Training {
     /// The paper's network: three inputs, four hidden units (P5, section 4.4).
     pub network: Fit,
+    /// The same network, by back-propagation.
+    pub printed: Fit,
     /// The network of all features.
     pub rich: Fit,
     /// Weight of the squares of the ridge's weights, for each sample.
@@ -29,9 +31,13 @@ pub struct Training {
 
 impl Default for Training {
     fn default() -> Self {
-        let network = Fit { hidden: 4, decay: 1e-2, restarts: 3, steps: 150 };
+        let descent = Descent::Marquardt;
+        let network = Fit { hidden: 4, decay: 1e-2, restarts: 3, steps: 150, descent };
+        // P5, section 4.4, says the rate and no more.
+        let descent = Descent::BackPropagation { rate: 0.3 };
         Self {
             network,
+            printed: Fit { decay: 0.0, steps: 2000, descent, ..network },
             rich: Fit { hidden: 8, decay: 3e-2, ..network },
             ridge: 1e-4,
             block_frames: 15,
@@ -86,6 +92,7 @@ impl Sample {
     pub fn distance(&self, head: &Head, how: Distance) -> f64 {
         match how {
             Distance::Network => head.network.answer(&self.features.values()),
+            Distance::Printed => head.printed.answer(&self.features.values()),
             Distance::Rich => head.rich.answer(&self.inputs()),
             Distance::Ridge => head.ridge.answer(&self.features),
             Distance::Analytic => self.floor_m + head.floor_offset_m,
@@ -201,9 +208,11 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         analytic_sigma: flat,
         ridge_sigma: flat,
         network_sigma: flat,
+        printed_sigma: flat,
         rich_sigma: flat,
         ridge: ridge(samples, training.ridge),
         network: training.network.network(&printed, &targets, seed),
+        printed: training.printed.network(&printed, &targets, seed),
         rich: training.rich.network(&all, &targets, seed),
     };
     let answers: Vec<Answers> = samples.iter().map(|sample| sample.answers(&head)).collect();
@@ -215,8 +224,8 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
 pub type Answers = [f64; WAYS.len()];
 
 /// All ways to the distance.
-pub const WAYS: [Distance; 4] =
-    [Distance::Network, Distance::Rich, Distance::Ridge, Distance::Analytic];
+pub const WAYS: [Distance; 5] =
+    [Distance::Network, Distance::Printed, Distance::Rich, Distance::Ridge, Distance::Analytic];
 
 /// What heads say that were fitted to everybody but those of whom they say it.
 ///
@@ -259,8 +268,13 @@ impl Head {
         let line = |way: usize| {
             spread(samples.iter().zip(answers).map(|(s, said)| (said[way], s.distance_m)))
         };
-        [self.network_sigma, self.rich_sigma, self.ridge_sigma, self.analytic_sigma] =
-            [line(0), line(1), line(2), line(3)];
+        [
+            self.network_sigma,
+            self.printed_sigma,
+            self.rich_sigma,
+            self.ridge_sigma,
+            self.analytic_sigma,
+        ] = std::array::from_fn(line);
     }
 }
 
