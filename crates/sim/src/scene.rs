@@ -109,8 +109,8 @@ impl Scene {
         with_companions.fold(self.crowd, usize::saturating_add)
     }
 
-    /// The same room with everybody alone in it for so long, one after the other, from
-    /// when the first of them enters, and until the last of them has had their turn.
+    /// Returns the same room with each person alone in it for `each_s`, one after the
+    /// other, from the time at which the first of them enters.
     pub fn in_turn(&self, each_s: f64) -> Self {
         let mut scene = self.clone();
         let mut now_s = scene.people.first().map_or(0.0, |person| person.enters_s);
@@ -558,8 +558,8 @@ pub enum Posture {
 pub struct PersonSettings {
     /// Points to walk through; the first is where they start.
     pub path: Vec<[f64; 2]>,
-    /// So many points follow the path that the seed chooses anywhere in the room,
-    /// off furniture and the robot's start.
+    /// Number of points that follow the path, which the seed chooses: anywhere in the
+    /// room, off furniture and the robot's start.
     pub wander: usize,
     /// Preferred speed, m/s.
     pub speed_mps: f64,
@@ -571,7 +571,7 @@ pub struct PersonSettings {
     /// Is not in the room before, s: whoever learns what the empty room looks
     /// like needs to see it.
     pub enters_s: f64,
-    /// Is not in the room from then on, s; stays if left out.
+    /// End of the stay in the room, s; none if left out.
     pub leaves_s: Option<f64>,
     /// What follows the end of the path.
     pub at_end: AtEnd,

@@ -139,6 +139,7 @@ fn settings_that_cannot_work_are_refused() {
 fn it_keeps_the_promises_of_its_kind() {
     let mut registry = tagalong_core::Registry::default();
     crate::register(&mut registry);
+    assert!(registry.find(crate::NAME).is_ok());
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

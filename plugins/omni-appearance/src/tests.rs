@@ -159,6 +159,7 @@ fn somebody_whom_the_model_does_not_know_is_refused() {
 fn it_keeps_the_promises_of_its_kind() {
     let mut registry = Registry::default();
     crate::register(&mut registry);
+    assert!(registry.find(crate::NAME).is_ok());
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

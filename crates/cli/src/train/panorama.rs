@@ -13,20 +13,21 @@ use crate::simulate::threads;
 /// What `tagalong train` is asked for.
 pub const NAME: &str = "omni-distance";
 
-/// A room with two people, one after the other: another room, other people and another
+/// Rooms with two people, one after the other: another room, other people and another
 /// mirror with every seed.
 const ROOM: &str = include_str!("../../../../configs/scenes/omni-room.toml");
 /// Groups from here on are strangers.
 const STRANGER: u64 = 100;
-/// For how long each of the two of the first room is seen, s: each gets a head of
-/// their own.
-const KNOWN_S: f64 = 60.0;
-/// Other rooms, for everybody's head, and for how long each of their people is seen, s.
-const STRANGE: (u64, f64) = (27, 11.0);
-/// The same of a quick training, which has the first room only.
+/// Time for which each person of the first room is seen, s: each gets a head of their
+/// own.
+const KNOWN_S: f64 = 40.0;
+/// Other rooms, for the general head, and the time for which each of their people is
+/// seen, s.
+const STRANGE: (u64, f64) = (15, 10.0);
+/// The time of a quick training, which has the first room only, s.
 const QUICK_S: f64 = 12.0;
 
-/// What is drawn.
+/// A room to draw.
 struct Room {
     seed: u64,
     each_s: f64,
@@ -42,7 +43,7 @@ fn rooms(quick: bool, seed: u64) -> Vec<Room> {
 }
 
 impl Room {
-    /// The scene: the empty room, the first person, then the second.
+    /// Returns the scene: the empty room, the first person, then the second.
     fn scene(&self) -> Result<Scene, Failure> {
         let variant = Variant::of_split(Split::Train, self.seed);
         let scene = Scene::parse_with(ROOM, &variant).map_err(Failure::failed)?;

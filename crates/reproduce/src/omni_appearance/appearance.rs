@@ -13,16 +13,16 @@ use crate::lab::read;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Rooms, with two people each.
-const ROOMS: u64 = 10;
+const ROOMS: u64 = 8;
 /// How long each of them is seen, s: more rooms tell more than more images of one.
 const EACH_S: f64 = 24.0;
 /// Times that each room is divided into training and test.
 const REPEATS: u64 = 4;
 
-/// How a distance is found: the name, from whose measurements, and from what of them.
+/// A way to the distance: its name, the detector that measures, and the form.
 type Way = (&'static str, Eye, Distance);
 
-/// Whose measurements: those of a shipped config.
+/// The detector of a shipped config.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Eye {
     Printed,
@@ -45,7 +45,7 @@ const WAYS: [Way; 7] = [
 /// The columns that are fitted within a room.
 const SPLITS: [Split; 3] = [Split::Random, Split::Place, Split::PlaceAndPerson];
 
-/// What is measured of the people of one room, by each of [`EYES`].
+/// The people of one room as each of [`EYES`] measures them.
 struct Room {
     samples: [Vec<Sample>; EYES.len()],
 }
@@ -56,7 +56,7 @@ impl Room {
     }
 }
 
-/// A shipped detector: its settings and everybody's head of its model, which was
+/// A shipped detector: its settings and the general head of its model, which was
 /// fitted to rooms of the training split.
 struct Shipped {
     config: Config,
@@ -80,14 +80,14 @@ impl Shipped {
     }
 }
 
-/// The settings of the detector in a config.
+/// Returns the settings of the detector in a config.
 fn settings(text: &str) -> Result<Config, toml::de::Error> {
     let config: toml::Table = text.parse()?;
     let detector = config.get("detectors").and_then(|all| all.get(0)?.get("config")).cloned();
     detector.map_or_else(|| Ok(Config::default()), toml::Value::try_into)
 }
 
-/// What the detectors see of the people in a scene.
+/// Draws a scene and collects what both detectors measure in it.
 fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, ReproduceError> {
     let collector = |shipped: &Shipped| Collector::new(shipped.config.clone()).map_err(failed);
     let mut collectors = [collector(&shipped[0])?, collector(&shipped[1])?];
@@ -131,13 +131,13 @@ fn errors(samples: &[Sample], head: &Head, how: Distance) -> Vec<f64> {
     samples.iter().map(|s| (s.distance(head, how) - s.distance_m).abs()).collect()
 }
 
-/// Errors of all ways in one room, by a head for each of [`EYES`].
+/// Returns the errors of all ways in one room, by a head for each of [`EYES`].
 fn of_ways(parts: [&[Sample]; EYES.len()], heads: [&Head; EYES.len()]) -> Vec<Vec<f64>> {
     let way = |(_, eye, how): &Way| errors(parts[*eye as usize], heads[*eye as usize], *how);
     WAYS.iter().map(way).collect()
 }
 
-/// Errors of all ways in one room whose own samples they are fitted to.
+/// Returns the errors of all ways in one room, fitted to samples of that room.
 fn within(room: &Room, split: Split) -> Result<Vec<Vec<f64>>, ReproduceError> {
     let mut all = vec![Vec::new(); WAYS.len()];
     for seed in 0..REPEATS {

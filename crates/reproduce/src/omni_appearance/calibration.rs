@@ -78,8 +78,8 @@ fn distances_to(stations: &[Station], known: &[Known]) -> Vec<f64> {
     cameras.distances_m(known).iter().map(|m| 100.0 * m).collect()
 }
 
-/// Distances of one room: of the cameras as guessed, as calibrated, and as they are;
-/// to places that were used, and to those held out.
+/// Returns the distances of one room: by the cameras as guessed, as calibrated, and as
+/// they are; to places that were used, and to those held out.
 fn of_room(lab: &Lab, scene: &Scene) -> [[Vec<f64>; 2]; 3] {
     let mut scene = scene.clone();
     // The robot's own camera is of no importance here.

@@ -9,8 +9,8 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 /// Rooms, with two people each.
 const ROOMS: u64 = 10;
 /// How long each of them is seen, s.
-const EACH_S: f64 = 14.0;
-/// Somebody is found who is told to be within this, m.
+const EACH_S: f64 = 12.0;
+/// Largest error of a position that counts as found, m.
 const FOUND_M: f64 = 0.5;
 
 /// The filters of section 6.2, and what `u` may be.
@@ -35,8 +35,8 @@ const LAST_U: &str =
 const DISTANCES: [(&str, &str); 2] =
     [("network 3-4-1", "network"), ("network of all features", "rich")];
 
-/// The printed method is taken apart: what each row changes of the row above, its
-/// detector, and its filter.
+/// Steps away from the printed method: the change against the row above, its detector,
+/// and its filter.
 const STEPS: [(&str, &str, &str); 6] = [
     ("misprint: the panorama has no seam", SEAMLESS, PRINTED_U),
     ("misprint: u is the last difference, with its noise", SEAMLESS, LAST_U),
@@ -62,13 +62,13 @@ const OURS: &str = "plugin = \"floor-kalman\"";
 const PRINTED: &str = "omni-appearance-as-printed";
 const BEYOND: [&str; 2] = ["omni-appearance", "omni-best"];
 
-/// How far off the runs of one room are.
+/// Errors of the runs of one room.
 struct Walk {
     /// In the images in which all filters have an answer, for each filter.
     of_filters: Vec<Vec<f64>>,
     /// In the images in which it has an answer, for each step from the printed method.
     of_steps: Vec<Vec<f64>>,
-    /// Images with somebody to be found.
+    /// Images with a person in view.
     images: usize,
 }
 
@@ -165,7 +165,7 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
     }
 }
 
-/// What the errors of the print cost, and what the method lacks.
+/// Compares the printed method with one that is put right, step by step.
 fn steps(walks: &[Walk]) -> Table {
     let names = std::iter::once("as printed").chain(STEPS.map(|(name, ..)| name)).chain(BEYOND);
     let draws = |at: usize| -> Vec<Vec<f64>> {

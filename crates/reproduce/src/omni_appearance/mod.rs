@@ -41,11 +41,11 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// What is drawn with every seed.
+/// A note on the draws.
 const FRESH: &str = "Each draw is another room with other furniture, light, people and ways, and \
     another mirror, which differs from what the log says of it by chance.";
 
-/// Rooms with two people each, one after the other, each for so long.
+/// Returns rooms with two people each, one after the other, each for `each_s`.
 fn in_turn(lab: &Lab, seeds: u64, each_s: f64) -> Result<Vec<Scene>, ReproduceError> {
     let scenes = lab.scenes("omni-room", &[], lab.seeds(seeds))?;
     let alone = |scene: Scene| Scene { webcams: Vec::new(), ..scene.in_turn(each_s) };
@@ -57,13 +57,13 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Means of the draws that have any values.
+/// Returns the means of the draws that have any values.
 fn means<'a>(draws: impl IntoIterator<Item = &'a Vec<f64>>) -> Vec<f64> {
     draws.into_iter().filter(|values| !values.is_empty()).map(|values| mean(values)).collect()
 }
 
-/// The mean of the means of draws, its interval over draws, and the deviation of all
-/// values.
+/// Returns the mean of the means of draws, its interval over draws, and the deviation
+/// of all values.
 fn over_draws(draws: &[Vec<f64>], digits: usize) -> Cell {
     let all = Cell::mean(&draws.concat(), digits);
     let means = means(draws);
@@ -76,7 +76,8 @@ fn over_draws(draws: &[Vec<f64>], digits: usize) -> Cell {
     }
 }
 
-/// The mean difference of draws to those of a rival, with its interval over draws.
+/// Returns the mean difference of draws to those of a rival, with its interval over
+/// draws.
 fn difference(rival: &[Vec<f64>], draws: &[Vec<f64>], digits: usize) -> Cell {
     let both = rival.iter().zip(draws).filter(|(a, b)| !a.is_empty() && !b.is_empty());
     let (a, b): (Vec<f64>, Vec<f64>) = both.map(|(a, b)| (mean(a), mean(b))).unzip();

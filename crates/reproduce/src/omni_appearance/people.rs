@@ -11,7 +11,7 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 const PIPELINES: [&str; 4] =
     ["omni-appearance-as-printed", "omni-appearance", "omni-ekf", "omni-best"];
 /// Draws of each scene.
-const SEEDS: u64 = 8;
+const SEEDS: u64 = 6;
 /// How long they are, s: more draws tell more than longer ones.
 const LONG_S: f64 = 29.0;
 

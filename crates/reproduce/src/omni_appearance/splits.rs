@@ -1,4 +1,4 @@
-//! What a distance is fitted to, and what it is tried on.
+//! Training and test samples of one room.
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -8,24 +8,24 @@ use tagalong_omni_appearance::train::Sample;
 
 /// Part of the samples, or of the places, that is used for training (P5, section 4.4).
 const TRAINING_PART: f64 = 0.3;
-/// Places are sectors around the robot: so many. Each has near and far ones, so that
-/// what is held out is a place and no range of distances.
+/// Number of places: sectors around the robot. Each has near and far ones, so that a
+/// place is held out and no range of distances.
 const SECTORS: u64 = 12;
 
-/// How samples of one room are divided.
+/// A way to divide the samples of one room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Split {
-    /// At random, as in the paper: a third of a second before and after most images of
-    /// the test there is one of the training.
+    /// At random, as in the paper: most images of the test have a neighbour in the
+    /// training, a third of a second away.
     Random,
-    /// By where the person is.
+    /// By the sector in which the person is.
     Place,
-    /// By where the person is and by who it is.
+    /// By sector and person.
     PlaceAndPerson,
 }
 
 impl Split {
-    /// Samples for training, and for testing.
+    /// Returns samples for training, and for testing.
     pub(super) fn divide(self, samples: &[Sample], seed: u64) -> [Vec<Sample>; 2] {
         let places = match self {
             Self::Random => BTreeSet::new(),
@@ -57,13 +57,13 @@ impl Split {
     }
 }
 
-/// The sector in which somebody is.
+/// Returns the sector in which the person of a sample is.
 fn sector(sample: &Sample) -> u64 {
     let turn = (sample.true_bearing_rad + PI) / TAU;
     ((turn * SECTORS as f64) as u64).min(SECTORS - 1)
 }
 
-/// A part of some keys, by chance.
+/// Returns a part of some keys, by chance.
 fn chosen(keys: std::ops::Range<u64>, part: f64, seed: u64) -> BTreeSet<u64> {
     let count = (part * (keys.end - keys.start) as f64).round() as usize;
     let mut order: Vec<(u64, u64)> = keys.map(|key| (mix(key ^ (seed << 40)), key)).collect();
