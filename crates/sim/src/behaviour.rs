@@ -128,7 +128,13 @@ impl Walker {
 
     /// Whether they are in the room.
     pub fn is_there(&self, now_s: f64) -> bool {
-        now_s >= self.settings.enters_s
+        now_s >= self.settings.enters_s && self.settings.leaves_s.is_none_or(|end_s| now_s < end_s)
+    }
+
+    /// The points of the way.
+    #[cfg(test)]
+    pub fn points(&self) -> Vec<Point2<f64>> {
+        self.settings.path.iter().map(|point| Point2::from(*point)).collect()
     }
 
     /// Where somebody who walks along should be.
@@ -362,13 +368,15 @@ pub fn lead_of(walkers: &[Walker], i: usize) -> Option<Lead> {
     walkers[i].beside.map(|(leader, offset)| walkers[leader].lead(offset))
 }
 
-/// The places of all whom a walker keeps off: everybody but their own group,
-/// and of that whoever comes too near.
-pub fn others(walkers: &[Walker], i: usize) -> Vec<Point2<f64>> {
+/// The places of all whom a walker keeps off: everybody in the room but their own
+/// group, and of that whoever comes too near.
+pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
     let group = |j: usize| walkers[j].beside.map_or(j, |(leader, _)| leader);
     let place = |j: usize| walkers[j].stance.place;
     let counts = |j: &usize| {
-        *j != i && (group(*j) != group(i) || (place(*j) - place(i)).norm() < TOO_NEAR_M)
+        *j != i
+            && walkers[*j].is_there(now_s)
+            && (group(*j) != group(i) || (place(*j) - place(i)).norm() < TOO_NEAR_M)
     };
     (0..walkers.len()).filter(counts).map(place).collect()
 }
@@ -409,7 +417,7 @@ mod tests {
             let hidden = hidden_by(walkers, &Point2::origin());
             play_tricks(walkers, &hidden, now_s);
             for i in 0..walkers.len() {
-                let (lead, others) = (lead_of(walkers, i), others(walkers, i));
+                let (lead, others) = (lead_of(walkers, i), others(walkers, i, now_s));
                 walkers[i].step(now_s, 0.02, lead.as_ref(), &others, &[]);
             }
             see(walkers);

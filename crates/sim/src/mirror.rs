@@ -36,6 +36,8 @@ pub struct MirrorSettings {
     pub centre_px: [f64; 2],
     /// Standard deviation of the log's mistake about that, pixels.
     pub centre_error_px: f64,
+    /// Standard deviation of the log's mistake about `half_angle_deg`, degrees.
+    pub angle_error_deg: f64,
     /// Standard deviation of the tilt of the mirror against the camera, degrees;
     /// the log does not know it.
     pub tilt_error_deg: f64,
@@ -50,6 +52,7 @@ impl Default for MirrorSettings {
             panorama: [480, 120],
             centre_px: [0.0, 0.0],
             centre_error_px: 0.3,
+            angle_error_deg: 0.1,
             tilt_error_deg: 0.2,
         }
     }
@@ -101,11 +104,12 @@ impl MirrorCamera {
         );
         let tilt = Vector3::new(error(of.tilt_error_deg), error(of.tilt_error_deg), 0.0);
         let tilt = UnitQuaternion::from_scaled_axis(tilt.map(f64::to_radians));
+        let mistaken = mirror.half_angle_rad + error(of.angle_error_deg).to_radians();
         let apex = Vector3::new(0.0, 0.0, of.apex_m);
         let [columns, rows] = of.panorama;
         Self {
             panorama: Panorama {
-                mirror: ConicalMirror { centre_px: logged, ..mirror },
+                mirror: ConicalMirror { centre_px: logged, half_angle_rad: mistaken, ..mirror },
                 columns,
                 rows,
             },
@@ -343,6 +347,7 @@ mod tests {
         let mirror = MirrorSettings {
             centre_px: [2.0, -1.5],
             centre_error_px: 0.0,
+            angle_error_deg: 0.0,
             tilt_error_deg: 0.0,
             ..MirrorSettings::default()
         };
@@ -379,6 +384,21 @@ mod tests {
             a.angle(&b).to_degrees()
         };
         assert!(moved(20.0) > 0.3 && moved(20.0) < 9.0, "{}", moved(20.0));
+    }
+
+    #[test]
+    fn the_log_is_mistaken_about_the_cone_by_little_and_otherwise_for_each_seed() {
+        let off_deg = |seed| {
+            let settings = CameraSettings { mirror: MirrorSettings::default(), ..settings() };
+            let camera = MirrorCamera::new(&settings, &mut Random::new(seed, 1));
+            (camera.panorama.mirror.half_angle_rad - camera.mirror.half_angle_rad).to_degrees()
+        };
+        let all: Vec<f64> = (0..400).map(off_deg).collect();
+        let deviation = (all.iter().map(|off| off * off).sum::<f64>() / 400.0).sqrt();
+        assert!((0.08..0.11).contains(&deviation), "{deviation}");
+        assert!(all.iter().all(|off| off.abs() < 0.201));
+        let of_log = camera().panorama.mirror;
+        assert_eq!(of_log, ConicalMirror { centre_px: of_log.centre_px, ..camera().mirror });
     }
 
     #[test]

@@ -109,6 +109,20 @@ impl Scene {
         with_companions.fold(self.crowd, usize::saturating_add)
     }
 
+    /// Returns the same room with each person alone in it for `each_s`, one after the
+    /// other, from the time at which the first of them enters.
+    pub fn in_turn(&self, each_s: f64) -> Self {
+        let mut scene = self.clone();
+        let mut now_s = scene.people.first().map_or(0.0, |person| person.enters_s);
+        for person in &mut scene.people {
+            person.enters_s = now_s;
+            now_s += each_s;
+            person.leaves_s = Some(now_s);
+        }
+        scene.duration_s = now_s;
+        scene
+    }
+
     /// What the log may be used for.
     pub fn split(&self) -> Split {
         Split::of(self.seed)
@@ -167,8 +181,17 @@ impl Scene {
             (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
             (self.number_of_people() <= 200, "there must be at most 200 people"),
             (
-                self.people.iter().all(|p| !p.path.is_empty()),
-                "every person needs a path of one point at least",
+                self.people.iter().all(|p| !p.path.is_empty() || p.wander > 0),
+                "every person needs a path of one point at least, or wander",
+            ),
+            (
+                self.people.iter().all(|p| p.posture != Posture::Seated || !p.path.is_empty()),
+                "who sits needs a path of one point: the place of the chair",
+            ),
+            (self.people.iter().all(|p| p.wander <= 1000), "wander must be at most 1000"),
+            (
+                self.people.iter().all(|p| p.leaves_s.is_none_or(|leaves_s| leaves_s > p.enters_s)),
+                "leaves_s must be after enters_s",
             ),
             (
                 self.people.iter().all(|p| p.subject.max(p.look) < Some(SUBJECTS)),
@@ -535,6 +558,9 @@ pub enum Posture {
 pub struct PersonSettings {
     /// Points to walk through; the first is where they start.
     pub path: Vec<[f64; 2]>,
+    /// Number of points that follow the path, which the seed chooses: anywhere in the
+    /// room, off furniture and the robot's start.
+    pub wander: usize,
     /// Preferred speed, m/s.
     pub speed_mps: f64,
     /// Stands until then, s.
@@ -545,6 +571,8 @@ pub struct PersonSettings {
     /// Is not in the room before, s: whoever learns what the empty room looks
     /// like needs to see it.
     pub enters_s: f64,
+    /// End of the stay in the room, s; none if left out.
+    pub leaves_s: Option<f64>,
     /// What follows the end of the path.
     pub at_end: AtEnd,
     /// What they do when hidden.
@@ -576,10 +604,12 @@ impl Default for PersonSettings {
     fn default() -> Self {
         Self {
             path: Vec::new(),
+            wander: 0,
             speed_mps: 1.1,
             start_s: 0.0,
             rest_s: Vec::new(),
             enters_s: 0.0,
+            leaves_s: None,
             at_end: AtEnd::Stop,
             trick: Trick::None,
             hide_s: 3.0,
@@ -609,11 +639,24 @@ mod tests {
     }
 
     #[test]
+    fn in_turn_everybody_has_the_room_for_themselves() {
+        let text = "[[people]]\nwander = 2\nenters_s = 9.0\n[[people]]\nwander = 2\n";
+        let scene = Scene::parse(text).unwrap().in_turn(20.0);
+        let times = |person: &PersonSettings| (person.enters_s, person.leaves_s);
+        let times: Vec<_> = scene.people.iter().map(times).collect();
+        assert_eq!(times, [(9.0, Some(29.0)), (29.0, Some(49.0))]);
+        assert_eq!(scene.duration_s, 49.0);
+    }
+
+    #[test]
     fn impossible_values_are_refused() {
         for text in [
             "duration_s = 0.0",
             "[camera]\nwidth = 0",
             "[[people]]\nspeed_mps = 1.0",
+            "[[people]]\nwander = 1001",
+            "[[people]]\nwander = 3\nposture = \"seated\"",
+            "[[people]]\nwander = 3\nenters_s = 4.0\nleaves_s = 4.0",
             "[camera]\nkind = \"stereo\"\ncolour = false",
         ] {
             assert!(Scene::parse(text).is_err(), "{text}");

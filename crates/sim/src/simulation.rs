@@ -293,7 +293,7 @@ impl Simulation {
         let hidden = hidden_by(&self.walkers, &robot);
         play_tricks(&mut self.walkers, &hidden, now_s);
         let ways: Vec<_> = (0..self.walkers.len())
-            .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i)))
+            .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i, now_s)))
             .collect();
         let ahead = self.robot.pose.rotation * Vector2::new(GOES_M, 0.0);
         self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M, ahead });
@@ -590,7 +590,13 @@ fn chairs(scene: &Scene) -> impl Iterator<Item = Furniture> {
 fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random) -> Vec<Walker> {
     let mut walkers = Vec::new();
     for person in &scene.people {
-        add_group(&mut walkers, person.clone(), person.companions, scene, random);
+        let mut person = person.clone();
+        for _ in 0..person.wander {
+            let point = free_point(scene, &[], obstacles, &ANYWHERE, random);
+            person.path.push([point.x, point.y]);
+        }
+        let companions = person.companions;
+        add_group(&mut walkers, person, companions, scene, random);
     }
     let mut left = scene.crowd;
     while left > 0 {
@@ -648,8 +654,8 @@ fn wanderer(
     obstacles: &[Obstacle],
     random: &mut Random,
 ) -> PersonSettings {
-    let mut path = vec![free_point(scene, walkers, obstacles, random)];
-    path.extend((0..3).map(|_| free_point(scene, &[], obstacles, random)));
+    let mut path = vec![free_point(scene, walkers, obstacles, &MIDDLE, random)];
+    path.extend((0..3).map(|_| free_point(scene, &[], obstacles, &MIDDLE, random)));
     let (speed_mps, start_s) = (random.between(0.6, 1.3), random.between(0.0, 2.0));
     let posture = if random.chance(0.15) { Posture::Phone } else { Posture::Upright };
     let at_end = AtEnd::Loop;
@@ -663,19 +669,37 @@ fn wanderer(
     }
 }
 
-/// A random point of the room off the robot's start, furniture and people; after
+/// Where random points may lie.
+struct Area {
+    /// Parts of the room's length and width.
+    parts: [[f64; 2]; 2],
+    /// Not so near to the robot's start, m.
+    off_robot_m: f64,
+}
+
+/// Where a crowd wanders: ahead of a robot that starts at the near end.
+const MIDDLE: Area = Area { parts: [[0.2, 0.92], [0.15, 0.85]], off_robot_m: 1.5 };
+/// Where somebody with `wander` goes.
+const ANYWHERE: Area = Area { parts: [[0.06, 0.94], [0.1, 0.9]], off_robot_m: 0.9 };
+
+/// A random point of an area off the robot's start, furniture and people; after
 /// some tries any.
 fn free_point(
     scene: &Scene,
     walkers: &[Walker],
     obstacles: &[Obstacle],
+    area: &Area,
     random: &mut Random,
 ) -> Point2<f64> {
     let [x, y] = scene.room.size_m;
     let robot = Point2::from(scene.robot.start);
-    let mut point = || Point2::new(random.between(0.2, 0.92) * x, random.between(0.15, 0.85) * y);
+    let [along, across] = area.parts;
+    let mut point = || {
+        let x = random.between(along[0], along[1]) * x;
+        Point2::new(x, random.between(across[0], across[1]) * y)
+    };
     let free = |at: &Point2<f64>| {
-        (at - robot).norm() > 1.5
+        (at - robot).norm() > area.off_robot_m
             && obstacles.iter().all(|o| (at - o.at).norm() > o.radius_m + 0.35)
             && walkers.iter().all(|w| (at - w.stance.place).norm() > 1.0)
     };

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3, Point3, Vector2};
+use nalgebra::{DMatrix, DVector, Isometry2, Matrix2, Matrix2x3, Matrix3, Point2, Point3, Vector2};
 use proptest::prelude::*;
 use tagalong_core::{
     Camera, Detection, Distortion, Estimate, Evidence, Filter, Frame, Images, Matched, Motion,
@@ -139,6 +139,7 @@ fn settings_that_cannot_work_are_refused() {
 fn it_keeps_the_promises_of_its_kind() {
     let mut registry = tagalong_core::Registry::default();
     crate::register(&mut registry);
+    assert!(registry.find(crate::NAME).is_ok());
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }
@@ -194,7 +195,7 @@ proptest! {
             let mut filter = FloorKalman::new(config).unwrap();
             filter.start(ID, &sighting(x, y));
             let motion = Motion { forward, left, turn, ..Motion::at_rest(0.3) };
-            let mut at = nalgebra::Point2::new(x, y);
+            let mut at = Point2::new(x, y);
             for _ in 0..4 {
                 filter.predict(&motion);
                 at = motion.apply_to_point(at);
@@ -205,4 +206,246 @@ proptest! {
             }
         }
     }
+}
+
+/// The four states as a textbook has them, in the room, in matrices of any size.
+struct Textbook {
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Textbook {
+    fn predict(&mut self, dt: f64, q: f64, ego: &DMatrix<f64>) {
+        let f = DMatrix::from_row_slice(
+            4,
+            4,
+            &[1.0, 0.0, dt, 0.0, 0.0, 1.0, 0.0, dt, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        );
+        let (a, b, c) = (q * dt * dt * dt / 3.0, q * dt * dt / 2.0, q * dt);
+        let noise = DMatrix::from_row_slice(
+            4,
+            4,
+            &[a, 0.0, b, 0.0, 0.0, a, 0.0, b, b, 0.0, c, 0.0, 0.0, b, 0.0, c],
+        );
+        self.mean = &f * &self.mean;
+        self.covariance = &f * &self.covariance * f.transpose() + noise;
+        let mut position = self.covariance.view_mut((0, 0), (2, 2));
+        position += ego;
+    }
+
+    /// Returns the normalised innovation squared.
+    fn correct(&mut self, z: &DVector<f64>, r: &DMatrix<f64>) -> f64 {
+        let h = DMatrix::identity(2, 4);
+        let innovation = z - &h * &self.mean;
+        let s = (&h * &self.covariance * h.transpose() + r).try_inverse().unwrap();
+        let gain = &self.covariance * h.transpose() * &s;
+        self.mean += &gain * &innovation;
+        self.covariance = (DMatrix::identity(4, 4) - &gain * &h) * &self.covariance;
+        (innovation.transpose() * s * innovation)[(0, 0)]
+    }
+}
+
+/// A robot that drives a curve, in a room that is turned, with detections whose
+/// covariance has a direction: place, velocity and covariance in the robot's axes are
+/// those of the textbook's filter in the room.
+#[test]
+fn four_states_are_those_of_a_filter_written_down() {
+    let config = Config { room_heading_deg: 30.0, ..Config::default() };
+    let (q, speed) = (config.acceleration_noise, config.initial_speed_mps);
+    let mut filter = FloorKalman::new(config).unwrap();
+    let r = Matrix2::new(0.05, 0.02, 0.02, 0.03);
+    let sighting = |x: f64, y: f64| {
+        let mut covariance = Matrix3::from_diagonal_element(0.02);
+        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&r);
+        Detection { covariance, ..sighting(x, y) }
+    };
+    let dynamic = |m: &Matrix2<f64>| DMatrix::from_fn(2, 2, |i, j| m[(i, j)]);
+    let mut room_from_robot = Isometry2::new(Vector2::zeros(), -30.0_f64.to_radians());
+    filter.start(ID, &sighting(2.0, 1.0));
+    let turn = |pose: &Isometry2<f64>| *pose.rotation.to_rotation_matrix().matrix();
+    let start = room_from_robot * Point2::new(2.0, 1.0);
+    let mut covariance = DMatrix::from_diagonal_element(4, 4, speed * speed);
+    let first = turn(&room_from_robot) * r * turn(&room_from_robot).transpose();
+    covariance.view_mut((0, 0), (2, 2)).copy_from(&dynamic(&first));
+    let mean = DVector::from_vec(vec![start.x, start.y, 0.0, 0.0]);
+    let mut book = Textbook { mean, covariance };
+    for (x, y) in [(2.1, 1.2), (1.9, 1.3), (1.6, 1.1), (1.7, 0.8)] {
+        let uncertain = Matrix3::new(0.01, 0.002, 0.0, 0.002, 0.004, 0.001, 0.0, 0.001, 0.003);
+        let motion = Motion {
+            forward: 0.2,
+            left: 0.05,
+            turn: 0.3,
+            covariance: uncertain,
+            ..Motion::at_rest(0.4)
+        };
+        room_from_robot *= motion.isometry();
+        let rotation = turn(&room_from_robot);
+        // A turn of the robot moves whom it sees across, by as much as they are away.
+        let away = book.mean.rows(0, 2) - room_from_robot.translation.vector;
+        let j = Matrix2x3::from_columns(&[
+            rotation.column(0).into_owned(),
+            rotation.column(1).into_owned(),
+            Vector2::new(-away[1], away[0]),
+        ]);
+        book.predict(0.4, q, &dynamic(&(j * uncertain * j.transpose())));
+        filter.predict(&motion);
+        let z = room_from_robot * Point2::new(x, y);
+        let of_room = rotation * r * rotation.transpose();
+        let expected = book.correct(&DVector::from_vec(vec![z.x, z.y]), &dynamic(&of_room));
+        let (nis, degrees) = see(&mut filter, &sighting(x, y));
+        assert!((nis - expected).abs() < 1e-9 && degrees == 2, "{nis} {expected}");
+        let found = estimate(&filter);
+        let place = room_from_robot.inverse() * Point2::new(book.mean[0], book.mean[1]);
+        let velocity = rotation.transpose() * Vector2::new(book.mean[2], book.mean[3]);
+        assert!((found.person.position.xy() - place).norm() < 1e-9);
+        assert!((found.person.velocity - velocity).norm() < 1e-9);
+        let block = |row: usize, column: usize| {
+            let of_book = book.covariance.fixed_view::<2, 2>(row, column).into_owned();
+            rotation.transpose() * of_book * rotation
+        };
+        for (row, column) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
+            let (i, j) = (row + row / 2, column + column / 2);
+            let of_filter = found.covariance.fixed_view::<2, 2>(i, j).into_owned();
+            assert!((of_filter - block(row, column)).norm() < 1e-9, "{row} {column}");
+        }
+    }
+}
+
+#[test]
+fn the_height_is_filtered_by_itself_and_kept_where_it_is_not_measured() {
+    let mut filter = FloorKalman::new(Config { height_noise: 0.2, ..Config::default() }).unwrap();
+    let with_height = |z: f64, variance: f64| {
+        let mut detection = sighting(2.0, 0.0);
+        detection.position.z = z;
+        detection.covariance[(2, 2)] = variance;
+        detection
+    };
+    filter.start(ID, &with_height(1.5, 0.04));
+    filter.predict(&Motion::at_rest(0.5));
+    let height = |filter: &FloorKalman| {
+        let found = estimate(filter);
+        (found.person.position.z, found.covariance[(2, 2)])
+    };
+    let prior = 0.04 + 0.2 * 0.2 * 0.5;
+    assert!((height(&filter).1 - prior).abs() < 1e-12);
+    see(&mut filter, &with_height(1.8, 0.03));
+    let gain = prior / (prior + 0.03);
+    let (z, variance) = height(&filter);
+    assert!((z - (1.5 + gain * 0.3)).abs() < 1e-12, "{z}");
+    assert!((variance - (1.0 - gain) * prior).abs() < 1e-12, "{variance}");
+    for unmeasured in [100.0, 1e6] {
+        see(&mut filter, &with_height(9.0, unmeasured));
+        assert_eq!(height(&filter), (z, variance));
+    }
+    see(&mut filter, &with_height(9.0, 99.0));
+    assert!(height(&filter).0 > z);
+}
+
+#[test]
+fn polar_noise_lies_along_the_ray_however_the_robot_is_turned() {
+    let config = Config {
+        measurement: Measurement::Polar,
+        room_heading_deg: 50.0,
+        sigma_range_m: 0.2,
+        sigma_range_per_m: 0.1,
+        sigma_bearing_deg: 2.0,
+        ..Config::default()
+    };
+    let spread = |x: f64, y: f64, along: Vector2<f64>| {
+        let mut filter = FloorKalman::new(config.clone()).unwrap();
+        filter.start(ID, &sighting(x, y));
+        let c = estimate(&filter).covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        let across = Vector2::new(-along.y, along.x);
+        (along.dot(&(c * along)).sqrt(), across.dot(&(c * across)).sqrt())
+    };
+    let angle = 2.0_f64.to_radians();
+    let (along, across) = spread(3.0, -4.0, Vector2::new(0.6, -0.8));
+    assert!((along - 0.7).abs() < 1e-9 && (across - 5.0 * angle).abs() < 1e-9, "{along} {across}");
+    // Nobody is nearer than the robot's own size.
+    let (along, across) = spread(0.05, 0.0, Vector2::x());
+    assert!((along - 0.205).abs() < 1e-9 && (across - 0.1 * angle).abs() < 1e-9);
+}
+
+/// What `last-difference` says of its own errors, against the recursion of the joint
+/// covariance of two posteriors.
+#[test]
+fn the_noise_of_differences_is_that_of_the_joint_covariance() {
+    let config = Config { form: Form::LastDifference, ..Config::default() };
+    let r = Matrix2::new(0.03, 0.01, 0.01, 0.02);
+    let mut belief = Belief::new(Vector2::new(1.0, 2.0), &r, (1.6, 0.01), &config);
+    // Errors of the last posterior and of the one before.
+    let mut joint = DMatrix::zeros(4, 4);
+    joint.view_mut((0, 0), (2, 2)).copy_from(&r);
+    for step in 0..5 {
+        let dt = 0.2 + 0.05 * f64::from(step);
+        let (a, b) = if step == 0 { (1.0, 0.0) } else { (2.0, -1.0) };
+        let mut ahead = DMatrix::zeros(4, 4);
+        for axis in 0..2 {
+            ahead[(axis, axis)] = a;
+            ahead[(axis, axis + 2)] = b;
+            ahead[(axis + 2, axis)] = 1.0;
+        }
+        joint = &ahead * joint * ahead.transpose();
+        let before = belief.position();
+        let mut prior = joint.fixed_view::<2, 2>(0, 0) + config.process(dt);
+        joint.view_mut((0, 0), (2, 2)).copy_from(&prior);
+        belief.predict(dt, &Matrix2::zeros(), &config);
+        assert!((belief.position_covariance() - prior).norm() < 1e-12, "{step}");
+        if step > 0 {
+            let u = belief.position() - before;
+            assert!((belief.velocity().0 - u / dt).norm() < 1e-12);
+        }
+        let kept = Matrix2::identity() - prior * (prior + r).try_inverse().unwrap();
+        let mut corrected = DMatrix::identity(4, 4);
+        corrected.view_mut((0, 0), (2, 2)).copy_from(&kept);
+        joint = &corrected * joint * corrected.transpose();
+        let gain = Matrix2::identity() - kept;
+        prior = kept * prior * kept.transpose() + gain * r * gain.transpose();
+        joint.view_mut((0, 0), (2, 2)).copy_from(&prior);
+        belief.correct(&Vector2::new(1.0 + 0.1 * f64::from(step), 2.2), &r, config.form);
+        assert!((belief.position_covariance() - prior).norm() < 1e-12, "{step}");
+    }
+}
+
+#[test]
+fn each_number_has_its_least_and_its_most() {
+    let least = [
+        ("step_s", 1e-3),
+        ("sigma_range_m", 1e-3),
+        ("sigma_range_per_m", 0.0),
+        ("sigma_bearing_deg", 1e-3),
+        ("acceleration_noise", 1e-6),
+        ("initial_speed_mps", 1e-3),
+        ("height_noise", 0.0),
+        ("room_heading_deg", -360.0),
+    ];
+    let checked = |key: &str, value: f64| {
+        let config: Config = toml::from_str(&format!("{key} = {value:?}")).unwrap();
+        FloorKalman::new(config).err().map(|error| error.to_string())
+    };
+    for (key, least) in least {
+        assert_eq!((checked(key, least), checked(key, 1000.0)), (None, None), "{key}");
+        for wrong in [least - 1e-7, 1000.1] {
+            assert!(checked(key, wrong).is_some_and(|why| why.contains(key)), "{key} {wrong}");
+        }
+    }
+    let covariance = |measurement_m2| Config { measurement_m2, ..Config::default() };
+    assert!(FloorKalman::new(covariance([9e5, 0.0, 9e5])).is_ok());
+    assert!(FloorKalman::new(covariance([1e6, 0.0, 9e5])).is_err());
+    assert!(FloorKalman::new(covariance([1.0, 2.0, 1.0])).is_err());
+}
+
+#[test]
+fn who_is_stopped_is_forgotten_and_a_stranger_gives_no_support() {
+    let mut filter = FloorKalman::new(Config::default()).unwrap();
+    filter.start(ID, &sighting(2.0, 0.0));
+    let (other, frame) = (TrackId(2), frame());
+    let detection = sighting(2.0, 0.1);
+    let matched = [Matched { id: other, detection: &detection }];
+    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    assert!(filter.update(&evidence).unwrap().is_empty());
+    filter.stop(other);
+    assert_eq!(filter.estimates(&camera()).len(), 1);
+    filter.stop(ID);
+    assert!(filter.estimates(&camera()).is_empty());
 }

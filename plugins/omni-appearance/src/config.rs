@@ -10,6 +10,8 @@ use tagalong_core::{Error, Result};
 pub enum Distance {
     /// The network of the paper: three features, four hidden units.
     Network,
+    /// The same network, trained as in the paper: by back-propagation at a rate of 0.3.
+    Printed,
     /// A network of all features that are measured.
     Rich,
     /// A straight line in the lower edge, its square, its inverse, width and area.
@@ -24,7 +26,8 @@ pub enum Distance {
 pub struct Config {
     /// Model file, relative to the config; empty: the model that is built in.
     pub model: String,
-    /// How the distance is found: `network`, `rich`, `ridge` or `analytic`.
+    /// How the distance is found: `network`, `printed`, `rich`, `ridge` or
+    /// `analytic`.
     pub distance: Distance,
     /// Name of the person in the model whose head is used; `general` for
     /// everybody's, `nearest` for the one whose looks fit best.
@@ -142,6 +145,66 @@ impl Config {
         match rules.iter().find(|(holds, _)| !holds) {
             Some((_, message)) => Err(Error::Settings((*message).into())),
             None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_setting_has_its_bounds() {
+        let checked = |line: &str| toml::from_str::<Config>(line).unwrap().check();
+        let good = [
+            "background_frames = 10000",
+            "threshold_sigmas = 100.0",
+            "adapt_s = 1000000.0",
+            "absorb_s = 0.0",
+            "shadow_min = 1.0",
+            "shadow_tint = 1.0",
+            "column_pixels = 1000",
+            "bridge_columns = 100",
+            "valley = 0.0",
+            "max_people = 100",
+            "head_height_m = [-0.9, 3.9]",
+            "sigma_bearing_deg = 90.0",
+            "sigma_aside_m = 0.0",
+            "sigma_height_m = 10.0",
+            "walls_m = [0.5, 1000.0]",
+            "slack_px = [20, 0]",
+        ];
+        for line in good {
+            assert!(checked(line).is_ok(), "{line}");
+        }
+        let wrong = [
+            "background_frames = 0",
+            "background_frames = 10001",
+            "threshold_sigmas = 100.1",
+            "adapt_s = -0.1",
+            "absorb_s = -1.0",
+            "shadow_min = 1.1",
+            "shadow_max = -0.1",
+            "shadow_tint = 1.1",
+            "column_pixels = 0",
+            "bridge_columns = 101",
+            "valley = 1.0",
+            "max_people = 0",
+            "max_people = 101",
+            "head_height_m = [-1.0, 2.0]",
+            "head_height_m = [1.0, 1.0]",
+            "head_height_m = [1.0, 4.0]",
+            "sigma_bearing_deg = 0.001",
+            "sigma_aside_m = 1.1",
+            "sigma_height_m = 0.0",
+            "walls_m = []",
+            "walls_m = [0.4, 2.0]",
+            "slack_px = [0, 21]",
+        ];
+        for line in wrong {
+            let key = line.split(' ').next().unwrap();
+            let told = checked(line).map_err(|error| error.to_string());
+            assert!(told.as_ref().is_err_and(|why| why.contains(key)), "{line}: {told:?}");
         }
     }
 }

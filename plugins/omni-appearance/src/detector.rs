@@ -169,3 +169,94 @@ fn fits(search: &Search<'_>, person: &Detection) -> bool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, SMatrix, Vector2};
+    use tagalong_conformance::context;
+    use tagalong_core::{ConicalMirror, Estimate, Lens, Panorama, Person, Rect, TrackId};
+
+    use super::*;
+
+    fn detector() -> OmniAppearance {
+        let config = Config {
+            sigma_bearing_deg: 1.0,
+            sigma_aside_m: 0.03,
+            sigma_height_m: 0.2,
+            ..Config::default()
+        };
+        OmniAppearance::new(config, &context()).unwrap()
+    }
+
+    /// A camera 0.3 m ahead of the middle of the robot.
+    fn camera() -> Camera {
+        let d =
+            [67.5_f64.to_radians(), 0.05, 2.0_f64.to_radians().tan(), 53.0_f64.to_radians().tan()];
+        let mirror = ConicalMirror::from_coefficients(1.0, [0.0; 2], &d).unwrap();
+        let panorama = Panorama { mirror, columns: 480, rows: 120 };
+        let mut robot_from_camera = ConicalMirror::upright(1.5);
+        robot_from_camera.translation.vector.x = 0.3;
+        let lens = Lens::Panorama(panorama);
+        Camera { lens, width: 480, height: 120, robot_from_camera }
+    }
+
+    #[test]
+    fn a_place_is_known_along_the_ray_by_the_distance_and_across_it_by_the_bearing() {
+        let spread = |visible: f64| {
+            let at = Point3::new(0.3 + 1.8, -2.4, 1.6);
+            let c = detector().covariance(&at, &camera(), [3.0, 0.25], visible);
+            let (out, aside) = (Vector3::new(0.6, -0.8, 0.0), Vector3::new(0.8, 0.6, 0.0));
+            assert!(out.dot(&(c * aside)).abs() < 1e-12);
+            assert!((c[(2, 2)] - 0.04).abs() < 1e-12 && c[(0, 2)].abs() + c[(1, 2)].abs() < 1e-12);
+            (out.dot(&(c * out)), aside.dot(&(c * aside)))
+        };
+        let bearing = 3.0 * 1.0_f64.to_radians();
+        let across = bearing * bearing + 0.03 * 0.03;
+        let (along, whole) = spread(1.0);
+        assert!((along - 0.0625).abs() < 1e-12 && (whole - across).abs() < 1e-12);
+        let hidden = across + 0.25_f64.powi(2) * 0.3 * 0.3;
+        assert!((spread(0.7).1 - hidden).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_ordinary_stature_is_surer_than_an_odd_one() {
+        let detector = detector();
+        assert_eq!(detector.score(1.6), 3.0);
+        assert!((detector.score(1.8) - 2.5).abs() < 1e-9);
+        assert!((detector.score(1.3) - (3.0 - 0.5 * 2.25)).abs() < 1e-9);
+        assert_eq!(detector.score(9.0), -3.0);
+    }
+
+    #[test]
+    fn a_search_near_a_track_ends_at_three_deviations_and_some() {
+        let spread = Matrix2::new(0.05, 0.01, 0.01, 0.03);
+        let mut covariance = SMatrix::<f64, 5, 5>::zeros();
+        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&spread);
+        let person = Person { position: Point3::new(2.0, 1.0, 1.6), velocity: Vector2::zeros() };
+        let track = Track {
+            id: TrackId(1),
+            estimate: Estimate { person, covariance, region: Rect::default() },
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 3,
+            unseen_s: 0.0,
+            score: 1.0,
+        };
+        let reach = 3.0 * 0.2 + 0.3;
+        let near = |way: Vector2<f64>| {
+            let position = Point3::new(2.0 + way.x, 1.0 + way.y, 0.2);
+            let person = Detection {
+                region: Rect::default(),
+                position,
+                covariance: Matrix3::identity(),
+                score: 0.0,
+                source: "test",
+            };
+            fits(&Search::Near(&track), &person)
+        };
+        for way in [Vector2::new(0.6, 0.8), Vector2::new(-0.6, 0.8)] {
+            assert!(near(way * (reach - 1e-6)) && !near(way * (reach + 1e-6)));
+        }
+    }
+}

@@ -63,12 +63,16 @@ pub struct Head {
     pub ridge_sigma: Line,
     /// Of the network.
     pub network_sigma: Line,
+    /// Of the network that was trained by back-propagation.
+    pub printed_sigma: Line,
     /// Of the rich network.
     pub rich_sigma: Line,
     /// The ridge.
     pub ridge: Ridge,
     /// Of three features.
     pub network: Network,
+    /// The same, trained by back-propagation.
+    pub printed: Network,
     /// Of all features.
     pub rich: Network,
 }
@@ -127,6 +131,7 @@ impl Head {
     pub fn distance(&self, features: &Features, camera: &View<'_>, how: Distance) -> (f64, f64) {
         let (distance, sigma) = match how {
             Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
+            Distance::Printed => (self.printed.answer(&features.values()), self.printed_sigma),
             Distance::Rich => (self.rich.answer(&camera.inputs(features)), self.rich_sigma),
             Distance::Ridge => (self.ridge.answer(features), self.ridge_sigma),
             Distance::Analytic => {
@@ -137,8 +142,15 @@ impl Head {
     }
 
     fn is_sane(&self) -> bool {
-        let lines = [self.analytic_sigma, self.ridge_sigma, self.network_sigma, self.rich_sigma];
+        let lines = [
+            self.analytic_sigma,
+            self.ridge_sigma,
+            self.network_sigma,
+            self.printed_sigma,
+            self.rich_sigma,
+        ];
         self.network.is_sane(3)
+            && self.printed.is_sane(3)
             && self.rich.is_sane(INPUTS)
             && self.ridge.is_sane()
             && self.floor_offset_m.is_finite()
@@ -215,13 +227,14 @@ impl Geometry {
         Self { size, elevations_deg, height_m: view.height_m }
     }
 
-    /// True if a camera is like this one: half a row and three centimetres.
+    /// Returns whether a camera is like this one, to within two rows and three
+    /// centimetres: no mirror's angle is measured better.
     pub fn is_like(&self, other: &Self) -> bool {
         let row_deg = (self.elevations_deg[0] - self.elevations_deg[1]) / self.size[1] as f64;
         let elevations = self.elevations_deg.iter().zip(other.elevations_deg);
         self.size == other.size
             && (self.height_m - other.height_m).abs() < 0.03
-            && elevations.into_iter().all(|(a, b)| (a - b).abs() < 0.5 * row_deg.abs())
+            && elevations.into_iter().all(|(a, b)| (a - b).abs() < 2.0 * row_deg.abs())
     }
 }
 
@@ -237,7 +250,7 @@ struct File {
     people: Vec<Person>,
 }
 
-const FORMAT: &str = "omni-distance 1";
+const FORMAT: &str = "omni-distance 2";
 
 impl Model {
     /// The head for somebody: by name, everybody's for `general`, and for
@@ -283,5 +296,90 @@ impl Model {
             return Err("its numbers are not finite or do not fit together".into());
         }
         Ok(Self { geometry: file.geometry, general: file.general, people: file.people })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn misfit_is_the_root_of_the_mean_square_in_deviations() {
+        let known = Signature { mean: [10.0, 20.0, 30.0, 1.7], sigma: [2.0, 4.0, 5.0, 0.1] };
+        let misfit = known.misfit(&[12.0, 16.0, 40.0, 1.5]);
+        assert!((misfit - (10.0_f64 / 4.0).sqrt()).abs() < 1e-9, "{misfit}");
+        let exact = Signature { sigma: [0.0; 4], ..known };
+        assert!((exact.misfit(&[10.0, 20.0, 30.0, 1.7 + 2e-6]) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_line_is_never_below_a_centimetre() {
+        let line = Line { start: 0.1, slope: -0.02 };
+        assert!((line.at(2.0) - 0.06).abs() < 1e-12);
+        assert_eq!(line.at(20.0), 0.01);
+    }
+
+    #[test]
+    fn cameras_are_alike_within_two_rows_and_three_centimetres() {
+        // A row is half a degree.
+        let one = Geometry { size: [480, 100], elevations_deg: [10.0, -40.0], height_m: 1.5 };
+        let like =
+            |elevations_deg, height_m| one.is_like(&Geometry { elevations_deg, height_m, ..one });
+        assert!(like([10.99, -40.99], 1.529) && like([9.01, -39.01], 1.471));
+        assert!(!like([11.01, -40.0], 1.5) && !like([10.0, -41.01], 1.5));
+        assert!(!like([8.99, -40.0], 1.5) && !like([10.0, -38.99], 1.5));
+        assert!(!like([10.0, -40.0], 1.531) && !like([10.0, -40.0], 1.469));
+        assert!(!one.is_like(&Geometry { size: [480, 101], ..one }));
+    }
+
+    #[test]
+    fn a_ridge_answers_by_its_formula() {
+        let ridge = Ridge {
+            mean: [1.0, 2.0, 0.25, 4.0, 5.0],
+            scale: [2.0, 4.0, 0.5, 2.0, 10.0],
+            weights: [3.0, 1.0, -1.0, 2.0, 0.5, -2.0],
+        };
+        let features = Features {
+            width: 8.0,
+            bottom: 3.0,
+            pixels: 25.0,
+            top: 0.0,
+            middle: 0.0,
+            core: 0.0,
+            low: 0.0,
+        };
+        // Terms 3, 9, 1/4, 8 and 25, which are 1, 7/4, 0, 2 and 2 when scaled.
+        assert!((ridge.answer(&features) - (3.0 + 1.0 - 1.75 + 0.0 + 1.0 - 4.0)).abs() < 1e-12);
+        assert!(ridge.is_sane());
+        let broken = |change: fn(&mut Ridge)| {
+            let mut ridge = ridge;
+            change(&mut ridge);
+            !ridge.is_sane()
+        };
+        assert!(broken(|r| r.scale[2] = 0.0) && broken(|r| r.weights[5] = f64::NAN));
+        assert!(broken(|r| r.mean[0] = f64::INFINITY));
+    }
+
+    #[test]
+    fn a_head_with_one_broken_part_is_none() {
+        let text = include_str!("../../../configs/models/omni-distance.toml");
+        let head = Model::from_text(text).unwrap().general;
+        assert!(head.is_sane());
+        let broken: [fn(&mut Head); 9] = [
+            |h| h.network.output.clear(),
+            |h| h.printed.output.clear(),
+            |h| h.rich.output.clear(),
+            |h| h.ridge.scale[0] = -1.0,
+            |h| h.floor_offset_m = f64::NAN,
+            |h| h.analytic_sigma.start = f64::NAN,
+            |h| h.printed_sigma.slope = f64::INFINITY,
+            |h| h.network_sigma.slope = f64::NAN,
+            |h| h.rich_sigma.start = f64::INFINITY,
+        ];
+        for (number, change) in broken.into_iter().enumerate() {
+            let mut other = head.clone();
+            change(&mut other);
+            assert!(!other.is_sane(), "{number}");
+        }
     }
 }

@@ -89,4 +89,33 @@ mod tests {
         assert!(!network.is_sane(1));
         assert!(!Network { output: vec![1.0], ..network }.is_sane(9));
     }
+
+    #[test]
+    fn a_network_whose_parts_do_not_fit_is_insane() {
+        let sane = Network {
+            mean: vec![1.0, 2.0],
+            scale: vec![2.0, 4.0],
+            target: [3.0, 0.5],
+            hidden: vec![vec![0.5, -1.0, 0.25]],
+            output: vec![2.0, -1.0],
+        };
+        assert!(sane.is_sane(2));
+        let broken: [fn(&mut Network); 8] = [
+            |n| n.scale.push(1.0),
+            |n| n.scale[1] = 0.0,
+            |n| n.hidden[0].push(0.0),
+            |n| n.output.push(0.0),
+            |n| n.mean[0] = f64::NAN,
+            |n| n.target[1] = f64::INFINITY,
+            |n| n.hidden[0][1] = f64::NAN,
+            |n| n.output[0] = f64::NAN,
+        ];
+        for (number, change) in broken.into_iter().enumerate() {
+            let mut other = sane.clone();
+            change(&mut other);
+            assert!(!other.is_sane(2), "{number}");
+        }
+        let none = Network { mean: vec![], scale: vec![], hidden: vec![vec![0.1]], ..sane };
+        assert!(!none.is_sane(2), "a network of no inputs tells nothing");
+    }
 }

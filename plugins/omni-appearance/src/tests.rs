@@ -143,7 +143,7 @@ fn the_shipped_model_is_one() {
     assert_eq!(Model::from_text(&model.to_text()).unwrap(), model);
     assert_eq!(model.people.len(), 2);
     let refused = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();
-    assert!(refused("distance 1", "distance 9").contains("distance 9"));
+    assert!(refused("distance 2", "distance 9").contains("distance 9"));
     assert!(refused("\"width\"", "\"girth\"").contains("features"));
     assert!(refused("floor_offset_m = ", "floor_offset_m = inf #").contains("finite"));
 }
@@ -159,6 +159,7 @@ fn somebody_whom_the_model_does_not_know_is_refused() {
 fn it_keeps_the_promises_of_its_kind() {
     let mut registry = Registry::default();
     crate::register(&mut registry);
+    assert!(registry.find(crate::NAME).is_ok());
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }
@@ -166,7 +167,7 @@ fn it_keeps_the_promises_of_its_kind() {
 #[cfg(feature = "train")]
 mod fits {
     use super::*;
-    use crate::train::{Collector, Training, head};
+    use crate::train::{Collector, Training, WAYS, head};
 
     /// People at known places: all ways to the distance get near it, and the same
     /// seed gives the same head.
@@ -187,7 +188,7 @@ mod fits {
         let training = Training::default();
         let fitted = head(&collector.samples, &training, 3).unwrap();
         assert_eq!(head(&collector.samples, &training, 3).unwrap(), fitted);
-        for how in [Distance::Network, Distance::Rich, Distance::Ridge, Distance::Analytic] {
+        for how in WAYS {
             let errors =
                 collector.samples.iter().map(|s| (s.distance(&fitted, how) - s.distance_m).abs());
             let mean = errors.sum::<f64>() / 120.0;

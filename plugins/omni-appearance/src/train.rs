@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector, Point3};
 use tagalong_core::{Detection, Error, Example, Fitted, Frame, Funnel, Result, Trainer};
 use tagalong_learn::mix;
 
-pub use crate::fit::Fit;
 use crate::fit::mean_and_scale;
+pub use crate::fit::{Descent, Fit};
 use crate::model::INPUTS;
 use crate::{
     Blob, Config, Distance, Eyes, Features, Geometry, Head, Line, Model, Person, Ridge, Signature,
@@ -19,6 +19,8 @@ use crate::{
 pub struct Training {
     /// The paper's network: three inputs, four hidden units (P5, section 4.4).
     pub network: Fit,
+    /// The same network, by back-propagation.
+    pub printed: Fit,
     /// The network of all features.
     pub rich: Fit,
     /// Weight of the squares of the ridge's weights, for each sample.
@@ -29,9 +31,13 @@ pub struct Training {
 
 impl Default for Training {
     fn default() -> Self {
-        let network = Fit { hidden: 4, decay: 1e-2, restarts: 3, steps: 150 };
+        let descent = Descent::Marquardt;
+        let network = Fit { hidden: 4, decay: 1e-2, restarts: 3, steps: 150, descent };
+        // P5, section 4.4, says the rate and no more.
+        let descent = Descent::BackPropagation { rate: 0.3 };
         Self {
             network,
+            printed: Fit { decay: 0.0, steps: 2000, descent, ..network },
             rich: Fit { hidden: 8, decay: 3e-2, ..network },
             ridge: 1e-4,
             block_frames: 15,
@@ -86,6 +92,7 @@ impl Sample {
     pub fn distance(&self, head: &Head, how: Distance) -> f64 {
         match how {
             Distance::Network => head.network.answer(&self.features.values()),
+            Distance::Printed => head.printed.answer(&self.features.values()),
             Distance::Rich => head.rich.answer(&self.inputs()),
             Distance::Ridge => head.ridge.answer(&self.features),
             Distance::Analytic => self.floor_m + head.floor_offset_m,
@@ -201,9 +208,11 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         analytic_sigma: flat,
         ridge_sigma: flat,
         network_sigma: flat,
+        printed_sigma: flat,
         rich_sigma: flat,
         ridge: ridge(samples, training.ridge),
         network: training.network.network(&printed, &targets, seed),
+        printed: training.printed.network(&printed, &targets, seed),
         rich: training.rich.network(&all, &targets, seed),
     };
     let answers: Vec<Answers> = samples.iter().map(|sample| sample.answers(&head)).collect();
@@ -215,8 +224,8 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
 pub type Answers = [f64; WAYS.len()];
 
 /// All ways to the distance.
-pub const WAYS: [Distance; 4] =
-    [Distance::Network, Distance::Rich, Distance::Ridge, Distance::Analytic];
+pub const WAYS: [Distance; 5] =
+    [Distance::Network, Distance::Printed, Distance::Rich, Distance::Ridge, Distance::Analytic];
 
 /// What heads say that were fitted to everybody but those of whom they say it.
 ///
@@ -259,8 +268,13 @@ impl Head {
         let line = |way: usize| {
             spread(samples.iter().zip(answers).map(|(s, said)| (said[way], s.distance_m)))
         };
-        [self.network_sigma, self.rich_sigma, self.ridge_sigma, self.analytic_sigma] =
-            [line(0), line(1), line(2), line(3)];
+        [
+            self.network_sigma,
+            self.printed_sigma,
+            self.rich_sigma,
+            self.ridge_sigma,
+            self.analytic_sigma,
+        ] = std::array::from_fn(line);
     }
 }
 
@@ -410,4 +424,201 @@ fn figures(collector: &Collector, training: &Training, seed: u64) -> Result<toml
 
 fn rounded(value: f64) -> toml::Value {
     toml::Value::Float((1e4 * value).round() / 1e4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Somebody at a distance, whose lower edge and width say so without noise.
+    fn sample(number: u64) -> Sample {
+        let distance_m = 1.0 + 0.04 * ((number * 37) % 100) as f64;
+        let features = Features {
+            width: 60.0 / distance_m,
+            bottom: 12.0 * distance_m,
+            pixels: 900.0 / distance_m + (number % 7) as f64,
+            top: 9.0,
+            middle: 50.0,
+            core: 30.0 / distance_m,
+            low: 90.0,
+        };
+        Sample {
+            features,
+            floor_m: distance_m - 0.1,
+            looks: [10.0 + (number % 3) as f64, 20.0, 30.0, 1.7],
+            distance_m,
+            bearing_rad: 0.1,
+            true_bearing_rad: 0.15,
+            person: number % 10,
+            frame: number,
+        }
+    }
+
+    fn samples(count: u64) -> Vec<Sample> {
+        (0..count).map(sample).collect()
+    }
+
+    #[test]
+    fn the_spread_is_the_line_through_absolute_errors() {
+        // Errors whose mean is that of a normal with 0.1 + 0.05 x.
+        let half_normal = (2.0 / std::f64::consts::PI).sqrt();
+        let pairs = |slope: f64| {
+            let said = (1..=40).map(|i| 0.2 * f64::from(i));
+            said.map(move |x| (x, x + (0.1 + slope * x) * half_normal))
+        };
+        let line = spread(pairs(0.05));
+        assert!((line.start - 0.1).abs() < 1e-9 && (line.slope - 0.05).abs() < 1e-9, "{line:?}");
+        // What falls with the distance is as wide everywhere as on the mean, 4.1 m.
+        let line = spread(pairs(-0.01));
+        assert!((line.start - 0.059).abs() < 1e-9 && line.slope == 0.0, "{line:?}");
+        let exact = spread([(1.0, 1.0), (2.0, 2.0)].into_iter());
+        assert_eq!((exact.start, exact.slope), (0.02, 0.0));
+        let one = spread([(1.0, 1.5)].into_iter());
+        assert!((one.start - 0.5 / half_normal).abs() < 1e-9 && one.slope == 0.0);
+    }
+
+    #[test]
+    fn the_ridge_finds_a_straight_line_and_shrinks_with_its_weight() {
+        let mut all = samples(60);
+        for sample in &mut all {
+            let f = sample.features;
+            sample.distance_m = 0.5 + 0.07 * f.bottom - 0.01 * f.width + 0.001 * f.pixels;
+        }
+        let free = ridge(&all, 0.0);
+        for sample in &all {
+            assert!((free.answer(&sample.features) - sample.distance_m).abs() < 1e-4);
+        }
+        let held = ridge(&all, 10.0);
+        let norm = |ridge: &Ridge| ridge.weights[1..].iter().map(|w| w * w).sum::<f64>();
+        assert!(norm(&held) < 0.1 * norm(&free));
+        assert!((held.weights[0] - free.weights[0]).abs() < 1e-6, "the mean is not held");
+        // One weight of one term, by hand: x'y / (x'x + n w), with x of deviation 1.
+        let only = samples(40)
+            .iter()
+            .map(|s| Sample { features: Features { width: 1.0, pixels: 1.0, ..s.features }, ..*s })
+            .collect::<Vec<_>>();
+        let heavy = ridge(&only, 1e6);
+        let (mean, scale) = mean_and_scale(only.iter().map(|s| s.features.bottom));
+        let product: f64 =
+            only.iter().map(|s| (s.features.bottom - mean) / scale * s.distance_m).sum();
+        let expected = product / (40.0 * 1e6);
+        assert!((heavy.weights[1] / expected - 1.0).abs() < 1e-3, "{heavy:?} {expected}");
+    }
+
+    #[test]
+    fn a_signature_is_mean_and_deviation_of_looks() {
+        let of = signature(&samples(30));
+        let off = of.mean.iter().zip([11.0, 20.0, 30.0, 1.7]).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{:?}", of.mean);
+        assert!((of.sigma[0] - (2.0_f64 / 3.0).sqrt()).abs() < 1e-9, "{:?}", of.sigma);
+        assert!(of.sigma[1] < 1e-6);
+    }
+
+    /// The analytic way of a head is the floor and a mean: what it says of a sample
+    /// tells which others it was fitted to.
+    #[test]
+    fn answers_come_from_everybody_else() {
+        let mut all = samples(60);
+        for (number, sample) in all.iter_mut().enumerate() {
+            sample.floor_m = sample.distance_m - 0.1 * ((number * number) % 17) as f64;
+        }
+        let training = Training { block_frames: 4, ..quick() };
+        let analytic = WAYS.iter().position(|way| *way == Distance::Analytic).unwrap();
+        let key = |held: HeldOut, sample: &Sample| match held {
+            HeldOut::Blocks => sample.frame / 4 % 5,
+            HeldOut::People => sample.person % 5,
+        };
+        for held in [HeldOut::Blocks, HeldOut::People] {
+            let answers = held_out(&all, held, &training, 1).unwrap();
+            for (sample, said) in all.iter().zip(&answers) {
+                let others = all.iter().filter(|other| key(held, other) != key(held, sample));
+                let off: Vec<f64> = others.map(|other| other.distance_m - other.floor_m).collect();
+                let mean = off.iter().sum::<f64>() / off.len() as f64;
+                assert!((said[analytic] - sample.floor_m - mean).abs() < 1e-9, "{held:?}");
+            }
+        }
+        // Of one person alone blocks are held out, whatever is asked for.
+        let alone: Vec<Sample> = all.iter().map(|s| Sample { person: 3, ..*s }).collect();
+        let of = |held| held_out(&alone, held, &training, 1).unwrap();
+        assert_eq!(of(HeldOut::People), of(HeldOut::Blocks));
+    }
+
+    fn quick() -> Training {
+        let training = Training::default();
+        let few = |fit: Fit| Fit { restarts: 1, steps: 5, ..fit };
+        Training {
+            network: few(training.network),
+            printed: few(training.printed),
+            rich: few(training.rich),
+            ..training
+        }
+    }
+
+    #[test]
+    fn a_model_knows_people_and_no_strangers_and_doubts_itself_by_what_it_was_not_fitted_to() {
+        let mut all = samples(60);
+        for (number, sample) in all.iter_mut().enumerate() {
+            sample.person = [3, 7, STRANGERS][number % 3];
+            sample.floor_m -= 0.01 * ((number * 7) % 5) as f64;
+        }
+        let geometry = Geometry { size: [480, 120], elevations_deg: [8.0, -43.0], height_m: 1.5 };
+        let model = model(&all, geometry, &quick(), 1).unwrap();
+        let names: Vec<&str> = model.people.iter().map(|person| person.name.as_str()).collect();
+        assert_eq!(names, ["person-3", "person-7"]);
+        let own: Vec<Sample> = all.iter().filter(|s| s.person == 3).copied().collect();
+        let mean = own.iter().map(|s| s.distance_m - s.floor_m).sum::<f64>() / own.len() as f64;
+        assert!((model.people[0].head.floor_offset_m - mean).abs() < 1e-12);
+        assert_eq!(model.people[0].signature, signature(&own));
+        for (held, samples, head) in [
+            (HeldOut::People, &all, &model.general),
+            (HeldOut::Blocks, &own, &model.people[0].head),
+        ] {
+            let seed = if held == HeldOut::People { 1 } else { mix(1 ^ 3) };
+            let said = held_out(samples, held, &quick(), seed).unwrap();
+            let lines = [
+                head.network_sigma,
+                head.printed_sigma,
+                head.rich_sigma,
+                head.ridge_sigma,
+                head.analytic_sigma,
+            ];
+            for (way, line) in lines.into_iter().enumerate() {
+                let pairs = samples.iter().zip(&said).map(|(s, said)| (said[way], s.distance_m));
+                assert_eq!(line, spread(pairs), "{way}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_card_has_the_means_of_what_is_off() {
+        let collector = Collector {
+            samples: samples(40),
+            missed: 3,
+            ..Collector::new(Config::default()).unwrap()
+        };
+        let card = figures(&collector, &quick(), 1).unwrap();
+        assert_eq!(card["samples"].as_integer(), Some(40));
+        assert_eq!(card["missed"].as_integer(), Some(3));
+        assert_eq!(card["bearing_error_deg"].as_float(), Some(2.8648));
+        let folds = card["five_folds_of_people"].as_table().unwrap();
+        assert_eq!(folds.len(), WAYS.len());
+        // The floor is 0.1 m short for everybody, so the held-out mean corrects it.
+        assert_eq!(folds["analytic_error_m"].as_float(), Some(0.0));
+        assert!(folds.contains_key("printed_error_m"));
+        assert_eq!(rounded(0.123_449), toml::Value::Float(0.1234));
+    }
+
+    #[test]
+    fn bearings_differ_by_the_shorter_way_round() {
+        let off = |a: f64, b: f64| {
+            Sample { bearing_rad: a, true_bearing_rad: b, ..sample(0) }.bearing_error_rad()
+        };
+        assert!((off(3.1, -3.1) - (std::f64::consts::TAU - 6.2)).abs() < 1e-12);
+        assert!((off(-0.2, 0.1) - 0.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ten_samples_are_enough_and_nine_are_not() {
+        assert!(head(&samples(10), &quick(), 1).is_ok() && head(&samples(9), &quick(), 1).is_err());
+    }
 }

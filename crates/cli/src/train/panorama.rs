@@ -13,27 +13,42 @@ use crate::simulate::threads;
 /// What `tagalong train` is asked for.
 pub const NAME: &str = "omni-distance";
 
-/// Two people, each of whom gets a head of their own ...
+/// Rooms with two people, one after the other: another room, other people and another
+/// mirror with every seed.
 const ROOM: &str = include_str!("../../../../configs/scenes/omni-room.toml");
-/// ... and others, for everybody's head, who come close to the robot, too.
-const STRANGERS: &str = include_str!("../../../../configs/scenes/omni-near.toml");
 /// Groups from here on are strangers.
 const STRANGER: u64 = 100;
+/// Time for which each person of the first room is seen, s: each gets a head of their
+/// own.
+const KNOWN_S: f64 = 40.0;
+/// Other rooms, for the general head, and the time for which each of their people is
+/// seen, s.
+const STRANGE: (u64, f64) = (15, 10.0);
+/// The time of a quick training, which has the first room only, s.
+const QUICK_S: f64 = 12.0;
 
-/// What is drawn.
+/// A room to draw.
 struct Room {
-    text: &'static str,
     seed: u64,
-    duration_s: f64,
+    each_s: f64,
 }
 
 fn rooms(quick: bool, seed: u64) -> Vec<Room> {
-    let room = |text, seed, duration_s| Room { text, seed, duration_s };
     if quick {
-        return vec![room(ROOM, seed, 30.0)];
+        return vec![Room { seed, each_s: QUICK_S }];
     }
-    let strangers = (0..10).map(|i| room(STRANGERS, seed + i, 45.0));
-    std::iter::once(room(ROOM, seed, 150.0)).chain(strangers).collect()
+    let (rooms, each_s) = STRANGE;
+    let strange = (1..=rooms).map(|number| Room { seed: seed + number, each_s });
+    std::iter::once(Room { seed, each_s: KNOWN_S }).chain(strange).collect()
+}
+
+impl Room {
+    /// Returns the scene: the empty room, the first person, then the second.
+    fn scene(&self) -> Result<Scene, Failure> {
+        let variant = Variant::of_split(Split::Train, self.seed);
+        let scene = Scene::parse_with(ROOM, &variant).map_err(Failure::failed)?;
+        Ok(Scene { webcams: Vec::new(), ..scene.in_turn(self.each_s) })
+    }
 }
 
 /// Draws, fits, writes model and card.
@@ -61,8 +76,8 @@ pub fn train(session: &Session<'_>, args: &TrainArgs) -> Outcome {
 
 fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
     let scene = |room: &Room| {
-        let name = if room.text == ROOM { "omni-room" } else { "omni-near" };
-        toml::Value::from(format!("{name}, split train, seed {}, {} s", room.seed, room.duration_s))
+        let Room { seed, each_s } = room;
+        toml::Value::from(format!("omni-room, split train, seed {seed}, {each_s} s of each person"))
     };
     let mut card = toml::Table::new();
     card.insert("model".into(), NAME.into());
@@ -72,21 +87,15 @@ fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
     card.extend(figures.clone());
     format!(
         "# Made by `tagalong train {NAME}` with this seed. Mean absolute errors on blocks\n\
-         # of images, and on people, that nothing was fitted to.\n{card}"
+         # of images, and on people in other rooms, that nothing was fitted to.\n{card}"
     )
 }
 
 /// Shows everybody in a room to the trainer.
 fn show(session: &Session<'_>, room: &Room, trainer: &mut dyn Trainer) -> Result<(), Failure> {
-    let variant = Variant {
-        seed: Some(room.seed),
-        split: Some(Split::Train),
-        set: vec![("duration_s".into(), room.duration_s.to_string())],
-    };
-    let scene = Scene::parse_with(room.text, &variant).map_err(Failure::failed)?;
-    let scene = Scene { webcams: Vec::new(), ..scene };
-    session.bar.set_length((room.duration_s * scene.camera.rate_hz) as u64);
-    let first = if room.text == ROOM { 0 } else { STRANGER * (1 + room.seed) };
+    let scene = room.scene()?;
+    session.bar.set_length((scene.duration_s * scene.camera.rate_hz) as u64);
+    let first = if room.seed == session.args.seed { 0 } else { STRANGER * (1 + room.seed) };
     let mut draw = Draw::new(&scene, threads(None));
     while let Some(drawn) = draw.next_frame() {
         take(&drawn.frame, &drawn.truth, first, trainer)?;

@@ -221,3 +221,43 @@ fn clearance_is_to_what_is_really_there() {
     let Clearance { people_m, things_m } = alone.clearance(0.25);
     assert!(people_m == f64::INFINITY && (things_m - 1.25).abs() < 0.02, "{things_m}");
 }
+
+/// Two who wander, one after the other.
+const TURNS: &str = "seed = 4\nduration_s = 6.0\n[camera]\nwidth = 16\nheight = 16\n\
+    rate_hz = 2.0\n[room]\nclutter = 5\n[robot]\nstart = [4.5, 3.0]\n\
+    [[people]]\nwander = 30\nleaves_s = 3.0\n[[people]]\nwander = 30\nenters_s = 3.0\n";
+
+#[test]
+fn one_leaves_as_the_other_enters() {
+    let drawn = shots(&TURNS.replace("[camera]", "[faults]\ndropped = 0.0\n[camera]"), 1);
+    let there: Vec<Vec<u16>> =
+        drawn.iter().map(|shot| shot.truth.iter().map(|person| person.id).collect()).collect();
+    assert_eq!(there, [[1]; 6].into_iter().chain([[2]; 6]).collect::<Vec<_>>());
+}
+
+#[test]
+fn who_wanders_goes_elsewhere_with_every_seed_and_keeps_off_things() {
+    let ways = |seed: u64| {
+        let text = TURNS.replace("seed = 4", &format!("seed = {seed}"));
+        let scene = Scene::parse(&text).unwrap();
+        let simulation = Simulation::new(&scene, 1);
+        let off = |at: &Point2<f64>| {
+            let things = simulation.obstacles.iter().map(|o| (at - o.at).norm() - o.radius_m);
+            things.fold((at - Point2::new(4.5, 3.0)).norm() - 0.55, f64::min)
+        };
+        let people = walkers(&scene, &simulation.obstacles, &mut Random::new(seed, 3));
+        let ways: Vec<Vec<Point2<f64>>> = people.iter().map(Walker::points).collect();
+        for at in ways.iter().flatten() {
+            assert!(off(at) > 0.35, "{at}");
+            assert!((0.5..8.5).contains(&at.x) && (0.6..5.4).contains(&at.y), "{at}");
+        }
+        ways
+    };
+    let (first, second) = (ways(4), ways(5));
+    assert_eq!(first, ways(4));
+    assert!(first.iter().all(|way| way.len() == 30));
+    assert!(first[0] != first[1] && first[0] != second[0]);
+    // They come everywhere, near the robot and far from it.
+    let near = first.iter().flatten().filter(|at| (*at - Point2::new(4.5, 3.0)).norm() < 1.6);
+    assert!((3..30).contains(&near.count()));
+}
