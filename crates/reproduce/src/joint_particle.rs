@@ -177,19 +177,19 @@ fn misprints(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
 /// Values that are tried for the printed form, one change at a time.
 const TRIED: [&[(&str, &str)]; 14] = [
     &[],
-    &[("detectors.0.config.likelihood_sigma", "0.00025")],
-    &[("detectors.0.config.likelihood_sigma", "0.0005")],
     &[("detectors.0.config.likelihood_sigma", "0.002")],
     &[("detectors.0.config.likelihood_sigma", "0.004")],
-    &[("detectors.0.config.likelihood_sigma", "0.008")],
+    &[("detectors.0.config.likelihood_sigma", "0.016")],
+    &[("detectors.0.config.likelihood_sigma", "0.032")],
+    &[("detectors.0.config.likelihood_sigma", "0.064")],
     &[("filter.config.position_noise", "0.08")],
     &[("filter.config.position_noise", "0.3")],
     &[("filter.config.velocity_noise", "0.1")],
     &[("filter.config.velocity_noise", "1.0")],
     &[("filter.config.height_noise", "0.06")],
-    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.035")],
-    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.07")],
     &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.15")],
+    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.3")],
+    &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.6")],
 ];
 
 /// How the printed form does with other values of what P3 does not print.
