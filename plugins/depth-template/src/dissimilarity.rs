@@ -111,7 +111,7 @@ mod tests {
     use tagalong_core::DepthImage;
 
     use super::*;
-    use crate::bank::{Bank, Direction, Pose};
+    use crate::bank::{Bank, Direction, Pose, TemplateRow};
 
     const BACKGROUND_M: f64 = 7.0;
 
@@ -160,7 +160,8 @@ mod tests {
         let depth = DepthImage::from_fn(220, 220, |x, y| {
             let row = shape.rows.iter().find(|r| r.dy == y as i64 - 100);
             let dx = x as i64 - 110;
-            let is_person = row.is_some_and(|r| r.from <= dx && dx < r.to);
+            let outline = |r: &TemplateRow| (r.from + r.guard_from) / 2..(r.to + r.guard_to) / 2;
+            let is_person = row.is_some_and(|r| outline(r).contains(&dx));
             if is_person { z as f32 } else { z as f32 + 2.0 }
         });
         let rows = RowSums::new(&depth, 1);

@@ -42,7 +42,11 @@ pub const OF_P1: [Variant; 4] = [
     Variant {
         name: "printed, velocity corrected",
         of: "stereo-ekf-as-printed",
-        set: &[NO_VELOCITY, ("filter.config.printed_sigma_w", Number(2.5))],
+        set: &[
+            NO_VELOCITY,
+            ("filter.config.printed_sigma_w", Number(5.0)),
+            ("filter.config.printed_sigma_v_m", Number(0.1)),
+        ],
     },
     Variant { name: "stereo-ekf", of: "stereo-ekf", set: &[] },
     Variant { name: "stereo-best", of: "stereo-best", set: &[] },
