@@ -56,7 +56,7 @@ const SEEN_BY: [(&str, &str); 1] = [("camera.kind", "stereo")];
 const STEREO: &str = "stereo-ekf";
 const PRINTED: &str = "joint-particle-as-printed";
 /// Sigma for the dissimilarity with the size of the window inside of the root, m.
-const RMS_SIGMA: &str = "0.07";
+const RMS_SIGMA: &str = "0.15";
 /// An estimate farther from a head than this on the floor is no estimate of it, m.
 const FAR_M: f64 = 1.0;
 /// Who is seen less than this is hidden (the default of `[occlusion]`).
