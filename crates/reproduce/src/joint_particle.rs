@@ -108,19 +108,19 @@ fn hidden(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let names =
         ["joint-particle-all", "joint-particle-kde50", PRINTED, "particle-best", "depth-ekf"];
     let title = "One of two people turns back, stops, passes or walks along while hidden";
-    compare(lab, "crossing-hidden", 140, title, lab.contenders(&names)?)
+    compare(lab, "crossing-hidden", 84, title, lab.contenders(&names)?)
 }
 
 fn oblique(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let names = ["joint-particle-all", "joint-particle-kde50", "particle-best", "depth-ekf"];
     let title = "Two people cross and change depth (P3, Fig. 9)";
-    compare(lab, "crossing-oblique", 56, title, lab.contenders(&names)?)
+    compare(lab, "crossing-oblique", 28, title, lab.contenders(&names)?)
 }
 
 fn three(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let names = ["joint-particle-all", "particle-best", "depth-ekf"];
     let title = "Three people cross, one of whom may turn back, stop or swap places while hidden";
-    compare(lab, "crossing-three", 56, title, lab.contenders(&names)?)
+    compare(lab, "crossing-three", 28, title, lab.contenders(&names)?)
 }
 
 fn compare(
@@ -171,7 +171,7 @@ fn misprints(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     });
     contenders.push(lab.contender("particle-best")?);
     let title = "What the misprints of P3 cost, and what the method lacks";
-    compare(lab, "crossing-parallel", 56, title, contenders)
+    compare(lab, "crossing-parallel", 28, title, contenders)
 }
 
 /// Values that are tried for the printed form, one change at a time.
