@@ -44,7 +44,7 @@ pub const OF_P1: [Variant; 4] = [
         of: "stereo-ekf-as-printed",
         set: &[
             NO_VELOCITY,
-            ("filter.config.printed_sigma_w", Number(5.0)),
+            ("filter.config.printed_sigma_w", Number(2.5)),
             ("filter.config.printed_sigma_v_m", Number(0.1)),
         ],
     },
