@@ -59,7 +59,11 @@ pub const OF_P4: [Variant; 5] = [
     Variant {
         name: "printed, velocity corrected",
         of: "stereo-svm-ekf-as-printed",
-        set: &[NO_VELOCITY, ("filter.config.printed_sigma_w", Number(2.5))],
+        set: &[
+            NO_VELOCITY,
+            ("filter.config.printed_sigma_w", Number(1.0)),
+            ("filter.config.printed_sigma_v_m", Number(0.03)),
+        ],
     },
     Variant {
         name: "printed, filter corrected",
