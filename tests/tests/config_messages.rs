@@ -30,9 +30,14 @@ confirm_hits = 3
 "#;
 
 fn build(text: &str) -> Result<RunSettings, ConfigError> {
+    build_in(Path::new("."), text)
+}
+
+/// Builds a config of this folder, beside whose files it names others.
+fn build_in(folder: &Path, text: &str) -> Result<RunSettings, ConfigError> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    Pipeline::from_toml(text, Path::new("."), &registry).map(|(_, run)| run)
+    Pipeline::from_toml(text, folder, &registry).map(|(_, run)| run)
 }
 
 /// The message for `GOOD` with `from` replaced by `to`.
@@ -113,7 +118,7 @@ fn every_shipped_config_builds() {
     for path in shipped() {
         let text = fs::read_to_string(&path).unwrap();
         let name = path.display().to_string();
-        let tables = build(&text).and_then(|run| {
+        let tables = build_in(path.parent().unwrap(), &text).and_then(|run| {
             run.table::<InputSettings>("input")?;
             run.table::<Limits>("limits")
         });

@@ -100,8 +100,8 @@ fn every_shipped_scene_can_be_read_and_says_what_it_is_for() {
 }
 
 const OMNI: &str = "duration_s = 0.6\n[camera]\nkind = \"panorama\"\nwidth = 96\nheight = 96\n\
-    rate_hz = 5.0\nheight_m = 1.55\n[faults]\ndropped = 0.0\nlate = 0.0\n\
-    [robot]\nstart = [4.0, 3.0]\n[[people]]\npath = [[2.0, 3.0]]\nextras = [\"green-hat\"]\n\
+    rate_hz = 5.0\nheight_m = 1.55\n[camera.mirror]\nangle_error_deg = 0.0\n\
+    [faults]\ndropped = 0.0\nlate = 0.0\n[robot]\nstart = [4.0, 3.0]\n[[people]]\npath = [[2.0, 3.0]]\nextras = [\"green-hat\"]\n\
     [[webcams]]\nat = [0.2, 0.3]\nwidth = 32\nheight = 24\n[[webcams]]\nwidth = 32\nheight = 24\n";
 
 /// The first message of a topic.
