@@ -278,7 +278,7 @@ fn growing(trial: Trial) -> Result<Vec<Vec<Tally>>, TrialError> {
     let frames = trial.moments.len();
     let first = |seconds: f64| 0..(frames as f64 * seconds / LENGTHS_S[0]).round() as usize;
     let mut tallies = vec![Vec::new(); trial.runs.len()];
-    for frames in LENGTHS_S.map(first).into_iter().chain([frames / 2..frames]) {
+    for frames in LENGTHS_S.map(first).into_iter().chain(std::iter::once(frames / 2..frames)) {
         let part = part(&trial, frames);
         for (run, tallies) in part.runs.iter().zip(&mut tallies) {
             tallies.push(JUDGE.judge(&part, run)?.tally);

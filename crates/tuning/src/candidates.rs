@@ -34,7 +34,7 @@ fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Ca
         }
         let with = |begun: &Candidate| {
             let begun = begun.clone();
-            values.iter().map(move |value| [begun.as_slice(), &[value.clone()]].concat())
+            values.iter().map(move |value| [begun.as_slice(), std::slice::from_ref(value)].concat())
         };
         all = all.iter().flat_map(with).collect();
     }

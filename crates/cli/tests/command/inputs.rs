@@ -30,11 +30,7 @@ impl Home {
 
     /// A recording of the real world; `None`, said, where there is none.
     fn real(log: &str) -> Option<Self> {
-        let log = root().join("../shared/data/logs").join(log);
-        if !log.exists() {
-            println!("skipped: {} is not here", log.display());
-            return None;
-        }
+        let log = tagalong_testdata::find(&format!("logs/{log}"))?;
         let home = tempfile::tempdir().unwrap();
         fs::copy(&log, home.path().join("with.mcap")).unwrap();
         Some(Self(home).strip())
