@@ -18,8 +18,9 @@ use crate::clock::Clock;
 use crate::control::Steering;
 use crate::doubts::Doubts;
 use crate::lifecycle::Lifecycle;
-use crate::pipeline::{DetectorSlot, Pipeline, Slot};
+use crate::pipeline::Pipeline;
 use crate::settings::{DetectorSettings, PipelineSettings, PluginSettings, RobotSettings, Role};
+use crate::slots::{DetectorSlot, Slot};
 
 mod checks;
 mod inputs;

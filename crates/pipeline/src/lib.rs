@@ -58,6 +58,7 @@ mod pipeline;
 mod report;
 mod settings;
 mod sightings;
+mod slots;
 mod target;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 //! the predicted places, near over far.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use tagalong_core::{Camera, Detection, Rect};
+use tagalong_core::{Camera, Detection, Estimate, Frame, Rect};
 
 use crate::OcclusionSettings;
 
@@ -174,6 +174,17 @@ fn is_on_body(region: &Rect, point: Point2<f64>) -> bool {
         _ => 0.0,
     };
     across < half_width
+}
+
+/// Returns the cover of somebody who is where the filter says.
+pub(crate) fn cover(estimate: &Estimate, frame: &Frame) -> Cover {
+    let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    Cover::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
+}
+
+/// Returns the cover of somebody who was expected there, and seen.
+pub(crate) fn cover_seen(seen: &Detection, expected: &Estimate, frame: &Frame) -> Cover {
+    Cover::of(seen, &frame.camera).or(cover(expected, frame))
 }
 
 #[cfg(test)]

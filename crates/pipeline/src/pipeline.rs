@@ -3,8 +3,8 @@ use std::path::PathBuf;
 
 use nalgebra::Point3;
 use tagalong_core::{
-    Command, Detection, Detector, Estimate, Evidence, Filter, Frame, Funnel, Inputs, Likelihood,
-    Matched, Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
+    Command, Detection, Estimate, Evidence, Filter, Frame, Funnel, Inputs, Likelihood, Matched,
+    Motion, Reason, Search, Stamp, Track, TrackId, Verifier,
 };
 use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
@@ -16,12 +16,13 @@ use crate::doubts::Doubts;
 use crate::lifecycle::{Lifecycle, Sight};
 use crate::memo::{self, Identities};
 use crate::now::Now;
-use crate::occlusion::{Cover, Visibility, aside, part_shown, range_m, visibility};
-use crate::sightings::{Rules, Sighting};
-use crate::weighing::Metered;
-use crate::{
-    DetectorSettings, Fate, FrameReport, Orders, Outcome, PipelineSettings, Role, StepError,
+use crate::occlusion::{
+    Cover, Visibility, aside, cover, cover_seen, part_shown, range_m, visibility,
 };
+use crate::sightings::{Rules, Sighting};
+use crate::slots::{DetectorSlot, Slot, likelihood};
+use crate::weighing::Metered;
+use crate::{Fate, FrameReport, Orders, Outcome, PipelineSettings, Role, StepError};
 
 /// Plugins and the rules by which they work together.
 pub struct Pipeline {
@@ -45,28 +46,6 @@ pub struct Pipeline {
     pub(crate) base_dir: PathBuf,
     /// Set where answers are shared with other pipelines.
     pub(crate) shared: Option<Identities>,
-}
-
-/// A plugin under its name.
-pub(crate) struct Slot<P: ?Sized> {
-    pub(crate) name: String,
-    pub(crate) plugin: Box<P>,
-}
-
-/// A detector and what it is used for.
-pub(crate) struct DetectorSlot {
-    pub(crate) settings: DetectorSettings,
-    pub(crate) plugin: Box<dyn Detector>,
-}
-
-impl DetectorSlot {
-    fn has(&self, role: Role) -> bool {
-        self.settings.roles.contains(&role)
-    }
-
-    fn is_due(&self, frame: u64) -> bool {
-        frame % u64::from(self.settings.every.max(1)) == u64::from(self.settings.offset)
-    }
 }
 
 /// Log-odds that stand for certainty. Larger ones would drown all others.
@@ -694,19 +673,4 @@ impl Pipeline {
     fn due_with(&self, now: &Now<'_>, role: Role) -> Vec<usize> {
         now.due.iter().copied().filter(|i| self.detectors[*i].has(role)).collect()
     }
-}
-
-/// Weighs scenes for the filter, where a detector is used for that.
-fn likelihood(detectors: &[DetectorSlot]) -> Option<&dyn Likelihood> {
-    detectors.iter().find(|slot| slot.has(Role::Weigh))?.plugin.likelihood()
-}
-
-fn cover(estimate: &Estimate, frame: &Frame) -> Cover {
-    let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-    Cover::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
-}
-
-/// Of somebody who was expected there, and seen.
-fn cover_seen(seen: &Detection, expected: &Estimate, frame: &Frame) -> Cover {
-    Cover::of(seen, &frame.camera).or(cover(expected, frame))
 }

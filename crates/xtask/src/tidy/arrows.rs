@@ -19,7 +19,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("triangulate", &["core"]),
     ("eval", &["core"]),
     ("report", &["core", "eval"]),
-    ("trials", &["core", "vision", "pipeline", "sim", "eval"]),
+    ("trials", &["core", "vision", "stereo", "pipeline", "sim", "eval"]),
     ("tuning", &["core", "pipeline", "eval"]),
     // What is reproduced may be the learning of a plugin.
     (

@@ -1,0 +1,127 @@
+//! The people of a scene, before the first image.
+
+use super::*;
+
+/// So many of a crowd come as two.
+const CROWD_PAIRS: f64 = 0.3;
+
+/// Returns the people whom the scene names, and its crowd, where they start.
+pub(super) fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random) -> Vec<Walker> {
+    let mut walkers = Vec::new();
+    for person in &scene.people {
+        let mut person = person.clone();
+        for _ in 0..person.wander {
+            let point = free_point(scene, &[], obstacles, &ANYWHERE, random);
+            person.path.push([point.x, point.y]);
+        }
+        let companions = person.companions;
+        add_group(&mut walkers, person, companions, scene, random);
+    }
+    let mut left = scene.crowd;
+    while left > 0 {
+        let companions = usize::from(left > 1 && random.chance(CROWD_PAIRS));
+        let person = wanderer(scene, &walkers, obstacles, random);
+        add_group(&mut walkers, person, companions, scene, random);
+        left -= 1 + companions;
+    }
+    walkers
+}
+
+/// Somebody and those who walk along, to the left and to the right of them.
+fn add_group(
+    walkers: &mut Vec<Walker>,
+    person: PersonSettings,
+    companions: usize,
+    scene: &Scene,
+    random: &mut Random,
+) {
+    let leader = walkers.len();
+    let own = PersonSettings { subject: None, look: None, height_m: None, ..person.clone() };
+    walkers.push(somebody(person, scene.split(), random));
+    let mut aside = [0.0; 2];
+    for number in 0..companions {
+        let side = number % 2;
+        aside[side] += random.between(0.6, 1.0);
+        let left = if side == 0 { aside[side] } else { -aside[side] };
+        let offset = Vector2::new(random.between(-0.25, 0.15), left);
+        let along = somebody(own.clone(), scene.split(), random);
+        let along = along.along((leader, &walkers[leader]), offset);
+        walkers.push(along);
+    }
+}
+
+/// One of the people of a split.
+fn somebody(settings: PersonSettings, split: Split, random: &mut Random) -> Walker {
+    let any = random.below(SUBJECTS);
+    let mut person = Person::subject(split.subject(settings.subject.unwrap_or(any)));
+    if let Some(look) = settings.look {
+        person.look = Person::subject(split.subject(look)).look;
+    }
+    if let Some(extras) = &settings.extras {
+        person.look.extras.clone_from(extras);
+    }
+    if let Some(height_m) = settings.height_m {
+        person.build.height_m = height_m;
+    }
+    Walker::new(person, settings)
+}
+
+/// Somebody who walks between random points of the room.
+fn wanderer(
+    scene: &Scene,
+    walkers: &[Walker],
+    obstacles: &[Obstacle],
+    random: &mut Random,
+) -> PersonSettings {
+    let mut path = vec![free_point(scene, walkers, obstacles, &MIDDLE, random)];
+    path.extend((0..3).map(|_| free_point(scene, &[], obstacles, &MIDDLE, random)));
+    let (speed_mps, start_s) = (random.between(0.6, 1.3), random.between(0.0, 2.0));
+    let posture = if random.chance(0.15) { Posture::Phone } else { Posture::Upright };
+    let at_end = AtEnd::Loop;
+    PersonSettings {
+        path: path.iter().map(|p| [p.x, p.y]).collect(),
+        speed_mps,
+        start_s,
+        at_end,
+        posture,
+        ..PersonSettings::default()
+    }
+}
+
+/// Where random points may lie.
+struct Area {
+    /// Parts of the room's length and width.
+    parts: [[f64; 2]; 2],
+    /// Not so near to the robot's start, m.
+    off_robot_m: f64,
+}
+
+/// Where a crowd wanders: ahead of a robot that starts at the near end.
+const MIDDLE: Area = Area { parts: [[0.2, 0.92], [0.15, 0.85]], off_robot_m: 1.5 };
+/// Where somebody with `wander` goes.
+const ANYWHERE: Area = Area { parts: [[0.06, 0.94], [0.1, 0.9]], off_robot_m: 0.9 };
+
+/// A random point of an area off the robot's start, furniture and people; after
+/// some tries any.
+fn free_point(
+    scene: &Scene,
+    walkers: &[Walker],
+    obstacles: &[Obstacle],
+    area: &Area,
+    random: &mut Random,
+) -> Point2<f64> {
+    let [x, y] = scene.room.size_m;
+    let robot = Point2::from(scene.robot.start);
+    let [along, across] = area.parts;
+    let mut point = || {
+        let x = random.between(along[0], along[1]) * x;
+        Point2::new(x, random.between(across[0], across[1]) * y)
+    };
+    let free = |at: &Point2<f64>| {
+        (at - robot).norm() > area.off_robot_m
+            && obstacles.iter().all(|o| (at - o.at).norm() > o.radius_m + 0.35)
+            && walkers.iter().all(|w| (at - w.stance.place).norm() > 1.0)
+    };
+    let tries: Vec<_> = (0..30).map(|_| point()).collect();
+    tries.iter().copied().find(free).unwrap_or(tries[0])
+}
