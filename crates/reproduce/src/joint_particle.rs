@@ -182,7 +182,7 @@ const TRIED: [&[(&str, &str)]; 14] = [
     &[("detectors.0.config.likelihood_sigma", "0.016")],
     &[("detectors.0.config.likelihood_sigma", "0.032")],
     &[("detectors.0.config.likelihood_sigma", "0.064")],
-    &[("filter.config.position_noise", "0.08")],
+    &[("filter.config.position_noise", "0.16")],
     &[("filter.config.position_noise", "0.3")],
     &[("filter.config.velocity_noise", "0.1")],
     &[("filter.config.velocity_noise", "1.0")],
@@ -204,7 +204,7 @@ fn fit(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
         with_values(&printed, &name, values)
     };
     let contenders: std::result::Result<Vec<_>, _> = TRIED.into_iter().map(contender).collect();
-    let seeds = lab.seeds(28);
+    let seeds = lab.seeds(14);
     let scenes = lab.scenes_of(Split::Validation, "crossing-parallel", &SEEN_BY, seeds)?;
     let mut trials = Trials::new(lab, "crossing-parallel", &scenes, contenders?)?;
     trials.notes.push("Drawn of the split validation: the settings are chosen here.".into());

@@ -23,6 +23,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("import mot", "needs somebody else's data"),
     ("import tum", "needs somebody else's data"),
     ("../shared", "needs the annotated logs"),
+    ("benches/rooms.toml", "needs the annotated logs"),
     ("LOG.people.csv", "needs an annotated log"),
     ("old/report.json", "needs a report of last week"),
     ("SLURM_", "needs a cluster"),

@@ -16,6 +16,8 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 const ROOMS: u64 = 8;
 /// How long each of them is seen, s: more rooms tell more than more images of one.
 const EACH_S: f64 = 24.0;
+/// Fewer samples fit no head.
+const LEAST_SAMPLES: usize = 10;
 /// Times that each room is divided into training and test.
 const REPEATS: u64 = 4;
 
@@ -123,8 +125,12 @@ pub(super) fn appearance(lab: &Lab) -> Result<Findings, ReproduceError> {
     Ok(Findings { tables, pictures: Vec::new() })
 }
 
-fn fitted(samples: &[Sample], seed: u64) -> Result<Head, ReproduceError> {
-    head(samples, &Training::default(), seed).map_err(failed)
+/// Returns a head of these samples; `None` if they are too few to fit one.
+fn fitted(samples: &[Sample], seed: u64) -> Result<Option<Head>, ReproduceError> {
+    if samples.len() < LEAST_SAMPLES {
+        return Ok(None);
+    }
+    head(samples, &Training::default(), seed).map(Some).map_err(failed)
 }
 
 fn errors(samples: &[Sample], head: &Head, how: Distance) -> Vec<f64> {
@@ -137,14 +143,23 @@ fn of_ways(parts: [&[Sample]; EYES.len()], heads: [&Head; EYES.len()]) -> Vec<Ve
     WAYS.iter().map(way).collect()
 }
 
-/// Returns the errors of all ways in one room, fitted to samples of that room.
-fn within(room: &Room, split: Split) -> Result<Vec<Vec<f64>>, ReproduceError> {
+/// Returns the errors of all ways in one room, fitted to samples of that room, and
+/// counts the divisions that leave too few of them.
+fn within(
+    room: &Room,
+    split: Split,
+    too_few: &mut u64,
+) -> Result<Vec<Vec<f64>>, ReproduceError> {
     let mut all = vec![Vec::new(); WAYS.len()];
     for seed in 0..REPEATS {
         let parts = [0, 1].map(|eye| split.divide(&room.samples[eye], seed));
-        let heads = [fitted(&parts[0][0], seed)?, fitted(&parts[1][0], seed)?];
+        let [first, second] = [fitted(&parts[0][0], seed)?, fitted(&parts[1][0], seed)?];
+        let (Some(first), Some(second)) = (first, second) else {
+            *too_few += 1;
+            continue;
+        };
         let tests = [&parts[0][1][..], &parts[1][1][..]];
-        let repeat = of_ways(tests, [&heads[0], &heads[1]]);
+        let repeat = of_ways(tests, [&first, &second]);
         all.iter_mut().zip(repeat).for_each(|(all, errors)| all.extend(errors));
     }
     Ok(all)
@@ -153,8 +168,10 @@ fn within(room: &Room, split: Split) -> Result<Vec<Vec<f64>>, ReproduceError> {
 /// Section 6.1, the first table.
 fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceError> {
     let mut columns: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
+    let mut too_few = 0;
     for split in SPLITS {
-        columns.push(rooms.iter().map(|room| within(room, split)).collect::<Result<_, _>>()?);
+        let within = |room| within(room, split, &mut too_few);
+        columns.push(rooms.iter().map(within).collect::<Result<_, _>>()?);
     }
     let heads = [&shipped[0].head, &shipped[1].head];
     let elsewhere = |room: &Room| of_ways([&room.samples[0], &room.samples[1]], heads);
@@ -190,6 +207,11 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
                  around the robot; to those of one person in six of them, tried on the other \
                  person in the other six."
             ),
+            format!(
+                "Left out: {too_few} of {} divisions, which leave fewer than {LEAST_SAMPLES} \
+                 samples to fit.",
+                SPLITS.len() * rooms.len() * REPEATS as usize
+            ),
             "The last column is the shipped models, fitted to other people in rooms of the \
              training split: many more samples, and none of this room, of these people or of \
              this mirror."
@@ -206,7 +228,7 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
     let mut parts = Vec::new();
     for room in rooms {
         let [training, test] = Split::Place.divide(room.of(Eye::Ours), 0);
-        parts.push((fitted(&training, 0)?, test));
+        parts.extend(fitted(&training, 0)?.map(|head| (head, test)));
     }
     let row = |name: &str, value: &dyn Fn(&Head, &Sample) -> f64| {
         let (mut plain, mut ranked) = (Vec::new(), Vec::new());
@@ -292,11 +314,14 @@ fn of_persons(rooms: &[Room], strangers: &Head) -> Result<Table, ReproduceError>
         let of = |samples: &[Sample], who: u64, is_own: bool| -> Vec<Sample> {
             samples.iter().filter(|s| (s.person == who) == is_own).copied().collect()
         };
-        let both = fitted(&training, 0)?;
+        let Some(both) = fitted(&training, 0)? else { continue };
         let mut errors_of = [const { Vec::new() }; 4];
         for who in people {
-            let (own, other) =
-                (fitted(&of(&training, who, true), 0)?, fitted(&of(&training, who, false), 0)?);
+            let of_others = fitted(&of(&training, who, false), 0)?;
+            let (Some(own), Some(other)) = (fitted(&of(&training, who, true), 0)?, of_others)
+            else {
+                continue;
+            };
             let tested = of(&test, who, true);
             for (all, head) in errors_of.iter_mut().zip([&own, &other, &both, strangers]) {
                 all.extend(errors(&tested, head, Distance::Network));
