@@ -145,11 +145,7 @@ fn of_ways(parts: [&[Sample]; EYES.len()], heads: [&Head; EYES.len()]) -> Vec<Ve
 
 /// Returns the errors of all ways in one room, fitted to samples of that room, and
 /// counts the divisions that leave too few of them.
-fn within(
-    room: &Room,
-    split: Split,
-    too_few: &mut u64,
-) -> Result<Vec<Vec<f64>>, ReproduceError> {
+fn within(room: &Room, split: Split, too_few: &mut u64) -> Result<Vec<Vec<f64>>, ReproduceError> {
     let mut all = vec![Vec::new(); WAYS.len()];
     for seed in 0..REPEATS {
         let parts = [0, 1].map(|eye| split.divide(&room.samples[eye], seed));
