@@ -199,7 +199,7 @@ impl DepthTemplate {
                 let template = bank.template(pose);
                 let at = (local.x, local.y);
                 let fit = match &scene.printed {
-                    Some(printed) => printed.fit(scene.rows, template, at, local.depth_m)?,
+                    Some(printed) => printed.fit(template, at, local.depth_m)?,
                     None => {
                         scene.matcher.fit_up_to(most, scene.rows, template, at, local.depth_m)?
                     }
@@ -327,7 +327,7 @@ impl Detector for DepthTemplate {
         };
         let printed = match is_printed {
             true => Some(Dissimilarity {
-                sums: frame.derived()?,
+                metres: frame.derived()?,
                 background_m: RowSums::UNITS / background,
                 min_foreground_valid: self.config.min_foreground_valid,
             }),

@@ -1,59 +1,15 @@
 use std::sync::Arc;
 
-use tagalong_core::{Derived, Frame, Result};
-use tagalong_vision::RowSums;
-
 use crate::bank::Template;
 use crate::matching::Match;
-use crate::view::Working;
-
-/// Running sums of depths and of their squares along the rows of a reduced image, m and
-/// m². The papers compare depths; everything else here compares inverse depths.
-#[derive(Clone, Debug)]
-pub struct DepthSums {
-    width: usize,
-    sums: Vec<[f64; 2]>,
-}
-
-impl DepthSums {
-    /// The sums of a reduced image.
-    pub fn new(rows: &RowSums) -> Self {
-        let mut sums = Vec::with_capacity((rows.width() + 1) * rows.height());
-        for y in 0..rows.height() {
-            let mut running = [0.0; 2];
-            sums.push(running);
-            for value in rows.values(y) {
-                if *value > 0 {
-                    let depth_m = RowSums::UNITS / f64::from(*value);
-                    running = [running[0] + depth_m, running[1] + depth_m * depth_m];
-                }
-                sums.push(running);
-            }
-        }
-        Self { width: rows.width(), sums }
-    }
-
-    /// Sum of `(depth - t)²` over the `count` readings among the pixels `from..to` of row
-    /// `y`, m².
-    fn squared_error(&self, (y, from, to): (usize, usize, usize), count: f64, t: f64) -> f64 {
-        let row = &self.sums[y * (self.width + 1)..(y + 1) * (self.width + 1)];
-        let [sum, squares] = [row[to][0] - row[from][0], row[to][1] - row[from][1]];
-        (count * t * t - 2.0 * t * sum + squares).max(0.0)
-    }
-}
-
-impl Derived for DepthSums {
-    fn derive(frame: &Frame) -> Result<Self> {
-        Ok(Self::new(&frame.derived::<Working>()?.0))
-    }
-}
+use crate::printed::Metres;
 
 /// P4's dissimilarity: the plain sum of squared differences between the depths of a
 /// binary template and those of the image, over the whole window, m².
 #[derive(Clone, Debug)]
 pub struct Dissimilarity {
     /// The depths of the frame.
-    pub sums: Arc<DepthSums>,
+    pub metres: Arc<Metres>,
     /// The one depth of all that is not the person, m.
     pub background_m: f64,
     /// Fraction of the person's pixels that must have a reading.
@@ -65,31 +21,21 @@ impl Dissimilarity {
     /// foreground at `depth_m`. Where there is no reading, of which the papers say
     /// nothing, the mean of the other pixels stands. `None` if too little of the person
     /// has one.
-    pub fn fit(
-        &self,
-        rows: &RowSums,
-        template: &Template,
-        (x, y): (i64, i64),
-        depth_m: f64,
-    ) -> Option<Match> {
+    pub fn fit(&self, template: &Template, (x, y): (i64, i64), depth_m: f64) -> Option<Match> {
         let (mut read, mut person, mut person_read, mut sum) = (0.0, 0.0, 0.0, 0.0);
-        let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
         for row in &template.rows {
             // The outline lies in the middle of the guard.
             let (from, to) = ((row.from + row.guard_from) / 2, (row.to + row.guard_to) / 2);
             person += (to - from) as f64;
-            let Some(line) = usize::try_from(y + row.dy).ok().filter(|l| *l < rows.height()) else {
-                continue;
-            };
+            let line = y + row.dy;
             let ends = [-template.half_width, from, to, template.half_width + 1];
-            let ends = ends.map(|end| inside(x + end));
+            let ends = ends.map(|end| x + end);
             let depths = [self.background_m, depth_m, self.background_m];
             for (k, expected_m) in depths.into_iter().enumerate() {
-                let run = (line, ends[k], ends[k + 1].max(ends[k]));
-                let count = f64::from(rows.run(run.0, run.1, run.2).count);
-                sum += self.sums.squared_error(run, count, expected_m);
-                read += count;
-                person_read += if k == 1 { count } else { 0.0 };
+                let run = self.metres.run(line, (ends[k], ends[k + 1]));
+                sum += run.squared_error(expected_m).max(0.0);
+                read += run.count;
+                person_read += if k == 1 { run.count } else { 0.0 };
             }
         }
         let foreground_valid = person_read / f64::max(person, 1.0);
@@ -109,6 +55,7 @@ fn window(template: &Template) -> f64 {
 mod tests {
     use proptest::prelude::*;
     use tagalong_core::DepthImage;
+    use tagalong_vision::RowSums;
 
     use super::*;
     use crate::bank::{Bank, Direction, Pose, TemplateRow};
@@ -116,8 +63,8 @@ mod tests {
     const BACKGROUND_M: f64 = 7.0;
 
     fn dissimilarity(rows: &RowSums) -> Dissimilarity {
-        let sums = Arc::new(DepthSums::new(rows));
-        Dissimilarity { sums, background_m: BACKGROUND_M, min_foreground_valid: 0.2 }
+        let metres = Arc::new(Metres::new(rows));
+        Dissimilarity { metres, background_m: BACKGROUND_M, min_foreground_valid: 0.2 }
     }
 
     /// The sum over every pixel of the window.
@@ -144,7 +91,7 @@ mod tests {
             let rows = RowSums::new(&DepthImage::from_pixels(48, 40, pixels).unwrap(), 1);
             let mut bank = Bank::new(100);
             let template = bank.template(Pose::nearest(Direction::ALL[which], 0.0, 0.0, 40.0));
-            let fast = dissimilarity(&rows).fit(&rows, template, (x, y), z);
+            let fast = dissimilarity(&rows).fit(template, (x, y), z);
             let (sum, read) = slow(&rows, template, (x, y), z);
             let pixels = (template.rows.len() as i64 * (2 * template.half_width + 1)) as f64;
             if let Some(fast) = fast {
@@ -166,7 +113,7 @@ mod tests {
         });
         let rows = RowSums::new(&depth, 1);
         let mut bank = Bank::new(max_rows);
-        let found = dissimilarity(&rows).fit(&rows, bank.template(pose), (110, 100), z);
+        let found = dissimilarity(&rows).fit(bank.template(pose), (110, 100), z);
         found.unwrap().cost
     }
 

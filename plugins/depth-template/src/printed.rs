@@ -21,7 +21,9 @@ pub struct Printed {
     is_rms: bool,
 }
 
-/// The depths of a frame with running sums along each row, m.
+/// The depths of a frame with running sums along each row, m: the papers compare depths,
+/// everything else here compares inverse depths.
+#[derive(Clone, Debug)]
 pub struct Metres {
     width: i64,
     height: i64,
@@ -30,8 +32,9 @@ pub struct Metres {
 
 /// Number, sum and sum of squares of the readings up to a pixel.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    count: f64,
+pub struct Sums {
+    /// Pixels with a reading.
+    pub count: f64,
     sum: f64,
     squares: f64,
 }
@@ -40,14 +43,21 @@ struct Sums {
 const LEAST: f64 = -1e5;
 
 impl Sums {
-    fn squared_error(&self, expected_m: f64) -> f64 {
+    /// Returns the sum of `(depth - expected_m)²` over the readings, m².
+    pub fn squared_error(&self, expected_m: f64) -> f64 {
         self.count * expected_m * expected_m - 2.0 * expected_m * self.sum + self.squares
     }
 }
 
 impl Derived for Metres {
     fn derive(frame: &Frame) -> Result<Self> {
-        let image = &frame.derived::<Working>()?.0;
+        Ok(Self::new(&frame.derived::<Working>()?.0))
+    }
+}
+
+impl Metres {
+    /// Sums up a reduced image.
+    pub fn new(image: &RowSums) -> Self {
         let mut sums = Vec::with_capacity((image.width() + 1) * image.height());
         for line in 0..image.height() {
             let mut running = Sums::default();
@@ -62,13 +72,11 @@ impl Derived for Metres {
                 running
             }));
         }
-        Ok(Self { width: image.width() as i64, height: image.height() as i64, sums })
+        Self { width: image.width() as i64, height: image.height() as i64, sums }
     }
-}
 
-impl Metres {
     /// The readings of a run of a row, as far as it is inside the image.
-    fn run(&self, line: i64, (from, to): Span) -> Sums {
+    pub fn run(&self, line: i64, (from, to): Span) -> Sums {
         if !(0..self.height).contains(&line) {
             return Sums::default();
         }
