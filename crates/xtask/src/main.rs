@@ -6,12 +6,14 @@ mod markdown;
 mod metadata;
 mod new_plugin;
 mod program;
+mod record;
 mod rehearse;
 mod tidy;
 mod try_out;
 mod walk_through;
 mod workspace;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -43,6 +45,12 @@ enum Command {
     },
     /// Runs the command lines of the documents that take no more than seconds
     Rehearse,
+    /// Runs every config on every log and writes checksums of what comes out, to be
+    /// compared with those after a change
+    Record {
+        /// The file to write.
+        file: PathBuf,
+    },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -82,6 +90,7 @@ fn run(command: Command) -> Result<()> {
         Command::NewPlugin(_) => try_out::try_out(&workspace),
         Command::Docs { slow } => docs::fill(&workspace, slow.as_deref()),
         Command::Tidy => tidy::tidy(&workspace),
+        Command::Record { file } => record::record(&workspace, &file),
         Command::Rehearse => rehearse::rehearse(&workspace),
         Command::Ci => ci::ci(&workspace),
     }
