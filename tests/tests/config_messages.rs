@@ -21,11 +21,11 @@ config = { max_depth_m = 5.0 }
 [filter]
 plugin = "ekf"
 
-[association]
+[associator.config]
 cost = "mahalanobis"
 gate_m = 1.0
 
-[lifecycle]
+[manager.config]
 confirm_hits = 3
 "#;
 
@@ -68,15 +68,23 @@ fn mistakes_are_answered_with_place_cause_and_remedy() {
         ),
         ("max_depth_m = 5.0", "max_dept_m = 5.0", &["my.toml:7:", "`max_dept_m`", "`max_depth_m`"]),
         ("max_depth_m = 5.0", "max_depth_m = \"far\"", &["my.toml:7:", "far"]),
-        ("[association]", "[asociation]", &["my.toml:12:2", "did you mean `association`"]),
+        ("[associator.config]", "[asociation]", &["my.toml:12:2", "did you mean `association`"]),
         ("gate_m =", "gate_n =", &["my.toml:14:1", "`gate_n`", "`gate_m`"]),
-        ("gate_m = 1.0", "gate_m = -1.0", &["my.toml:14:", "`association.gate_m`", "positive"]),
-        ("gate_m = 1.0", "gate_m = nan", &["my.toml:14:", "`association.gate_m`", "positive"]),
+        (
+            "gate_m = 1.0",
+            "gate_m = -1.0",
+            &["my.toml:14:", "`associator.config.gate_m`", "positive"],
+        ),
+        (
+            "gate_m = 1.0",
+            "gate_m = nan",
+            &["my.toml:14:", "`associator.config.gate_m`", "positive"],
+        ),
         ("\"mahalanobis\"", "\"overlp\"", &["my.toml:13:8", "`overlp`", "`overlap`"]),
         ("\"follow\", ", "\"folow\", ", &["my.toml:5:", "`folow`", "`follow`"]),
         ("every = 2", "every = 0", &["my.toml:6:", "every"]),
         ("every = 2", "every = 2\noffset = 2", &["my.toml:7:", "offset"]),
-        ("confirm_hits = 3", "confirm_hits = 0", &["my.toml:17:", "`lifecycle.confirm_hits`"]),
+        ("confirm_hits = 3", "confirm_hits = 0", &["my.toml:17:", "`manager.config.confirm_hits`"]),
         ("[filter]\nplugin = \"ekf\"\n", "", &["filter"]),
         ("plugin = \"ekf\"", "plugin = \"ekf\"\nconfig = { gain = 1 }", &["my.toml:11:", "`gain`"]),
         ("seed = 3", "seed = 3\nseed = 4", &["my.toml:2:", "duplicate key"]),

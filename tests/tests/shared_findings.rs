@@ -19,8 +19,8 @@ const SCENE: &str = "seed = 3\nduration_s = 1.5\n[camera]\nwidth = 320\nheight =
 
 /// Settings of detector, verifier and life cycle, each alone.
 const CHANGES: [(&str, &str); 4] = [
-    ("lifecycle.confirm_hits", "1"),
-    ("lifecycle.start_score", "1.5"),
+    ("manager.config.confirm_hits", "1"),
+    ("manager.config.start_score", "1.5"),
     ("detectors.0.config.discover_cost", "0.12"),
     ("verifiers.0.config.weight", "0.5"),
 ];

@@ -10,6 +10,9 @@ use tagalong_core::Registry;
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {
     tagalong_arc_follow::register(registry);
+    tagalong_associate_hungarian::register(registry);
+    tagalong_associate_jpda::register(registry);
+    tagalong_associate_two_stage::register(registry);
     tagalong_body_net::register(registry);
     tagalong_clear_follow::register(registry);
     tagalong_color_texture::register(registry);
@@ -23,6 +26,8 @@ pub fn register(registry: &mut Registry) {
     tagalong_image_kalman::register(registry);
     tagalong_joint_particle::register(registry);
     tagalong_last_seen::register(registry);
+    tagalong_manage_m_of_n::register(registry);
+    tagalong_manage_sprt::register(registry);
     tagalong_omni_appearance::register(registry);
     tagalong_recorded_detections::register(registry);
     tagalong_svm_patch::register(registry);

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use schemars::schema_for;
 use serde_json::{Map, Value, json};
 use tagalong_core::{PluginInfo, Registry};
-use tagalong_pipeline::PipelineSettings;
+use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings};
 
 use crate::config_file::OuterSettings;
 
@@ -126,10 +126,10 @@ pub fn schema(registry: &Registry) -> Value {
     let object = |value: &mut Value| value.as_object_mut().map(std::mem::take).unwrap_or_default();
     let mut properties = object(&mut around["properties"]);
     let mut definitions = object(&mut around["$defs"]);
-    for (section, kind, many) in SECTIONS {
+    for (section, kind, many, default) in SECTIONS {
         let names: Vec<&PluginInfo> =
             plugins(registry).into_iter().filter(|p| p.kind.to_string() == kind).collect();
-        let of_kind = plugin_section(&names, section, &mut definitions);
+        let of_kind = plugin_section(&names, section, default, &mut definitions);
         let whole = if many { json!({ "type": "array", "items": of_kind }) } else { of_kind };
         properties.insert(section.to_owned(), whole);
     }
@@ -144,16 +144,24 @@ pub fn schema(registry: &Registry) -> Value {
     })
 }
 
-/// The sections that name plugins, their kind, and whether there may be several.
-const SECTIONS: [(&str, &str, bool); 4] = [
-    ("detectors", "detector", true),
-    ("verifiers", "verifier", true),
-    ("filter", "filter", false),
-    ("controller", "controller", false),
+/// The sections that name plugins, their kind, whether there may be several, and the plugin
+/// where none is named.
+const SECTIONS: [(&str, &str, bool, Option<&str>); 6] = [
+    ("detectors", "detector", true, None),
+    ("verifiers", "verifier", true, None),
+    ("associator", "associator", false, Some(DEFAULT_ASSOCIATOR)),
+    ("filter", "filter", false, None),
+    ("manager", "track manager", false, Some(DEFAULT_MANAGER)),
+    ("controller", "controller", false, None),
 ];
 
 /// A section: which plugin decides what `config` may hold.
-fn plugin_section(plugins: &[&PluginInfo], section: &str, out: &mut Map<String, Value>) -> Value {
+fn plugin_section(
+    plugins: &[&PluginInfo],
+    section: &str,
+    default: Option<&str>,
+    out: &mut Map<String, Value>,
+) -> Value {
     let names: Vec<&str> = plugins.iter().map(|plugin| plugin.name).collect();
     let mut properties = Map::new();
     if section == "detectors" {
@@ -167,15 +175,17 @@ fn plugin_section(plugins: &[&PluginInfo], section: &str, out: &mut Map<String, 
         .iter()
         .map(|plugin| {
             let config = lifted(plugin.schema(), plugin.name, out);
+            // A section that names no plugin passes the condition of the default one alone.
+            let named = if default == Some(plugin.name) { json!([]) } else { json!(["plugin"]) };
             json!({
-                "if": { "properties": { "plugin": { "const": plugin.name } } },
+                "if": { "properties": { "plugin": { "const": plugin.name } }, "required": named },
                 "then": { "properties": { "config": config } },
             })
         })
         .collect();
     json!({
         "type": "object",
-        "required": ["plugin"],
+        "required": if default.is_some() { json!([]) } else { json!(["plugin"]) },
         "properties": properties,
         "additionalProperties": false,
         "allOf": choices,
@@ -228,7 +238,7 @@ mod tests {
                 assert!(text.contains(&format!("| `{}", key.0)), "{} of {}", key.0, plugin.name);
             }
         }
-        for key in ["association.gate_m", "input.depth_offset_px", "input.camera.height_m"] {
+        for key in ["merge.same_person_m", "input.depth_offset_px", "input.camera.height_m"] {
             assert!(text.contains(&format!("| `{key}` |")), "{key}");
         }
         assert!(!text.contains("|  |\n"), "a key without a meaning");
@@ -253,7 +263,7 @@ mod tests {
         let schema = schema(&registry());
         check_references(&schema, &schema);
         let properties = schema["properties"].as_object().unwrap();
-        for section in ["detectors", "filter", "input", "lifecycle", "seed"] {
+        for section in ["detectors", "filter", "input", "manager", "merge", "seed"] {
             assert!(properties.contains_key(section), "{section}");
         }
         let ekf = schema["properties"]["filter"]["allOf"].as_array().unwrap();

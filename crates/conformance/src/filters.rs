@@ -84,7 +84,7 @@ impl Run {
     fn start(&mut self, places: &[Point3<f64>]) {
         for (id, place) in (1..).zip(places) {
             let detection = self.sight(place);
-            self.filter.start(TrackId(id), &detection);
+            self.filter.start(TrackId(id), &detection, &self.camera);
         }
     }
 
@@ -92,11 +92,11 @@ impl Run {
     fn step(&mut self, seen: &[(u32, Point3<f64>)]) -> Result<BTreeMap<TrackId, Support>, String> {
         self.index += 1;
         self.world_from_robot *= self.motion.isometry();
-        self.filter.predict(&self.motion);
+        self.filter.predict(&self.motion, &self.camera);
         let sightings: Vec<_> =
             seen.iter().map(|(id, place)| (TrackId(*id), self.sight(place))).collect();
         let matched: Vec<_> =
-            sightings.iter().map(|(id, detection)| Matched { id: *id, detection }).collect();
+            sightings.iter().map(|(id, detection)| Matched::certain(*id, detection)).collect();
         let oracle = Oracle(seen.iter().map(|(_, place)| self.in_robot(place)).collect());
         let frame = moving_frame(self.index, &self.camera, Images::default(), self.motion);
         let evidence = Evidence {
@@ -147,7 +147,7 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
     let mut run = Run::new(subject, From::Nothing, Motion::at_rest(0.0))?;
     run.start(&COUPLE);
     for (name, frame) in odd_frames() {
-        run.filter.predict(&Motion::at_rest(0.0));
+        run.filter.predict(&Motion::at_rest(0.0), &frame.camera);
         let oracle = Oracle(Vec::new());
         let evidence = Evidence {
             frame: &frame,

@@ -19,12 +19,14 @@
 //! discovers nobody), so that is demanded by name: [`Suite::must_discover`],
 //! [`Suite::must_follow`].
 
+mod associators;
 mod controllers;
 mod detectors;
 pub mod figure;
 mod filters;
 mod general;
 mod likelihoods;
+mod managers;
 pub mod patch;
 mod random;
 mod scenes;
@@ -183,7 +185,9 @@ fn checks_of(kind: Kind) -> Checks {
     let (own, more): (&[Check], &[Check]) = match kind {
         Kind::Detector => (detectors::CHECKS, likelihoods::CHECKS),
         Kind::Verifier => (verifiers::CHECKS, &[]),
+        Kind::Associator => (associators::CHECKS, &[]),
         Kind::Filter => (filters::CHECKS, &[]),
+        Kind::Manager => (managers::CHECKS, &[]),
         Kind::Controller => (controllers::CHECKS, &[]),
     };
     own.iter().chain(more)

@@ -1,8 +1,8 @@
 use std::path::Path;
 
 use tagalong_core::{
-    ConfigError, Context, Controller, Detector, Filter, PluginInfo, Registry, Value, Verifier,
-    Wheels,
+    Associator, ConfigError, Context, Controller, Detector, Filter, PluginInfo, Registry,
+    TrackManager, Value, Verifier, Wheels,
 };
 use toml::de::{DeTable, DeValue};
 
@@ -40,6 +40,18 @@ impl Subject<'_> {
         })
     }
 
+    pub(crate) fn associator(&self, from: From<'_>) -> Result<Box<dyn Associator>, String> {
+        self.build(from, |value, context| {
+            self.registry.build_associator(self.info.name, value, context)
+        })
+    }
+
+    pub(crate) fn manager(&self, from: From<'_>) -> Result<Box<dyn TrackManager>, String> {
+        self.build(from, |value, context| {
+            self.registry.build_manager(self.info.name, value, context)
+        })
+    }
+
     pub(crate) fn filter(&self, from: From<'_>) -> Result<Box<dyn Filter>, String> {
         self.build(from, |value, context| {
             self.registry.build_filter(self.info.name, value, context)
@@ -54,11 +66,13 @@ impl Subject<'_> {
 
     /// Builds it only to see whether that works.
     pub(crate) fn try_build(&self, from: From<'_>) -> Result<(), String> {
-        use tagalong_core::Kind::{Controller, Detector, Filter, Verifier};
+        use tagalong_core::Kind::{Associator, Controller, Detector, Filter, Manager, Verifier};
         match self.info.kind {
             Detector => self.detector(from).map(drop),
             Verifier => self.verifier(from).map(drop),
+            Associator => self.associator(from).map(drop),
             Filter => self.filter(from).map(drop),
+            Manager => self.manager(from).map(drop),
             Controller => self.controller(from).map(drop),
         }
     }

@@ -42,18 +42,42 @@ pub struct Matched<'a> {
     pub id: TrackId,
     /// Its detection.
     pub detection: &'a Detection,
+    /// Probability that the detection is of the track, above 0 and at most 1.
+    pub weight: f64,
+}
+
+impl<'a> Matched<'a> {
+    /// Returns a match without doubt.
+    pub fn certain(id: TrackId, detection: &'a Detection) -> Self {
+        Self { id, detection, weight: 1.0 }
+    }
 }
 
 /// Everything that one frame says about the people a filter believes in.
 pub struct Evidence<'a> {
     /// The frame.
     pub frame: &'a Frame,
-    /// Detections with their track; a track appears at most once.
+    /// Detections with their track. A track appears once, with the weight 1, or several times
+    /// with weights whose sum is at most 1 where the associator weighs alternatives.
     pub matched: &'a [Matched<'a>],
     /// Detections that the association left alone.
     pub unmatched: &'a [Detection],
     /// Weighs scenes, where the pipeline has a detector that can.
     pub likelihood: Option<&'a dyn Likelihood>,
+}
+
+impl<'a> Evidence<'a> {
+    /// Returns the most probable detection of each track, for filters that take one.
+    pub fn best_matches(&self) -> BTreeMap<TrackId, &'a Detection> {
+        let mut best: BTreeMap<TrackId, Matched<'a>> = BTreeMap::new();
+        for matched in self.matched {
+            let slot = best.entry(matched.id).or_insert(*matched);
+            if matched.weight > slot.weight {
+                *slot = *matched;
+            }
+        }
+        best.into_iter().map(|(id, matched)| (id, matched.detection)).collect()
+    }
 }
 
 /// How the evidence of one frame supports one track.
@@ -74,10 +98,11 @@ pub trait Filter: Send {
     }
 
     /// Starts a belief. `id` is new.
-    fn start(&mut self, id: TrackId, detection: &Detection);
+    fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera);
 
-    /// Moves every belief into the robot's new frame and forward in time.
-    fn predict(&mut self, motion: &Motion);
+    /// Moves every belief into the robot's new frame and forward in time. `camera` is that of
+    /// the new frame.
+    fn predict(&mut self, motion: &Motion, camera: &Camera);
 
     /// Takes in the evidence of a frame and returns whom it supports.
     ///
@@ -111,7 +136,7 @@ pub trait Filter: Send {
 /// A filter of one person.
 pub trait PersonFilter: Send {
     /// What is believed of a person.
-    type Belief: Send;
+    type Belief: Clone + Send;
 
     /// The belief after the first sighting.
     fn start(&self, detection: &Detection) -> Self::Belief;
@@ -122,6 +147,13 @@ pub trait PersonFilter: Send {
     /// Corrects the belief by a sighting.
     fn correct(&self, belief: &mut Self::Belief, detection: &Detection, camera: &Camera)
     -> Support;
+
+    /// Merges alternatives of one person into one belief; the weights sum to 1 and the
+    /// heaviest comes first. A filter of means and covariances matches the moments of the
+    /// mixture; by default the heaviest alternative stays.
+    fn merge(&self, alternatives: &[(f64, Self::Belief)]) -> Self::Belief {
+        alternatives[0].1.clone()
+    }
 
     /// The belief in the common form.
     fn estimate(&self, belief: &Self::Belief, camera: &Camera) -> Estimate;
@@ -140,25 +172,61 @@ impl<F: PersonFilter> PerPerson<F> {
     }
 }
 
+impl<F: PersonFilter> PerPerson<F> {
+    /// Corrects a belief by weighted alternatives: each detection, and none at all with the
+    /// weight that is missing from 1 (Bar-Shalom and Tse's probabilistic data association).
+    fn correct_weighted(
+        filter: &F,
+        belief: &mut F::Belief,
+        matches: &[Matched<'_>],
+        camera: &Camera,
+    ) -> Support {
+        let mut supports = Vec::new();
+        let mut alternatives: Vec<(f64, F::Belief)> = Vec::new();
+        for matched in matches {
+            let mut corrected = belief.clone();
+            supports.push(filter.correct(&mut corrected, matched.detection, camera));
+            alternatives.push((matched.weight, corrected));
+        }
+        let missed = 1.0 - matches.iter().map(|matched| matched.weight).sum::<f64>();
+        if missed > CERTAINTY {
+            alternatives.push((missed, belief.clone()));
+        }
+        // A stable sort: equal weights stay in the order of the detections.
+        alternatives.sort_by(|a, b| b.0.total_cmp(&a.0));
+        *belief = filter.merge(&alternatives);
+        let heaviest =
+            matches.iter().zip(&supports).max_by(|a, b| a.0.weight.total_cmp(&b.0.weight));
+        heaviest.map_or(Support::default(), |(_, support)| *support)
+    }
+}
+
+/// Weights closer to 0 than this, or to 1, are those of a decision without alternatives.
+const CERTAINTY: f64 = 1e-9;
+
 impl<F: PersonFilter> Filter for PerPerson<F> {
-    fn start(&mut self, id: TrackId, detection: &Detection) {
+    fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
         self.beliefs.insert(id, self.filter.start(detection));
     }
 
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &Motion, _: &Camera) {
         for belief in self.beliefs.values_mut() {
             self.filter.predict(belief, motion);
         }
     }
 
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+        let camera = &evidence.frame.camera;
         let mut supported = BTreeMap::new();
-        for matched in evidence.matched {
-            if let Some(belief) = self.beliefs.get_mut(&matched.id) {
-                let support =
-                    self.filter.correct(belief, matched.detection, &evidence.frame.camera);
-                supported.insert(matched.id, support);
-            }
+        for (id, matches) in by_track(evidence.matched) {
+            let Some(belief) = self.beliefs.get_mut(&id) else { continue };
+            let support = match &matches[..] {
+                [only] if only.weight > 1.0 - CERTAINTY => {
+                    self.filter.correct(belief, only.detection, camera)
+                }
+                several => Self::correct_weighted(&self.filter, belief, several, camera),
+            };
+            supported.insert(id, support);
         }
         Ok(supported)
     }
@@ -173,6 +241,15 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
     fn stop(&mut self, id: TrackId) {
         self.beliefs.remove(&id);
     }
+}
+
+/// Groups the matches by track.
+fn by_track<'a>(matched: &[Matched<'a>]) -> BTreeMap<TrackId, Vec<Matched<'a>>> {
+    let mut groups: BTreeMap<TrackId, Vec<Matched<'a>>> = BTreeMap::new();
+    for matched in matched {
+        groups.entry(matched.id).or_default().push(*matched);
+    }
+    groups
 }
 
 #[cfg(test)]
@@ -230,15 +307,13 @@ mod tests {
             let estimates = filter.estimates(&frame.camera).into_iter();
             estimates.map(|(id, e)| (id.0, e.person.position.x)).collect::<Vec<_>>()
         };
-        filter.start(TrackId(1), &seen(2.0));
-        filter.start(TrackId(2), &seen(5.0));
-        filter.predict(&Motion { forward: 0.5, ..Motion::at_rest(0.1) });
+        filter.start(TrackId(1), &seen(2.0), &frame.camera);
+        filter.start(TrackId(2), &seen(5.0), &frame.camera);
+        filter.predict(&Motion { forward: 0.5, ..Motion::at_rest(0.1) }, &frame.camera);
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.5)]);
         let (detection, stranger) = (seen(4.0), seen(9.0));
-        let matched = [
-            Matched { id: TrackId(2), detection: &detection },
-            Matched { id: TrackId(7), detection: &stranger },
-        ];
+        let matched =
+            [Matched::certain(TrackId(2), &detection), Matched::certain(TrackId(7), &stranger)];
         let evidence =
             Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
         let supported = filter.update(&evidence).unwrap();

@@ -25,6 +25,7 @@
 //! * No clocks and no global randomness in plugins: time comes from the frame,
 //!   seeds from [`Context`]. Same log, same config, same seed: same bytes.
 
+mod associator;
 mod camera;
 mod control;
 mod detection;
@@ -33,8 +34,11 @@ mod error;
 mod filter;
 mod frame;
 mod funnel;
+mod guarded;
 mod image;
 mod inputs;
+mod manager;
+mod mixture;
 mod motion;
 mod names;
 mod panorama;
@@ -48,6 +52,7 @@ mod time;
 mod track;
 mod trainer;
 
+pub use associator::{Association, Associations, Associator, Gate};
 pub use camera::{Camera, Distortion, Lens, Pinhole};
 pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
 pub use detection::Detection;
@@ -56,8 +61,13 @@ pub use error::{Error, Result};
 pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Support};
 pub use frame::{Derived, Frame, Images, RightImage};
 pub use funnel::{Dropped, Funnel};
+pub use guarded::{Guarded, StepError};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use inputs::{Capabilities, Input, Inputs, Usage};
+pub use manager::{
+    Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
+};
+pub use mixture::match_moments;
 pub use motion::{Motion, Wheels, planar_pose};
 pub use names::nearest;
 pub use panorama::{ConicalMirror, Panorama};

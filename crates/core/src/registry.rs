@@ -5,19 +5,23 @@ use std::path::PathBuf;
 use toml::Spanned;
 
 use crate::{
-    ConfigError, Controller, Detector, Error, Filter, Result, Settings, Trainer, Value, Verifier,
-    Wheels, commented_defaults, nearest, parse_settings,
+    Associator, ConfigError, Controller, Detector, Error, Filter, Result, Settings, TrackManager,
+    Trainer, Value, Verifier, Wheels, commented_defaults, nearest, parse_settings,
 };
 
-/// The four kinds of plugin.
+/// The six kinds of plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Finds people in images.
     Detector,
-    /// Doubts what a detector found.
+    /// Judges what a detector found.
     Verifier,
-    /// Believes in people over time.
+    /// Decides which detection belongs to which track.
+    Associator,
+    /// Estimates the states of people over time.
     Filter,
+    /// Decides when tracks start, are confirmed, and end.
+    Manager,
     /// Steers after one of them.
     Controller,
 }
@@ -27,9 +31,19 @@ impl fmt::Display for Kind {
         f.write_str(match self {
             Self::Detector => "detector",
             Self::Verifier => "verifier",
+            Self::Associator => "associator",
             Self::Filter => "filter",
+            Self::Manager => "track manager",
             Self::Controller => "controller",
         })
+    }
+}
+
+impl Kind {
+    /// Returns the kind with its article, for sentences.
+    fn with_article(self) -> String {
+        let article = if self == Self::Associator { "an" } else { "a" };
+        format!("{article} {self}")
     }
 }
 
@@ -72,7 +86,9 @@ type Build<P> =
 enum Maker {
     Detector(Build<Box<dyn Detector>>),
     Verifier(Build<Box<dyn Verifier>>),
+    Associator(Build<Box<dyn Associator>>),
     Filter(Build<Box<dyn Filter>>),
+    Manager(Build<Box<dyn TrackManager>>),
     Controller(Build<Box<dyn Controller>>),
 }
 
@@ -153,6 +169,20 @@ impl Registry {
         self.add::<C>(name, Kind::Verifier, summary, maker);
     }
 
+    /// Registers an associator.
+    ///
+    /// # Panics
+    /// As [`Registry::detector`].
+    pub fn associator<C: Settings, P: Associator + 'static>(
+        &mut self,
+        name: &'static str,
+        summary: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        let maker = Maker::Associator(boxed(build, |plugin| Box::new(plugin)));
+        self.add::<C>(name, Kind::Associator, summary, maker);
+    }
+
     /// Registers a filter.
     ///
     /// # Panics
@@ -165,6 +195,20 @@ impl Registry {
     ) {
         let maker = Maker::Filter(boxed(build, |plugin| Box::new(plugin)));
         self.add::<C>(name, Kind::Filter, summary, maker);
+    }
+
+    /// Registers a track manager.
+    ///
+    /// # Panics
+    /// As [`Registry::detector`].
+    pub fn manager<C: Settings, P: TrackManager + 'static>(
+        &mut self,
+        name: &'static str,
+        summary: &'static str,
+        build: impl Fn(C, &Context) -> Result<P> + Send + Sync + 'static,
+    ) {
+        let maker = Maker::Manager(boxed(build, |plugin| Box::new(plugin)));
+        self.add::<C>(name, Kind::Manager, summary, maker);
     }
 
     /// Registers a controller.
@@ -262,6 +306,22 @@ impl Registry {
         }
     }
 
+    /// Builds an associator from its settings.
+    ///
+    /// # Errors
+    /// As [`Registry::build_detector`].
+    pub fn build_associator(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn Associator>, ConfigError> {
+        match &self.of_kind(name, Kind::Associator)?.maker {
+            Maker::Associator(build) => build(config, context),
+            _ => Err(self.wrong_kind(name, Kind::Associator)),
+        }
+    }
+
     /// Builds a filter from its settings.
     ///
     /// # Errors
@@ -275,6 +335,22 @@ impl Registry {
         match &self.of_kind(name, Kind::Filter)?.maker {
             Maker::Filter(build) => build(config, context),
             _ => Err(self.wrong_kind(name, Kind::Filter)),
+        }
+    }
+
+    /// Builds a track manager from its settings.
+    ///
+    /// # Errors
+    /// As [`Registry::build_detector`].
+    pub fn build_manager(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<Box<dyn TrackManager>, ConfigError> {
+        match &self.of_kind(name, Kind::Manager)?.maker {
+            Maker::Manager(build) => build(config, context),
+            _ => Err(self.wrong_kind(name, Kind::Manager)),
         }
     }
 
@@ -334,7 +410,11 @@ impl Registry {
         let message = match self.plugins.get(name) {
             Some(info) => {
                 let list = of_kind.join(", ");
-                format!("`{name}` is a {}, not a {kind}; available {kind}s: {list}", info.kind)
+                format!(
+                    "`{name}` is {}, not {}; available {kind}s: {list}",
+                    info.kind.with_article(),
+                    kind.with_article()
+                )
             }
             None => unknown(&format!("{kind} plugin"), name, of_kind),
         };
@@ -454,9 +534,9 @@ mod tests {
     }
 
     impl Filter for Idle {
-        fn start(&mut self, _: crate::TrackId, _: &Detection) {}
+        fn start(&mut self, _: crate::TrackId, _: &Detection, _: &crate::Camera) {}
 
-        fn predict(&mut self, _: &crate::Motion) {}
+        fn predict(&mut self, _: &crate::Motion, _: &crate::Camera) {}
 
         fn update(
             &mut self,
@@ -472,6 +552,35 @@ mod tests {
         fn stop(&mut self, _: crate::TrackId) {}
     }
 
+    impl Associator for Idle {
+        fn fits(&self, _: &crate::Track, _: &Detection, _: &crate::Gate) -> bool {
+            false
+        }
+
+        fn associate(
+            &mut self,
+            _: &[crate::Track],
+            _: &[Detection],
+            _: &crate::Gate,
+        ) -> crate::Associations {
+            crate::Associations::default()
+        }
+    }
+
+    impl TrackManager for Idle {
+        fn initiate(
+            &mut self,
+            _: crate::TrackId,
+            _: &crate::Unassociated<'_>,
+        ) -> crate::Initiation {
+            crate::Initiation::Drop("idle")
+        }
+
+        fn manage(&mut self, _: &[crate::ObservedTrack<'_>]) -> crate::TrackChanges {
+            crate::TrackChanges::default()
+        }
+    }
+
     impl Controller for Idle {
         fn command(&mut self, _: &crate::Scene<'_>) -> crate::WheelSpeeds {
             crate::WheelSpeeds::STOP
@@ -481,7 +590,9 @@ mod tests {
     fn all_kinds() -> Registry {
         let mut registry = registry();
         registry.detector("finder", "finds", |_: Config, _| Ok(Idle));
+        registry.associator("matcher", "matches", |_: Config, _| Ok(Idle));
         registry.filter("believer", "believes", |_: Config, _| Ok(Idle));
+        registry.manager("keeper", "keeps", |_: Config, _| Ok(Idle));
         registry.controller("driver", "drives", |_: Config, _| Ok(Idle));
         registry
     }
@@ -493,14 +604,18 @@ mod tests {
             [
                 registry.build_detector(name, None, &context()).is_ok(),
                 registry.build_verifier(name, None, &context()).is_ok(),
+                registry.build_associator(name, None, &context()).is_ok(),
                 registry.build_filter(name, None, &context()).is_ok(),
+                registry.build_manager(name, None, &context()).is_ok(),
                 registry.build_controller(name, None, &context()).is_ok(),
             ]
         };
-        assert_eq!(builds("finder"), [true, false, false, false]);
-        assert_eq!(builds("fixed"), [false, true, false, false]);
-        assert_eq!(builds("believer"), [false, false, true, false]);
-        assert_eq!(builds("driver"), [false, false, false, true]);
+        for (place, name) in
+            ["finder", "fixed", "matcher", "believer", "keeper", "driver"].iter().enumerate()
+        {
+            let built = builds(name).into_iter().enumerate();
+            assert!(built.into_iter().all(|(kind, is_ok)| is_ok == (kind == place)), "{name}");
+        }
         let kinds: Vec<_> = registry.plugins().map(|p| format!("{} {}", p.kind, p.name)).collect();
         let expected =
             ["filter believer", "verifier counting", "controller driver", "detector finder"];
@@ -514,6 +629,8 @@ mod tests {
         let expected =
             "`finder` is a detector, not a verifier; available verifiers: counting, fixed";
         assert_eq!(refused.to_string(), expected);
+        let refused = registry.build_verifier("matcher", None, &context()).err().unwrap();
+        assert!(refused.to_string().starts_with("`matcher` is an associator, not a verifier;"));
         let refused = registry.build_filter("beleiver", None, &context()).err().unwrap();
         let expected =
             "unknown filter plugin `beleiver`; did you mean `believer`? available: believer";

@@ -6,21 +6,21 @@ use std::ops::Range;
 use std::path::Path;
 
 use tagalong_core::{
-    ConfigError, Context, Filter, Registry, Settings, Value, Verifier, nearest, parse_settings,
+    Associator, ConfigError, Context, Filter, Guarded, Registry, Settings, TrackManager, Value,
+    Verifier, nearest, parse_settings,
 };
 use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use tagalong_tracking::{DetectorSettings, DetectorSlot, Parts, Role, Tracker};
+
 use crate::GovernorSettings;
-use crate::clock::Clock;
 use crate::control::Steering;
-use crate::doubts::Doubts;
-use crate::lifecycle::Lifecycle;
 use crate::pipeline::Pipeline;
-use crate::settings::{DetectorSettings, PipelineSettings, PluginSettings, RobotSettings, Role};
-use crate::slots::{DetectorSlot, Slot};
+use crate::preprocessors::preprocessors;
+use crate::settings::{PipelineSettings, PluginSettings, RobotSettings};
 
 mod checks;
 mod inputs;
@@ -39,20 +39,34 @@ const MAX_BYTES: usize = 1 << 20;
 /// Deepest nesting of a config.
 const MAX_DEPTH: usize = 32;
 
-const OWN: [&str; 11] = [
+const OWN: [&str; 10] = [
     "seed",
     "without",
     "robot",
     "stereo",
     "odometry",
     "clock",
-    "association",
+    "merge",
     "occlusion",
-    "lifecycle",
     "target",
     "governor",
 ];
-const PLUGINS: [&str; 4] = ["detectors", "verifiers", "filter", "controller"];
+const PLUGINS: [&str; 6] =
+    ["detectors", "verifiers", "associator", "filter", "manager", "controller"];
+/// The associator of a config that names none.
+pub const DEFAULT_ASSOCIATOR: &str = "associate-hungarian";
+/// The track manager of a config that names none.
+pub const DEFAULT_MANAGER: &str = "manage-m-of-n";
+
+/// Keys of older configs, and what stands in their place.
+const RENAMED: [(&str, &str); 2] = [
+    (
+        "association",
+        "`[associator.config]`; `same_person_m`, `same_person_iou` and `max_detections` stand in \
+         `[merge]`",
+    ),
+    ("lifecycle", "`[manager.config]`"),
+];
 
 /// How a config is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,15 +138,17 @@ impl Pipeline {
         let builder = Builder { registry, base_dir, settings: &settings };
         let (detectors, places) = builder.detectors(root.remove("detectors"))?;
         let verifiers = builder.verifiers(root.remove("verifiers"))?;
+        let associator = builder.associator(root.remove("associator"))?;
         let (filter, filter_span) = builder.filter(root.remove("filter"))?;
+        let manager = builder.manager(root.remove("manager"))?;
         check_detectors(&detectors, &places)?;
         check_weighing(&filter, &detectors, filter_span)?;
         let steering = builder.steering(root.remove("controller"))?;
         let plugins: Vec<Declared<'_>> = detectors
             .iter()
-            .map(|slot| (&*slot.settings.plugin, slot.plugin.capabilities().inputs))
-            .chain(verifiers.iter().map(|slot| (&*slot.name, slot.plugin.inputs())))
-            .chain([(&*filter.name, filter.plugin.inputs())])
+            .map(|slot| (&*slot.settings.plugin, slot.plugin.plugin().capabilities().inputs))
+            .chain(verifiers.iter().map(|verifier| (verifier.name(), verifier.plugin().inputs())))
+            .chain([(filter.name(), filter.plugin().inputs())])
             .chain(steering.as_ref().map(Steering::inputs))
             .collect();
         let without_span = root.get("without").map(Spanned::span);
@@ -145,24 +161,17 @@ impl Pipeline {
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let (seed, robot) = (settings.seed, settings.robot.clone());
         let run = RunSettings { seed, robot, tune, text: text.into() };
+        let odometry = settings.odometry.clone().map(VisualOdometry::new);
+        let preprocessors = preprocessors(stereo, odometry);
+        let parts = Parts { preprocessors, detectors, verifiers, associator, filter, manager };
         let pipeline = Self {
             inputs,
-            clock: Clock::new(settings.clock.clone()),
-            lifecycle: Lifecycle::new(settings.lifecycle.clone()),
-            doubts: Doubts::default(),
-            stereo,
-            odometry: settings.odometry.clone().map(VisualOdometry::new),
+            tracker: Tracker::new(parts, settings.tracker()),
             settings,
-            detectors,
-            verifiers,
-            filter,
             steering,
             resolved,
-            frames: 0,
             failed: None,
-            sketches: false,
             base_dir: base_dir.to_owned(),
-            shared: None,
         };
         Ok((pipeline, run))
     }
@@ -198,6 +207,10 @@ fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigErr
         PLUGINS.into_iter().chain(OWN).chain([tune::TABLE]).chain(foreign).collect();
     for key in root.keys() {
         let name: &str = key.get_ref();
+        if let Some((_, now)) = RENAMED.iter().find(|(old, _)| *old == name) {
+            let message = format!("`{name}` is now {now}");
+            return Err(ConfigError { message, span: Some(key.span()) });
+        }
         if !known.contains(&name) {
             let hint = nearest(name, known.iter().copied())
                 .map_or(String::new(), |better| format!(" did you mean `{better}`?"));
@@ -261,6 +274,18 @@ impl<'a, T: Settings> Section<'a, T> {
     }
 }
 
+impl<'a> Section<'a, PluginSettings> {
+    /// Takes a section apart that may be left out, or name no plugin.
+    fn or_default(name: &str, value: Option<Value<'a>>, plugin: &str) -> Result<Self, ConfigError> {
+        let empty = || Spanned::new(0..0, DeValue::Table(DeTable::new()));
+        let mut section = Self::new(name, value.unwrap_or_else(empty))?;
+        if section.settings.plugin.is_empty() {
+            section.settings.plugin = plugin.to_owned();
+        }
+        Ok(section)
+    }
+}
+
 struct Builder<'a> {
     registry: &'a Registry,
     base_dir: &'a Path,
@@ -295,12 +320,16 @@ impl Builder<'_> {
                 offset: section.span_of("offset"),
                 roles: section.span_of("roles"),
             });
+            let plugin = Guarded::new(section.settings.plugin.clone(), plugin);
             built.0.push(DetectorSlot { settings: section.settings, plugin });
         }
         Ok(built)
     }
 
-    fn verifiers(&self, value: Option<Value<'_>>) -> Result<Vec<Slot<dyn Verifier>>, ConfigError> {
+    fn verifiers(
+        &self,
+        value: Option<Value<'_>>,
+    ) -> Result<Vec<Guarded<dyn Verifier>>, ConfigError> {
         let mut built = Vec::new();
         for (index, value) in list("verifiers", value)?.into_iter().enumerate() {
             let mut section = Section::<PluginSettings>::new("verifiers", value)?;
@@ -308,7 +337,7 @@ impl Builder<'_> {
             let context = self.context(1, index);
             let name = &section.settings.plugin;
             let plugin = section.at_plugin(self.registry.build_verifier(name, config, &context))?;
-            built.push(Slot { name: section.settings.plugin, plugin });
+            built.push(Guarded::new(section.settings.plugin, plugin));
         }
         Ok(built)
     }
@@ -316,7 +345,7 @@ impl Builder<'_> {
     fn filter(
         &self,
         value: Option<Value<'_>>,
-    ) -> Result<(Slot<dyn Filter>, Range<usize>), ConfigError> {
+    ) -> Result<(Guarded<dyn Filter>, Range<usize>), ConfigError> {
         let Some(value) = value else {
             let message = "no filter: add a section [filter] with `plugin = \"...\"`";
             return Err(ConfigError::new(message));
@@ -327,7 +356,23 @@ impl Builder<'_> {
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_filter(name, config, &context))?;
         let span = section.span_of("plugin").unwrap_or(section.span);
-        Ok((Slot { name: section.settings.plugin, plugin }, span))
+        Ok((Guarded::new(section.settings.plugin, plugin), span))
+    }
+
+    fn associator(&self, value: Option<Value<'_>>) -> Result<Guarded<dyn Associator>, ConfigError> {
+        let mut section = Section::or_default("associator", value, DEFAULT_ASSOCIATOR)?;
+        let (config, context) = (section.config.take(), self.context(4, 0));
+        let name = &section.settings.plugin;
+        let plugin = section.at_plugin(self.registry.build_associator(name, config, &context))?;
+        Ok(Guarded::new(section.settings.plugin, plugin))
+    }
+
+    fn manager(&self, value: Option<Value<'_>>) -> Result<Guarded<dyn TrackManager>, ConfigError> {
+        let mut section = Section::or_default("manager", value, DEFAULT_MANAGER)?;
+        let (config, context) = (section.config.take(), self.context(5, 0));
+        let name = &section.settings.plugin;
+        let plugin = section.at_plugin(self.registry.build_manager(name, config, &context))?;
+        Ok(Guarded::new(section.settings.plugin, plugin))
     }
 
     fn steering(&self, value: Option<Value<'_>>) -> Result<Option<Steering>, ConfigError> {
@@ -408,7 +453,7 @@ fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), C
 
 /// Returns a role of the config that the detector does not offer, and the words for it.
 fn missing_role(slot: &DetectorSlot) -> Option<(&'static str, &'static str)> {
-    let offered = slot.plugin.capabilities();
+    let offered = slot.plugin.plugin().capabilities();
     let roles = [
         (Role::Discover, offered.discovers, "discover", "discover people"),
         (Role::Follow, offered.tracks, "follow", "find a tracked person again"),
@@ -421,18 +466,18 @@ fn missing_role(slot: &DetectorSlot) -> Option<(&'static str, &'static str)> {
 }
 
 fn check_weighing(
-    filter: &Slot<dyn Filter>,
+    filter: &Guarded<dyn Filter>,
     detectors: &[DetectorSlot],
     span: Range<usize>,
 ) -> Result<(), ConfigError> {
     let weighs = |slot: &DetectorSlot| slot.settings.roles.contains(&Role::Weigh);
-    if !filter.plugin.weighs_scenes() || detectors.iter().any(weighs) {
+    if !filter.plugin().weighs_scenes() || detectors.iter().any(weighs) {
         return Ok(());
     }
     let message = format!(
         "`{}` weighs scenes, and no detector does that for it: \
          add the role weigh to a detector that has a likelihood",
-        filter.name
+        filter.name()
     );
     Err(ConfigError { message, span: Some(span) })
 }

@@ -1,8 +1,8 @@
 use tagalong_core::{
-    Command, Controller, Frame, Inputs, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
+    Command, Controller, Frame, Guarded, Inputs, Motion, Reason, Scene, Stamp, StepError, Track,
+    TrackId, WheelSpeeds,
 };
 
-use crate::boundary::{StepError, contain};
 use crate::governor::{Aim, Governor, Surroundings, Wish};
 use crate::target::{Lock, Search};
 use crate::{LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings};
@@ -12,8 +12,7 @@ const FRESH_FRAMES: u32 = 3;
 
 /// The controller, the lock on whom it follows, and the governor of its commands.
 pub(crate) struct Steering {
-    name: String,
-    controller: Box<dyn Controller>,
+    controller: Guarded<dyn Controller>,
     lock: Lock,
     search: Search,
     search_settings: SearchSettings,
@@ -39,8 +38,7 @@ impl Steering {
     ) -> Self {
         let PipelineSettings { robot, governor, target, .. } = settings;
         Self {
-            name,
-            controller,
+            controller: Guarded::new(name, controller),
             lock: Lock::new(target.clone()),
             search: Search::default(),
             search_settings: target.search.clone(),
@@ -66,12 +64,12 @@ impl Steering {
 
     /// The distance that the controller keeps, m, if it keeps one.
     pub(crate) fn stand_off_m(&self) -> Option<f64> {
-        self.controller.stand_off_m()
+        self.controller.plugin().stand_off_m()
     }
 
     /// The controller's name and its inputs.
     pub(crate) fn inputs(&self) -> (&str, Inputs) {
-        (&self.name, self.controller.inputs())
+        (self.controller.name(), self.controller.plugin().inputs())
     }
 
     pub(crate) fn governor(&self) -> &Governor {
@@ -136,7 +134,7 @@ impl Steering {
             wheels: self.robot.wheels(),
             max_speed_mps: self.robot.max_speed_mps,
         };
-        contain(&self.name, frame.index, || self.controller.command(&scene))
+        self.controller.ask(frame.index, |controller| controller.command(&scene))
     }
 
     /// What the wheels turn for: the controller's wish while somebody is followed,

@@ -1,62 +1,10 @@
-use tagalong_core::{Command, Detection, Funnel, Motion, Sketch, Stamp, Track, TrackId};
+use tagalong_core::{Command, Funnel, Motion, Sketch, Stamp, Track, TrackId};
+use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing};
 
-use crate::{LockReport, Weighing};
+use crate::LockReport;
 
-/// What became of a detection.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
-    /// It was given to this track.
-    Matched(TrackId),
-    /// It started this track.
-    Started(TrackId),
-    /// This test dropped it.
-    Dropped(&'static str),
-}
-
-/// A detection and what became of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
-    /// The detection; its score includes the verifiers' margins.
-    pub detection: Detection,
-    /// What became of it.
-    pub fate: Fate,
-}
-
-/// What the stamp of a frame led to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Outcome {
-    /// An ordinary frame.
-    Tracked,
-    /// The same stamp as the frame before: not processed.
-    Duplicate,
-    /// Slightly older than the frame before: not processed.
-    OutOfOrder,
-    /// After a gap: processed, but tracks that were not confirmed ended.
-    Gap {
-        /// Time since the frame before, s.
-        by_s: f64,
-    },
-    /// The clock was set back: all tracks ended, then the frame was processed.
-    ResetBackward {
-        /// How far, s.
-        by_s: f64,
-    },
-    /// The clock jumped ahead: all tracks ended, then the frame was processed.
-    ResetForward {
-        /// Time since the frame before, s.
-        by_s: f64,
-    },
-}
-
-impl Outcome {
-    /// False for frames that left no trace in the pipeline.
-    pub fn is_processed(&self) -> bool {
-        !matches!(self, Self::Duplicate | Self::OutOfOrder)
-    }
-}
-
-/// Everything that one frame led to.
+/// Everything that one frame led to: the [`TrackingReport`], and where the pipeline has a
+/// controller, the target and the command.
 #[derive(Clone, Debug)]
 pub struct FrameReport {
     /// Index of the frame.
@@ -89,32 +37,44 @@ pub struct FrameReport {
     /// What the filter shows of its work, where [`crate::Pipeline::sketch`] asks
     /// for it.
     pub sketch: Sketch,
-    /// Milliseconds per stage. With those of `weighing` the only part that
-    /// differs between two runs.
+    /// Milliseconds per stage. With those of `weighing` and of the plugins the only part
+    /// that differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
+    /// Milliseconds per plugin.
+    pub plugin_timings: Vec<(String, f64)>,
     /// Tracks that ended in this frame.
     pub ended: Vec<TrackId>,
 }
 
 impl FrameReport {
-    /// Of a frame that led to nothing yet.
+    /// Returns the report of a frame that led to nothing yet.
     pub fn new(index: u64, stamp: Stamp) -> Self {
+        TrackingReport::new(index, stamp).into()
+    }
+}
+
+impl From<TrackingReport> for FrameReport {
+    fn from(tracking: TrackingReport) -> Self {
+        let TrackingReport { index, stamp, outcome, motion, candidates, funnel, tracks, .. } =
+            tracking;
+        let TrackingReport { nis, weighing, sketch, timings, plugin_timings, ended, .. } = tracking;
         Self {
             index,
             stamp,
-            outcome: Outcome::Tracked,
-            motion: Motion::at_rest(0.0),
-            candidates: Vec::new(),
-            funnel: Funnel::default(),
-            tracks: Vec::new(),
+            outcome,
+            motion,
+            candidates,
+            funnel,
+            tracks,
             target: None,
             lock: None,
             command: None,
-            nis: Vec::new(),
-            weighing: Weighing::default(),
-            sketch: Sketch::default(),
-            timings: Vec::new(),
-            ended: Vec::new(),
+            nis,
+            weighing,
+            sketch,
+            timings,
+            plugin_timings,
+            ended,
         }
     }
 }

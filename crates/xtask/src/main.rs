@@ -50,6 +50,9 @@ enum Command {
     Record {
         /// The file to write.
         file: PathBuf,
+        /// A built program to record, instead of this workspace's.
+        #[arg(long)]
+        program: Option<PathBuf>,
     },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
@@ -90,7 +93,7 @@ fn run(command: Command) -> Result<()> {
         Command::NewPlugin(_) => try_out::try_out(&workspace),
         Command::Docs { slow } => docs::fill(&workspace, slow.as_deref()),
         Command::Tidy => tidy::tidy(&workspace),
-        Command::Record { file } => record::record(&workspace, &file),
+        Command::Record { file, program } => record::record(&workspace, &file, program),
         Command::Rehearse => rehearse::rehearse(&workspace),
         Command::Ci => ci::ci(&workspace),
     }

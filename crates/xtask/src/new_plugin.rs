@@ -9,15 +9,19 @@ use clap::ValueEnum;
 
 use crate::workspace::{Workspace, succeed};
 
-/// The four kinds of plugin.
+/// The six kinds of plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
     /// Finds people in images.
     Detector,
-    /// Doubts what a detector found.
+    /// Judges what a detector found.
     Verifier,
-    /// Believes in people over time.
+    /// Decides which detection belongs to which track.
+    Associator,
+    /// Estimates the states of people over time.
     Filter,
+    /// Decides when tracks start, are confirmed, and end.
+    Manager,
     /// Steers after one of them.
     Controller,
 }
@@ -51,7 +55,9 @@ impl Kind {
         match self {
             Self::Detector => template!("detector", "detect"),
             Self::Verifier => template!("verifier", "verify"),
+            Self::Associator => template!("associator", "associate"),
             Self::Filter => template!("filter", "filter"),
+            Self::Manager => template!("manager", "manage"),
             Self::Controller => template!("controller", "control"),
         }
     }
@@ -198,7 +204,7 @@ mod tests {
     #[test]
     fn no_placeholder_is_left() {
         let (_folder, workspace) = workspace();
-        for (kind, name) in Kind::value_variants().iter().zip(["d", "v", "f", "c"]) {
+        for (kind, name) in Kind::value_variants().iter().zip(["d", "v", "a", "f", "m", "e"]) {
             create(&workspace, *kind, name).unwrap();
             let verb = format!("src/{}.rs", kind.template().verb.0);
             for file in ["Cargo.toml", "README.md", "src/lib.rs", "src/config.rs", &verb] {

@@ -23,8 +23,8 @@ const SCENES: [(&str, &str); 4] =
 const RIDE: &str = "configs/scenes/follow-passing.toml";
 
 /// Writes a line for each run to `file`.
-pub fn record(workspace: &Workspace, file: &Path) -> Result<()> {
-    let program = release_program(workspace)?;
+pub fn record(workspace: &Workspace, file: &Path, program: Option<PathBuf>) -> Result<()> {
+    let program = program.map_or_else(|| release_program(workspace), Ok)?;
     let work = workspace.root().join("target/record");
     fs::create_dir_all(&work)?;
     let logs = [real_logs(workspace)?, scene_logs(workspace, &program, &work)?].concat();
@@ -85,7 +85,7 @@ fn run_line(
 ) -> Result<String> {
     let folder = work.join("run");
     let mut command = Command::new(program);
-    command.arg("run").args([config, log]).args(["--quiet", "--overwrite", "-o"]).arg(&folder);
+    command.arg("run").args([config, log]).args(["--overwrite", "-o"]).arg(&folder);
     let done = command.current_dir(workspace.root()).output()?;
     let code = done.status.code().map_or("killed".into(), |code| code.to_string());
     let mut line = format!("{} {} exit {code}", stem(config), stem(log));

@@ -62,7 +62,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
             cargo(&format!("{config} is a valid config"), &run, &[])?;
         }
     }
-    eprintln!("new-plugin --try: all four kinds work, and so does the walk-through");
+    eprintln!("new-plugin --try: all six kinds work, and so does the walk-through");
     Ok(())
 }
 

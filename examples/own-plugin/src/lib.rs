@@ -1,5 +1,9 @@
 //! A verifier that trusts people by the contrast of their picture: a person has
-//! some, a blank wall has none.
+//! some, a blank wall has none. Beside it stand an associator and a track manager, the two
+//! kinds that decide which tracks there are.
+
+pub mod nearest;
+pub mod patient;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,8 +12,14 @@ use tagalong_core::{Detection, Frame, Input, Inputs, Registry, Result, Verifier}
 /// The name of this plugin in configs.
 pub const NAME: &str = "own-contrast";
 
-/// Registers the plugin.
+/// Registers the plugins.
 pub fn register(registry: &mut Registry) {
+    registry.associator("own-nearest", "nearest pairs first", |config, _| {
+        Ok(nearest::OwnNearest(config))
+    });
+    registry.manager("own-patient", "ends what was unseen for long", |config, _| {
+        Ok(patient::OwnPatient(config))
+    });
     let summary = "people have more contrast than walls";
     registry.verifier(NAME, summary, |config: Config, _| Ok(OwnContrast { config }));
 }

@@ -8,12 +8,14 @@ fn it_conforms() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// The config beside it is right, and means this plugin.
+/// The configs beside them are right, and mean these plugins.
 #[test]
-fn the_program_knows_it() {
+fn the_program_knows_them() {
     let program = env!("CARGO_BIN_EXE_own-plugin");
-    let config = concat!(env!("CARGO_MANIFEST_DIR"), "/own-contrast.toml");
-    let output = std::process::Command::new(program).args(["check", config]).output();
-    let output = output.expect("the program starts");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for config in ["own-contrast.toml", "own-tracker.toml"] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(config);
+        let output = std::process::Command::new(program).arg("check").arg(path).output();
+        let output = output.expect("the program starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
 }

@@ -1,5 +1,7 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector3, Vector5};
-use tagalong_core::{Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
+use tagalong_core::{
+    Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support, match_moments,
+};
 
 use crate::Config;
 
@@ -126,6 +128,15 @@ impl PersonFilter for Ekf {
         belief.mean += gain * innovation;
         belief.covariance = self.corrected(&p, &gain, &r);
         Support { nis: Some((nis, measured)) }
+    }
+
+    fn merge(&self, alternatives: &[(f64, Belief)]) -> Belief {
+        let parts: Vec<_> = alternatives
+            .iter()
+            .map(|(weight, belief)| (*weight, belief.mean, belief.covariance))
+            .collect();
+        let (mean, covariance) = match_moments(&parts);
+        Belief { mean, covariance: symmetric(covariance) }
     }
 
     fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {

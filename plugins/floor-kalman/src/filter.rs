@@ -90,13 +90,13 @@ impl FloorKalman {
 }
 
 impl Filter for FloorKalman {
-    fn start(&mut self, id: TrackId, detection: &Detection) {
+    fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
         let (at, r) = self.measured(detection);
         let height = (detection.position.z, detection.covariance[(2, 2)]);
         self.beliefs.insert(id, Belief::new(at, &r, height, &self.config));
     }
 
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &Motion, _: &Camera) {
         let mut beliefs = std::mem::take(&mut self.beliefs);
         self.room_from_robot *= motion.isometry();
         for belief in beliefs.values_mut() {
@@ -108,15 +108,15 @@ impl Filter for FloorKalman {
 
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
         let mut supported = BTreeMap::new();
-        for matched in evidence.matched {
-            let (z, r) = self.measured(matched.detection);
-            let Some(belief) = self.beliefs.get_mut(&matched.id) else { continue };
+        for (id, detection) in evidence.best_matches() {
+            let (z, r) = self.measured(detection);
+            let Some(belief) = self.beliefs.get_mut(&id) else { continue };
             let nis = belief.correct(&z, &r, self.config.form);
-            let height = matched.detection.covariance[(2, 2)];
+            let height = detection.covariance[(2, 2)];
             if height < UNMEASURED_M2 {
-                belief.correct_height(matched.detection.position.z, height);
+                belief.correct_height(detection.position.z, height);
             }
-            supported.insert(matched.id, Support { nis: nis.map(|nis| (nis, 2)) });
+            supported.insert(id, Support { nis: nis.map(|nis| (nis, 2)) });
         }
         Ok(supported)
     }

@@ -33,7 +33,7 @@ fn sighting(x: f64, y: f64) -> Detection {
 }
 
 fn see(filter: &mut FloorKalman, detection: &Detection) -> (f64, u32) {
-    let matched = [Matched { id: ID, detection }];
+    let matched = [Matched::certain(ID, detection)];
     let frame = frame();
     let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
     filter.update(&evidence).unwrap()[&ID].nis.unwrap()
@@ -50,9 +50,9 @@ fn forms() -> [Form; 3] {
 /// Somebody at a steady walk, seen without noise.
 fn after_a_walk(config: Config) -> FloorKalman {
     let mut filter = FloorKalman::new(config).unwrap();
-    filter.start(ID, &sighting(2.0, 0.0));
+    filter.start(ID, &sighting(2.0, 0.0), &camera());
     for step in 1..=30 {
-        filter.predict(&Motion::at_rest(1.0 / 3.0));
+        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
         see(&mut filter, &sighting(2.0 + 0.2 * f64::from(step), 0.0));
     }
     filter
@@ -62,7 +62,7 @@ fn after_a_walk(config: Config) -> FloorKalman {
 fn the_printed_filter_is_the_printed_filter() {
     let config = Config { form: Form::Still, measurement: Measurement::Fixed, ..Config::default() };
     let mut filter = FloorKalman::new(config).unwrap();
-    filter.start(ID, &sighting(1.0, 2.0));
+    filter.start(ID, &sighting(1.0, 2.0), &camera());
     let r = Matrix2::new(0.011, -0.004, -0.004, 0.020);
     let q = Matrix2::new(0.024, -0.001, -0.001, 0.043);
     let (mut x, mut p) = (Vector2::new(1.0, 2.0), r);
@@ -72,7 +72,7 @@ fn the_printed_filter_is_the_printed_filter() {
         let k = p * (p + r).try_inverse().unwrap();
         x += k * (z - x);
         p = (Matrix2::identity() - k) * p;
-        filter.predict(&Motion::at_rest(1.0 / 3.0));
+        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
         see(&mut filter, &sighting(z.x, z.y));
         let found = estimate(&filter);
         assert!((found.person.position.xy().coords - x).norm() < 1e-12);
@@ -89,7 +89,7 @@ fn a_walk_is_foreseen_by_those_who_know_a_velocity() {
     let ahead = |form, compat_printed_u| {
         let config = Config { form, compat_printed_u, ..Config::default() };
         let mut filter = after_a_walk(config);
-        filter.predict(&Motion::at_rest(1.0 / 3.0));
+        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
         estimate(&filter).person.position.x - 8.2
     };
     assert!(ahead(Form::Still, false) < -0.19, "{}", ahead(Form::Still, false));
@@ -107,7 +107,7 @@ fn the_noise_of_u_makes_the_prediction_less_certain() {
     let spread = |compat_printed_u| {
         let form = Form::LastDifference;
         let mut filter = after_a_walk(Config { form, compat_printed_u, ..Config::default() });
-        filter.predict(&Motion::at_rest(1.0 / 3.0));
+        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
         estimate(&filter).covariance[(0, 0)]
     };
     assert!(spread(false) > 1.3 * spread(true), "{} {}", spread(false), spread(true));
@@ -118,7 +118,7 @@ fn a_polar_measurement_is_wide_where_it_is_far() {
     let spread = |range: f64| {
         let config = Config { measurement: Measurement::Polar, ..Config::default() };
         let mut filter = FloorKalman::new(config).unwrap();
-        filter.start(ID, &sighting(0.0, range));
+        filter.start(ID, &sighting(0.0, range), &camera());
         let c = estimate(&filter).covariance;
         (c[(1, 1)].sqrt(), c[(0, 0)].sqrt())
     };
@@ -193,11 +193,11 @@ proptest! {
         for form in forms() {
             let config = Config { form, room_heading_deg: room, ..Config::default() };
             let mut filter = FloorKalman::new(config).unwrap();
-            filter.start(ID, &sighting(x, y));
+            filter.start(ID, &sighting(x, y), &camera());
             let motion = Motion { forward, left, turn, ..Motion::at_rest(0.3) };
             let mut at = Point2::new(x, y);
             for _ in 0..4 {
-                filter.predict(&motion);
+                filter.predict(&motion, &camera());
                 at = motion.apply_to_point(at);
                 let found = estimate(&filter);
                 prop_assert!((found.person.position.xy() - at).norm() < 1e-9);
@@ -261,7 +261,7 @@ fn four_states_are_those_of_a_filter_written_down() {
     };
     let dynamic = |m: &Matrix2<f64>| DMatrix::from_fn(2, 2, |i, j| m[(i, j)]);
     let mut room_from_robot = Isometry2::new(Vector2::zeros(), -30.0_f64.to_radians());
-    filter.start(ID, &sighting(2.0, 1.0));
+    filter.start(ID, &sighting(2.0, 1.0), &camera());
     let turn = |pose: &Isometry2<f64>| *pose.rotation.to_rotation_matrix().matrix();
     let start = room_from_robot * Point2::new(2.0, 1.0);
     let mut covariance = DMatrix::from_diagonal_element(4, 4, speed * speed);
@@ -288,7 +288,7 @@ fn four_states_are_those_of_a_filter_written_down() {
             Vector2::new(-away[1], away[0]),
         ]);
         book.predict(0.4, q, &dynamic(&(j * uncertain * j.transpose())));
-        filter.predict(&motion);
+        filter.predict(&motion, &camera());
         let z = room_from_robot * Point2::new(x, y);
         let of_room = rotation * r * rotation.transpose();
         let expected = book.correct(&DVector::from_vec(vec![z.x, z.y]), &dynamic(&of_room));
@@ -320,8 +320,8 @@ fn the_height_is_filtered_by_itself_and_kept_where_it_is_not_measured() {
         detection.covariance[(2, 2)] = variance;
         detection
     };
-    filter.start(ID, &with_height(1.5, 0.04));
-    filter.predict(&Motion::at_rest(0.5));
+    filter.start(ID, &with_height(1.5, 0.04), &camera());
+    filter.predict(&Motion::at_rest(0.5), &camera());
     let height = |filter: &FloorKalman| {
         let found = estimate(filter);
         (found.person.position.z, found.covariance[(2, 2)])
@@ -353,7 +353,7 @@ fn polar_noise_lies_along_the_ray_however_the_robot_is_turned() {
     };
     let spread = |x: f64, y: f64, along: Vector2<f64>| {
         let mut filter = FloorKalman::new(config.clone()).unwrap();
-        filter.start(ID, &sighting(x, y));
+        filter.start(ID, &sighting(x, y), &camera());
         let c = estimate(&filter).covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let across = Vector2::new(-along.y, along.x);
         (along.dot(&(c * along)).sqrt(), across.dot(&(c * across)).sqrt())
@@ -438,10 +438,10 @@ fn each_number_has_its_least_and_its_most() {
 #[test]
 fn who_is_stopped_is_forgotten_and_a_stranger_gives_no_support() {
     let mut filter = FloorKalman::new(Config::default()).unwrap();
-    filter.start(ID, &sighting(2.0, 0.0));
+    filter.start(ID, &sighting(2.0, 0.0), &camera());
     let (other, frame) = (TrackId(2), frame());
     let detection = sighting(2.0, 0.1);
-    let matched = [Matched { id: other, detection: &detection }];
+    let matched = [Matched::certain(other, &detection)];
     let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
     assert!(filter.update(&evidence).unwrap().is_empty());
     filter.stop(other);

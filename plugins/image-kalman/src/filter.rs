@@ -1,17 +1,14 @@
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use tagalong_core::{
-    Camera, Detection, Distortion, Estimate, Evidence, Filter, Motion, Pinhole, Result, Support,
-    TrackId,
+    Camera, Detection, Estimate, Evidence, Filter, Motion, Result, Support, TrackId,
 };
 
 use crate::{Belief, Config};
 
-/// The filter. It predicts through the camera of the frame before.
+/// The filter.
 pub struct ImageKalman {
     config: Config,
-    camera: Arc<Camera>,
     beliefs: BTreeMap<TrackId, Belief>,
 }
 
@@ -22,36 +19,29 @@ impl ImageKalman {
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
-        Ok(Self { config, camera: Arc::new(unknown_camera()), beliefs: BTreeMap::new() })
+        Ok(Self { config, beliefs: BTreeMap::new() })
     }
-}
-
-/// Stands in until the first frame shows the camera.
-fn unknown_camera() -> Camera {
-    let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
 }
 
 impl Filter for ImageKalman {
-    fn start(&mut self, id: TrackId, detection: &Detection) {
-        let belief = Belief::start(&self.config, detection, &self.camera);
+    fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
+        let belief = Belief::start(&self.config, detection, camera);
         self.beliefs.insert(id, belief);
     }
 
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &Motion, camera: &Camera) {
         for belief in self.beliefs.values_mut() {
-            belief.predict(&self.config, motion, &self.camera);
+            belief.predict(&self.config, motion, camera);
         }
     }
 
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
         let camera = &evidence.frame.camera;
-        self.camera = Arc::clone(camera);
         let mut supported = BTreeMap::new();
-        for matched in evidence.matched {
-            if let Some(belief) = self.beliefs.get_mut(&matched.id) {
-                let support = belief.correct(&self.config, matched.detection, camera);
-                supported.insert(matched.id, support);
+        for (id, detection) in evidence.best_matches() {
+            if let Some(belief) = self.beliefs.get_mut(&id) {
+                let support = belief.correct(&self.config, detection, camera);
+                supported.insert(id, support);
             }
         }
         Ok(supported)

@@ -156,11 +156,11 @@ fn sightings_that_make_no_sense_leave_finite_numbers() {
     let moves = Motion { forward: 3.0, turn: 2.0, ..Motion::at_rest(0.0) };
     for odd in odd {
         let mut filter = ImageKalman::new(Config::default()).unwrap();
-        filter.start(TrackId(1), &odd);
+        filter.start(TrackId(1), &odd, &camera());
         for seen in [&odd, &seen, &odd] {
-            filter.predict(&moves);
+            filter.predict(&moves, &camera());
             let frame = Frame::new(1, Stamp::default(), camera(), moves, Images::default());
-            let matched = [Matched { id: TrackId(1), detection: seen }];
+            let matched = [Matched::certain(TrackId(1), seen)];
             let evidence =
                 Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
             filter.update(&evidence).unwrap();
@@ -382,14 +382,14 @@ fn the_shape_follows_what_is_seen_by_its_weight() {
 fn only_whoever_is_tracked_is_supported_and_a_stopped_one_is_gone() {
     let (camera, seen) = ahead(4.0);
     let mut filter = ImageKalman::new(Config::default()).unwrap();
-    filter.start(TrackId(1), &seen);
+    filter.start(TrackId(1), &seen, &camera);
     let camera = Arc::new(camera);
     let frame = |camera: &Arc<Camera>| {
         let motion = Motion::at_rest(0.1);
         Frame::new(1, Stamp::default(), Arc::clone(camera), motion, Images::default())
     };
     let frame = frame(&camera);
-    let matched = [1, 2].map(|id| Matched { id: TrackId(id), detection: &seen });
+    let matched = [1, 2].map(|id| Matched::certain(TrackId(id), &seen));
     let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
     let supports = filter.update(&evidence).unwrap();
     assert_eq!(supports.keys().collect::<Vec<_>>(), [&TrackId(1)]);

@@ -190,13 +190,13 @@ impl Filter for JointParticle {
         Inputs::NONE.accept(Input::Colour)
     }
 
-    fn start(&mut self, id: TrackId, detection: &Detection) {
+    fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
         let first = Particle::of(detection, &self.config);
         self.groups.push(Group::single(id, &first, self.seed, &self.config));
         self.unfound_s.insert(id, 0.0);
     }
 
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &Motion, _: &Camera) {
         let transition = Transition::new(motion, &self.config);
         self.groups.iter_mut().for_each(|group| group.predict(&transition));
         for heading in self.headings.values_mut() {
@@ -212,9 +212,9 @@ impl Filter for JointParticle {
         self.renew();
         self.regroup(&evidence.frame.camera);
         let sightings: BTreeMap<TrackId, Particle> = evidence
-            .matched
-            .iter()
-            .map(|m| (m.id, Particle::of(m.detection, &self.config)))
+            .best_matches()
+            .into_iter()
+            .map(|(id, detection)| (id, Particle::of(detection, &self.config)))
             .collect();
         self.unfound_s.extend(sightings.keys().map(|id| (*id, 0.0)));
         let headings = self.headings.clone();
@@ -317,15 +317,15 @@ mod tests {
         let (mut filter, id) = (JointParticle::new(Config::default(), 1).unwrap(), TrackId(1));
         let (frame, detection) = (frame(), detection());
         let flattering = Flattering(nats);
-        filter.start(id, &detection);
+        filter.start(id, &detection, &frame.camera);
         let mut is_seen = |matched: &[Matched<'_>]| {
-            filter.predict(&frame.motion);
+            filter.predict(&frame.motion, &frame.camera);
             let likelihood: Option<&dyn Likelihood> = Some(&flattering);
             let evidence = Evidence { frame: &frame, matched, unmatched: &[], likelihood };
             filter.update(&evidence).unwrap().contains_key(&id)
         };
         let seen: Vec<bool> = (0..12).map(|_| is_seen(&[])).collect();
-        let again = is_seen(&[Matched { id, detection: &detection }]);
+        let again = is_seen(&[Matched::certain(id, &detection)]);
         (seen, again)
     }
 
@@ -334,9 +334,9 @@ mod tests {
         let config = Config { method: Method::Kde, ..Config::default() };
         let (mut filter, frame) = (JointParticle::new(config.clone(), 1).unwrap(), frame());
         let farther = Detection { position: Point3::new(3.0, 0.1, 1.6), ..detection() };
-        filter.start(TrackId(1), &detection());
-        filter.start(TrackId(2), &farther);
-        filter.predict(&frame.motion);
+        filter.start(TrackId(1), &detection(), &frame.camera);
+        filter.start(TrackId(2), &farther, &frame.camera);
+        filter.predict(&frame.motion, &frame.camera);
         let likelihood: Option<&dyn Likelihood> = Some(&Flattering(3.0));
         let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
         filter.update(&evidence).unwrap();

@@ -89,12 +89,12 @@ struct Faulty {
 }
 
 impl Filter for Faulty {
-    fn start(&mut self, id: TrackId, detection: &Detection) {
-        self.inner.start(id, detection);
+    fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
+        self.inner.start(id, detection, camera);
     }
 
-    fn predict(&mut self, motion: &Motion) {
-        self.inner.predict(motion);
+    fn predict(&mut self, motion: &Motion, camera: &Camera) {
+        self.inner.predict(motion, camera);
     }
 
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
@@ -103,8 +103,7 @@ impl Filter for Faulty {
             return self.inner.update(evidence);
         }
         let in_order = (1..).zip(evidence.matched);
-        let matched: Vec<_> =
-            in_order.map(|(id, m)| Matched { id: TrackId(id), detection: m.detection }).collect();
+        let matched: Vec<_> = in_order.map(|(id, m)| Matched { id: TrackId(id), ..*m }).collect();
         self.inner.update(&Evidence { matched: &matched, ..*evidence })
     }
 

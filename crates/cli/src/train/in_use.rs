@@ -115,7 +115,7 @@ mod tests {
             InUse::as_it_is(&path).unwrap().proposing().unwrap().parse().unwrap();
         let cost = proposing["detectors"][0]["config"]["discover_cost"].as_float();
         assert_eq!(cost, Some(0.1));
-        assert!(!proposing.contains_key("verifiers") && proposing.contains_key("lifecycle"));
+        assert!(!proposing.contains_key("verifiers") && proposing.contains_key("manager"));
         let failure = InUse::as_it_is(&folder.path().join("none.toml")).err().unwrap();
         assert!(failure.message.contains("none.toml"), "{}", failure.message);
     }

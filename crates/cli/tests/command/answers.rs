@@ -32,7 +32,7 @@ fn printed_defaults_are_accepted_as_they_are() {
     let home = tempfile::tempdir().unwrap();
     let around = answer(&["config", "pipeline"], home.path());
     let detector = answer(&["config", "nearest-thing"], home.path());
-    assert!(around.contains("[association]") && around.contains("# depth_topic ="), "{around}");
+    assert!(around.contains("[merge]") && around.contains("# depth_topic ="), "{around}");
     let plugins = format!(
         "\n[[detectors]]\nplugin = \"nearest-thing\"\n[detectors.config]\n{detector}\n[filter]\n\
          plugin = \"ekf\"\n"

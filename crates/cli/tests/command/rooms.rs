@@ -174,11 +174,11 @@ fn a_setting_that_fails_is_named() {
 #[test]
 fn settings_that_contradict_each_other_are_left_out_and_counted() {
     let home = Home::new();
-    let tune = "lifecycle.confirm_hits = [3, 4]\nlifecycle.confirm_within = [3, 5]";
-    home.config("near", "[lifecycle]\nconfirm_within = 4\n", tune);
+    let tune = "manager.config.confirm_hits = [3, 4]\nmanager.config.confirm_within = [3, 5]";
+    home.config("near", "[manager.config]\nconfirm_within = 4\n", tune);
     let text = fs::read_to_string(home.path("configs/near.toml")).unwrap();
     // The section of the detector ends before that of the life cycle.
-    assert!(text.contains("[lifecycle]"));
+    assert!(text.contains("[manager.config]"));
     let fitted = home.fitted(&[]);
     assert_eq!((fitted["settings"].as_u64(), fitted["refused"].as_u64()), (Some(4), Some(1)));
 }
@@ -192,10 +192,10 @@ fn mistakes_are_told_with_file_and_line() {
         assert_eq!(code(&output), code_wanted, "{told}");
         words.iter().for_each(|word| assert!(told.contains(word), "{word} in {told}"));
     };
-    home.config("near", "", "\"lifecycle.confirm_hit\" = [1]");
-    tell(2, &["near.toml:9:1", "did you mean `lifecycle.confirm_hits`?"]);
-    home.config("near", "", "lifecycle.confirm_hits = [1, 99]");
-    tell(2, &["configs/near.toml:9:30", "= 99 is not allowed", "`lifecycle.confirm_within`"]);
+    home.config("near", "", "\"manager.config.confirm_hit\" = [1]");
+    tell(2, &["near.toml:9:1", "did you mean `manager.config.confirm_hits`?"]);
+    home.config("near", "", "manager.config.confirm_hits = [1, 99]");
+    tell(2, &["configs/near.toml:9:30", "= 99 is not allowed", "`manager.config.confirm_within`"]);
     let mut check = own_plugin();
     let checked = check.current_dir(home.folder.path()).args(["check", "configs/near.toml"]);
     let checked = checked.output().unwrap();

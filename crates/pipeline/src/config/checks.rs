@@ -15,7 +15,6 @@ enum Must {
     Fraction,
     Inside,
     Finite,
-    Number,
     AtLeast(f64, &'static str),
     AtMost(f64, &'static str),
 }
@@ -28,7 +27,6 @@ impl Must {
             Self::Fraction => value > 0.0 && value <= 1.0,
             Self::Inside => value > 0.0 && value < 1.0,
             Self::Finite => value.is_finite(),
-            Self::Number => !value.is_nan(),
             Self::AtLeast(limit, _) => value >= limit,
             Self::AtMost(limit, _) => value <= limit,
         }
@@ -41,7 +39,6 @@ impl Must {
             Self::Fraction => "above 0 and at most 1".into(),
             Self::Inside => "above 0 and below 1".into(),
             Self::Finite => "finite".into(),
-            Self::Number => "a number".into(),
             Self::AtLeast(limit, what) => format!("at least {limit}{what}"),
             Self::AtMost(limit, what) => format!("at most {limit}{what}"),
         }
@@ -101,55 +98,23 @@ fn rules(settings: &PipelineSettings) -> Vec<Rule> {
         ("occlusion", "min_gap_sigmas", occlusion.min_gap_sigmas, Must::NotNegative),
         ("occlusion", "body_width_m", occlusion.body_width_m, Must::NotNegative),
     ];
-    rules.extend(association_rules(settings));
-    rules.extend(lifecycle_rules(settings));
+    rules.extend(merge_rules(settings));
     rules.extend(governor_rules(settings));
     rules.extend(target_rules(settings));
     rules
 }
 
-fn association_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
-    let s = &settings.association;
+fn merge_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
+    let s = &settings.merge;
     [
-        ("gate", s.gate, Must::Positive),
-        ("gate_m", s.gate_m, Must::Positive),
-        ("gate_speed_mps", s.gate_speed_mps, Must::NotNegative),
-        ("min_overlap", s.min_overlap, Must::Fraction),
-        ("miss_factor", s.miss_factor, Must::Positive),
         ("same_person_m", s.same_person_m, Must::NotNegative),
         ("same_person_iou", s.same_person_iou, Must::Fraction),
         ("max_detections", s.max_detections as f64, Must::Positive),
-    ]
-    .into_iter()
-    .map(|(key, value, must)| ("association", key, value, must))
-}
-
-fn lifecycle_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {
-    let s = &settings.lifecycle;
-    let hits = f64::from(s.confirm_hits);
-    [
-        ("start_score", s.start_score, Must::Finite),
-        ("doubt_s", s.doubt_s, Must::NotNegative),
-        ("doubt_m", s.doubt_m, Must::NotNegative),
-        ("doubt_limit", s.doubt_limit, Must::NotNegative),
-        ("confirm_hits", hits, Must::Positive),
-        ("confirm_within", f64::from(s.confirm_within), Must::AtMost(32.0, "")),
-        ("confirm_within", f64::from(s.confirm_within), Must::AtLeast(hits, ", as `confirm_hits`")),
-        ("confirm_score", s.confirm_score, Must::Number),
-        ("tentative_misses", f64::from(s.tentative_misses), Must::Positive),
-        ("drop_after_s", s.drop_after_s, Must::NotNegative),
-        ("drop_after_misses", f64::from(s.drop_after_misses), Must::Positive),
-        ("left_drop_after_s", s.left_drop_after_s, Must::NotNegative),
-        ("occluded_drop_after_s", s.occluded_drop_after_s, Must::NotNegative),
-        ("score_weight", s.score_weight, Must::Fraction),
-        ("miss_score", s.miss_score, Must::Finite),
-        ("drop_score", s.drop_score, Must::Number),
-        ("drop_score", s.drop_score, Must::AtMost(s.start_score, ", as `start_score`")),
         ("duplicate_m", s.duplicate_m, Must::NotNegative),
         ("max_tracks", s.max_tracks as f64, Must::Positive),
     ]
     .into_iter()
-    .map(|(key, value, must)| ("lifecycle", key, value, must))
+    .map(|(key, value, must)| ("merge", key, value, must))
 }
 
 fn governor_rules(settings: &PipelineSettings) -> impl Iterator<Item = Rule> {

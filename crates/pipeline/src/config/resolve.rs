@@ -1,7 +1,10 @@
 use tagalong_core::{ConfigError, Registry};
 use toml::{Table, Value};
 
-use crate::settings::{DetectorSettings, PipelineSettings};
+use tagalong_tracking::DetectorSettings;
+
+use super::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER};
+use crate::settings::PipelineSettings;
 
 /// Returns the config with every default filled in, of the plugins too. What may be tuned
 /// is no part of it.
@@ -13,6 +16,10 @@ pub(super) fn resolve(
     let mut root: Table = toml::from_str(text)?;
     root.remove(super::tune::TABLE);
     root.extend(table_of(settings)?);
+    for (section, plugin) in [("associator", DEFAULT_ASSOCIATOR), ("manager", DEFAULT_MANAGER)] {
+        let named = Table::from_iter([("plugin".to_owned(), Value::from(plugin))]);
+        fill(root.entry(section).or_insert_with(|| Value::Table(Table::new())), named);
+    }
     for (name, value) in &mut root {
         match (name.as_str(), value) {
             ("detectors", Value::Array(sections)) => {
@@ -26,7 +33,9 @@ pub(super) fn resolve(
                     fill_config(section, registry)?;
                 }
             }
-            ("filter" | "controller", section) => fill_config(section, registry)?,
+            ("associator" | "filter" | "manager" | "controller", section) => {
+                fill_config(section, registry)?
+            }
             _ => {}
         }
     }

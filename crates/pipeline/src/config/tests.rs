@@ -24,13 +24,26 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
     let weighing = "filter = { plugin = 'odd', config = { how = 'weighs' } }\n";
     let cases: Vec<(String, &[&str])> = vec![
         (own("sed = 1"), &["a.toml:1:1", "unknown key `sed`", "did you mean `seed`?"]),
-        (own("lifecycle.confirm_hit = 1"), &["a.toml:1:11", "did you mean `confirm_hits`?"]),
-        (own("association.cost = 'overlapp'"), &["a.toml:1:20", "did you mean `overlap`?"]),
-        (own("association.gate = -1.0"), &["a.toml:1:20", "`association.gate` must be positive"]),
-        (own("association.gate_m = nan"), &["a.toml:1:22", "must be positive, not NaN"]),
+        (own("manager.config.confirm_hit = 1"), &["a.toml:1:16", "did you mean `confirm_hits`?"]),
+        (own("associator.config.cost = 'overlapp'"), &["a.toml:1:26", "did you mean `overlap`?"]),
+        (own("associator.config.gate = -1.0"), &["a.toml:1:", "`gate` must be positive"]),
+        (own("associator.config.gate_m = nan"), &["a.toml:1:", "`gate_m` must be positive"]),
         (own("occlusion.min_visible = 1.5"), &["a.toml:1:25", "above 0 and at most 1"]),
-        (own("lifecycle.confirm_hits = 9"), &["`lifecycle.confirm_within` must be at least 9"]),
-        (own("lifecycle.confirm_within = 40"), &["a.toml:1:28", "at most 32"]),
+        (
+            own("manager.config.confirm_hits = 9"),
+            &["a.toml:1:", "`confirm_within` must be at least 9"],
+        ),
+        (
+            own("manager.config.confirm_within = 40"),
+            &["a.toml:1:", "`confirm_within` must lie between 1.0 and 32.0"],
+        ),
+        (own("association.gate = 9.0"), &["a.toml:1:1", "now `[associator.config]`", "[merge]"]),
+        (own("lifecycle.confirm_hits = 2"), &["a.toml:1:1", "now `[manager.config]`"]),
+        (own("manager.plugin = 'steady'"), &["a.toml:1:18", "`steady` is a filter, not a track"]),
+        (
+            own("associator.plugin = 'manage-m-of-n'"),
+            &["not an associator; available", "hungarian"],
+        ),
         (own("robot.max_speed_mps = inf"), &["a.toml:1:23", "must be positive, not inf"]),
         (own("stereo.window = 4"), &["a.toml:1:17", "`stereo.window` must be 3, 5, 7 or 9"]),
         (own("odometry.cell_px = 4"), &["a.toml:1:20", "`odometry.cell_px` must be from 8 to 256"]),
@@ -127,7 +140,7 @@ fn tables_of_others_are_left_to_them() {
 
 #[test]
 fn the_resolved_config_holds_every_default_and_means_the_same() {
-    let text = format!("{PLAIN}\n[lifecycle]\nconfirm_hits = 2\n[input]\ntopic = 'x'");
+    let text = format!("{PLAIN}\n[manager.config]\nconfirm_hits = 2\n[input]\ntopic = 'x'");
     let (pipeline, _) = build(&text).unwrap();
     let resolved = pipeline.resolved();
     for line in ["gate = 11.34", "confirm_hits = 2", "every = 1", "how = \"\"", "topic = \"x\""] {
@@ -153,7 +166,7 @@ fn the_seed_can_be_replaced() {
 #[test]
 fn the_defaults_are_printed_under_their_documentation_and_parse() {
     let text = commented_defaults::<PipelineSettings>();
-    for key in ["[association]", "# Mahalanobis: largest squared distance.", "gate = 11.34"] {
+    for key in ["[merge]", "# Most detections in a frame;", "max_detections = 1024"] {
         assert!(text.contains(key), "{key} in\n{text}");
     }
     for key in ["# [stereo]", "# method = \"semi-global\"", "# min_depth_m = 0.5"] {
@@ -191,7 +204,7 @@ fn without_a_number(table: &toml::Table, path: &str) -> Vec<String> {
 fn no_setting_may_be_no_number() {
     let defaults = toml::Table::try_from(PipelineSettings::default()).unwrap();
     let lines = without_a_number(&defaults, "");
-    assert!(lines.len() > 60, "{}", lines.len());
+    assert!(lines.len() > 40, "{}", lines.len());
     for line in lines {
         let shown = build(&format!("{line}\n{PLAIN}")).map(|_| ()).expect_err(&line);
         assert!(shown.starts_with("a.toml:1:"), "{line}: {shown}");
@@ -201,8 +214,8 @@ fn no_setting_may_be_no_number() {
 #[test]
 fn settings_may_be_at_their_bounds_and_not_beyond() {
     for (line, fits) in [
-        ("association.gate = 0.0", false),
-        ("association.gate = inf", false),
+        ("associator.config.gate = 0.0", false),
+        ("associator.config.gate = inf", false),
         ("robot.wheel_slip = 0.0", true),
         ("robot.wheel_slip = -0.01", false),
         ("robot.wheel_slip = inf", false),
@@ -213,14 +226,14 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
         ("target.again_from = 0.0", false),
         ("target.refuse_below = 0.4", true),
         ("target.refuse_below = 0.41", false),
-        ("lifecycle.miss_score = -inf", false),
-        ("lifecycle.drop_score = -inf", true),
-        ("lifecycle.drop_score = 0.0", true),
-        ("lifecycle.drop_score = 0.1", false),
-        ("lifecycle.confirm_within = 3", true),
-        ("lifecycle.confirm_within = 2", false),
-        ("lifecycle.confirm_within = 32", true),
-        ("lifecycle.max_tracks = 0", false),
+        ("manager.config.miss_score = -inf", false),
+        ("manager.config.drop_score = -inf", true),
+        ("manager.config.drop_score = 0.0", true),
+        ("manager.config.drop_score = 0.1", false),
+        ("manager.config.confirm_within = 3", true),
+        ("manager.config.confirm_within = 2", false),
+        ("manager.config.confirm_within = 32", true),
+        ("merge.max_tracks = 0", false),
         ("clock = { max_gap_s = 2.0, reset_gap_s = 2.0 }", true),
         ("clock = { max_gap_s = 2.0, reset_gap_s = 1.9 }", false),
         ("governor.corridor.range_m = 100.0", true),
@@ -316,7 +329,7 @@ plugin = 'choosy'
 plugin = 'steady'
 [controller]
 plugin = 'drive'
-[association]
+[associator.config]
 cost = 'overlap'
 gate = 9.0
 ";

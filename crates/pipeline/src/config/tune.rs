@@ -19,7 +19,7 @@ const MAX_VALUES: usize = 64;
 /// A setting that may be fitted, and the values that may be tried for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tunable {
-    /// Its place in the config: `lifecycle.confirm_hits`, `detectors.0.config.min_cells`.
+    /// Its place in the config: `manager.config.confirm_hits`, `detectors.0.config.min_cells`.
     pub key: String,
     /// The value that the config has.
     pub now: toml::Value,
@@ -256,11 +256,11 @@ mod tests {
     #[test]
     fn lists_and_spreads_take_the_type_of_their_setting() {
         let lines = [
-            "\"lifecycle.confirm_hits\" = [1, 2]",
-            "lifecycle.drop_after_s = [1, 2.5]",
+            "\"manager.config.confirm_hits\" = [1, 2]",
+            "manager.config.drop_after_s = [1, 2.5]",
             "\"detectors.0.config.script\" = { between = [0, 2], steps = 5 }",
-            "association.gate_m = { between = [0.5, 1.0], steps = 3 }",
-            "association.cost = [\"overlap\", \"mahalanobis\"]",
+            "associator.config.gate_m = { between = [0.5, 1.0], steps = 3 }",
+            "associator.config.cost = [\"overlap\", \"mahalanobis\"]",
         ];
         let (_, tunables) = build(&lines.join("\n")).unwrap();
         let shown: Vec<String> = tunables
@@ -268,11 +268,11 @@ mod tests {
             .map(|t| format!("{} {}", t.key, toml::Value::Array(t.values.clone())))
             .collect();
         for line in [
-            "lifecycle.confirm_hits [1, 2]",
-            "lifecycle.drop_after_s [1.0, 2.5]",
+            "manager.config.confirm_hits [1, 2]",
+            "manager.config.drop_after_s [1.0, 2.5]",
             "detectors.0.config.script [0, 1, 2]",
-            "association.gate_m [0.5, 0.75, 1.0]",
-            "association.cost [\"overlap\", \"mahalanobis\"]",
+            "associator.config.gate_m [0.5, 0.75, 1.0]",
+            "associator.config.cost [\"overlap\", \"mahalanobis\"]",
         ] {
             assert!(shown.iter().any(|s| s == line), "{line} in {shown:#?}");
         }
@@ -282,22 +282,37 @@ mod tests {
     #[test]
     fn mistakes_are_shown_with_their_line() {
         let cases: &[(&str, &[&str])] = &[
-            ("\"lifecycle.confirm_hit\" = [1]", &["a.toml:7:1", "`lifecycle.confirm_hits`?"]),
-            ("lifecycle.confirm_hit = [1]", &["a.toml:7:11", "`lifecycle.confirm_hits`?"]),
+            (
+                "\"manager.config.confirm_hit\" = [1]",
+                &["a.toml:7:1", "`manager.config.confirm_hits`?"],
+            ),
+            (
+                "manager.config.confirm_hit = [1]",
+                &["a.toml:7:16", "`manager.config.confirm_hits`?"],
+            ),
             ("\"detectors.1.config.script\" = [1]", &["`detectors.0.config.script`?"]),
             ("seed = [1, 2]", &["a.toml:7:1", "nothing to tune is called `seed`"]),
             ("\"filter.plugin\" = ['odd']", &["nothing to tune is called `filter.plugin`"]),
             ("lifecycle = [1]", &["nothing to tune is called `lifecycle`"]),
-            ("lifecycle.confirm_hits = 2", &["a.toml:7:26", "needs a list of values"]),
-            ("lifecycle.confirm_hits = []", &["a.toml:7:26", "needs a list of values"]),
-            ("lifecycle.confirm_hits = [1, 2.5]", &["a.toml:7:30", "float, not integer"]),
-            ("lifecycle.confirm_hits = ['x']", &["a.toml:7:27", "string, not integer"]),
-            ("lifecycle.confirm_hits = [1, 1]", &["a.toml:7:30", "twice"]),
-            ("association.gate = { between = [2, 1], steps = 3 }", &["the lower number first"]),
-            ("association.gate = { between = [1, 2], steps = 1 }", &["`steps` must be from 2"]),
-            ("association.gate = { between = [1, 2] }", &["a.toml:7", "missing field `steps`"]),
-            ("association.gate = { between = [1, 2], stps = 3 }", &["did you mean `steps`?"]),
-            ("association.cost = { between = [1, 2], steps = 2 }", &["float, not string"]),
+            ("manager.config.confirm_hits = 2", &["a.toml:7:31", "needs a list of values"]),
+            ("manager.config.confirm_hits = []", &["a.toml:7:31", "needs a list of values"]),
+            ("manager.config.confirm_hits = [1, 2.5]", &["a.toml:7:35", "float, not integer"]),
+            ("manager.config.confirm_hits = ['x']", &["a.toml:7:32", "string, not integer"]),
+            ("manager.config.confirm_hits = [1, 1]", &["a.toml:7:35", "twice"]),
+            (
+                "associator.config.gate = { between = [2, 1], steps = 3 }",
+                &["the lower number first"],
+            ),
+            (
+                "associator.config.gate = { between = [1, 2], steps = 1 }",
+                &["`steps` must be from 2"],
+            ),
+            (
+                "associator.config.gate = { between = [1, 2] }",
+                &["a.toml:7", "missing field `steps`"],
+            ),
+            ("associator.config.gate = { between = [1, 2], stps = 3 }", &["did you mean `steps`?"]),
+            ("associator.config.cost = { between = [1, 2], steps = 2 }", &["float, not string"]),
         ];
         for (tune, expected) in cases {
             let shown = build(tune).map(|_| ()).expect_err(tune);
@@ -309,16 +324,16 @@ mod tests {
 
     #[test]
     fn values_that_a_setting_does_not_allow_are_shown_with_their_line() {
-        let shown = check("lifecycle.confirm_hits = [1, 2, 9]").unwrap_err();
-        assert!(shown.contains("a.toml:7:33") && shown.contains("must be at least 9"), "{shown}");
-        let shown = check("\"association.cost\" = ['overlap', 'far']").unwrap_err();
-        assert!(shown.contains("a.toml:7:34") && shown.contains("unknown variant"), "{shown}");
+        let shown = check("manager.config.confirm_hits = [1, 2, 9]").unwrap_err();
+        assert!(shown.contains("a.toml:7:38") && shown.contains("must be at least 9"), "{shown}");
+        let shown = check("\"associator.config.cost\" = ['overlap', 'far']").unwrap_err();
+        assert!(shown.contains("a.toml:7:40") && shown.contains("unknown variant"), "{shown}");
     }
 
     #[test]
     fn the_table_leaves_the_pipeline_as_it_is() {
         let plain = World::default().pipeline(PLAIN).resolved();
-        let (tuned, _) = build("lifecycle.confirm_hits = [1, 2]").unwrap();
+        let (tuned, _) = build("manager.config.confirm_hits = [1, 2]").unwrap();
         assert_eq!(tuned.resolved(), plain);
     }
 
@@ -326,13 +341,14 @@ mod tests {
     fn values_are_put_where_they_belong() {
         let resolved = World::default().pipeline(PLAIN).resolved();
         let (two, script) = (toml::Value::Integer(2), toml::Value::Integer(7));
-        let values = [("lifecycle.confirm_hits", &two), ("detectors.0.config.script", &script)];
+        let values =
+            [("manager.config.confirm_hits", &two), ("detectors.0.config.script", &script)];
         let text = with_values(&resolved, &values).unwrap();
         let changed = World::default().pipeline(&text).resolved();
         assert!(changed.contains("confirm_hits = 2\n") && changed.contains("script = 7\n"));
         let count = |text: &str| text.lines().count();
         assert_eq!(count(&changed), count(&resolved));
-        assert!(with_values(&resolved, &[("lifecycle.no_such", &two)]).is_err());
+        assert!(with_values(&resolved, &[("manager.config.no_such", &two)]).is_err());
         assert!(with_values(&resolved, &[("detectors.9.every", &two)]).is_err());
     }
 }

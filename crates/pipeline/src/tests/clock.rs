@@ -41,7 +41,8 @@ fn t1_a_clock_set_back_ends_all_tracks_once() {
 
 #[test]
 fn t1_the_robot_stands_until_three_fresh_frames_came() {
-    let config = format!("{PLAIN}\n[lifecycle]\nconfirm_hits = 1\n[controller]\nplugin = 'drive'");
+    let config =
+        format!("{PLAIN}\n[manager.config]\nconfirm_hits = 1\n[controller]\nplugin = 'drive'");
     let drives = |config: &str| -> Vec<bool> {
         let (_, reports) = at(&[10.0, 10.1, 1.0, 1.1, 1.2, 1.3], config);
         reports.iter().map(|r| r.command.unwrap().wheels.left != 0.0).collect()

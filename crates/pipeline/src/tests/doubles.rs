@@ -8,10 +8,10 @@ use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Camera, Capabilities, Controller, Detection, Detector, Distortion, Error, Estimate, Evidence,
-    Filter, Frame, Funnel, Images, Input, Inputs, Likelihood, Motion, PerPerson, Person,
-    PersonFilter, Pinhole, Registry, Result, Scene, Search, Stamp, Support, TrackId, Verifier,
-    WheelSpeeds,
+    Association, Associations, Associator, Camera, Capabilities, Controller, Detection, Detector,
+    Distortion, Error, Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs,
+    Likelihood, Motion, PerPerson, Person, PersonFilter, Pinhole, Registry, Result, Scene, Search,
+    Stamp, Support, Track, TrackId, Verifier, WheelSpeeds,
 };
 
 use crate::{FrameReport, Pipeline};
@@ -86,12 +86,15 @@ impl World {
         });
         registry.verifier("choosy", "doubts some", |config: Config, _| Ok(Choosy(config)));
         let world = self.clone();
+        tagalong_associate_hungarian::register(&mut registry);
+        tagalong_manage_m_of_n::register(&mut registry);
         registry.filter("steady", "believes what it saw", move |_: Config, _| {
             Ok(PerPerson::new(Steady(world.clone())))
         });
         registry.filter("odd", "makes mistakes", |config: Config, _| {
             Ok(Odd { config, ids: BTreeSet::new() })
         });
+        registry.associator("weighing", "weighs", |config: Config, _| Ok(Weighs(config)));
         registry.controller("drive", "drives", |config: Config, _| Ok(Drive(config)));
         registry
     }
@@ -200,6 +203,7 @@ impl Verifier for Choosy {
 /// Constant velocity, learned from the last two sightings.
 struct Steady(World);
 
+#[derive(Clone)]
 struct Belief {
     person: Person,
     age_s: f64,
@@ -244,12 +248,12 @@ struct Odd {
 }
 
 impl Filter for Odd {
-    fn start(&mut self, id: TrackId, _: &Detection) {
+    fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
         assert!(self.config.how != "panic", "cannot start {id}");
         self.ids.insert(id);
     }
 
-    fn predict(&mut self, _: &Motion) {}
+    fn predict(&mut self, _: &Motion, _: &Camera) {}
 
     fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
         let nis = Some((f64::NAN, 3));
@@ -278,6 +282,26 @@ impl Filter for Odd {
 
     fn weighs_scenes(&self) -> bool {
         self.config.how == "weighs"
+    }
+}
+
+/// Gives each track the first detection, with a weight; or pairs that cannot be.
+struct Weighs(Config);
+
+impl Associator for Weighs {
+    fn fits(&self, _: &Track, _: &Detection, _: &Gate) -> bool {
+        true
+    }
+
+    fn associate(&mut self, tracks: &[Track], found: &[Detection], _: &Gate) -> Associations {
+        let pair = |track, detection, weight| Association { track, detection, weight };
+        let pairs = match self.0.how.as_str() {
+            "impossible" => vec![pair(7, 0, 1.0), pair(0, 9, 1.0), pair(0, 0, f64::NAN)],
+            weight => (0..tracks.len().min(found.len()))
+                .map(|track| pair(track, track, weight.parse().unwrap()))
+                .collect(),
+        };
+        Associations { pairs, spent: Vec::new() }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::{FrameReport, Pipeline};
 /// Of two scripts the first forgets; verifiers and thresholds differ.
 const CONFIGS: [&str; 4] = [
     "",
-    "lifecycle.drop_after_s = 0.3\nlifecycle.drop_after_misses = 1",
+    "manager.config.drop_after_s = 0.3\nmanager.config.drop_after_misses = 1",
     "[[verifiers]]\nplugin = 'choosy'",
     "[[verifiers]]\nplugin = 'choosy'\nconfig = { how = 'once' }",
 ];
@@ -31,7 +31,7 @@ fn world() -> World {
 
 /// A report without its times.
 fn untimed(report: FrameReport) -> String {
-    format!("{:?}", FrameReport { timings: Vec::new(), ..report })
+    format!("{:?}", FrameReport { timings: Vec::new(), plugin_timings: Vec::new(), ..report })
 }
 
 /// What pipelines say of the same frames, step by step side by side.

@@ -34,7 +34,7 @@ fn pair() -> Images {
 fn a_pair_gives_the_detectors_depth() {
     let mut pipeline = World::default().pipeline(CONFIG);
     let report = pipeline.step(&with_images(pair())).unwrap();
-    assert_eq!(report.timings[0].0, "stereo");
+    assert_eq!(report.plugin_timings[0].0, "stereo");
     assert!(report.funnel.entries().iter().any(|e| e.test.starts_with("stereo pixels: ")));
 }
 

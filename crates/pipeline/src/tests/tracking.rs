@@ -143,8 +143,9 @@ fn three_misses_are_needed_however_slow_the_log_is() {
 fn the_gate_grows_with_the_time_between_frames() {
     let walk = |i: i32| vec![person(3.0, -1.5 + f64::from(i))];
     let numbers = |dt_s: f64| ids(&World::of((0..3).map(walk)).run(PLAIN, 3, dt_s)[2]).len();
-    let wide =
-        |gate_m: f64| format!("association.gate = 1e3\nassociation.gate_m = {gate_m}\n{PLAIN}");
+    let wide = |gate_m: f64| {
+        format!("associator.config.gate = 1e3\nassociator.config.gate_m = {gate_m}\n{PLAIN}")
+    };
     let slow = World::of((0..3).map(walk)).run(&wide(0.3), 3, 0.5);
     assert_eq!(ids(&slow[2]), [1], "1 m in half a second");
     let fast = World::of((0..3).map(walk)).run(&wide(0.3), 3, 0.1);
@@ -195,7 +196,7 @@ fn the_silence_of_a_detector_on_anothers_frame_is_no_miss() {
         config = { script = 1 }
         [filter]
         plugin = 'steady'
-        [lifecycle]
+        [manager.config]
         drop_after_s = 0.05
         drop_after_misses = 1
         tentative_misses = 1
@@ -281,7 +282,7 @@ fn nobody_looks_for_a_person_behind_one_who_was_found() {
         let near = person(2.0, 0.0);
         if i < 5 { vec![near, person(4.0, 0.9)] } else { vec![near, person(4.0, 0.1)] }
     };
-    let far_config = format!("association.gate = 1e3\n{FOLLOWING}");
+    let far_config = format!("associator.config.gate = 1e3\n{FOLLOWING}");
     let world = World::of((0..8).map(people));
     world.run(&far_config, 8, 0.1);
     let asked = world.asked.lock().unwrap();
@@ -333,7 +334,7 @@ fn two_tracks_of_one_person_become_the_older_one() {
         let apart = (0.8 - 0.1 * f64::from(i)).max(0.28);
         vec![person(3.0, 0.0), person(3.0, apart)]
     };
-    let config = format!("{PLAIN}\n[lifecycle]\nduplicate_m = 0.3");
+    let config = format!("{PLAIN}\n[merge]\nduplicate_m = 0.3");
     let reports = World::of((0..12).map(approach)).run(&config, 12, 0.1);
     assert_eq!(ids(&reports[2]), [1, 2]);
     let ended: Vec<u32> = reports.iter().flat_map(|r| &r.ended).map(|id| id.0).collect();
@@ -343,7 +344,7 @@ fn two_tracks_of_one_person_become_the_older_one() {
 
 #[test]
 fn nobody_starts_where_somebody_is_seen() {
-    let config = format!("{PLAIN}\n[lifecycle]\nduplicate_m = 0.3");
+    let config = format!("{PLAIN}\n[merge]\nduplicate_m = 0.3");
     let one = vec![person(3.0, 0.0)];
     let frames = [one.clone(), vec![person(3.0, 0.0), person(3.0, 0.28)], one];
     let reports = World::of(frames).run(&config, 3, 0.1);
@@ -354,7 +355,7 @@ fn nobody_starts_where_somebody_is_seen() {
 #[test]
 fn too_many_detections_and_tracks_are_dropped_lowest_score_first() {
     let crowd = || (0..8).map(|i| scored(f64::from(i), person(3.0, f64::from(i) * 0.4 - 1.4)));
-    let config = format!("association.max_detections = 6\nlifecycle.max_tracks = 4\n{PLAIN}");
+    let config = format!("merge.max_detections = 6\nmerge.max_tracks = 4\n{PLAIN}");
     let report = World::of([crowd().collect()]).run(&config, 1, 0.1).remove(0);
     assert_eq!(report.funnel.count("too many detections"), 2);
     assert_eq!(report.funnel.count("track: too many"), 2);
@@ -364,7 +365,7 @@ fn too_many_detections_and_tracks_are_dropped_lowest_score_first() {
 
 #[test]
 fn overlap_in_the_image_can_decide_who_is_who() {
-    let config = format!("association.cost = 'overlap'\n{PLAIN}");
+    let config = format!("associator.config.cost = 'overlap'\n{PLAIN}");
     let walk = |i: i32| {
         let y = 0.04 * f64::from(i);
         vec![person(3.0, y - 1.0), person(3.0, y)]
@@ -385,6 +386,7 @@ fn the_same_run_gives_the_same_reports() {
         let reports = World::of((0..20).map(walk)).run(FOLLOWING, 20, 0.1);
         let timeless = reports.into_iter().map(|r| FrameReport {
             timings: vec![],
+            plugin_timings: vec![],
             weighing: Weighing { ms: 0.0, ..r.weighing },
             ..r
         });
@@ -406,7 +408,7 @@ fn all_stages_are_timed() {
 fn first_track_of_a_coat_stand(lifecycle: &str) -> Option<usize> {
     let score = |i: i32| if i % 4 == 3 { 1.5 } else { -2.0 };
     let world = World::of((0..20).map(|i| vec![scored(score(i), person(3.0, 0.0))]));
-    let reports = world.run(&format!("{PLAIN}[lifecycle]\n{lifecycle}"), 20, 0.1);
+    let reports = world.run(&format!("{PLAIN}[manager.config]\n{lifecycle}"), 20, 0.1);
     reports.iter().position(|report| !report.tracks.is_empty())
 }
 
@@ -420,8 +422,30 @@ fn where_somebody_was_rejected_one_look_starts_no_track() {
 fn who_comes_to_a_doubted_place_is_believed_a_little_later() {
     let score = |i: i32| if i < 10 { -3.0 } else { 2.5 };
     let world = World::of((0..20).map(|i| vec![scored(score(i), person(3.0, 0.0))]));
-    let reports = world.run(&format!("{PLAIN}[lifecycle]\ndoubt_s = 3.0"), 20, 0.1);
+    let reports = world.run(&format!("{PLAIN}[manager.config]\ndoubt_s = 3.0"), 20, 0.1);
     let first = reports.iter().position(|report| !report.tracks.is_empty()).unwrap();
     assert!((11..=13).contains(&first), "{first}");
     assert_eq!(reports[10].funnel.count("doubt"), 1);
+}
+
+/// An associator by name, and what it gives.
+fn associated(how: &str, frames: u64) -> Vec<FrameReport> {
+    let associator =
+        format!("[associator]\nplugin = 'weighing'\nconfig = {{ how = '{how}' }}\n{PLAIN}");
+    World::of((0..frames).map(|_| vec![person(3.0, 0.0)])).run(&associator, frames, 0.1)
+}
+
+#[test]
+fn a_track_that_is_probably_missed_is_missed() {
+    let seen = |how: &str| associated(how, 2)[1].tracks[0].seen;
+    assert!(seen("1.0") && seen("0.6") && !seen("0.4"));
+    let ended = associated("0.4", 9).iter().any(|report| !report.ended.is_empty());
+    assert!(ended, "never confirmed");
+}
+
+#[test]
+fn pairs_that_cannot_be_are_counted_and_form_no_match() {
+    let reports = associated("impossible", 2);
+    assert_eq!(reports[1].funnel.count("association not possible"), 3);
+    assert!(reports[1].candidates.iter().all(|c| !matches!(c.fate, Fate::Matched(_))));
 }

@@ -63,7 +63,7 @@ fn noise() -> Step {
 }
 
 fn start_and_gate() -> Step {
-    let keys = ["filter.config.initial_velocity_variance", "association.gate"];
+    let keys = ["filter.config.initial_velocity_variance", "associator.config.gate"];
     Step { goal: Goal::Place, tried: each_with_each(keys, &INITIAL, &GATES) }
 }
 

@@ -45,8 +45,8 @@ const LOWERED: [(&str, f64); 9] = [
     ("detectors.0.config.min_body", 0.5),
     ("detectors.0.config.discover_cost", 0.26),
     ("detectors.0.config.follow_cost", 0.36),
-    ("lifecycle.start_score", -4.0),
-    ("lifecycle.drop_score", -8.0),
+    ("manager.config.start_score", -4.0),
+    ("manager.config.drop_score", -8.0),
 ];
 /// Whom the rooms show, many moments of few scenes being worth less than few of many.
 const ROOMS: [(&str, &[(&str, &str)]); 3] = [

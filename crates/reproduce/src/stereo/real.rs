@@ -18,7 +18,7 @@ use crate::{Lab, ReproduceError};
 /// What detects in depth images of real rooms.
 const DETECTS: &str = "depth-ekf";
 /// What a config says of verifiers, and of what becomes of those whom they reject.
-const OF_VERIFIERS: [&str; 2] = ["verifiers", "lifecycle"];
+const OF_VERIFIERS: [&str; 2] = ["verifiers", "manager"];
 
 /// The detector of `depth-ekf` with the verifiers of another config, or without any.
 ///

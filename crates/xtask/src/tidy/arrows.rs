@@ -13,7 +13,9 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("learn", &["core"]),
     ("stereo", &["core", "vision"]),
     ("odometry", &["core"]),
-    ("pipeline", &["core", "stereo", "odometry"]),
+    ("assignment", &["core"]),
+    ("tracking", &["core"]),
+    ("pipeline", &["core", "stereo", "odometry", "tracking"]),
     ("log", &["core", "vision"]),
     ("sim", &["core"]),
     ("triangulate", &["core"]),
@@ -66,10 +68,11 @@ const ARROWS: &[(&str, &[&str])] = &[
 ];
 
 /// What a plugin may lean on.
-const OF_PLUGINS: &[&str] = &["core", "vision", "learn"];
+const OF_PLUGINS: &[&str] = &["core", "vision", "learn", "assignment"];
 
 /// What the tests of any crate may lean on in addition.
-const FOR_TESTS: &[&str] = &["core", "vision", "learn", "sim", "conformance", "testdata"];
+const FOR_TESTS: &[&str] =
+    &["core", "vision", "learn", "sim", "conformance", "testdata", "plugins"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {

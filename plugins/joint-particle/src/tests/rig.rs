@@ -65,7 +65,8 @@ impl Rig {
     }
 
     pub fn start(&mut self, id: u32, position: [f64; 3], sigmas: [f64; 3]) {
-        self.filter.start(TrackId(id), &sighting(Point3::from(position), sigmas));
+        let camera = frame(Motion::at_rest(0.1), None).camera;
+        self.filter.start(TrackId(id), &sighting(Point3::from(position), sigmas), &camera);
     }
 
     /// One frame without sightings, the robot at rest, a tenth of a second later.
@@ -84,9 +85,9 @@ impl Rig {
         let frame = frame(motion, colour);
         let matched: Vec<Matched<'_>> = sightings
             .iter()
-            .map(|(id, detection)| Matched { id: TrackId(*id), detection })
+            .map(|(id, detection)| Matched::certain(TrackId(*id), detection))
             .collect();
-        self.filter.predict(&motion);
+        self.filter.predict(&motion, &frame.camera);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
         let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood };
         let seen: std::collections::BTreeMap<TrackId, Support> =

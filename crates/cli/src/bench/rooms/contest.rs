@@ -58,7 +58,7 @@ impl Contestant {
         self.config.file.stem()
     }
 
-    /// Returns the settings in words: `lifecycle.confirm_hits = 2, ...`.
+    /// Returns the settings in words: `manager.config.confirm_hits = 2, ...`.
     pub fn words(&self, setting: usize) -> String {
         let word = |(tunable, value): (&Tunable, &toml::Value)| {
             format!("{} = {}", tunable.key, shown(value))

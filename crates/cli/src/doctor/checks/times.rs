@@ -43,7 +43,7 @@ pub fn rate(evidence: &Evidence) -> Option<Finding> {
         "a person who goes far between two images fits no track, and tracks are confirmed late",
     );
     Some(finding.remedy(format!(
-        "record 5 images a second or more; else\n[association] gate_m = {:.1}\n[lifecycle] \
+        "record 5 images a second or more; else\n[associator.config] gate_m = {:.1}\n[manager.config] \
          confirm_hits = 2",
         (1.0 + walked).min(3.0)
     )))

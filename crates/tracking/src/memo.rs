@@ -21,11 +21,11 @@ impl Derived for Memo {
 
 /// Who answers: all that an answer depends on, beside the frame and the question.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Identities {
+pub struct Identities {
     /// Of each detector; none of one that remembers, whose answers are its own.
-    pub(crate) detectors: Vec<Option<String>>,
+    pub detectors: Vec<Option<String>>,
     /// Of each verifier.
-    pub(crate) verifiers: Vec<String>,
+    pub verifiers: Vec<String>,
 }
 
 /// Returns what `find` finds, or what was found when the same was asked before.

@@ -12,7 +12,7 @@
 /// Costs must be finite.
 ///
 /// ```
-/// use tagalong_pipeline::assign;
+/// use tagalong_assignment::assign;
 /// let cost = [[Some(1.0), Some(2.0)], [Some(1.5), None]];
 /// assert_eq!(assign(2, &[9.0, 9.0], |r, c| cost[r][c]), [Some(1), Some(0)]);
 /// assert_eq!(assign(2, &[0.5, 9.0], |r, c| cost[r][c]), [None, Some(0)]);

@@ -1,20 +1,20 @@
-//! Places of which it was said before that nobody stands there.
+//! Places at which candidates were rejected before.
 //!
 //! A coat stand that was rejected in twenty frames is no person when the twenty-first
-//! look is mistaken. The log-odds of all newcomers at one place add up, and fade, as
-//! those of a track do (P4, section II-C, has neither; `algorithms`, section 3).
+//! look is mistaken. The log-odds of all candidates at one place add up, and fade, as
+//! those of a track do (P4, section II-C, has neither).
 
 use nalgebra::Point2;
 use tagalong_core::{Detection, Motion};
 
-use crate::LifecycleSettings;
+use crate::Config;
 
-/// Doubts fade out below this, log-odds.
+/// ClutterMap fade out below this, log-odds.
 const FAINT: f64 = 0.05;
 
-/// Where newcomers were rejected, in the frame of the robot.
+/// Where candidates were rejected, in the frame of the robot.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Doubts {
+pub(crate) struct ClutterMap {
     places: Vec<Place>,
 }
 
@@ -25,9 +25,9 @@ struct Place {
     log_odds: f64,
 }
 
-impl Doubts {
+impl ClutterMap {
     /// The robot moves on, time passes.
-    pub(crate) fn predict(&mut self, motion: &Motion, settings: &LifecycleSettings) {
+    pub(crate) fn predict(&mut self, motion: &Motion, settings: &Config) {
         let faded = (-motion.dt / settings.doubt_s).exp();
         for place in &mut self.places {
             place.at = motion.apply_to_point(place.at);
@@ -38,7 +38,7 @@ impl Doubts {
 
     /// The log-odds that a newcomer is a person, with all that was said of the place
     /// before. Below `start_score` they are remembered.
-    pub(crate) fn hear(&mut self, detection: &Detection, settings: &LifecycleSettings) -> f64 {
+    pub(crate) fn add_evidence(&mut self, detection: &Detection, settings: &Config) -> f64 {
         if settings.doubt_s <= 0.0 {
             return detection.score;
         }
@@ -71,76 +71,80 @@ impl Doubts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::doubles::{person, scored};
+    use crate::tests::{person, scored};
 
-    fn settings() -> LifecycleSettings {
-        LifecycleSettings { doubt_s: 2.0, ..LifecycleSettings::default() }
+    fn settings() -> Config {
+        Config { doubt_s: 2.0, ..Config::default() }
     }
 
     #[test]
     fn what_was_said_of_a_place_adds_up_to_a_limit() {
-        let mut doubts = Doubts::default();
-        let mut hear = |score| doubts.hear(&scored(score, person(3.0, 0.0)), &settings());
+        let mut clutter = ClutterMap::default();
+        let mut hear = |score| clutter.add_evidence(&scored(score, person(3.0, 0.0)), &settings());
         assert_eq!([-2.0, -3.0, -4.0].map(&mut hear), [-2.0, -5.0, -9.0]);
         assert_eq!([4.0, 1.0, 3.0, 3.0].map(hear), [-2.0, -1.0, 2.0, 3.0], "from -6 on");
     }
 
     #[test]
     fn each_newcomer_is_judged_alone_unless_the_config_says_otherwise() {
-        let (mut doubts, alone) = (Doubts::default(), LifecycleSettings::default());
+        let (mut clutter, alone) = (ClutterMap::default(), Config::default());
         for score in [-5.0, -5.0, 1.0] {
-            assert_eq!(doubts.hear(&scored(score, person(3.0, 0.0)), &alone), score);
+            assert_eq!(clutter.add_evidence(&scored(score, person(3.0, 0.0)), &alone), score);
         }
     }
 
     #[test]
     fn a_place_stays_where_it_is_while_the_robot_turns_and_drives() {
-        let mut doubts = Doubts::default();
-        doubts.hear(&scored(-4.0, person(3.0, 0.0)), &settings());
+        let mut clutter = ClutterMap::default();
+        clutter.add_evidence(&scored(-4.0, person(3.0, 0.0)), &settings());
         let turn = std::f64::consts::FRAC_PI_2;
         let motion = Motion { forward: 1.0, turn, ..Motion::at_rest(0.0) };
-        doubts.predict(&motion, &settings());
-        assert_eq!(doubts.clone().hear(&person(3.0, 0.0), &settings()), 1.0, "another place");
-        assert_eq!(doubts.hear(&person(0.0, -2.0), &settings()), -3.0);
+        clutter.predict(&motion, &settings());
+        assert_eq!(
+            clutter.clone().add_evidence(&person(3.0, 0.0), &settings()),
+            1.0,
+            "another place"
+        );
+        assert_eq!(clutter.add_evidence(&person(0.0, -2.0), &settings()), -3.0);
     }
 
     #[test]
-    fn doubts_fade() {
-        let mut doubts = Doubts::default();
-        doubts.hear(&scored(-4.0, person(3.0, 0.0)), &settings());
-        doubts.predict(&Motion::at_rest(2.0), &settings());
-        let log_odds = doubts.clone().hear(&person(3.0, 0.0), &settings());
+    fn clutter_fade() {
+        let mut clutter = ClutterMap::default();
+        clutter.add_evidence(&scored(-4.0, person(3.0, 0.0)), &settings());
+        clutter.predict(&Motion::at_rest(2.0), &settings());
+        let log_odds = clutter.clone().add_evidence(&person(3.0, 0.0), &settings());
         assert!((log_odds - (1.0 - 4.0 / std::f64::consts::E)).abs() < 1e-12, "{log_odds}");
-        doubts.predict(&Motion::at_rest(20.0), &settings());
-        assert!(doubts.places.is_empty());
+        clutter.predict(&Motion::at_rest(20.0), &settings());
+        assert!(clutter.places.is_empty());
     }
 
     #[test]
     fn each_place_is_doubted_by_itself() {
-        let mut doubts = Doubts::default();
-        doubts.hear(&scored(-4.0, person(3.0, 0.0)), &settings());
-        doubts.hear(&scored(-2.0, person(3.0, 0.5)), &settings());
-        let at = |y: f64| doubts.clone().hear(&person(3.0, y), &settings());
+        let mut clutter = ClutterMap::default();
+        clutter.add_evidence(&scored(-4.0, person(3.0, 0.0)), &settings());
+        clutter.add_evidence(&scored(-2.0, person(3.0, 0.5)), &settings());
+        let at = |y: f64| clutter.clone().add_evidence(&person(3.0, y), &settings());
         assert_eq!([0.0, 0.2, 0.29, 0.81].map(at), [-3.0, -3.0, -1.0, 1.0], "the nearest counts");
-        doubts.clear();
-        assert_eq!(doubts.hear(&person(3.0, 0.0), &settings()), 1.0);
+        clutter.clear();
+        assert_eq!(clutter.add_evidence(&person(3.0, 0.0), &settings()), 1.0);
     }
 
     #[test]
     fn who_is_believed_after_all_leaves_no_doubt() {
-        let mut doubts = Doubts::default();
-        doubts.hear(&scored(-1.0, person(3.0, 0.0)), &settings());
-        assert_eq!(doubts.hear(&scored(1.0, person(3.0, 0.0)), &settings()), 0.0);
-        assert_eq!(doubts.hear(&scored(1.0, person(3.0, 0.0)), &settings()), 1.0);
+        let mut clutter = ClutterMap::default();
+        clutter.add_evidence(&scored(-1.0, person(3.0, 0.0)), &settings());
+        assert_eq!(clutter.add_evidence(&scored(1.0, person(3.0, 0.0)), &settings()), 0.0);
+        assert_eq!(clutter.add_evidence(&scored(1.0, person(3.0, 0.0)), &settings()), 1.0);
     }
 
     #[test]
-    fn faint_doubts_are_forgotten() {
-        let mut doubts = Doubts::default();
-        doubts.hear(&scored(-0.06, person(3.0, 0.0)), &settings());
-        doubts.predict(&Motion::at_rest(0.1), &settings());
-        assert_eq!(doubts.places.len(), 1);
-        doubts.predict(&Motion::at_rest(0.5), &settings());
-        assert!(doubts.places.is_empty());
+    fn faint_clutter_are_forgotten() {
+        let mut clutter = ClutterMap::default();
+        clutter.add_evidence(&scored(-0.06, person(3.0, 0.0)), &settings());
+        clutter.predict(&Motion::at_rest(0.1), &settings());
+        assert_eq!(clutter.places.len(), 1);
+        clutter.predict(&Motion::at_rest(0.5), &settings());
+        assert!(clutter.places.is_empty());
     }
 }

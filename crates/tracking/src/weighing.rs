@@ -63,7 +63,21 @@ impl Likelihood for Metered<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::doubles::{frame, person};
+    use std::sync::Arc;
+
+    use nalgebra::Point3;
+    use tagalong_core::{Camera, Distortion, Images, Motion, Pinhole, Stamp};
+
+    fn frame() -> Frame {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+    }
+
+    fn standing() -> Person {
+        Person { position: Point3::new(3.0, 0.0, 1.6), velocity: nalgebra::Vector2::zeros() }
+    }
 
     struct Size;
 
@@ -75,9 +89,8 @@ mod tests {
 
     #[test]
     fn scenes_are_counted_and_the_answers_stay() {
-        let (metered, frame) = (Metered::new(&Size), frame(1, 0.0));
-        let velocity = nalgebra::Vector2::zeros();
-        let people = [Person { position: person(3.0, 0.0).position, velocity }; 5];
+        let (metered, frame) = (Metered::new(&Size), frame());
+        let people = [standing(); 5];
         let mut out = Vec::new();
         metered.log_likelihoods(&frame, &people, 2, &mut out).unwrap();
         assert_eq!(out, [2.0, 2.0, 1.0]);
@@ -97,9 +110,8 @@ mod tests {
                 Ok(vec![vec![Rect::new(1.0, 2.0, 3.0, 4.0)]; scene.len()])
             }
         }
-        let velocity = nalgebra::Vector2::zeros();
-        let people = [Person { position: person(3.0, 0.0).position, velocity }; 2];
-        let shapes = Metered::new(&Round).silhouettes(&frame(1, 0.0), &people).unwrap();
+        let people = [standing(); 2];
+        let shapes = Metered::new(&Round).silhouettes(&frame(), &people).unwrap();
         assert_eq!(shapes, vec![vec![Rect::new(1.0, 2.0, 3.0, 4.0)]; 2]);
     }
 }

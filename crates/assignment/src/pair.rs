@@ -1,0 +1,297 @@
+//! How well a track and a detection fit.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Detection, Rect, Track};
+
+use crate::assign;
+
+/// What makes a detection and a track fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cost {
+    /// Distance in the robot frame, in units of its uncertainty.
+    #[default]
+    Mahalanobis,
+    /// Overlap of the regions in the image.
+    Overlap,
+}
+
+/// How overlap is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Overlap {
+    /// Intersection over union.
+    #[default]
+    Iou,
+    /// Twice the intersection over the sum of the areas.
+    Dice,
+}
+
+/// How the fit of a pair is measured, and where it ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairCost {
+    /// The measure.
+    pub cost: Cost,
+    /// Mahalanobis: largest squared distance.
+    pub gate: f64,
+    /// Mahalanobis: largest distance on the floor, m, between frames that are close in time ...
+    pub gate_m: f64,
+    /// ... and by how much it grows with the time between them, m/s.
+    pub gate_speed_mps: f64,
+    /// Overlap: smallest overlap.
+    pub min_overlap: f64,
+    /// Overlap: its measure.
+    pub overlap: Overlap,
+}
+
+/// How well a pair fits: the cost, and the logarithm of the volume in which the detection could
+/// have been.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Squared Mahalanobis distance d², or -ln of the overlap.
+    pub cost: f64,
+    /// ln |S| of the innovation covariance S; 0 for overlaps.
+    pub log_volume: f64,
+}
+
+impl PairCost {
+    /// Returns how well a track and a detection fit, `dt_s` after the last frame; `None`
+    /// outside of the gate.
+    pub fn fit(&self, track: &Track, detection: &Detection, dt_s: f64) -> Option<Fit> {
+        match self.cost {
+            Cost::Mahalanobis => self.mahalanobis(track, detection, dt_s),
+            Cost::Overlap => {
+                let overlap = overlap(&track.estimate.region, &detection.region, self.overlap);
+                let fits = overlap >= self.min_overlap;
+                fits.then(|| Fit { cost: -overlap.ln(), log_volume: 0.0 })
+            }
+        }
+    }
+
+    /// Returns the largest cost within the gate.
+    pub fn at_gate(&self) -> f64 {
+        match self.cost {
+            Cost::Mahalanobis => self.gate,
+            Cost::Overlap => -self.min_overlap.ln(),
+        }
+    }
+
+    /// d² = ν' S⁻¹ ν with S = P + R.
+    fn mahalanobis(&self, track: &Track, detection: &Detection, dt_s: f64) -> Option<Fit> {
+        let innovation = detection.position - track.estimate.person.position;
+        if innovation.xy().norm() > self.gate_m + self.gate_speed_mps * dt_s {
+            return None;
+        }
+        let position = track.estimate.covariance.fixed_view::<3, 3>(0, 0);
+        let spread = (position + detection.covariance).cholesky()?;
+        let cost = innovation.dot(&spread.solve(&innovation));
+        let log_volume = 2.0 * spread.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+        let is_near = cost <= self.gate && log_volume.is_finite();
+        is_near.then_some(Fit { cost, log_volume })
+    }
+}
+
+/// Assigns detections to tracks so that the sum of the negative log-likelihoods d² + ln |S| is
+/// smallest; a nearly certain track must not lose its detection to one that could be anywhere.
+/// Leaving a track alone costs `miss_factor` times the cost at the gate. Returns the detection
+/// of each track.
+pub fn assign_fits(
+    fits: &[Vec<Option<Fit>>],
+    detections: usize,
+    at_gate: f64,
+    miss_factor: f64,
+) -> Vec<Option<usize>> {
+    let volumes = || fits.iter().flatten().flatten().map(|f| f.log_volume);
+    let least = volumes().fold(f64::INFINITY, f64::min);
+    let most = volumes().fold(f64::NEG_INFINITY, f64::max);
+    let range = if most > least { most - least } else { 0.0 };
+    let miss = miss_factor * at_gate + range;
+    assign(detections, &vec![miss; fits.len()], |row, column| {
+        fits[row][column].map(|f| f.cost + f.log_volume - least)
+    })
+}
+
+fn overlap(a: &Rect, b: &Rect, kind: Overlap) -> f64 {
+    match kind {
+        Overlap::Iou => a.iou(b),
+        Overlap::Dice => {
+            let sum = a.area() + b.area();
+            if sum > 0.0 { 2.0 * a.intersection(b).area() / sum } else { 0.0 }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use proptest::prelude::*;
+    use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, TrackId};
+
+    use super::*;
+
+    const DEFAULT: PairCost = PairCost {
+        cost: Cost::Mahalanobis,
+        gate: 11.34,
+        gate_m: 1.0,
+        gate_speed_mps: 1.5,
+        min_overlap: 0.3,
+        overlap: Overlap::Iou,
+    };
+
+    fn fit(track: &Track, detection: &Detection, dt_s: f64, settings: &PairCost) -> Option<Fit> {
+        settings.fit(track, detection, dt_s)
+    }
+
+    /// The assignment with a price of a miss in multiples of the cost at the gate.
+    fn associate(
+        tracks: &[Track],
+        detections: &[Detection],
+        fit: impl Fn(&Track, &Detection) -> Option<Fit>,
+        (settings, miss_factor): (&PairCost, f64),
+    ) -> Vec<Option<usize>> {
+        let row = |track| detections.iter().map(|detection| fit(track, detection)).collect();
+        let fits: Vec<Vec<Option<Fit>>> = tracks.iter().map(row).collect();
+        assign_fits(&fits, detections.len(), settings.at_gate(), miss_factor)
+    }
+
+    fn person(x: f64, y: f64) -> Detection {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let position = Point3::new(x, y, 1.6);
+        Detection {
+            region: Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            position,
+            covariance: Matrix3::identity() * 0.01,
+            score: 1.0,
+            source: "test",
+        }
+    }
+
+    fn track(position: Point3<f64>, covariance: SMatrix<f64, 5, 5>) -> Track {
+        let person = Person { position, velocity: Vector2::zeros() };
+        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 10.0, 10.0) };
+        Track {
+            id: TrackId(1),
+            estimate,
+            seen: false,
+            occluded: false,
+            confirmed: true,
+            age: 0,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_distance_is_that_of_the_inverted_matrix(
+            off in prop::array::uniform3(-0.6..0.6f64), spread in prop::array::uniform9(-0.3..0.3f64),
+        ) {
+            let settings = PairCost { gate: 1e9, ..DEFAULT };
+            let root = Matrix3::from_iterator(spread);
+            let covariance = root * root.transpose() + Matrix3::identity() * 0.01;
+            let detection = Detection { covariance, ..person(3.0, 0.0) };
+            let prior = SMatrix::<f64, 5, 5>::identity() * 0.04;
+            let track = track(detection.position - nalgebra::Vector3::from(off), prior);
+            let found = fit(&track, &detection, 0.1, &settings).unwrap();
+            let s = covariance + Matrix3::identity() * 0.04;
+            let nu = nalgebra::Vector3::from(off);
+            let expected = (nu.transpose() * s.try_inverse().unwrap() * nu).x;
+            prop_assert!((found.cost - expected).abs() < 1e-6 * (1.0 + expected));
+            prop_assert!((found.log_volume - s.determinant().ln()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_vague_track_does_not_take_the_detection_of_a_certain_one() {
+        let settings = DEFAULT;
+        let detection = person(3.0, 0.0);
+        let near = detection.position + nalgebra::Vector3::new(0.25, 0.0, 0.0);
+        let certain = track(near, SMatrix::identity() * 0.01);
+        let vague = track(near, SMatrix::identity() * 1.0);
+        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+        let given = associate(&[vague, certain], &[detection], fit, (&settings, 1.0));
+        assert_eq!(given, [None, Some(0)]);
+    }
+
+    #[test]
+    fn both_measures_of_overlap() {
+        let (a, b) = (Rect::new(0.0, 0.0, 2.0, 1.0), Rect::new(1.0, 0.0, 2.0, 1.0));
+        assert_eq!(overlap(&a, &b, Overlap::Iou), 1.0 / 3.0);
+        assert_eq!(overlap(&a, &b, Overlap::Dice), 0.5);
+        assert_eq!(overlap(&Rect::default(), &Rect::default(), Overlap::Dice), 0.0);
+    }
+
+    #[test]
+    fn nobody_is_found_outside_the_gate_or_farther_than_they_can_have_walked() {
+        let settings = PairCost { gate: 4.0, ..DEFAULT };
+        let fits = |off_m: f64, variance: f64, dt_s: f64| {
+            let detection = Detection { covariance: Matrix3::zeros(), ..person(3.0, 0.0) };
+            let at = detection.position - nalgebra::Vector3::new(off_m, 0.0, 0.0);
+            let track = track(at, SMatrix::identity() * variance);
+            fit(&track, &detection, dt_s, &settings).is_some()
+        };
+        assert!(fits(0.19, 0.01, 0.1) && !fits(0.21, 0.01, 0.1), "two standard deviations");
+        // One metre, and 1.5 m for each second.
+        assert!(fits(1.14, 1.0, 0.1) && !fits(1.16, 1.0, 0.1));
+        assert!(fits(1.74, 1.0, 0.5) && !fits(1.76, 1.0, 0.5));
+        assert!(!fits(0.0, 0.0, 0.1), "a place without any uncertainty can be held against none");
+    }
+
+    /// Two people far apart; one was not seen for long and may be anywhere.
+    #[test]
+    fn a_vague_track_takes_its_own_detection_as_well_as_a_certain_one_does() {
+        let settings = DEFAULT;
+        let detections = [person(3.0, 0.0), person(5.0, 2.0)];
+        let certain = track(detections[0].position, SMatrix::identity() * 1e-4);
+        let off = detections[1].position + nalgebra::Vector3::new(0.9, 0.0, 0.0);
+        let vague = track(off, SMatrix::identity() * 0.5);
+        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+        let given = associate(&[certain, vague.clone()], &detections, fit, (&settings, 1.0));
+        assert_eq!(given, [Some(0), Some(1)]);
+        let alone = associate(&[vague], &detections[1..], fit, (&settings, 1.0));
+        assert_eq!(alone, [Some(0)]);
+    }
+
+    /// The price of leaving a track alone decides whether a poor pair is better than none.
+    #[test]
+    fn a_track_is_rather_left_alone_where_a_miss_is_cheap() {
+        let detection = person(3.0, 0.0);
+        let off = detection.position + nalgebra::Vector3::new(0.42, 0.0, 0.0);
+        let track = track(off, SMatrix::identity() * 0.01);
+        let given = |miss_factor: f64| {
+            let settings = DEFAULT;
+            let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+            associate(
+                std::slice::from_ref(&track),
+                std::slice::from_ref(&detection),
+                fit,
+                (&settings, miss_factor),
+            )
+        };
+        // The squared distance is 0.42² / 0.02 = 8.8, the gate 11.34.
+        assert_eq!((given(1.0), given(0.5)), (vec![Some(0)], vec![None]));
+    }
+
+    #[test]
+    fn regions_that_overlap_enough_fit_the_better_the_more_they_overlap() {
+        let settings = PairCost { cost: Cost::Overlap, ..DEFAULT };
+        let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
+        track.estimate.region = Rect::new(0.0, 0.0, 10.0, 10.0);
+        let cost = |x: f64| {
+            let region = Rect::new(x, 0.0, 10.0, 10.0);
+            fit(&track, &Detection { region, ..person(9.0, 9.0) }, 0.1, &settings).map(|f| f.cost)
+        };
+        assert_eq!(cost(0.0), Some(0.0));
+        assert!((cost(5.0).unwrap() - 3.0_f64.ln()).abs() < 1e-12, "a third");
+        assert_eq!(cost(5.5), None, "less than 0.3");
+        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
+        let detection = Detection { region: Rect::new(5.0, 0.0, 10.0, 10.0), ..person(3.0, 0.0) };
+        let given = |miss_factor: f64| {
+            let (tracks, seen) = (std::slice::from_ref(&track), std::slice::from_ref(&detection));
+            associate(tracks, seen, fit, (&settings, miss_factor))
+        };
+        assert_eq!((given(1.0), given(0.9)), (vec![Some(0)], vec![None]));
+    }
+}

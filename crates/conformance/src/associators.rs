@@ -1,0 +1,153 @@
+//! What associators promise.
+
+use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+use tagalong_core::{
+    Association, Associations, Associator, Detection, Estimate, Gate, Person, Track, TrackId,
+};
+
+use crate::random::Random;
+use crate::scenes::{DT_S, level, sighting};
+use crate::subject::{From, Subject};
+use crate::{Check, Verdict, demand};
+
+pub(crate) const CHECKS: &[Check] = &[
+    ("nothing leads to no pair", nothing_leads_to_nothing),
+    ("pairs are possible", pairs_are_possible),
+    ("same input, same answer", repeatable),
+    ("each track gets its own detection", own_detections),
+    ("far detections are left alone", far_detections),
+];
+
+const GATE: Gate = Gate { dt_s: DT_S, start_log_odds: 0.0 };
+
+fn detection(x: f64, y: f64, random: &mut Random) -> Detection {
+    sighting(&Point3::new(x, y, 1.6), &level(), 0.05, random)
+}
+
+/// A track at a place, known to 0.2 m.
+fn track(id: u32, x: f64, y: f64) -> Track {
+    let position = Point3::new(x, y, 1.6);
+    let person = Person { position, velocity: Vector2::zeros() };
+    let covariance = SMatrix::<f64, 5, 5>::identity() * 0.04;
+    let estimate = Estimate { person, covariance, region: level().upper_body(&position) };
+    Track {
+        id: TrackId(id),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 10,
+        unseen_s: 0.0,
+        score: 2.0,
+    }
+}
+
+/// Tracks and detections all over the room, some of them doubtful.
+fn crowd(random: &mut Random, tracks: u32, detections: usize) -> (Vec<Track>, Vec<Detection>) {
+    let mut place = || (2.0 + 4.0 * random.uniform(), 3.0 * random.uniform() - 1.5);
+    let places: Vec<(f64, f64)> = (0..tracks as usize + detections).map(|_| place()).collect();
+    let (of_tracks, of_detections) = places.split_at(tracks as usize);
+    let tracks = (1..).zip(of_tracks).map(|(id, (x, y))| track(id, *x, *y)).collect();
+    let found = of_detections.iter().map(|(x, y)| {
+        let mut found = detection(*x, *y, random);
+        found.score = 6.0 * random.uniform() - 4.0;
+        found.covariance = Matrix3::identity() * (0.01 + 0.2 * random.uniform());
+        found
+    });
+    (tracks, found.collect())
+}
+
+fn nothing_leads_to_nothing(subject: &Subject<'_>) -> Verdict {
+    let mut associator = subject.associator(From::Nothing)?;
+    let (tracks, detections) = crowd(&mut Random::new(3), 2, 2);
+    for (name, tracks, detections) in [
+        ("no tracks and no detections", &[][..], &[][..]),
+        ("no tracks", &[], &detections[..]),
+        ("no detections", &tracks[..], &[]),
+    ] {
+        let answer = associator.associate(tracks, detections, &GATE);
+        demand(answer.pairs.is_empty(), || format!("with {name} it pairs {:?}", answer.pairs))?;
+    }
+    Ok(())
+}
+
+fn pairs_are_possible(subject: &Subject<'_>) -> Verdict {
+    let mut associator = subject.associator(From::Nothing)?;
+    let mut random = Random::new(5);
+    for round in 0..40 {
+        let (tracks, detections) = crowd(&mut random, round % 7, (round % 5) as usize * 2);
+        let answer = associator.associate(&tracks, &detections, &GATE);
+        for pair in &answer.pairs {
+            check_pair(associator.as_ref(), pair, &tracks, &detections)?;
+        }
+        check_sums(&answer, tracks.len(), detections.len())?;
+    }
+    Ok(())
+}
+
+fn check_pair(
+    associator: &dyn Associator,
+    pair: &Association,
+    tracks: &[Track],
+    detections: &[Detection],
+) -> Verdict {
+    let known = tracks.get(pair.track).zip(detections.get(pair.detection));
+    let (track, detection) = known.ok_or_else(|| format!("{pair:?} is of nothing it was given"))?;
+    let fits = GATE.admits(track, detection) && associator.fits(track, detection, &GATE);
+    demand(fits, || format!("{pair:?} is a pair that its own gate refuses"))?;
+    demand(pair.weight > 0.0 && pair.weight <= 1.0, || format!("{pair:?} has no probability"))
+}
+
+/// The weights of a track, and of a detection, are probabilities of alternatives.
+fn check_sums(answer: &Associations, tracks: usize, detections: usize) -> Verdict {
+    let sum = |is_of: &dyn Fn(&Association) -> bool| -> f64 {
+        answer.pairs.iter().filter(|pair| is_of(pair)).map(|pair| pair.weight).sum()
+    };
+    let of_tracks = (0..tracks).map(|at| sum(&|pair| pair.track == at));
+    let of_detections = (0..detections).map(|at| sum(&|pair| pair.detection == at));
+    let most = of_tracks.chain(of_detections).fold(0.0, f64::max);
+    demand(most <= 1.0 + 1e-9, || format!("weights sum to {most}: {:?}", answer.pairs))
+}
+
+fn repeatable(subject: &Subject<'_>) -> Verdict {
+    let defaults = subject.info.defaults();
+    let (tracks, detections) = crowd(&mut Random::new(8), 6, 8);
+    let answer = |from| -> Result<_, String> {
+        Ok(subject.associator(from)?.associate(&tracks, &detections, &GATE))
+    };
+    let (first, second) = (answer(From::Nothing)?, answer(From::Text(&defaults))?);
+    demand(first == second, || format!("two answers differ: {first:?} and {second:?}"))
+}
+
+/// Returns the most probable detection of each track.
+fn best(answer: &Associations, tracks: usize) -> Vec<Option<usize>> {
+    let of_track = |at: usize| {
+        let pairs = answer.pairs.iter().filter(|pair| pair.track == at);
+        pairs.max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|pair| pair.detection)
+    };
+    (0..tracks).map(of_track).collect()
+}
+
+fn own_detections(subject: &Subject<'_>) -> Verdict {
+    let mut associator = subject.associator(From::Nothing)?;
+    let mut random = Random::new(2);
+    let places = [(3.0, -1.2), (3.0, 0.0), (4.0, 1.3)];
+    let tracks: Vec<Track> = (1..).zip(places).map(|(id, (x, y))| track(id, x, y)).collect();
+    let detections: Vec<Detection> =
+        [2, 0, 1].map(|at: usize| detection(places[at].0, places[at].1, &mut random)).into();
+    let found = best(&associator.associate(&tracks, &detections, &GATE), 3);
+    demand(found == [Some(1), Some(2), Some(0)], || {
+        format!("three tracks apart, each detected, got the detections {found:?}")
+    })
+}
+
+fn far_detections(subject: &Subject<'_>) -> Verdict {
+    let mut associator = subject.associator(From::Nothing)?;
+    let mut random = Random::new(2);
+    let tracks = [track(1, 3.0, 0.0)];
+    let detections = [detection(6.0, 2.0, &mut random)];
+    let answer = associator.associate(&tracks, &detections, &GATE);
+    demand(answer.pairs.is_empty(), || {
+        format!("a detection 3.6 m away was given to the track: {:?}", answer.pairs)
+    })
+}

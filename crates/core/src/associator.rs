@@ -1,0 +1,101 @@
+use crate::{Detection, Track};
+
+/// The pairs of a track and a detection that are possible at all in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gate {
+    /// Time since the frame before, s.
+    pub dt_s: f64,
+    /// Log-odds from which on a detection may start a track
+    /// ([`crate::TrackManager::start_log_odds`]).
+    pub start_log_odds: f64,
+}
+
+impl Gate {
+    /// Returns false for a pair that is probably no person. A detection that alone would
+    /// start no track still supports a track that probably is a person, because log-odds
+    /// add up.
+    pub fn admits(&self, track: &Track, detection: &Detection) -> bool {
+        detection.score >= self.start_log_odds || track.score + detection.score >= 0.0
+    }
+}
+
+/// One detection as evidence of one track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Association {
+    /// Index of the track in what the associator was given.
+    pub track: usize,
+    /// Index of the detection.
+    pub detection: usize,
+    /// Probability that the detection is of the track, above 0 and at most 1. What is
+    /// missing from 1 in the sum over a track is the probability that the track was missed.
+    pub weight: f64,
+}
+
+/// What an associator decided about one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Associations {
+    /// The pairs. A track or a detection may appear in several of them.
+    pub pairs: Vec<Association>,
+    /// Indices of detections without a pair that start no track either.
+    pub spent: Vec<usize>,
+}
+
+impl Associations {
+    /// Returns the decisions of a one-to-one assignment: the detection of each track.
+    ///
+    /// ```
+    /// use tagalong_core::Associations;
+    /// let associations = Associations::one_to_one([Some(1), None]);
+    /// assert_eq!(associations.pairs[0].detection, 1);
+    /// assert_eq!(associations.pairs.len(), 1);
+    /// ```
+    pub fn one_to_one(detection_of_track: impl IntoIterator<Item = Option<usize>>) -> Self {
+        let rows = detection_of_track.into_iter().enumerate();
+        let pairs = rows
+            .filter_map(|(track, detection)| {
+                detection.map(|detection| Association { track, detection, weight: 1.0 })
+            })
+            .collect();
+        Self { pairs, spent: Vec::new() }
+    }
+}
+
+/// Decides which detections belong to which tracks: nearest neighbour, global assignment,
+/// several stages, or probabilities.
+///
+/// ```
+/// # use tagalong_core::*;
+/// /// Gives each track the first detection within a metre.
+/// struct FirstComer;
+///
+/// impl Associator for FirstComer {
+///     fn fits(&self, track: &Track, detection: &Detection, _: &Gate) -> bool {
+///         (track.estimate.person.position - detection.position).norm() < 1.0
+///     }
+///
+///     fn associate(&mut self, tracks: &[Track], found: &[Detection], gate: &Gate) -> Associations {
+///         let mut free = vec![true; found.len()];
+///         Associations::one_to_one(tracks.iter().map(|track| {
+///             let fits = |i: &usize| free[*i] && self.fits(track, &found[*i], gate);
+///             let index = (0..found.len()).find(fits)?;
+///             free[index] = false;
+///             Some(index)
+///         }))
+///     }
+/// }
+/// ```
+pub trait Associator: Send {
+    /// Returns true if the detection may be of the track. A search near a track takes the
+    /// best detection that fits. [`Gate::admits`] was asked before.
+    fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool;
+
+    /// Decides about all tracks of a frame at once. `tracks` are predicted to the frame,
+    /// near to far; pairs that [`Gate::admits`] or [`Associator::fits`] refuses must not be
+    /// returned. The same input gives the same answer.
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations;
+}

@@ -1,0 +1,283 @@
+//! The detections of one frame on their way through the tracker.
+
+use tagalong_core::{Associations, Detection, Funnel, Matched, Track, TrackId};
+
+use crate::{Candidate, Fate, MergeSettings};
+
+/// A detection about which nothing is decided yet.
+#[derive(Clone, Debug)]
+pub(crate) struct PendingDetection {
+    pub(crate) detection: Detection,
+    /// Index of the detector that made it.
+    pub(crate) detector: usize,
+    /// Its score before the verifiers.
+    pub(crate) detector_log_odds: f64,
+    /// Found by a search of the whole image.
+    pub(crate) discovered: bool,
+    /// `None` while nothing is decided.
+    pub(crate) fate: Option<Fate>,
+}
+
+impl PendingDetection {
+    pub(crate) fn new(detection: Detection, detector: usize, discovered: bool) -> Self {
+        let detector_log_odds = detection.score;
+        Self { detection, detector, detector_log_odds, discovered, fate: None }
+    }
+
+    /// Returns the detection with its fate.
+    pub(crate) fn with(self, fate: Fate) -> Self {
+        Self { fate: Some(fate), ..self }
+    }
+
+    /// Returns the test that a score below `start_log_odds` fails.
+    pub(crate) fn score_test(&self, start_log_odds: f64) -> &'static str {
+        if self.detector_log_odds >= start_log_odds { "verifier" } else { "score" }
+    }
+}
+
+/// All detections of one frame, and which of them belong to which tracks.
+#[derive(Default)]
+pub(crate) struct DetectionSet {
+    all: Vec<PendingDetection>,
+    /// Track, index of the detection, weight.
+    pairs: Vec<(TrackId, usize, f64)>,
+}
+
+impl DetectionSet {
+    pub(crate) fn add(&mut self, pending: impl IntoIterator<Item = PendingDetection>) {
+        self.all.extend(pending);
+    }
+
+    /// Returns the detections with their tracks, for the filter.
+    pub(crate) fn matched(&self) -> Vec<Matched<'_>> {
+        let matched = |(id, index, weight): &(TrackId, usize, f64)| Matched {
+            id: *id,
+            detection: &self.all[*index].detection,
+            weight: *weight,
+        };
+        self.pairs.iter().map(matched).collect()
+    }
+
+    /// Returns the most probable detection of a track that the filter accepted.
+    pub(crate) fn of_track(&self, id: TrackId) -> Option<&PendingDetection> {
+        self.heaviest(id).map(|index| &self.all[index])
+    }
+
+    /// Returns the probability that a track was detected at all.
+    pub(crate) fn weight_of_track(&self, id: TrackId) -> f64 {
+        self.pairs.iter().filter(|(track, ..)| *track == id).map(|(.., weight)| weight).sum()
+    }
+
+    fn heaviest(&self, id: TrackId) -> Option<usize> {
+        let of_track = self.pairs.iter().filter(|(track, ..)| *track == id);
+        of_track.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(_, index, _)| *index)
+    }
+
+    /// Changes the detections of a track, and returns the most probable one afterwards.
+    pub(crate) fn change_of_track(
+        &mut self,
+        id: TrackId,
+        mut change: impl FnMut(&mut Detection),
+    ) -> Option<&Detection> {
+        for (_, index, _) in self.pairs.iter().filter(|(track, ..)| *track == id) {
+            change(&mut self.all[*index].detection);
+        }
+        self.heaviest(id).map(|index| &self.all[index].detection)
+    }
+
+    /// Returns the indices of detections about which nothing is decided.
+    pub(crate) fn undecided(&self) -> Vec<usize> {
+        (0..self.all.len()).filter(|i| self.all[*i].fate.is_none()).collect()
+    }
+
+    /// Returns the detections about which nothing is decided.
+    pub(crate) fn undecided_detections(&self) -> Vec<Detection> {
+        self.undecided().into_iter().map(|i| self.all[i].detection.clone()).collect()
+    }
+
+    pub(crate) fn get(&self, index: usize) -> &PendingDetection {
+        &self.all[index]
+    }
+
+    pub(crate) fn settle(&mut self, index: usize, fate: Fate) {
+        self.all[index].fate = Some(fate);
+    }
+
+    /// Keeps one detection for each person, the one with the best score: two detectors may
+    /// have found the same one, and so may the searches near two tracks.
+    pub(crate) fn merge(&mut self, settings: &MergeSettings) {
+        let mut order = self.undecided();
+        order.sort_by(|a, b| self.score(*b).total_cmp(&self.score(*a)));
+        let mut kept: Vec<usize> = Vec::new();
+        for index in order {
+            let is_same = |other: &&usize| {
+                is_same_person(&self.all[index].detection, &self.all[**other].detection, settings)
+            };
+            match kept.iter().find(is_same).copied() {
+                Some(better) => {
+                    self.all[better].discovered |= self.all[index].discovered;
+                    self.settle(index, Fate::Dropped("same person"));
+                }
+                None => kept.push(index),
+            }
+        }
+    }
+
+    /// Drops the lowest scores where there are too many.
+    pub(crate) fn limit(&mut self, most: usize) {
+        let mut open = self.undecided();
+        let excess = self.all.len().saturating_sub(most).min(open.len());
+        open.sort_by(|a, b| self.score(*a).total_cmp(&self.score(*b)));
+        for index in open.into_iter().take(excess) {
+            self.settle(index, Fate::Dropped("too many detections"));
+        }
+    }
+
+    /// Takes over what the associator decided about the detections at the indices `open`.
+    pub(crate) fn take_over(&mut self, answer: &Associations, tracks: &[Track], open: &[usize]) {
+        for pair in &answer.pairs {
+            self.pairs.push((tracks[pair.track].id, open[pair.detection], pair.weight));
+        }
+        for &index in open {
+            let of_detection = self.pairs.iter().filter(|(_, detection, _)| *detection == index);
+            if let Some((id, ..)) = of_detection.max_by(|a, b| a.2.total_cmp(&b.2)) {
+                self.all[index].fate = Some(Fate::Matched(*id));
+            }
+        }
+        for spent in answer.spent.iter().filter_map(|at| open.get(*at)) {
+            self.all[*spent].fate.get_or_insert(Fate::Dropped("associator"));
+        }
+    }
+
+    /// Drops what was given to tracks that the filter does not support after all.
+    pub(crate) fn reject(&mut self, is_supported: impl Fn(TrackId) -> bool, test: &'static str) {
+        self.pairs.retain(|(id, ..)| is_supported(*id));
+        for pending in &mut self.all {
+            if let Some(Fate::Matched(id)) = pending.fate
+                && !is_supported(id)
+            {
+                pending.fate = Some(Fate::Dropped(test));
+            }
+        }
+    }
+
+    /// Returns the candidates of the report; what was dropped is counted.
+    pub(crate) fn into_candidates(self, funnel: &mut Funnel) -> Vec<Candidate> {
+        let candidate = |pending: PendingDetection| {
+            let fate = pending.fate.unwrap_or(Fate::Dropped("score"));
+            if let Fate::Dropped(test) = fate {
+                funnel.drop_at(test, pending.detection.region);
+            }
+            Candidate { detection: pending.detection, fate }
+        };
+        self.all.into_iter().map(candidate).collect()
+    }
+
+    fn score(&self, index: usize) -> f64 {
+        self.all[index].detection.score
+    }
+}
+
+/// Returns true if two detections are of one person.
+fn is_same_person(a: &Detection, b: &Detection, settings: &MergeSettings) -> bool {
+    let apart = (a.position - b.position).xy();
+    if apart.norm() < settings.same_person_m {
+        return true;
+    }
+    let spread = (a.covariance + b.covariance).fixed_view::<2, 2>(0, 0).into_owned();
+    let contradicts =
+        spread.cholesky().is_none_or(|s| apart.dot(&s.solve(&apart)) > CHI_SQUARED_2_99);
+    !contradicts && a.region.iou(&b.region) > settings.same_person_iou
+}
+
+/// The 99 % point of chi-squared with two degrees of freedom.
+const CHI_SQUARED_2_99: f64 = 9.21;
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3};
+    use tagalong_core::{Association, Camera, Distortion, Pinhole, Rect};
+
+    use super::*;
+
+    fn person(x: f64, y: f64) -> Detection {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let position = Point3::new(x, y, 1.6);
+        Detection {
+            region: Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            position,
+            covariance: Matrix3::identity() * 0.01,
+            score: 1.0,
+            source: "test",
+        }
+    }
+
+    #[test]
+    fn two_people_one_behind_the_other_are_two_unless_their_range_is_unknown() {
+        let settings = MergeSettings::default();
+        let (near, far) = (person(3.0, 0.0), person(3.6, 0.0));
+        assert!(near.region.iou(&far.region) > settings.same_person_iou);
+        assert!(!is_same_person(&near, &far, &settings));
+        let vague = |d: Detection| Detection { covariance: Matrix3::identity() * 4.0, ..d };
+        assert!(is_same_person(&vague(near), &vague(far), &settings));
+    }
+
+    #[test]
+    fn detections_at_one_place_are_of_one_person_whatever_the_image_says() {
+        let settings = MergeSettings::default();
+        let at = |x: f64, y: f64, region_x: f64| {
+            let region = Rect::new(region_x, 0.0, 100.0, 100.0);
+            Detection { region, covariance: Matrix3::identity() * 0.02, ..person(x, y) }
+        };
+        let first = at(3.0, 0.0, 0.0);
+        assert!(is_same_person(&first, &at(3.0, 0.24, 500.0), &settings));
+        assert!(!is_same_person(&first, &at(3.0, 0.26, 500.0), &settings));
+        // 0.6 m are three standard deviations of the difference: squared 9, of 9.21.
+        assert!(is_same_person(&first, &at(3.0, 0.6, 30.0), &settings));
+        assert!(!is_same_person(&first, &at(3.0, 0.61, 30.0), &settings));
+        assert!(!is_same_person(&first, &at(3.0, 0.6, 34.0), &settings), "they overlap by less");
+    }
+
+    fn tracks(ids: &[u32]) -> Vec<Track> {
+        let person = tagalong_core::Person {
+            position: Point3::new(3.0, 0.0, 1.6),
+            velocity: nalgebra::Vector2::zeros(),
+        };
+        let estimate = tagalong_core::Estimate {
+            person,
+            covariance: nalgebra::SMatrix::identity(),
+            region: Rect::default(),
+        };
+        let track = |id: &u32| Track {
+            id: TrackId(*id),
+            estimate: estimate.clone(),
+            seen: false,
+            occluded: false,
+            confirmed: true,
+            age: 0,
+            unseen_s: 0.0,
+            score: 1.0,
+        };
+        ids.iter().map(track).collect()
+    }
+
+    /// Track 7 has two alternatives; track 9 shares the second one, and spends the third.
+    #[test]
+    fn a_detection_goes_to_the_track_that_it_is_most_probably_of() {
+        let mut set = DetectionSet::default();
+        let detections = [person(2.0, 0.0), person(3.0, 0.0), person(4.0, 0.0), person(5.0, 0.0)];
+        set.add(detections.map(|detection| PendingDetection::new(detection, 0, true)));
+        let pair = |track, detection, weight| Association { track, detection, weight };
+        let pairs = vec![pair(0, 0, 0.6), pair(0, 1, 0.3), pair(1, 1, 0.5)];
+        let answer = Associations { pairs, spent: vec![2] };
+        set.take_over(&answer, &tracks(&[7, 9]), &[0, 1, 2, 3]);
+        let fates: Vec<_> = (0..4).map(|i| set.get(i).fate).collect();
+        let (first, second) = (Fate::Matched(TrackId(7)), Fate::Matched(TrackId(9)));
+        assert_eq!(fates, [Some(first), Some(second), Some(Fate::Dropped("associator")), None]);
+        assert_eq!(set.of_track(TrackId(7)).unwrap().detection.position.x, 2.0);
+        assert_eq!(set.matched().len(), 3);
+        set.reject(|id| id == TrackId(7), "filter");
+        assert_eq!((set.matched().len(), set.get(1).fate), (2, Some(Fate::Dropped("filter"))));
+    }
+}

@@ -1,0 +1,53 @@
+//! The tracker: [`Tracker::step`] takes one frame through all stages, in the order in which
+//! the modules stand below, and returns a [`TrackingReport`] with the tracks and, for every
+//! candidate that led to none, the test that dropped it.
+//!
+//! | stage | module | decided by |
+//! |---|---|---|
+//! | stamps that jump | `clock` | [`ClockSettings`] |
+//! | depth and motion completed | `preprocess` | each [`Preprocessor`] |
+//! | tracks predicted | | the filter |
+//! | tracks searched for, image searched for new people | `search` | detectors, verifiers |
+//! | detections of one person merged | `detections` | [`MergeSettings`] |
+//! | detections associated with tracks | | the associator |
+//! | detections of half-hidden people made less certain | `occlusion` | [`OcclusionSettings`] |
+//! | filter updated | | the filter |
+//! | tracks started, confirmed, ended | `table` | the track manager |
+//! | tracks of one person merged | `duplicates` | [`MergeSettings`] |
+//!
+//! The tracker itself decides nothing about people: it asks the plugins in this order, checks
+//! their answers, and counts what they drop.
+//!
+//! # Invariants
+//!
+//! * Time never runs backwards into a plugin.
+//! * The number of a track is never used twice, not even after a reset.
+//! * Nothing is dropped silently: each loss is counted in the funnel.
+//! * No number that is not finite leaves the tracker.
+//! * Coasting is no mode: a predicted occlusion, a verifier's wrong no and a detector's miss
+//!   look the same to the filter, namely as no evidence.
+//! * Timings influence nothing.
+
+mod clock;
+mod detections;
+mod duplicates;
+mod memo;
+mod occlusion;
+mod preprocess;
+mod report;
+mod search;
+mod settings;
+mod stage;
+mod table;
+mod tracker;
+mod weighing;
+
+pub use memo::Identities;
+pub use preprocess::{Preprocessed, Preprocessor};
+pub use report::{Candidate, Fate, Outcome, TrackingReport};
+pub use search::DetectorSlot;
+pub use settings::{
+    ClockSettings, DetectorSettings, MergeSettings, OcclusionSettings, Role, TrackerSettings,
+};
+pub use tracker::{Parts, STAGES, Tracked, Tracker};
+pub use weighing::Weighing;

@@ -1,0 +1,52 @@
+use nalgebra::Point2;
+use tagalong_core::{Frame, Funnel, Guarded, Motion, StepError};
+
+use crate::stage::StageLog;
+
+/// What a preprocessor completed.
+#[derive(Default)]
+pub struct Preprocessed {
+    /// The frame with what it lacked; `None` if it is used as it is.
+    pub frame: Option<Frame>,
+    /// A better estimate of the robot's motion since the last processed frame; `None` if there
+    /// is none.
+    pub motion: Option<Motion>,
+}
+
+/// Completes frames before people are searched for in them: depth from a stereo pair, or
+/// egomotion from the images.
+pub trait Preprocessor: Send {
+    /// Completes a frame. `motion` is the robot's motion since the last processed frame, `None`
+    /// after a jump of the clock; `people` are the positions of all tracks before that motion,
+    /// m on the floor, by number.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] if the frame lacks what is needed.
+    fn process(
+        &mut self,
+        frame: &Frame,
+        motion: Option<Motion>,
+        people: &[Point2<f64>],
+        funnel: &mut Funnel,
+    ) -> tagalong_core::Result<Preprocessed>;
+}
+
+/// Takes a frame through all preprocessors; each sees what those before it completed.
+pub(crate) fn preprocess(
+    preprocessors: &mut [Guarded<dyn Preprocessor>],
+    frame: &Frame,
+    mut motion: Option<Motion>,
+    people: &[Point2<f64>],
+    log: &mut StageLog,
+) -> Result<(Option<Frame>, Option<Motion>), StepError> {
+    let mut completed: Option<Frame> = None;
+    for preprocessor in preprocessors {
+        let input = completed.as_ref().unwrap_or(frame);
+        let funnel = &mut log.funnel;
+        let output = preprocessor
+            .call(frame.index, |plugin| plugin.process(input, motion, people, funnel))?;
+        motion = output.motion.or(motion);
+        completed = output.frame.or(completed);
+    }
+    Ok((completed, motion))
+}

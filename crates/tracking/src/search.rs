@@ -1,0 +1,148 @@
+//! Detectors asked about a frame, and verifiers about their answers.
+
+use tagalong_core::{
+    Detector, Frame, Funnel, Guarded, Likelihood, Search, StepError, Track, Verifier,
+};
+
+use crate::detections::PendingDetection;
+use crate::memo::{self, Identities};
+use crate::{DetectorSettings, Fate, Role};
+
+/// Log-odds that stand for certainty. Larger ones would drown all others.
+const CERTAIN: f64 = 100.0;
+
+/// A detector and its settings.
+pub struct DetectorSlot {
+    /// Its settings.
+    pub settings: DetectorSettings,
+    /// The plugin.
+    pub plugin: Guarded<dyn Detector>,
+}
+
+impl DetectorSlot {
+    /// Returns true if the config gives the detector this role.
+    pub fn has(&self, role: Role) -> bool {
+        self.settings.roles.contains(&role)
+    }
+
+    /// Returns true if the detector works on the frame with this count from 0.
+    pub(crate) fn is_due(&self, frame: u64) -> bool {
+        frame % u64::from(self.settings.every.max(1)) == u64::from(self.settings.offset)
+    }
+}
+
+/// All detectors and verifiers.
+pub(crate) struct SearchStage {
+    pub(crate) detectors: Vec<DetectorSlot>,
+    pub(crate) verifiers: Vec<Guarded<dyn Verifier>>,
+    /// Set where answers are shared with other pipelines.
+    pub(crate) shared: Option<Identities>,
+}
+
+impl SearchStage {
+    /// Returns the detectors that work on the frame with this count from 0.
+    pub(crate) fn due(&self, frame: u64) -> Vec<usize> {
+        (0..self.detectors.len()).filter(|i| self.detectors[*i].is_due(frame)).collect()
+    }
+
+    /// Returns those of `due` with a role.
+    pub(crate) fn with_role(&self, due: &[usize], role: Role) -> Vec<usize> {
+        due.iter().copied().filter(|i| self.detectors[*i].has(role)).collect()
+    }
+
+    /// Returns the likelihood that weighs scenes for the filter, if a detector has that role.
+    pub(crate) fn likelihood(&self) -> Option<&dyn Likelihood> {
+        self.detectors.iter().find(|slot| slot.has(Role::Weigh))?.plugin.plugin().likelihood()
+    }
+
+    /// Returns the best detection of one track that fails no test, if there is one, and the
+    /// others with the tests that they failed.
+    pub(crate) fn find_track(
+        &mut self,
+        frame: &Frame,
+        detectors: &[usize],
+        track: &Track,
+        mut failed_test: impl FnMut(&PendingDetection) -> Result<Option<&'static str>, StepError>,
+        funnel: &mut Funnel,
+    ) -> Result<(Option<PendingDetection>, Vec<PendingDetection>), StepError> {
+        let mut best: Option<PendingDetection> = None;
+        let mut dropped = Vec::new();
+        for &index in detectors {
+            for found in self.detect(frame, index, &Search::Near(track), funnel)? {
+                let is_better =
+                    |best: &PendingDetection| found.detection.score > best.detection.score;
+                let test = match failed_test(&found)? {
+                    None if !best.as_ref().is_none_or(is_better) => Some(NOT_BEST),
+                    test => test,
+                };
+                let loser = match test {
+                    Some(test) => Some((found, test)),
+                    None => best.replace(found).map(|worse| (worse, NOT_BEST)),
+                };
+                dropped.extend(loser.map(|(loser, test)| loser.with(Fate::Dropped(test))));
+            }
+        }
+        Ok((best, dropped))
+    }
+
+    /// Asks a detector, and the verifiers about its answers.
+    pub(crate) fn detect(
+        &mut self,
+        frame: &Frame,
+        index: usize,
+        search: &Search<'_>,
+        funnel: &mut Funnel,
+    ) -> Result<Vec<PendingDetection>, StepError> {
+        let slot = &mut self.detectors[index];
+        let identity = self.shared.as_ref().and_then(|shared| shared.detectors[index].as_deref());
+        let found = slot.plugin.call(frame.index, |detector| match identity {
+            Some(identity) => memo::found(identity, frame, search, funnel, |funnel| {
+                detector.detect(frame, search, funnel)
+            }),
+            None => detector.detect(frame, search, funnel),
+        })?;
+        let discovered = matches!(search, Search::Everywhere { .. });
+        let mut passed = Vec::new();
+        for detection in found {
+            if !detection.is_sane() {
+                funnel.drop_many("detection not finite", 1);
+                continue;
+            }
+            let pending = PendingDetection::new(detection, index, discovered);
+            if self.detectors[index].settings.verify {
+                passed.extend(self.verify(frame, pending, funnel)?);
+            } else {
+                passed.push(pending);
+            }
+        }
+        Ok(passed)
+    }
+
+    /// Adds the verifiers' log-odds to the score.
+    fn verify(
+        &mut self,
+        frame: &Frame,
+        mut pending: PendingDetection,
+        funnel: &mut Funnel,
+    ) -> Result<Option<PendingDetection>, StepError> {
+        let mut sum = 0.0;
+        for (at, verifier) in self.verifiers.iter_mut().enumerate() {
+            let candidate = &pending.detection;
+            sum += verifier.call(frame.index, |verifier| match &self.shared {
+                Some(shared) => memo::margin(&shared.verifiers[at], frame, candidate, || {
+                    verifier.margin(frame, candidate)
+                }),
+                None => verifier.margin(frame, candidate),
+            })?;
+        }
+        if !sum.is_finite() {
+            funnel.drop_at("verifier not finite", pending.detection.region);
+            return Ok(None);
+        }
+        pending.detection.score = (pending.detection.score + sum).clamp(-CERTAIN, CERTAIN);
+        Ok(Some(pending))
+    }
+}
+
+/// The test that the weaker of two detections of one track fails.
+const NOT_BEST: &str = "not the best sighting";

@@ -1,0 +1,174 @@
+//! The tracks, with what is known of each beside the filter's state.
+
+use std::collections::BTreeMap;
+
+use tagalong_core::{Camera, Estimate, Observation, Track, TrackHealth, TrackId};
+
+use crate::occlusion::range_m;
+
+/// What is kept of a track.
+#[derive(Clone, Debug)]
+struct Record {
+    health: TrackHealth,
+    /// Index of the detector that found it last.
+    detector: usize,
+    observation: Observation,
+    age: u32,
+    unseen_s: f64,
+}
+
+/// All tracks of a tracker. Numbers rise, and are never used twice.
+#[derive(Default)]
+pub(crate) struct TrackTable {
+    records: BTreeMap<TrackId, Record>,
+    started: u32,
+}
+
+impl TrackTable {
+    pub(crate) fn ids(&self) -> Vec<TrackId> {
+        self.records.keys().copied().collect()
+    }
+
+    pub(crate) fn tentative_ids(&self) -> Vec<TrackId> {
+        let tentative = self.records.iter().filter(|(_, record)| !record.health.confirmed);
+        tentative.map(|(id, _)| *id).collect()
+    }
+
+    pub(crate) fn contains(&self, id: TrackId) -> bool {
+        self.records.contains_key(&id)
+    }
+
+    /// Returns the number of the next track; `None` when all are used up.
+    pub(crate) fn next_id(&self) -> Option<TrackId> {
+        self.started.checked_add(1).map(TrackId)
+    }
+
+    /// Starts the track [`TrackTable::next_id`].
+    pub(crate) fn start(&mut self, id: TrackId, health: TrackHealth, detector: usize) {
+        self.started = id.0;
+        let observation = Observation::Started;
+        let record = Record { health, detector, observation, age: 0, unseen_s: 0.0 };
+        self.records.insert(id, record);
+    }
+
+    pub(crate) fn end(&mut self, id: TrackId) {
+        self.records.remove(&id);
+    }
+
+    /// Lets time pass for all tracks.
+    pub(crate) fn age(&mut self, dt_s: f64) {
+        for record in self.records.values_mut() {
+            record.age = record.age.saturating_add(1);
+            record.unseen_s += dt_s;
+        }
+    }
+
+    /// Notes what a frame says of a track, and the detector that found it, if one did.
+    pub(crate) fn observe(&mut self, id: TrackId, observed: Observation, by: Option<usize>) {
+        let Some(record) = self.records.get_mut(&id) else { return };
+        record.observation = observed;
+        record.detector = by.unwrap_or(record.detector);
+        if observed.is_supported() {
+            record.unseen_s = 0.0;
+        }
+    }
+
+    pub(crate) fn set_health(&mut self, id: TrackId, health: TrackHealth) {
+        if let Some(record) = self.records.get_mut(&id) {
+            record.health = health;
+        }
+    }
+
+    pub(crate) fn observation(&self, id: TrackId) -> Option<Observation> {
+        self.records.get(&id).map(|record| record.observation)
+    }
+
+    /// Returns the detector that found a track last.
+    pub(crate) fn detector(&self, id: TrackId) -> Option<usize> {
+        self.records.get(&id).map(|record| record.detector)
+    }
+
+    /// Returns the tracks that are too many, lowest scores first, and of equals the youngest.
+    pub(crate) fn too_many(&self, most: usize) -> Vec<TrackId> {
+        let records = self.records.iter();
+        let mut all: Vec<_> = records.map(|(id, record)| (record.health.log_odds, *id)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        let excess = all.len().saturating_sub(most);
+        all.into_iter().take(excess).map(|(_, id)| id).collect()
+    }
+
+    /// Returns the tracks of these estimates, near to far.
+    pub(crate) fn tracks(
+        &self,
+        estimates: BTreeMap<TrackId, Estimate>,
+        camera: &Camera,
+    ) -> Vec<Track> {
+        let mut tracks: Vec<Track> =
+            estimates.into_iter().filter_map(|(id, estimate)| self.track(id, estimate)).collect();
+        let range = |track: &Track| range_m(&track.estimate.person.position, camera);
+        tracks.sort_by(|a, b| range(a).total_cmp(&range(b)).then(a.id.cmp(&b.id)));
+        tracks
+    }
+
+    fn track(&self, id: TrackId, estimate: Estimate) -> Option<Track> {
+        let record = self.records.get(&id)?;
+        Some(Track {
+            id,
+            estimate,
+            seen: record.observation.is_supported(),
+            occluded: record.observation == Observation::Occluded,
+            confirmed: record.health.confirmed,
+            age: record.age,
+            unseen_s: record.unseen_s,
+            score: record.health.log_odds,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEALTH: TrackHealth = TrackHealth { confirmed: false, log_odds: 1.0 };
+
+    #[test]
+    fn a_number_is_never_used_twice() {
+        let mut table = TrackTable::default();
+        for expected in 1..=3 {
+            let id = table.next_id().unwrap();
+            assert_eq!(id, TrackId(expected));
+            table.start(id, HEALTH, 0);
+            table.end(id);
+        }
+        let mut full = TrackTable { started: u32::MAX, ..TrackTable::default() };
+        assert_eq!(full.next_id(), None);
+        full.end(TrackId(1));
+        assert!(full.ids().is_empty());
+    }
+
+    #[test]
+    fn the_lowest_scores_are_too_many_and_of_equals_the_youngest() {
+        let mut table = TrackTable::default();
+        for log_odds in [1.0, 3.0, 1.0, 2.0] {
+            let id = table.next_id().unwrap();
+            table.start(id, TrackHealth { log_odds, ..HEALTH }, 0);
+        }
+        assert_eq!(table.too_many(2), [TrackId(3), TrackId(1)]);
+        assert_eq!(table.too_many(4), []);
+    }
+
+    #[test]
+    fn only_support_ends_the_time_unseen() {
+        let mut table = TrackTable::default();
+        table.start(TrackId(1), HEALTH, 2);
+        for observation in [Observation::Missed, Observation::Occluded, Observation::OutOfView] {
+            table.age(0.5);
+            table.observe(TrackId(1), observation, None);
+        }
+        let record = &table.records[&TrackId(1)];
+        assert_eq!((record.age, record.unseen_s, record.detector), (3, 1.5, 2));
+        table.observe(TrackId(1), Observation::Detected { log_odds: 1.0 }, Some(4));
+        let record = &table.records[&TrackId(1)];
+        assert_eq!((record.unseen_s, record.detector), (0.0, 4));
+    }
+}

@@ -1,0 +1,598 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Point2, Point3};
+use tagalong_core::{
+    Associations, Associator, Detection, Estimate, Evidence, Filter, Frame, Gate, Guarded,
+    Initiation, Likelihood, Motion, Observation, ObservedTrack, Search, StepError, Support, Track,
+    TrackId, TrackManager, Unassociated, Verifier,
+};
+
+use crate::clock::{Clock, Tick};
+use crate::detections::{DetectionSet, PendingDetection};
+use crate::duplicates::DuplicateFinder;
+use crate::memo::Identities;
+use crate::occlusion::{Cover, Visibility, aside, cover, cover_seen, part_shown, visibility};
+use crate::preprocess::preprocess;
+use crate::search::SearchStage;
+use crate::stage::StageLog;
+use crate::table::TrackTable;
+use crate::weighing::Metered;
+use crate::{
+    DetectorSlot, Fate, MergeSettings, Outcome, Preprocessor, Role, TrackerSettings, TrackingReport,
+};
+
+/// The stages that [`TrackingReport::timings`] names, in their order.
+pub const STAGES: [&str; 8] =
+    ["preprocess", "predict", "track", "discover", "associate", "update", "manage", "learn"];
+
+/// What a tracker is made of.
+pub struct Parts {
+    /// Stages that complete a frame first, in their order.
+    pub preprocessors: Vec<Guarded<dyn Preprocessor>>,
+    /// Detectors with their roles.
+    pub detectors: Vec<DetectorSlot>,
+    /// Verifiers; their log-odds add up.
+    pub verifiers: Vec<Guarded<dyn Verifier>>,
+    /// The associator.
+    pub associator: Guarded<dyn Associator>,
+    /// The filter.
+    pub filter: Guarded<dyn Filter>,
+    /// The track manager.
+    pub manager: Guarded<dyn TrackManager>,
+}
+
+/// Plugins, and the tracks that they keep.
+pub struct Tracker {
+    settings: TrackerSettings,
+    preprocessors: Vec<Guarded<dyn Preprocessor>>,
+    search: SearchStage,
+    associator: Guarded<dyn Associator>,
+    filter: Guarded<dyn Filter>,
+    manager: Guarded<dyn TrackManager>,
+    clock: Clock,
+    table: TrackTable,
+    duplicates: DuplicateFinder,
+    /// The tracks after the last processed frame, in the robot frame of that time.
+    last: Vec<Track>,
+    /// Processed frames.
+    frames: u64,
+    sketches: bool,
+}
+
+/// What became of one frame.
+pub struct Tracked {
+    /// The report.
+    pub report: TrackingReport,
+    /// The frame as the preprocessors completed it; `None` if it was used as it came.
+    pub completed: Option<Frame>,
+}
+
+/// The tracks as the filter believes them after the update of one frame.
+struct Posterior {
+    supports: BTreeMap<TrackId, Support>,
+    estimates: BTreeMap<TrackId, Estimate>,
+}
+
+impl Tracker {
+    /// Creates a tracker without tracks.
+    pub fn new(parts: Parts, settings: TrackerSettings) -> Self {
+        let Parts { preprocessors, detectors, verifiers, associator, filter, manager } = parts;
+        Self {
+            clock: Clock::new(settings.clock.clone()),
+            settings,
+            preprocessors,
+            search: SearchStage { detectors, verifiers, shared: None },
+            associator,
+            filter,
+            manager,
+            table: TrackTable::default(),
+            duplicates: DuplicateFinder::default(),
+            last: Vec::new(),
+            frames: 0,
+            sketches: false,
+        }
+    }
+
+    /// Takes one frame through all stages.
+    ///
+    /// # Errors
+    /// [`StepError`] if a plugin fails or panics. The tracker is of no use then.
+    pub fn step(&mut self, frame: &Frame) -> Result<Tracked, StepError> {
+        let mut log = StageLog::new();
+        let mut report = TrackingReport::new(frame.index, frame.stamp);
+        let (outcome, motion) = match self.clock.tick(frame, &mut log.funnel) {
+            Tick::Skip(outcome) => {
+                let report = TrackingReport { outcome, funnel: log.funnel, ..report };
+                return Ok(Tracked { report, completed: None });
+            }
+            Tick::Go(outcome, motion) => (outcome, motion),
+        };
+        let (completed, motion) = self.preprocess(frame, motion, &mut log)?;
+        let frame = log.timed(STAGES[0], completed.as_ref().unwrap_or(frame));
+        self.reset_after(outcome, frame, &mut log)?;
+        let predicted = self.predict(frame, motion, &mut log)?;
+        let predicted = log.timed(STAGES[1], predicted);
+        let due = self.search.due(self.frames);
+        let gate = self.gate(motion);
+        let mut detections = self.search_tracks(frame, &due, &predicted, &gate, &mut log)?;
+        log.timed(STAGES[2], ());
+        self.search_image(frame, &due, &mut detections, &mut log)?;
+        log.timed(STAGES[3], ());
+        self.associate(frame, &predicted, &gate, &mut detections, &mut log)?;
+        log.timed(STAGES[4], ());
+        let posterior = self.update(frame, &mut detections, &mut report, &mut log)?;
+        let posterior = log.timed(STAGES[5], posterior);
+        let tracks = self.manage(frame, &due, posterior, &mut detections, &mut log)?;
+        report.tracks = log.timed(STAGES[6], tracks);
+        self.learn(frame, &report.tracks)?;
+        log.timed(STAGES[7], ());
+        self.frames += 1;
+        self.last.clone_from(&report.tracks);
+        report.outcome = outcome;
+        report.motion = motion.unwrap_or(report.motion);
+        let report = self.finish(report, detections, log);
+        Ok(Tracked { report, completed })
+    }
+
+    /// Lets the filter show its work in [`TrackingReport::sketch`]. That takes time, which
+    /// counts as that of the stage `update`, and changes nothing else.
+    pub fn sketch(&mut self, wanted: bool) {
+        self.sketches = wanted;
+    }
+
+    /// Shares the answers of detectors and verifiers with other trackers that are shown the
+    /// very same frame and share, too.
+    pub fn share_answers(&mut self, identities: Identities) {
+        self.search.shared = Some(identities);
+    }
+
+    /// Returns the detectors with their roles.
+    pub fn detectors(&self) -> &[DetectorSlot] {
+        &self.search.detectors
+    }
+
+    /// Returns the number of verifiers.
+    pub fn verifier_count(&self) -> usize {
+        self.search.verifiers.len()
+    }
+
+    fn preprocess(
+        &mut self,
+        frame: &Frame,
+        motion: Option<Motion>,
+        log: &mut StageLog,
+    ) -> Result<(Option<Frame>, Option<Motion>), StepError> {
+        let mut people: Vec<(TrackId, Point2<f64>)> =
+            self.last.iter().map(|t| (t.id, t.estimate.person.position.xy())).collect();
+        people.sort_by_key(|(id, _)| *id);
+        let people: Vec<Point2<f64>> = people.into_iter().map(|(_, place)| place).collect();
+        preprocess(&mut self.preprocessors, frame, motion, &people, log)
+    }
+
+    /// Ends the tracks that a jump of the clock cuts off.
+    fn reset_after(
+        &mut self,
+        outcome: Outcome,
+        frame: &Frame,
+        log: &mut StageLog,
+    ) -> Result<(), StepError> {
+        let (ids, test) = match outcome {
+            Outcome::ResetBackward { .. } => (self.table.ids(), "track: clock set back"),
+            Outcome::ResetForward { .. } => (self.table.ids(), "track: clock jumped ahead"),
+            Outcome::Gap { .. } => (self.table.tentative_ids(), "track: gap in the log"),
+            Outcome::Tracked | Outcome::Duplicate | Outcome::OutOfOrder => return Ok(()),
+        };
+        self.manager.ask(frame.index, |manager| manager.reset())?;
+        ids.into_iter().try_for_each(|id| self.end(frame, id, test, log))
+    }
+
+    /// Returns all tracks, predicted into the robot's new frame, near to far.
+    fn predict(
+        &mut self,
+        frame: &Frame,
+        motion: Option<Motion>,
+        log: &mut StageLog,
+    ) -> Result<Vec<Track>, StepError> {
+        if let Some(motion) = motion {
+            let camera = &frame.camera;
+            self.filter.ask(frame.index, |filter| filter.predict(&motion, camera))?;
+            self.table.age(motion.dt);
+            self.manager.ask(frame.index, |manager| manager.predict(&motion))?;
+        }
+        let estimates = self.estimates(frame, log)?;
+        Ok(self.table.tracks(estimates, &frame.camera))
+    }
+
+    fn gate(&self, motion: Option<Motion>) -> Gate {
+        let start_log_odds = self.manager.plugin().start_log_odds();
+        Gate { dt_s: motion.map_or(0.0, |motion| motion.dt), start_log_odds }
+    }
+
+    /// Searches for each track, near to far, but for those that a found, nearer person hides.
+    fn search_tracks(
+        &mut self,
+        frame: &Frame,
+        due: &[usize],
+        predicted: &[Track],
+        gate: &Gate,
+        log: &mut StageLog,
+    ) -> Result<DetectionSet, StepError> {
+        let mut detections = DetectionSet::default();
+        let detectors = self.search.with_role(due, Role::Follow);
+        if detectors.is_empty() {
+            return Ok(detections);
+        }
+        let mut covers: Vec<Cover> = Vec::new();
+        let associator = &mut self.associator;
+        for track in predicted {
+            let settings = &self.settings.occlusion;
+            let Estimate { region, person, .. } = &track.estimate;
+            let seen = visibility(region, &person.position, &covers, &frame.camera, settings);
+            if seen != Visibility::Visible {
+                continue;
+            }
+            let failed_test = |found: &PendingDetection| {
+                if !gate.admits(track, &found.detection) {
+                    return Ok(Some(found.score_test(gate.start_log_odds)));
+                }
+                let fits = associator.ask(frame.index, |associator| {
+                    associator.fits(track, &found.detection, gate)
+                })?;
+                Ok((!fits).then_some("gate"))
+            };
+            let funnel = &mut log.funnel;
+            let (found, dropped) =
+                self.search.find_track(frame, &detectors, track, failed_test, funnel)?;
+            detections.add(dropped);
+            let Some(found) = found else { continue };
+            covers.push(cover_seen(&found.detection, &track.estimate, frame));
+            detections.add([found]);
+        }
+        Ok(detections)
+    }
+
+    /// Searches the image for people that were not found yet.
+    fn search_image(
+        &mut self,
+        frame: &Frame,
+        due: &[usize],
+        detections: &mut DetectionSet,
+        log: &mut StageLog,
+    ) -> Result<(), StepError> {
+        let occupied = detections.undecided_detections();
+        for index in self.search.with_role(due, Role::Discover) {
+            let search = Search::Everywhere { occupied: &occupied };
+            detections.add(self.search.detect(frame, index, &search, &mut log.funnel)?);
+        }
+        detections.limit(self.settings.merge.max_detections);
+        Ok(())
+    }
+
+    /// Gives detections to tracks, all at once: a search near one track that found another
+    /// person must not steal that person's detection.
+    fn associate(
+        &mut self,
+        frame: &Frame,
+        predicted: &[Track],
+        gate: &Gate,
+        detections: &mut DetectionSet,
+        log: &mut StageLog,
+    ) -> Result<(), StepError> {
+        detections.merge(&self.settings.merge);
+        let (open, found) = (detections.undecided(), detections.undecided_detections());
+        let mut answer = self
+            .associator
+            .ask(frame.index, |associator| associator.associate(predicted, &found, gate))?;
+        let impossible = remove_impossible(&mut answer, predicted, &found, gate);
+        log.funnel.drop_many("association not possible", impossible);
+        detections.take_over(&answer, predicted, &open);
+        self.inflate_occluded(frame, predicted, detections);
+        Ok(())
+    }
+
+    /// Lets detections of half-hidden people say less of the position.
+    fn inflate_occluded(&self, frame: &Frame, predicted: &[Track], detections: &mut DetectionSet) {
+        let settings = &self.settings.occlusion;
+        if settings.body_width_m == 0.0 {
+            return;
+        }
+        let camera = &frame.camera;
+        let mut covers: Vec<Cover> = Vec::new();
+        for track in predicted {
+            let Estimate { region, person, .. } = &track.estimate;
+            let part = part_shown(region, &person.position, &covers, camera, settings);
+            let inflate = |found: &mut Detection| {
+                found.covariance += aside(part, &found.position, camera, settings);
+            };
+            match detections.change_of_track(track.id, inflate) {
+                Some(found) => covers.push(cover_seen(found, &track.estimate, frame)),
+                None => covers.extend(track.confirmed.then(|| cover(&track.estimate, frame))),
+            }
+        }
+    }
+
+    /// Hands the evidence to the filter.
+    fn update(
+        &mut self,
+        frame: &Frame,
+        detections: &mut DetectionSet,
+        report: &mut TrackingReport,
+        log: &mut StageLog,
+    ) -> Result<Posterior, StepError> {
+        let (matched, unmatched) = (detections.matched(), detections.undecided_detections());
+        let metered = self.search.likelihood().map(Metered::new);
+        let likelihood = metered.as_ref().map(|metered| metered as &dyn Likelihood);
+        let evidence = Evidence { frame, matched: &matched, unmatched: &unmatched, likelihood };
+        let mut supports = self.filter.call(frame.index, |filter| filter.update(&evidence))?;
+        log.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
+        if self.sketches {
+            report.sketch = self.filter.call(frame.index, |filter| filter.sketch(&evidence))?;
+        }
+        let before = supports.len();
+        supports.retain(|id, _| self.table.contains(*id));
+        log.funnel.drop_many("support of an unknown track", (before - supports.len()) as u64);
+        detections.reject(|id| supports.contains_key(&id), "filter");
+        for (id, support) in &supports {
+            match support.nis {
+                Some((nis, dof)) if nis.is_finite() => log.nis.push((*id, nis, dof)),
+                Some(_) => log.funnel.drop_many("nis not finite", 1),
+                None => {}
+            }
+        }
+        Ok(Posterior { supports, estimates: self.estimates(frame, log)? })
+    }
+
+    /// Starts, confirms and ends tracks, and returns those that go on.
+    fn manage(
+        &mut self,
+        frame: &Frame,
+        due: &[usize],
+        mut posterior: Posterior,
+        detections: &mut DetectionSet,
+        log: &mut StageLog,
+    ) -> Result<Vec<Track>, StepError> {
+        let started = self.start_tracks(frame, &posterior, detections)?;
+        if !started.is_empty() {
+            posterior.estimates = self.estimates(frame, log)?;
+        }
+        self.observe_tracks(frame, due, &posterior, &started, detections);
+        let tracks = self.table.tracks(posterior.estimates.clone(), &frame.camera);
+        let observed: Vec<ObservedTrack<'_>> = tracks
+            .iter()
+            .filter_map(|track| {
+                let observation = self.table.observation(track.id)?;
+                Some(ObservedTrack { track, observation })
+            })
+            .collect();
+        let changes = self.manager.ask(frame.index, |manager| manager.manage(&observed))?;
+        for (id, health) in changes.health {
+            self.table.set_health(id, health);
+        }
+        for (id, test) in changes.ends {
+            self.end(frame, id, test, log)?;
+        }
+        self.prune(frame, &posterior.estimates, log)?;
+        Ok(self.table.tracks(posterior.estimates, &frame.camera))
+    }
+
+    /// Ends duplicates and what exceeds the limit.
+    fn prune(
+        &mut self,
+        frame: &Frame,
+        estimates: &BTreeMap<TrackId, Estimate>,
+        log: &mut StageLog,
+    ) -> Result<(), StepError> {
+        let MergeSettings { duplicate_m, max_tracks, .. } = self.settings.merge;
+        let alive = estimates.iter().filter(|(id, _)| self.table.contains(**id));
+        let places: BTreeMap<TrackId, Point2<f64>> =
+            alive.map(|(id, estimate)| (*id, estimate.person.position.xy())).collect();
+        let table = &self.table;
+        let is_hidden = |id| table.observation(id) == Some(Observation::Occluded);
+        for (kept, ended) in self.duplicates.find(&places, duplicate_m, is_hidden) {
+            if let Some(health) = self.manager.ask(frame.index, |m| m.merge(kept, ended))? {
+                self.table.set_health(kept, health);
+            }
+            self.end(frame, ended, "track: duplicate", log)?;
+        }
+        for id in self.table.too_many(max_tracks) {
+            self.end(frame, id, "track: too many", log)?;
+        }
+        Ok(())
+    }
+
+    /// Offers detections that belong to no track to the manager.
+    fn start_tracks(
+        &mut self,
+        frame: &Frame,
+        posterior: &Posterior,
+        detections: &mut DetectionSet,
+    ) -> Result<BTreeSet<TrackId>, StepError> {
+        let mut started = BTreeSet::new();
+        let updated: Vec<Point3<f64>> = posterior
+            .estimates
+            .iter()
+            .filter(|(id, _)| posterior.supports.contains_key(id))
+            .map(|(_, estimate)| estimate.person.position)
+            .collect();
+        for index in detections.undecided() {
+            let pending = detections.get(index);
+            let away = |place: &Point3<f64>| (place - pending.detection.position).xy().norm();
+            let is_tracked =
+                updated.iter().any(|place| away(place) < self.settings.merge.duplicate_m);
+            let fate = match self.table.next_id() {
+                _ if is_tracked => Fate::Dropped("tracked already"),
+                Some(id) => self.initiate(frame, id, pending)?,
+                None => Fate::Dropped("no track numbers left"),
+            };
+            started.extend(match fate {
+                Fate::Started(id) => Some(id),
+                _ => None,
+            });
+            detections.settle(index, fate);
+        }
+        Ok(started)
+    }
+
+    /// Starts a track of a detection, if the manager agrees.
+    fn initiate(
+        &mut self,
+        frame: &Frame,
+        id: TrackId,
+        pending: &PendingDetection,
+    ) -> Result<Fate, StepError> {
+        let PendingDetection { detection, detector_log_odds, discovered, .. } = pending;
+        let candidate = Unassociated {
+            detection,
+            detector_log_odds: *detector_log_odds,
+            discovered: *discovered,
+        };
+        let answer = self.manager.ask(frame.index, |manager| manager.initiate(id, &candidate))?;
+        let health = match answer {
+            Initiation::Start(health) => health,
+            Initiation::Drop(test) => return Ok(Fate::Dropped(test)),
+        };
+        let camera = &frame.camera;
+        self.filter.ask(frame.index, |filter| filter.start(id, detection, camera))?;
+        self.table.start(id, health, pending.detector);
+        Ok(Fate::Started(id))
+    }
+
+    /// Notes what the frame says of each track.
+    fn observe_tracks(
+        &mut self,
+        frame: &Frame,
+        due: &[usize],
+        posterior: &Posterior,
+        started: &BTreeSet<TrackId>,
+        detections: &DetectionSet,
+    ) {
+        let Posterior { supports, estimates } = posterior;
+        let supported = supports.keys().chain(started).filter_map(|id| estimates.get(id));
+        let covers: Vec<Cover> = supported.map(|estimate| cover(estimate, frame)).collect();
+        for (id, estimate) in estimates.iter().filter(|(id, _)| !started.contains(id)) {
+            let found = detections.of_track(*id);
+            let (observation, by) = match (supports.contains_key(id), found) {
+                // An associator that weighs alternatives may think a miss more probable.
+                (true, Some(found)) if detections.weight_of_track(*id) >= 0.5 => {
+                    let log_odds = found.detection.score;
+                    (Observation::Detected { log_odds }, Some(found.detector))
+                }
+                (true, None) => (Observation::Updated, None),
+                _ => (self.unsupported(frame, due, *id, estimate, &covers), None),
+            };
+            self.table.observe(*id, observation, by);
+        }
+    }
+
+    /// Returns why a track without evidence has none.
+    fn unsupported(
+        &self,
+        frame: &Frame,
+        due: &[usize],
+        id: TrackId,
+        estimate: &Estimate,
+        covers: &[Cover],
+    ) -> Observation {
+        let Estimate { region, person, .. } = estimate;
+        let settings = &self.settings.occlusion;
+        match visibility(region, &person.position, covers, &frame.camera, settings) {
+            Visibility::Hidden => Observation::Occluded,
+            Visibility::Outside => Observation::OutOfView,
+            Visibility::Visible if self.was_searched(due, id) => Observation::Missed,
+            Visibility::Visible => Observation::NotSearched,
+        }
+    }
+
+    /// Returns true if the detector that found the track last, or the filter itself, looked at
+    /// this frame. The silence of a detector on a frame that is another's turn is no miss.
+    fn was_searched(&self, due: &[usize], id: TrackId) -> bool {
+        let by_filter = self.filter.plugin().weighs_scenes();
+        by_filter || self.table.detector(id).is_none_or(|detector| due.contains(&detector))
+    }
+
+    /// Lets appearance models adapt.
+    fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<(), StepError> {
+        for slot in &mut self.search.detectors {
+            slot.plugin.call(frame.index, |detector| detector.learn(frame, tracks))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the filter's estimates of all tracks. One that is missing or not finite ends its
+    /// track: no such number leaves the tracker.
+    fn estimates(
+        &mut self,
+        frame: &Frame,
+        log: &mut StageLog,
+    ) -> Result<BTreeMap<TrackId, Estimate>, StepError> {
+        let camera = &frame.camera;
+        let mut all = self.filter.ask(frame.index, |filter| filter.estimates(camera))?;
+        let before = all.len();
+        all.retain(|id, _| self.table.contains(*id));
+        log.funnel.drop_many("estimate of an unknown track", (before - all.len()) as u64);
+        for id in self.table.ids() {
+            if !all.get(&id).is_some_and(Estimate::is_sane) {
+                all.remove(&id);
+                self.end(frame, id, "track: estimate not finite", log)?;
+            }
+        }
+        Ok(all)
+    }
+
+    fn end(
+        &mut self,
+        frame: &Frame,
+        id: TrackId,
+        test: &'static str,
+        log: &mut StageLog,
+    ) -> Result<(), StepError> {
+        self.filter.ask(frame.index, |filter| filter.stop(id))?;
+        self.manager.ask(frame.index, |manager| manager.stop(id))?;
+        self.table.end(id);
+        log.nis.retain(|(track, ..)| *track != id);
+        log.funnel.drop_many(test, 1);
+        log.ended.push(id);
+        Ok(())
+    }
+
+    fn finish(
+        &mut self,
+        mut report: TrackingReport,
+        detections: DetectionSet,
+        mut log: StageLog,
+    ) -> TrackingReport {
+        report.candidates = detections.into_candidates(&mut log.funnel);
+        report.plugin_timings = self.plugin_timings();
+        let StageLog { funnel, nis, ended, weighing, timings, .. } = log;
+        TrackingReport { funnel, nis, ended, weighing, timings, ..report }
+    }
+
+    fn plugin_timings(&mut self) -> Vec<(String, f64)> {
+        fn spent<P: ?Sized>(guarded: &mut Guarded<P>) -> (String, f64) {
+            (guarded.name().to_owned(), guarded.take_ms())
+        }
+        let mut all: Vec<_> = self.preprocessors.iter_mut().map(spent).collect();
+        all.extend(self.search.detectors.iter_mut().map(|slot| spent(&mut slot.plugin)));
+        all.extend(self.search.verifiers.iter_mut().map(spent));
+        all.push(spent(&mut self.associator));
+        all.push(spent(&mut self.filter));
+        all.push(spent(&mut self.manager));
+        all
+    }
+}
+
+/// Removes pairs that no associator may return, and returns their number.
+fn remove_impossible(
+    answer: &mut Associations,
+    tracks: &[Track],
+    detections: &[Detection],
+    gate: &Gate,
+) -> u64 {
+    let before = answer.pairs.len();
+    answer.pairs.retain(|pair| {
+        let known = tracks.get(pair.track).zip(detections.get(pair.detection));
+        let admitted = known.is_some_and(|(track, detection)| gate.admits(track, detection));
+        admitted && pair.weight > 0.0 && pair.weight <= 1.0
+    });
+    (before - answer.pairs.len()) as u64
+}

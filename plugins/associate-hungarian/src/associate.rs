@@ -1,0 +1,141 @@
+use tagalong_assignment::{Cost, Fit, assign_fits};
+use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
+
+use crate::Config;
+
+/// The associator: the assignment of all tracks and detections of a frame with the least sum
+/// of costs.
+pub struct Hungarian {
+    config: Config,
+}
+
+impl Hungarian {
+    /// Creates the associator.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        Ok(Self { config })
+    }
+
+    fn fit(&self, track: &Track, detection: &Detection, gate: &Gate) -> Option<Fit> {
+        // P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
+        let printed = self.config.compat_printed_cost && self.config.cost == Cost::Overlap;
+        let outside = printed.then_some(Fit { cost: 0.0, log_volume: 0.0 });
+        self.config.pair_cost().fit(track, detection, gate.dt_s).or(outside)
+    }
+}
+
+impl Associator for Hungarian {
+    fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool {
+        self.fit(track, detection, gate).is_some()
+    }
+
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations {
+        let fit = |track: &Track, detection: &Detection| {
+            gate.admits(track, detection).then(|| self.fit(track, detection, gate)).flatten()
+        };
+        let row = |track| detections.iter().map(|detection| fit(track, detection)).collect();
+        let fits: Vec<Vec<Option<Fit>>> = tracks.iter().map(row).collect();
+        let at_gate = self.config.pair_cost().at_gate();
+        let given = assign_fits(&fits, detections.len(), at_gate, self.config.miss_factor);
+        Associations::one_to_one(given)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, Rect, Registry, TrackId};
+
+    use super::*;
+
+    fn person(x: f64, y: f64) -> Detection {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let position = Point3::new(x, y, 1.6);
+        Detection {
+            region: Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            position,
+            covariance: Matrix3::identity() * 0.01,
+            score: 1.0,
+            source: "test",
+        }
+    }
+
+    fn track(position: Point3<f64>, covariance: SMatrix<f64, 5, 5>) -> Track {
+        let person = Person { position, velocity: Vector2::zeros() };
+        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 10.0, 10.0) };
+        Track {
+            id: TrackId(1),
+            estimate,
+            seen: false,
+            occluded: false,
+            confirmed: true,
+            age: 0,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+
+    #[test]
+    fn the_promises_of_associators_are_kept() {
+        let mut registry = Registry::default();
+        crate::register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+
+    #[test]
+    fn pairs_that_are_probably_no_person_are_not_formed() {
+        let mut hungarian = Hungarian::new(Config::default()).unwrap();
+        let doubtful = Detection { score: -2.0, ..person(3.0, 0.0) };
+        let at = track(doubtful.position, SMatrix::identity() * 0.01);
+        let mut pairs = |score: f64| {
+            let track = Track { score, ..at.clone() };
+            hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
+        };
+        assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        for config in [
+            Config { gate: 0.0, ..Config::default() },
+            Config { gate_m: f64::NAN, ..Config::default() },
+            Config { gate_speed_mps: -1.0, ..Config::default() },
+            Config { min_overlap: 1.1, ..Config::default() },
+            Config { miss_factor: f64::INFINITY, ..Config::default() },
+        ] {
+            assert!(Hungarian::new(config.clone()).is_err(), "{config:?}");
+        }
+    }
+
+    /// P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
+    #[test]
+    fn who_overlaps_is_given_what_overlaps_but_in_print_whatever_does_not() {
+        let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
+        let at = |x: f64| {
+            let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
+            track.estimate.region = boxed(x);
+            track
+        };
+        let tracks = [at(0.0), at(50.0)];
+        let seen = [2.0, 51.0].map(|x| Detection { region: boxed(x), ..person(3.0, 0.0) });
+        let given = |compat_printed_cost: bool| {
+            let settings = Config { cost: Cost::Overlap, compat_printed_cost, ..Config::default() };
+            let answer = Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE);
+            answer.pairs.iter().map(|pair| Some(pair.detection)).collect::<Vec<_>>()
+        };
+        assert_eq!(given(false), [Some(0), Some(1)]);
+        assert_eq!(given(true), [Some(1), Some(0)]);
+    }
+}

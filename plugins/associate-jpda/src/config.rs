@@ -1,0 +1,61 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_assignment::{Cost, Overlap, PairCost};
+use tagalong_core::{NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+
+/// Settings of the associator `associate-jpda`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Largest squared Mahalanobis distance. 11.34 is the 99 % point of chi-squared with 3
+    /// degrees of freedom.
+    pub gate: f64,
+    /// Largest distance on the floor, m, between frames that are close in time ...
+    pub gate_m: f64,
+    /// ... and by how much it grows with the time between them, m/s.
+    pub gate_speed_mps: f64,
+    /// Probability that a visible person is detected in a frame.
+    pub detection_probability: f64,
+    /// False detections in a cubic metre and a frame.
+    pub clutter_per_m3: f64,
+    /// Pairs that are less probable are left out.
+    pub min_weight: f64,
+    /// Most detections in a cluster of tracks; 1 to 16. The work doubles with each.
+    pub max_detections: u32,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            gate: 11.34,
+            gate_m: 1.0,
+            gate_speed_mps: 1.5,
+            detection_probability: 0.9,
+            clutter_per_m3: 0.05,
+            min_weight: 0.05,
+            max_detections: 12,
+        }
+    }
+}
+
+impl Config {
+    /// Returns the part that says how well a pair fits.
+    pub(crate) fn pair_cost(&self) -> PairCost {
+        let Self { gate, gate_m, gate_speed_mps, .. } = *self;
+        let (cost, overlap) = (Cost::Mahalanobis, Overlap::Iou);
+        PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap: 1.0, overlap }
+    }
+
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        check_ranges(&[
+            ("gate", self.gate, POSITIVE),
+            ("gate_m", self.gate_m, POSITIVE),
+            ("gate_speed_mps", self.gate_speed_mps, NOT_NEGATIVE),
+            ("detection_probability", self.detection_probability, 0.01..=0.999),
+            ("clutter_per_m3", self.clutter_per_m3, POSITIVE),
+            ("min_weight", self.min_weight, 1e-6..=0.5),
+            ("max_detections", f64::from(self.max_detections), 1.0..=16.0),
+        ])
+    }
+}

@@ -1,0 +1,167 @@
+use tagalong_assignment::{Fit, assign_fits};
+use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
+
+use crate::Config;
+
+/// The associator.
+pub struct TwoStage {
+    config: Config,
+}
+
+impl TwoStage {
+    /// Creates the associator.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        Ok(Self { config })
+    }
+
+    fn is_strong(&self, detection: &Detection) -> bool {
+        detection.score >= self.config.strong_log_odds
+    }
+
+    fn fit(&self, track: &Track, detection: &Detection, gate: &Gate) -> Option<Fit> {
+        let pair_cost = self.config.pair_cost();
+        let fit = pair_cost.fit(track, detection, gate.dt_s)?;
+        // The likelihood of a weak detection being clutter is higher, so it has to fit better.
+        let part = if self.is_strong(detection) { 1.0 } else { self.config.weak_gate };
+        (fit.cost <= part * pair_cost.at_gate()).then_some(fit)
+    }
+
+    /// Assigns the detections of one strength to the tracks that have none yet.
+    fn assign_stage(
+        &self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+        strong: bool,
+        given: &mut [Option<usize>],
+    ) {
+        let rows: Vec<usize> = (0..tracks.len()).filter(|i| given[*i].is_none()).collect();
+        let columns: Vec<usize> =
+            (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
+        let fit = |row: usize, column: usize| {
+            let (track, detection) = (&tracks[row], &detections[column]);
+            gate.admits(track, detection).then(|| self.fit(track, detection, gate)).flatten()
+        };
+        let fits: Vec<Vec<Option<Fit>>> = rows
+            .iter()
+            .map(|row| columns.iter().map(|column| fit(*row, *column)).collect())
+            .collect();
+        let at_gate = self.config.pair_cost().at_gate();
+        let assigned = assign_fits(&fits, columns.len(), at_gate, self.config.miss_factor);
+        for (row, column) in rows.into_iter().zip(assigned) {
+            given[row] = column.map(|column| columns[column]);
+        }
+    }
+}
+
+impl Associator for TwoStage {
+    fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool {
+        self.fit(track, detection, gate).is_some()
+    }
+
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations {
+        let mut given = vec![None; tracks.len()];
+        self.assign_stage(tracks, detections, gate, true, &mut given);
+        self.assign_stage(tracks, detections, gate, false, &mut given);
+        let taken = |index: &usize| given.contains(&Some(*index));
+        let weak = (0..detections.len()).filter(|index| !self.is_strong(&detections[*index]));
+        let spent = weak.filter(|index| !taken(index)).collect();
+        Associations { spent, ..Associations::one_to_one(given.iter().copied()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use tagalong_core::{Estimate, Person, Rect, Registry, TrackId};
+
+    use super::*;
+
+    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+
+    fn detection(y: f64, score: f64) -> Detection {
+        Detection {
+            region: Rect::new(0.0, 0.0, 9.0, 9.0),
+            position: Point3::new(3.0, y, 1.6),
+            covariance: Matrix3::identity() * 0.01,
+            score,
+            source: "test",
+        }
+    }
+
+    fn track(id: u32, y: f64) -> Track {
+        let person = Person { position: Point3::new(3.0, y, 1.6), velocity: Vector2::zeros() };
+        let covariance = SMatrix::identity() * 0.01;
+        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 9.0, 9.0) };
+        Track {
+            id: TrackId(id),
+            estimate,
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 2.0,
+        }
+    }
+
+    fn pairs(answer: &Associations) -> Vec<(usize, usize)> {
+        answer.pairs.iter().map(|pair| (pair.track, pair.detection)).collect()
+    }
+
+    #[test]
+    fn the_promises_of_associators_are_kept() {
+        let mut registry = Registry::default();
+        crate::register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+
+    /// The weak one is nearer; one assignment of all would take it.
+    #[test]
+    fn a_strong_detection_goes_before_a_nearer_weak_one() {
+        let mut two_stage = TwoStage::new(Config::default()).unwrap();
+        let detections = [detection(0.05, 0.2), detection(0.2, 3.0)];
+        let answer = two_stage.associate(&[track(1, 0.0)], &detections, &GATE);
+        assert_eq!(pairs(&answer), [(0, 1)]);
+        assert_eq!(answer.spent, [0], "a weak detection starts no track");
+    }
+
+    #[test]
+    fn a_weak_detection_continues_the_track_that_is_left() {
+        let mut two_stage = TwoStage::new(Config::default()).unwrap();
+        let tracks = [track(1, 0.0), track(2, 1.0)];
+        let detections = [detection(1.05, -0.5), detection(0.05, 3.0)];
+        let answer = two_stage.associate(&tracks, &detections, &GATE);
+        assert_eq!(pairs(&answer), [(0, 1), (1, 0)]);
+        assert_eq!(answer.spent, Vec::<usize>::new());
+    }
+
+    /// 0.4 m are a squared distance of 8, which is within the gate and not within half of it.
+    #[test]
+    fn a_weak_detection_has_to_fit_better() {
+        let two_stage = TwoStage::new(Config::default()).unwrap();
+        let fits = |score: f64| two_stage.fits(&track(1, 0.0), &detection(0.4, score), &GATE);
+        assert!(fits(3.0) && !fits(0.2));
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        for config in [
+            Config { weak_gate: 1.5, ..Config::default() },
+            Config { strong_log_odds: f64::NAN, ..Config::default() },
+            Config { gate: 0.0, ..Config::default() },
+        ] {
+            assert!(TwoStage::new(config.clone()).is_err(), "{config:?}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{ANY, Error, NOT_NEGATIVE, Result, check_ranges};
+
+/// Settings of the track manager `manage-m-of-n`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// A detection that belongs to no track starts one from this score on
+    /// (log-odds, verifiers included).
+    pub start_score: f64,
+    /// Newcomers who were rejected at the same place count, too, and are forgotten
+    /// with this time constant, s; 0: each newcomer is judged alone.
+    pub doubt_s: f64,
+    /// A place is the same within this, m.
+    pub doubt_m: f64,
+    /// No place is doubted more than this, log-odds.
+    pub doubt_limit: f64,
+    /// A track is confirmed when it was seen this often ...
+    pub confirm_hits: u32,
+    /// ... in so many frames in which it could have been seen (at most 32), ...
+    pub confirm_within: u32,
+    /// ... or at once by a detection with at least this score.
+    pub confirm_score: f64,
+    /// A track that is not confirmed ends after this many misses in a row.
+    pub tentative_misses: u32,
+    /// A track ends when it should have been visible and was not seen for
+    /// longer than this, s, ...
+    pub drop_after_s: f64,
+    /// ... and missed at least this often in a row.
+    pub drop_after_misses: u32,
+    /// A track that left the image ends when it was not seen for longer, s.
+    pub left_drop_after_s: f64,
+    /// A track that is hidden behind another one ends when it was not seen for
+    /// longer, s.
+    pub occluded_drop_after_s: f64,
+    /// Weight of a frame in the score of a track, 0 to 1.
+    pub score_weight: f64,
+    /// What a miss says: the score that a track tends to while it should be
+    /// visible and is not.
+    pub miss_score: f64,
+    /// A track with a lower score ends. It takes several doubtful sightings
+    /// to get there.
+    pub drop_score: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            start_score: 0.0,
+            doubt_s: 0.0,
+            doubt_m: 0.3,
+            doubt_limit: 6.0,
+            confirm_hits: 3,
+            confirm_within: 5,
+            confirm_score: 4.0,
+            tentative_misses: 2,
+            drop_after_s: 1.0,
+            drop_after_misses: 3,
+            left_drop_after_s: 2.0,
+            occluded_drop_after_s: 3.0,
+            score_weight: 0.3,
+            miss_score: -1.0,
+            drop_score: -2.0,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        let hits = f64::from(self.confirm_hits);
+        check_ranges(&[
+            ("start_score", self.start_score, ANY),
+            ("doubt_s", self.doubt_s, NOT_NEGATIVE),
+            ("doubt_m", self.doubt_m, NOT_NEGATIVE),
+            ("doubt_limit", self.doubt_limit, NOT_NEGATIVE),
+            ("confirm_hits", hits, 1.0..=32.0),
+            ("confirm_within", f64::from(self.confirm_within), 1.0..=32.0),
+            ("tentative_misses", f64::from(self.tentative_misses), 1.0..=f64::from(u32::MAX)),
+            ("drop_after_s", self.drop_after_s, NOT_NEGATIVE),
+            ("drop_after_misses", f64::from(self.drop_after_misses), 1.0..=f64::from(u32::MAX)),
+            ("left_drop_after_s", self.left_drop_after_s, NOT_NEGATIVE),
+            ("occluded_drop_after_s", self.occluded_drop_after_s, NOT_NEGATIVE),
+            ("score_weight", self.score_weight, 1e-6..=1.0),
+            ("miss_score", self.miss_score, ANY),
+        ])?;
+        self.check_relations()
+    }
+
+    /// Refuses settings that contradict each other.
+    fn check_relations(&self) -> Result<()> {
+        let Self { confirm_hits, confirm_within, confirm_score, .. } = self;
+        let Self { drop_score, start_score, .. } = self;
+        if confirm_within < confirm_hits {
+            let message = format!(
+                "`confirm_within` must be at least {confirm_hits}, as `confirm_hits`, not \
+                 {confirm_within}"
+            );
+            return Err(Error::Settings(message));
+        }
+        if confirm_score.is_nan() {
+            return Err(Error::Settings("`confirm_score` must be a number, not NaN".into()));
+        }
+        if drop_score.is_nan() || drop_score > start_score {
+            let message = format!(
+                "`drop_score` must be at most {start_score}, as `start_score`, not {drop_score}"
+            );
+            return Err(Error::Settings(message));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! Places at which things are that are no persons, in the robot frame, moved along with the
+//! world.
+
+use nalgebra::Point2;
+use tagalong_core::Motion;
+
+/// Clutter that counts for less, log-odds, is forgotten.
+const FAINT: f64 = 0.05;
+
+#[derive(Clone, Debug)]
+struct Place {
+    at: Point2<f64>,
+    /// How much speaks against a person at this place, log-odds above 0.
+    against: f64,
+}
+
+/// Evidence against persons, by place.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ClutterMap {
+    places: Vec<Place>,
+}
+
+impl ClutterMap {
+    /// Moves all places into the robot's new frame, and lets them fade with a time constant, s.
+    pub(crate) fn predict(&mut self, motion: &Motion, time_constant_s: f64) {
+        let faded = (-motion.dt / time_constant_s).exp();
+        for place in &mut self.places {
+            place.at = motion.apply_to_point(place.at);
+            place.against *= faded;
+        }
+        self.places.retain(|place| place.against > FAINT);
+    }
+
+    /// Returns how much speaks against a person at a place.
+    pub(crate) fn against(&self, at: &Point2<f64>, within_m: f64) -> f64 {
+        let near = self.places.iter().filter(|place| (place.at - at).norm() <= within_m);
+        near.map(|place| place.against).fold(0.0, f64::max)
+    }
+
+    /// Adds evidence against persons at a place, up to `most`.
+    pub(crate) fn add(&mut self, at: Point2<f64>, against: f64, within_m: f64, most: f64) {
+        let near = self.places.iter_mut().filter(|place| (place.at - at).norm() <= within_m);
+        let nearest = near.min_by(|a, b| (a.at - at).norm().total_cmp(&(b.at - at).norm()));
+        match nearest {
+            Some(place) => place.against = (place.against + against).min(most),
+            None => self.places.push(Place { at, against: against.min(most) }),
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.places.clear();
+    }
+}
