@@ -77,6 +77,8 @@ pub enum Lens {
     /// The unwrapped image of a conical mirror. Its *depth* is the horizontal
     /// distance from the mirror's axis, and its columns go once around.
     Panorama(Panorama),
+    /// No lens: a frame without images, of a laser scan alone. No point has a pixel.
+    Blind,
 }
 
 /// A camera: its lens, its image size, and where it sits on the robot.
@@ -130,12 +132,27 @@ impl Camera {
         }
     }
 
+    /// Stands for the camera in frames without images: it sits where another sensor does, and
+    /// shows nothing. Tracks and detections have no box in its image ([`Rect::default`]).
+    pub fn blind(robot_from_sensor: Isometry3<f64>) -> Self {
+        let any = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Distortion::None };
+        let level = Self::mounted(any, 0, 0, 0.0, 0.0, 0.0).robot_from_camera;
+        let robot_from_camera = robot_from_sensor * level;
+        Self { lens: Lens::Blind, width: 0, height: 0, robot_from_camera }
+    }
+
+    /// Returns true for a camera without an image.
+    pub fn is_blind(&self) -> bool {
+        matches!(self.lens, Lens::Blind)
+    }
+
     /// Pixels per metre at one metre of depth, along columns; of a panorama
-    /// pixels per radian.
+    /// pixels per radian; 0 without an image.
     pub fn focal_px(&self) -> f64 {
         match &self.lens {
             Lens::Pinhole(lens) => lens.fx,
             Lens::Panorama(lens) => lens.columns as f64 / TAU,
+            Lens::Blind => 0.0,
         }
     }
 
@@ -143,7 +160,7 @@ impl Camera {
     pub fn panorama(&self) -> Option<&Panorama> {
         match &self.lens {
             Lens::Panorama(lens) => Some(lens),
-            Lens::Pinhole(_) => None,
+            Lens::Pinhole(_) | Lens::Blind => None,
         }
     }
 
@@ -168,6 +185,7 @@ impl Camera {
         let lens = match &self.lens {
             Lens::Panorama(lens) => return Some(lens.pixel(point_in_camera)),
             Lens::Pinhole(lens) => lens,
+            Lens::Blind => return None,
         };
         if point_in_camera.z <= 1e-6 {
             return None;
@@ -187,6 +205,7 @@ impl Camera {
                 Vector3::new(x, y, 1.0)
             }
             Lens::Panorama(lens) => lens.ray(pixel).1,
+            Lens::Blind => Vector3::z(),
         }
     }
 
@@ -194,7 +213,7 @@ impl Camera {
     /// origin, but for a panorama, which has no single viewpoint.
     fn viewpoint(&self, pixel: Point2<f64>) -> Point3<f64> {
         match &self.lens {
-            Lens::Pinhole(_) => Point3::origin(),
+            Lens::Pinhole(_) | Lens::Blind => Point3::origin(),
             Lens::Panorama(lens) => lens.ray(pixel).0,
         }
     }
@@ -209,7 +228,7 @@ impl Camera {
     pub fn depth_of(&self, point_in_robot: &Point3<f64>) -> f64 {
         let point = self.robot_from_camera.inverse_transform_point(point_in_robot);
         match &self.lens {
-            Lens::Pinhole(_) => point.z,
+            Lens::Pinhole(_) | Lens::Blind => point.z,
             Lens::Panorama(_) => point.xy().coords.norm(),
         }
     }
@@ -289,7 +308,9 @@ impl Camera {
         let ray = self.ray(pixel);
         let lateral = (depth_m * sigma_px / self.focal_px()).powi(2);
         let across = match &self.lens {
-            Lens::Pinhole(_) => Matrix3::from_diagonal(&Vector3::new(lateral, lateral, 0.0)),
+            Lens::Pinhole(_) | Lens::Blind => {
+                Matrix3::from_diagonal(&Vector3::new(lateral, lateral, 0.0))
+            }
             Lens::Panorama(_) => {
                 let out = Vector3::new(ray.x, ray.y, 0.0);
                 (Matrix3::identity() - out * out.transpose()) * lateral
@@ -317,6 +338,20 @@ mod tests {
     fn tilted(pitch: f64, roll: f64, distortion: Distortion) -> Camera {
         let lens = Pinhole { fx: 530.0, fy: 528.0, cx: 310.0, cy: 243.0, distortion };
         Camera::mounted(lens, 640, 480, 2.4, pitch, roll)
+    }
+
+    #[test]
+    fn a_blind_camera_sits_where_the_sensor_does_and_shows_nothing() {
+        let pose = Isometry3::from_parts(Vector3::new(0.8, 0.2, 0.4).into(), nalgebra::one());
+        let blind = Camera::blind(pose);
+        assert!(blind.is_blind() && blind.height_m() == 0.4);
+        assert_eq!(blind.project(&Point3::new(3.0, 0.0, 1.0)), None);
+        assert_eq!(blind.upper_body(&Point3::new(3.0, 0.0, 1.6)), Rect::default());
+        assert!(
+            (blind.depth_of(&Point3::new(3.0, 0.0, 0.4)) - 2.2).abs() < 1e-12,
+            "it looks ahead"
+        );
+        assert!(!tilted(0.1, 0.0, Distortion::None).is_blind());
     }
 
     #[test]

@@ -2,10 +2,9 @@ use std::any::{Any, TypeId};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use nalgebra::Point3;
-
 use crate::{
-    Camera, DepthImage, Error, GreyImage, Input, Inputs, Motion, Recorded, Result, RgbImage, Stamp,
+    Camera, DepthImage, Error, GreyImage, Input, Inputs, LaserScan, Motion, Recorded, Result,
+    RgbImage, Stamp,
 };
 
 /// The images that one moment delivered. All have the size of the camera's
@@ -44,21 +43,21 @@ pub trait Derived: Send + Sync + Sized + 'static {
 /// A derived thing, or why it could not be computed.
 type Slot = OnceLock<Result<Arc<dyn Any + Send + Sync>>>;
 
-/// One moment of a log: images, camera, and how the robot moved since the
-/// frame before. A frame is immutable; what plugins derive from it is computed
+/// One moment of a log: images or a laser scan, the camera, and how the robot moved since
+/// the frame before. A frame is immutable; what plugins derive from it is computed
 /// once, on first use.
 pub struct Frame {
     /// 1-based index of the image in the log.
     pub index: u64,
     /// When the image was captured.
     pub stamp: Stamp,
-    /// The camera that all images share.
+    /// The camera that all images share; [`Camera::blind`] in a frame of a laser scan alone.
     pub camera: Arc<Camera>,
     /// The robot's motion since the previous frame.
     pub motion: Motion,
     images: Images,
     recorded: Option<Vec<Recorded>>,
-    laser: Option<Arc<[Point3<f64>]>>,
+    laser: Option<LaserScan>,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
 }
@@ -96,15 +95,23 @@ impl Frame {
         self.recorded.as_deref()
     }
 
-    /// The same frame with what a laser scanner met.
-    pub fn with_laser(self, laser: Option<Arc<[Point3<f64>]>>) -> Self {
+    /// The same frame with a laser scan.
+    pub fn with_laser(self, laser: Option<LaserScan>) -> Self {
         Self { laser, ..self }
     }
 
-    /// Where the rays of a laser scanner met something, robot frame at the time of the
-    /// image, m; `None` without a scanner, or where it was silent.
-    pub fn laser(&self) -> Option<&[Point3<f64>]> {
-        self.laser.as_deref()
+    /// Returns the laser scan, in the robot frame at the time of the frame; `None` without a
+    /// scanner, or where it was silent.
+    pub fn laser(&self) -> Option<&LaserScan> {
+        self.laser.as_ref()
+    }
+
+    /// Returns the laser scan of a frame that cannot do without.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] where the log carries none.
+    pub fn scan(&self) -> Result<&LaserScan> {
+        self.laser.as_ref().ok_or(Error::MissingImage { input: Input::Laser })
     }
 
     /// The same moment with a depth image.
@@ -210,6 +217,8 @@ impl Frame {
 mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    use nalgebra::Point3;
+
     use super::*;
     use crate::{Distortion, Pinhole};
 
@@ -242,11 +251,11 @@ mod tests {
 
     #[test]
     fn depth_that_is_added_leaves_the_rest() {
-        let laser: Arc<[Point3<f64>]> = Arc::new([Point3::new(1.0, 0.5, 0.2)]);
+        let laser = LaserScan::of_points([Point3::new(1.0, 0.5, 0.2)]);
         let frame = frame(Images::default()).with_laser(Some(laser)).with_recorded(Some(vec![]));
         let with_depth = frame.with_depth(Arc::new(DepthImage::filled(4, 4, 2.0)));
         assert!(with_depth.depth().is_ok());
-        assert_eq!(with_depth.laser(), Some(&[Point3::new(1.0, 0.5, 0.2)][..]));
+        assert_eq!(with_depth.laser().unwrap().points[..], [Point3::new(1.0, 0.5, 0.2)]);
         assert_eq!(with_depth.recorded().map(<[_]>::len), Some(0));
         assert!(with_depth.images().depth.is_some() && with_depth.images().colour.is_none());
     }
@@ -261,7 +270,8 @@ mod tests {
             depth: Some(Arc::new(DepthImage::filled(4, 4, 2.0))),
             right: Some(Arc::new(right)),
         };
-        let frame = frame(images).with_laser(Some(Arc::new([]))).with_recorded(Some(vec![]));
+        let frame =
+            frame(images).with_laser(Some(LaserScan::of_points([]))).with_recorded(Some(vec![]));
         assert!(frame.restricted_to(&Inputs::ANY).is_none(), "nothing has to go");
         let held = |frame: &Frame| {
             let Images { colour, grey, depth, right } = frame.images();

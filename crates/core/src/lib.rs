@@ -45,6 +45,7 @@ mod panorama;
 mod recorded;
 mod rect;
 mod registry;
+mod scan;
 mod sent;
 mod settings;
 mod sketch;
@@ -74,6 +75,7 @@ pub use panorama::{ConicalMirror, Panorama};
 pub use recorded::Recorded;
 pub use rect::Rect;
 pub use registry::{Context, Kind, PluginInfo, Registry};
+pub use scan::LaserScan;
 pub use sent::Sent;
 pub use settings::{
     ANY, ConfigError, NOT_NEGATIVE, POSITIVE, Settings, Value, check_ranges, commented_defaults,

@@ -34,7 +34,7 @@ impl Chosen {
 /// Chooses topics as named in the settings, else by type, encoding and name. A topic
 /// whose input is not used is not chosen, as if the log did not have it, but for one:
 /// frames are counted, timed and seen as the images of the colour topic are, and where
-/// there are none, those of the depth topic.
+/// there are none, those of the depth topic. In a log without images they are laser scans.
 ///
 /// # Errors
 /// [`LogError::Missing`] for a named topic that is not there, and for inputs
@@ -110,7 +110,7 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
             DETECTIONS,
         ),
         (
-            chosen.colour.is_none() && chosen.depth.is_none(),
+            chosen.colour.is_none() && chosen.depth.is_none() && chosen.laser.is_none(),
             "images at all",
             "colour_topic",
             COLOUR,

@@ -110,7 +110,7 @@ impl Steering {
         let person = target.map(|track| &track.estimate.person);
         let (corridor, camera) = (self.governor.corridor(), &frame.camera);
         self.surroundings.look(corridor, camera, frame.depth().ok(), motion, person);
-        self.surroundings.feel(corridor, frame.laser());
+        self.surroundings.feel(corridor, frame.laser().map(|scan| &scan.points[..]));
         self.surroundings.meet(tracks, followed);
         let look = |corridor: &_, curvature| {
             self.surroundings.ahead(corridor, curvature, target.map(place))

@@ -6,6 +6,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use tagalong_core::LaserScan;
+
 use crate::random::{mix, normal_at};
 use crate::world::World;
 
@@ -102,14 +104,24 @@ impl LaserSettings {
         (0..).zip(self.directions()).map(range).collect()
     }
 
-    /// The points that some ranges stand for, robot frame, m.
-    pub fn points(&self, ranges: &[f32]) -> impl Iterator<Item = Point3<f64>> {
-        let met = self.directions().zip(ranges).filter(|(_, range)| range.is_finite());
-        let height_m = self.height_m;
-        met.map(move |(direction, range)| {
+    /// Returns the scan that some ranges stand for; the scanner sits above the robot's origin.
+    pub fn scan(&self, ranges: &[f32]) -> LaserScan {
+        let rays = (0..).zip(self.directions()).zip(ranges);
+        let met = rays.filter(|(_, range)| range.is_finite());
+        let point = |((ray, direction), range): ((u32, f64), &f32)| {
             let range = f64::from(*range);
-            Point3::new(range * direction.cos(), range * direction.sin(), height_m)
-        })
+            let (x, y) = (range * direction.cos(), range * direction.sin());
+            (ray, Point3::new(x, y, self.height_m))
+        };
+        let (rays, points): (Vec<u32>, Vec<Point3<f64>>) = met.map(point).unzip();
+        let mut directions = self.directions();
+        let increment_rad = directions.next().zip(directions.next()).map_or(0.0, |(a, b)| b - a);
+        LaserScan {
+            robot_from_scanner: Isometry3::translation(0.0, 0.0, self.height_m),
+            increment_rad,
+            points: points.into(),
+            rays: rays.into(),
+        }
     }
 }
 
@@ -151,7 +163,7 @@ mod tests {
         assert!(ranges[0].is_nan(), "behind, something is too near: {ranges:?}");
         assert_eq!(ranges[1], f32::INFINITY, "nothing to the right");
         assert!(near(ranges[2], 1.5) && near(ranges[3], 2.5), "ahead and left: {ranges:?}");
-        let points: Vec<Point3<f64>> = FOUR.points(&ranges).collect();
+        let points = FOUR.scan(&ranges).points;
         assert!((points[0] - Point3::new(1.5, 0.0, 0.2)).norm() < 1e-6);
         assert!((points[1] - Point3::new(0.0, 2.5, 0.2)).norm() < 1e-6);
         assert_eq!(points.len(), 2);

@@ -76,6 +76,10 @@ pub(crate) fn visibility(
     camera: &Camera,
     settings: &OcclusionSettings,
 ) -> Visibility {
+    if camera.is_blind() {
+        // Without an image there is no silhouette; a laser scan does not tell who is hidden.
+        return Visibility::Visible;
+    }
     let Shown { all, inside, visible } = shown(region, position, covers, camera, settings);
     let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
     match (all > 0 && enough(inside), enough(visible)) {

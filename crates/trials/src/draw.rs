@@ -123,7 +123,7 @@ impl Draw {
         let motion = self.motion(stamp, odom_from_robot);
         let camera = Arc::clone(&self.camera);
         let scan = self.simulation.laser().zip(shot.laser.as_deref());
-        let laser = scan.map(|(laser, ranges)| laser.points(ranges).collect());
+        let laser = scan.map(|(laser, ranges)| laser.scan(ranges));
         let frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images));
         Drawn {
             frame: frame.with_laser(laser),

@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn settings_are_shown_where_they_stand() {
         let resolved: Table = toml::from_str(
-            "seed = 1\n[manager.config]\nstart_score = 0.5\n[[verifiers]]\nplugin = 'a'\n\
+            "seed = 1\n[manager]\nplugin = 'm'\n[manager.config]\nstart_score = 0.5\n[[verifiers]]\nplugin = 'a'\n\
              [verifiers.config]\nweight = 2.0\n",
         )
         .unwrap();
@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(
             lines,
             [
-                "[manager.config] start_score = 0.5",
+                "[manager] plugin = \"m\", config = { start_score = 0.5 }",
                 "[[verifiers]] plugin = \"a\", config = { weight = 2.0 }"
             ]
         );

@@ -210,10 +210,15 @@ mod tests {
             let (a, b) = (logged.frame.depth().unwrap(), drawn.depth().unwrap());
             let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
             assert!(a.pixels().iter().zip(b.pixels()).all(same));
-            let (a, b) = (logged.frame.laser().unwrap(), drawn.laser().unwrap());
+            let (a, b) = (&logged.frame.laser().unwrap().points, &drawn.laser().unwrap().points);
             assert_eq!(a.len(), b.len());
             assert!(a.len() > 60, "most rays meet something: {}", a.len());
-            assert!(a.iter().zip(b).all(|(a, b)| (a - b).norm() < 1e-5), "{:?} {:?}", a[0], b[0]);
+            assert!(
+                a.iter().zip(b.iter()).all(|(a, b)| (a - b).norm() < 1e-5),
+                "{:?} {:?}",
+                a[0],
+                b[0]
+            );
             frames += 1;
         }
         assert!(frames > 40 && draw.next_frame().is_none(), "{frames}");

@@ -195,7 +195,7 @@ fn mistakes_are_told_with_file_and_line() {
     home.config("near", "", "\"manager.config.confirm_hit\" = [1]");
     tell(2, &["near.toml:9:1", "did you mean `manager.config.confirm_hits`?"]);
     home.config("near", "", "manager.config.confirm_hits = [1, 99]");
-    tell(2, &["configs/near.toml:9:30", "= 99 is not allowed", "`manager.config.confirm_within`"]);
+    tell(2, &["configs/near.toml:9:35", "= 99 is not allowed", "`confirm_hits` must lie between"]);
     let mut check = own_plugin();
     let checked = check.current_dir(home.folder.path()).args(["check", "configs/near.toml"]);
     let checked = checked.output().unwrap();

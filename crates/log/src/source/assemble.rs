@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3, Point3};
+use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Input, Lens, Motion, Panorama,
-    Pinhole, RightImage, Stamp, planar_pose,
+    Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Input, LaserScan as Scan, Lens,
+    Motion, Panorama, Pinhole, RightImage, Stamp, planar_pose,
 };
 use tagalong_vision::Unwrapping;
 
 use super::LogFrame;
 use super::intake::Intake;
-use super::laser::seen_from;
+use super::laser::{is_sane, seen_from};
 use super::mount::robot_frame;
 use super::pairing::Payload;
 use super::plan::Plan;
@@ -21,7 +21,7 @@ use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
 use crate::images::{
     ImageError, Pixels, decode_compressed, decode_raw, size_of_compressed, size_of_raw,
 };
-use crate::msgs::{CompressedImage, Image, decode};
+use crate::msgs::{CompressedImage, Image, LaserScan, decode};
 use crate::odometry::{PoseAt, unknown_motion};
 use crate::register::Registration;
 use crate::scan::Type;
@@ -65,6 +65,9 @@ impl Assembler {
         tally: &mut Tally,
     ) -> Option<LogFrame> {
         self.index += 1;
+        if plan.is_of_scans() {
+            return self.assemble_scan(plan, image, intake, tally);
+        }
         let tolerance_s = plan.input.pair_tolerance_s;
         let depth = intake.depth.take(image.stamp, next, tolerance_s);
         let right = intake.right.take(image.stamp, next, tolerance_s);
@@ -97,6 +100,34 @@ impl Assembler {
         let laser = self.laser(plan, image.stamp, intake, tally);
         let mut item = self.finish(plan, image.stamp, camera, images, intake, tally);
         item.frame = item.frame.with_recorded(recorded).with_laser(laser);
+        Some(item)
+    }
+
+    /// Makes a frame of a laser scan alone; `None` if it is damaged or its pose is not known,
+    /// which is counted.
+    fn assemble_scan(
+        &mut self,
+        plan: &Plan,
+        scan: &Payload,
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> Option<LogFrame> {
+        let Some(sweep) = decode::<LaserScan>(&scan.data).ok().filter(is_sane) else {
+            tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
+            return None;
+        };
+        let Some(pose) = plan.mount.at(&intake.tf, scan.stamp) else {
+            tally.count("laser_scans_without_pose");
+            return None;
+        };
+        let camera = Camera::blind(pose);
+        if self.camera.as_deref() != Some(&camera) {
+            self.camera = Some(Arc::new(camera));
+        }
+        let camera = Arc::clone(self.camera.as_ref()?);
+        let mut item = self.finish(plan, scan.stamp, camera, Images::default(), intake, tally);
+        let scan = seen_from(&sweep, &pose, &Isometry2::identity());
+        item.frame = item.frame.with_laser(Some(scan));
         Some(item)
     }
 
@@ -250,13 +281,7 @@ impl Assembler {
     }
 
     /// What the laser scanner met, in the robot frame at the time of the image.
-    fn laser(
-        &self,
-        plan: &Plan,
-        stamp: Stamp,
-        intake: &Intake,
-        tally: &mut Tally,
-    ) -> Option<Arc<[Point3<f64>]>> {
+    fn laser(&self, plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) -> Option<Scan> {
         plan.chosen.laser.as_ref()?;
         let Some(scan) = intake.laser.near(stamp) else {
             tally.count("frames_without_laser");

@@ -19,7 +19,7 @@ use crate::topics::Chosen;
 /// Everything that has been read and not yet become a frame.
 pub(super) struct Intake {
     chosen: Chosen,
-    /// The topic that makes the frames: colour, or depth where there is none.
+    /// The topic that makes the frames: colour, or depth where there is none, or laser scans.
     primary: String,
     info: Option<CameraInfo>,
     pub(super) frames: Reorder,
@@ -160,8 +160,11 @@ fn headed(message: &Message<'_>) -> Result<Payload, CdrError> {
     Ok(Payload { stamp: header.stamp(), frame_id: header.frame_id, data: message.data.to_vec() })
 }
 
-/// The stamp and frame of an image message, and its bytes.
+/// The stamp and frame of an image or a scan, and its bytes.
 fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
+    if Type::of(&message.channel.schema_name) == Type::LaserScan {
+        return headed(message);
+    }
     let header = if Type::of(&message.channel.schema_name) == Type::Image {
         decode::<Image<'_>>(message.data)?.header
     } else {

@@ -1,11 +1,10 @@
-//! What a laser scanner met at the time of an image.
+//! Laser scans: nearest to an image in time, or frames of their own.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3, Point3};
-use tagalong_core::Stamp;
+use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
+use tagalong_core::{LaserScan as Scan, Stamp};
 
 use crate::msgs::LaserScan;
 
@@ -43,22 +42,33 @@ impl Scans {
     }
 }
 
-/// Where the rays of a scan met something, in the frame of a robot that has moved by
-/// `robot_from_then` since, m.
+/// Returns a scan in the frame of a robot that has moved by `robot_from_then` since.
 pub(super) fn seen_from(
     scan: &LaserScan,
     robot_from_laser: &Isometry3<f64>,
     robot_from_then: &Isometry2<f64>,
-) -> Arc<[Point3<f64>]> {
-    let moved = |point: Point3<f64>| {
+) -> Scan {
+    let (x, y) = (robot_from_then.translation.x, robot_from_then.translation.y);
+    let turn =
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), robot_from_then.rotation.angle());
+    let moved = Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn);
+    let moved_point = |point: Point3<f64>| {
         let then = robot_from_laser * point;
         let now = robot_from_then * then.xy();
         Point3::new(now.x, now.y, then.z)
     };
-    points(scan).map(moved).collect()
+    let (rays, points): (Vec<u32>, Vec<Point3<f64>>) =
+        points(scan).map(|(ray, point)| (ray, moved_point(point))).unzip();
+    Scan {
+        robot_from_scanner: moved * robot_from_laser,
+        increment_rad: f64::from(scan.angle_increment),
+        points: points.into(),
+        rays: rays.into(),
+    }
 }
 
-fn is_sane(scan: &LaserScan) -> bool {
+/// Returns false for a scan whose angles or ranges are none.
+pub(super) fn is_sane(scan: &LaserScan) -> bool {
     let angles = [scan.angle_min, scan.angle_increment];
     let is_known = angles.into_iter().all(f32::is_finite) && !limits(scan).is_empty();
     is_known && scan.ranges.len() <= MAX_RAYS
@@ -69,18 +79,18 @@ fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
     scan.range_min.max(0.0)..=scan.range_max
 }
 
-/// Where the rays met something, in the frame of the scanner, m. Ranges beyond the
-/// scanner's own limits, infinite and NaN ones are rays that met nothing.
-fn points(scan: &LaserScan) -> impl Iterator<Item = Point3<f64>> {
+/// Where the rays met something, in the frame of the scanner, m, with the number of the ray.
+/// Ranges beyond the scanner's own limits, infinite and NaN ones are rays that met nothing.
+fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
     let (first, step) = (f64::from(scan.angle_min), f64::from(scan.angle_increment));
     let limits = limits(scan);
     let rays = scan.ranges.iter().enumerate();
     let met = rays.filter(move |(_, range)| limits.contains(*range));
     let point = move |(ray, range): (usize, &f32)| {
         let (angle, range) = (first + ray as f64 * step, f64::from(*range));
-        Point3::new(range * angle.cos(), range * angle.sin(), 0.0)
+        (ray as u32, Point3::new(range * angle.cos(), range * angle.sin(), 0.0))
     };
-    met.map(point).filter(|point| point.coords.norm().is_finite())
+    met.map(point).filter(|(_, point)| point.coords.norm().is_finite())
 }
 
 #[cfg(test)]
@@ -105,7 +115,8 @@ mod tests {
 
     #[test]
     fn rays_turn_from_right_to_left_and_what_met_nothing_is_left_out() {
-        let [right, left] = points(&scan(1.0, &[2.0, f32::INFINITY, 3.0])).collect::<Vec<_>>()[..]
+        let [(0, right), (2, left)] =
+            points(&scan(1.0, &[2.0, f32::INFINITY, 3.0])).collect::<Vec<_>>()[..]
         else {
             panic!("two rays met something");
         };
@@ -145,7 +156,10 @@ mod tests {
         let scan = scans.near(Stamp::default().plus_seconds(1.0)).unwrap();
         let mount = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::zeros());
         let driven = Isometry2::translation(-0.5, 0.0);
-        let points = seen_from(scan, &mount, &driven);
-        assert!((points[0] - Point3::new(1.6, 0.0, 0.2)).norm() < 1e-6, "{points:?}");
+        let scan = seen_from(scan, &mount, &driven);
+        assert!((scan.points[0] - Point3::new(1.6, 0.0, 0.2)).norm() < 1e-6, "{scan:?}");
+        let origin = scan.robot_from_scanner.translation.vector;
+        assert!((origin - Vector3::new(-0.4, 0.0, 0.2)).norm() < 1e-12, "{origin}");
+        assert_eq!(scan.rays[..], [1]);
     }
 }

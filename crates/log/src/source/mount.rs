@@ -49,6 +49,13 @@ impl Mount {
         Self::fixed(&mount, "an assumption (neither tf, nor [input.camera], nor depth)".into())
     }
 
+    /// Of a laser scanner that tf does not know.
+    pub(super) fn scanner_at_origin() -> Self {
+        let source = "an assumption (no tf): the scanner sits at the robot's origin, level, and \
+                      looks ahead";
+        Self::Fixed { pose: Isometry3::identity(), source: source.into() }
+    }
+
     /// What to tell about it.
     pub(super) fn source(&self) -> String {
         match self {

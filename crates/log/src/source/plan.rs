@@ -67,7 +67,16 @@ impl Plan {
     }
 
     fn primary_input(&self) -> Input {
-        if self.chosen.colour.is_some() { Input::Colour } else { Input::Depth }
+        match (&self.chosen.colour, &self.chosen.depth) {
+            (Some(_), _) => Input::Colour,
+            (None, Some(_)) => Input::Depth,
+            (None, None) => Input::Laser,
+        }
+    }
+
+    /// True if laser scans make the frames, because the log has no images.
+    pub(super) fn is_of_scans(&self) -> bool {
+        self.primary_input() == Input::Laser
     }
 
     /// The mirror whose images are still circular.
@@ -104,7 +113,8 @@ impl Plan {
 }
 
 fn primary(chosen: &Chosen) -> &str {
-    chosen.colour.as_ref().or(chosen.depth.as_ref()).map_or("", String::as_str)
+    let images = chosen.colour.as_ref().or(chosen.depth.as_ref());
+    images.or(chosen.laser.as_ref()).map_or("", String::as_str)
 }
 
 /// What the scan has to say, before anything else.
@@ -193,7 +203,7 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
         let hint = "; name it as `colour_info_topic` under [input]".to_owned();
         return Err(missing(&plan.scan, wanted, hint));
     }
-    if plan.lens.is_none() {
+    if plan.lens.is_none() && !plan.is_of_scans() {
         tally.note("no calibration: a lens with a view of 53 degrees is assumed");
     }
     Ok(())
@@ -219,6 +229,9 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     let mirror = plan.lens.is_some_and(|lens| lens.mirror.is_some());
     if let Some(mount) = Mount::find(&plan.scan, camera, &plan.input, mirror) {
         return Ok(mount);
+    }
+    if plan.is_of_scans() {
+        return Ok(Mount::scanner_at_origin());
     }
     match floor(plan, reread)? {
         Some(mount) => Ok(mount),

@@ -55,7 +55,8 @@ fn who_is_in_the_laser_scan_alone_is_not_driven_into() {
     let (_, mut pipeline) = driving("");
     let shins = [Point3::new(0.5, 0.3, 0.2), Point3::new(0.5, 0.15, 0.2)];
     for (index, laser, reason) in [(21, &shins[..], Reason::Blocked), (22, &[], Reason::Limited)] {
-        let frame = frame(index, index as f64 * 0.1).with_laser(Some(laser.into()));
+        let frame = frame(index, index as f64 * 0.1)
+            .with_laser(Some(tagalong_core::LaserScan::of_points(laser)));
         let command = pipeline.step(&frame).unwrap().command.unwrap();
         assert_eq!(command.reason, reason, "{index}");
         let WheelSpeeds { left, right } = command.wheels;
