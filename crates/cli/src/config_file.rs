@@ -7,9 +7,8 @@ use sha2::{Digest, Sha256};
 use tagalong_core::{ConfigError, Registry, Settings, parse_settings};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits};
-use tagalong_pipeline::{Options, Pipeline, RunSettings, check_tuning};
+use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
 use tagalong_trials::Contender;
-use toml::de::DeTable;
 
 use crate::outcome::Failure;
 use crate::suggest::config_hint;
@@ -100,15 +99,20 @@ impl ConfigFile {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// SHA-256 of its bytes.
+    /// SHA-256 of its bytes, and of those of the configs that it extends.
     pub fn sha256(&self) -> String {
-        let digest = Sha256::digest(self.text.as_bytes());
-        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+        let mut digest = Sha256::new_with_prefix(self.text.as_bytes());
+        if let Ok(document) = self.document() {
+            document.bases().for_each(|(_, text)| digest.update(text.as_bytes()));
+        }
+        digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// The files that its settings name, such as models, by the name used there.
     pub fn files(&self) -> Vec<(String, PathBuf)> {
-        let Ok(table) = self.text.parse::<toml::Table>() else { return Vec::new() };
+        let Ok(table) = self.document().and_then(|document| document.table()) else {
+            return Vec::new();
+        };
         let folder = self.folder();
         let mut names = Vec::new();
         strings(&toml::Value::Table(table), &mut names);
@@ -132,7 +136,9 @@ impl ConfigFile {
     /// The config as it takes part in trials.
     pub fn contender(&self) -> Contender {
         let folder = self.folder().to_owned();
-        Contender { folder, ..Contender::new(self.stem(), self.text.clone()) }
+        // A mistake shows its line when the pipeline is built from the text as it is.
+        let config = flattened(&self.text, &folder).unwrap_or_else(|_| self.text.clone());
+        Contender { folder, ..Contender::new(self.stem(), config) }
     }
 
     /// The tables that are not the pipeline's.
@@ -154,8 +160,13 @@ impl ConfigFile {
 
     /// One top-level table, with places for its mistakes.
     fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
-        let mut whole = DeTable::parse(&self.text)?;
-        parse_settings(whole.get_mut().remove(name))
+        let document = self.document()?;
+        let table = document.root()?.remove(name);
+        parse_settings(table).map_err(|error| document.locate(error))
+    }
+
+    fn document(&self) -> Result<Document, ConfigError> {
+        Document::read(&self.text, self.folder())
     }
 
     fn mistake(&self, error: &ConfigError) -> Failure {

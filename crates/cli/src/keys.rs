@@ -24,7 +24,16 @@ pub fn around_schema() -> Value {
         properties.extend(part["properties"].as_object().cloned().unwrap_or_default());
     }
     properties.insert("tune".into(), tune_schema());
+    properties.insert("extends".into(), extends_schema());
     json!({ "type": "object", "properties": properties, "$defs": definitions })
+}
+
+fn extends_schema() -> Value {
+    json!({
+        "type": "string",
+        "description": "Path of a config, from the folder of this one. Keys that stand here replace \
+                        those that stand there; lists are replaced as a whole.",
+    })
 }
 
 /// `[tune]`: its keys are the dotted names of all others.
@@ -138,7 +147,7 @@ pub fn schema(registry: &Registry) -> Value {
         "title": "A pipeline of Tagalong",
         "type": "object",
         "additionalProperties": false,
-        "required": ["filter"],
+        "anyOf": [{ "required": ["filter"] }, { "required": ["extends"] }],
         "properties": properties,
         "$defs": definitions,
     })

@@ -23,6 +23,7 @@ use crate::preprocessors::preprocessors;
 use crate::settings::{PipelineSettings, PluginSettings, RobotSettings};
 
 mod checks;
+mod document;
 mod inputs;
 mod resolve;
 #[cfg(test)]
@@ -30,14 +31,10 @@ mod tests;
 mod tune;
 
 use checks::check;
+pub use document::{Document, flattened};
 use inputs::{Declared, declared_inputs};
 use resolve::resolve;
 pub use tune::{Tunable, check_tuning, with_values};
-
-/// Longest config, bytes.
-const MAX_BYTES: usize = 1 << 20;
-/// Deepest nesting of a config.
-const MAX_DEPTH: usize = 32;
 
 const OWN: [&str; 10] = [
     "seed",
@@ -93,7 +90,7 @@ pub struct RunSettings {
     pub robot: RobotSettings,
     /// `[tune]`: the settings that may be fitted. A run takes no notice of them.
     pub tune: Vec<Tunable>,
-    text: String,
+    document: Document,
 }
 
 impl RunSettings {
@@ -103,7 +100,8 @@ impl RunSettings {
     /// # Errors
     /// Unknown keys and wrong types, with their place in the config.
     pub fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
-        parse_settings(parse(&self.text)?.remove(name))
+        parse_settings(self.document.root()?.remove(name))
+            .map_err(|error| self.document.locate(error))
     }
 }
 
@@ -132,7 +130,18 @@ impl Pipeline {
         registry: &Registry,
         options: &Options,
     ) -> Result<(Self, RunSettings), ConfigError> {
-        let mut root = parse(text)?;
+        let document = Document::read(text, base_dir)?;
+        Self::from_document(&document, base_dir, registry, options)
+            .map_err(|error| document.locate(error))
+    }
+
+    fn from_document(
+        document: &Document,
+        base_dir: &Path,
+        registry: &Registry,
+        options: &Options,
+    ) -> Result<(Self, RunSettings), ConfigError> {
+        let mut root = document.root()?;
         refuse_unknown(&root, options)?;
         let settings = own_settings(&root, options)?;
         let builder = Builder { registry, base_dir, settings: &settings };
@@ -153,14 +162,14 @@ impl Pipeline {
             .collect();
         let without_span = root.get("without").map(Spanned::span);
         let inputs = declared_inputs(&settings, &plugins, steering.is_some(), without_span)?;
-        let resolved = resolve(text, &settings, registry)?;
+        let resolved = resolve(document.table()?, &settings, registry)?;
         let tune = tune::read(root.remove(tune::TABLE), &resolved)?;
         let resolved =
             toml::to_string(&resolved).map_err(|error| ConfigError::new(error.to_string()))?;
         let stereo = settings.stereo.clone().map(StereoDepth::new).transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let (seed, robot) = (settings.seed, settings.robot.clone());
-        let run = RunSettings { seed, robot, tune, text: text.into() };
+        let run = RunSettings { seed, robot, tune, document: document.clone() };
         let odometry = settings.odometry.clone().map(VisualOdometry::new);
         let preprocessors = preprocessors(stereo, odometry);
         let parts = Parts { preprocessors, detectors, verifiers, associator, filter, manager };
@@ -177,34 +186,14 @@ impl Pipeline {
     }
 }
 
-fn parse(text: &str) -> Result<DeTable<'_>, ConfigError> {
-    if text.len() > MAX_BYTES {
-        let message = format!("the config has {} bytes; at most {MAX_BYTES} are read", text.len());
-        return Err(ConfigError::new(message));
-    }
-    let root = DeTable::parse(text)?.into_inner();
-    for value in root.values() {
-        if depth(value.get_ref()) >= MAX_DEPTH {
-            let message = format!("nested deeper than {MAX_DEPTH} levels");
-            return Err(ConfigError { message, span: Some(value.span()) });
-        }
-    }
-    Ok(root)
-}
-
-/// Levels of nesting below a value. The parser bounds the recursion.
-fn depth(value: &DeValue<'_>) -> usize {
-    match value {
-        DeValue::Array(items) => 1 + items.iter().map(|v| depth(v.get_ref())).max().unwrap_or(0),
-        DeValue::Table(table) => 1 + table.values().map(|v| depth(v.get_ref())).max().unwrap_or(0),
-        _ => 0,
-    }
-}
-
 fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigError> {
     let foreign = options.foreign.iter().map(String::as_str);
-    let known: Vec<&str> =
-        PLUGINS.into_iter().chain(OWN).chain([tune::TABLE]).chain(foreign).collect();
+    let known: Vec<&str> = PLUGINS
+        .into_iter()
+        .chain(OWN)
+        .chain([tune::TABLE, document::EXTENDS])
+        .chain(foreign)
+        .collect();
     for key in root.keys() {
         let name: &str = key.get_ref();
         if let Some((_, now)) = RENAMED.iter().find(|(old, _)| *old == name) {

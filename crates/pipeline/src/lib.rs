@@ -44,7 +44,8 @@ mod target;
 mod tests;
 
 pub use config::{
-    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Options, RunSettings, Tunable, check_tuning, with_values,
+    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Tunable, check_tuning,
+    flattened, with_values,
 };
 pub use governor::{CorridorSettings, GovernorSettings, Orders};
 pub use pipeline::Pipeline;

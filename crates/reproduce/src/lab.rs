@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use tagalong_core::Registry;
-use tagalong_pipeline::StereoSettings;
+use tagalong_pipeline::{StereoSettings, flattened};
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Trial, TrialError, each, in_order};
 
@@ -159,7 +159,11 @@ impl Lab<'_> {
     /// # Errors
     /// A config that cannot be read.
     pub fn contender(&self, name: &str) -> Result<Contender, ReproduceError> {
-        let text = read(&self.configs.join(format!("{name}.toml")))?;
+        let path = self.configs.join(format!("{name}.toml"));
+        let text = read(&path)?;
+        let text = flattened(&text, &self.configs).map_err(|error| {
+            ReproduceError::Other(error.render(&path.display().to_string(), &text))
+        })?;
         Ok(Contender { folder: self.configs.clone(), ..Contender::new(name, text) })
     }
 

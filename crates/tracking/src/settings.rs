@@ -19,7 +19,7 @@ pub struct ClockSettings {
 
 impl Default for ClockSettings {
     fn default() -> Self {
-        Self { max_back_s: 0.1, max_gap_s: 0.5, reset_gap_s: 5.0 }
+        Self { max_back_s: 0.1, max_gap_s: 0.5, reset_gap_s: 0.9 }
     }
 }
 

@@ -103,7 +103,8 @@ fn confirmed(config: Config, score: f64, observations: &[Observation]) -> bool {
 #[test]
 fn hits_confirm_only_if_they_are_close_to_each_other() {
     use Observation::{Missed, NotSearched, Occluded, OutOfView};
-    let config = || Config { tentative_misses: 9, ..Config::default() };
+    let config =
+        || Config { confirm_hits: 3, confirm_within: 5, tentative_misses: 9, ..Config::default() };
     let hits = |observations: &[Observation]| confirmed(config(), 1.0, observations);
     assert!(!hits(&[DETECTED]) && hits(&[DETECTED, DETECTED]), "the first detection counts");
     assert!(hits(&[Missed, DETECTED, Missed, DETECTED]), "three of five");

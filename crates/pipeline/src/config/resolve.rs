@@ -9,11 +9,10 @@ use crate::settings::PipelineSettings;
 /// Returns the config with every default filled in, of the plugins too. What may be tuned
 /// is no part of it.
 pub(super) fn resolve(
-    text: &str,
+    mut root: Table,
     settings: &PipelineSettings,
     registry: &Registry,
 ) -> Result<Table, ConfigError> {
-    let mut root: Table = toml::from_str(text)?;
     root.remove(super::tune::TABLE);
     root.extend(table_of(settings)?);
     for (section, plugin) in [("associator", DEFAULT_ASSOCIATOR), ("manager", DEFAULT_MANAGER)] {

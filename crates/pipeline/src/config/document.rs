@@ -1,0 +1,318 @@
+//! A config with the configs that it extends: `extends = "base.toml"`.
+//!
+//! The texts are read as one, end to end: a byte range says in which file it lies.
+
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use tagalong_core::ConfigError;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::tune;
+
+/// Longest config, bytes.
+const MAX_BYTES: usize = 1 << 20;
+/// Deepest nesting of a config.
+const MAX_DEPTH: usize = 32;
+/// Most configs that extend one another.
+const MAX_BASES: usize = 8;
+/// The key that names the config to extend.
+pub(super) const EXTENDS: &str = "extends";
+
+/// A config, and those that it extends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Document {
+    text: String,
+    bases: Vec<Base>,
+}
+
+/// A config that is extended.
+#[derive(Clone, Debug, PartialEq)]
+struct Base {
+    path: PathBuf,
+    /// The text behind as much space as the texts before it take.
+    padded: String,
+    start: usize,
+}
+
+impl Base {
+    fn text(&self) -> &str {
+        self.padded.get(self.start..).unwrap_or_default()
+    }
+
+    fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+}
+
+impl Document {
+    /// Reads a config. What it extends is looked for from `folder`.
+    ///
+    /// # Errors
+    /// A text that is no TOML, too long or nested too deep, and a base that cannot be read,
+    /// extends itself, or has such a fault.
+    pub fn read(text: &str, folder: &Path) -> Result<Self, ConfigError> {
+        let mut document = Self { text: text.to_owned(), bases: Vec::new() };
+        let (mut folder, mut end) = (folder.to_owned(), text.len());
+        let mut extends = parse(text, 0)?.remove(EXTENDS).map(name_of);
+        while let Some((name, span)) = &extends {
+            let base = base_at(&folder, name.as_deref(), end, &document.bases)
+                .map_err(|message| ConfigError { message, span: Some(span.clone()) });
+            let base = base.map_err(|error| document.locate(error))?;
+            end = base.padded.len();
+            base.folder().clone_into(&mut folder);
+            document.bases.push(base.clone());
+            let table = parse(&base.padded, base.start).map_err(|error| document.locate(error));
+            extends = table?.remove(EXTENDS).map(name_of);
+        }
+        Ok(document)
+    }
+
+    /// Returns the config with everything that it inherits.
+    ///
+    /// # Errors
+    /// None for a config that was read.
+    pub fn root(&self) -> Result<DeTable<'_>, ConfigError> {
+        // From the far end: each config knows then which plugins it inherits.
+        let mut inherited = DeTable::new();
+        for base in self.bases.iter().rev() {
+            let mut table = parse(&base.padded, base.start)?;
+            table.remove(EXTENDS);
+            // A list of values to try belongs to the file that was written for the trial.
+            table.remove(tune::TABLE);
+            let mut table = anchor_paths(table, base.folder());
+            inherit(&mut table, inherited);
+            inherited = table;
+        }
+        let mut root = parse(&self.text, 0)?;
+        root.remove(EXTENDS);
+        inherit(&mut root, inherited);
+        Ok(root)
+    }
+
+    /// Returns the texts of the configs that are extended, with their paths, the nearest first.
+    pub fn bases(&self) -> impl Iterator<Item = (&Path, &str)> {
+        self.bases.iter().map(|base| (base.path.as_path(), base.text()))
+    }
+
+    /// Returns the config with everything that it inherits, without places.
+    ///
+    /// # Errors
+    /// As [`Document::root`].
+    pub fn table(&self) -> Result<toml::Table, ConfigError> {
+        use serde::Deserialize;
+        let whole = Spanned::new(0..0, DeValue::Table(self.root()?));
+        Ok(toml::Table::deserialize(toml::de::ValueDeserializer::from(whole))?)
+    }
+
+    /// Names the file of a mistake that lies in a base, with the line there.
+    pub fn locate(&self, error: ConfigError) -> ConfigError {
+        let Some(span) = &error.span else { return error };
+        let Some(base) = self.bases.iter().rev().find(|base| base.start <= span.start) else {
+            return error;
+        };
+        let shift = |at: usize| at.saturating_sub(base.start);
+        let span = Range { start: shift(span.start), end: shift(span.end) };
+        let there = ConfigError { message: error.message, span: Some(span) };
+        let shown = there.render(&base.path.display().to_string(), base.text());
+        ConfigError::new(format!("it extends {}, where:\n{shown}", base.path.display()))
+    }
+}
+
+/// Returns a config as one TOML text that extends no other: the text itself if it does so
+/// already.
+///
+/// # Errors
+/// As [`Document::read`].
+pub fn flattened(text: &str, folder: &Path) -> Result<String, ConfigError> {
+    let document = Document::read(text, folder)?;
+    if document.bases.is_empty() {
+        return Ok(text.to_owned());
+    }
+    toml::to_string(&document.table()?).map_err(|error| ConfigError::new(error.to_string()))
+}
+
+/// Parses a text that begins `start` bytes into what is given.
+fn parse(padded: &str, start: usize) -> Result<DeTable<'_>, ConfigError> {
+    let bytes = padded.len() - start;
+    if bytes > MAX_BYTES {
+        let message = format!("the config has {bytes} bytes; at most {MAX_BYTES} are read");
+        return Err(ConfigError::new(message));
+    }
+    let root = DeTable::parse(padded)?.into_inner();
+    for value in root.values() {
+        if depth(value.get_ref()) >= MAX_DEPTH {
+            let message = format!("nested deeper than {MAX_DEPTH} levels");
+            return Err(ConfigError { message, span: Some(value.span()) });
+        }
+    }
+    Ok(root)
+}
+
+/// Returns the levels of nesting below a value. The parser bounds the recursion.
+fn depth(value: &DeValue<'_>) -> usize {
+    match value {
+        DeValue::Array(items) => 1 + items.iter().map(|v| depth(v.get_ref())).max().unwrap_or(0),
+        DeValue::Table(table) => 1 + table.values().map(|v| depth(v.get_ref())).max().unwrap_or(0),
+        _ => 0,
+    }
+}
+
+/// Returns the path that a value names, and its place.
+fn name_of(value: Spanned<DeValue<'_>>) -> (Option<String>, Range<usize>) {
+    (value.get_ref().as_str().map(str::to_owned), value.span())
+}
+
+fn base_at(
+    folder: &Path,
+    name: Option<&str>,
+    start: usize,
+    before: &[Base],
+) -> Result<Base, String> {
+    let Some(name) = name else { return Err(format!("`{EXTENDS}` must be the path of a config")) };
+    let path = folder.join(name);
+    if before.len() == MAX_BASES || before.iter().any(|base| base.path == path) {
+        return Err(format!(
+            "`{EXTENDS}` goes on in a circle, or through more than {MAX_BASES} configs"
+        ));
+    }
+    let text = fs::read_to_string(&path)
+        .map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
+    Ok(Base { path, padded: "\n".repeat(start) + &text, start })
+}
+
+/// Adds what a table lacks. Lists are not joined, and the settings of another plugin are
+/// not inherited.
+fn inherit<'a>(table: &mut DeTable<'a>, base: DeTable<'a>) {
+    for (key, value) in base {
+        match (table.get_mut(&key), value) {
+            (Some(own), value) => inherit_value(own.get_mut(), value.into_inner()),
+            (None, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+fn inherit_value<'a>(own: &mut DeValue<'a>, base: DeValue<'a>) {
+    if let (DeValue::Table(own), DeValue::Table(base)) = (own, base)
+        && same_plugin(own, &base)
+    {
+        inherit(own, base);
+    }
+}
+
+fn same_plugin(own: &DeTable<'_>, base: &DeTable<'_>) -> bool {
+    let [own, base] = [own, base].map(|table| table.get("plugin")?.get_ref().as_str());
+    own.is_none() || base.is_none() || own == base
+}
+
+/// Lets texts that name files beside a base do so from elsewhere.
+fn anchor_paths<'a>(table: DeTable<'a>, folder: &Path) -> DeTable<'a> {
+    table.into_iter().map(|(key, value)| (key, anchor_path(value, folder))).collect()
+}
+
+fn anchor_path<'a>(value: Spanned<DeValue<'a>>, folder: &Path) -> Spanned<DeValue<'a>> {
+    let span = value.span();
+    let anchored = match value.into_inner() {
+        DeValue::String(name) if !name.is_empty() && folder.join(&*name).is_file() => {
+            DeValue::String(folder.join(&*name).display().to_string().into())
+        }
+        DeValue::Array(items) => {
+            DeValue::Array(items.into_iter().map(|item| anchor_path(item, folder)).collect())
+        }
+        DeValue::Table(table) => DeValue::Table(anchor_paths(table, folder)),
+        other => other,
+    };
+    Spanned::new(span, anchored)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        folder
+    }
+
+    fn table(text: &str, files: &[(&str, &str)]) -> Result<toml::Table, String> {
+        let folder = folder(files);
+        Document::read(text, folder.path())
+            .and_then(|document| document.table())
+            .map_err(|error| error.render("own.toml", text))
+    }
+
+    #[test]
+    fn a_config_states_only_what_differs() {
+        let base = "[filter]\nplugin = 'a'\nconfig = { x = 1, y = 2 }\n[clock]\nmax_gap_s = 1.0\n\
+                    [[detectors]]\nplugin = 'd'\n[[detectors]]\nplugin = 'e'\n[tune]\nx = [1]\n";
+        let own = "extends = 'base.toml'\nfilter.config.y = 3\n[[detectors]]\nplugin = 'f'\n";
+        let expected = "[filter]\nplugin = 'a'\nconfig = { x = 1, y = 3 }\n\
+                        [clock]\nmax_gap_s = 1.0\n[[detectors]]\nplugin = 'f'\n";
+        assert_eq!(table(own, &[("base.toml", base)]).unwrap(), expected.parse().unwrap());
+    }
+
+    #[test]
+    fn another_plugin_inherits_no_settings() {
+        let base = "filter = { plugin = 'a', config = { x = 1 } }\n";
+        let middle = "extends = 'base.toml'\nfilter.config.y = 2\n";
+        let files = [("base.toml", base), ("middle.toml", middle)];
+        for extended in ["base.toml", "middle.toml"] {
+            let own = format!("extends = '{extended}'\nfilter.plugin = 'b'\n");
+            let expected = "filter = { plugin = 'b' }\n".parse().unwrap();
+            assert_eq!(table(&own, &files).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn a_base_may_extend_another_one_in_its_own_folder() {
+        let files = [
+            ("sub/near.toml", "extends = 'far.toml'\na = 1\nb = 1\n"),
+            ("sub/far.toml", "a = 2\nb = 2\nc = 'model.txt'\n"),
+            ("sub/model.txt", "x"),
+        ];
+        let read = table("extends = 'sub/near.toml'\nb = 0\n", &files).unwrap();
+        assert_eq!((read["a"].as_integer(), read["b"].as_integer()), (Some(1), Some(0)));
+        let model = read["c"].as_str().unwrap();
+        assert!(Path::new(model).ends_with("sub/model.txt"), "{model}");
+    }
+
+    #[test]
+    fn mistakes_of_a_base_are_shown_there() {
+        let shown = table("extends = 'base.toml'\n", &[("base.toml", "a = 1\nb = \n")]);
+        let shown = shown.unwrap_err();
+        for words in ["own.toml: it extends ", "base.toml:2:5: ", "b = "] {
+            assert!(shown.contains(words), "{shown}");
+        }
+    }
+
+    #[test]
+    fn circles_and_missing_bases_are_refused_with_their_line() {
+        let missing = table("a = 1\nextends = 'b.toml'\n", &[]).unwrap_err();
+        assert!(missing.contains("own.toml:2:11: cannot extend "), "{missing}");
+        let circle = [("b.toml", "extends = 'b.toml'\n")];
+        let circle = table("extends = 'b.toml'\n", &circle).unwrap_err();
+        assert!(circle.contains("b.toml:1:11: `extends` goes on in a circle"), "{circle}");
+        let number = table("extends = 1\n", &[]).unwrap_err();
+        assert!(number.contains("own.toml:1:11: `extends` must be the path"), "{number}");
+    }
+
+    #[test]
+    fn what_extends_nothing_stays_as_it_is() {
+        let text = "# a comment\nseed = 1\n";
+        assert_eq!(flattened(text, Path::new(".")).unwrap(), text);
+        let folder = folder(&[("b.toml", "a = 1\n")]);
+        assert_eq!(
+            flattened("extends = 'b.toml'\nc = 2\n", folder.path()).unwrap(),
+            "a = 1\nc = 2\n"
+        );
+    }
+}
