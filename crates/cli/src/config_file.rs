@@ -153,9 +153,7 @@ impl ConfigFile {
                 output: self.table("output")?,
             })
         };
-        let outer = read().map_err(|error| self.mistake(&error))?;
-        outer.output.validate().map_err(|why| self.mistake(&ConfigError::new(why)))?;
-        Ok(outer)
+        read().map_err(|error| self.mistake(&error))
     }
 
     /// One top-level table, with places for its mistakes.

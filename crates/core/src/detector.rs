@@ -146,12 +146,11 @@ impl Trust {
     pub fn new(weight: f64, limit: f64, bias: f64) -> Result<Self> {
         for (name, value) in [("weight", weight), ("limit", limit)] {
             if !(value.is_finite() && value >= 0.0) {
-                let message = format!("`{name}` = {value} must be a number from 0 on");
-                return Err(Error::Settings(message));
+                return Err(Error::setting(name, format!("must be at least 0, not {value}")));
             }
         }
         if !bias.is_finite() {
-            return Err(Error::Settings(format!("`bias` = {bias} must be finite")));
+            return Err(Error::setting("bias", format!("must be a finite number, not {bias}")));
         }
         Ok(Self { weight, limit, bias })
     }

@@ -28,9 +28,14 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
-    /// Settings that parse but cannot work.
-    #[error("{0}")]
-    Settings(String),
+    /// A setting that parses but cannot work.
+    #[error("`{key}` {why}")]
+    Settings {
+        /// The key, dotted where it stands in a table.
+        key: String,
+        /// What it must be, and its value.
+        why: String,
+    },
     /// Anything else, in a sentence.
     #[error("{0}")]
     Other(String),
@@ -38,3 +43,10 @@ pub enum Error {
 
 /// The result of a plugin's work.
 pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// Creates the error of a setting that cannot work: "`key` must be ...".
+    pub fn setting(key: impl Into<String>, why: impl Into<String>) -> Self {
+        Self::Settings { key: key.into(), why: why.into() }
+    }
+}

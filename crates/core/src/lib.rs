@@ -78,8 +78,7 @@ pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use scan::LaserScan;
 pub use sent::Sent;
 pub use settings::{
-    ANY, ConfigError, NOT_NEGATIVE, POSITIVE, Settings, Value, check_ranges, commented_defaults,
-    parse_settings,
+    ConfigError, Settings, Value, check_settings, commented_defaults, parse_settings,
 };
 pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;

@@ -2,8 +2,6 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
-use toml::Spanned;
-
 use crate::{
     Associator, ConfigError, Controller, Detector, Error, Filter, Result, Settings, TrackManager,
     Trainer, Value, Verifier, Wheels, commented_defaults, nearest, parse_settings,
@@ -431,11 +429,11 @@ where
     B: 'static,
 {
     Box::new(move |value, context| {
-        let span = value.as_ref().map(Spanned::span);
-        let config = parse_settings::<C>(value)?;
-        build(config, context)
-            .map(boxed)
-            .map_err(|error| ConfigError { message: error.to_string(), span })
+        let config = parse_settings::<C>(value.clone())?;
+        build(config, context).map(boxed).map_err(|error| match &value {
+            Some(value) => ConfigError::at_key(&error, value),
+            None => ConfigError::new(error.to_string()),
+        })
     })
 }
 
@@ -650,7 +648,7 @@ mod tests {
         }
         let mut registry = Registry::default();
         registry.verifier("tall", "doubts the small", |config: Height, _| match config.height_m {
-            height if height < 0.0 => Err(Error::Settings("nobody is that small".into())),
+            height if height < 0.0 => Err(Error::setting("height_m", "is below the floor")),
             _ => Ok(Counting),
         });
         let info = registry.find("tall").unwrap();
@@ -661,7 +659,7 @@ mod tests {
         let error = registry.build_verifier("tall", Some(value), &context()).err().unwrap();
         assert_eq!(
             error.render("a.toml", text).lines().next(),
-            Some("a.toml:1:1: nobody is that small")
+            Some("a.toml:1:14: `height_m` is below the floor")
         );
     }
 

@@ -1,5 +1,5 @@
-use std::fmt::Write as _;
-use std::ops::{Range, RangeInclusive};
+use std::fmt::{self, Write as _};
+use std::ops;
 
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
@@ -23,7 +23,7 @@ pub struct ConfigError {
     /// What is wrong and what would be right.
     pub message: String,
     /// Byte range in the text; `None` if it concerns the file as a whole.
-    pub span: Option<Range<usize>>,
+    pub span: Option<ops::Range<usize>>,
 }
 
 impl ConfigError {
@@ -33,9 +33,18 @@ impl ConfigError {
     }
 
     /// The same error at `span`, unless it already has a place.
-    pub fn or_at(mut self, span: Option<Range<usize>>) -> Self {
+    pub fn or_at(mut self, span: Option<ops::Range<usize>>) -> Self {
         self.span = self.span.or(span);
         self
+    }
+
+    /// Returns the error of settings that stand at `value`, at the key that it names.
+    pub fn at_key(error: &Error, value: &Value<'_>) -> Self {
+        let named = match error {
+            Error::Settings { key, .. } => place_of(value, key),
+            _ => None,
+        };
+        Self { message: error.to_string(), span: Some(named.unwrap_or_else(|| value.span())) }
     }
 
     /// The error as a person wants to read it: file, line, column, the line
@@ -61,6 +70,15 @@ impl ConfigError {
     }
 }
 
+/// Returns where the value of a dotted key stands.
+fn place_of(value: &Value<'_>, key: &str) -> Option<ops::Range<usize>> {
+    let found = key.split('.').try_fold(value, |at, part| match at.get_ref() {
+        DeValue::Table(table) => table.get(part),
+        _ => None,
+    });
+    found.map(Spanned::span)
+}
+
 impl From<toml::de::Error> for ConfigError {
     fn from(error: toml::de::Error) -> Self {
         let message = error.message().trim_end();
@@ -68,26 +86,127 @@ impl From<toml::de::Error> for ConfigError {
     }
 }
 
-/// Numbers that are neither endless nor far beyond anything that is measured.
-pub const ANY: RangeInclusive<f64> = -1e6..=1e6;
-/// The same without negative ones.
-pub const NOT_NEGATIVE: RangeInclusive<f64> = 0.0..=1e6;
-/// The same without nothing.
-pub const POSITIVE: RangeInclusive<f64> = 1e-6..=1e6;
-
-/// Refuses settings that are no numbers or out of their range.
+/// Refuses numbers outside of the ranges that the fields declare with
+/// `#[schemars(range(min = ..., max = ...))]`, and floats that are not finite where a field
+/// declares none. Those of an editor's schema are the same.
 ///
 /// # Errors
-/// [`Error::Settings`] names the first such setting, and the range.
-pub fn check_ranges(settings: &[(&str, f64, RangeInclusive<f64>)]) -> crate::Result<()> {
-    match settings.iter().find(|(_, value, range)| !range.contains(value)) {
+/// [`Error::Settings`] names the first such key, its range and its value.
+pub fn check_settings<T: Settings>(settings: &T) -> crate::Result<()> {
+    let value = toml::Value::try_from(settings).map_err(|why| Error::Other(why.to_string()))?;
+    let schema = schemars::schema_for!(T).to_value();
+    match out_of_range(&value, &schema, &schema, "") {
+        Some((key, why)) => Err(Error::Settings { key, why }),
         None => Ok(()),
-        Some((key, value, range)) => {
-            let bound = match range {
-                range if *range == POSITIVE => "be positive and at most 1e6".to_owned(),
-                range => format!("lie between {:?} and {:?}", range.start(), range.end()),
-            };
-            Err(Error::Settings(format!("`{key}` must {bound}, not {value}")))
+    }
+}
+
+/// Returns the first value below `path` that its schema does not allow, and why.
+fn out_of_range(
+    value: &toml::Value,
+    schema: &serde_json::Value,
+    root: &serde_json::Value,
+    path: &str,
+) -> Option<(String, String)> {
+    let number = match value {
+        toml::Value::Table(table) => {
+            return table.iter().find_map(|(key, value)| {
+                let property = resolve(&schema["properties"][key], root).1;
+                out_of_range(value, property, root, &join(path, key))
+            });
+        }
+        toml::Value::Array(items) => return list_out_of_range(items, schema, root, path),
+        toml::Value::Integer(number) => *number as f64,
+        toml::Value::Float(number) => *number,
+        _ => return None,
+    };
+    let range = Range::of(schema);
+    (!range.contains(number)).then(|| (path.to_owned(), format!("must {range}, not {number}")))
+}
+
+fn list_out_of_range(
+    items: &[toml::Value],
+    schema: &serde_json::Value,
+    root: &serde_json::Value,
+    path: &str,
+) -> Option<(String, String)> {
+    let count = items.len() as f64;
+    let limit = |key: &str, default| schema[key].as_f64().unwrap_or(default);
+    let (least, most) = (limit("minItems", 0.0), limit("maxItems", f64::INFINITY));
+    if !(least..=most).contains(&count) {
+        return Some((path.to_owned(), format!("must have {least} to {most} values, not {count}")));
+    }
+    let each = resolve(&schema["items"], root).1;
+    items.iter().find_map(|item| out_of_range(item, each, root, path))
+}
+
+/// Least number of a range that stands for "positive": any smaller one is a mistake of units.
+const POSITIVE: f64 = 1e-6;
+
+/// The numbers that a schema allows.
+struct Range {
+    least: Option<f64>,
+    most: Option<f64>,
+    above: Option<f64>,
+    below: Option<f64>,
+}
+
+impl Range {
+    fn of(schema: &serde_json::Value) -> Self {
+        let bound = |key: &str| schema[key].as_f64();
+        Self {
+            least: bound("minimum"),
+            most: bound("maximum"),
+            above: bound("exclusiveMinimum"),
+            below: bound("exclusiveMaximum"),
+        }
+    }
+
+    /// Returns true for a number within the bounds. Not for one that is not finite: a
+    /// comparison with NaN is never true, and a robot would drive on.
+    fn contains(&self, number: f64) -> bool {
+        let Self { least, most, above, below } = self;
+        number.is_finite()
+            && least.is_none_or(|bound| number >= bound)
+            && most.is_none_or(|bound| number <= bound)
+            && above.is_none_or(|bound| number > bound)
+            && below.is_none_or(|bound| number < bound)
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { least, most, above, below } = *self;
+        match (least, most, above, below) {
+            (None, None, None, None) => return f.write_str("be a finite number"),
+            (None, None, Some(0.0), None) => return f.write_str("be positive"),
+            (Some(least), Some(most), None, None) if least != POSITIVE => {
+                return write!(f, "lie between {} and {}", Shown(least), Shown(most));
+            }
+            _ => {}
+        }
+        let lower = match (least, above) {
+            (Some(POSITIVE), _) | (_, Some(0.0)) => Some("positive".to_owned()),
+            (Some(least), _) => Some(format!("at least {}", Shown(least))),
+            (_, above) => above.map(|above| format!("above {}", Shown(above))),
+        };
+        let upper = match (most, below) {
+            (Some(most), _) => Some(format!("at most {}", Shown(most))),
+            (_, below) => below.map(|below| format!("below {}", Shown(below))),
+        };
+        let both: Vec<String> = lower.into_iter().chain(upper).collect();
+        write!(f, "be {}", both.join(" and "))
+    }
+}
+
+/// A bound in few digits.
+struct Shown(f64);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.abs() {
+            0.0 | 1e-3..1e5 => write!(f, "{}", self.0),
+            _ => write!(f, "{:e}", self.0),
         }
     }
 }
@@ -95,12 +214,13 @@ pub fn check_ranges(settings: &[(&str, f64, RangeInclusive<f64>)]) -> crate::Res
 /// Reads settings from a value of a config file; the defaults where there is none.
 ///
 /// # Errors
-/// Unknown keys and wrong types, with their place and the nearest valid name.
+/// Unknown keys, wrong types and numbers out of their range, with their place; for a name
+/// the nearest valid one.
 pub fn parse_settings<T: Settings>(value: Option<Value<'_>>) -> Result<T, ConfigError> {
-    match value {
-        None => Ok(T::default()),
-        Some(value) => Ok(T::deserialize(toml::de::ValueDeserializer::from(value))?),
-    }
+    let Some(value) = value else { return Ok(T::default()) };
+    let settings = T::deserialize(toml::de::ValueDeserializer::from(value.clone()))?;
+    check_settings(&settings).map_err(|error| ConfigError::at_key(&error, &value))?;
+    Ok(settings)
 }
 
 /// Adds "did you mean" to serde's "unknown field `a`, expected one of `b`, `c`".
@@ -299,18 +419,73 @@ mod tests {
         assert_eq!(placed.or_at(Some(5..6)).span, Some(1..2));
     }
 
+    #[derive(Serialize, Deserialize, JsonSchema, Clone)]
+    #[serde(default, deny_unknown_fields)]
+    struct Ranges {
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        positive: f64,
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+        inside: f64,
+        any: f64,
+        #[schemars(range(min = 1, max = 16))]
+        count: usize,
+        #[schemars(length(min = 1, max = 2), inner(range(min = 0.5)))]
+        list: Vec<f64>,
+        inner: InnerRanges,
+    }
+
+    #[derive(Serialize, Deserialize, JsonSchema, Clone)]
+    #[serde(default, deny_unknown_fields)]
+    struct InnerRanges {
+        #[schemars(range(max = 2.0))]
+        deep: f64,
+    }
+
+    impl Default for InnerRanges {
+        fn default() -> Self {
+            Self { deep: 0.0 }
+        }
+    }
+
+    impl Default for Ranges {
+        fn default() -> Self {
+            let inner = InnerRanges::default();
+            Self { positive: 1.0, inside: 0.5, any: 0.0, count: 1, list: vec![1.0], inner }
+        }
+    }
+
     #[test]
     fn the_first_setting_out_of_its_range_is_named() {
-        let check = |settings: &[(&str, f64, RangeInclusive<f64>)]| {
-            check_ranges(settings).map_err(|error| error.to_string())
+        type Change<'a> = &'a dyn Fn(&mut Ranges);
+        let says = |change: Change<'_>| {
+            let mut ranges = Ranges::default();
+            change(&mut ranges);
+            check_settings(&ranges).map_or_else(|error| error.to_string(), |()| "fine".into())
         };
-        let fine = [("a", 0.0, NOT_NEGATIVE), ("b", -1e6, ANY), ("c", 1e6, POSITIVE)];
-        assert_eq!(check(&fine), Ok(()));
-        let wrong = |value, range| check(&[("a", 1.0, ANY), ("b", value, range)]).unwrap_err();
-        assert_eq!(wrong(0.0, POSITIVE), "`b` must be positive and at most 1e6, not 0");
-        assert_eq!(wrong(2.0, 0.0..=1.0), "`b` must lie between 0.0 and 1.0, not 2");
-        assert_eq!(wrong(f64::NAN, ANY), "`b` must lie between -1000000.0 and 1000000.0, not NaN");
-        assert!(check(&[("a", -0.1, NOT_NEGATIVE)]).is_err());
+        assert_eq!(says(&|_| ()), "fine");
+        assert_eq!(says(&|r| r.positive = 1e6), "fine");
+        assert_eq!(says(&|r| r.list = vec![0.5, 9.0]), "fine");
+        let wrong: [(Change<'_>, &str); 8] = [
+            (&|r| r.positive = 0.0, "`positive` must be positive and at most 1e6, not 0"),
+            (&|r| r.inside = 1.0, "`inside` must be positive and below 1, not 1"),
+            (&|r| r.any = f64::NAN, "`any` must be a finite number, not NaN"),
+            (&|r| r.any = f64::INFINITY, "`any` must be a finite number, not inf"),
+            (&|r| r.count = 17, "`count` must lie between 1 and 16, not 17"),
+            (&|r| r.list = vec![1.0, 0.4], "`list` must be at least 0.5, not 0.4"),
+            (&|r| r.list = vec![], "`list` must have 1 to 2 values, not 0"),
+            (&|r| r.inner.deep = 2.5, "`inner.deep` must be at most 2, not 2.5"),
+        ];
+        for (change, expected) in wrong {
+            assert_eq!(says(change), expected);
+        }
+    }
+
+    #[test]
+    fn a_number_out_of_its_range_is_shown_at_its_key() {
+        let text = "x = { any = 1.0, inner = { deep = 9.0 } }";
+        let mut root = toml::de::DeTable::parse(text).unwrap().into_inner();
+        let error = parse_settings::<Ranges>(root.remove("x")).err().unwrap();
+        assert_eq!(error.span.map(|span| &text[span]), Some("9.0"));
     }
 
     #[test]

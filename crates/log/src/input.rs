@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::check_settings;
 
 use crate::LogError;
 
@@ -29,6 +30,7 @@ pub struct InputSettings {
     /// Topic of the right camera's calibration, which has the baseline.
     pub right_info_topic: Option<String>,
     /// Images whose stamps differ by no more than this belong together, s.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub pair_tolerance_s: f64,
     /// The robot's frame: X forward, Y left, Z up, on the floor. Where tf has
     /// `base_footprint` too, and this is left at `base_link`, that one is used.
@@ -37,17 +39,22 @@ pub struct InputSettings {
     pub odom_frame: String,
     /// Metres per unit of depth, where the log departs from the convention
     /// (millimetres for 16UC1, metres for 32FC1); makes mono16 images depth.
+    #[schemars(range(min = 1e-6, max = 1e3))]
     pub depth_unit_m: Option<f64>,
     /// Columns and rows by which depth images are moved to lie on colour, where the
     /// log's are not registered well (`tagalong doctor` measures it).
+    #[schemars(inner(range(min = -1000, max = 1000)))]
     pub depth_offset_px: [i32; 2],
     /// The pose of the camera, for logs whose tf does not give it, or gives it wrong.
     pub camera: Option<MountSettings>,
     /// Columns and rows to which the circular image of a conical mirror is unwrapped.
+    #[schemars(inner(range(min = 8, max = 8192)))]
     pub panorama: [usize; 2],
     /// Images that arrive up to this many frames late are put in order.
+    #[schemars(range(max = 64))]
     pub reorder_frames: usize,
     /// Standard deviation of odometry as a fraction of the travel.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub odometry_sigma: f64,
 }
 
@@ -82,26 +89,7 @@ impl InputSettings {
     /// # Errors
     /// [`LogError::Settings`], which names the key.
     pub fn check(&self) -> Result<(), LogError> {
-        let refuse = |text: &str| Err(LogError::Settings(text.to_owned()));
-        if !(0.0..=10.0).contains(&self.pair_tolerance_s) {
-            return refuse("pair_tolerance_s must lie between 0 and 10");
-        }
-        if !(0.0..=10.0).contains(&self.odometry_sigma) {
-            return refuse("odometry_sigma must lie between 0 and 10");
-        }
-        if self.depth_unit_m.is_some_and(|unit| !(1e-6..=1e3).contains(&unit)) {
-            return refuse("depth_unit_m must lie between 1e-6 and 1000");
-        }
-        if !self.depth_offset_px.iter().all(|offset| (-1000..=1000).contains(offset)) {
-            return refuse("depth_offset_px must lie between -1000 and 1000");
-        }
-        if !self.panorama.iter().all(|side| (8..=8192).contains(side)) {
-            return refuse("panorama must be 8 to 8192 columns and rows");
-        }
-        if self.reorder_frames > 64 {
-            return refuse("reorder_frames must be at most 64: each keeps its images in memory");
-        }
-        self.camera.as_ref().map_or(Ok(()), MountSettings::check)
+        check_settings(self).map_err(|error| LogError::Settings(error.to_string()))
     }
 }
 
@@ -110,22 +98,12 @@ impl InputSettings {
 #[serde(default, deny_unknown_fields)]
 pub struct MountSettings {
     /// Height above the floor, m.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 100))]
     pub height_m: f64,
     /// How far the camera looks down, degrees.
+    #[schemars(range(min = -180.0, max = 180.0))]
     pub pitch_down_deg: f64,
     /// How far its right side is raised, degrees.
+    #[schemars(range(min = -180.0, max = 180.0))]
     pub roll_deg: f64,
-}
-
-impl MountSettings {
-    fn check(&self) -> Result<(), LogError> {
-        let angles = [self.pitch_down_deg, self.roll_deg];
-        if !(self.height_m > 0.0 && self.height_m < 100.0) {
-            return Err(LogError::Settings("camera.height_m must be positive".into()));
-        }
-        if angles.iter().any(|a| !(-180.0..=180.0).contains(a)) {
-            return Err(LogError::Settings("the camera's angles are given in degrees".into()));
-        }
-        Ok(())
-    }
 }

@@ -55,10 +55,13 @@ impl PipelineSettings {
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSettings {
     /// Half the distance between the driven wheels, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub wheel_half_separation_m: f64,
     /// Standard deviation of a wheel's travel, as a fraction of it.
+    #[schemars(range(min = 0.0))]
     pub wheel_slip: f64,
     /// Speed limit of a wheel, m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_mps: f64,
 }
 

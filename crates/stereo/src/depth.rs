@@ -38,7 +38,7 @@ impl StereoDepth {
     /// Depth by these settings.
     ///
     /// # Errors
-    /// [`Error::Settings`] if [`StereoSettings::mistake`] finds one.
+    /// As [`StereoSettings::check`].
     pub fn new(settings: StereoSettings) -> Result<Self> {
         Ok(Self {
             matcher: Matcher::new(settings.clone())?,

@@ -45,11 +45,9 @@ impl Matcher {
     /// are not its concern: see [`crate::StereoDepth`].
     ///
     /// # Errors
-    /// [`Error::Settings`] if [`StereoSettings::mistake`] finds one.
+    /// As [`StereoSettings::check`].
     pub fn new(settings: StereoSettings) -> Result<Self> {
-        if let Some((key, must)) = settings.mistake() {
-            return Err(Error::Settings(format!("`{key}` must be {must}")));
-        }
+        settings.check()?;
         Ok(Self {
             penalties: penalties(&settings),
             settings,
@@ -117,7 +115,7 @@ impl Matcher {
                      for: reduce the width or raise the least depth",
                     MAX_DISPARITIES - 1
                 );
-                return Err(Error::Settings(message));
+                return Err(Error::Other(message));
             }
         };
         run(self, left, right);

@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result, check_settings};
 
 /// How disparities are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -20,18 +21,22 @@ pub struct StereoSettings {
     pub method: Method,
     /// Pairs that are wider are reduced to this width, px, and their depth is
     /// brought back to their size.
+    #[schemars(range(min = 16, max = 8192))]
     pub width: usize,
     /// Nearest depth that is looked for, m. Half of it is twice the work.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_depth_m: f64,
     /// Greatest depth that is given, m.
     pub max_depth_m: f64,
     /// Largest disparity that is looked for, px at the reduced width; 0 takes
     /// what `min_depth_m` asks for.
+    #[schemars(range(max = 255))]
     pub max_disparity: usize,
     /// Differences in brightness up to this are taken for noise, of 255.
     pub noise: u8,
     /// Least distance of the second best match from the best, as a fraction of
     /// its cost, 0 to 1.
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1))]
     pub uniqueness: f64,
     /// Largest difference between the disparities of a point in the left and
     /// in the right image, px at the reduced width.
@@ -43,26 +48,32 @@ pub struct StereoSettings {
     /// Patches of fewer pixels than this are taken for errors.
     pub speckle_pixels: usize,
     /// Neighbours whose disparities differ by at most this are of one patch, px.
+    #[schemars(range(min = 0.0))]
     pub speckle_step: f64,
     /// Holes of at most so many pixels along a row are filled, px at the reduced
     /// width, if their ends are of one patch; 0 leaves them.
     pub fill_px: usize,
     /// So are holes up to this wide, in distances of the two cameras.
+    #[schemars(range(min = 0.0))]
     pub fill_baselines: f64,
     /// Half the side of the window over which disparities are refined from the
     /// brightness itself, px at the reduced width; 0 leaves them.
+    #[schemars(range(max = 16))]
     pub refine_px: usize,
     /// Block: side of the window, px; odd, at most 9.
     pub window: usize,
     /// Semi-global: penalty of a disparity that changes by one.
     pub small_penalty: u8,
     /// Semi-global: penalty of a greater change where the image is smooth ...
+    #[schemars(range(max = 200))]
     pub large_penalty: u8,
     /// ... and where it has a strong edge.
     pub edge_penalty: u8,
     /// Vertical offset of the images from which on a warning is given, px.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_vertical_px: f64,
     /// Threads; 0 takes one for each core. The result does not depend on it.
+    #[schemars(range(max = 64))]
     pub threads: usize,
 }
 
@@ -97,32 +108,24 @@ impl Default for StereoSettings {
 pub const MAX_DISPARITIES: usize = 256;
 
 impl StereoSettings {
-    /// What is wrong with the settings: the key, and what its value must be.
-    pub fn mistake(&self) -> Option<(&'static str, String)> {
-        let must = |right: bool, key, words: &str| (!right).then(|| (key, words.to_owned()));
-        let near = self.min_depth_m;
-        must((16..=8192).contains(&self.width), "width", "from 16 to 8192")
-            .or_else(|| must(near.is_finite() && near > 0.0, "min_depth_m", "positive"))
-            .or_else(|| must(self.max_depth_m > near, "max_depth_m", "greater than `min_depth_m`"))
-            .or_else(|| must(self.max_disparity < MAX_DISPARITIES, "max_disparity", "below 256"))
-            .or_else(|| {
-                must((0.0..1.0).contains(&self.uniqueness), "uniqueness", "from 0 to below 1")
-            })
-            .or_else(|| must(self.speckle_step >= 0.0, "speckle_step", "at least 0"))
-            .or_else(|| must(self.fill_baselines >= 0.0, "fill_baselines", "at least 0"))
-            .or_else(|| must(self.refine_px <= 16, "refine_px", "at most 16"))
-            .or_else(|| {
-                let odd = self.window % 2 == 1 && (3..=9).contains(&self.window);
-                must(odd, "window", "3, 5, 7 or 9")
-            })
-            .or_else(|| {
-                let rising = self.small_penalty <= self.edge_penalty
-                    && self.edge_penalty <= self.large_penalty;
-                let words = "at least `small_penalty` and at most `large_penalty`";
-                must(rising, "edge_penalty", words)
-            })
-            .or_else(|| must(self.large_penalty <= 200, "large_penalty", "at most 200"))
-            .or_else(|| must(self.max_vertical_px > 0.0, "max_vertical_px", "positive"))
-            .or_else(|| must(self.threads <= 64, "threads", "at most 64"))
+    /// Refuses settings that cannot work.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] names the key.
+    pub fn check(&self) -> Result<()> {
+        check_settings(self)?;
+        let Self { min_depth_m, max_depth_m, window, .. } = self;
+        let Self { small_penalty, edge_penalty, large_penalty, .. } = self;
+        if max_depth_m <= min_depth_m {
+            return Err(Error::setting("max_depth_m", "must be greater than `min_depth_m`"));
+        }
+        if ![3, 5, 7, 9].contains(window) {
+            return Err(Error::setting("window", "must be 3, 5, 7 or 9"));
+        }
+        if edge_penalty < small_penalty || edge_penalty > large_penalty {
+            let why = "must be at least `small_penalty` and at most `large_penalty`";
+            return Err(Error::setting("edge_penalty", why));
+        }
+        Ok(())
     }
 }

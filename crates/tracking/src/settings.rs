@@ -8,9 +8,11 @@ pub struct ClockSettings {
     /// A frame that is older than the one before by at most this many seconds
     /// came out of order and is dropped; one that is older by more says that
     /// the clock was set back, and all tracks end.
+    #[schemars(range(min = 0.0))]
     pub max_back_s: f64,
     /// A longer pause than this, in seconds, and than three usual frame
     /// periods, is a gap: tracks that are not confirmed end.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap_s: f64,
     /// After a pause that is longer than this, in seconds, and than three
     /// usual frame periods, all tracks end.
@@ -29,17 +31,22 @@ impl Default for ClockSettings {
 pub struct MergeSettings {
     /// Two detections nearer to each other on the floor than this are of one person, m; the
     /// one with the higher score is kept.
+    #[schemars(range(min = 0.0))]
     pub same_person_m: f64,
     /// Two detections that overlap by more than this are of one person, unless their
     /// positions contradict it.
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub same_person_iou: f64,
     /// Most detections in a frame; the ones with the lowest scores are dropped.
+    #[schemars(range(min = 1))]
     pub max_detections: usize,
     /// Two tracks that are nearer to each other on the floor than this, m, in 3 of 5 frames
     /// are of one person, and the older number is kept. A detection so near to a track that
     /// is seen starts no track.
+    #[schemars(range(min = 0.0))]
     pub duplicate_m: f64,
     /// Most tracks at a time; the ones with the lowest scores end.
+    #[schemars(range(min = 1))]
     pub max_tracks: usize,
 }
 
@@ -73,15 +80,19 @@ pub struct OcclusionSettings {
     /// A person of whom a smaller part than this is visible behind nearer
     /// people is hidden; one of whom a smaller part is inside the image has
     /// left it.
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub min_visible: f64,
     /// Only a person who is nearer by at least this hides another one, m ...
+    #[schemars(range(min = 0.0))]
     pub min_gap_m: f64,
     /// ... and by at least this many standard deviations of that person's
     /// range.
+    #[schemars(range(min = 0.0))]
     pub min_gap_sigmas: f64,
     /// Width of a body, m. Of somebody half hidden the half that shows is found, and its
     /// middle lies up to half the width of the hidden part aside: the sighting is widened
     /// by that. 0: it is not.
+    #[schemars(range(min = 0.0))]
     pub body_width_m: f64,
 }
 

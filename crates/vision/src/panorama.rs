@@ -116,12 +116,12 @@ impl<P: Blend> Unwrapper<P> {
     /// For raw images of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`Error::Settings`] for numbers that are those of no mirror, an empty
+    /// [`Error::Other`] for numbers that are those of no mirror, an empty
     /// panorama, or raw images of less than 2 x 2 pixels.
     pub fn new(panorama: &Panorama, width: usize, height: usize) -> Result<Self> {
         let empty = panorama.columns == 0 || panorama.rows == 0 || width.min(height) < 2;
         if !panorama.mirror.is_sane() || empty {
-            return Err(Error::Settings(format!(
+            return Err(Error::Other(format!(
                 "{width}x{height} pixels of {:?} cannot be unwrapped to {}x{}",
                 panorama.mirror, panorama.columns, panorama.rows
             )));

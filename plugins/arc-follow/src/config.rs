@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Error, Result, check_settings};
 
 /// The way to the target (P1, Figure 7; P4, Figure 8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -23,27 +23,36 @@ pub struct Config {
     pub path: Path,
     /// By what path C divides the radius of the circle (k in P1, section 3):
     /// 1.5 to 2.5 for usual fields of view. No unit.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub path_gain: f64,
     /// The wheel speeds exactly as the papers print them: no bound on the
     /// curvature, no turning on the spot, no slowing down in bends. Paths A
     /// and C only.
     pub as_printed: bool,
     /// Distance kept from the person, m, on the floor.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub stand_off_m: f64,
     /// Speed for each metre beyond the stand-off, 1/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub range_gain_per_s: f64,
     /// Speeds up by at most this much, m/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_acceleration: f64,
     /// Slows down by at most this much, m/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_deceleration: f64,
     /// Turning for each radian of bearing while the robot stands, 1/s; it
     /// fades as the robot drives faster.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub bearing_gain_per_s: f64,
     /// Turns no faster than this, rad/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_turn_rate: f64,
     /// Largest curvature of the path, 1/m.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub max_curvature: f64,
     /// A target nearer than this steers as if it were this far away, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub min_range_m: f64,
     /// Paths A and C stop and turn on the spot while the bearing exceeds the
     /// second of these angles, and until it is below the first, degrees.
@@ -52,12 +61,15 @@ pub struct Config {
     pub align_deg: [f64; 2],
     /// Steers to where the person went, this far ahead, m, instead of straight to the
     /// person: through the middle of doors and round corners. 0 is off.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub trail_m: f64,
     /// Drives after a person who is not seen for half of this time, then slows
     /// down, and stands still at the end of it, s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_unseen_s: f64,
     /// From the capture of an image until the wheels answer to it, s: the
     /// target is predicted by as much.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub latency_s: f64,
 }
 
@@ -90,36 +102,18 @@ pub(crate) const MOST: f64 = 1e6;
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        self.check_numbers()?;
+        check_settings(self)?;
         let angles = [("turn_in_place_deg", self.turn_in_place_deg), ("align_deg", self.align_deg)];
         for (key, [off, on]) in angles {
             if !(0.0 < off && off <= on && on < 180.0) {
-                let message = format!("`{key}` must be two rising angles between 0 and 180");
-                return Err(Error::Settings(message));
+                return Err(Error::setting(key, "must be two rising angles between 0 and 180"));
             }
         }
         if self.as_printed && self.path == Path::B {
-            let message = "`as_printed` needs path A or C: no equation is printed for path B";
-            return Err(Error::Settings(message.into()));
+            let why = "needs path A or C: no equation is printed for path B";
+            return Err(Error::setting("as_printed", why));
         }
         Ok(())
-    }
-
-    fn check_numbers(&self) -> Result<()> {
-        check_ranges(&[
-            ("path_gain", self.path_gain, POSITIVE),
-            ("stand_off_m", self.stand_off_m, NOT_NEGATIVE),
-            ("range_gain_per_s", self.range_gain_per_s, POSITIVE),
-            ("max_acceleration", self.max_acceleration, POSITIVE),
-            ("max_deceleration", self.max_deceleration, POSITIVE),
-            ("bearing_gain_per_s", self.bearing_gain_per_s, NOT_NEGATIVE),
-            ("max_turn_rate", self.max_turn_rate, POSITIVE),
-            ("max_curvature", self.max_curvature, NOT_NEGATIVE),
-            ("min_range_m", self.min_range_m, POSITIVE),
-            ("trail_m", self.trail_m, NOT_NEGATIVE),
-            ("max_unseen_s", self.max_unseen_s, POSITIVE),
-            ("latency_s", self.latency_s, NOT_NEGATIVE),
-        ])
     }
 
     /// k of P1, section 3: path A is path C with a gain of one; path B drives

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_assignment::{Cost, Overlap, PairCost};
-use tagalong_core::{NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of the associator `associate-hungarian`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -11,13 +11,17 @@ pub struct Config {
     pub cost: Cost,
     /// Mahalanobis: largest squared distance. 11.34 is the 99 % point of
     /// chi-squared with 3 degrees of freedom.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate: f64,
     /// Mahalanobis: largest distance on the floor, m, between frames that are
     /// close in time ...
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate_m: f64,
     /// ... and by how much it grows with the time between them, m/s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub gate_speed_mps: f64,
     /// Overlap: smallest overlap.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub min_overlap: f64,
     /// Overlap: `iou` or `dice`.
     pub overlap: Overlap,
@@ -26,6 +30,7 @@ pub struct Config {
     pub compat_printed_cost: bool,
     /// What it costs to leave a track without a detection, as a multiple of
     /// the cost at the gate.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub miss_factor: f64,
 }
 
@@ -44,9 +49,6 @@ impl Default for Config {
     }
 }
 
-/// Fractions above nothing, up to all.
-const FRACTION: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
-
 impl Config {
     /// Returns the part that says how well a pair fits.
     pub(crate) fn pair_cost(&self) -> PairCost {
@@ -56,12 +58,6 @@ impl Config {
 
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("gate", self.gate, POSITIVE),
-            ("gate_m", self.gate_m, POSITIVE),
-            ("gate_speed_mps", self.gate_speed_mps, NOT_NEGATIVE),
-            ("min_overlap", self.min_overlap, FRACTION),
-            ("miss_factor", self.miss_factor, POSITIVE),
-        ])
+        check_settings(self)
     }
 }

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_assignment::{Cost, Overlap, PairCost};
-use tagalong_core::{NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of the associator `associate-jpda`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -9,18 +9,25 @@ use tagalong_core::{NOT_NEGATIVE, POSITIVE, Result, check_ranges};
 pub struct Config {
     /// Largest squared Mahalanobis distance. 11.34 is the 99 % point of chi-squared with 3
     /// degrees of freedom.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate: f64,
     /// Largest distance on the floor, m, between frames that are close in time ...
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate_m: f64,
     /// ... and by how much it grows with the time between them, m/s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub gate_speed_mps: f64,
     /// Probability that a visible person is detected in a frame.
+    #[schemars(range(min = 0.01, max = 0.999))]
     pub detection_probability: f64,
     /// False detections in a cubic metre and a frame.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub clutter_per_m3: f64,
     /// Pairs that are less probable are left out.
+    #[schemars(range(min = 1e-6, max = 0.5))]
     pub min_weight: f64,
     /// Most detections in a cluster of tracks; 1 to 16. The work doubles with each.
+    #[schemars(range(min = 1, max = 16))]
     pub max_detections: u32,
 }
 
@@ -48,14 +55,6 @@ impl Config {
 
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("gate", self.gate, POSITIVE),
-            ("gate_m", self.gate_m, POSITIVE),
-            ("gate_speed_mps", self.gate_speed_mps, NOT_NEGATIVE),
-            ("detection_probability", self.detection_probability, 0.01..=0.999),
-            ("clutter_per_m3", self.clutter_per_m3, POSITIVE),
-            ("min_weight", self.min_weight, 1e-6..=0.5),
-            ("max_detections", f64::from(self.max_detections), 1.0..=16.0),
-        ])
+        check_settings(self)
     }
 }

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_assignment::{Cost, Overlap, PairCost};
-use tagalong_core::{ANY, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of the associator `associate-two-stage`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -11,21 +11,27 @@ pub struct Config {
     pub cost: Cost,
     /// Mahalanobis: largest squared distance. 11.34 is the 99 % point of chi-squared with 3
     /// degrees of freedom.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate: f64,
     /// Mahalanobis: largest distance on the floor, m, between frames that are close in time ...
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate_m: f64,
     /// ... and by how much it grows with the time between them, m/s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub gate_speed_mps: f64,
     /// Overlap: smallest overlap.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub min_overlap: f64,
     /// Overlap: `iou` or `dice`.
     pub overlap: Overlap,
     /// What it costs to leave a track without a detection, as a multiple of the cost at the
     /// gate.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub miss_factor: f64,
     /// Detections from these log-odds on are strong.
     pub strong_log_odds: f64,
     /// A weak detection continues a track only within this part of the gate, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub weak_gate: f64,
 }
 
@@ -54,14 +60,6 @@ impl Config {
 
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("gate", self.gate, POSITIVE),
-            ("gate_m", self.gate_m, POSITIVE),
-            ("gate_speed_mps", self.gate_speed_mps, NOT_NEGATIVE),
-            ("min_overlap", self.min_overlap, 1e-6..=1.0),
-            ("miss_factor", self.miss_factor, POSITIVE),
-            ("strong_log_odds", self.strong_log_odds, ANY),
-            ("weak_gate", self.weak_gate, 0.0..=1.0),
-        ])
+        check_settings(self)
     }
 }

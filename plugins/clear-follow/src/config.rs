@@ -1,45 +1,60 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Error, Result, check_settings};
 
 /// Settings of the controller `clear-follow`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Distance kept from the person, m, on the floor.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub stand_off_m: f64,
     /// Speed for each metre beyond the stand-off, 1/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub range_gain_per_s: f64,
     /// Turning for each radian of bearing, 1/s, beside as much as the person
     /// walks around the robot.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub bearing_gain_per_s: f64,
     /// Turns no faster than this, rad/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_turn_rate: f64,
     /// Speeds up by at most this much, m/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_acceleration: f64,
     /// Slows down by at most this much, m/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_deceleration: f64,
     /// Drives after a person who is not seen for half of this time, then slows
     /// down, and stands still at the end of it, s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_unseen_s: f64,
     /// From the capture of an image until the wheels answer to it, s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub latency_s: f64,
     /// Looks ahead for this long, s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub horizon_s: f64,
     /// Radius of the robot, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub radius_m: f64,
     /// Wants this much room around itself, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub room_m: f64,
     /// Things lower than this are floor, and higher ones are passed below, m.
     pub heights_m: [f64; 2],
     /// Remembers things out of sight for this long, s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub memory_s: f64,
     /// What it costs to have no room at all; a change of the speed by its whole
     /// limit costs one.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub room_weight: f64,
     /// What it costs to have somebody right before the person.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub sight_weight: f64,
     /// What it costs to turn differently, for each rad/s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub turn_weight: f64,
 }
 
@@ -72,26 +87,10 @@ pub(crate) const MOST: f64 = 1e6;
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("stand_off_m", self.stand_off_m, NOT_NEGATIVE),
-            ("range_gain_per_s", self.range_gain_per_s, POSITIVE),
-            ("bearing_gain_per_s", self.bearing_gain_per_s, POSITIVE),
-            ("max_turn_rate", self.max_turn_rate, POSITIVE),
-            ("max_acceleration", self.max_acceleration, POSITIVE),
-            ("max_deceleration", self.max_deceleration, POSITIVE),
-            ("max_unseen_s", self.max_unseen_s, POSITIVE),
-            ("latency_s", self.latency_s, NOT_NEGATIVE),
-            ("horizon_s", self.horizon_s, POSITIVE),
-            ("radius_m", self.radius_m, POSITIVE),
-            ("room_m", self.room_m, POSITIVE),
-            ("memory_s", self.memory_s, NOT_NEGATIVE),
-            ("room_weight", self.room_weight, NOT_NEGATIVE),
-            ("sight_weight", self.sight_weight, NOT_NEGATIVE),
-            ("turn_weight", self.turn_weight, NOT_NEGATIVE),
-        ])?;
+        check_settings(self)?;
         let [low, high] = self.heights_m;
         if !(0.0 <= low && low < high && high <= MOST) {
-            return Err(Error::Settings("`heights_m` must be two rising heights".into()));
+            return Err(Error::setting("heights_m", "must be two rising heights"));
         }
         Ok(())
     }

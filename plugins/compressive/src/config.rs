@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{ANY, Result, check_ranges};
+use tagalong_core::{Error, Result, check_settings};
 
 /// Settings of `compressive`. Distances in the image are in widths of the box:
 /// a pixel of the papers, whose boxes are some 64 pixels wide, is 0.016.
@@ -8,40 +8,54 @@ use tagalong_core::{ANY, Result, check_ranges};
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Numbers that describe a box.
+    #[schemars(range(min = 1, max = 1000))]
     pub features: usize,
     /// Each of them is made of two rectangles to so many.
+    #[schemars(range(min = 2, max = 16))]
     pub most_rectangles: usize,
     /// Weight of the past when a model learns from a frame, 0 to 1.
+    #[schemars(range(min = 0.0, max = 0.999))]
     pub memory: f64,
     /// The same when another detector has found the person elsewhere.
+    #[schemars(range(min = 0.0, max = 0.999))]
     pub anchored_memory: f64,
     /// The least standard deviation of a number, grey values: a number that
     /// never changed so far must not decide alone.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub min_sigma: f64,
     /// How far from the expected place boxes are searched, widths.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub search_radius: f64,
     /// Distance of the boxes of the coarse search, widths.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub coarse_step: f64,
     /// The fine search goes so far around the best coarse box, widths, pixel by
     /// pixel as long as the boxes are small.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub fine_radius: f64,
     /// Boxes this near to the person teach what they look like, widths.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub positive_radius: f64,
     /// Boxes at least so far teach what they do not look like, widths, ...
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub negative_from: f64,
     /// ... and at most so far.
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub negative_to: f64,
     /// Number of these.
+    #[schemars(range(min = 2, max = 1000))]
     pub negatives: usize,
     /// Drops boxes that do not show something at the person's distance.
     pub depth_filter: bool,
     /// What is nearer than this to the expected distance may be the person, m.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub depth_tolerance_m: f64,
     /// Whatever is nearer than the person by more than this hides them, m.
     pub hidden_by_m: f64,
     /// Takes the size of the box from the distance.
     pub scale_from_depth: bool,
     /// Most that the size of the box changes from frame to frame, as a fraction.
+    #[schemars(range(min = 0.0, max = 0.999))]
     pub max_scale_change: f64,
     /// Least confidence of a sighting: the mean log-ratio of a number.
     pub min_confidence: f64,
@@ -54,8 +68,10 @@ pub struct Config {
     /// other detector supports loses its score and ends.
     pub score: f64,
     /// Standard deviation of the place of the box, widths.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub sigma_box: f64,
     /// Standard deviation of a distance from the depth image, m.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub sigma_depth_m: f64,
     /// As in the papers: learn in every frame, whoever is in the box.
     pub compat_always_learn: bool,
@@ -102,28 +118,17 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("features", self.features as f64, 1.0..=1000.0),
-            ("most_rectangles", self.most_rectangles as f64, 2.0..=16.0),
-            ("memory", self.memory, 0.0..=0.999),
-            ("anchored_memory", self.anchored_memory, 0.0..=0.999),
-            ("min_sigma", self.min_sigma, 1e-6..=100.0),
-            ("search_radius", self.search_radius, 1e-6..=100.0),
-            ("coarse_step", self.coarse_step, 0.01 * self.search_radius..=100.0),
-            ("fine_radius", self.fine_radius, 0.0..=1.0),
-            ("positive_radius", self.positive_radius, 1e-6..=100.0),
-            ("negatives", self.negatives as f64, 2.0..=1000.0),
-            ("negative_from", self.negative_from, 1e-6..=10.0),
-            ("negative_to", self.negative_to, self.negative_from..=10.0),
-            ("depth_tolerance_m", self.depth_tolerance_m, 1e-6..=100.0),
-            ("hidden_by_m", self.hidden_by_m, ANY),
-            ("max_scale_change", self.max_scale_change, 0.0..=0.999),
-            ("min_confidence", self.min_confidence, ANY),
-            ("learn_confidence", self.learn_confidence, ANY),
-            ("min_lead", self.min_lead, ANY),
-            ("score", self.score, ANY),
-            ("sigma_box", self.sigma_box, 1e-6..=100.0),
-            ("sigma_depth_m", self.sigma_depth_m, 1e-6..=100.0),
-        ])
+        check_settings(self)?;
+        // A finer grid than a hundredth of the radius is thousands of boxes a person.
+        let least = 0.01 * self.search_radius;
+        if self.coarse_step < least {
+            let why = format!("must be at least {least}, a hundredth of `search_radius`");
+            return Err(Error::setting("coarse_step", why));
+        }
+        if self.negative_to < self.negative_from {
+            let why = format!("must be at least {}, as `negative_from`", self.negative_from);
+            return Err(Error::setting("negative_to", why));
+        }
+        Ok(())
     }
 }

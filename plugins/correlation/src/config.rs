@@ -1,38 +1,51 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{ANY, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of `correlation`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// A picture that correlates less with what is seen is not found.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_correlation: f64,
     /// It must correlate by so much more than elsewhere, ...
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_lead: f64,
     /// ... which is at least so far away, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub elsewhere_m: f64,
     /// This part of the body at least must not be behind something nearer.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_shown: f64,
     /// Where this part of the body has depth, other detectors know better.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub max_known: f64,
     /// What is nearer or farther than the person by more is something else, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub depth_tolerance_m: f64,
     /// People are searched so many standard deviations around the expected place, ...
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub search_sigmas: f64,
     /// ... but not farther aside than this, m, ...
+    #[schemars(range(min = 0.0, max = 2.0))]
     pub search_aside_m: f64,
     /// ... nor up and down.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub search_up_m: f64,
     /// A picture is remembered if depth shows the person's body in this part of the
     /// upper-body square.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_body: f64,
     /// Standard deviation of the place across the line of sight, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_place_m: f64,
     /// Standard deviation of the distance, which a picture does not tell, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance_m: f64,
     /// A picture that is older than this is not looked for, s: what was taken for a person
     /// is found again as well, and its track must end.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub memory_s: f64,
     /// Score of a sighting, log-odds. 0: a picture says who it is, not whether that is a
     /// person.
@@ -63,21 +76,6 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("min_correlation", self.min_correlation, 0.0..=1.0),
-            ("min_lead", self.min_lead, NOT_NEGATIVE),
-            ("elsewhere_m", self.elsewhere_m, POSITIVE),
-            ("min_shown", self.min_shown, 0.0..=1.0),
-            ("max_known", self.max_known, 0.0..=1.0),
-            ("depth_tolerance_m", self.depth_tolerance_m, POSITIVE),
-            ("search_sigmas", self.search_sigmas, NOT_NEGATIVE),
-            ("search_aside_m", self.search_aside_m, 0.0..=2.0),
-            ("search_up_m", self.search_up_m, 0.0..=1.0),
-            ("min_body", self.min_body, 0.0..=1.0),
-            ("sigma_place_m", self.sigma_place_m, POSITIVE),
-            ("sigma_distance_m", self.sigma_distance_m, POSITIVE),
-            ("memory_s", self.memory_s, NOT_NEGATIVE),
-            ("score", self.score, ANY),
-        ])
+        check_settings(self)
     }
 }

@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Input,
-    Inputs, Likelihood, Rect, Result, Search, Track,
+    Inputs, Likelihood, Rect, Result, Search, Track, check_settings,
 };
 use tagalong_vision::RowSums;
 
@@ -53,6 +53,7 @@ impl DepthTemplate {
     /// # Errors
     /// [`Error::Settings`] for ranges that hold nothing.
     pub fn new(config: DepthTemplateConfig) -> Result<Self> {
+        check_settings(&config)?;
         let ordered = [
             ("min_depth_m", config.min_depth_m, "max_depth_m", config.max_depth_m),
             (
@@ -65,15 +66,8 @@ impl DepthTemplate {
         ];
         for (low, a, high, b) in ordered {
             if a.partial_cmp(&b) != Some(Ordering::Less) {
-                return Err(Error::Settings(format!("`{low}` = {a} must be below `{high}` = {b}")));
+                return Err(Error::setting(low, format!("= {a} must be below `{high}` = {b}")));
             }
-        }
-        if !(config.likelihood_sigma.is_finite() && config.likelihood_sigma > 0.0) {
-            let message = "`likelihood_sigma` must be greater than 0";
-            return Err(Error::Settings(message.into()));
-        }
-        if config.directions.is_empty() {
-            return Err(Error::Settings("`directions` must name one at least".into()));
         }
         Ok(Self {
             bank: Bank::new(config.max_rows),

@@ -1,24 +1,29 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of the filter `ekf`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Spectral density of the person's white acceleration, m²/s³.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub acceleration_noise: f64,
     /// How fast the height of the head may wander (sitting down, gait),
     /// m per square root of a second.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub height_noise: f64,
     /// Variance of each velocity component of a newcomer, m²/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub initial_velocity_variance: f64,
     /// Standard deviation added to that of each detection, m: what detectors
     /// do not know about themselves.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub extra_sigma_m: f64,
     /// Degrees of freedom of the measurement noise: with few of them, 4 say, a
     /// detection far from the prediction counts for less (Student's t); 0: the
     /// noise is normal, and every detection counts in full.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub student_dof: f64,
     /// As printed: subtract the robot's speed from the person's velocity in
     /// every frame. Biased while the robot moves.
@@ -31,8 +36,10 @@ pub struct Config {
     /// As printed: the same variance for all coordinates of all detections.
     pub compat_printed_measurement: bool,
     /// Standard deviation of the printed process noise, m/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub printed_sigma_w: f64,
     /// Standard deviation of the printed measurement noise, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub printed_sigma_v_m: f64,
 }
 
@@ -57,21 +64,6 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let must = [
-            ("acceleration_noise", self.acceleration_noise, false),
-            ("height_noise", self.height_noise, true),
-            ("initial_velocity_variance", self.initial_velocity_variance, false),
-            ("extra_sigma_m", self.extra_sigma_m, true),
-            ("student_dof", self.student_dof, true),
-            ("printed_sigma_w", self.printed_sigma_w, false),
-            ("printed_sigma_v_m", self.printed_sigma_v_m, false),
-        ];
-        for (key, value, may_be_zero) in must {
-            if !value.is_finite() || value < 0.0 || (value == 0.0 && !may_be_zero) {
-                let bound = if may_be_zero { "at least 0" } else { "positive" };
-                return Err(Error::Settings(format!("`{key}` must be {bound}, not {value}")));
-            }
-        }
-        Ok(())
+        check_settings(self)
     }
 }

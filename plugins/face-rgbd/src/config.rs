@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{ANY, POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of `face-rgbd`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -12,24 +12,31 @@ pub struct Config {
     /// Faces with lower log-odds are dropped.
     pub min_score: f64,
     /// Log-odds are limited to this.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_score: f64,
     /// A face is a group of more windows than this.
     pub min_neighbours: usize,
     /// Narrowest window that is looked for, pixels.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub min_side_px: f64,
     /// Widest, as a fraction of the shorter side of the image.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_side: f64,
     /// Each size is so many times the one before.
+    #[schemars(range(min = 1.02, max = 4.0))]
     pub scale_step: f64,
     /// Looks where depth and geometry allow a face only; off: everywhere.
     pub depth_proposals: bool,
     /// With depth: windows are as wide as this at least, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub min_face_m: f64,
     /// With depth: windows are as wide as this at most, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_face_m: f64,
     /// Distances at which faces are looked for, m.
     pub min_depth_m: f64,
     /// See `min_depth_m`.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_depth_m: f64,
     /// Heights of faces above the floor, m.
     pub min_height_m: f64,
@@ -40,15 +47,19 @@ pub struct Config {
     pub max_points: usize,
     /// The window of a face is so wide, m: tells the distance where there is no
     /// depth.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub face_m: f64,
     /// The centre of the head is so far above that of the window, as a fraction
     /// of the window's side.
     pub head_above: f64,
     /// Standard deviation of a window's place, as a fraction of its side.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_place: f64,
     /// Standard deviation of a distance from the depth image, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_depth_m: f64,
     /// Standard deviation of a distance that only the size tells, as a fraction.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
     /// How a cascade is trained; only `tagalong train cascade` reads it.
     pub training: Training,
@@ -134,24 +145,7 @@ impl Default for Training {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("min_score", self.min_score, ANY),
-            ("max_score", self.max_score, POSITIVE),
-            ("min_side_px", self.min_side_px, POSITIVE),
-            ("max_side", self.max_side, POSITIVE),
-            ("scale_step", self.scale_step, 1.02..=4.0),
-            ("min_face_m", self.min_face_m, POSITIVE),
-            ("max_face_m", self.max_face_m, POSITIVE),
-            ("min_depth_m", self.min_depth_m, ANY),
-            ("max_depth_m", self.max_depth_m, POSITIVE),
-            ("min_height_m", self.min_height_m, ANY),
-            ("max_height_m", self.max_height_m, ANY),
-            ("face_m", self.face_m, POSITIVE),
-            ("head_above", self.head_above, ANY),
-            ("sigma_place", self.sigma_place, POSITIVE),
-            ("sigma_depth_m", self.sigma_depth_m, POSITIVE),
-            ("sigma_distance", self.sigma_distance, POSITIVE),
-        ])
+        check_settings(self)
     }
 }
 
@@ -168,8 +162,8 @@ impl Training {
             && counts.iter().all(|count| *count > 0)
             && self.depth <= 4
             && self.calibration.iter().all(|tenth| (2..10).contains(tenth));
-        let why = "`training`: rates and `tilt` lie between 0 and 1, `side` between 12 and 64, `depth` is at \
+        let why = "rates and `tilt` lie between 0 and 1, `side` between 12 and 64, `depth` is at \
                    most 4, `calibration` has numbers from 2 to 9, and counts are positive";
-        if fine { Ok(()) } else { Err(tagalong_core::Error::Settings(why.into())) }
+        if fine { Ok(()) } else { Err(tagalong_core::Error::Other(format!("`training`: {why}"))) }
     }
 }

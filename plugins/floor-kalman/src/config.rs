@@ -1,7 +1,7 @@
 use nalgebra::Matrix2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, check_settings};
 
 /// How a person's next position is predicted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -40,22 +40,30 @@ pub struct Config {
     /// (P5, equation 10).
     pub process_m2: [f64; 3],
     /// The time between two images to which Q belongs, s.
+    #[schemars(range(min = 1e-3, max = 1e3))]
     pub step_s: f64,
     /// R of `fixed`: xx, xy, yy in room axes, m² (P5, equation 10).
     pub measurement_m2: [f64; 3],
     /// Of `polar`: standard deviation of the range at the robot, m.
+    #[schemars(range(min = 1e-3, max = 1e3))]
     pub sigma_range_m: f64,
     /// Of `polar`: what each metre of range adds to it, m.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub sigma_range_per_m: f64,
     /// Of `polar`: standard deviation of the bearing, degrees.
+    #[schemars(range(min = 1e-3, max = 1e3))]
     pub sigma_bearing_deg: f64,
     /// Of `constant-velocity`: spectral density of the white acceleration, m²/s³.
+    #[schemars(range(min = 1e-6, max = 1e3))]
     pub acceleration_noise: f64,
     /// Standard deviation of a newcomer's velocity components, m/s.
+    #[schemars(range(min = 1e-3, max = 1e3))]
     pub initial_speed_mps: f64,
     /// How fast the height of the head may wander, m per square root of a second.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub height_noise: f64,
     /// From the robot's heading at the start to the X axis of the room, degrees.
+    #[schemars(range(min = -360.0, max = 1e3))]
     pub room_heading_deg: f64,
     /// As printed (equation 6): the noise of u is left out of the prediction.
     pub compat_printed_u: bool,
@@ -94,28 +102,13 @@ impl Config {
 
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let refuse = |text: String| Err(Error::Settings(text));
+        check_settings(self)?;
         for (key, value) in
             [("process_m2", self.process_m2), ("measurement_m2", self.measurement_m2)]
         {
-            let known = value.iter().all(|v| v.is_finite() && v.abs() < 1e6);
-            if !known || symmetric(value).cholesky().is_none() {
-                return refuse(format!("`{key}` must be a covariance (xx, xy, yy), not {value:?}"));
-            }
-        }
-        let numbers = [
-            ("step_s", self.step_s, 1e-3),
-            ("sigma_range_m", self.sigma_range_m, 1e-3),
-            ("sigma_range_per_m", self.sigma_range_per_m, 0.0),
-            ("sigma_bearing_deg", self.sigma_bearing_deg, 1e-3),
-            ("acceleration_noise", self.acceleration_noise, 1e-6),
-            ("initial_speed_mps", self.initial_speed_mps, 1e-3),
-            ("height_noise", self.height_noise, 0.0),
-            ("room_heading_deg", self.room_heading_deg, -360.0),
-        ];
-        for (key, value, least) in numbers {
-            if !(least..=1e3).contains(&value) {
-                return refuse(format!("`{key}` must be {least} to 1000, not {value}"));
+            if symmetric(value).cholesky().is_none() {
+                let why = format!("must be a covariance (xx, xy, yy), not {value:?}");
+                return Err(Error::setting(key, why));
             }
         }
         Ok(())

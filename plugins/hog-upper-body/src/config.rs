@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{ANY, NOT_NEGATIVE, POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 use crate::Kind;
 
@@ -16,22 +16,29 @@ pub struct Config {
     /// Windows with lower log-odds are dropped.
     pub min_score: f64,
     /// Log-odds are limited to this.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_score: f64,
     /// Smallest upper body that is looked for, pixels.
+    #[schemars(range(min = 16.0, max = 1e5))]
     pub min_side_px: f64,
     /// Largest, as a fraction of the shorter side of the image.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_side: f64,
     /// Each size is so many times the one before.
+    #[schemars(range(min = 1.02, max = 4.0))]
     pub scale_step: f64,
     /// With depth: a window may be larger or smaller than the distance says by
     /// this factor.
+    #[schemars(range(min = 1.0, max = 1e3))]
     pub size_tolerance: f64,
     /// Distances at which people are looked for, m.
     pub min_depth_m: f64,
     /// See `min_depth_m`.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_depth_m: f64,
     /// With depth: where most of what is above a square is as far away as what it shows,
     /// give or take this, it shows no head, m; 0: not asked.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub above_m: f64,
     /// Heights of a head's centre above the floor, m.
     pub min_head_height_m: f64,
@@ -40,17 +47,23 @@ pub struct Config {
     /// Looks at windows that depth and geometry allow only; off: at all.
     pub depth_proposals: bool,
     /// Two windows that overlap by more (IoU) are of one person ...
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub overlap: f64,
     /// ... unless they are farther apart than this in depth, m.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub apart_m: f64,
     /// A search near a track looks at windows whose centre is nearer than this
     /// to the expected one, widths.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub near: f64,
     /// Standard deviation of a window's place, as a fraction of its side.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_place: f64,
     /// Standard deviation of a distance from the depth image, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_depth_m: f64,
     /// Standard deviation of a distance that only the size tells, as a fraction.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
     /// How a model is fitted; only `tagalong train` reads it.
     pub training: Training,
@@ -128,24 +141,6 @@ impl Default for Training {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("min_score", self.min_score, ANY),
-            ("max_score", self.max_score, POSITIVE),
-            ("min_side_px", self.min_side_px, 16.0..=1e5),
-            ("max_side", self.max_side, POSITIVE),
-            ("scale_step", self.scale_step, 1.02..=4.0),
-            ("size_tolerance", self.size_tolerance, 1.0..=1e3),
-            ("min_depth_m", self.min_depth_m, ANY),
-            ("max_depth_m", self.max_depth_m, POSITIVE),
-            ("min_head_height_m", self.min_head_height_m, ANY),
-            ("above_m", self.above_m, NOT_NEGATIVE),
-            ("max_head_height_m", self.max_head_height_m, ANY),
-            ("overlap", self.overlap, NOT_NEGATIVE),
-            ("apart_m", self.apart_m, NOT_NEGATIVE),
-            ("near", self.near, NOT_NEGATIVE),
-            ("sigma_place", self.sigma_place, POSITIVE),
-            ("sigma_depth_m", self.sigma_depth_m, POSITIVE),
-            ("sigma_distance", self.sigma_distance, POSITIVE),
-        ])
+        check_settings(self)
     }
 }

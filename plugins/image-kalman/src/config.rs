@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{POSITIVE, Result, check_ranges};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of `image-kalman`. Lengths in the image are given in widths of the
 /// box, so that near and far people are treated alike; the box of an upper body
@@ -9,25 +9,34 @@ use tagalong_core::{POSITIVE, Result, check_ranges};
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Spectral density of the white acceleration of the box, widths²/s³.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub acceleration_noise: f64,
     /// How fast the width may wander, as a fraction of it per square root of a
     /// second.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub scale_noise: f64,
     /// Spectral density of the white acceleration along the ray, m²/s³.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub range_noise: f64,
     /// Standard deviation of the velocity of a newcomer's box, widths/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub initial_speed: f64,
     /// Standard deviation of a newcomer's velocity along the ray, m/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub initial_range_speed_mps: f64,
     /// Standard deviation added to that of a box's centre, widths: what
     /// detectors do not know about themselves.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_centre: f64,
     /// Standard deviation of a box's width, as a fraction of it.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_scale: f64,
     /// Standard deviation added to that of a range, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_range_m: f64,
     /// Weight of a sighting in the shape of the box (its height over its width,
     /// and where in it the head is), 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub shape_weight: f64,
     /// As printed: the measurement matrix of eq. 8, which has the time step in
     /// it. Lags by one frame's way.
@@ -57,16 +66,6 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_ranges(&[
-            ("acceleration_noise", self.acceleration_noise, POSITIVE),
-            ("scale_noise", self.scale_noise, POSITIVE),
-            ("range_noise", self.range_noise, POSITIVE),
-            ("initial_speed", self.initial_speed, POSITIVE),
-            ("initial_range_speed_mps", self.initial_range_speed_mps, POSITIVE),
-            ("sigma_centre", self.sigma_centre, POSITIVE),
-            ("sigma_scale", self.sigma_scale, POSITIVE),
-            ("sigma_range_m", self.sigma_range_m, POSITIVE),
-            ("shape_weight", self.shape_weight, 0.0..=1.0),
-        ])
+        check_settings(self)
     }
 }

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Result, check_settings};
 
 /// How the particles of people whose silhouettes overlap are weighed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -39,32 +39,42 @@ pub struct Config {
     /// How people whose silhouettes overlap are weighed.
     pub method: Method,
     /// Particles of a person alone (P3: 100).
+    #[schemars(range(min = 1, max = 100000))]
     pub particles: usize,
     /// `all`, `table`, `kde`, `gp`: this many particles of each of two people
     /// are combined with each other (P3: 25, which makes 625).
+    #[schemars(range(min = 1, max = 300))]
     pub joint_side: usize,
     /// `partitioned`: most particles of a group; how many there are follows
     /// from their spread (KLD sampling) ...
+    #[schemars(range(min = 1, max = 100000))]
     pub max_particles: usize,
     /// ... so that the error of their distribution stays below this, nats, ...
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub kld_error: f64,
     /// ... with this normal quantile of certainty (2.33 is 99 %).
+    #[schemars(range(min = -10.0, max = 10.0))]
     pub kld_quantile: f64,
     /// Only the place across the viewing ray is drawn; depth, height and
     /// velocity are small Kalman filters in each particle. Otherwise
     /// everything is drawn, as P3 does.
     pub marginalise: bool,
     /// Spectral density of a person's white acceleration, m²/s³.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub acceleration_noise: f64,
     /// Standard deviation of the place on the floor beside what velocity
     /// explains, m per square root of a second.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub position_noise: f64,
     /// Standard deviation of the height, m per square root of a second.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub height_noise: f64,
     /// Standard deviation of the velocity beside what acceleration explains,
     /// m/s per square root of a second.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub velocity_noise: f64,
     /// Variance of each velocity component of a newcomer, m²/s².
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub initial_velocity_variance: f64,
     /// `table`, `kde`, `gp` with `marginalise = false`: two people who are
     /// weighed together keep their depth and height, as P3 assumes of a short
@@ -74,6 +84,7 @@ pub struct Config {
     /// where all fit alike, where the track walks (P3).
     pub facing_by_image: bool,
     /// This part of the particles is moved to what a detector found, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub from_detection: f64,
     /// A person is seen if the scene is more likely by this with than without
     /// the person, nats, ...
@@ -84,34 +95,45 @@ pub struct Config {
     /// `trust_s`: furniture explains a little of the image, a person most of it.
     pub min_support_unfound: f64,
     /// Time for which a silhouette is trusted that no detector finds, s.
+    #[schemars(range(min = 0.0, max = 1e9))]
     pub trust_s: f64,
     /// Upper-body squares are enlarged by this part of their size before they
     /// are asked whether they overlap.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub inflate: f64,
     /// People part when they are farther from each other than this on the
     /// floor, m, ...
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub split_m: f64,
     /// ... and their squares do not overlap in this many frames in a row.
     pub split_frames: u32,
     /// `kde`, `gp`: particles that are compared with the image (P3: 30 or 50).
+    #[schemars(range(min = 1, max = 1000))]
     pub points: usize,
     /// `kde`, `gp`: which ones.
     pub chosen: Chosen,
     /// Width of the kernel along the place of the near person, m (P3: 0.04).
+    #[schemars(range(min = 1e-4, max = 10.0))]
     pub kernel_near_m: f64,
     /// Width of the kernel along the place of the far person, m (P3: 0.1).
+    #[schemars(range(min = 1e-4, max = 10.0))]
     pub kernel_far_m: f64,
     /// `gp`: variance of the likelihood that the kernels do not explain.
+    #[schemars(range(min = 1e-9, max = 10.0))]
     pub nugget: f64,
     /// `table`: reach of the near person's place, m (P3: 0.3).
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub reach_near_m: f64,
     /// `table`: reach of the far person's place, m (P3: 0.9).
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub reach_far_m: f64,
     /// `table`: distance of its places, m (P3: 0.03).
+    #[schemars(range(min = 5e-3, max = 10.0))]
     pub step_m: f64,
     /// After people part, their colours are compared with those before; they
     /// change names if that is more likely by this, in Bhattacharyya
     /// coefficients. 2 is never.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub swap_margin: f64,
     /// As printed: kernels with 2 sigma in place of 2 sigma² (millimetres).
     pub compat_printed_kernel: bool,
@@ -175,36 +197,6 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let ranges = [
-            ("particles", self.particles as f64, 1.0, 100_000.0),
-            ("joint_side", self.joint_side as f64, 1.0, 300.0),
-            ("max_particles", self.max_particles as f64, 1.0, 100_000.0),
-            ("points", self.points as f64, 1.0, 1000.0),
-            ("kld_error", self.kld_error, 1e-6, 10.0),
-            ("kld_quantile", self.kld_quantile, -10.0, 10.0),
-            ("acceleration_noise", self.acceleration_noise, 0.0, 1e3),
-            ("position_noise", self.position_noise, 0.0, 1e3),
-            ("height_noise", self.height_noise, 0.0, 1e3),
-            ("velocity_noise", self.velocity_noise, 0.0, 1e3),
-            ("initial_velocity_variance", self.initial_velocity_variance, 0.0, 1e3),
-            ("from_detection", self.from_detection, 0.0, 1.0),
-            ("min_support", self.min_support, -1e6, 1e6),
-            ("min_support_found", self.min_support_found, -1e6, 1e6),
-            ("min_support_unfound", self.min_support_unfound, -1e6, 1e6),
-            ("trust_s", self.trust_s, 0.0, 1e9),
-            ("inflate", self.inflate, 0.0, 10.0),
-            ("split_m", self.split_m, 0.0, 100.0),
-            ("kernel_near_m", self.kernel_near_m, 1e-4, 10.0),
-            ("kernel_far_m", self.kernel_far_m, 1e-4, 10.0),
-            ("nugget", self.nugget, 1e-9, 10.0),
-            ("reach_near_m", self.reach_near_m, 0.0, 10.0),
-            ("reach_far_m", self.reach_far_m, 0.0, 10.0),
-            ("step_m", self.step_m, 5e-3, 10.0),
-            ("swap_margin", self.swap_margin, 0.0, 10.0),
-        ];
-        let bad = ranges.iter().find(|(_, value, low, high)| !(*low..=*high).contains(value));
-        bad.map_or(Ok(()), |(key, value, low, high)| {
-            Err(Error::Settings(format!("`{key}` must be in {low} to {high}, not {value}")))
-        })
+        check_settings(self)
     }
 }

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Result, check_settings};
 
 /// Settings of the filter `last-seen`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -12,9 +12,11 @@ pub struct Config {
     pub ego_motion: bool,
     /// How fast somebody may have moved away unseen: the standard deviation
     /// grows by this, metres per square root of a second.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub wander: f64,
     /// The velocity that is reported, and used for nothing, is the way between
     /// the last sighting and the first one in this time before it, s.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub velocity_over_s: f64,
 }
 
@@ -27,12 +29,6 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        for (key, value) in [("wander", self.wander), ("velocity_over_s", self.velocity_over_s)] {
-            if !(value > 0.0 && value <= 100.0) {
-                let message = format!("`{key}` must be positive and at most 100, not {value}");
-                return Err(Error::Settings(message));
-            }
-        }
-        Ok(())
+        check_settings(self)
     }
 }

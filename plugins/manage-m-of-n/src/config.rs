@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{ANY, Error, NOT_NEGATIVE, Result, check_ranges};
+use tagalong_core::{Error, Result, check_settings};
 
 /// Settings of the track manager `manage-m-of-n`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -11,30 +11,41 @@ pub struct Config {
     pub start_score: f64,
     /// Newcomers who were rejected at the same place count, too, and are forgotten
     /// with this time constant, s; 0: each newcomer is judged alone.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub doubt_s: f64,
     /// A place is the same within this, m.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub doubt_m: f64,
     /// No place is doubted more than this, log-odds.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub doubt_limit: f64,
     /// A track is confirmed when it was seen this often ...
+    #[schemars(range(min = 1, max = 32))]
     pub confirm_hits: u32,
     /// ... in so many frames in which it could have been seen (at most 32), ...
+    #[schemars(range(min = 1, max = 32))]
     pub confirm_within: u32,
     /// ... or at once by a detection with at least this score.
     pub confirm_score: f64,
     /// A track that is not confirmed ends after this many misses in a row.
+    #[schemars(range(min = 1))]
     pub tentative_misses: u32,
     /// A track ends when it should have been visible and was not seen for
     /// longer than this, s, ...
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub drop_after_s: f64,
     /// ... and missed at least this often in a row.
+    #[schemars(range(min = 1))]
     pub drop_after_misses: u32,
     /// A track that left the image ends when it was not seen for longer, s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub left_drop_after_s: f64,
     /// A track that is hidden behind another one ends when it was not seen for
     /// longer, s.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub occluded_drop_after_s: f64,
     /// Weight of a frame in the score of a track, 0 to 1.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub score_weight: f64,
     /// What a miss says: the score that a track tends to while it should be
     /// visible and is not.
@@ -69,44 +80,21 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        let hits = f64::from(self.confirm_hits);
-        check_ranges(&[
-            ("start_score", self.start_score, ANY),
-            ("doubt_s", self.doubt_s, NOT_NEGATIVE),
-            ("doubt_m", self.doubt_m, NOT_NEGATIVE),
-            ("doubt_limit", self.doubt_limit, NOT_NEGATIVE),
-            ("confirm_hits", hits, 1.0..=32.0),
-            ("confirm_within", f64::from(self.confirm_within), 1.0..=32.0),
-            ("tentative_misses", f64::from(self.tentative_misses), 1.0..=f64::from(u32::MAX)),
-            ("drop_after_s", self.drop_after_s, NOT_NEGATIVE),
-            ("drop_after_misses", f64::from(self.drop_after_misses), 1.0..=f64::from(u32::MAX)),
-            ("left_drop_after_s", self.left_drop_after_s, NOT_NEGATIVE),
-            ("occluded_drop_after_s", self.occluded_drop_after_s, NOT_NEGATIVE),
-            ("score_weight", self.score_weight, 1e-6..=1.0),
-            ("miss_score", self.miss_score, ANY),
-        ])?;
+        check_settings(self)?;
         self.check_relations()
     }
 
     /// Refuses settings that contradict each other.
     fn check_relations(&self) -> Result<()> {
-        let Self { confirm_hits, confirm_within, confirm_score, .. } = self;
-        let Self { drop_score, start_score, .. } = self;
+        let Self { confirm_hits, confirm_within, drop_score, start_score, .. } = self;
         if confirm_within < confirm_hits {
-            let message = format!(
-                "`confirm_within` must be at least {confirm_hits}, as `confirm_hits`, not \
-                 {confirm_within}"
-            );
-            return Err(Error::Settings(message));
+            let why =
+                format!("must be at least {confirm_hits}, as `confirm_hits`, not {confirm_within}");
+            return Err(Error::setting("confirm_within", why));
         }
-        if confirm_score.is_nan() {
-            return Err(Error::Settings("`confirm_score` must be a number, not NaN".into()));
-        }
-        if drop_score.is_nan() || drop_score > start_score {
-            let message = format!(
-                "`drop_score` must be at most {start_score}, as `start_score`, not {drop_score}"
-            );
-            return Err(Error::Settings(message));
+        if drop_score > start_score {
+            let why = format!("must be at most {start_score}, as `start_score`, not {drop_score}");
+            return Err(Error::setting("drop_score", why));
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, check_settings};
 
 /// How the distance follows from what is seen.
 #[derive(
@@ -33,47 +33,64 @@ pub struct Config {
     /// everybody's, `nearest` for the one whose looks fit best.
     pub person: String,
     /// Images of the empty room that make the background; nobody is found before.
+    #[schemars(range(min = 1, max = 10000))]
     pub background_frames: u32,
     /// A pixel differs from the background by more than so many standard
     /// deviations ...
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub threshold_sigmas: f64,
     /// ... and by more than this, grey levels.
     pub threshold_floor: u8,
     /// Time in which the background follows a change, s; 0 keeps it as it is.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub adapt_s: f64,
     /// What differs for so long without a break becomes background, s; 0: nothing.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub absorb_s: f64,
     /// A pixel whose colours are all darker, but not below this part of the
     /// background, may be shadow; 1 finds none.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub shadow_min: f64,
     /// Nor above this part.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub shadow_max: f64,
     /// Most difference between the colours' parts in a shadow.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub shadow_tint: f64,
     /// Fewest pixels in a column of a person; more if the empty room had more.
+    #[schemars(range(min = 1, max = 1000))]
     pub column_pixels: u16,
     /// Gaps of up to so many columns do not divide a person.
+    #[schemars(range(max = 100))]
     pub bridge_columns: usize,
     /// Fewest pixels of a person.
     pub min_pixels: u32,
     /// A run is divided where its columns fall below this part of the lower one
     /// of the peaks beside; 0 divides none.
+    #[schemars(range(min = 0.0, max = 0.999))]
     pub valley: f64,
     /// Most people in an image; the largest are kept.
+    #[schemars(range(min = 1, max = 100))]
     pub max_people: usize,
     /// Heights of heads that are believed, m.
+    #[schemars(inner(range(min = -0.999, max = 3.999)))]
     pub head_height_m: [f64; 2],
     /// Standard deviation of the bearing, degrees, ...
+    #[schemars(range(min = 0.01, max = 90.0))]
     pub sigma_bearing_deg: f64,
     /// ... and of what is seen of a body about its middle, m: arms and legs swing.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub sigma_aside_m: f64,
     /// Standard deviation of the head's height, m.
+    #[schemars(range(min = 0.001, max = 10.0))]
     pub sigma_height_m: f64,
     /// Walls and furniture are taken to be at one of these distances, whichever fits
     /// best, when the background follows the robot's motion, m.
+    #[schemars(length(min = 1, max = 16), inner(range(min = 0.5, max = 1000.0)))]
     pub walls_m: Vec<f64>,
     /// The background is known to within so many columns and rows after the
     /// robot has moved.
+    #[schemars(inner(range(max = 20)))]
     pub slack_px: [usize; 2],
     /// As printed: columns are averaged as if the panorama ended at its seam.
     pub compat_printed_seam: bool,
@@ -112,40 +129,12 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
+        check_settings(self)?;
         let [low, high] = self.head_height_m;
-        let rules = [
-            (
-                (1..=10_000).contains(&self.background_frames),
-                "background_frames must be 1 to 10000",
-            ),
-            ((0.0..=100.0).contains(&self.threshold_sigmas), "threshold_sigmas must be 0 to 100"),
-            ((0.0..=1e6).contains(&self.adapt_s), "adapt_s must be 0 to 1000000"),
-            ((0.0..=1e6).contains(&self.absorb_s), "absorb_s must be 0 to 1000000"),
-            ((0.0..=1.0).contains(&self.shadow_min), "shadow_min must be 0 to 1"),
-            ((0.0..=1.0).contains(&self.shadow_max), "shadow_max must be 0 to 1"),
-            ((0.0..=1.0).contains(&self.shadow_tint), "shadow_tint must be 0 to 1"),
-            ((1..=1000).contains(&self.column_pixels), "column_pixels must be 1 to 1000"),
-            (self.bridge_columns <= 100, "bridge_columns must be at most 100"),
-            ((0.0..1.0).contains(&self.valley), "valley must be 0 to less than 1"),
-            ((1..=100).contains(&self.max_people), "max_people must be 1 to 100"),
-            (-1.0 < low && low < high && high < 4.0, "head_height_m must grow, from -1 to 4"),
-            (
-                (0.01..=90.0).contains(&self.sigma_bearing_deg),
-                "sigma_bearing_deg must be 0.01 to 90",
-            ),
-            ((0.0..=1.0).contains(&self.sigma_aside_m), "sigma_aside_m must be 0 to 1"),
-            ((0.001..=10.0).contains(&self.sigma_height_m), "sigma_height_m must be 0.001 to 10"),
-            (
-                (1..=16).contains(&self.walls_m.len())
-                    && self.walls_m.iter().all(|wall| (0.5..=1000.0).contains(wall)),
-                "walls_m must be 1 to 16 distances of 0.5 to 1000",
-            ),
-            (self.slack_px.iter().all(|px| *px <= 20), "slack_px must be at most 20"),
-        ];
-        match rules.iter().find(|(holds, _)| !holds) {
-            Some((_, message)) => Err(Error::Settings((*message).into())),
-            None => Ok(()),
+        if low >= high {
+            return Err(Error::setting("head_height_m", format!("must rise, not {low} to {high}")));
         }
+        Ok(())
     }
 }
 

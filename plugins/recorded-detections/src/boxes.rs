@@ -15,12 +15,11 @@ pub(crate) type Boxes = BTreeMap<u64, Vec<Recorded>>;
 pub(crate) fn read(path: &Path) -> Result<Boxes> {
     let shown = path.display();
     let text = std::fs::read_to_string(path)
-        .map_err(|error| Error::Settings(format!("cannot read boxes `{shown}`: {error}")))?;
+        .map_err(|error| Error::Other(format!("cannot read boxes `{shown}`: {error}")))?;
     let mut boxes = Boxes::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let (frame, recorded) = parse(line).map_err(|why| {
-            Error::Settings(format!("boxes `{shown}`, line {}: {why}", index + 1))
-        })?;
+        let (frame, recorded) = parse(line)
+            .map_err(|why| Error::Other(format!("boxes `{shown}`, line {}: {why}", index + 1)))?;
         boxes.entry(frame).or_default().push(recorded);
     }
     Ok(boxes)

@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::{Result, check_settings};
 
 /// What a recorded box is drawn around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -39,15 +40,20 @@ pub struct Config {
     /// What the boxes are drawn around.
     pub body: Body,
     /// How tall a person is taken to be whose whole body fills a box, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub height_m: f64,
     /// Standard deviation of a box's place, pixels.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_px: f64,
     /// Standard deviation of the depth of a face read from the depth image, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_depth_m: f64,
     /// Standard deviation of a distance that only the size of the box tells, as
     /// a fraction of the distance.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
     /// Standard deviation of a recorded position in space, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_position_m: f64,
     /// A search near a track takes boxes that overlap the expected one by this
     /// much (IoU), or ...
@@ -75,16 +81,8 @@ impl Default for Config {
 }
 
 impl Config {
-    /// What is wrong with the values, if anything.
-    pub(crate) fn mistake(&self) -> Option<String> {
-        let positive = [
-            ("height_m", self.height_m),
-            ("sigma_px", self.sigma_px),
-            ("sigma_depth_m", self.sigma_depth_m),
-            ("sigma_distance", self.sigma_distance),
-            ("sigma_position_m", self.sigma_position_m),
-        ];
-        let wrong = positive.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite()));
-        wrong.map(|(key, value)| format!("{key} is {value}; it must be above 0"))
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        check_settings(self)
     }
 }

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{
-    Capabilities, Context, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_BELOW_TOP_M,
+    Capabilities, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_BELOW_TOP_M,
     HEAD_RADIUS_M, Input, Inputs, Recorded, Rect, Result, Search, Track, UPPER_BODY_SIDE_M,
 };
 
@@ -30,9 +30,7 @@ impl RecordedDetections {
     /// # Errors
     /// Settings that cannot work, or a file that cannot be read.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        if let Some(mistake) = config.mistake() {
-            return Err(Error::Settings(mistake));
-        }
+        config.check()?;
         let boxes = match config.path.as_str() {
             "" => None,
             path => Some(read(&context.base_dir.join(path))?),

@@ -58,7 +58,7 @@ macro_rules! register_with_fault {
         let summary = if name == "no-summary" { "" } else { "a test double" };
         match name {
             "cannot-build" => registry.$kind(name, summary, move |_: super::Healthy, _| {
-                Some(plugin()).filter(|_| false).ok_or(Error::Settings("needs a model".into()))
+                Some(plugin()).filter(|_| false).ok_or(Error::Other("needs a model".into()))
             }),
             "default-out-of-range" => {
                 registry.$kind(name, summary, move |_: super::Renamed, _| Ok(plugin()));

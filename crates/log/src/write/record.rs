@@ -8,25 +8,13 @@ use tagalong_core::{Camera, Rect, Stamp, Track, TrackId, WheelSpeeds};
 pub struct OutputSettings {
     /// Confirmed tracks stay in `tracks.csv` until they were unseen for this
     /// long, s. 0 writes a track only in frames where the person was seen.
+    #[schemars(range(min = 0.0))]
     pub report_unseen_s: f64,
 }
 
 impl Default for OutputSettings {
     fn default() -> Self {
         Self { report_unseen_s: 0.0 }
-    }
-}
-
-impl OutputSettings {
-    /// What is wrong with the values, if anything.
-    ///
-    /// # Errors
-    /// A sentence that names the key.
-    pub fn validate(&self) -> Result<(), String> {
-        if self.report_unseen_s >= 0.0 && self.report_unseen_s.is_finite() {
-            return Ok(());
-        }
-        Err(format!("output.report_unseen_s is {}; it must be 0 or more", self.report_unseen_s))
     }
 }
 

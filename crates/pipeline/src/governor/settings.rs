@@ -8,26 +8,35 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct GovernorSettings {
     /// Largest acceleration, m/s².
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_mps2: f64,
     /// Largest deceleration while somebody is followed, m/s²; a stop is at once.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_decel_mps2: f64,
     /// Largest turn rate, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_turn_radps: f64,
     /// The robot may drive backwards.
     pub reverse: bool,
     /// From an image to wheels that move accordingly, s; for the distance in
     /// which the robot stops.
+    #[schemars(range(min = 0.0))]
     pub reaction_s: f64,
     /// Distance that is left when the robot has stopped, m.
+    #[schemars(range(min = 0.0))]
     pub margin_m: f64,
     /// A command is good for this long, s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub valid_s: f64,
     /// Half speed after a longer pause between frames, s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub slow_after_s: f64,
     /// Stop after a longer pause between frames, s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub stop_after_s: f64,
     /// Odometry that moves faster has jumped, m/s: a fault until the pipeline is
     /// armed again.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_odometry_mps: f64,
     /// What is looked at in the depth image.
     pub corridor: CorridorSettings,
@@ -65,29 +74,40 @@ impl GovernorSettings {
 #[serde(default, deny_unknown_fields)]
 pub struct CorridorSettings {
     /// Half the width of what the robot sweeps, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub half_width_m: f64,
     /// The robot's foremost point, ahead of the point between its wheels, m.
+    #[schemars(range(min = 0.0))]
     pub front_m: f64,
     /// What has not stood in its place for a second may step in: for it the robot
     /// sweeps so much more on both sides, m.
+    #[schemars(range(min = 0.0))]
     pub steps_in_m: f64,
     /// No movement towards what is nearer to the front than this, m.
+    #[schemars(range(min = 0.0))]
     pub stop_m: f64,
     /// What is farther away does not matter, m.
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 100))]
     pub range_m: f64,
     /// What is lower is floor, m; at `range_m` three centimetres for each metre
     /// more.
+    #[schemars(range(min = 0.0))]
     pub floor_m: f64,
     /// What is higher the robot passes below, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub top_m: f64,
     /// Points this near to the person who is followed are that person, m.
+    #[schemars(range(min = 0.0))]
     pub target_radius_m: f64,
     /// So many points are something, in a grid of 160 columns over the image.
+    #[schemars(range(min = 1))]
     pub min_points: u32,
     /// Less than this part of the image with depth is a blind camera.
+    #[schemars(range(min = 0.0))]
     pub min_seen: f64,
     /// What was seen and is out of view now, beside the robot or below the image,
     /// is believed to be there for this long, s.
+    #[schemars(range(min = 0.0))]
     pub memory_s: f64,
 }
 

@@ -10,36 +10,48 @@ pub struct TargetSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u32>,
     /// In front is up to this bearing to either side, degrees ...
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub choose_within_deg: f64,
     /// ... and up to this distance, m, ...
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub choose_within_m: f64,
     /// ... once there has been somebody for this long, s: who is nearest is not
     /// always seen first.
+    #[schemars(range(min = 0.0))]
     pub choose_after_s: f64,
     /// Remember what the person looks like, doubt a track that looks like
     /// somebody else, and know the person again. Without it a track is followed
     /// while it lives, and nobody after that.
     pub remember: bool,
     /// The person is known well after so many sightings.
+    #[schemars(range(min = 1))]
     pub training_sightings: u32,
     /// Weight of a sighting in the belief that it is the same person, 0 to 1.
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub belief_weight: f64,
     /// Below this probability it is doubted that it is the same person: slower.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub doubt_below: f64,
     /// Below this probability it is somebody else: lost.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub refuse_below: f64,
     /// Out of sight for longer than this, s, it is doubted who comes back.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub doubt_after_s: f64,
     /// Out of sight for longer than this, s, the person is lost.
     pub lose_after_s: f64,
     /// Somebody is known again from this probability on, sightings added up, ...
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub again_from: f64,
     /// ... in so many sightings in a row.
+    #[schemars(range(min = 1))]
     pub again_sightings: u32,
     /// Nobody gets farther than at this speed from where they were seen last, m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach_mps: f64,
     /// Somebody nearer to the person than this may be taken for them, m: looks are
     /// compared, and nothing is learned.
+    #[schemars(range(min = 0.0))]
     pub alone_m: f64,
     /// What differences in looks say.
     pub looks: LooksSettings,
@@ -92,6 +104,7 @@ pub struct LooksSettings {
     pub height: [f64; 2],
     /// Weight of being nearer to the person's looks than to those of others who
     /// were seen beside them.
+    #[schemars(range(min = 0.0))]
     pub rivals: f64,
 }
 
@@ -115,16 +128,22 @@ pub struct SearchSettings {
     /// Turn towards where the person went, and drive to where they were last.
     pub enabled: bool,
     /// Waits for this long first: most people come back by themselves, s.
+    #[schemars(range(min = 0.0))]
     pub wait_s: f64,
     /// Turns at most this fast, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub turn_radps: f64,
     /// Drives at most this fast, m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_mps: f64,
     /// As near as this to where the person was last is there, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub arrive_m: f64,
     /// Gives up driving there after this time, s.
+    #[schemars(range(min = 0.0))]
     pub drive_s: f64,
     /// Gives up, stands still and watches after this time, s.
+    #[schemars(range(min = 0.0))]
     pub give_up_s: f64,
 }
 

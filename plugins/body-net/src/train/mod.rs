@@ -186,14 +186,14 @@ fn rounded(value: f64, steps: f64) -> toml::Value {
 
 fn check(training: &Training) -> Result<()> {
     let rules = [
-        (training.epochs >= 1, "`epochs` must be at least 1"),
-        (training.rate > 0.0 && training.rate <= 1.0, "`rate` must be above 0 and at most 1"),
-        ((0.0..1.0).contains(&training.decay), "`decay` must be from 0 to below 1"),
-        (training.batch >= 1, "`batch` must be at least 1"),
-        (training.folds >= 2, "`folds` must be at least 2"),
+        (training.epochs >= 1, "epochs", "must be at least 1"),
+        (training.rate > 0.0 && training.rate <= 1.0, "rate", "must be above 0 and at most 1"),
+        ((0.0..1.0).contains(&training.decay), "decay", "must be from 0 to below 1"),
+        (training.batch >= 1, "batch", "must be at least 1"),
+        (training.folds >= 2, "folds", "must be at least 2"),
     ];
-    match rules.iter().find(|(holds, _)| !holds) {
-        Some((_, message)) => Err(Error::Settings((*message).into())),
+    match rules.iter().find(|(holds, ..)| !holds) {
+        Some((_, key, why)) => Err(Error::setting(*key, *why)),
         None => Ok(()),
     }
 }

@@ -141,7 +141,7 @@ impl Trainer for TreeTrainer {
         let best = trials
             .iter()
             .min_by(|a, b| a.loss().total_cmp(&b.loss()))
-            .ok_or_else(|| Error::Settings("nothing to try".into()))?;
+            .ok_or_else(|| Error::Other("nothing to try".into()))?;
         let everything: Vec<usize> = (0..self.examples.len()).collect();
         let mut trees = self.boost(&examples, &everything)?;
         trees.truncate(best.trees);
@@ -223,19 +223,25 @@ fn check(training: &Training) -> Result<()> {
     let rules = [
         (
             !trees.is_empty() && trees.iter().all(|n| (1..=5000).contains(n)),
-            "`trees` must be numbers from 1 to 5000",
+            "trees",
+            "must be numbers from 1 to 5000",
         ),
-        (training.rate > 0.0 && training.rate <= 1.0, "`rate` must be above 0 and at most 1"),
+        (training.rate > 0.0 && training.rate <= 1.0, "rate", "must be above 0 and at most 1"),
         (
             training.features > 0.0 && training.features <= 1.0,
-            "`features` must be above 0 and at most 1",
+            "features",
+            "must be above 0 and at most 1",
         ),
-        (training.caution.is_finite() && training.caution > 0.0, "`caution` must be positive"),
-        ((0.0..1.0).contains(&training.without_depth), "`without_depth` must be from 0 to below 1"),
-        (training.folds >= 2, "`folds` must be at least 2"),
+        (training.caution.is_finite() && training.caution > 0.0, "caution", "must be positive"),
+        (
+            (0.0..1.0).contains(&training.without_depth),
+            "without_depth",
+            "must be from 0 to below 1",
+        ),
+        (training.folds >= 2, "folds", "must be at least 2"),
     ];
-    match rules.iter().find(|(holds, _)| !holds) {
-        Some((_, message)) => Err(Error::Settings((*message).into())),
+    match rules.iter().find(|(holds, ..)| !holds) {
+        Some((_, key, why)) => Err(Error::setting(*key, *why)),
         None => Ok(()),
     }
 }

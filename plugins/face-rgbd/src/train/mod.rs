@@ -69,7 +69,7 @@ impl CascadeTrainer {
         let mut begun = begun.unwrap_or_else(|| Cascade::without_stages(side));
         begun.stages.truncate(config.training.stages);
         if (begun.width, begun.height) != (side, side) {
-            return Err(Error::Settings(format!("windows of the cascade are not {side} wide")));
+            return Err(Error::Other(format!("windows of the cascade are not {side} wide")));
         }
         let (faces, others) = (Vec::new(), Vec::new());
         Ok(Self { config, seed, begun, faces, others, pictures: Vec::new() })

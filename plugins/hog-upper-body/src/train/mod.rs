@@ -68,7 +68,7 @@ impl HogTrainer {
         if !penalties.iter().all(|p| *p > 0.0 && p.is_finite())
             || training.epochs * training.trees == 0
         {
-            return Err(Error::Settings("penalties, `epochs` and `trees` must be positive".into()));
+            return Err(Error::Other("penalties, `epochs` and `trees` must be positive".into()));
         }
         Ok(Self {
             kind,

@@ -104,7 +104,7 @@ impl Trainer for PatchTrainer {
         let best = trials
             .iter()
             .max_by(|a, b| a.area().total_cmp(&b.area()))
-            .ok_or_else(|| Error::Settings("nothing to try".into()))?;
+            .ok_or_else(|| Error::Other("nothing to try".into()))?;
         let (mut model, fitted) = self.last_fit(best.gamma, best.penalty)?;
         let Line { slope, offset } = platt(&best.held_out);
         (model.slope, model.offset) = (slope, offset);
@@ -132,16 +132,16 @@ fn check(training: &Training) -> Result<()> {
     let positive =
         |values: &[f64]| !values.is_empty() && values.iter().all(|v| v.is_finite() && *v > 0.0);
     let rules = [
-        (positive(&training.gammas), "`gammas` must be positive numbers"),
-        (positive(&training.penalties), "`penalties` must be positive numbers"),
-        (training.folds >= 2, "`folds` must be at least 2"),
-        (training.max_samples <= 5000, "`max_samples` must be at most 5000: memory is its square"),
-        (training.max_tried <= 5000, "`max_tried` must be at most 5000: memory is its square"),
-        (training.max_vectors >= 2, "`max_vectors` must be at least 2"),
-        ((0.0..=2.0).contains(&training.grow), "`grow` must be in 0 to 2"),
+        (positive(&training.gammas), "gammas", "must be positive numbers"),
+        (positive(&training.penalties), "penalties", "must be positive numbers"),
+        (training.folds >= 2, "folds", "must be at least 2"),
+        (training.max_samples <= 5000, "max_samples", "must be at most 5000: memory is its square"),
+        (training.max_tried <= 5000, "max_tried", "must be at most 5000: memory is its square"),
+        (training.max_vectors >= 2, "max_vectors", "must be at least 2"),
+        ((0.0..=2.0).contains(&training.grow), "grow", "must be in 0 to 2"),
     ];
-    match rules.iter().find(|(holds, _)| !holds) {
-        Some((_, message)) => Err(Error::Settings((*message).into())),
+    match rules.iter().find(|(holds, ..)| !holds) {
+        Some((_, key, why)) => Err(Error::setting(*key, *why)),
         None => Ok(()),
     }
 }
