@@ -1,11 +1,11 @@
-//! The hand-made annotations `NAME.people.csv`, and a small scorer for them.
+//! Annotations `NAME.people.csv`, made by hand, and a small scorer for them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use tagalong_core::Rect;
 
-/// Overlap from which on a box covers a person.
+/// Least overlap of a box with the person that it covers.
 const MIN_IOU: f64 = 0.5;
 
 /// One annotated person in one frame.
@@ -13,22 +13,23 @@ const MIN_IOU: f64 = 0.5;
 pub struct Annotation {
     /// 1-based index of the colour image.
     pub frame: u64,
-    /// The person.
+    /// Number of the person.
     pub id: u32,
     /// Upper-body square, clipped to the image.
     pub region: Rect,
     /// Visible part of the upper body, 0 to 1.
     pub visible: f64,
-    /// Neither a miss nor a false alarm.
+    /// True if the row counts neither as a miss nor as a false alarm.
     pub ignore: bool,
 }
 
-/// Reads a `people.csv`; `None` where there is no such file.
+/// Reads a `people.csv`; returns `None` if there is no such file.
 ///
 /// # Panics
-/// If the file is there and not as its description says.
+/// If the file does not match its description.
 pub fn read(path: &Path) -> Option<Vec<Annotation>> {
     let text = std::fs::read_to_string(path).ok()?;
+    // The first line names the columns.
     let rows = text.lines().skip(1).filter(|line| !line.trim().is_empty());
     Some(rows.map(annotation).collect())
 }
@@ -48,26 +49,24 @@ fn annotation(line: &str) -> Annotation {
 /// Boxes of one frame: track number and region.
 pub type Boxes = BTreeMap<u64, Vec<(u32, Rect)>>;
 
-/// What a run gave against the annotations.
+/// Score of a run against the annotations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
-    /// People who count, and how many of them were covered within two frames
-    /// of being fully in view for the first time.
+    /// People that count; see `covered_soon`.
     pub people: usize,
-    /// See `people`.
+    /// People that were covered within two frames of being fully in view for the first time.
     pub covered_soon: usize,
-    /// Annotated rows that count, and how many were covered.
+    /// Annotated rows that count; see `covered`.
     pub rows: usize,
-    /// See `rows`.
+    /// Rows that were covered.
     pub covered: usize,
-    /// Boxes on nobody, annotated or ignored.
+    /// Boxes on no person, annotated or ignored.
     pub false_boxes: usize,
-    /// Track numbers that each person had.
+    /// Track numbers of each person.
     pub ids: BTreeMap<u32, BTreeSet<u32>>,
 }
 
-/// Scores `boxes`: each covers at most one person, the pairs with the largest
-/// overlap first.
+/// Scores `boxes`: each covers at most one person, the pairs with the largest overlap first.
 pub fn score(annotations: &[Annotation], boxes: &Boxes) -> Score {
     let mut score = Score::default();
     let mut covered: BTreeSet<(u64, u32)> = BTreeSet::new();
@@ -103,6 +102,7 @@ fn matched(truth: &[&Annotation], found: &[(u32, Rect)]) -> Vec<(usize, usize)> 
         }
     }
     pairs.retain(|p| p.0 >= MIN_IOU);
+    // Equal overlaps are ordered by index, so that the score is repeatable.
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let (mut truths, mut boxes) = (BTreeSet::new(), BTreeSet::new());
     pairs
@@ -118,7 +118,7 @@ fn matched(truth: &[&Annotation], found: &[(u32, Rect)]) -> Vec<(usize, usize)> 
         .collect()
 }
 
-/// The first frame in which each person is wholly visible.
+/// Returns the first frame in which each person is wholly visible.
 fn first_full_view(counting: &[&Annotation]) -> BTreeMap<u32, u64> {
     let mut first = BTreeMap::new();
     for annotation in counting.iter().filter(|a| a.visible >= 1.0) {

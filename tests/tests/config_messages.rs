@@ -1,5 +1,5 @@
-//! Mistakes in a config are answered with the place, the cause and the remedy;
-//! the shipped configs have none.
+//! Errors in a config are reported with the place, the cause and the remedy; the shipped configs
+//! have none.
 
 #![allow(clippy::unwrap_used, reason = "a broken test may stop loudly")]
 
@@ -33,14 +33,14 @@ fn build(text: &str) -> Result<RunSettings, ConfigError> {
     build_in(Path::new("."), text)
 }
 
-/// Builds a config of this folder, beside whose files it names others.
+/// Builds a config that refers to files beside the configs of this folder.
 fn build_in(folder: &Path, text: &str) -> Result<RunSettings, ConfigError> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     Pipeline::from_toml(text, folder, &registry).map(|(_, run)| run)
 }
 
-/// The message for `GOOD` with `from` replaced by `to`.
+/// Returns the message for `GOOD` with `from` replaced by `to`.
 fn message(from: &str, to: &str) -> String {
     assert!(GOOD.contains(from), "`{from}` is not in the good config");
     let text = GOOD.replacen(from, to, 1);
@@ -118,6 +118,7 @@ fn shipped() -> Vec<PathBuf> {
 
 #[test]
 fn every_shipped_config_builds() {
+    // With a wrong folder the loop below would pass without a config.
     assert!(!shipped().is_empty());
     for path in shipped() {
         let text = fs::read_to_string(&path).unwrap();

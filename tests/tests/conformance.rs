@@ -1,14 +1,14 @@
-//! Every plugin of the catalog keeps the promises of its kind.
+//! Every plugin of the catalog passes the checks of its kind.
 
 use tagalong_conformance::Suite;
 use tagalong_core::Registry;
 
-/// Detectors that discover the drawn person in a depth or colour image. A
-/// freshly generated detector finds nobody and is not listed; the one that
-/// works is, and then has to go on working.
+/// Detectors that discover the simulated person in a depth or colour image. A freshly generated
+/// detector finds no people and is not listed; a working one is listed, so that it has to keep
+/// working.
 const DISCOVER: &[&str] = &["depth-template"];
 
-/// Detectors that find the drawn person near a track.
+/// Detectors that find the simulated person near a track.
 const FOLLOW: &[&str] = &["depth-template"];
 
 #[test]

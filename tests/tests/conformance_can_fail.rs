@@ -1,6 +1,5 @@
-//! Every check of the conformance suite can fail: a healthy plugin of each kind
-//! passes, and for each check there is a copy of it with one deliberate fault
-//! that is caught by that check.
+//! Every check of the conformance suite can fail: a healthy plugin of each kind passes, and for
+//! each check there is a copy of it with one deliberate fault that is caught by that check.
 
 mod broken;
 
@@ -9,7 +8,7 @@ use std::collections::BTreeSet;
 use tagalong_conformance::{Suite, check_names};
 use tagalong_core::{Kind, Registry};
 
-/// The healthy plugin passes, each fault is caught by its check, and there is
+/// Checks that the healthy plugin passes, that each fault is caught by its check, and that there is
 /// a fault for every check of the kind.
 fn proves(
     kind: Kind,

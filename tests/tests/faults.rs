@@ -1,6 +1,6 @@
-//! Faults of sensors and clocks, from the log or the frame to the tracks and the
-//! wheels. The names of the tests begin with the fault's: T5, time stamps that
-//! disagree; S1, a depth camera that shows nothing.
+//! Faults of sensors and clocks, from the log or the frame to the tracks and the wheels. The names
+//! of the tests begin with the fault's: T5, time stamps that disagree; S1, a depth camera without
+//! readings.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
 use std::path::{Path, PathBuf};
@@ -42,18 +42,18 @@ fn at(index: usize) -> Stamp {
     Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(index as f64 * PERIOD_S)
 }
 
-/// How the messages of a recording are out of step.
+/// Faults of the messages of a recording.
 #[derive(Clone, Copy, Default)]
 struct Fault {
-    /// The stamps of depth images are this much later than those of colour, s.
+    /// Lag of the stamps of depth images behind those of colour, s.
     skew_s: f64,
-    /// Only each second depth image is there.
+    /// True if every second depth image is missing.
     half_depth: bool,
-    /// Messages are recorded up to this long after their stamps, in another order, s.
+    /// Largest delay of recording after the stamp, which changes the order of messages, s.
     delay_s: f64,
 }
 
-/// A log with a fault, in a folder that goes with it.
+/// A log with a fault, with its temporary folder.
 struct Recorded {
     _folder: tempfile::TempDir,
     path: PathBuf,
@@ -70,7 +70,7 @@ fn record(camera: &Camera, shots: &[Shot], fault: Fault) -> Recorded {
     };
     log.send("/tf_static", at(0), &TFMessage { transforms: vec![fixed] }).unwrap();
     log.send("/camera/camera_info", at(0), &info(camera)).unwrap();
-    // Whatever: a sequence that is not in order.
+    // A fixed sequence that is not sorted.
     let delay = |index: usize| fault.delay_s * ((index * 7) % 5) as f64 / 4.0;
     let mut images = Vec::new();
     for (index, shot) in shots.iter().enumerate() {
@@ -80,6 +80,7 @@ fn record(camera: &Camera, shots: &[Shot], fault: Fault) -> Recorded {
             images.push((later.plus_seconds(delay(2 * index + 1)), later, shot, true));
         }
     }
+    // A log holds its messages in the order of recording.
     images.sort_by_key(|(recorded, ..)| *recorded);
     for (recorded, stamp, shot, is_depth) in images {
         send(&mut log, recorded, stamp, &shot.images, is_depth);
@@ -108,8 +109,8 @@ fn info(camera: &Camera) -> CameraInfo {
     CameraInfo::of_lens(&Header::new(at(0), "camera"), &lens, size, 0.0)
 }
 
-/// What a run over a log gave: stamps with tracks, and how many images found no
-/// partner, colour and depth.
+/// Result of a run over a log: stamps with tracks, and the number of colour and depth images
+/// without a partner.
 #[derive(Debug)]
 struct Run {
     tracks: Vec<(Stamp, Vec<Track>)>,
@@ -136,6 +137,7 @@ fn run(recorded: &Recorded) -> Run {
 fn t5_when_a_message_was_recorded_does_not_matter() {
     let (camera, shots) = shots();
     let prompt = run(&record(&camera, &shots, Fault::default()));
+    // More than two periods, so that messages of several frames change their order.
     let late = run(&record(&camera, &shots, Fault { delay_s: 0.25, ..Fault::default() }));
     assert_eq!(prompt.tracks.len(), shots.len());
     assert!(prompt.tracks.iter().any(|(_, tracks)| tracks.iter().any(|track| track.confirmed)));
@@ -172,8 +174,7 @@ fn frame(camera: &Arc<Camera>, index: usize, images: Images) -> Frame {
     Frame::new(index as u64 + 1, at(index), Arc::clone(camera), motion, images)
 }
 
-/// First the drawn images, then for six seconds the last one with this depth
-/// everywhere.
+/// Processes the simulated images, then for six seconds the last one with this depth everywhere.
 fn go_blind(camera: &Arc<Camera>, shots: &[Shot], depth_m: f32) -> Vec<FrameReport> {
     let mut pipeline = pipeline("depth-ekf-follow.toml");
     let blind = DepthImage::filled(camera.width, camera.height, depth_m);
@@ -187,6 +188,7 @@ fn go_blind(camera: &Arc<Camera>, shots: &[Shot], depth_m: f32) -> Vec<FrameRepo
 fn s1_depth_that_shows_nothing_ends_tracks_and_starts_none() {
     let (camera, shots) = shots();
     let camera = Arc::new(camera);
+    // Forms of "no reading"; 65.535 m is the largest value of depth in 16-bit millimetres.
     for depth_m in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 65.535] {
         let reports = go_blind(&camera, &shots, depth_m);
         let (seeing, blind) = reports.split_at(shots.len());

@@ -1,5 +1,4 @@
-//! The loop is closed: images are drawn from where the controller has driven
-//! the robot to.
+//! Closed loop: images are rendered from the pose to which the controller has driven the robot.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
 use std::path::Path;
@@ -10,7 +9,7 @@ use tagalong_core::{Camera, Frame, Motion, Registry, Stamp, TrackId};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth, Variant};
 
-/// A person walks ahead and around a bend at 0.7 m/s.
+/// Returns a scene with a person that walks ahead and around a bend at 0.7 m/s.
 fn scene() -> Scene {
     let walk = Variant::default()
         .with("duration_s", 11.0)
@@ -20,7 +19,7 @@ fn scene() -> Scene {
     Scene::parse_with(include_str!("../scenes/small-room.toml"), &walk).unwrap()
 }
 
-/// The frames that a pipeline gets, from what a robot records.
+/// Converts the recordings of a robot to the frames of a pipeline.
 struct Recorder {
     camera: Arc<Camera>,
     odometry: Isometry2<f64>,
@@ -94,6 +93,7 @@ fn the_robot_stays_with_a_person_who_walks() {
         let (range_m, bearing) = (head.x.hypot(head.y), head.y.atan2(head.x).to_degrees());
         assert!((1.5..2.4).contains(&range_m), "{range_m} m away after {at_s} s");
         assert!(bearing.abs() < 15.0, "{bearing} degrees aside after {at_s} s");
+        // In the first second the track is not confirmed yet.
         assert!(*at_s < 1.0 || *target == Some(TrackId(1)), "{target:?} after {at_s} s");
     }
     let way = steps[0].world_from_robot.inverse() * steps[steps.len() - 1].world_from_robot;

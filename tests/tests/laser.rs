@@ -1,4 +1,4 @@
-//! People in a log without images: the detector of the example `laser_legs`.
+//! Detection of people in a log without images, with the detector of the example `laser_legs`.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 #[path = "../../crates/cli/examples/laser_legs/legs.rs"]
@@ -26,8 +26,8 @@ fn pipeline() -> Pipeline {
     Pipeline::from_toml(CONFIG, Path::new("."), &registry).unwrap().0
 }
 
-/// The wheelchair drives 110 m; the odometry of the log says so, and people beside it are
-/// tracked although there is not a single image.
+/// The wheelchair drives 110 m by the odometry of the log, and people beside it are tracked
+/// although there is not a single image.
 #[test]
 fn scans_alone_make_the_frames_of_a_log_without_images() {
     let mut pipeline = pipeline();
@@ -46,7 +46,7 @@ fn scans_alone_make_the_frames_of_a_log_without_images() {
     assert!(confirmed > 30, "{confirmed}");
 }
 
-/// Without tf the scanner is taken to sit at the robot's origin, and that is said.
+/// Without tf the scanner is assumed at the robot's origin, and a note says so.
 #[test]
 fn a_scanner_that_tf_does_not_know_is_at_the_origin() {
     let mut pipeline = pipeline();

@@ -1,4 +1,4 @@
-//! People in a conical mirror, from drawn rooms and logs to tracks.
+//! Tracking of people in a conical mirror, from simulated rooms and logs to tracks.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on fails")]
 
@@ -14,15 +14,15 @@ use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
 use tagalong_trials::{Contender, Judge, Trial};
 
-/// Somebody comes in when the room is known, and walks behind the robot, where the
-/// panorama ends and begins.
+/// Scene in which a person enters after the background is learned, and walks behind the robot,
+/// across the seam of the panorama.
 const ROOM: &str = "seed = 5\nduration_s = 15.0\n[room]\nsize_m = [10.0, 5.0]\n\
     floor = \"carpet\"\nwallpaper = true\n[camera]\nkind = \"panorama\"\nwidth = 480\n\
     height = 480\nrate_hz = 3.0\nheight_m = 1.55\n[robot]\nstart = [5.0, 2.5]\n\
     [[people]]\npath = [[3.0, 1.4], [2.6, 3.8]]\nspeed_mps = 0.6\nenters_s = 9.0\nlook = 21\n";
-/// Images of a log; uncompressed ones are large.
+/// Number of images of a log; uncompressed ones are large.
 const FRAMES_OF_A_LOG: usize = 12;
-/// The frame of the camera.
+/// Name of the camera's frame.
 const CAMERA: &str = "camera";
 
 fn registry() -> Registry {
@@ -51,6 +51,7 @@ fn a_person_who_crosses_the_seam_keeps_identity_and_place() {
         .flat_map(|moment| &moment.truth)
         .map(|person| person.head_in_robot.y > 0.0)
         .collect();
+    // The seam is straight behind the robot, so a person that crosses it changes the side.
     assert_eq!(sides.len(), 2, "nobody crossed the seam");
     for run in &trial.runs {
         let judged = Judge::default().judge(&trial, run).unwrap();
@@ -70,7 +71,7 @@ fn a_person_who_crosses_the_seam_keeps_identity_and_place() {
     }
 }
 
-/// The circular images of the first moments, somebody in the last of them.
+/// Returns the circular images of the first moments, with a person in the last of them.
 fn shots(scene: &Scene) -> (Simulation, Vec<Shot>) {
     let mut simulation = Simulation::new(scene, 2);
     let events = std::iter::from_fn(|| simulation.next_event());
@@ -82,7 +83,7 @@ fn shots(scene: &Scene) -> (Simulation, Vec<Shot>) {
     (simulation, shots)
 }
 
-/// A log of images, uncompressed, as the driver of a camera writes it.
+/// Writes a log of uncompressed images, as a camera driver does.
 fn write(path: &Path, simulation: &Simulation, info: &CameraInfo, images: &[(Stamp, RgbImage)]) {
     let mut log = MessageLog::create(path).unwrap();
     let mount = TransformStamped {
@@ -121,11 +122,12 @@ fn info(model: &str, size: [usize; 2], focal: f64, centre: [f64; 2], d: [f64; 4]
     }
 }
 
-/// Where people are in each image, m.
+/// Positions of people in each image, m.
 type Places = Vec<Vec<[f64; 3]>>;
 
-/// What is seen in a log: images as they reach the tracker, and where people are.
+/// Returns the images of a log as the tracker receives them, and the positions of detections.
 fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
+    // A short log has few images from which to learn the background.
     let few = "[[detectors]]\nplugin = \"omni-appearance\"\nconfig = { distance = \"rich\", \
                background_frames = 6 }\n[filter]\nplugin = \"floor-kalman\"\n";
     let mut pipeline = Contender::new("few", few).pipeline(&registry(), 0).unwrap();
@@ -143,6 +145,7 @@ fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
 
 #[test]
 fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
+    // The log ends after 12 images at 3 Hz, so the person has to enter early.
     let enters_early = ROOM.replace("enters_s = 9.0", "enters_s = 2.5");
     let (simulation, shots) = shots(&Scene::parse(&enters_early).unwrap());
     let panorama: Panorama = *simulation.panorama().unwrap();

@@ -1,6 +1,6 @@
-//! The shipped `depth-ekf` config, unchanged, on every real log with depth, and
-//! `particle-best` and `rgbd-best` where people hide each other.
-//! Without `../shared/data/logs` each test says that it skips.
+//! The shipped `depth-ekf` config, unchanged, on every real log with depth, and `particle-best` and
+//! `rgbd-best` on a log with occlusions. Without `../shared/data/logs` each test reports that it
+//! skips.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -18,7 +18,7 @@ use tagalong_tests::people::{Boxes, Score, read, score};
 struct Run {
     /// Boxes of confirmed tracks that were seen in the frame.
     confirmed: Boxes,
-    /// Detections of each frame, whatever became of them.
+    /// Number of detections in each frame, dropped ones included.
     detections: BTreeMap<u64, usize>,
     frames: u64,
     funnel: Funnel,
@@ -57,6 +57,7 @@ fn run(path: &Path, config: &str) -> Run {
             run.confirmed.insert(frame.index, boxes);
         }
     }
+    // A lost frame would change the score without a message.
     assert!(!source.data_lost(), "{:?}", source.counters());
     run
 }
@@ -101,7 +102,7 @@ fn nobody_is_confirmed_in_the_empty_frames_of_filinha() {
     assert!(score.covered * 10 >= score.rows * 7, "{score:?}");
 }
 
-/// Numbers beyond one for each person.
+/// Returns the track numbers in excess of one per person.
 fn surplus(score: &Score) -> usize {
     score.ids.values().map(|ids| ids.len().saturating_sub(1)).sum()
 }

@@ -1,5 +1,5 @@
-//! Pipelines that share what they find in a frame say the same, bit by bit, as those that
-//! look for themselves.
+//! Pipelines that share their detections in a frame give the same results, bit by bit, as those
+//! that run all detectors themselves.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on fails")]
 
@@ -10,14 +10,14 @@ use tagalong_pipeline::{FrameReport, Pipeline, with_values};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Draw};
 
-/// Two people pass each other before a robot that turns, and furniture.
+/// Scene with two people that pass each other before a turning robot, and with furniture.
 const SCENE: &str = "seed = 3\nduration_s = 1.5\n[camera]\nwidth = 320\nheight = 240\n\
     field_of_view_deg = 70.0\n[room]\nclutter = 4\n[robot]\nstart = [0.8, 2.0]\n\
     path = [[2.2, 2.2], [2.8, 3.4]]\nspeed_mps = 0.5\n\
     [[people]]\npath = [[3.8, 3.4], [3.8, 1.6]]\nspeed_mps = 0.8\n\
     [[people]]\npath = [[4.8, 1.9], [4.8, 4.8]]\nspeed_mps = 0.8\n";
 
-/// Settings of detector, verifier and life cycle, each alone.
+/// Settings of detector, verifier and track manager, each changed alone.
 const CHANGES: [(&str, &str); 4] = [
     ("manager.config.confirm_hits", "1"),
     ("manager.config.start_score", "1.5"),
@@ -25,7 +25,7 @@ const CHANGES: [(&str, &str); 4] = [
     ("verifiers.0.config.weight", "0.5"),
 ];
 
-/// Shipped configs, and the same with each change that they have room for.
+/// Returns shipped configs, and each with every change to which it has a key.
 fn pipelines() -> Vec<Pipeline> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let mut registry = Registry::default();
@@ -55,6 +55,7 @@ fn run(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
     let frames: Vec<Frame> =
         std::iter::from_fn(|| draw.next_frame()).map(|drawn| drawn.frame).collect();
     let say = |frame| -> Vec<String> {
+        // Timings differ between any two runs.
         let untimed = |report| FrameReport { timings: Vec::new(), ..report };
         pipelines.iter_mut().map(|p| format!("{:?}", untimed(p.step(frame).unwrap()))).collect()
     };
@@ -68,6 +69,7 @@ fn sharing_changes_no_bit() {
     let (alone, sharing) = (run(&mut alone), run(&mut sharing));
     assert!(alone.len() > 8, "{} frames", alone.len());
     let last: std::collections::BTreeSet<&String> = alone.iter().flatten().collect();
+    // Pipelines with equal results would not show that shared results are kept apart.
     assert!(last.len() > alone.len() * 5, "the pipelines hardly differ");
     for (number, (alone, sharing)) in alone.iter().zip(&sharing).enumerate() {
         for (pipeline, (alone, sharing)) in alone.iter().zip(sharing).enumerate() {

@@ -1,5 +1,5 @@
-//! A real stereo pair, from the images to wheel speeds: a pedestrian 11 m ahead of a
-//! car. Without `../shared/data/logs` the test says that it skips.
+//! A real stereo pair, from the images to wheel speeds: a pedestrian 11 m ahead of a car. Without
+//! `../shared/data/logs` the test reports that it skips.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -13,8 +13,8 @@ use tagalong_core::Registry;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::{FrameReport, Pipeline};
 
-/// Where the pedestrian is in the last frame: straight ahead and to the left, m.
-/// The car drives, and its log says nothing of that, so that tracks lag behind.
+/// Position of the pedestrian in the last frame: straight ahead and to the left, m. The car drives,
+/// but its log has no odometry, so that tracks lag behind.
 const PEDESTRIAN_M: Point2<f64> = Point2::new(11.2, 3.15);
 
 fn reports() -> Option<Vec<FrameReport>> {

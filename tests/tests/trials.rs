@@ -1,4 +1,4 @@
-//! Pipelines of the catalog on drawn scenes.
+//! Pipelines of the catalog on simulated scenes.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on fails")]
 
@@ -9,8 +9,8 @@ use tagalong_eval::Tally;
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Judge, each};
 
-/// Two people pass before a turning robot, one behind the other; small images,
-/// so that a test can afford them.
+/// Scene with two people that pass before a turning robot, one behind the other; small images,
+/// which keep the test fast.
 const SCENE: &str = "duration_s = 6.0\n[camera]\nwidth = 320\nheight = 240\n\
     field_of_view_deg = 70.0\n[room]\nclutter = 4\n[robot]\nstart = [0.8, 2.0]\n\
     path = [[2.2, 2.2], [2.8, 3.4]]\nspeed_mps = 0.5\n\
@@ -37,7 +37,7 @@ fn scenes(seeds: u64, duration_s: f64) -> Vec<Scene> {
     (1..=seeds).map(|seed| Scene { seed, duration_s, ..scene.clone() }).collect()
 }
 
-/// One tally a contender and a scene.
+/// Returns one tally per contender and scene.
 fn tallies(names: &[&str], seeds: u64, duration_s: f64, threads: usize) -> Vec<Vec<Tally>> {
     let keep = |trial: tagalong_trials::Trial| {
         let judge = Judge::default();

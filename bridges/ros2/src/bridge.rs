@@ -19,28 +19,28 @@ use crate::stamps::StampClock;
 use crate::wheels::{Told, Wheels};
 use crate::{BridgeError, Options};
 
-/// How long to wait for messages before looking whether to stop.
+/// Longest wait for messages before the stop flag is checked.
 const TURN: Duration = Duration::from_millis(50);
-/// Between two attempts to start.
+/// Time between two attempts to start.
 const ATTEMPT: Duration = Duration::from_millis(500);
-/// After the first image, others are waited for this long: odometry and transforms
-/// are not asked for by every pipeline, and better than none.
+/// Time to wait for other topics after the first image: not every pipeline requires odometry and
+/// transforms, but each is better with them.
 const GATHER: Duration = Duration::from_secs(2);
-/// Without a frame for so long, that is told.
+/// Time without a frame after which a message is logged.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Frames that are older than this on arrival speak for clocks that disagree, s.
+/// Age on arrival above which a frame indicates clocks that disagree, s.
 const OLD_S: f64 = 0.5;
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// Frames that went through the pipeline.
+    /// Frames that the pipeline processed.
     pub frames: u64,
-    /// Messages, by topic.
+    /// Message counts by topic.
     pub traffic: BTreeMap<String, Traffic>,
-    /// What was skipped and lost where frames are made, by name.
+    /// Skipped and lost inputs of the frame source, by name.
     pub counters: BTreeMap<&'static str, u64>,
-    /// What the wheels were told.
+    /// Commands sent to the wheels.
     pub told: Told,
 }
 
@@ -59,10 +59,10 @@ impl fmt::Display for Summary {
     }
 }
 
-/// Bridges until `stop` is set. `tell` is given sentences for whoever started it.
+/// Runs the bridge until `stop` is set. `tell` receives log messages.
 ///
 /// # Errors
-/// [`BridgeError`]. The robot was told to stop in any case.
+/// [`BridgeError`]. The robot is told to stop in any case.
 pub fn run(
     options: &Options,
     stop: &AtomicBool,
@@ -79,14 +79,13 @@ pub fn run(
     let mut bridge = Bridge::new(options, setup, source, &mut network, inbox, clock)?;
     bridge.tell_topics(tell);
     let ended = bridge.work(stop, tell);
-    // The robot stands before the network is left.
+    // The robot is stopped before the node leaves the network.
     let summary = bridge.finish();
     drop((ears, switch));
     ended.map(|()| summary)
 }
 
-/// Listens until everything is there that the pipeline needs; `None` if told to
-/// stop before.
+/// Listens until all inputs of the pipeline are there; returns `None` if stopped before.
 fn start(
     options: &Options,
     setup: &Setup,
@@ -122,6 +121,7 @@ fn start(
         let gathered = first.is_some_and(|first| first.elapsed() > GATHER);
         match listening.start() {
             Ok(source) if gathered || is_late => {
+                // Topics that the pipeline does not use are no longer received.
                 ears.retain(|ear| source.topics().any(|topic| topic == ear.topic()));
                 return Ok(Some((source, ears)));
             }
@@ -132,7 +132,7 @@ fn start(
     Ok(None)
 }
 
-/// A pipeline between topics.
+/// A pipeline between input and output topics.
 struct Bridge {
     pipeline: Pipeline,
     source: LiveSource,
@@ -148,7 +148,7 @@ struct Bridge {
     quiet: bool,
 }
 
-/// Where results go.
+/// Publishers of the results.
 struct Out {
     tracks: Publisher<Detection3DArray>,
     target: Publisher<PoseStamped>,
@@ -206,6 +206,7 @@ impl Bridge {
                     false => self.source.take(&topic, &data),
                 }
             }
+            // Only the newest frame: a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
                 Some(found) => self.step(&found, tell)?,
                 None => self.look_for_silence(tell)?,
@@ -214,18 +215,20 @@ impl Bridge {
         Ok(())
     }
 
-    /// Takes a frame through the pipeline and tells everybody.
+    /// Takes a frame through the pipeline and publishes the results.
     fn step(&mut self, found: &LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         (self.heard, self.quiet) = (Instant::now(), false);
         if self.frames == 0 {
             self.compare_clocks(found.frame.stamp, tell);
         }
+        // Before the step, so that the command of this very frame is a stop.
         if found.odom_jumped {
             self.disarm("odometry jumped", tell);
         }
         let report = self.pipeline.step(&found.frame);
-        // Where the robot is a guess it must not move, but may again afterwards.
+        // A robot with stale odometry must not move, but may again afterwards.
         self.obey(!found.odom_stale);
+        // Returned only now, so that the wheels hear of a failed step.
         let report = report?;
         self.frames += 1;
         self.publish(found, &report);
@@ -238,7 +241,7 @@ impl Bridge {
         }
     }
 
-    /// Who listens is not waited for, so that what is not sent is lost.
+    /// Publishes the results. Subscribers are not waited for, so a message may be lost.
     fn publish(&self, found: &LogFrame, report: &FrameReport) {
         let record = FrameRecord {
             index: report.index,
@@ -289,7 +292,7 @@ impl Bridge {
         }
     }
 
-    /// Says once why there are no frames.
+    /// Reports once why there are no frames.
     fn look_for_silence(&mut self, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         if let Some(misfit) = self.source.misfit().filter(|_| self.frames == 0) {
             return Err(misfit.into());
@@ -318,7 +321,7 @@ impl Bridge {
     }
 }
 
-/// Starts the thread of the wheels, which turns their speeds into messages.
+/// Starts the thread of the wheels, which converts their speeds to messages.
 fn drive(
     options: &Options,
     setup: &Setup,
@@ -335,13 +338,13 @@ fn drive(
     };
     let tell = move |wheels| {
         let header = Header::new(clock.now(), base_frame.as_str());
-        // A full queue means that nobody has read the command before this one.
+        // A full queue means that the previous command has not been read.
         let _lost = publisher.publish(twist(header, wheels, half_m));
     };
     Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), now, tell))
 }
 
-/// Wheel speeds as the motion of the robot's middle.
+/// Converts wheel speeds to the velocity of the robot's centre.
 fn twist(header: Header, WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistStamped {
     let mut twist = TwistStamped { header, ..TwistStamped::default() };
     twist.twist.linear.x = 0.5 * (left + right);

@@ -1,10 +1,10 @@
-//! Where messages wait for the thread that makes frames.
+//! Queue of messages for the thread that makes frames.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Messages that wait, a few of each topic. Who is too slow misses the oldest.
+/// Waiting messages, a few of each topic. A slow reader misses the oldest.
 #[derive(Debug, Default)]
 pub struct Inbox {
     topics: Mutex<BTreeMap<String, Topic>>,
@@ -17,19 +17,20 @@ struct Topic {
     traffic: Traffic,
 }
 
-/// How many messages of a topic came, and how many of them nobody read.
+/// Numbers of received and of dropped messages of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// Messages that came.
+    /// Messages that arrived.
     pub received: u64,
-    /// Messages that were dropped because newer ones came before they were read.
+    /// Messages that were dropped because newer ones arrived before they were read.
     pub dropped: u64,
 }
 
 impl Inbox {
-    /// Puts in a message; of the same topic, `room` are kept and the oldest dropped.
+    /// Adds a message; of the same topic, `room` are kept and the oldest dropped.
     pub fn push(&self, topic: &str, message: Vec<u8>, room: usize) {
         let mut topics = self.lock();
+        // `entry` would allocate the name for each message.
         if !topics.contains_key(topic) {
             topics.insert(topic.to_owned(), Topic::default());
         }
@@ -43,8 +44,8 @@ impl Inbox {
         self.arrived.notify_all();
     }
 
-    /// Everything that waits: by topic, and there in the order of arrival. Nothing
-    /// if nothing comes for this long.
+    /// Returns all waiting messages by topic, in the order of arrival within a topic; empty if none
+    /// arrives within `patience`.
     pub fn take(&self, patience: Duration) -> Vec<(String, Vec<u8>)> {
         let empty = |topics: &mut BTreeMap<String, Topic>| {
             topics.values().all(|topic| topic.waiting.is_empty())
@@ -57,7 +58,7 @@ impl Inbox {
         all.collect()
     }
 
-    /// What came since the start, by topic.
+    /// Returns the message counts since the start, by topic.
     pub fn traffic(&self) -> BTreeMap<String, Traffic> {
         self.lock().iter().map(|(name, topic)| (name.clone(), topic.traffic)).collect()
     }

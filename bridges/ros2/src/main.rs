@@ -13,6 +13,7 @@ fn main() -> ExitCode {
     let options = Options::parse();
     let (stop, signal) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
     let listening = [SIGINT, SIGTERM].into_iter().try_for_each(|number| {
+        // The number of the signal determines the exit code.
         flag::register_usize(number, Arc::clone(&signal), number as usize)?;
         flag::register(number, Arc::clone(&stop)).map(drop)
     });

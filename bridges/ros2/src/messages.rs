@@ -1,9 +1,8 @@
-//! Messages on their way from DDS to where frames are made.
+//! Conversion of messages from DDS to the frame source.
 //!
-//! DDS hands out messages that own their bytes; the reader of logs takes them as
-//! they lie on the wire. So images, which it borrows, have a twin here that owns
-//! its pixels, and what was received is written down once more: a copy of an
-//! image, a tenth of a millisecond.
+//! DDS delivers messages that own their bytes; the log reader takes them as they lie on the wire.
+//! Images, which it borrows, therefore have a counterpart here that owns its pixels, and received
+//! messages are encoded again: a copy of an image, a tenth of a millisecond.
 
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
@@ -56,13 +55,13 @@ impl OwnedCompressedImage {
     }
 }
 
-/// `sensor_msgs::msg::dds_::Image_`, as DDS names types, to `sensor_msgs/msg/Image`.
+/// Converts `sensor_msgs::msg::dds_::Image_`, as DDS names types, to `sensor_msgs/msg/Image`.
 pub(crate) fn ros_type(dds: &str) -> Option<String> {
     let (package, name) = dds.split_once("::msg::dds_::")?;
     Some(format!("{package}/msg/{}", name.strip_suffix('_')?))
 }
 
-/// `rt/odom`, as DDS names topics, to `/odom`.
+/// Converts `rt/odom`, as DDS names topics, to `/odom`.
 pub(crate) fn ros_topic(dds: &str) -> Option<&str> {
     dds.strip_prefix("rt").filter(|name| name.starts_with('/'))
 }

@@ -1,4 +1,4 @@
-//! DDS: who is there, what they say, and what is said to them.
+//! The DDS node: discovery, subscriptions and publishers.
 
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -23,19 +23,19 @@ use crate::inbox::Inbox;
 use crate::messages::{Bool, OwnedCompressedImage, OwnedImage, ros_topic, ros_type};
 use crate::stamps::StampClock;
 
-/// Images that wait for the thread that makes frames.
+/// Number of images that wait for the thread that makes frames.
 const IMAGES: usize = 2;
-/// Other messages that wait.
+/// Number of other messages that wait.
 const OTHERS: usize = 64;
 
-/// Our node.
+/// The node of the bridge.
 pub(crate) struct Network {
     node: Node,
     context: Context,
     spinner: Option<JoinHandle<()>>,
 }
 
-/// A topic that is listened to until this is dropped.
+/// A subscription, which ends when it is dropped.
 pub(crate) struct Ear {
     topic: String,
     abort: AbortHandle,
@@ -59,21 +59,22 @@ fn failed(error: impl std::fmt::Debug) -> BridgeError {
     BridgeError::Network(format!("{error:?}"))
 }
 
-/// The newest only, lost is lost: what sensors send, and what fits all who send.
+/// Returns the profile of sensors: the newest messages only, without repetition, which is
+/// compatible with all publishers.
 fn sensor(depth: usize) -> QosProfile {
     QosProfile::subscription_default()
         .reliability_best_effort()
         .history(History::KeepLast { depth })
 }
 
-/// What was said before we came is told, too.
+/// Returns a profile that also receives messages sent before the subscription.
 fn latched() -> QosProfile {
     sensor(OTHERS)
         .reliability_reliable(WhenFull::DEFAULT)
         .durability(ros2_client::qos::Durability::TransientLocal)
 }
 
-/// Everything arrives; nobody is waited for.
+/// Returns a profile in which all messages arrive, and publishing does not wait.
 fn reliable() -> QosProfile {
     QosProfile::publisher_default()
         .reliability_reliable(WhenFull::Fail)
@@ -89,12 +90,12 @@ impl Network {
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let mut node = context.new_node(name, options).map_err(failed)?;
         let spinner = node.spinner().map_err(failed)?;
-        // It ends when the node is dropped.
+        // The thread ends when the node is dropped.
         let spinner = thread::spawn(move || drop(block_on(spinner.spin())));
         Ok(Self { node, context, spinner: Some(spinner) })
     }
 
-    /// All topics that somebody has, and their message types.
+    /// Returns all discovered topics with their message types.
     pub(crate) fn topics(&self) -> Vec<(String, String)> {
         let found = self.context.discovered_topics();
         let named = found.iter().filter_map(|topic| {
@@ -103,7 +104,7 @@ impl Network {
         named.collect()
     }
 
-    /// Puts the messages of a topic into the inbox; `None` for a type of no use.
+    /// Puts the messages of a topic into the inbox; returns `None` for a type without use.
     pub(crate) fn listen(
         &mut self,
         topic: &str,
@@ -131,6 +132,7 @@ impl Network {
             CameraInfo::TYPE => self.plain::<CameraInfo>(topic, sensor(OTHERS), inbox),
             Odometry::TYPE => self.plain::<Odometry>(topic, sensor(OTHERS), inbox),
             LaserScan::TYPE => self.plain::<LaserScan>(topic, sensor(OTHERS), inbox),
+            // Static transforms are sent once, usually before the bridge joins.
             TFMessage::TYPE if topic.ends_with("tf_static") => {
                 self.plain::<TFMessage>(topic, latched(), inbox)
             }
@@ -142,7 +144,7 @@ impl Network {
         ear.map(Some)
     }
 
-    /// Puts messages of the topic that stops and arms into the inbox.
+    /// Puts the messages of the topic that stops and arms into the inbox.
     pub(crate) fn listen_to_switch(
         &mut self,
         topic: &str,
@@ -178,19 +180,19 @@ impl Network {
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
         let (abort, registration) = AbortHandle::new_pair();
         let thread = thread::spawn(move || {
-            // What does not decode is of another type than its topic says.
+            // A message that does not decode is of another type than its topic states.
             let whole = subscription.async_stream().filter_map(|message| ready(message.ok()));
             let put = whole.for_each(|(message, _)| {
                 inbox.push(&name, encode(message), room);
                 ready(())
             });
-            // It ends by being aborted.
+            // The stream ends by being aborted.
             let _aborted = block_on(Abortable::new(put, registration));
         });
         Ok(Ear { topic: topic.to_owned(), abort, thread: Some(thread) })
     }
 
-    /// A publisher of this type.
+    /// Creates a publisher of this type.
     pub(crate) fn publisher<M: Message + Serialize>(
         &mut self,
         topic: &str,
@@ -202,8 +204,8 @@ impl Network {
     }
 }
 
-/// The name of a topic, which lies in the namespace unless it begins with a slash.
-/// (What ros2-client does by itself doubles the slash in the namespace `/`.)
+/// Returns the name of a topic, which lies in the namespace unless it begins with a slash.
+/// (ros2-client by itself doubles the slash in the namespace `/`.)
 fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
     let full = match topic.starts_with('/') {
         true => topic.to_owned(),

@@ -45,34 +45,34 @@ pub struct Options {
     /// Topic of the odometry; over `[input] odometry_topic`.
     #[arg(long, value_name = "TOPIC")]
     pub odometry: Option<String>,
-    /// Where confirmed tracks go (vision_msgs/Detection3DArray).
+    /// Topic of confirmed tracks (vision_msgs/Detection3DArray).
     #[arg(long, value_name = "TOPIC", default_value = "people/tracks")]
     pub tracks: String,
-    /// Where the pose of the person to follow goes (geometry_msgs/PoseStamped).
+    /// Topic of the pose of the target (geometry_msgs/PoseStamped).
     #[arg(long, value_name = "TOPIC", default_value = "people/target_pose")]
     pub target: String,
-    /// Where states and reasons go, in words (std_msgs/String).
+    /// Topic of states and reasons, as text (std_msgs/String).
     #[arg(long, value_name = "TOPIC", default_value = "people/state")]
     pub state: String,
-    /// What stops the robot (false) and lets it move again after a fault (true)
+    /// Topic that stops the robot (false) and lets it move again after a fault (true)
     /// (std_msgs/Bool).
     #[arg(long, value_name = "TOPIC", default_value = "people/enable")]
     pub enable: String,
-    /// Where commands go (geometry_msgs/TwistStamped).
+    /// Topic of commands (geometry_msgs/TwistStamped).
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     pub command: String,
-    /// Commands a second.
+    /// Commands per second.
     #[arg(long, value_name = "HZ", default_value_t = 25.0, value_parser = rate)]
     pub rate: f64,
-    /// How long to wait for topics and their first messages, s.
+    /// Longest wait for topics and their first messages, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0, value_parser = seconds)]
     pub wait: f64,
-    /// What tells the age of a frame.
+    /// Clock for the age of a frame.
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockSource,
 }
 
-/// Commands must come at 20 Hz or more.
+/// Parses the rate; commands must come at 20 Hz or more.
 fn rate(text: &str) -> Result<f64, String> {
     within(text, 20.0, 200.0)
 }
@@ -89,7 +89,7 @@ fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// What the config says.
+/// Contents of the config.
 pub(crate) struct Setup {
     pub(crate) pipeline: Pipeline,
     pub(crate) robot: RobotSettings,
@@ -120,7 +120,7 @@ impl Options {
         Ok(Setup { pipeline, robot: run.robot, input: self.named(input), limits })
     }
 
-    /// The settings with the topics of the command line.
+    /// Returns the settings with the topics of the command line.
     fn named(&self, input: InputSettings) -> InputSettings {
         InputSettings {
             colour_topic: self.colour.clone().or(input.colour_topic),

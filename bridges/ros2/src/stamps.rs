@@ -3,18 +3,18 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use tagalong_core::Stamp;
 
-/// What tells the time by which a frame is old.
+/// Clock for the age of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ClockSource {
     /// The clock of this machine, which must agree with that of the stamps.
     #[default]
     System,
-    /// The stamp of the newest image, plus the time since it came: for simulated
-    /// time, replayed logs and clocks that disagree. Time on the way counts as none.
+    /// The stamp of the newest image, plus the time since it arrived: for simulated time, replayed
+    /// logs and clocks that disagree. The time of transmission counts as none.
     Arrival,
 }
 
-/// The time, by the clock of the stamps.
+/// Current time by the clock of the stamps.
 #[derive(Debug)]
 pub(crate) struct StampClock {
     source: ClockSource,
@@ -26,7 +26,7 @@ impl StampClock {
         Self { source, heard: Mutex::new(None) }
     }
 
-    /// An image with this stamp has just come.
+    /// Records the stamp of an image that has just arrived.
     pub(crate) fn hear(&self, stamp: Stamp) {
         *self.heard.lock().unwrap_or_else(PoisonError::into_inner) = Some((stamp, Instant::now()));
     }

@@ -1,4 +1,4 @@
-//! The thread that tells the wheels what to do.
+//! Thread that sends commands to the wheels.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -7,26 +7,26 @@ use std::time::{Duration, Instant};
 use tagalong_core::{Stamp, WheelSpeeds};
 use tagalong_pipeline::Orders;
 
-/// Zero is told for this long after the last frame, s; then nothing, so that
-/// others may drive (the `stop_pub_timeout` of Nav2).
+/// Duration of zero commands after the last frame, s; then none are sent, so that other nodes may
+/// drive (the `stop_pub_timeout` of Nav2).
 const ZEROS_S: f64 = 2.0;
-/// At the end, zero is told so often, and this far apart.
+/// Number of zero commands at the end, and time between them.
 const FAREWELLS: u32 = 5;
 const BETWEEN_FAREWELLS: Duration = Duration::from_millis(10);
 
-/// Tells the wheels something at a steady rate, from what was last ordered; zero
-/// when that has expired, and zero at the end, whatever the end is.
+/// Sends commands to the wheels at a steady rate, from the last orders; zero when these have
+/// expired, and zero at the end, also after an error.
 pub struct Wheels {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<Told>>,
 }
 
-/// What the wheels were told.
+/// Numbers of commands sent to the wheels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Told {
-    /// Commands.
+    /// Commands in total.
     pub commands: u64,
-    /// Those by which the robot stands.
+    /// Commands of zero speed.
     pub zeros: u64,
 }
 
@@ -39,15 +39,15 @@ struct Shared {
 #[derive(Clone, Copy, Default)]
 struct State {
     orders: Option<Orders>,
-    /// When the last frame was worked off.
+    /// Time at which the last frame was processed.
     frame: Option<Instant>,
-    /// Orders that were not yet told.
+    /// True if the orders have not been sent yet.
     is_new: bool,
     quits: bool,
 }
 
 impl State {
-    /// What to tell at this time, if anything.
+    /// Returns the command for this time, if any.
     fn command(&self, now: Stamp) -> Option<WheelSpeeds> {
         let wheels = self.orders.map_or(WheelSpeeds::STOP, |orders| orders.at(now).wheels);
         let recent = self.frame.is_some_and(|at| at.elapsed().as_secs_f64() <= ZEROS_S);
@@ -56,8 +56,8 @@ impl State {
 }
 
 impl Wheels {
-    /// Starts the thread. `now` is the time by the clock of the frames' stamps,
-    /// `tell` sends wheel speeds and must not wait.
+    /// Starts the thread. `now` returns the time by the clock of the frames' stamps, `tell` sends
+    /// wheel speeds and must not wait.
     pub fn start(
         period: Duration,
         now: impl Fn() -> Stamp + Send + 'static,
@@ -69,14 +69,14 @@ impl Wheels {
         Self { shared, thread: Some(thread) }
     }
 
-    /// After each frame: what holds until the next one; `None` is a stop.
+    /// Sets the orders that hold until the next frame; `None` is a stop.
     pub fn obey(&self, orders: Option<Orders>) {
         let mut state = self.shared.lock();
         *state = State { orders, frame: Some(Instant::now()), is_new: true, ..*state };
         self.shared.changed.notify_all();
     }
 
-    /// Stops the robot and ends; says what was told in all.
+    /// Stops the robot and the thread; returns the counts of commands.
     pub fn finish(mut self) -> Told {
         self.quit()
     }
@@ -84,6 +84,7 @@ impl Wheels {
     fn quit(&mut self) -> Told {
         self.shared.lock().quits = true;
         self.shared.changed.notify_all();
+        // Taken, because `finish` drops the value, which quits once more.
         let told = self.thread.take().map(JoinHandle::join);
         told.and_then(Result::ok).unwrap_or_default()
     }
@@ -122,7 +123,7 @@ impl Shared {
         told
     }
 
-    /// Waits for new orders, but no longer than a period; `None` at the end.
+    /// Waits for new orders, but no longer than a period; returns `None` at the end.
     fn wait(&self, period: Duration) -> Option<State> {
         let idle = |state: &mut State| !state.is_new && !state.quits;
         let waited = self.changed.wait_timeout_while(self.lock(), period, idle);
@@ -138,7 +139,7 @@ mod tests {
 
     use super::*;
 
-    /// Everything that was told, and when.
+    /// All sent commands with their times.
     type Tape = Arc<Mutex<Vec<(Instant, WheelSpeeds)>>>;
 
     fn start(tape: &Tape) -> Wheels {

@@ -1,7 +1,7 @@
-//! The bridge and a drawn robot, two participants that talk over UDP.
+//! The bridge and a simulated robot, two participants that communicate over UDP.
 //!
-//! Where they cannot hear each other (no multicast, no loopback), that is said and
-//! nothing is tested.
+//! If they cannot hear each other (no multicast, no loopback), the test reports that and is
+//! skipped.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
 use std::path::Path;
@@ -26,7 +26,7 @@ use tagalong_log::msgs::{
 use tagalong_ros2::{BridgeError, Options, Summary, run};
 use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Variant};
 
-/// Somebody stands before the robot and then walks away slowly.
+/// Returns a scene of a person that stands before the robot and then walks away slowly.
 fn scene() -> Scene {
     let walk = Variant::default()
         .with("duration_s", 10.0)
@@ -36,12 +36,13 @@ fn scene() -> Scene {
     Scene::parse_with(include_str!("../../../tests/scenes/small-room.toml"), &walk).unwrap()
 }
 
-/// What may pass between the moment that an image was sent last and that a command
-/// was received: how long a command lasts, a control period, and the way.
+/// Longest time between the last image and a command that moves: the validity of a command, a
+/// control period, and the transmission.
 const LAST_MOVE_S: f64 = 0.5 + 0.04 + 0.2;
 
-/// A domain that no other run of this test uses now.
+/// Returns a domain that no other run of this test is likely to use.
 fn domain(offset: u32) -> u16 {
+    // Three domains per process, below the limit of 232.
     (100 + 3 * (std::process::id() % 40) + offset) as u16
 }
 
@@ -54,7 +55,7 @@ fn kind(message_type: &str) -> MessageTypeName {
     MessageTypeName::new(package, name)
 }
 
-/// A participant that is not the bridge.
+/// A participant other than the bridge.
 struct Peer {
     node: Node,
 }
@@ -103,7 +104,7 @@ impl Peer {
     }
 }
 
-/// Messages, and when they came.
+/// Messages with their times of arrival.
 struct Collected<M> {
     heard: Arc<Mutex<Vec<(Instant, M)>>>,
     thread: JoinHandle<()>,
@@ -116,7 +117,7 @@ impl<M> Collected<M> {
     }
 }
 
-/// True if two participants hear each other at all.
+/// Returns true if two participants hear each other at all.
 fn can_talk() -> bool {
     let stop = Arc::new(AtomicBool::new(false));
     let (mut one, mut other) = (Peer::join(domain(1), "one"), Peer::join(domain(1), "other"));
@@ -131,7 +132,7 @@ fn can_talk() -> bool {
     !heard.finish().is_empty()
 }
 
-/// The topics of a drawn robot.
+/// Topics of a simulated robot.
 struct Robot {
     peer: Peer,
     colour: Publisher<Image<'static>>,
@@ -140,7 +141,7 @@ struct Robot {
     odometry: Publisher<Odometry>,
     fixed: Publisher<TFMessage>,
     camera: Camera,
-    /// What the clock shows at the start of the scene.
+    /// Time of the clock at the start of the scene.
     epoch: Stamp,
 }
 
@@ -161,8 +162,7 @@ impl Robot {
         }
     }
 
-    /// Says everything of a scene at the pace at which it happens; says when the last
-    /// image was sent.
+    /// Publishes a scene in real time; returns the time of the last image.
     fn play(&self, mut simulation: Simulation) -> Instant {
         self.fixed.publish(self.mount()).unwrap();
         let start = Instant::now();
@@ -226,6 +226,7 @@ impl Robot {
         let (width, height) = (self.camera.width as u32, self.camera.height as u32);
         let (encoding, step) = (encoding.into(), bytes * width);
         let (header, is_bigendian) = (header.clone(), 0);
+        // The message borrows its data, and a leak in a test does no harm.
         Image { header, height, width, encoding, is_bigendian, step, data: data.leak() }
     }
 
@@ -248,7 +249,7 @@ fn bridge(domain: u16, stop: &Arc<AtomicBool>) -> JoinHandle<Result<Summary, Bri
     thread::spawn(move || run(&options, &stop, &|sentence| eprintln!("bridge: {sentence}")))
 }
 
-/// Metres per second and radians per second.
+/// Returns metres per second and radians per second.
 fn speeds(command: &TwistStamped) -> [f64; 2] {
     [command.twist.linear.x, command.twist.angular.z]
 }

@@ -1,15 +1,13 @@
 //! Global assignment with gates.
 //!
-//! Shortest augmenting paths with potentials (Jonker and Volgenant, "A Shortest
-//! Augmenting Path Algorithm for Dense and Sparse Linear Assignment Problems",
-//! Computing 38, 1987). Leaving a row alone is a first-class answer: each row
-//! has a column of its own that stands for it.
+//! Shortest augmenting paths with potentials (Jonker and Volgenant, "A Shortest Augmenting Path
+//! Algorithm for Dense and Sparse Linear Assignment Problems", Computing 38, 1987). A row may stay
+//! unassigned: each row has a private column that stands for it.
 
-/// Assigns rows (tracks) to columns (detections) so that the sum of costs is
-/// smallest. `cost(row, column)` is `None` for a forbidden pair; a row without
-/// a column costs `miss[row]`. Returns the column of each row. Among equally
-/// good answers the choice depends on the order of rows and columns only.
-/// Costs must be finite.
+/// Assigns rows (tracks) to columns (detections) so that the sum of costs is minimal. `cost(row,
+/// column)` is `None` for a forbidden pair; a row without a column costs `miss[row]`. Returns the
+/// column of each row. Among equally good assignments the choice depends on the order of rows and
+/// columns only. Costs must be finite.
 ///
 /// ```
 /// use tagalong_assignment::assign;
@@ -26,6 +24,7 @@ pub fn assign(
         if column < columns {
             cost(row, column).unwrap_or(f64::INFINITY)
         } else if column - columns == row {
+            // The private column of the row, which stands for no assignment.
             miss[row]
         } else {
             f64::INFINITY
@@ -53,8 +52,8 @@ impl Search {
         }
     }
 
-    /// Gives `start` a column along the shortest alternating path (Dijkstra on
-    /// reduced costs). One always exists, because each row can be left alone.
+    /// Assigns a column to `start` along the shortest alternating path (Dijkstra on reduced costs).
+    /// A path always exists, because each row can stay unassigned.
     fn augment(&mut self, start: usize, cost: &impl Fn(usize, usize) -> f64) {
         let columns = self.row_of_column.len();
         let mut distance = vec![f64::INFINITY; columns];
@@ -88,6 +87,7 @@ impl Search {
     }
 
     fn adjust(&mut self, start: usize, settled: &[usize], distance: &[f64], reached: f64) {
+        // Without this step some reduced costs become negative, for which Dijkstra is not valid.
         self.row_potential[start] += reached;
         for &column in settled {
             let slack = reached - distance[column];
@@ -140,7 +140,7 @@ mod tests {
         Some(sum)
     }
 
-    /// All ways to give rows different columns or none.
+    /// Tries all ways to assign different columns or none to the rows.
     fn best_of_all(cost: &[Vec<Option<f64>>], miss: &[f64], taken: &mut Vec<Option<usize>>) -> f64 {
         if taken.len() == miss.len() {
             return total(cost, miss, taken).unwrap_or(f64::INFINITY);

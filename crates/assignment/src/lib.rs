@@ -1,8 +1,8 @@
-//! What associators share: the cost of a pair of a track and a detection, its gate, and the
-//! global assignment with the least sum of costs.
+//! Common parts of the associators: the cost of a pair of a track and a detection, its gate, and
+//! the global assignment with the least sum of costs.
 //!
-//! An associator is a plugin; it depends on no other plugin. What several of them compute in
-//! the same way stands here.
+//! An associator is a plugin; it depends on no other plugin. Code that several of them need belongs
+//! here.
 
 mod assign;
 mod pair;

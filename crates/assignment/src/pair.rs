@@ -1,4 +1,4 @@
-//! How well a track and a detection fit.
+//! Cost of a pair of a track and a detection.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use tagalong_core::{Detection, Rect, Track};
 
 use crate::assign;
 
-/// What makes a detection and a track fit.
+/// Measure of the fit of a detection and a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cost {
@@ -17,7 +17,7 @@ pub enum Cost {
     Overlap,
 }
 
-/// How overlap is measured.
+/// Measure of the overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Overlap {
@@ -28,25 +28,24 @@ pub enum Overlap {
     Dice,
 }
 
-/// How the fit of a pair is measured, and where it ends.
+/// Measure of the fit of a pair, with its gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairCost {
-    /// The measure.
+    /// Measure of the fit.
     pub cost: Cost,
     /// Mahalanobis: largest squared distance.
     pub gate: f64,
     /// Mahalanobis: largest distance on the floor, m, between frames that are close in time ...
     pub gate_m: f64,
-    /// ... and by how much it grows with the time between them, m/s.
+    /// ... and its growth with the time between them, m/s.
     pub gate_speed_mps: f64,
     /// Overlap: smallest overlap.
     pub min_overlap: f64,
-    /// Overlap: its measure.
+    /// Overlap: measure of the overlap.
     pub overlap: Overlap,
 }
 
-/// How well a pair fits: the cost, and the logarithm of the volume in which the detection could
-/// have been.
+/// Fit of a pair: the cost, and the logarithm of the volume of the innovation covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
     /// Squared Mahalanobis distance d², or -ln of the overlap.
@@ -56,8 +55,8 @@ pub struct Fit {
 }
 
 impl PairCost {
-    /// Returns how well a track and a detection fit, `dt_s` after the last frame; `None`
-    /// outside of the gate.
+    /// Returns the fit of a track and a detection, `dt_s` after the last frame; `None` outside of
+    /// the gate.
     pub fn fit(&self, track: &Track, detection: &Detection, dt_s: f64) -> Option<Fit> {
         match self.cost {
             Cost::Mahalanobis => self.mahalanobis(track, detection, dt_s),
@@ -77,13 +76,15 @@ impl PairCost {
         }
     }
 
-    /// d² = ν' S⁻¹ ν with S = P + R.
+    /// Computes d² = ν' S⁻¹ ν with S = P + R.
     fn mahalanobis(&self, track: &Track, detection: &Detection, dt_s: f64) -> Option<Fit> {
         let innovation = detection.position - track.estimate.person.position;
+        // A track with a large covariance admits detections at any distance by d² alone.
         if innovation.xy().norm() > self.gate_m + self.gate_speed_mps * dt_s {
             return None;
         }
         let position = track.estimate.covariance.fixed_view::<3, 3>(0, 0);
+        // A singular covariance has no inverse, and the pair no distance.
         let spread = (position + detection.covariance).cholesky()?;
         let cost = innovation.dot(&spread.solve(&innovation));
         let log_volume = 2.0 * spread.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
@@ -93,9 +94,9 @@ impl PairCost {
 }
 
 /// Assigns detections to tracks so that the sum of the negative log-likelihoods d² + ln |S| is
-/// smallest; a nearly certain track must not lose its detection to one that could be anywhere.
-/// Leaving a track alone costs `miss_factor` times the cost at the gate. Returns the detection
-/// of each track.
+/// minimal: with ln |S|, a nearly certain track does not lose its detection to one with a large
+/// covariance. A missed track costs `miss_factor` times the cost at the gate, plus the range of ln
+/// |S|. Returns the detection of each track.
 pub fn assign_fits(
     fits: &[Vec<Option<Fit>>],
     detections: usize,
@@ -105,6 +106,7 @@ pub fn assign_fits(
     let volumes = || fits.iter().flatten().flatten().map(|f| f.log_volume);
     let least = volumes().fold(f64::INFINITY, f64::min);
     let most = volumes().fold(f64::NEG_INFINITY, f64::max);
+    // With the range of ln |S| added, no pair within the gate costs more than a miss at factor 1.
     let range = if most > least { most - least } else { 0.0 };
     let miss = miss_factor * at_gate + range;
     assign(detections, &vec![miss; fits.len()], |row, column| {
@@ -143,7 +145,7 @@ mod tests {
         settings.fit(track, detection, dt_s)
     }
 
-    /// The assignment with a price of a miss in multiples of the cost at the gate.
+    /// Runs the assignment with the cost of a miss in multiples of the cost at the gate.
     fn associate(
         tracks: &[Track],
         detections: &[Detection],
@@ -233,13 +235,13 @@ mod tests {
             fit(&track, &detection, dt_s, &settings).is_some()
         };
         assert!(fits(0.19, 0.01, 0.1) && !fits(0.21, 0.01, 0.1), "two standard deviations");
-        // One metre, and 1.5 m for each second.
+        // The gate is one metre, plus 1.5 m for each second.
         assert!(fits(1.14, 1.0, 0.1) && !fits(1.16, 1.0, 0.1));
         assert!(fits(1.74, 1.0, 0.5) && !fits(1.76, 1.0, 0.5));
         assert!(!fits(0.0, 0.0, 0.1), "a place without any uncertainty can be held against none");
     }
 
-    /// Two people far apart; one was not seen for long and may be anywhere.
+    /// The two people are far apart; one track was missed for long and has a large covariance.
     #[test]
     fn a_vague_track_takes_its_own_detection_as_well_as_a_certain_one_does() {
         let settings = DEFAULT;
@@ -254,7 +256,7 @@ mod tests {
         assert_eq!(alone, [Some(0)]);
     }
 
-    /// The price of leaving a track alone decides whether a poor pair is better than none.
+    /// The cost of a miss decides if a poor pair is better than none.
     #[test]
     fn a_track_is_rather_left_alone_where_a_miss_is_cheap() {
         let detection = person(3.0, 0.0);

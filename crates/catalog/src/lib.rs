@@ -1,9 +1,9 @@
-//! The one list of all plugin crates.
+//! List of all plugin crates.
 //!
-//! Nothing registers itself before `main`: a program owns a [`Registry`] and
-//! hands it to [`register`]. What is not listed here does not exist for the
-//! `tagalong` command, and `cargo xtask tidy` fails on a plugin folder that is
-//! not listed. `cargo xtask new-plugin` inserts its line in sorted order.
+//! No code runs before `main`: a program owns a [`Registry`] and passes it to [`register`]. A
+//! plugin that is not listed here is unknown to the `tagalong` command, and `cargo xtask tidy`
+//! fails on a plugin folder that is not listed. `cargo xtask new-plugin` inserts its line in sorted
+//! order.
 
 use tagalong_core::Registry;
 

@@ -1,8 +1,8 @@
-//! A control loop around a pipeline, as on a robot: frames come when they come,
-//! the wheels are told something fifty times a second.
+//! A control loop around a pipeline, as on a robot: frames come irregularly, the wheels receive a
+//! command fifty times a second.
 //!
-//! Here both come from a drawn scene. On a robot `next` is the driver of the
-//! camera and the odometry, and `drive` is the one of the wheels.
+//! Here both belong to a simulated scene. On a robot `next` is the driver of the camera and the
+//! odometry, and `drive` is the one of the wheels.
 //!
 //! ```sh
 //! cargo run --release -p tagalong-cli --example control_loop
@@ -17,7 +17,7 @@ use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Variant};
 use tagalong_trials::Draw;
 
-/// Follows somebody for this long, s.
+/// Duration of the ride, s.
 const SECONDS: f64 = 8.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -33,8 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut robot = Draw::live(&scene, 1);
 
     loop {
-        // Until the next frame comes, the last command is asked for again and
-        // again. It expires by itself: if the camera stops, so does the robot.
+        // Until the next frame comes, the last command is requested again and again. It expires by
+        // itself: if the camera stops, so does the robot.
         let next = robot.next_frame_while(|_, event| {
             let Event::Odometry(reading) = event else { return None };
             let now = Stamp::from_nanos(reading.at_ns);
@@ -45,8 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if frame.stamp.seconds_since(Stamp::default()) > SECONDS {
             break;
         }
-        // A pipeline that fails has stopped the robot already: `command_at` says
-        // zero from now on.
+        // A pipeline that fails has stopped the robot already: `command_at` is zero from now on.
         let report = pipeline.step(&frame)?;
         if let (Some(command), Some(lock), 1) = (report.command, report.lock, frame.index % 10) {
             tell(&frame.stamp, &command, lock.state.name(), lock.why);

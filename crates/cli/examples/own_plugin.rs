@@ -1,5 +1,5 @@
-//! A plugin outside the workspace: the `tagalong` command with one more
-//! detector, which takes the nearest thing in the depth image for a person.
+//! A plugin outside the workspace: the `tagalong` command with one more detector, which takes the
+//! nearest object in the depth image for a person.
 //!
 //! ```text
 //! cargo run --example own_plugin -- list
@@ -30,11 +30,11 @@ fn main() -> ExitCode {
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Config {
-    /// What is farther away is background, m.
+    /// Depth beyond which a pixel is background, m.
     max_depth_m: f64,
-    /// Panics after this many frames, to show what happens then; 0 never does.
+    /// Panics after this many frames, to test the handling; 0 never does.
     panic_after_frames: u64,
-    /// Takes at least this long for a frame, to try out slow plugins, ms.
+    /// Takes at least this long for a frame, to test slow plugins, ms.
     delay_ms: u64,
 }
 
@@ -78,7 +78,7 @@ impl Detector for NearestThing {
     }
 }
 
-/// The box around everything nearer than the limit, and its mean depth.
+/// Returns the box around everything nearer than the limit, and its mean depth.
 fn nearest(depth: &DepthImage, max_depth_m: f64) -> Option<(Rect, f64)> {
     let (mut left, mut top, mut right, mut bottom) = (usize::MAX, usize::MAX, 0, 0);
     let (mut sum, mut count) = (0.0, 0.0);

@@ -20,7 +20,7 @@ use crate::triangulate::TriangulateArgs;
 #[derive(Debug, Parser)]
 #[command(name = "tagalong", version, about, after_help = EXIT_CODES, max_term_width = 100)]
 pub struct Cli {
-    /// What to do.
+    /// Subcommand to run.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -36,7 +36,7 @@ finished but part of the log was lost or the doctor found something bad, 130 and
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Shows everything on a drawn scene: a log, two pipelines, pictures, a report
+    /// Shows everything on a simulated scene: a log, two pipelines, pictures, a report
     #[command(after_help = DEMO_HELP)]
     Demo(DemoArgs),
     /// Tracks the people of a log
@@ -45,15 +45,15 @@ pub enum Command {
     /// Lists the plugins
     #[command(after_help = "Example:\n  tagalong list --format json")]
     List {
-        /// How to print.
+        /// Output format.
         #[arg(long, value_enum, default_value_t)]
         format: Format,
     },
     /// Prints the default settings of a plugin, each with its explanation
     #[command(after_help = CONFIG_HELP)]
     Config {
-        /// Name of the plugin, `pipeline` for everything around the plugins, `all`, or
-        /// `funnel` for which setting belongs to which test.
+        /// Name of the plugin, `pipeline` for everything around the plugins, `all`, or `funnel` for
+        /// the settings of each test.
         plugin: String,
         /// As TOML, as a table, or as a JSON schema.
         #[arg(long, value_enum, default_value_t)]
@@ -62,51 +62,51 @@ pub enum Command {
     /// Prints a JSON schema of configs, for editors
     #[command(after_help = SCHEMA_HELP)]
     Schema,
-    /// Prints what a shell needs to complete our commands
+    /// Prints the completion script of a shell
     #[command(after_help = COMPLETIONS_HELP)]
     Completions {
         /// The shell.
         shell: Shell,
     },
-    /// Writes manual pages, one a command
+    /// Writes manual pages, one per command
     #[command(
         after_help = "Example:\n  tagalong man -o ~/.local/share/man/man1 && man tagalong-run"
     )]
     Man {
-        /// The folder to write to.
+        /// Folder to write to.
         #[arg(short, long, value_name = "DIR")]
         output: PathBuf,
     },
-    /// Says whether a config is right, and whether it fits a log
+    /// Checks a config, and whether it fits a log
     #[command(after_help = CHECK_HELP)]
     Check {
         /// The config.
         config: PathBuf,
         /// A log that the config should work on.
         log: Option<PathBuf>,
-        /// How to print.
+        /// Output format.
         #[arg(long, value_enum, default_value_t)]
         format: Format,
     },
-    /// Says why nobody, or the wrong thing, is detected in a log
+    /// Explains missing or false detections in a log
     #[command(after_help = DOCTOR_HELP)]
     Doctor(DoctorArgs),
-    /// Makes a log of a data set or a folder of images
+    /// Makes a log from a data set or a folder of images
     #[command(after_help = IMPORT_HELP)]
     Import(ImportArgs),
     /// Compares pipelines on the same logs
     #[command(after_help = BENCH_HELP)]
     Bench(BenchArgs),
-    /// Scores tracks against the truth
+    /// Scores tracks against the ground truth
     #[command(after_help = EVAL_HELP)]
     Eval(EvalArgs),
-    /// Draws the log of a robot among people, with the truth, from a scene
+    /// Simulates the log of a robot among people, with the ground truth, from a scene
     #[command(after_help = SIMULATE_HELP)]
     Simulate(SimulateArgs),
-    /// Lets a pipeline steer the simulated robot after somebody, and judges it
+    /// Lets a pipeline steer the simulated robot after a person, and scores the ride
     #[command(after_help = FOLLOW_HELP)]
     Follow(FollowArgs),
-    /// Compares pipelines on many draws of the same scenes, in memory
+    /// Compares pipelines on many random variants of the same scenes, in memory
     #[command(after_help = TRIALS_HELP)]
     Trials(TrialsArgs),
     /// Prints the tables of a published system beside ours
@@ -115,10 +115,10 @@ pub enum Command {
     /// Makes the model file of a plugin, and its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
-    /// Measures where a coloured hat is, by fixed cameras in a log
+    /// Measures the position of a coloured hat with fixed cameras in a log
     #[command(after_help = TRIANGULATE_HELP)]
     Triangulate(TriangulateArgs),
-    /// Says what a log contains and what a pipeline could use of it
+    /// Lists the contents of a log, and the inputs that a pipeline could use
     #[command(after_help = INSPECT_HELP)]
     Inspect {
         /// The log, an MCAP file with ROS 2 messages.
@@ -126,7 +126,7 @@ pub enum Command {
         /// Take the `[input]` and `[limits]` sections of this config.
         #[arg(long)]
         config: Option<PathBuf>,
-        /// How to print.
+        /// Output format.
         #[arg(long, value_enum, default_value_t)]
         format: Format,
     },
@@ -285,18 +285,18 @@ Examples:
   tagalong inspect robot.mcap
   tagalong inspect robot.mcap --format json | jq .topics";
 
-/// The arguments of `tagalong run`.
+/// Arguments of `tagalong run`.
 #[derive(Args, Debug)]
 pub struct RunArgs {
     /// The pipeline, a TOML file [default: depth-ekf, built in].
     pub config: Option<PathBuf>,
-    /// The log, an MCAP file with ROS 2 messages [default: a short drawn one,
-    /// written to runs/sample.mcap].
+    /// The log, an MCAP file with ROS 2 messages [default: a short simulated one, written to
+    /// runs/sample.mcap].
     pub log: Option<PathBuf>,
-    /// Where the files go [default: runs/<log>-<config>].
+    /// Output folder [default: runs/<log>-<config>].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Draw a picture of every frame: boxes, ids, trails, and a view from above.
+    /// Render a picture of every frame: boxes, ids, trails, and a view from above.
     #[arg(long)]
     pub overlay: bool,
     /// Replace the files of an earlier run in the same directory.
@@ -305,22 +305,22 @@ pub struct RunArgs {
     /// Fail (exit code 1) if anything of the log was lost or damaged.
     #[arg(long)]
     pub strict: bool,
-    /// Threads: 1 does everything in turn, 2 reads ahead, 3 draws aside. The
-    /// results are the same.
+    /// Threads: 1 does everything in turn, 2 reads ahead, 3 also renders in parallel. The results
+    /// are the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
     /// Use this seed instead of the config's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// How to print what was found.
+    /// Output format of the results.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
-    /// Print nothing; for commands that are made of runs.
+    /// Suppresses all output; for commands that consist of runs.
     #[arg(skip)]
     pub quiet: bool,
 }
 
-/// How results are printed.
+/// Output format of results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// For people.
@@ -331,13 +331,13 @@ pub enum Format {
 }
 
 impl RunArgs {
-    /// The log that is read.
+    /// Returns the path of the log.
     pub fn log(&self) -> &Path {
         self.log.as_deref().unwrap_or(Path::new(SAMPLE))
     }
 }
 
-/// Where the drawn log goes that stands in for a real one.
+/// Path of the simulated log that stands in for a real one.
 const SAMPLE: &str = "runs/sample.mcap";
 
 #[cfg(test)]

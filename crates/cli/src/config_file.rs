@@ -16,21 +16,21 @@ use crate::suggest::config_hint;
 /// Longest config that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A config as it lies on disk.
+/// Text of a config file, with its path.
 pub struct ConfigFile {
     path: PathBuf,
     text: String,
 }
 
-/// The tables of a config that are not the pipeline's.
+/// Tables of a config that are not the pipeline's.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OuterSettings {
-    /// `[input]`: where the images come from.
+    /// `[input]`: topics and frames of the images.
     pub input: InputSettings,
-    /// `[limits]`: how large a log's parts may be.
+    /// `[limits]`: largest sizes of a log's parts.
     pub limits: Limits,
-    /// `[output]`: what is written.
+    /// `[output]`: contents of the output files.
     pub output: OutputSettings,
 }
 
@@ -44,6 +44,7 @@ impl ConfigFile {
         let size = match fs::metadata(path) {
             Ok(about) if about.is_dir() => {
                 let message = format!("{shown} is a directory, not a config");
+                // A config in the directory is suggested: `x` stands for any name in it.
                 return Err(Failure::usage(message + &config_hint(&path.join("x"))));
             }
             Ok(about) => about.len(),
@@ -56,6 +57,7 @@ impl ConfigFile {
             let message = format!("{shown} has {size} bytes; a config has at most {MAX_BYTES}");
             return Err(Failure::usage(message));
         }
+        // Read as bytes: a file that is no text gets a message of its own.
         let bytes = fs::read(path)
             .map_err(|error| Failure::usage(format!("cannot read config {shown}: {error}")))?;
         let text = String::from_utf8(bytes)
@@ -63,28 +65,28 @@ impl ConfigFile {
         Ok(Self { path: path.to_owned(), text })
     }
 
-    /// The config that is used where none is given.
+    /// Returns the config that is used where none is given.
     pub fn built_in() -> Self {
         let text = include_str!("../../../configs/depth-ekf.toml").to_owned();
         Self { path: "configs/depth-ekf.toml".into(), text }
     }
 
-    /// Its name without folder and extension.
+    /// Returns its name without folder and extension.
     pub fn stem(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Its name without folder.
+    /// Returns its name without folder.
     pub fn name(&self) -> String {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// The config with another text, at the same place: files that it names are the same.
+    /// Returns the config with another text at the same path, so that it names the same files.
     pub fn with_text(&self, text: String) -> Self {
         Self { path: self.path.clone(), text }
     }
 
-    /// Checks the values of `[tune]`: the pipeline is built with each of them.
+    /// Checks the values of `[tune]` by building the pipeline with each of them.
     ///
     /// # Errors
     /// A value that its setting does not allow, shown with its line: exit code 2.
@@ -94,7 +96,7 @@ impl ConfigFile {
             .map_err(|error| self.mistake(&error))
     }
 
-    /// Where relative paths start.
+    /// Returns the folder against which relative paths are resolved.
     fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
@@ -108,7 +110,7 @@ impl ConfigFile {
         digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The files that its settings name, such as models, by the name used there.
+    /// Returns the files that its settings name, such as models, with the name used there.
     pub fn files(&self) -> Vec<(String, PathBuf)> {
         let Ok(table) = self.document().and_then(|document| document.table()) else {
             return Vec::new();
@@ -117,6 +119,7 @@ impl ConfigFile {
         let mut names = Vec::new();
         strings(&toml::Value::Table(table), &mut names);
         let named = names.into_iter().map(|name| (folder.join(&name), name));
+        // Plugins alone know which texts are paths; a text that names a file counts as one.
         named.filter(|(path, _)| path.is_file()).map(|(path, name)| (name, path)).collect()
     }
 
@@ -133,7 +136,7 @@ impl ConfigFile {
             .map_err(|error| self.mistake(&error))
     }
 
-    /// The config as it takes part in trials.
+    /// Returns the config as a contender of trials.
     pub fn contender(&self) -> Contender {
         let folder = self.folder().to_owned();
         // A mistake shows its line when the pipeline is built from the text as it is.
@@ -141,10 +144,10 @@ impl ConfigFile {
         Contender { folder, ..Contender::new(self.stem(), config) }
     }
 
-    /// The tables that are not the pipeline's.
+    /// Returns the tables that are not the pipeline's.
     ///
     /// # Errors
-    /// As [`ConfigFile::pipeline`].
+    /// As for [`ConfigFile::pipeline`].
     pub fn outer(&self) -> Result<OuterSettings, Failure> {
         let read = || -> Result<OuterSettings, ConfigError> {
             Ok(OuterSettings {
@@ -156,7 +159,7 @@ impl ConfigFile {
         read().map_err(|error| self.mistake(&error))
     }
 
-    /// One top-level table, with places for its mistakes.
+    /// Reads one top-level table, with spans for its mistakes.
     fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
         let document = self.document()?;
         let table = document.root()?.remove(name);
@@ -176,7 +179,7 @@ fn options(seed: Option<u64>) -> Options {
     Options { foreign: OuterSettings::TABLES.map(str::to_owned).to_vec(), seed }
 }
 
-/// All texts in a value.
+/// Collects all texts in a value.
 fn strings(value: &toml::Value, out: &mut Vec<String>) {
     match value {
         toml::Value::String(text) if !text.is_empty() => out.push(text.clone()),
@@ -187,10 +190,10 @@ fn strings(value: &toml::Value, out: &mut Vec<String>) {
 }
 
 impl OuterSettings {
-    /// The names of the tables.
+    /// Names of the tables.
     const TABLES: [&str; 3] = ["input", "limits", "output"];
 
-    /// As TOML, to stand behind the pipeline's resolved config.
+    /// Returns the tables as TOML, to be appended to the pipeline's resolved config.
     pub fn resolved(&self) -> String {
         toml::to_string(self).unwrap_or_default()
     }

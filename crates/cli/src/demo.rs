@@ -1,4 +1,4 @@
-//! `tagalong demo`: the whole way from a scene to a report, without a file.
+//! `tagalong demo`: every step from a scene to a report, without an input file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,27 +16,27 @@ use crate::{run, signals::Signals};
 
 const SCENE: &str = include_str!("../../../configs/scenes/demo.toml");
 
-/// The pipelines that are compared, and what is in their files.
+/// Compared pipelines, with the text of their configs.
 const PIPELINES: [(&str, &str); 2] = [
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
     ("naive", include_str!("../../../configs/naive.toml")),
 ];
 
-/// The arguments of `tagalong demo`.
+/// Arguments of `tagalong demo`.
 #[derive(Args, Debug)]
 pub struct DemoArgs {
-    /// Where the files go.
+    /// Output folder.
     #[arg(short, long, value_name = "DIR", default_value = "tagalong-demo")]
     pub output: PathBuf,
     /// Replace the files of an earlier demo in the same directory.
     #[arg(long)]
     pub overwrite: bool,
-    /// Draw another luck: looks, furniture, noise.
+    /// Use another random seed: appearance, furniture, noise.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
 }
 
-/// Draws a scene, tracks its people with two pipelines, compares them.
+/// Simulates a scene, tracks its people with two pipelines, compares them.
 ///
 /// # Errors
 /// A directory that is not empty is exit code 2; a disk that fails is 1.

@@ -1,5 +1,5 @@
-//! Every key of a config, from the code: as a table for people, and as one JSON
-//! schema for editors.
+//! Every key of a config, from the code: as a table for readers, and as one JSON schema for
+//! editors.
 
 use std::fmt::Write as _;
 
@@ -10,12 +10,12 @@ use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings};
 
 use crate::config_file::OuterSettings;
 
-/// The schemas of everything around the plugins.
+/// Returns the schemas of everything around the plugins.
 fn around() -> [Value; 2] {
     [schema_for!(PipelineSettings).to_value(), schema_for!(OuterSettings).to_value()]
 }
 
-/// The schema of everything around the plugins.
+/// Returns the schema of everything around the plugins.
 pub fn around_schema() -> Value {
     let mut definitions = Map::new();
     let mut properties = Map::new();
@@ -36,7 +36,7 @@ fn extends_schema() -> Value {
     })
 }
 
-/// `[tune]`: its keys are the dotted names of all others.
+/// Returns the schema of `[tune]`, with the dotted names of all others as keys.
 fn tune_schema() -> Value {
     let spread = json!({
         "type": "object",
@@ -62,15 +62,15 @@ fn tune_schema() -> Value {
     })
 }
 
-/// The plugins, by kind and name.
+/// Returns the plugins, by kind and name.
 fn plugins(registry: &Registry) -> Vec<&PluginInfo> {
     let mut plugins: Vec<_> = registry.plugins().collect();
     plugins.sort_by_key(|plugin| (plugin.kind, plugin.name));
     plugins
 }
 
-/// All keys as Markdown: a table for everything around the plugins, and one for
-/// each plugin.
+/// Returns all keys as Markdown: a table for everything around the plugins, and one for each
+/// plugin.
 pub fn markdown(registry: &Registry) -> String {
     let mut out = String::from("### Around the plugins\n\n");
     table(&mut out, &around());
@@ -81,14 +81,14 @@ pub fn markdown(registry: &Registry) -> String {
     out
 }
 
-/// The keys of one plugin as Markdown.
+/// Returns the keys of one plugin as Markdown.
 pub fn markdown_of(plugin: &PluginInfo) -> String {
     let mut out = String::new();
     table(&mut out, &[plugin.schema()]);
     out
 }
 
-/// The keys around the plugins as Markdown.
+/// Returns the keys around the plugins as Markdown.
 pub fn markdown_around() -> String {
     let mut out = String::new();
     table(&mut out, &around());
@@ -100,7 +100,7 @@ fn table(out: &mut String, schemas: &[Value]) {
     schemas.iter().for_each(|schema| rows(out, "", schema, schema));
 }
 
-/// The keys of a table and of those in it.
+/// Appends the keys of a table and of those in it.
 fn rows(out: &mut String, path: &str, table: &Value, root: &Value) {
     for (key, property) in table["properties"].as_object().into_iter().flatten() {
         let (text, target) = resolve(property, root);
@@ -112,12 +112,13 @@ fn rows(out: &mut String, path: &str, table: &Value, root: &Value) {
             Value::Null => "none".to_owned(),
             value => format!("`{value}`"),
         };
+        // A cell of a Markdown table must be one line without a bare `|`.
         let text = text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
         let _ = writeln!(out, "| `{path}{key}` | {default} | {} |", text.replace('|', "\\|"));
     }
 }
 
-/// The description of a property, and the schema that it refers to.
+/// Returns the description of a property, and the schema that it refers to.
 fn resolve<'a>(property: &'a Value, root: &'a Value) -> (Option<&'a str>, &'a Value) {
     let any = property["anyOf"].as_array().into_iter().flatten();
     let mut references = std::iter::once(property).chain(any).map(|p| &p["$ref"]);
@@ -128,8 +129,8 @@ fn resolve<'a>(property: &'a Value, root: &'a Value) -> (Option<&'a str>, &'a Va
     (property["description"].as_str().or_else(|| target["description"].as_str()), target)
 }
 
-/// A JSON schema of a whole config: the sections, and in each the settings of the
-/// plugin that it names.
+/// Returns a JSON schema of a whole config: the sections, and in each the settings of the plugin
+/// that it names.
 pub fn schema(registry: &Registry) -> Value {
     let mut around = around_schema();
     let object = |value: &mut Value| value.as_object_mut().map(std::mem::take).unwrap_or_default();
@@ -153,8 +154,7 @@ pub fn schema(registry: &Registry) -> Value {
     })
 }
 
-/// The sections that name plugins, their kind, whether there may be several, and the plugin
-/// where none is named.
+/// Sections that name plugins: their kind, whether there may be several, and the default plugin.
 const SECTIONS: [(&str, &str, bool, Option<&str>); 6] = [
     ("detectors", "detector", true, None),
     ("verifiers", "verifier", true, None),
@@ -164,7 +164,7 @@ const SECTIONS: [(&str, &str, bool, Option<&str>); 6] = [
     ("controller", "controller", false, None),
 ];
 
-/// A section: which plugin decides what `config` may hold.
+/// Returns the schema of a section, in which the plugin determines the keys of `config`.
 fn plugin_section(
     plugins: &[&PluginInfo],
     section: &str,
@@ -201,7 +201,7 @@ fn plugin_section(
     })
 }
 
-/// A schema whose definitions are moved to `out`, under names that begin with
+/// Returns a schema without definitions, which are moved to `out`, under names that begin with
 /// `owner`.
 fn lifted(mut schema: Value, owner: &str, out: &mut Map<String, Value>) -> Value {
     rename(&mut schema, owner);
@@ -215,7 +215,8 @@ fn lifted(mut schema: Value, owner: &str, out: &mut Map<String, Value>) -> Value
     schema
 }
 
-/// Lets references point to the moved definitions.
+/// Redirects references to the moved definitions.
+// Two plugins may both define `Settings`, so each name gets its owner as a prefix.
 fn rename(value: &mut Value, owner: &str) {
     match value {
         Value::Object(fields) => {
@@ -253,7 +254,7 @@ mod tests {
         assert!(!text.contains("|  |\n"), "a key without a meaning");
     }
 
-    /// All references of the schema lead somewhere.
+    /// Checks that all references of the schema lead somewhere.
     fn check_references(value: &Value, root: &Value) {
         match value {
             Value::Object(fields) => {

@@ -1,5 +1,5 @@
-//! The `tagalong` command, as a library, so that plugins outside the workspace
-//! get the same command with one call:
+//! The `tagalong` command, as a library, so that plugins outside the workspace get the same command
+//! with one call:
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
@@ -10,9 +10,8 @@
 //! }
 //! ```
 //!
-//! Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2
-//! wrong usage or config, 3 finished but part of the log was lost, 130 and 143
-//! after SIGINT and SIGTERM.
+//! Results go to stdout, log messages go to stderr. Exit codes: 0 ok, 1 failed, 2 wrong usage or
+//! config, 3 finished but part of the log was lost, 130 and 143 after SIGINT and SIGTERM.
 
 mod args;
 mod bench;
@@ -44,8 +43,7 @@ use clap::Parser;
 use outcome::{Outcome, say};
 use tagalong_core::Registry;
 
-/// The whole program: registers plugins, reads the command line, does what it
-/// says.
+/// Runs the whole program: registers the plugins, parses the command line, dispatches the command.
 pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
     tell_panics_briefly();
     let mut registry = Registry::default();
@@ -55,6 +53,7 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
     match dispatch(&cli.command, &registry) {
         Ok(ended) => ExitCode::from(ended.code()),
         Err(failure) => {
+            // An empty message: stdout was closed, and there is no reader to inform.
             if !failure.message.is_empty() {
                 say(&format!("error: {}", failure.message));
             }
@@ -63,8 +62,7 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
     }
 }
 
-/// A mistake in the code is told in a line or two, unless a developer asked for
-/// more with `RUST_BACKTRACE`.
+/// Reports a panic in a line or two, unless `RUST_BACKTRACE` is set.
 fn tell_panics_briefly() {
     if std::env::var_os("RUST_BACKTRACE").is_none() {
         std::panic::set_hook(Box::new(|panic| say(&format!("internal error: {panic}"))));

@@ -14,7 +14,7 @@ use tagalong_sim::Split;
 use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 use crate::simulate;
 
-/// The arguments of `tagalong reproduce`.
+/// Arguments of `tagalong reproduce`.
 #[derive(Args, Debug)]
 pub struct ReproduceArgs {
     /// The published system; without one, lists the systems and their tables.
@@ -22,14 +22,14 @@ pub struct ReproduceArgs {
     /// Only these of its tables and figures.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     pub only: Vec<String>,
-    /// A minute's version: fewer draws, wider intervals.
+    /// A minute's version: fewer variants, wider intervals.
     #[arg(long)]
     pub quick: bool,
-    /// Draws each scene with this many seeds of the test split.
+    /// Simulates each scene with this many seeds of the test split.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: Option<u64>,
-    /// The first of these seeds, counted within the split: another one gives the
-    /// tables of other draws.
+    /// The first of these seeds, counted within the split: another one gives the tables of other
+    /// random variants.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub first_seed: u64,
     /// Trials that run at once; apart from times, the results are the same
@@ -39,19 +39,19 @@ pub struct ReproduceArgs {
     /// The folder with the configs and scenes.
     #[arg(long, value_name = "DIR", default_value = "configs")]
     pub configs: PathBuf,
-    /// The folder with real logs and labelled images; what needs them is left
-    /// out where there is none.
+    /// The folder with real logs and labelled images; experiments that need them are left out where
+    /// there is none.
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     pub data: PathBuf,
     /// Writes the tables (JSON, Markdown) and pictures (SVG) to this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// How to print.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
 }
 
-/// How tables are printed.
+/// Output format of tables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum TableFormat {
     /// For people.
@@ -63,7 +63,7 @@ pub enum TableFormat {
     Json,
 }
 
-/// Does the experiments and prints their tables.
+/// Runs the experiments and prints their tables.
 ///
 /// # Errors
 /// Unknown names and unreadable configs are exit code 2; plugins that fail are 1.
@@ -71,6 +71,7 @@ pub fn reproduce(args: &ReproduceArgs, registry: &Registry) -> Outcome {
     let Some(name) = &args.system else { return list(args.format) };
     let system = system(name).ok_or_else(|| unknown(name, SYSTEMS.iter().map(|s| s.name)))?;
     let experiments = chosen(system, &args.only)?;
+    // Checked first: a split has a limited number of seeds.
     Split::Test.seeds(args.first_seed, args.seeds.unwrap_or(1)).map_err(Failure::usage)?;
     // Before the work of an hour, not after it.
     args.output.as_deref().map_or(Ok(()), make_folder)?;
@@ -124,7 +125,7 @@ fn list(format: TableFormat) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// The experiments that are asked for, in the order of the system.
+/// Returns the requested experiments, in the order of the system.
 fn chosen(system: &System, only: &[String]) -> Result<Vec<&'static Experiment>, Failure> {
     let all = system.experiments;
     let is_there = |name: &&String| all.iter().any(|experiment| experiment.name == **name);
@@ -169,8 +170,7 @@ fn write(folder: &Path, all: &[Found]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A progress bar that starts anew with each experiment; hidden where there is no
-/// terminal.
+/// Progress bar that starts anew with each experiment; hidden without a terminal.
 struct Bar(ProgressBar);
 
 impl Bar {

@@ -1,5 +1,5 @@
-//! The built-in log: two drawn people walk past each other in front of a slowly
-//! moving robot. It stands in where the user gives no log.
+//! The built-in log: two simulated people walk past each other in front of a slowly moving robot.
+//! It is used where the user gives no log.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use crate::simulate::{record, threads};
 
 const SCENE: &str = include_str!("../../../configs/scenes/sample.toml");
 
-/// Draws the log and writes it to `path`.
+/// Simulates the log and writes it to `path`.
 ///
 /// # Errors
-/// [`WriteError`] if the disk says no.
+/// [`WriteError`] if the file cannot be written.
 #[expect(clippy::expect_used, reason = "the scene is part of the program, and a test reads it")]
 pub fn write(path: &Path) -> Result<(), WriteError> {
     let scene = Scene::parse(SCENE).expect("the built-in scene is right");

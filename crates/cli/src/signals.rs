@@ -7,10 +7,10 @@ use signal_hook::flag;
 
 use crate::outcome::Failure;
 
-/// Whether somebody wants the program to stop.
+/// Record of a received stop signal.
 ///
-/// The first SIGINT or SIGTERM only leaves a note, so that the current frame
-/// and the files can be finished; a second one ends the program at once.
+/// The first SIGINT or SIGTERM is only recorded, so that the current frame and the files can be
+/// finished; a second one ends the program at once.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
     received: Arc<AtomicUsize>,
@@ -20,7 +20,7 @@ impl Signals {
     /// Listens from now on.
     ///
     /// # Errors
-    /// A system that does not let us: exit code 1.
+    /// The system refuses the handler: exit code 1.
     pub fn listen() -> Result<Self, Failure> {
         Self::register()
             .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))
@@ -38,7 +38,7 @@ impl Signals {
         Ok(signals)
     }
 
-    /// The signal that asked to stop, if one did.
+    /// Returns the signal that asked to stop, if there was one.
     pub fn received(&self) -> Option<u8> {
         u8::try_from(self.received.load(Ordering::Relaxed)).ok().filter(|signal| *signal != 0)
     }

@@ -1,4 +1,4 @@
-//! What a mistyped or unusable path probably meant.
+//! Suggestions for a mistyped or unusable path.
 
 use std::fs;
 use std::io;
@@ -8,7 +8,7 @@ use tagalong_core::nearest;
 
 use crate::outcome::Failure;
 
-/// "; did you mean `configs/depth-ekf.toml`?", if there is such a file.
+/// Returns "; did you mean `configs/depth-ekf.toml`?", if there is such a file.
 pub fn config_hint(wanted: &Path) -> String {
     let folders = [wanted.parent().unwrap_or(Path::new("")).to_owned(), PathBuf::from("configs")];
     let files: Vec<PathBuf> = folders.iter().flat_map(|folder| toml_files(folder)).collect();
@@ -22,7 +22,7 @@ pub fn config_hint(wanted: &Path) -> String {
     }
 }
 
-/// The TOML files of a folder, by name.
+/// Returns the TOML files of a folder, by name.
 pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let Ok(entries) = fs::read_dir(here) else { return Vec::new() };
@@ -30,13 +30,15 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
         .flatten()
         .map(|entry| folder.join(entry.file_name()))
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        // In a Rust workspace, `Cargo.toml` is the only TOML file that is never a config.
         .filter(|path| path.file_name().is_none_or(|n| n != "Cargo.toml"))
         .collect();
+    // The order of a directory depends on the file system.
     files.sort();
     files
 }
 
-/// Refuses a path that cannot be a log, and says what to do instead.
+/// Refuses a path that cannot be a log, with a remedy.
 ///
 /// # Errors
 /// A missing file, a directory, or a bag of another format.
@@ -65,9 +67,9 @@ fn conversion(path: &Path, extension: &str) -> String {
     format!("{shown} is a {kind}, and only MCAP is read; convert it:\n{}", converter(path))
 }
 
-/// The command that makes an MCAP log of a bag: `rosbags-convert`, of `pip install
-/// rosbags`. Bags older than ROS 2 Iron hold no message definitions, which then come from
-/// the distribution named, and which `mcap convert` cannot do without.
+/// Returns the command that makes an MCAP log of a bag: `rosbags-convert`, of `pip install
+/// rosbags`. Bags older than ROS 2 Iron hold no message definitions; the tool takes them from the
+/// named distribution, and `mcap convert` cannot work without them.
 pub fn converter(path: &Path) -> String {
     let stem = path.with_extension("");
     let (shown, stem) = (path.display(), stem.display());
@@ -85,7 +87,7 @@ pub fn converter(path: &Path) -> String {
     )
 }
 
-/// The MCAP files of a folder, by name.
+/// Returns the MCAP files of a folder, by name.
 ///
 /// # Errors
 /// A folder that cannot be read.

@@ -1,4 +1,4 @@
-//! What associators promise.
+//! Checks of associators.
 
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_core::{
@@ -24,7 +24,7 @@ fn detection(x: f64, y: f64, random: &mut Random) -> Detection {
     sighting(&Point3::new(x, y, 1.6), &level(), 0.05, random)
 }
 
-/// A track at a place, known to 0.2 m.
+/// Returns a track at a position, with a standard deviation of 0.2 m.
 fn track(id: u32, x: f64, y: f64) -> Track {
     let position = Point3::new(x, y, 1.6);
     let person = Person { position, velocity: Vector2::zeros() };
@@ -42,7 +42,7 @@ fn track(id: u32, x: f64, y: f64) -> Track {
     }
 }
 
-/// Tracks and detections all over the room, some of them doubtful.
+/// Returns tracks and detections at random positions, some detections with low scores.
 fn crowd(random: &mut Random, tracks: u32, detections: usize) -> (Vec<Track>, Vec<Detection>) {
     let mut place = || (2.0 + 4.0 * random.uniform(), 3.0 * random.uniform() - 1.5);
     let places: Vec<(f64, f64)> = (0..tracks as usize + detections).map(|_| place()).collect();
@@ -98,7 +98,7 @@ fn check_pair(
     demand(pair.weight > 0.0 && pair.weight <= 1.0, || format!("{pair:?} has no probability"))
 }
 
-/// The weights of a track, and of a detection, are probabilities of alternatives.
+/// Checks that the weights of a track, and of a detection, sum to at most 1.
 fn check_sums(answer: &Associations, tracks: usize, detections: usize) -> Verdict {
     let sum = |is_of: &dyn Fn(&Association) -> bool| -> f64 {
         answer.pairs.iter().filter(|pair| is_of(pair)).map(|pair| pair.weight).sum()
@@ -106,6 +106,7 @@ fn check_sums(answer: &Associations, tracks: usize, detections: usize) -> Verdic
     let of_tracks = (0..tracks).map(|at| sum(&|pair| pair.track == at));
     let of_detections = (0..detections).map(|at| sum(&|pair| pair.detection == at));
     let most = of_tracks.chain(of_detections).fold(0.0, f64::max);
+    // Allows for the rounding of the sum.
     demand(most <= 1.0 + 1e-9, || format!("weights sum to {most}: {:?}", answer.pairs))
 }
 
@@ -115,6 +116,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     let answer = |from| -> Result<_, String> {
         Ok(subject.associator(from)?.associate(&tracks, &detections, &GATE))
     };
+    // Built without settings, and from the printed defaults, which must mean the same.
     let (first, second) = (answer(From::Nothing)?, answer(From::Text(&defaults))?);
     demand(first == second, || format!("two answers differ: {first:?} and {second:?}"))
 }

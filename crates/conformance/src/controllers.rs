@@ -1,4 +1,4 @@
-//! What controllers promise.
+//! Checks of controllers.
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{Controller, Frame, Images, Scene, Track, WheelSpeeds};
@@ -31,8 +31,8 @@ fn bounded(speeds: WheelSpeeds, scene: &str) -> Verdict {
     })
 }
 
-/// A person to follow whose head is at this place of the robot frame, m, 1.6 m
-/// above the floor, and who walks with this velocity, m/s.
+/// Returns a target with its head at a position in the robot frame, m, 1.6 m above the floor, and
+/// with a velocity, m/s.
 pub fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
     let mut target = track(1, Point3::new(x, y, 1.6), 0.1, &level());
     target.estimate.person.velocity = velocity;
@@ -68,7 +68,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 
-/// Also right after a target was followed at speed.
+/// Checks the stop also right after a target was followed at speed.
 fn no_target_means_stop(subject: &Subject<'_>) -> Verdict {
     let controller = &mut *subject.controller(From::Nothing)?;
     let frame = open_space(1, &[]);
@@ -86,6 +86,7 @@ fn no_target_means_stop(subject: &Subject<'_>) -> Verdict {
 fn speeds_are_bounded(subject: &Subject<'_>) -> Verdict {
     let controller = &mut *subject.controller(From::Nothing)?;
     let frame = open_space(1, &[]);
+    // At the robot, beside and behind it, and farther away than any camera sees.
     let places = [0.0, 1e-9, -1e-9, 0.3, -0.3, 1.5, -1.5, 6.0, -6.0, 500.0, -500.0];
     for x in places {
         for y in places {
@@ -112,7 +113,7 @@ fn mirrored_target(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// The command to a fresh controller after some frames of the same scene.
+/// Returns the last of five commands of a new controller for the same scene.
 fn steady(
     subject: &Subject<'_>,
     images: Images,

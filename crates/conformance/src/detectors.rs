@@ -1,4 +1,4 @@
-//! What detectors promise.
+//! Checks of detectors.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ pub(crate) const CHECKS: &[Check] = &[
 
 const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
 
-/// The search ran, or the detector wants an image that the drawn world lacks.
+/// Result of a search, or the lack of an image that the simulation does not provide.
 enum Seen {
     People(Vec<Detection>),
     Lacks,
@@ -87,7 +87,7 @@ fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// Two people, one of them walking aside, over a few frames.
+/// Simulates two people, one of them walking to the side, over four frames.
 fn walk(camera: &Arc<Camera>) -> Vec<Frame> {
     let steps = 0..4u64;
     steps
@@ -98,7 +98,7 @@ fn walk(camera: &Arc<Camera>) -> Vec<Frame> {
         .collect()
 }
 
-/// Everything a detector says while it watches the walk.
+/// Returns all detections of a detector in the frames of the walk.
 fn record(detector: &mut dyn Detector, frames: &[Frame]) -> Result<Vec<Detection>, String> {
     let followed = track(1, Figure::at(2.0, 0.4).head, 0.15, &frames[0].camera);
     let mut all = Vec::new();
@@ -184,7 +184,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     })
 }
 
-/// What one says that has seen the whole walk, and one that has seen nothing.
+/// Compares a detector that has processed the whole walk with a new one.
 fn question_alone(subject: &Subject<'_>) -> Verdict {
     let mut seasoned = subject.detector(From::Nothing)?;
     if seasoned.remembers() {
@@ -209,7 +209,7 @@ fn question_alone(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// All detections of the walk under each mounting.
+/// Returns all detections of the walk under each mounting.
 fn all_detections(subject: &Subject<'_>) -> Result<Vec<(Arc<Camera>, Detection)>, String> {
     let mut all = Vec::new();
     for (_, camera) in mountings() {
@@ -224,6 +224,7 @@ fn regions_are_in_the_image(subject: &Subject<'_>) -> Verdict {
     for (camera, detection) in all_detections(subject)? {
         let region = detection.region;
         let inside = region.clipped(camera.width, camera.height).area();
+        // Upper-body squares are amodal and may exceed the image, but not without limit.
         let amodal = 4.0 * (camera.width * camera.height) as f64;
         demand(region.is_sane() && inside > 0.0 && region.area() <= amodal, || {
             format!("{region:?} in an image of {}x{}", camera.width, camera.height)
@@ -235,6 +236,7 @@ fn regions_are_in_the_image(subject: &Subject<'_>) -> Verdict {
 fn covariance_is_positive(subject: &Subject<'_>) -> Verdict {
     for (_, detection) in all_detections(subject)? {
         let covariance = detection.covariance;
+        // Allows for the rounding of a rotation.
         let skew = (covariance - covariance.transpose()).abs().max();
         let positive = skew <= 1e-9 * covariance.norm() && covariance.cholesky().is_some();
         demand(positive, || format!("covariance {covariance:?}"))?;
@@ -243,7 +245,7 @@ fn covariance_is_positive(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// Two people 1.6 m apart: a search for one must not answer with the other.
+/// Simulates two people 1.6 m apart: a search for one must not return the other.
 fn near_stays_near(subject: &Subject<'_>) -> Verdict {
     let (sigma_m, window_m) = (0.15, 0.8);
     for (name, camera) in mountings() {
@@ -277,7 +279,7 @@ fn empty_stays_empty(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// No detection is more likely a person than not.
+/// Checks that no detection is more likely a person than not.
 fn believed_empty(found: &[Detection], scene: &str) -> Verdict {
     match found.iter().find(|d| d.score > 0.0) {
         Some(d) => Err(format!("{scene}: nobody is at {:.2}, score {:.2}", d.position, d.score)),
@@ -297,6 +299,7 @@ fn person_is_found(subject: &Subject<'_>) -> Verdict {
             let scene = format!("camera {name}, person turned by {turned_rad:.1} rad");
             let found = people(detector, &drawn(1, &camera, &[figure]), &EVERYWHERE)?;
             let believed: Vec<_> = found.into_iter().filter(|d| d.score > 0.0).collect();
+            // Other candidates are allowed as long as they are not more likely people than not.
             demand(believed.len() == 1, || format!("{scene}: {} found", believed.len()))?;
             is_at(&believed[0], &figure, &camera).map_err(|what| format!("{scene}: {what}"))?;
         }
@@ -304,7 +307,7 @@ fn person_is_found(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// The detection is where the person is, in the world and in the image.
+/// Checks that a detection matches the person in position and region.
 fn is_at(found: &Detection, figure: &Figure, camera: &Camera) -> Verdict {
     let error = found.position - figure.head;
     demand(error.xy().norm() < 0.3 && error.z.abs() < 0.2, || {
@@ -323,10 +326,11 @@ fn person_is_followed(subject: &Subject<'_>) -> Verdict {
         let detector = &mut *subject.detector(From::Nothing)?;
         let figure = Figure::at(2.0, 0.1);
         let mut followed = track(1, figure.head, 0.15, &camera);
-        // Models of appearance need a frame to learn from.
+        // Appearance models need a frame to learn from.
         let learned =
             detector.learn(&drawn(1, &camera, &[figure]), std::slice::from_ref(&followed));
         learned.map_err(|error| format!("learning is an error: {error}"))?;
+        // The predicted position is off by 10 cm, so that the detector has to search.
         followed.estimate.person.position.y -= 0.1;
         followed.estimate.region = camera.upper_body(&followed.estimate.person.position);
         let found = people(detector, &drawn(2, &camera, &[figure]), &Search::Near(&followed))?;
@@ -336,7 +340,7 @@ fn person_is_followed(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// Somebody is tracked for some frames and leaves; the track ends.
+/// Simulates a person that is tracked for three frames and leaves; then the track ends.
 fn forgets(subject: &Subject<'_>) -> Verdict {
     let camera = level();
     let detector = &mut *subject.detector(From::Nothing)?;

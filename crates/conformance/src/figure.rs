@@ -1,8 +1,8 @@
-//! A small drawn world: people of ellipsoids on a floor in front of a wall, ray
-//! cast into the depth and the colour image of a camera.
+//! Simulated scenes: people made of ellipsoids on a floor in front of a wall, ray cast into the
+//! depth and the colour image of a camera.
 //!
-//! The proportions are those of the head-and-shoulder template measured by
-//! Jafari et al. (ICRA 2014).
+//! The proportions are those of the head-and-shoulder template measured by Jafari et al. (ICRA
+//! 2014).
 
 use std::sync::Arc;
 
@@ -16,37 +16,37 @@ use crate::random::Random;
 pub struct Figure {
     /// Centre of the head in the robot frame, m.
     pub head: Point3<f64>,
-    /// Where the person looks, about the vertical of the robot frame, rad.
+    /// Direction in which the person faces, about the vertical of the robot frame, rad.
     pub heading_rad: f64,
 }
 
-/// What there is to see, in the robot frame.
+/// A simulated scene, in the robot frame.
 #[derive(Clone, Debug, Default)]
 pub struct World {
     /// The people.
     pub people: Vec<Figure>,
     /// Distance of a wall across the forward axis, m; `None` is open space.
     pub wall_m: Option<f64>,
-    /// Seed of axial depth noise like that of a structured-light camera
-    /// (Nguyen, Izadi & Lovell 2012); `None` draws without noise.
+    /// Seed of axial depth noise like that of a structured-light camera (Nguyen, Izadi & Lovell
+    /// 2012); `None` renders without noise.
     pub noise_seed: Option<u64>,
 }
 
 impl Figure {
-    /// A person of ordinary height at a place on the floor, who looks at the robot.
+    /// Returns a person of ordinary height at a position on the floor that faces the robot.
     pub fn at(x: f64, y: f64) -> Self {
         Self { head: Point3::new(x, y, 1.6), heading_rad: (-y).atan2(-x) }
     }
 }
 
 impl World {
-    /// People in front of a wall at 5 m.
+    /// Returns a scene of people in front of a wall at 5 m.
     pub fn with(people: &[Figure]) -> Self {
         Self { people: people.to_vec(), wall_m: Some(5.0), noise_seed: None }
     }
 
-    /// The colour and the depth image of the camera. Depth is along the optical
-    /// axis in metres, NaN where nothing is seen.
+    /// Renders the colour and the depth image of the camera. Depth is along the optical axis in
+    /// metres, NaN without a hit.
     pub fn draw(&self, camera: &Camera) -> Images {
         let shapes: Vec<Ellipsoid> = self.people.iter().flat_map(body).collect();
         let eye = camera.robot_from_camera.translation.vector;
@@ -78,22 +78,24 @@ impl World {
         let Some(seed) = self.noise_seed else { return };
         let mut random = Random::new(seed);
         for depth in depth.pixels_mut() {
+            // Axial noise of a structured-light camera, Nguyen, Izadi & Lovell.
             let sigma_m = 0.0012 + 0.0019 * (f64::from(*depth) - 0.4).powi(2);
             *depth += (sigma_m * random.normal()) as f32;
         }
     }
 }
 
-/// What a ray meets first.
+/// First intersection of a ray.
 struct Hit {
     depth_m: f64,
     colour: [u8; 3],
 }
 
-/// The plane at signed distance `away` along an axis on which the ray advances
-/// by `along` per metre of depth.
+/// Intersects a ray with the plane at signed distance `away` along an axis on which the ray
+/// advances by `along` per metre of depth.
 fn plane(away: f64, along: f64, light: f64, colour: [u8; 3]) -> Option<Hit> {
     let depth_m = away / along;
+    // A plane behind the camera, or beyond 50 m, is not seen.
     let seen = depth_m.is_finite() && depth_m > 0.01 && depth_m < 50.0;
     seen.then(|| Hit { depth_m, colour: shade(colour, light) })
 }
@@ -107,14 +109,14 @@ struct Ellipsoid {
     centre: Vector3<f64>,
     /// Half axes: along the heading, across it, vertical, m.
     half: Vector3<f64>,
-    /// From the robot's axes to those of the half axes.
+    /// Rotation from the robot's axes to those of the half axes.
     turn: Rotation3<f64>,
     colour: [u8; 3],
 }
 
 impl Ellipsoid {
-    /// The nearer intersection of `eye + t * ray`; `t` is the depth because the
-    /// ray is scaled to depth 1.
+    /// Returns the nearer intersection of `eye + t * ray`; `t` is the depth because the ray is
+    /// scaled to depth 1.
     fn hit(&self, eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {
         let start = (self.turn * (eye - self.centre)).component_div(&self.half);
         let step = (self.turn * ray).component_div(&self.half);
@@ -131,14 +133,14 @@ impl Ellipsoid {
     }
 }
 
-/// Along the heading, to the left, below the head; the three half axes; colour.
+/// Offset from the head (along the heading, to the left, below); the three half axes; colour.
 type Part = ([f64; 3], [f64; 3], [u8; 3]);
 
 const SKIN: [u8; 3] = [224, 172, 140];
 const SHIRT: [u8; 3] = [60, 90, 170];
 
-/// All parts above the hip, m. A head is about 19 cm long and 16 cm broad with
-/// hair, and sits some 4 cm before the axis of the trunk.
+/// All parts above the hip, m. A head is about 19 cm long and 16 cm broad with hair, and lies some
+/// 4 cm in front of the axis of the trunk.
 const UPPER_PARTS: [Part; 6] = [
     ([0.0, 0.0, 0.0], [0.095, 0.08, 0.115], SKIN),
     ([-0.02, 0.0, 0.15], [0.06, 0.065, 0.13], SKIN),
@@ -152,6 +154,7 @@ const UPPER_PARTS: [Part; 6] = [
 const HIP_M: f64 = 0.80;
 
 fn body(figure: &Figure) -> impl Iterator<Item = Ellipsoid> {
+    // The legs keep a positive length for a head at or below the height of the hip.
     let half_leg = (0.5 * (figure.head.z - HIP_M)).max(0.1);
     let leg = |across| -> Part {
         ([-0.04, across, HIP_M + half_leg], [0.09, 0.08, half_leg + 0.03], [50, 50, 60])

@@ -1,8 +1,7 @@
-//! What filters promise.
+//! Checks of filters.
 //!
-//! A filter is fed with sightings of people whose true places are known, while
-//! the robot stands or drives. Filters that weigh scenes get a likelihood that
-//! knows the truth.
+//! A filter receives detections of people at known positions, while the robot stands or drives.
+//! Filters that weigh scenes get a likelihood that knows the true positions.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,16 +28,17 @@ pub(crate) const CHECKS: &[Check] = &[
     ("ids never mix", ids_never_mix),
 ];
 
-/// Standard deviation of the sightings, m.
+/// Standard deviation of the detections, m.
 const SIGMA_M: f64 = 0.03;
 
-/// Knows where everybody is; flat where nobody can be seen.
+/// Likelihood that knows the true positions; constant without people.
 struct Oracle(Vec<Point3<f64>>);
 
 impl Likelihood for Oracle {
     fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> tagalong_core::Result<f64> {
         let explained = |person: &Person| {
             let nearest = self.0.iter().map(|truth| (person.position - truth).norm_squared());
+            // Beyond 1 m the likelihood is flat, as that of an image is.
             let d2 = nearest.fold(1.0, f64::min);
             (1.0 - d2) / (2.0 * 0.1 * 0.1)
         };
@@ -46,7 +46,7 @@ impl Likelihood for Oracle {
     }
 }
 
-/// People in the world, a robot that drives, and the filter that watches.
+/// Simulated people, a driving robot, and the filter under test.
 struct Run {
     filter: Box<dyn Filter>,
     camera: Arc<Camera>,
@@ -80,7 +80,7 @@ impl Run {
         sighting(&head, &self.camera, SIGMA_M, &mut self.random)
     }
 
-    /// Starts one belief per place, with the ids 1, 2, ...
+    /// Starts one track per position, with the ids 1, 2, ...
     fn start(&mut self, places: &[Point3<f64>]) {
         for (id, place) in (1..).zip(places) {
             let detection = self.sight(place);
@@ -88,7 +88,7 @@ impl Run {
         }
     }
 
-    /// One frame: the robot moves, and the people whose place is given are seen.
+    /// Simulates one frame: the robot moves, and the given people are detected.
     fn step(&mut self, seen: &[(u32, Point3<f64>)]) -> Result<BTreeMap<TrackId, Support>, String> {
         self.index += 1;
         self.world_from_robot *= self.motion.isometry();
@@ -127,14 +127,14 @@ impl Run {
         found.ok_or_else(|| format!("it lost track {id} without being told to stop"))
     }
 
-    /// Where in the world a track is believed to be, and its velocity there.
+    /// Returns the estimated position of a track in the world, and its velocity there.
     fn in_world(&self, id: u32) -> Result<(Point2<f64>, Vector2<f64>), String> {
         let person = self.estimate(id)?.person;
         Ok((self.world_from_robot * person.position.xy(), self.world_from_robot * person.velocity))
     }
 }
 
-/// Half a metre a second, turning by 0.2 rad/s, with honest odometry noise.
+/// Returns a motion of half a metre a second, turning by 0.2 rad/s, with realistic odometry noise.
 fn driving() -> Motion {
     let turn = 0.2 * DT_S;
     let covariance = Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-6, 1e-6, 1e-7));
@@ -182,10 +182,12 @@ fn covariance_stays_positive(subject: &Subject<'_>) -> Verdict {
     run.start(&COUPLE);
     for i in 0..60 {
         let seen = [(1, COUPLE[0]), (2, COUPLE[1])];
+        // 12 frames with detections, then 8 without, in which the covariance grows.
         run.step(if i % 20 < 12 { &seen } else { &[] })?;
         for (id, estimate) in run.estimates() {
             let p = estimate.covariance;
             let skew = (p - p.transpose()).abs().max();
+            // A covariance may be singular, and rounding would then fail the decomposition.
             let ridge = nalgebra::SMatrix::identity() * (1e-9 * p.norm().max(1e-6));
             let positive = skew <= 1e-9 * p.norm() && (p + ridge).cholesky().is_some();
             demand(positive && estimate.is_sane(), || {
@@ -229,6 +231,7 @@ fn standing_person_stands(subject: &Subject<'_>) -> Verdict {
         let (mut offset, mut drift) = (Vector2::zeros(), Vector2::zeros());
         for i in 0..60 {
             run.step(&[(1, place)])?;
+            // The first half of the run lets the velocity converge.
             if i >= 30 {
                 let (position, velocity) = run.in_world(1)?;
                 offset += (position - place.xy()) / 30.0;
@@ -243,7 +246,7 @@ fn standing_person_stands(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// A second without evidence must not carry the standing person away.
+/// Checks that a second without evidence does not carry the standing person away.
 fn coasts(run: &mut Run, place: &Point3<f64>) -> Verdict {
     for _ in 0..10 {
         run.step(&[])?;
@@ -276,6 +279,7 @@ fn stop_forgets(subject: &Subject<'_>) -> Verdict {
     run.step(&[(1, COUPLE[0]), (2, COUPLE[1])])?;
     run.filter.stop(TrackId(1));
     run.stopped.push(TrackId(1));
+    // Stopping an unknown track must do no harm.
     run.filter.stop(TrackId(99));
     let supported = run.step(&[(1, COUPLE[0]), (2, COUPLE[1])])?;
     demand(!supported.contains_key(&TrackId(1)), || "a stopped track is supported".into())?;
@@ -283,7 +287,7 @@ fn stop_forgets(subject: &Subject<'_>) -> Verdict {
     demand(left == [TrackId(2)], || format!("of tracks 1 and 2, stopping 1 leaves {left:?}"))
 }
 
-/// Evidence comes in any order, and one of the two is hidden for a while.
+/// Changes the order of the evidence, and misses each of the two people at times.
 fn ids_never_mix(subject: &Subject<'_>) -> Verdict {
     let mut run = Run::new(subject, From::Nothing, driving())?;
     run.start(&COUPLE);
@@ -292,6 +296,7 @@ fn ids_never_mix(subject: &Subject<'_>) -> Verdict {
     for seen in orders.iter().cycle().take(24) {
         let supported = run.step(seen)?;
         let missing = seen.iter().find(|(id, _)| !supported.contains_key(&TrackId(*id)));
+        // A filter that weighs scenes finds its evidence in the image, not in the detections.
         demand(missing.is_none() || run.filter.weighs_scenes(), || {
             format!("its own sighting does not support track {:?}", missing.map(|(id, _)| id))
         })?;

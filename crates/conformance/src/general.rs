@@ -1,4 +1,4 @@
-//! Checks that hold for plugins of every kind.
+//! Checks of all kinds of plugin.
 
 use tagalong_core::nearest;
 
@@ -18,8 +18,8 @@ fn builds(subject: &Subject<'_>) -> Verdict {
     subject.try_build(From::Nothing)
 }
 
-/// The printed defaults are TOML, hold each required setting, and build. That
-/// they also *mean* the defaults is part of "same seed, same output".
+/// Checks that the printed defaults are TOML, hold each required setting, and build. The check
+/// "same seed, same output" shows that they also *mean* the defaults.
 fn defaults_survive(subject: &Subject<'_>) -> Verdict {
     let text = subject.info.defaults();
     let table: toml::Table =

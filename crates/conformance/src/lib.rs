@@ -1,9 +1,8 @@
-//! What every plugin must do, checked against whatever a [`Registry`] holds.
+//! Conformance suite for all plugins of a [`Registry`].
 //!
-//! A plugin is tested the moment it is listed: the suite builds it from its
-//! default settings, shows it a small drawn world (see [`figure`]) and asks for
-//! the promises that the traits of `tagalong_core` make. A crate outside the
-//! workspace runs the same suite over a registry of its own:
+//! A plugin is tested as soon as it is listed: the suite builds it from its default settings, runs
+//! it on small simulated scenes (see [`figure`]) and checks the contracts of the traits of
+//! `tagalong_core`. A crate outside the workspace runs the same suite over its own registry:
 //!
 //! ```
 //! # fn register(_: &mut tagalong_core::Registry) {}
@@ -13,11 +12,10 @@
 //! assert!(failures.is_empty(), "{failures:#?}");
 //! ```
 //!
-//! A panic inside a plugin is caught and becomes a [`Failure`] that names the
-//! plugin and the check. Whether a detector has to find the drawn people is not
-//! to be read off its type (a face detector sees no face in them, a follower
-//! discovers nobody), so that is demanded by name: [`Suite::must_discover`],
-//! [`Suite::must_follow`].
+//! A panic inside a plugin is caught and becomes a [`Failure`] that names the plugin and the check.
+//! The type of a detector does not tell if it has to find the simulated people (a face detector
+//! sees no face in them, and some detectors only find tracked people again), so that is demanded by
+//! name: [`Suite::must_discover`], [`Suite::must_follow`].
 
 mod associators;
 mod controllers;
@@ -45,14 +43,14 @@ use tagalong_core::{Context, Kind, Registry};
 pub use controllers::target;
 use subject::{Subject, WHEELS};
 
-/// One promise that one plugin broke.
+/// Failure of one check by one plugin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// The name of the plugin in configs.
+    /// Name of the plugin in configs.
     pub plugin: String,
-    /// The name of the check, for example `empty scene stays empty`.
+    /// Name of the check, for example `empty scene stays empty`.
     pub check: &'static str,
-    /// What was seen, and what should have been.
+    /// Observed and expected behaviour.
     pub what: String,
 }
 
@@ -62,13 +60,13 @@ impl fmt::Display for Failure {
     }
 }
 
-/// What a plugin is built with in tests: seed 1, paths from the working
-/// directory, the drive of a small robot.
+/// Returns the context of plugins in tests: seed 1, paths from the working directory, the drive of
+/// a small robot.
 pub fn context() -> Context {
     Context { seed: 1, base_dir: PathBuf::from("."), wheels: WHEELS }
 }
 
-/// A check: its name, and what it does with a plugin. The error is a sentence.
+/// A check: its name and its function. The error is a sentence.
 type Check = (&'static str, fn(&Subject<'_>) -> Verdict);
 type Verdict = Result<(), String>;
 type Checks = Chain<slice::Iter<'static, Check>, slice::Iter<'static, Check>>;
@@ -82,7 +80,7 @@ pub struct Suite<'a> {
 }
 
 impl<'a> Suite<'a> {
-    /// A suite that demands of each plugin what holds for all of its kind.
+    /// Creates a suite without demands on single detectors.
     pub fn new(registry: &'a Registry) -> Self {
         Self {
             registry,
@@ -98,20 +96,20 @@ impl<'a> Suite<'a> {
         self
     }
 
-    /// Demands that this detector discovers the drawn person.
+    /// Demands that this detector discovers the simulated person.
     pub fn must_discover(mut self, detector: impl Into<String>) -> Self {
         self.discoverers.insert(detector.into());
         self
     }
 
-    /// Demands that this detector finds the drawn person again near a track.
+    /// Demands that this detector finds the simulated person again near a track.
     pub fn must_follow(mut self, detector: impl Into<String>) -> Self {
         self.followers.insert(detector.into());
         self
     }
 
-    /// Every broken promise of every plugin; a demand on a detector that is
-    /// not registered is one, too.
+    /// Returns all failures of all plugins; a demand on a detector that is not registered is one,
+    /// too.
     #[must_use = "broken promises are returned, not asserted"]
     pub fn check_all(&self) -> Vec<Failure> {
         let mut failures = self.unmet_demands();
@@ -121,13 +119,13 @@ impl<'a> Suite<'a> {
         failures
     }
 
-    /// Every broken promise of one plugin.
+    /// Returns all failures of one plugin.
     #[must_use = "broken promises are returned, not asserted"]
     pub fn check(&self, plugin: &str) -> Vec<Failure> {
         self.check_where(plugin, |_| true)
     }
 
-    /// The outcome of one check (see [`check_names`]) on one plugin.
+    /// Returns the failures of one check (see [`check_names`]) on one plugin.
     #[must_use = "broken promises are returned, not asserted"]
     pub fn check_one(&self, plugin: &str, check: &str) -> Vec<Failure> {
         self.check_where(plugin, |name| name == check)
@@ -146,6 +144,7 @@ impl<'a> Suite<'a> {
             must_follow: self.followers.contains(plugin),
         };
         let (name, builds) = general::BUILDS;
+        // The other checks need a plugin that can be built.
         if let Some(broken) = run(&subject, name, builds) {
             return vec![broken];
         }
@@ -169,13 +168,13 @@ impl<'a> Suite<'a> {
     }
 }
 
-/// [`Suite::check_all`] without demands on single detectors.
+/// Runs [`Suite::check_all`] without demands on single detectors.
 #[must_use = "broken promises are returned, not asserted"]
 pub fn check_all(registry: &Registry) -> Vec<Failure> {
     Suite::new(registry).check_all()
 }
 
-/// The names of all checks that apply to a kind of plugin.
+/// Returns the names of all checks that apply to a kind of plugin.
 pub fn check_names(kind: Kind) -> Vec<&'static str> {
     let checks = general::CHECKS.iter().chain(checks_of(kind));
     std::iter::once(general::BUILDS.0).chain(checks.map(|(name, _)| *name)).collect()
@@ -198,6 +197,7 @@ fn run(
     name: &'static str,
     check: fn(&Subject<'_>) -> Verdict,
 ) -> Option<Failure> {
+    // Each check builds its own plugins, so a panic leaves no broken state to later checks.
     let outcome = catch_unwind(AssertUnwindSafe(|| check(subject)));
     let what = match outcome {
         Ok(Ok(())) => return None,

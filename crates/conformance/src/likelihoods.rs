@@ -1,4 +1,4 @@
-//! What the likelihood that goes with a detector promises, if it has one.
+//! Checks of the likelihood of a detector, if it has one.
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{Detector, Error, Frame, Likelihood, Person};

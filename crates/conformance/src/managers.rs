@@ -1,4 +1,4 @@
-//! What track managers promise.
+//! Checks of track managers.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub(crate) const CHECKS: &[Check] = &[
     ("ends are of tracks that live", ends_are_of_the_living),
 ];
 
-/// A manager, and the bookkeeping that the tracker does for it.
+/// A manager, with the bookkeeping that the tracker does for it.
 struct Run {
     manager: Box<dyn TrackManager>,
     tracks: BTreeMap<TrackId, Track>,
@@ -30,7 +30,7 @@ struct Run {
     ended: Vec<(TrackId, &'static str)>,
 }
 
-/// Log-odds of a detection that is hardly in doubt.
+/// Log-odds of a nearly certain detection.
 const SURE: f64 = 3.0;
 const DETECTED: Observation = Observation::Detected { log_odds: SURE };
 
@@ -68,8 +68,8 @@ impl Run {
         Some(id)
     }
 
-    /// Offers the same candidate in one frame after the other, until it starts a track: a
-    /// manager may want to see it more than once.
+    /// Offers the same candidate in successive frames until it starts a track: a manager may
+    /// require several detections.
     fn start(&mut self, y: f64) -> Result<TrackId, String> {
         for _ in 0..30 {
             if let Some(id) = self.offer(&person(y, SURE)) {
@@ -80,7 +80,7 @@ impl Run {
         Err("a detection that is hardly in doubt starts no track within 3 s".into())
     }
 
-    /// One frame; tracks that are not named are occluded.
+    /// Simulates one frame; tracks that are not named are occluded.
     fn step(&mut self, observed: &[(TrackId, Observation)]) -> Verdict {
         self.manager.predict(&Motion::at_rest(DT_S));
         let observed: BTreeMap<TrackId, Observation> = observed.iter().copied().collect();
@@ -146,6 +146,7 @@ fn missed_ends(subject: &Subject<'_>) -> Verdict {
     let mut run = Run::new(subject, From::Nothing)?;
     let id = run.start(0.0)?;
     for i in 0..120 {
+        // The first 20 detections confirm the track.
         run.step(&[(id, if i < 20 { DETECTED } else { Observation::Missed })])?;
     }
     demand(run.tracks.is_empty(), || "missed for 10 s, the track lives on".into())
@@ -176,6 +177,7 @@ fn ends_are_of_the_living(subject: &Subject<'_>) -> Verdict {
     run.manager.stop(ids[1]);
     run.tracks.remove(&ids[1]);
     run.manager.reset();
+    // Stopping an unknown track must do no harm.
     run.manager.stop(TrackId(99));
     for _ in 0..120 {
         run.step(&[(ids[0], DETECTED), (ids[2], Observation::Missed)])?;

@@ -1,5 +1,5 @@
-//! The smallest thing a verifier can be shown: one candidate in one grey image
-//! that holds a head above shoulders, or bars.
+//! Minimal input of a verifier: one candidate in one grey image that shows a head above shoulders,
+//! or bars.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use tagalong_core::{
     Camera, Detection, Distortion, Frame, GreyImage, Images, Motion, Pinhole, Rect, Stamp,
 };
 
-/// A dark head above dark shoulders before a bright wall, or bars: 64x64, with
-/// noise from a seed.
+/// Renders a dark head above dark shoulders before a bright wall, or bars: 64x64, with noise from a
+/// seed.
 pub fn picture(is_person: bool, seed: u32) -> GreyImage {
     let mut state = seed.wrapping_mul(2_654_435_761) | 1;
     GreyImage::from_fn(64, 64, |x, y| {
@@ -20,11 +20,13 @@ pub fn picture(is_person: bool, seed: u32) -> GreyImage {
         } else {
             (x / 8 + seed as usize).is_multiple_of(2)
         };
+        // The upper bits, because the lower bits of a linear congruential generator have short
+        // periods.
         (if dark { 60 } else { 150 }) + (state >> 27) as u8
     })
 }
 
-/// A frame of that picture, from a camera 1 m above the floor that looks ahead.
+/// Returns a frame of that picture, from a camera 1 m above the floor that looks ahead.
 pub fn frame(grey: GreyImage) -> Frame {
     let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, grey.width(), grey.height(), 1.0, 0.0, 0.0));
@@ -32,7 +34,7 @@ pub fn frame(grey: GreyImage) -> Frame {
     Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
 }
 
-/// The candidate of that picture: 2 m ahead, of score 1.
+/// Returns the candidate of that picture: 2 m ahead, of score 1.
 pub fn candidate() -> Detection {
     Detection {
         region: Rect::new(8.0, 8.0, 48.0, 48.0),

@@ -1,4 +1,4 @@
-//! Frames, tracks and detections that the checks are made of.
+//! Frames, tracks and detections for the checks.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::random::Random;
 /// Time between frames, s.
 pub(crate) const DT_S: f64 = 0.1;
 
-/// A camera of the given width (4:3) and the field of view of a Kinect.
+/// Returns a camera of the given width (4:3) and the field of view of a Kinect.
 fn camera(width: usize, height_m: f64, pitch_down_deg: f64, roll_deg: f64) -> Camera {
     let height = width * 3 / 4;
     let focal = width as f64 * 0.82;
@@ -24,13 +24,13 @@ fn camera(width: usize, height_m: f64, pitch_down_deg: f64, roll_deg: f64) -> Ca
     Camera::mounted(lens, width, height, height_m, pitch, roll)
 }
 
-/// A level camera at breast height.
+/// Returns a level camera at breast height.
 pub(crate) fn level() -> Arc<Camera> {
     Arc::new(camera(640, 1.2, 0.0, 0.0))
 }
 
-/// The mountings under which a detector must work: level; looking down from
-/// above with a roll; level at half the resolution.
+/// Returns the mountings under which a detector must work: level; looking down from above with a
+/// roll; level at half the resolution.
 pub(crate) fn mountings() -> [(&'static str, Arc<Camera>); 3] {
     [
         ("level at 1.2 m", level()),
@@ -39,12 +39,12 @@ pub(crate) fn mountings() -> [(&'static str, Arc<Camera>); 3] {
     ]
 }
 
-/// A frame at rest.
+/// Returns a frame of a robot at rest.
 pub(crate) fn frame(index: u64, camera: &Arc<Camera>, images: Images) -> Frame {
     moving_frame(index, camera, images, Motion::at_rest(DT_S))
 }
 
-/// A frame after a motion of the robot.
+/// Returns a frame after a motion of the robot.
 pub(crate) fn moving_frame(
     index: u64,
     camera: &Arc<Camera>,
@@ -55,13 +55,13 @@ pub(crate) fn moving_frame(
     Frame::new(index, stamp, Arc::clone(camera), motion, images)
 }
 
-/// What the camera sees of people before a wall.
+/// Renders a frame of people in front of a wall.
 pub(crate) fn drawn(index: u64, camera: &Arc<Camera>, people: &[Figure]) -> Frame {
     let world = World { noise_seed: Some(index), ..World::with(people) };
     frame(index, camera, world.draw(camera))
 }
 
-/// Frames that carry nothing useful, with their names.
+/// Returns frames without useful content, with their names.
 pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
     let flat = |camera: &Arc<Camera>, grey: u8, depth: f32| {
         let (w, h) = (camera.width, camera.height);
@@ -89,22 +89,22 @@ pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
     ]
 }
 
-/// A frame of an ordinary camera without any image.
+/// Returns a frame of an ordinary camera without any image.
 pub(crate) fn bare_frame() -> Frame {
     frame(1, &level(), Images::default())
 }
 
-/// The frame with these inputs alone.
+/// Returns the frame with these inputs alone.
 pub(crate) fn restricted(frame: Frame, inputs: &Inputs) -> Frame {
     frame.restricted_to(inputs).unwrap_or(frame)
 }
 
-/// Of these inputs those that are required.
+/// Returns the required ones of these inputs.
 pub(crate) fn required(inputs: &Inputs) -> Inputs {
     inputs.of(Usage::Optional).fold(*inputs, Inputs::without)
 }
 
-/// A confirmed track at a place, at rest, known to `sigma_m`.
+/// Returns a confirmed track at a position, at rest, with a standard deviation of `sigma_m`.
 pub(crate) fn track(id: u32, head: Point3<f64>, sigma_m: f64, camera: &Camera) -> Track {
     let mut covariance = SMatrix::<f64, 5, 5>::identity() * (sigma_m * sigma_m);
     covariance[(3, 3)] = 0.05;
@@ -123,7 +123,7 @@ pub(crate) fn track(id: u32, head: Point3<f64>, sigma_m: f64, camera: &Camera) -
     }
 }
 
-/// What a good detector says of a person there, with an error of `sigma_m`.
+/// Simulates a detection of a person with an error of `sigma_m`.
 pub(crate) fn sighting(
     head: &Point3<f64>,
     camera: &Camera,
@@ -135,13 +135,14 @@ pub(crate) fn sighting(
     Detection {
         region: camera.upper_body(&position),
         position,
+        // Not less than 1 cm of standard deviation: filters invert the covariance.
         covariance: nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4),
         score: 3.0,
         source: "conformance",
     }
 }
 
-/// The same images seen in a mirror.
+/// Returns the mirror images.
 pub(crate) fn mirrored(images: &Images) -> Images {
     fn reversed<P: Copy>(image: &Image<P>) -> Image<P> {
         let (w, h) = (image.width(), image.height());

@@ -6,10 +6,10 @@ use tagalong_core::{
 };
 use toml::de::{DeTable, DeValue};
 
-/// The drive that controllers are checked with.
+/// The drive in checks of controllers.
 pub(crate) const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
 
-/// The plugin under test, and how to build it afresh.
+/// The plugin under test, with all that is needed to build it.
 pub(crate) struct Subject<'a> {
     pub(crate) registry: &'a Registry,
     pub(crate) info: &'a PluginInfo,
@@ -18,7 +18,7 @@ pub(crate) struct Subject<'a> {
     pub(crate) must_follow: bool,
 }
 
-/// Where the settings of a build come from.
+/// Source of the settings of a build.
 #[derive(Clone, Copy)]
 pub(crate) enum From<'t> {
     /// No `config` table at all.
@@ -64,7 +64,7 @@ impl Subject<'_> {
         })
     }
 
-    /// Builds it only to see whether that works.
+    /// Builds the plugin and drops it.
     pub(crate) fn try_build(&self, from: From<'_>) -> Result<(), String> {
         use tagalong_core::Kind::{Associator, Controller, Detector, Filter, Manager, Verifier};
         match self.info.kind {

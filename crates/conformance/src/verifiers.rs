@@ -1,4 +1,4 @@
-//! What verifiers promise.
+//! Checks of verifiers.
 
 use tagalong_core::{Detection, Error, Frame, Rect, Verifier};
 
@@ -28,7 +28,7 @@ fn margin(
     Ok(margin)
 }
 
-/// Candidates on, beside and outside the person, and of odd sizes.
+/// Returns candidates on, beside and outside the person, and of odd sizes.
 fn candidates() -> Vec<Detection> {
     let figure = Figure::at(2.0, 0.1);
     let good = sighting(&figure.head, &level(), 0.02, &mut Random::new(1));

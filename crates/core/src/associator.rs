@@ -1,42 +1,41 @@
 use crate::{Detection, Track};
 
-/// The pairs of a track and a detection that are possible at all in one frame.
+/// Limits on the pairs of a track and a detection that are considered in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
     /// Time since the frame before, s.
     pub dt_s: f64,
-    /// Log-odds from which on a detection may start a track
+    /// Log-odds at and above which a detection may start a track
     /// ([`crate::TrackManager::start_log_odds`]).
     pub start_log_odds: f64,
 }
 
 impl Gate {
-    /// Returns false for a pair that is probably no person. A detection that alone would
-    /// start no track still supports a track that probably is a person, because log-odds
-    /// add up.
+    /// Returns false for a pair that is probably no person. A detection that alone would start no
+    /// track still supports a track that probably is a person, because log-odds add up.
     pub fn admits(&self, track: &Track, detection: &Detection) -> bool {
         detection.score >= self.start_log_odds || track.score + detection.score >= 0.0
     }
 }
 
-/// One detection as evidence of one track.
+/// One detection as evidence for one track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Association {
-    /// Index of the track in what the associator was given.
+    /// Index of the track in the input of the associator.
     pub track: usize,
     /// Index of the detection.
     pub detection: usize,
-    /// Probability that the detection is of the track, above 0 and at most 1. What is
-    /// missing from 1 in the sum over a track is the probability that the track was missed.
+    /// Probability that the detection belongs to the track, above 0 and at most 1. The difference
+    /// between 1 and the sum over a track is the probability that the track was missed.
     pub weight: f64,
 }
 
-/// What an associator decided about one frame.
+/// Decisions of an associator about one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Associations {
     /// The pairs. A track or a detection may appear in several of them.
     pub pairs: Vec<Association>,
-    /// Indices of detections without a pair that start no track either.
+    /// Indices of detections that belong to no pair and must not start a track either.
     pub spent: Vec<usize>,
 }
 
@@ -85,13 +84,13 @@ impl Associations {
 /// }
 /// ```
 pub trait Associator: Send {
-    /// Returns true if the detection may be of the track. A search near a track takes the
-    /// best detection that fits. [`Gate::admits`] was asked before.
+    /// Returns true if the detection may belong to the track. A search near a track takes the best
+    /// detection that fits. [`Gate::admits`] has been checked before.
     fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool;
 
-    /// Decides about all tracks of a frame at once. `tracks` are predicted to the frame,
-    /// near to far; pairs that [`Gate::admits`] or [`Associator::fits`] refuses must not be
-    /// returned. The same input gives the same answer.
+    /// Assigns detections to all tracks of a frame at once. `tracks` are predicted to the frame and
+    /// sorted from near to far; pairs that [`Gate::admits`] or [`Associator::fits`] refuses must
+    /// not be returned. The same input gives the same result.
     fn associate(
         &mut self,
         tracks: &[Track],

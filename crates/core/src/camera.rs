@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector2, Vector3};
 
-/// Nearer to each other, two pixels are the same.
+/// Distance below which two pixels count as equal.
 const SAME_PIXEL_PX: f64 = 1e-3;
 
 use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Panorama, Rect, UPPER_BODY_SIDE_M};
@@ -10,7 +10,7 @@ use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Panorama, Rect, UPPER_BODY_SIDE_M};
 /// Lens distortion, as in `sensor_msgs/CameraInfo`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Distortion {
-    /// An ideal or an already rectified image.
+    /// No distortion: an ideal or an already rectified image.
     #[default]
     None,
     /// `plumb_bob`: k1, k2, p1, p2, k3.
@@ -20,10 +20,11 @@ pub enum Distortion {
 }
 
 impl Distortion {
-    /// Ideal normalised coordinates to distorted ones (OpenCV's model).
+    /// Converts ideal normalised coordinates to distorted ones (OpenCV's model).
     fn apply(&self, x: f64, y: f64) -> (f64, f64) {
         let (k, p1, p2) = match self {
             Self::None => return (x, y),
+            // Plumb bob is the rational model with a denominator of 1.
             Self::PlumbBob([k1, k2, p1, p2, k3]) => ([*k1, *k2, *k3, 0.0, 0.0, 0.0], *p1, *p2),
             Self::Rational([k1, k2, p1, p2, k3, k4, k5, k6]) => {
                 ([*k1, *k2, *k3, *k4, *k5, *k6], *p1, *p2)
@@ -38,12 +39,13 @@ impl Distortion {
         )
     }
 
-    /// Distorted normalised coordinates to ideal ones, by fixed-point iteration.
+    /// Converts distorted normalised coordinates to ideal ones, by fixed-point iteration.
     fn remove(&self, x_distorted: f64, y_distorted: f64) -> (f64, f64) {
         if *self == Self::None {
             return (x_distorted, y_distorted);
         }
         let (mut x, mut y) = (x_distorted, y_distorted);
+        // The model has no closed inverse; a fixed number of steps bounds the cost of a pixel.
         for _ in 0..20 {
             let (xd, yd) = self.apply(x, y);
             x += x_distorted - xd;
@@ -68,20 +70,20 @@ pub struct Pinhole {
     pub distortion: Distortion,
 }
 
-/// How directions become pixels.
+/// Projection model of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Lens {
     /// Perspective, with optional distortion.
     Pinhole(Pinhole),
-    /// The unwrapped image of a conical mirror. Its *depth* is the horizontal
-    /// distance from the mirror's axis, and its columns go once around.
+    /// Unwrapped image of a conical mirror. Its *depth* is the horizontal distance from the axis of
+    /// the mirror, and its columns cover the full circle.
     Panorama(Panorama),
-    /// No lens: a frame without images, of a laser scan alone. No point has a pixel.
+    /// No lens: the frames of a laser scan alone carry no images, and no point has a pixel.
     Blind,
 }
 
-/// A camera: its lens, its image size, and where it sits on the robot.
+/// A camera: its lens, its image size and its pose on the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// The lens.
@@ -95,9 +97,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A pinhole camera at `height_m` above the floor, above the robot's
-    /// origin, looking forward and `pitch_down_rad` downwards, with its right
-    /// side raised by `roll_rad`.
+    /// Returns a pinhole camera at `height_m` above the floor, above the robot's origin, looking
+    /// forward and `pitch_down_rad` downwards, with its right side raised by `roll_rad`.
     ///
     /// ```
     /// use nalgebra::{Point2, Point3};
@@ -115,9 +116,12 @@ impl Camera {
         pitch_down_rad: f64,
         roll_rad: f64,
     ) -> Self {
+        // The columns are the camera's x (right), y (down) and z (forward) in robot axes.
         let level = nalgebra::Rotation3::from_matrix_unchecked(Matrix3::new(
             0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0,
         ));
+        // Pitch acts about the horizontal axis of the levelled camera, and roll about the optical
+        // axis after that.
         let pitch = nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), -pitch_down_rad);
         let roll = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), -roll_rad);
         let rotation = nalgebra::UnitQuaternion::from_rotation_matrix(&(level * pitch * roll));
@@ -132,8 +136,8 @@ impl Camera {
         }
     }
 
-    /// Stands for the camera in frames without images: it sits where another sensor does, and
-    /// shows nothing. Tracks and detections have no box in its image ([`Rect::default`]).
+    /// Returns a placeholder camera for frames without images, at the pose of another sensor.
+    /// Tracks and detections have no box in its image ([`Rect::default`]).
     pub fn blind(robot_from_sensor: Isometry3<f64>) -> Self {
         let any = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Distortion::None };
         let level = Self::mounted(any, 0, 0, 0.0, 0.0, 0.0).robot_from_camera;
@@ -146,8 +150,8 @@ impl Camera {
         matches!(self.lens, Lens::Blind)
     }
 
-    /// Pixels per metre at one metre of depth, along columns; of a panorama
-    /// pixels per radian; 0 without an image.
+    /// Returns the pixels per metre at one metre of depth, along columns; of a panorama the pixels
+    /// per radian; 0 without an image.
     pub fn focal_px(&self) -> f64 {
         match &self.lens {
             Lens::Pinhole(lens) => lens.fx,
@@ -156,7 +160,7 @@ impl Camera {
         }
     }
 
-    /// The panorama, of a camera that has one.
+    /// Returns the panorama of a camera that has one.
     pub fn panorama(&self) -> Option<&Panorama> {
         match &self.lens {
             Lens::Panorama(lens) => Some(lens),
@@ -164,8 +168,8 @@ impl Camera {
         }
     }
 
-    /// The column that is `column` and nearest to `to`: in a panorama columns
-    /// are counted modulo its width, in other images there is nothing to choose.
+    /// Returns the column equivalent to `column` that is nearest to `to`. Columns of a panorama are
+    /// counted modulo its width; in other images `column` itself is returned.
     pub fn column_near(&self, column: f64, to: f64) -> f64 {
         self.panorama().map_or(column, |lens| {
             let around = lens.columns as f64;
@@ -173,20 +177,21 @@ impl Camera {
         })
     }
 
-    /// The pixel of a point in the robot frame; `None` behind the camera. The
-    /// pixel may lie outside the image.
+    /// Returns the pixel of a point in the robot frame; `None` behind the camera. The pixel may lie
+    /// outside the image.
     pub fn project(&self, point_in_robot: &Point3<f64>) -> Option<Point2<f64>> {
         self.project_from_camera(&self.robot_from_camera.inverse_transform_point(point_in_robot))
     }
 
-    /// The pixel of a point in the camera frame; `None` behind the camera. There
-    /// is nothing behind a panorama.
+    /// Returns the pixel of a point in the camera frame; `None` behind the camera. No point lies
+    /// behind a panorama.
     pub fn project_from_camera(&self, point_in_camera: &Point3<f64>) -> Option<Point2<f64>> {
         let lens = match &self.lens {
             Lens::Panorama(lens) => return Some(lens.pixel(point_in_camera)),
             Lens::Pinhole(lens) => lens,
             Lens::Blind => return None,
         };
+        // The division by z below diverges for points in the plane of the lens.
         if point_in_camera.z <= 1e-6 {
             return None;
         }
@@ -196,7 +201,7 @@ impl Camera {
         Some(Point2::new(lens.fx * x + lens.cx, lens.fy * y + lens.cy))
     }
 
-    /// The viewing ray of a pixel in the camera frame, scaled to depth 1.
+    /// Returns the viewing ray of a pixel in the camera frame, scaled to depth 1.
     pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
         match &self.lens {
             Lens::Pinhole(lens) => {
@@ -209,8 +214,8 @@ impl Camera {
         }
     }
 
-    /// Where the viewing ray of a pixel has depth 0, in the camera frame: the
-    /// origin, but for a panorama, which has no single viewpoint.
+    /// Returns the point of the viewing ray at depth 0, in the camera frame: the origin, except for
+    /// a panorama, which has no single viewpoint.
     fn viewpoint(&self, pixel: Point2<f64>) -> Point3<f64> {
         match &self.lens {
             Lens::Pinhole(_) | Lens::Blind => Point3::origin(),
@@ -218,13 +223,13 @@ impl Camera {
         }
     }
 
-    /// The point in the robot frame that a pixel with a depth shows.
+    /// Returns the point in the robot frame that lies at `depth_m` on the viewing ray of a pixel.
     pub fn back_project(&self, pixel: Point2<f64>, depth_m: f64) -> Point3<f64> {
         self.robot_from_camera * (self.viewpoint(pixel) + self.ray(pixel) * depth_m)
     }
 
-    /// Depth of a point in the robot frame, metres: along the optical axis, in a
-    /// panorama the distance from it.
+    /// Returns the depth of a point in the robot frame, metres: the distance along the optical
+    /// axis, or from the axis in a panorama.
     pub fn depth_of(&self, point_in_robot: &Point3<f64>) -> f64 {
         let point = self.robot_from_camera.inverse_transform_point(point_in_robot);
         match &self.lens {
@@ -233,40 +238,42 @@ impl Camera {
         }
     }
 
-    /// Height of the camera above the floor, metres.
+    /// Returns the height of the camera above the floor, metres.
     pub fn height_m(&self) -> f64 {
         self.robot_from_camera.translation.z
     }
 
-    /// How far the optical axis points below the horizon, radians.
+    /// Returns the angle of the optical axis below the horizon, radians.
     pub fn pitch_down_rad(&self) -> f64 {
         let forward = self.robot_from_camera.rotation * Vector3::z();
+        // Rounding may leave the sine slightly outside of [-1, 1], where `asin` returns NaN.
         (-forward.z).clamp(-1.0, 1.0).asin()
     }
 
-    /// Angle between the image's upward direction and the projected vertical,
+    /// Returns the angle between the image's upward direction and the projected vertical,
     /// radians; positive when the camera's right side is higher.
     pub fn roll_rad(&self) -> f64 {
         let up = self.robot_from_camera.rotation.inverse() * Vector3::z();
         up.x.atan2(-up.y)
     }
 
-    /// The upper-body square of a person whose head centre is at `head`: side
-    /// [`UPPER_BODY_SIDE_M`] at the depth of the face, its upper edge
-    /// [`HEAD_BELOW_TOP_M`] above the head centre, its middle column that of
-    /// the shoulders. It is amodal and may reach beyond the image; empty when
-    /// the head is behind the camera.
+    /// Returns the upper-body square of a person with the head centre `head`: its side is
+    /// [`UPPER_BODY_SIDE_M`] at the depth of the face, its upper edge [`HEAD_BELOW_TOP_M`] above
+    /// the head centre, its middle column that of the shoulders. The square is amodal and may
+    /// extend beyond the image; it is empty if the head is behind the camera.
     ///
     /// In a panorama it may continue beyond the right edge (see [`Panorama`]).
     pub fn upper_body(&self, head: &Point3<f64>) -> Rect {
         if let Some(lens) = self.panorama() {
             return lens.upper_body(&self.robot_from_camera.inverse_transform_point(head));
         }
+        // The square has its size at the face, which is nearer than the centre of the head.
         let depth = self.depth_of(head) - HEAD_RADIUS_M;
         let chest = head - Vector3::new(0.0, 0.0, SHOULDERS_BELOW_HEAD_M);
         let (Some(centre), Some(chest)) = (self.project(head), self.project(&chest)) else {
             return Rect::default();
         };
+        // The scale below diverges as the depth approaches zero.
         if depth <= 0.05 {
             return Rect::default();
         }
@@ -275,14 +282,15 @@ impl Camera {
         Rect::new(chest.x - 0.5 * side, centre.y - HEAD_BELOW_TOP_M * scale, side, side)
     }
 
-    /// The head centre of the person that an upper-body square at the given
-    /// depth of the face shows: the inverse of [`Camera::upper_body`], by
-    /// fixed-point iteration.
+    /// Returns the head centre of the person in an upper-body square, given the depth of the face:
+    /// the inverse of [`Camera::upper_body`], by fixed-point iteration.
     pub fn head_of(&self, upper_body: &Rect, face_depth_m: f64) -> Point3<f64> {
         if let Some(lens) = self.panorama() {
             return self.robot_from_camera * lens.head_of(upper_body, face_depth_m);
         }
         let depth = face_depth_m + HEAD_RADIUS_M;
+        // The column of the square depends on the shoulders, which depend on the head that is
+        // sought, so the inverse is iterated.
         let mut pixel = upper_body.centre();
         for _ in 0..8 {
             let shown = self.upper_body(&self.back_project(pixel, depth));
@@ -295,9 +303,9 @@ impl Camera {
         self.back_project(pixel, depth)
     }
 
-    /// Covariance in the robot frame of a point seen at `pixel` and `depth_m`
-    /// with the given standard deviations (first order, `algorithms`: stereo
-    /// covariance with depth in place of disparity).
+    /// Returns the covariance in the robot frame of a point at `pixel` and `depth_m` with the given
+    /// standard deviations (first order, `algorithms`: stereo covariance with depth in place of
+    /// disparity).
     pub fn covariance(
         &self,
         pixel: Point2<f64>,
@@ -306,12 +314,15 @@ impl Camera {
         sigma_depth_m: f64,
     ) -> Matrix3<f64> {
         let ray = self.ray(pixel);
+        // A pixel subtends an angle, so its error in metres grows with depth.
         let lateral = (depth_m * sigma_px / self.focal_px()).powi(2);
         let across = match &self.lens {
             Lens::Pinhole(_) | Lens::Blind => {
                 Matrix3::from_diagonal(&Vector3::new(lateral, lateral, 0.0))
             }
             Lens::Panorama(_) => {
+                // The depth of a panorama is horizontal, so pixel noise acts on the two directions
+                // perpendicular to the horizontal part of the ray.
                 let out = Vector3::new(ray.x, ray.y, 0.0);
                 (Matrix3::identity() - out * out.transpose()) * lateral
             }
@@ -319,13 +330,14 @@ impl Camera {
         let in_camera = across + ray * ray.transpose() * (sigma_depth_m * sigma_depth_m);
         let rotation = self.robot_from_camera.rotation.to_rotation_matrix();
         let in_robot = rotation.matrix() * in_camera * rotation.matrix().transpose();
+        // The mean with the transpose removes the asymmetry that rounding leaves.
         0.5 * (in_robot + in_robot.transpose())
     }
 }
 
-/// The column of the upper-body square is that of the body this far below the
-/// head centre. Measured: with it, squares of a camera rolled by 11 degrees
-/// agree with hand-annotated ones to about a pixel.
+/// Distance below the head centre of the body point that determines the column of the upper-body
+/// square. Measured: with it, squares of a camera rolled by 11 degrees agree with hand-annotated
+/// ones to about a pixel.
 const SHOULDERS_BELOW_HEAD_M: f64 = 0.25;
 
 #[cfg(test)]
@@ -458,7 +470,8 @@ mod tests {
         assert_eq!(camera.panorama(), None);
     }
 
-    /// By hand, for one direction: OpenCV's rational model of `calib3d`.
+    /// The expected values are computed by hand for one direction, by OpenCV's rational model of
+    /// `calib3d`.
     #[test]
     fn distortion_is_that_of_the_calibration_message() {
         let (x, y) = (0.3, -0.2);
@@ -496,7 +509,7 @@ mod tests {
         assert!(just_far_enough.area() > 0.0);
     }
 
-    /// The middle of the shoulders, not that of the head, is that of the square.
+    /// The square is centred on the middle of the shoulders, not on the head.
     #[test]
     fn in_a_rolled_camera_the_square_is_above_the_shoulders() {
         let camera = tilted(0.0, 0.2, Distortion::None);
@@ -515,7 +528,7 @@ mod tests {
         for (axis, sigma) in [(0, along), (1, across), (2, across)] {
             assert!((c[(axis, axis)].sqrt() - sigma).abs() < 1e-9, "{c}");
         }
-        // A metre to the left for each two ahead.
+        // The ray goes one metre to the left for each two metres ahead.
         let aside = camera.covariance(Point2::new(70.0, 240.0), 4.0, 0.0, 0.3);
         assert!((aside[(0, 1)] - 0.5 * 0.09).abs() < 1e-9, "{aside}");
         assert!((aside[(1, 1)] - 0.25 * 0.09).abs() < 1e-9, "{aside}");

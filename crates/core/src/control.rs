@@ -12,61 +12,60 @@ pub struct WheelSpeeds {
 }
 
 impl WheelSpeeds {
-    /// Standing still.
+    /// Robot at rest.
     pub const STOP: Self = Self { left: 0.0, right: 0.0 };
 }
 
-/// What the wheels may do, for how long, and why.
+/// Wheel speeds with a period of validity and a reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// The speeds: finite and within the robot's limits.
     pub wheels: WheelSpeeds,
-    /// When the image was taken that the command answers to.
+    /// Capture time of the frame to which the command responds.
     pub stamp: Stamp,
-    /// Whoever drives the wheels stops them after this, unless there is a newer
-    /// command.
+    /// Time at which the motor driver stops the wheels unless a newer command has arrived.
     pub valid_until: Stamp,
-    /// Why it is what it is.
+    /// Reason for the speeds.
     pub reason: Reason,
 }
 
-/// Why a command is what it is.
+/// Reason for the speeds of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Reason {
-    /// As the controller wishes.
+    /// As requested by the controller.
     Follow,
-    /// As the controller wishes, but slower: a limit of speed, acceleration or
-    /// turn rate.
+    /// As requested by the controller, but slower: a limit of speed, acceleration or turn rate
+    /// applies.
     Limited,
-    /// At most half as fast: it may be somebody else who is followed.
+    /// At most half as fast: the followed track may be another person.
     Unsure,
-    /// At most half as fast, to find a person again who is lost.
+    /// At most half as fast, to find a lost target again.
     Search,
-    /// Slower, for something is ahead.
+    /// Slower because an obstacle is ahead.
     Obstacle,
-    /// Slower, for frames come late.
+    /// Slower because frames arrive late.
     Slow,
-    /// Stop: something is too near ahead.
+    /// Stop: an obstacle ahead is too near.
     Blocked,
-    /// Stop: the depth image shows nothing at all.
+    /// Stop: the depth image has no readings at all.
     Blind,
-    /// Stop: nobody is followed.
+    /// Stop: there is no target.
     NoTarget,
     /// Stop: too few frames since the start or a jump of the clock.
     Settling,
     /// Stop: no frame for too long.
     Stalled,
-    /// Stop: the controller's wish is not finite.
+    /// Stop: the speeds requested by the controller are not finite.
     NotFinite,
-    /// Stop: the command before has expired and there is no newer one.
+    /// Stop: the previous command has expired and there is no newer one.
     Expired,
-    /// Stop: a fault that lasts until the pipeline is armed again.
+    /// Stop: a fault that persists until the pipeline is armed again.
     Fault,
 }
 
 impl Reason {
-    /// The word for it in files.
+    /// Returns the name of the reason in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Follow => "follow",
@@ -86,7 +85,7 @@ impl Reason {
         }
     }
 
-    /// True if the robot may move for this reason.
+    /// Returns true if the robot may move for this reason.
     pub fn moves(self) -> bool {
         matches!(
             self,
@@ -106,33 +105,33 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What a controller sees of one frame.
+/// Input of a controller for one frame.
 pub struct Scene<'a> {
     /// The frame; its depth image shows the obstacles.
     pub frame: &'a Frame,
-    /// The person to follow, if the pipeline is sure of one.
+    /// The track to follow, if the pipeline is sure of one.
     pub target: Option<&'a Track>,
-    /// Everybody confirmed, the target included.
+    /// All confirmed tracks, the target included.
     pub tracks: &'a [Track],
-    /// The drive.
+    /// The differential drive.
     pub wheels: Wheels,
-    /// The speed limit of a wheel, m/s.
+    /// Speed limit of a wheel, m/s.
     pub max_speed_mps: f64,
 }
 
-/// Steers after the target. It cannot fail: when unsure, it stops.
+/// Steers the robot after the target. It cannot fail: when unsure, it stops.
 pub trait Controller: Send {
-    /// Returns the inputs that the controller itself uses. The governor, which looks at
-    /// obstacles for all of them, declares its own.
+    /// Returns the inputs that the controller itself uses. The governor, which checks obstacles for
+    /// all controllers, declares its own.
     fn inputs(&self) -> Inputs {
         Inputs::NONE
     }
 
-    /// The wheel speeds to command now.
+    /// Returns the wheel speeds to command now.
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds;
 
-    /// The distance at which it stops before the person, m, if it keeps one. A
-    /// config whose robot cannot stop within it is refused.
+    /// Returns the distance at which the controller stops before the person, m, if it keeps one. A
+    /// config is refused if the robot cannot stop within it.
     fn stand_off_m(&self) -> Option<f64> {
         None
     }

@@ -2,7 +2,7 @@ use nalgebra::{Matrix3, Point3};
 
 use crate::Rect;
 
-/// One sighting of a person: an image region and a place.
+/// One detection of a person: an image region and a position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
     /// Upper-body square in the image (see [`crate::Camera::upper_body`]).
@@ -11,15 +11,15 @@ pub struct Detection {
     pub position: Point3<f64>,
     /// Covariance of the position, m². An unknown coordinate has a large variance.
     pub covariance: Matrix3<f64>,
-    /// Log-odds that this is a person; 0 is undecided. Comparable between the
-    /// detectors of a pipeline, so that their output can be ranked together.
+    /// Log-odds that this is a person; 0 is undecided. Comparable between the detectors of a
+    /// pipeline, so that their output can be ranked together.
     pub score: f64,
-    /// The plugin that made it.
+    /// Name of the plugin that made the detection.
     pub source: &'static str,
 }
 
 impl Detection {
-    /// True if every number is finite and the covariance has no negative variance.
+    /// Returns true if every number is finite and the covariance has no negative variance.
     pub fn is_sane(&self) -> bool {
         self.region.is_sane()
             && self.position.iter().all(|v| v.is_finite())

@@ -2,34 +2,34 @@ use nalgebra::Point3;
 
 use crate::{Capabilities, Detection, Error, Frame, Funnel, Inputs, Person, Rect, Result, Track};
 
-/// What a detector is asked.
+/// Query to a detector.
 #[derive(Clone, Copy)]
 pub enum Search<'a> {
-    /// *Discover*: who is in the image? `occupied` are the people already found
-    /// in this frame; they need not be found again.
+    /// *Discover*: find all people in the image. The people in `occupied` were already found in
+    /// this frame and need not be found again.
     Everywhere {
-        /// Already found in this frame.
+        /// Detections already made in this frame.
         occupied: &'a [Detection],
     },
-    /// *Follow*: where is this person now? The track is predicted to this frame.
+    /// *Follow*: find the person of this track again. The track is predicted to this frame.
     Near(&'a Track),
 }
 
-/// Answers one or more of three questions about an image: who is here
-/// (*discover*), where is this one now (*follow*), and, through its
-/// [`Likelihood`], how well an imagined scene explains what is seen (*weigh*).
+/// Performs one or more of three tasks on an image: finding new people (*discover*), finding a
+/// tracked person again (*follow*), and, through its [`Likelihood`], weighing a hypothetical scene
+/// against the image (*weigh*).
 pub trait Detector: Send {
-    /// Returns the inputs and the roles that the detector has with its settings. A
-    /// frame holds no image that no plugin of the pipeline declares, and a config that
-    /// gives a detector another role is refused.
+    /// Returns the inputs and the roles that the detector has with its settings. A frame holds no
+    /// image that no plugin of the pipeline declares, and a config that gives a detector another
+    /// role is refused.
     fn capabilities(&self) -> Capabilities;
 
-    /// Finds people. What a test drops is counted in `funnel` under the name of
-    /// the test. For [`Search::Near`] the best sighting comes first and lies
-    /// within the track's uncertainty.
+    /// Finds people. Candidates that a test drops are counted in `funnel` under the name of the
+    /// test. For [`Search::Near`] the best detection comes first and lies within the uncertainty of
+    /// the track.
     ///
     /// # Errors
-    /// [`crate::Error::MissingImage`] if the frame lacks what the detector needs.
+    /// [`crate::Error::MissingImage`] if the frame lacks an input that the detector needs.
     fn detect(
         &mut self,
         frame: &Frame,
@@ -37,8 +37,8 @@ pub trait Detector: Send {
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>>;
 
-    /// Adapts appearance models to the tracks of this frame, all of them, so
-    /// that models of people who left can be forgotten.
+    /// Adapts appearance models to the tracks of this frame. All tracks are passed, so that the
+    /// models of people that left can be discarded.
     ///
     /// # Errors
     /// As [`Detector::detect`].
@@ -47,34 +47,33 @@ pub trait Detector: Send {
         Ok(())
     }
 
-    /// Returns true if what it finds may depend on more than its settings, the frame and
-    /// the search: on earlier frames, on what it learned, on its own draws. What one that
-    /// does not remember found serves whoever asks the same of the same frame.
+    /// Returns true if the detections may depend on more than the settings, the frame and the
+    /// search: on earlier frames, on learned models, on random numbers. The detections of a
+    /// detector without memory are reused for the same search in the same frame.
     fn remembers(&self) -> bool {
         true
     }
 
-    /// The scene likelihood that goes with this detector, if it has one.
+    /// Returns the scene likelihood of this detector, if it has one.
     fn likelihood(&self) -> Option<&dyn Likelihood> {
         None
     }
 }
 
-/// Weighs imagined scenes against an image (P3: overlapping silhouettes).
+/// Weighs hypothetical scenes against an image (P3: overlapping silhouettes).
 pub trait Likelihood: Send + Sync {
-    /// Log-likelihood ratio of the scene against the empty background. Nearer
-    /// people hide farther ones; the order of `scene` does not matter. A
-    /// person's velocity says where the body faces; at rest it faces along the
-    /// viewing ray.
+    /// Returns the log-likelihood ratio of the scene against the empty background. Nearer people
+    /// occlude farther ones; the order of `scene` does not matter. The body of a person faces in
+    /// the direction of the velocity, or along the viewing ray at rest.
     ///
     /// # Errors
-    /// [`crate::Error::MissingImage`] if the frame lacks what is needed.
+    /// [`crate::Error::MissingImage`] if the frame lacks a required input.
     fn log_likelihood(&self, frame: &Frame, scene: &[Person]) -> Result<f64>;
 
-    /// Log-likelihood ratios of many scenes with `people_per_scene` people
-    /// each: `people` holds one scene after the other, and `out` one number a
-    /// scene afterwards. Whoever weighs hundreds of scenes asks here, so that
-    /// what depends on the frame alone is prepared once.
+    /// Computes the log-likelihood ratios of many scenes with `people_per_scene` people each:
+    /// `people` holds one scene after the other, and `out` receives one number per scene. Callers
+    /// that weigh hundreds of scenes use this function, so that data that depend on the frame alone
+    /// are prepared once.
     ///
     /// # Errors
     /// As [`Likelihood::log_likelihood`].
@@ -86,14 +85,15 @@ pub trait Likelihood: Send + Sync {
         out: &mut Vec<f64>,
     ) -> Result<()> {
         out.clear();
+        // `chunks` panics at 0, the size of scenes without people.
         for scene in people.chunks(people_per_scene.max(1)) {
             out.push(self.log_likelihood(frame, scene)?);
         }
         Ok(())
     }
 
-    /// For each person of the scene the runs of pixels that are compared with the
-    /// person's depth, near over far. For pictures; none by default.
+    /// Returns, for each person of the scene, the runs of pixels that are compared with the depth
+    /// of the person, nearer people in front of farther ones. For visualisation; empty by default.
     ///
     /// # Errors
     /// As [`Likelihood::log_likelihood`].
@@ -103,34 +103,34 @@ pub trait Likelihood: Send + Sync {
     }
 }
 
-/// Doubts detections (P4, II-C: an SVM on the intensity patch).
+/// Verifies detections (P4, II-C: an SVM on the intensity patch).
 pub trait Verifier: Send {
-    /// Returns the inputs that the verifier uses with its settings; as of
-    /// [`Detector::capabilities`].
+    /// Returns the inputs that the verifier uses with its settings; see [`Detector::capabilities`].
     fn inputs(&self) -> Inputs;
 
-    /// Log-odds that the candidate is a person; negative is "no". The same
-    /// candidate in the same frame always gets the same answer.
+    /// Returns the log-odds that the candidate is a person; negative rejects it. The same candidate
+    /// in the same frame always gets the same result.
     ///
     /// # Errors
-    /// [`crate::Error::MissingImage`] if the frame lacks what is needed.
+    /// [`crate::Error::MissingImage`] if the frame lacks a required input.
     fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64>;
 }
 
 impl<'a> Search<'a> {
-    /// True if `position` is of a person that was already found in this frame
-    /// (nearer than `within_m` on the floor).
+    /// Returns true if `position` belongs to a person that was already found in this frame (nearer
+    /// than `within_m` on the floor).
     pub fn is_occupied(&self, position: &Point3<f64>, within_m: f64) -> bool {
         match self {
             Self::Everywhere { occupied } => {
                 occupied.iter().any(|d| (d.position.xy() - position.xy()).norm() < within_m)
             }
+            // A search near a track has to find that very person, even if already found.
             Self::Near(_) => false,
         }
     }
 }
 
-/// What one look of a verifier is worth.
+/// Linear calibration of a verifier's log-odds, with a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trust {
     weight: f64,
@@ -139,10 +139,11 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// `weight * log_odds + bias`, the log-odds within plus and minus `limit`.
+    /// Creates the calibration `weight * log_odds + bias`, where the log-odds are clamped to plus
+    /// and minus `limit`.
     ///
     /// # Errors
-    /// [`Error::Settings`] for numbers that cannot work, by the names of the arguments.
+    /// [`Error::Settings`] for invalid numbers, by the names of the arguments.
     pub fn new(weight: f64, limit: f64, bias: f64) -> Result<Self> {
         for (name, value) in [("weight", weight), ("limit", limit)] {
             if !(value.is_finite() && value >= 0.0) {
@@ -155,8 +156,9 @@ impl Trust {
         Ok(Self { weight, limit, bias })
     }
 
-    /// The margin of a candidate whose model says so much of it.
+    /// Returns the calibrated log-odds for the log-odds of a model.
     pub fn margin(&self, log_odds: f64) -> f64 {
+        // Without the limit one overconfident verdict could outweigh all other evidence of a track.
         self.weight * log_odds.clamp(-self.limit, self.limit) + self.bias
     }
 }
@@ -199,7 +201,7 @@ mod tests {
         assert!(!Search::Everywhere { occupied: &[] }.is_occupied(&Point3::origin(), 9.0));
     }
 
-    /// Answers with the number of people, and refuses three.
+    /// A likelihood that returns the number of people, and refuses three.
     struct Count;
 
     impl Likelihood for Count {

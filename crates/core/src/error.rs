@@ -1,17 +1,17 @@
 use crate::Input;
 
-/// What can go wrong while a plugin works on a frame.
+/// Failure of a plugin at a frame or at its settings.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The frame lacks an image that the plugin cannot do without.
+    /// The frame lacks an image that the plugin requires.
     #[error("needs {input}, which this log does not carry")]
     MissingImage {
         /// The kind of image.
         input: Input,
     },
-    /// A plugin asked for an image that the log carries, but no plugin of the pipeline
-    /// declares (see [`crate::Inputs`]).
+    /// A plugin requested an image that the log carries, but no plugin of the pipeline declares
+    /// (see [`crate::Inputs`]).
     #[error(
         "uses {input} without declaring them: add `Input::{input:?}` to the inputs that the plugin \
          returns"
@@ -25,7 +25,7 @@ pub enum Error {
     Model {
         /// The file as named in the config.
         path: String,
-        /// What is wrong with it.
+        /// The cause.
         why: String,
     },
     /// A setting that parses but cannot work.
@@ -36,12 +36,12 @@ pub enum Error {
         /// What it must be, and its value.
         why: String,
     },
-    /// Anything else, in a sentence.
+    /// Any other failure, as a sentence.
     #[error("{0}")]
     Other(String),
 }
 
-/// The result of a plugin's work.
+/// Result of a call to a plugin.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {

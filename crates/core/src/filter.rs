@@ -4,7 +4,7 @@ use nalgebra::{Point3, SMatrix, Vector2};
 
 use crate::{Camera, Detection, Frame, Inputs, Likelihood, Motion, Rect, Result, Sketch, TrackId};
 
-/// A person in the robot frame.
+/// State of a person in the robot frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Person {
     /// Centre of the head, m.
@@ -13,7 +13,7 @@ pub struct Person {
     pub velocity: Vector2<f64>,
 }
 
-/// What a filter believes of a person.
+/// State estimate of one person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// The mean.
@@ -25,7 +25,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// True if every number is finite and no variance is negative.
+    /// Returns true if every number is finite and no variance is negative.
     pub fn is_sane(&self) -> bool {
         self.person.position.iter().all(|v| v.is_finite())
             && self.person.velocity.iter().all(|v| v.is_finite())
@@ -35,39 +35,39 @@ impl Estimate {
     }
 }
 
-/// A detection that the association gave to a track.
+/// A detection that the association assigned to a track.
 #[derive(Clone, Copy)]
 pub struct Matched<'a> {
     /// The track.
     pub id: TrackId,
     /// Its detection.
     pub detection: &'a Detection,
-    /// Probability that the detection is of the track, above 0 and at most 1.
+    /// Probability that the detection belongs to the track, above 0 and at most 1.
     pub weight: f64,
 }
 
 impl<'a> Matched<'a> {
-    /// Returns a match without doubt.
+    /// Returns a match of weight 1.
     pub fn certain(id: TrackId, detection: &'a Detection) -> Self {
         Self { id, detection, weight: 1.0 }
     }
 }
 
-/// Everything that one frame says about the people a filter believes in.
+/// Evidence of one frame for the tracks of a filter.
 pub struct Evidence<'a> {
     /// The frame.
     pub frame: &'a Frame,
-    /// Detections with their track. A track appears once, with the weight 1, or several times
-    /// with weights whose sum is at most 1 where the associator weighs alternatives.
+    /// Detections with their track. A track appears once, with the weight 1, or several times with
+    /// weights that sum to at most 1 if the associator weighs alternatives.
     pub matched: &'a [Matched<'a>],
-    /// Detections that the association left alone.
+    /// Detections without a track.
     pub unmatched: &'a [Detection],
-    /// Weighs scenes, where the pipeline has a detector that can.
+    /// The scene likelihood, if a detector of the pipeline has one.
     pub likelihood: Option<&'a dyn Likelihood>,
 }
 
 impl<'a> Evidence<'a> {
-    /// Returns the most probable detection of each track, for filters that take one.
+    /// Returns the most probable detection of each track, for filters that use one.
     pub fn best_matches(&self) -> BTreeMap<TrackId, &'a Detection> {
         let mut best: BTreeMap<TrackId, Matched<'a>> = BTreeMap::new();
         for matched in self.matched {
@@ -80,44 +80,43 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// How the evidence of one frame supports one track.
+/// Result of the update of one track.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Support {
-    /// Normalised innovation squared and its degrees of freedom, from filters
-    /// that have an innovation. Its mean over a consistent filter's run equals
-    /// the degrees of freedom.
+    /// Normalised innovation squared and its degrees of freedom, from filters that have an
+    /// innovation. Its mean over a run of a consistent filter equals the degrees of freedom.
     pub nis: Option<(f64, u32)>,
 }
 
-/// Holds the beliefs about **all** people at once, so that a joint filter is
-/// nothing special. Filters for one person are lifted by [`PerPerson`].
+/// Estimates the states of **all** people at once, so that a joint filter needs no special
+/// interface. Filters of one person are adapted by [`PerPerson`].
 pub trait Filter: Send {
     /// Returns the inputs that the filter itself uses; most leave images to detectors.
     fn inputs(&self) -> Inputs {
         Inputs::NONE
     }
 
-    /// Starts a belief. `id` is new.
+    /// Starts the state of a new track. `id` is new.
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera);
 
-    /// Moves every belief into the robot's new frame and forward in time. `camera` is that of
-    /// the new frame.
+    /// Moves every state into the robot's new frame and forward in time. `camera` is that of the
+    /// new frame.
     fn predict(&mut self, motion: &Motion, camera: &Camera);
 
-    /// Takes in the evidence of a frame and returns whom it supports.
+    /// Updates the states with the evidence of a frame and returns the supported tracks.
     ///
     /// # Errors
     /// [`crate::Error::MissingImage`] if a scene cannot be weighed.
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>>;
 
-    /// All beliefs, as the camera would see them.
+    /// Returns the estimates of all tracks, with their regions in the image of `camera`.
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate>;
 
-    /// Forgets a person.
+    /// Discards the state of a track.
     fn stop(&mut self, id: TrackId);
 
-    /// What the filter would show of its work on a frame that it was just updated
-    /// with, by the same evidence. Asked for pictures alone.
+    /// Returns a visualisation of the last update, given the same evidence. Called for
+    /// visualisation only.
     ///
     /// # Errors
     /// As [`Filter::update`].
@@ -126,8 +125,7 @@ pub trait Filter: Send {
         Ok(Sketch::default())
     }
 
-    /// True if the filter cannot work without a [`Likelihood`]; checked when
-    /// the pipeline is built.
+    /// Returns true if the filter requires a [`Likelihood`]; checked when the pipeline is built.
     fn weighs_scenes(&self) -> bool {
         false
     }
@@ -135,45 +133,45 @@ pub trait Filter: Send {
 
 /// A filter of one person.
 pub trait PersonFilter: Send {
-    /// What is believed of a person.
+    /// State of a person.
     type Belief: Clone + Send;
 
-    /// The belief after the first sighting.
+    /// Returns the state after the first detection.
     fn start(&self, detection: &Detection) -> Self::Belief;
 
-    /// Into the robot's new frame and forward in time.
+    /// Moves a state into the robot's new frame and forward in time.
     fn predict(&self, belief: &mut Self::Belief, motion: &Motion);
 
-    /// Corrects the belief by a sighting.
+    /// Updates a state with a detection.
     fn correct(&self, belief: &mut Self::Belief, detection: &Detection, camera: &Camera)
     -> Support;
 
-    /// Merges alternatives of one person into one belief; the weights sum to 1 and the
-    /// heaviest comes first. A filter of means and covariances matches the moments of the
-    /// mixture; by default the heaviest alternative stays.
+    /// Merges alternative states of one person into one; the weights sum to 1 and the heaviest
+    /// comes first. A filter with mean and covariance matches the moments of the mixture; by
+    /// default the heaviest alternative is kept.
     fn merge(&self, alternatives: &[(f64, Self::Belief)]) -> Self::Belief {
         alternatives[0].1.clone()
     }
 
-    /// The belief in the common form.
+    /// Converts a state to an estimate.
     fn estimate(&self, belief: &Self::Belief, camera: &Camera) -> Estimate;
 }
 
-/// Makes a [`Filter`] of a [`PersonFilter`] by keeping one belief a person.
+/// Adapter from a [`PersonFilter`] to a [`Filter`] with one state per person.
 pub struct PerPerson<F: PersonFilter> {
     filter: F,
     beliefs: BTreeMap<TrackId, F::Belief>,
 }
 
 impl<F: PersonFilter> PerPerson<F> {
-    /// Lifts `filter`.
+    /// Wraps `filter`.
     pub fn new(filter: F) -> Self {
         Self { filter, beliefs: BTreeMap::new() }
     }
 }
 
 impl<F: PersonFilter> PerPerson<F> {
-    /// Corrects a belief by weighted alternatives: each detection, and none at all with the
+    /// Updates a state with weighted alternatives: each detection, and a missed detection with the
     /// weight that is missing from 1 (Bar-Shalom and Tse's probabilistic data association).
     fn correct_weighted(
         filter: &F,
@@ -192,7 +190,8 @@ impl<F: PersonFilter> PerPerson<F> {
         if missed > CERTAINTY {
             alternatives.push((missed, belief.clone()));
         }
-        // A stable sort: equal weights stay in the order of the detections.
+        // The sort is stable, so equal weights keep the order of the detections and runs are
+        // repeatable.
         alternatives.sort_by(|a, b| b.0.total_cmp(&a.0));
         *belief = filter.merge(&alternatives);
         let heaviest =
@@ -201,7 +200,7 @@ impl<F: PersonFilter> PerPerson<F> {
     }
 }
 
-/// Weights closer to 0 than this, or to 1, are those of a decision without alternatives.
+/// Difference from 0 or 1 below which a weight counts as a decision without alternatives.
 const CERTAINTY: f64 = 1e-9;
 
 impl<F: PersonFilter> Filter for PerPerson<F> {
@@ -221,6 +220,8 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
         for (id, matches) in by_track(evidence.matched) {
             let Some(belief) = self.beliefs.get_mut(&id) else { continue };
             let support = match &matches[..] {
+                // A single certain match skips the mixture, so that one-to-one associations stay
+                // exact.
                 [only] if only.weight > 1.0 - CERTAINTY => {
                     self.filter.correct(belief, only.detection, camera)
                 }
@@ -261,7 +262,7 @@ mod tests {
     use super::*;
     use crate::{Distortion, Images, Pinhole, Stamp};
 
-    /// Believes the last place, moved along by the robot.
+    /// A filter that keeps the last position, moved along by the robot.
     struct Last;
 
     impl PersonFilter for Last {

@@ -7,13 +7,13 @@ use crate::{
     RgbImage, Stamp,
 };
 
-/// The images that one moment delivered. All have the size of the camera's
-/// image, and show the same view unless the name says otherwise.
+/// Images of one moment. All have the size of the camera's image, and show the same view unless the
+/// name says otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct Images {
     /// Colour.
     pub colour: Option<Arc<RgbImage>>,
-    /// Intensity, where the log carries no colour.
+    /// Intensity, if the log carries no colour.
     pub grey: Option<Arc<GreyImage>>,
     /// Depth, registered to the colour image.
     pub depth: Option<Arc<DepthImage>>,
@@ -26,32 +26,31 @@ pub struct Images {
 pub struct RightImage {
     /// The image.
     pub image: GreyImage,
-    /// How far the right camera is from the left one, m.
+    /// Distance between the two cameras, m.
     pub baseline_m: f64,
 }
 
-/// Something computed from a frame that several plugins want; see
-/// [`Frame::derived`].
+/// Data computed from a frame and shared by several plugins; see [`Frame::derived`].
 pub trait Derived: Send + Sync + Sized + 'static {
-    /// Computes it.
+    /// Computes the data.
     ///
     /// # Errors
-    /// If the frame lacks an image that it needs.
+    /// If the frame lacks an image that the computation needs.
     fn derive(frame: &Frame) -> Result<Self>;
 }
 
-/// A derived thing, or why it could not be computed.
+/// Derived data, or the error of their computation.
 type Slot = OnceLock<Result<Arc<dyn Any + Send + Sync>>>;
 
-/// One moment of a log: images or a laser scan, the camera, and how the robot moved since
-/// the frame before. A frame is immutable; what plugins derive from it is computed
-/// once, on first use.
+/// One moment of a log: images or a laser scan, the camera, and the robot's motion since the
+/// previous frame. A frame is immutable; data that plugins derive from it are computed once, on
+/// first use.
 pub struct Frame {
     /// 1-based index of the image in the log.
     pub index: u64,
-    /// When the image was captured.
+    /// Capture time of the frame.
     pub stamp: Stamp,
-    /// The camera that all images share; [`Camera::blind`] in a frame of a laser scan alone.
+    /// The camera of all images; [`Camera::blind`] in a frame of a laser scan alone.
     pub camera: Arc<Camera>,
     /// The robot's motion since the previous frame.
     pub motion: Motion,
@@ -63,7 +62,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame.
+    /// Creates a frame without a laser scan and recorded detections.
     pub fn new(
         index: u64,
         stamp: Stamp,
@@ -84,42 +83,43 @@ impl Frame {
         }
     }
 
-    /// The same frame with what another detector recorded of it.
+    /// Returns the frame with the detections that an external detector recorded.
     pub fn with_recorded(self, recorded: Option<Vec<Recorded>>) -> Self {
         Self { recorded, ..self }
     }
 
-    /// What another detector recorded of this moment; `None` where the log is
-    /// not read for it (`[input] detections_topic`).
+    /// Returns the detections that an external detector recorded; `None` if no topic is configured
+    /// for them (`[input] detections_topic`).
     pub fn recorded(&self) -> Option<&[Recorded]> {
         self.recorded.as_deref()
     }
 
-    /// The same frame with a laser scan.
+    /// Returns the frame with a laser scan.
     pub fn with_laser(self, laser: Option<LaserScan>) -> Self {
         Self { laser, ..self }
     }
 
     /// Returns the laser scan, in the robot frame at the time of the frame; `None` without a
-    /// scanner, or where it was silent.
+    /// scanner, or if it delivered no scan.
     pub fn laser(&self) -> Option<&LaserScan> {
         self.laser.as_ref()
     }
 
-    /// Returns the laser scan of a frame that cannot do without.
+    /// Returns the laser scan, for plugins that require one.
     ///
     /// # Errors
-    /// [`Error::MissingImage`] where the log carries none.
+    /// [`Error::MissingImage`] if the log carries none.
     pub fn scan(&self) -> Result<&LaserScan> {
         self.laser.as_ref().ok_or(Error::MissingImage { input: Input::Laser })
     }
 
-    /// The same moment with a depth image.
+    /// Returns the same moment with a depth image. Derived data are not copied.
     pub fn with_depth(&self, depth: Arc<DepthImage>) -> Self {
         let images = Images { depth: Some(depth), ..self.images.clone() };
         let camera = Arc::clone(&self.camera);
         let frame = Self::new(self.index, self.stamp, camera, self.motion, images);
         let (recorded, laser) = (self.recorded.clone(), self.laser.clone());
+        // Derived data may depend on the depth image and are left behind; the grey image does not.
         Self { recorded, laser, grey: self.grey.clone(), ..frame }
     }
 
@@ -135,13 +135,14 @@ impl Frame {
         }
     }
 
-    /// Returns the same moment with the declared inputs alone; `None` if it holds no
-    /// others. Images are shared, not copied.
+    /// Returns the same moment with the declared inputs alone; `None` if it holds no others. Images
+    /// are shared, not copied.
     pub fn restricted_to(&self, inputs: &Inputs) -> Option<Self> {
         if Input::ALL.into_iter().all(|input| inputs.uses(input) || !self.holds(input)) {
             return None;
         }
         let Images { colour, grey, depth, right } = &self.images;
+        // The new frame starts without derived data, which may stem from the withheld inputs.
         let uses = |input| inputs.uses(input).then_some(());
         let images = Images {
             colour: uses(Input::Colour).and_then(|()| colour.clone()),
@@ -156,39 +157,39 @@ impl Frame {
         Some(frame.with_laser(laser).with_recorded(recorded))
     }
 
-    /// The images as they came.
+    /// Returns the images of the log.
     pub fn images(&self) -> &Images {
         &self.images
     }
 
-    /// The colour image.
+    /// Returns the colour image.
     ///
     /// # Errors
-    /// [`Error::MissingImage`] where the log carries none.
+    /// [`Error::MissingImage`] if the log carries none.
     pub fn colour(&self) -> Result<&RgbImage> {
         self.images.colour.as_deref().ok_or(Error::MissingImage { input: Input::Colour })
     }
 
-    /// The depth image: metres along the optical axis, NaN = no reading.
+    /// Returns the depth image: metres along the optical axis, NaN = no reading.
     ///
     /// # Errors
-    /// [`Error::MissingImage`] where the log carries none.
+    /// [`Error::MissingImage`] if the log carries none.
     pub fn depth(&self) -> Result<&DepthImage> {
         self.images.depth.as_deref().ok_or(Error::MissingImage { input: Input::Depth })
     }
 
-    /// The right image of a stereo pair.
+    /// Returns the right image of a stereo pair.
     ///
     /// # Errors
-    /// [`Error::MissingImage`] where the log carries none.
+    /// [`Error::MissingImage`] if the log carries none.
     pub fn right(&self) -> Result<&RightImage> {
         self.images.right.as_deref().ok_or(Error::MissingImage { input: Input::Right })
     }
 
-    /// The intensity image, made from colour where the log carries only that.
+    /// Returns the intensity image, converted from colour if the log carries only that.
     ///
     /// # Errors
-    /// [`Error::MissingImage`] where the log carries neither.
+    /// [`Error::MissingImage`] if the log carries neither.
     pub fn grey(&self) -> Result<&GreyImage> {
         if let Some(grey) = &self.images.grey {
             return Ok(grey);
@@ -198,12 +199,14 @@ impl Frame {
         Ok(self.grey.get_or_init(|| Arc::new(colour.to_grey())))
     }
 
-    /// The derived thing `T` of this frame, computed by whoever asks first and
-    /// shared with everybody after that.
+    /// Returns the derived data `T` of this frame, computed on the first call and shared
+    /// afterwards.
     ///
     /// # Errors
-    /// What [`Derived::derive`] returned.
+    /// The error of [`Derived::derive`].
     pub fn derived<T: Derived>(&self) -> Result<Arc<T>> {
+        // The lock covers the lookup alone: `derive` may itself request other derived data of the
+        // frame, which would deadlock under the lock.
         let slot = {
             let mut slots = self.derived.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(slots.entry(TypeId::of::<T>()).or_default())

@@ -1,28 +1,27 @@
 use crate::Rect;
 
-/// How many candidates one test dropped, and one of them to look at.
+/// Number of candidates that one test dropped, with one example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dropped {
-    /// The test, in the words of the plugin's README.
+    /// Name of the test, as in the plugin's README.
     pub test: &'static str,
     /// Candidates dropped by it.
     pub count: u64,
-    /// Where the last one was, if the stage knows.
+    /// Region of the last one, if known.
     pub example: Option<Rect>,
 }
 
-/// The rejection funnel: which test dropped how many candidates.
+/// Rejection funnel: the number of candidates that each test dropped.
 ///
-/// It answers the question asked most often of a person tracker, "why does it
-/// detect nobody?". Every stage writes into it; the entries keep the order in
-/// which tests first dropped something, which is the order of the stages.
+/// It explains a frame without detections. Every stage writes into it; the entries keep the order
+/// in which tests first dropped a candidate, which is the order of the stages.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Funnel {
     entries: Vec<Dropped>,
 }
 
 impl Funnel {
-    /// Records one dropped candidate and where it was.
+    /// Records one dropped candidate and its region.
     pub fn drop_at(&mut self, test: &'static str, region: Rect) {
         self.add(test, 1, Some(region));
     }
@@ -34,19 +33,19 @@ impl Funnel {
         }
     }
 
-    /// Adds everything of `other`.
+    /// Adds the entries of `other`.
     pub fn merge(&mut self, other: &Self) {
         for entry in &other.entries {
             self.add(entry.test, entry.count, entry.example);
         }
     }
 
-    /// The entries, first test first.
+    /// Returns the entries, in the order of their first drop.
     pub fn entries(&self) -> &[Dropped] {
         &self.entries
     }
 
-    /// Candidates dropped by `test`.
+    /// Returns the number of candidates dropped by `test`.
     pub fn count(&self, test: &str) -> u64 {
         self.entries.iter().find(|e| e.test == test).map_or(0, |e| e.count)
     }

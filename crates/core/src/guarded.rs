@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::{Error, Frame, Result};
 
-/// Why a frame could not be processed. A pipeline that returned one is stopped.
+/// Failure to process a frame. A pipeline that returned one is stopped.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
@@ -15,10 +15,10 @@ pub enum StepError {
         plugin: String,
         /// Index of the frame.
         frame: u64,
-        /// What it said.
+        /// The plugin's error.
         error: Error,
     },
-    /// A plugin panicked: a mistake in its code.
+    /// A plugin panicked: a defect in its code.
     #[error("frame {frame}: `{plugin}` panicked: {message}; please report this to its author")]
     Panic {
         /// The plugin.
@@ -37,8 +37,8 @@ pub enum StepError {
 }
 
 impl StepError {
-    /// Tells an image that nothing declares from one that the log lacks; `frame` is the
-    /// one that came, with the images that were held back.
+    /// Distinguishes an image that no plugin declares from one that the log lacks; `frame` is the
+    /// original frame, including the images that were withheld.
     pub fn blame_declaration(self, frame: &Frame) -> Self {
         match self {
             Self::Plugin { plugin, frame: index, error: Error::MissingImage { input } }
@@ -51,7 +51,7 @@ impl StepError {
         }
     }
 
-    /// The frame that failed.
+    /// Returns the index of the frame that failed.
     pub fn frame(&self) -> u64 {
         match self {
             Self::Plugin { frame, .. } | Self::Panic { frame, .. } | Self::Stopped { frame } => {
@@ -61,8 +61,8 @@ impl StepError {
     }
 }
 
-/// A plugin under its name. Every call goes through [`Guarded::call`], which contains the
-/// plugin's panics, names it in its errors and takes its time: in one place for all kinds.
+/// A plugin with its name. Every call goes through [`Guarded::call`], which contains the plugin's
+/// panics, names it in its errors and measures its time: in one place for all kinds.
 pub struct Guarded<P: ?Sized> {
     name: String,
     plugin: Box<P>,
@@ -70,7 +70,7 @@ pub struct Guarded<P: ?Sized> {
 }
 
 impl<P: ?Sized> Guarded<P> {
-    /// Guards a plugin.
+    /// Wraps a plugin.
     pub fn new(name: impl Into<String>, plugin: Box<P>) -> Self {
         Self { name: name.into(), plugin, spent: Duration::ZERO }
     }
@@ -80,7 +80,7 @@ impl<P: ?Sized> Guarded<P> {
         &self.name
     }
 
-    /// Returns the plugin, to be asked what cannot fail.
+    /// Returns the plugin, for calls that cannot fail.
     pub fn plugin(&self) -> &P {
         &self.plugin
     }
@@ -94,6 +94,8 @@ impl<P: ?Sized> Guarded<P> {
         frame: u64,
         call: impl FnOnce(&mut P) -> Result<T>,
     ) -> std::result::Result<T, StepError> {
+        // The assertion is sound because a pipeline stops after a panic: no plugin is called again
+        // in a state that a panic left half updated.
         let start = Instant::now();
         let outcome = catch_unwind(AssertUnwindSafe(|| call(&mut self.plugin)));
         self.spent += start.elapsed();
@@ -120,7 +122,7 @@ impl<P: ?Sized> Guarded<P> {
         self.call(frame, |plugin| Ok(ask(plugin)))
     }
 
-    /// Returns the time that the plugin worked since this was asked last, ms.
+    /// Returns the time that the plugin worked since the last call of this function, ms.
     pub fn take_ms(&mut self) -> f64 {
         std::mem::take(&mut self.spent).as_secs_f64() * 1e3
     }

@@ -1,8 +1,8 @@
 use crate::Rect;
 
-/// Places a side of a region at which its depth is read.
+/// Samples per side of a region at which its depth is read.
 const TAPS: usize = 5;
-/// Readings that a region needs to show anything.
+/// Least number of readings for a region to have a depth.
 const LEAST_READINGS: usize = 8;
 
 /// A dense image, row by row, without padding.
@@ -21,7 +21,7 @@ pub type GreyImage = Image<u8>;
 pub type DepthImage = Image<f32>;
 
 impl<P: Copy> Image<P> {
-    /// An image of one value.
+    /// Creates an image of one value.
     pub fn filled(width: usize, height: usize, value: P) -> Self {
         Self { width, height, pixels: vec![value; width * height] }
     }
@@ -40,27 +40,27 @@ impl<P: Copy> Image<P> {
         Self { width, height, pixels }
     }
 
-    /// Columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// All pixels in row order.
+    /// Returns all pixels in row order.
     pub fn pixels(&self) -> &[P] {
         &self.pixels
     }
 
-    /// All pixels in row order, to write.
+    /// Returns all pixels in row order, mutably.
     pub fn pixels_mut(&mut self) -> &mut [P] {
         &mut self.pixels
     }
 
-    /// One row.
+    /// Returns one row.
     ///
     /// # Panics
     /// If `y` is not below the height.
@@ -68,13 +68,13 @@ impl<P: Copy> Image<P> {
         &self.pixels[y * self.width..(y + 1) * self.width]
     }
 
-    /// The pixel at column `x`, row `y`, or `None` outside.
+    /// Returns the pixel at column `x`, row `y`, or `None` outside.
     pub fn get(&self, x: i64, y: i64) -> Option<P> {
         let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
         (x < self.width && y < self.height).then(|| self.pixels[y * self.width + x])
     }
 
-    /// Every pixel changed by `change`.
+    /// Returns the image with `change` applied to every pixel.
     pub fn map<Q>(&self, change: impl FnMut(P) -> Q) -> Image<Q> {
         let pixels = self.pixels.iter().copied().map(change).collect();
         Image { width: self.width, height: self.height, pixels }
@@ -82,7 +82,7 @@ impl<P: Copy> Image<P> {
 }
 
 impl RgbImage {
-    /// Luma by the weights of ITU-R BT.601, rounded.
+    /// Converts to luma by the weights of ITU-R BT.601, rounded.
     pub fn to_grey(&self) -> GreyImage {
         self.map(|[r, g, b]| {
             ((299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b) + 500) / 1000) as u8
@@ -91,10 +91,11 @@ impl RgbImage {
 }
 
 impl DepthImage {
-    /// The depth of what fills the middle of a region, m: the median of what 5x5
-    /// places in its central half show, of which a third have to show something.
+    /// Returns the depth of the surface in the middle of a region, m: the median of 5x5 samples in
+    /// its central half, of which at least 8 must be readings.
     pub fn surface_m(&self, of: &Rect) -> Option<f64> {
         let (columns, rows) = (taps(of.x, of.width), taps(of.y, of.height));
+        // An array instead of a vector saves an allocation per region.
         let mut sorted = [f32::INFINITY; TAPS * TAPS];
         let readings = rows.into_iter().flat_map(|y| self.readings(&columns, y));
         let readings = readings.filter(|metres| is_reading(*metres));
@@ -108,20 +109,21 @@ impl DepthImage {
         Some(f64::from(*median))
     }
 
-    /// What some places of a row show; NaN outside of the image.
+    /// Returns the depths of a row at the given columns; NaN outside of the image.
     fn readings(&self, columns: &[usize; TAPS], y: usize) -> [f32; TAPS] {
         let row = if y < self.height { self.row(y) } else { &[] };
         columns.map(|x| row.get(x).copied().unwrap_or(f32::NAN))
     }
 }
 
-/// Where depth is read in the central half of what begins at `from`; what is negative
-/// becomes larger than any image.
+/// Returns the sample coordinates in the central half of the interval that begins at `from`;
+/// negative ones become larger than any image.
 fn taps(from: f64, size: f64) -> [usize; TAPS] {
     std::array::from_fn(|i| (from + size * (2 + i) as f64 / 8.0) as i64 as usize)
 }
 
 fn is_reading(metres: f32) -> bool {
+    // `&` instead of `&&` avoids a branch per reading.
     (metres > 0.0) & (metres < f32::INFINITY)
 }
 
@@ -130,7 +132,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All readings, one after the other, sorted.
+    /// Collects all readings and sorts them.
     fn slow_surface_m(depth: &DepthImage, of: &Rect) -> Option<f64> {
         let mut seen: Vec<f32> = Vec::new();
         for j in 2..7 {

@@ -22,11 +22,11 @@ pub enum Input {
 }
 
 impl Input {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 5] =
         [Self::Colour, Self::Depth, Self::Right, Self::Laser, Self::Detections];
 
-    /// Returns the word for it in configs and in JSON.
+    /// Returns the name in configs and in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Colour => "colour",
@@ -50,20 +50,20 @@ impl fmt::Display for Input {
     }
 }
 
-/// How an input is used.
+/// Use of an input by a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Usage {
-    /// Never looked at.
+    /// Never used.
     #[default]
     Unused,
-    /// Used where the log has it.
+    /// Used if the log has it.
     Optional,
-    /// Nothing works without it.
+    /// Required.
     Required,
 }
 
-/// The declared inputs of a plugin or of a pipeline: which of them it uses, and which
-/// it requires. A pipeline receives those that it declares and no others.
+/// Declared inputs of a plugin or of a pipeline, used or required. A pipeline receives the inputs
+/// that it declares and no others.
 ///
 /// ```
 /// # use tagalong_core::{Input, Inputs, Usage};
@@ -79,7 +79,7 @@ pub struct Inputs([Usage; Input::ALL.len()]);
 impl Inputs {
     /// No input is used.
     pub const NONE: Self = Self([Usage::Unused; Input::ALL.len()]);
-    /// Every input is used where the log has it.
+    /// Every input is used if the log has it.
     pub const ANY: Self = Self([Usage::Optional; Input::ALL.len()]);
 
     /// Returns these inputs with `input` required.
@@ -88,8 +88,7 @@ impl Inputs {
         self
     }
 
-    /// Returns these inputs with `input` used where the log has it; one that is required
-    /// stays required.
+    /// Returns these inputs with `input` used if the log has it; a required one stays required.
     pub const fn accept(mut self, input: Input) -> Self {
         if let Usage::Unused = self.0[input as usize] {
             self.0[input as usize] = Usage::Optional;
@@ -97,7 +96,7 @@ impl Inputs {
         self
     }
 
-    /// Returns these inputs with `input` used where the log has it, if it is used.
+    /// Returns these inputs with `input` optional, if it is used at all.
     pub fn relax(mut self, input: Input) -> Self {
         let usage = &mut self.0[input as usize];
         *usage = (*usage).min(Usage::Optional);
@@ -115,7 +114,7 @@ impl Inputs {
         Self(std::array::from_fn(|i| self.0[i].max(other.0[i])))
     }
 
-    /// Returns how `input` is used.
+    /// Returns the usage of `input`.
     pub fn usage(&self, input: Input) -> Usage {
         self.0[input as usize]
     }
@@ -125,12 +124,12 @@ impl Inputs {
         self.usage(input) > Usage::Unused
     }
 
-    /// Returns true if nothing works without `input`.
+    /// Returns true if `input` is required.
     pub fn requires(&self, input: Input) -> bool {
         self.usage(input) == Usage::Required
     }
 
-    /// Returns the inputs that are used like that.
+    /// Returns the inputs with the given usage.
     pub fn of(&self, usage: Usage) -> impl Iterator<Item = Input> {
         Input::ALL.into_iter().filter(move |input| self.usage(*input) == usage)
     }
@@ -139,13 +138,13 @@ impl Inputs {
 /// The declaration of a detector: its inputs, and the roles that a config may give it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Capabilities {
-    /// The inputs that it uses.
+    /// The inputs that the detector uses.
     pub inputs: Inputs,
-    /// It finds people that are not tracked yet ([`crate::Search::Everywhere`]).
+    /// True if it finds people that are not tracked yet ([`crate::Search::Everywhere`]).
     pub discovers: bool,
-    /// It finds a tracked person again ([`crate::Search::Near`]).
+    /// True if it finds a tracked person again ([`crate::Search::Near`]).
     pub tracks: bool,
-    /// It has a [`crate::Likelihood`].
+    /// True if it has a [`crate::Likelihood`].
     pub weighs: bool,
 }
 

@@ -1,29 +1,28 @@
-//! The words of Tagalong and the four kinds of plugin.
+//! Common types of Tagalong and the traits of its six kinds of plugin.
 //!
-//! Everything that two crates of the workspace say to each other is defined
-//! here and nowhere else: a [`Frame`] goes in, a [`Detector`] finds people in
-//! it as [`Detection`]s, a [`Verifier`] doubts them, a [`Filter`] believes in
-//! [`Track`]s, a [`Controller`] steers after one of them.
+//! All types that two crates of the workspace exchange are defined here and nowhere else: a
+//! [`Detector`] finds people in a [`Frame`] as [`Detection`]s, a [`Verifier`] judges them, an
+//! [`Associator`] assigns them to [`Track`]s, a [`Filter`] estimates their states, a
+//! [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of them.
 //!
-//! # Why a person is described twice
+//! # Why a detection has a region and a position
 //!
-//! A detection is an image region *and* a place in the robot's world. Stereo,
-//! RGB-D and panorama cameras then speak the same language, and a filter may
-//! think in pixels or in metres as it likes. The [`Camera`] translates. What is
-//! not known (the height of a person seen by a panorama) is a large variance,
-//! never a missing field.
+//! A detection is an image region *and* a position in the robot frame. Stereo, RGB-D and panorama
+//! cameras therefore share one interface, and a filter may work in pixels or in metres. The
+//! [`Camera`] converts between them. An unknown coordinate (the height of a person in a panorama)
+//! has a large variance; no field is ever missing.
 //!
 //! # Conventions
 //!
 //! * SI units. Stamps are nanoseconds ([`Stamp`]).
-//! * **Robot frame**: X forward, Y left, Z up, origin on the floor midway
-//!   between the wheels (REP 103). **Camera frame**: x right, y down, z forward.
-//! * Depth is the coordinate along the optical axis, in metres; NaN is "no
-//!   reading". It is never the Euclidean range.
-//! * The position of a person is the **centre of the head**
-//!   ([`HEAD_RADIUS_M`] behind the surface that a depth camera sees).
-//! * No clocks and no global randomness in plugins: time comes from the frame,
-//!   seeds from [`Context`]. Same log, same config, same seed: same bytes.
+//! * **Robot frame**: X forward, Y left, Z up, origin on the floor midway between the wheels (REP
+//!   103). **Camera frame**: x right, y down, z forward.
+//! * Depth is the coordinate along the optical axis, in metres; NaN is "no reading". It is never
+//!   the Euclidean range.
+//! * The position of a person is the **centre of the head** ([`HEAD_RADIUS_M`] behind the surface
+//!   that a depth camera measures).
+//! * No clocks and no global randomness in plugins: time comes from the frame, seeds from
+//!   [`Context`]. Same log, same config, same seed: same bytes.
 
 mod associator;
 mod camera;
@@ -87,14 +86,14 @@ pub use trainer::{Example, Fitted, Trainer};
 
 /// Distance from the visible surface of a head to its centre, in metres.
 ///
-/// Annotated heads carry the surface; beliefs carry the centre, because that
-/// point stays where it is when the robot drives around the person.
+/// Annotated heads carry the surface; states carry the centre, because that point stays the same
+/// when the robot drives around the person.
 pub const HEAD_RADIUS_M: f64 = 0.08;
 
-/// Side of the upper-body square (head and shoulders) at the person, in metres
-/// (the upper-body template of Jafari et al., ICRA 2014, spans the same 0.57 m).
+/// Side of the upper-body square (head and shoulders) at the person, in metres (the upper-body
+/// template of Jafari et al., ICRA 2014, spans the same 0.57 m).
 pub const UPPER_BODY_SIDE_M: f64 = 0.57;
 
-/// The centre of the head lies this far below the upper edge of the
-/// upper-body square, in metres (2.5 cm of air and half a head).
+/// Distance of the head centre below the upper edge of the upper-body square, in metres (2.5 cm of
+/// air and half a head).
 pub const HEAD_BELOW_TOP_M: f64 = 0.14;

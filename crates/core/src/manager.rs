@@ -1,18 +1,18 @@
 use crate::{Detection, Motion, Track, TrackId};
 
-/// A detection that belongs to no track.
+/// A detection without a track.
 #[derive(Clone, Copy, Debug)]
 pub struct Unassociated<'a> {
-    /// The detection; its log-odds include the verifiers'.
+    /// The detection; its log-odds include those of the verifiers.
     pub detection: &'a Detection,
-    /// Log-odds by the detector alone.
+    /// Log-odds of the detector alone.
     pub detector_log_odds: f64,
-    /// True if a search of the whole image found it. A search near a track passes tests that
-    /// are meant for known people, and proves nothing about a new one.
+    /// True if a search of the whole image found it. A search near a track passes tests that are
+    /// meant for tracked people, and is no evidence for a new one.
     pub discovered: bool,
 }
 
-/// Belief that a track is a person.
+/// Confirmation and log-odds of a track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackHealth {
     /// True once the track counts as a person and is reported.
@@ -21,34 +21,34 @@ pub struct TrackHealth {
     pub log_odds: f64,
 }
 
-/// What becomes of a candidate.
+/// Decision about a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Initiation {
-    /// It starts a track.
+    /// The candidate starts a track.
     Start(TrackHealth),
-    /// It starts none; the name of the test counts in the funnel.
+    /// The candidate starts none; the name of the test is counted in the funnel.
     Drop(&'static str),
 }
 
-/// What one frame says of one track.
+/// Observation of one track in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Observation {
-    /// It started in this frame.
+    /// The track started in this frame.
     Started,
-    /// It was updated by a detection with these log-odds.
+    /// The track was updated by a detection with these log-odds.
     Detected {
         /// Log-odds of the detection, verifiers included.
         log_odds: f64,
     },
-    /// It was updated by the image itself, without a detection of its own.
+    /// The track was updated by the image itself, without a detection of its own.
     Updated,
-    /// It is visible, and was searched for in vain.
+    /// The track is visible, and was searched for without success.
     Missed,
-    /// The detector that saw it last did not work on this frame.
+    /// The detector that found the track last did not run on this frame.
     NotSearched,
-    /// It is hidden behind a nearer track.
+    /// The track is occluded by a nearer track.
     Occluded,
-    /// It is outside of the image.
+    /// The track is outside of the image.
     OutOfView,
 }
 
@@ -64,21 +64,21 @@ impl Observation {
 pub struct ObservedTrack<'a> {
     /// The track after the update; its health is that before this frame.
     pub track: &'a Track,
-    /// What the frame says of it.
+    /// Its observation in this frame.
     pub observation: Observation,
 }
 
-/// What a manager decided about one frame.
+/// Decisions of a manager about one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackChanges {
-    /// The health of each track that goes on; that of others stays as it was.
+    /// Health of each track that continues; that of others is unchanged.
     pub health: Vec<(TrackId, TrackHealth)>,
-    /// Tracks that end, and the name of the test, which counts in the funnel.
+    /// Tracks that end, each with the name of the test, which is counted in the funnel.
     pub ends: Vec<(TrackId, &'static str)>,
 }
 
-/// Decides when tracks start, count as persons, and end: an initiator and a deleter in one,
-/// because both draw on the same evidence.
+/// Decides when tracks start, are confirmed and end: an initiator and a deleter in one, because
+/// both use the same evidence.
 ///
 /// ```
 /// # use tagalong_core::*;
@@ -106,32 +106,32 @@ pub trait TrackManager: Send {
         0.0
     }
 
-    /// Advances to the next frame: places that the manager remembers move into the robot's
-    /// new frame, and grow older.
+    /// Advances to the next frame: positions that the manager remembers move into the robot's new
+    /// frame, and age.
     fn predict(&mut self, motion: &Motion) {
         let _ = motion;
     }
 
-    /// Decides whether a candidate starts the track `id`. One at the place of a track that is
-    /// seen there does not come so far.
+    /// Decides if a candidate starts the track `id`. A candidate at the position of a track that
+    /// was detected there is dropped before.
     fn initiate(&mut self, id: TrackId, candidate: &Unassociated<'_>) -> Initiation;
 
-    /// Judges all tracks of a frame, near to far. [`crate::Track::age`],
+    /// Judges all tracks of a frame, sorted from near to far. [`crate::Track::age`],
     /// [`crate::Track::unseen_s`] and the estimate are those of this frame.
     fn manage(&mut self, tracks: &[ObservedTrack<'_>]) -> TrackChanges;
 
-    /// Takes note that two tracks are of one person, and `ended` is about to stop. Returns the
-    /// health of the one that goes on, if it changes.
+    /// Records that two tracks belong to one person, and that `ended` is about to stop. Returns the
+    /// health of the track that continues, if it changes.
     fn merge(&mut self, kept: TrackId, ended: TrackId) -> Option<TrackHealth> {
         let _ = (kept, ended);
         None
     }
 
-    /// Forgets a track that ended for another reason than the manager's own.
+    /// Discards a track that ended for another reason than a decision of this manager.
     fn stop(&mut self, id: TrackId) {
         let _ = id;
     }
 
-    /// Forgets all places: after a gap or a jump of the clock the robot may be anywhere.
+    /// Discards all positions: after a gap or a jump of the clock the robot may be at any place.
     fn reset(&mut self) {}
 }

@@ -1,7 +1,7 @@
 use nalgebra::{SMatrix, SVector};
 
 /// Returns mean and covariance of a mixture of Gaussians, given as (weight, mean, covariance)
-/// with weights whose sum is 1 (moment matching).
+/// with weights that sum to 1 (moment matching).
 ///
 /// ```
 /// # use nalgebra::{Vector1, Matrix1};

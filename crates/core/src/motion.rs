@@ -1,6 +1,6 @@
 use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Vector2, Vector3};
 
-/// The robot's own motion between two image stamps, in its frame at the first.
+/// Motion of the robot between two image stamps, in its frame at the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Time between the images, s; never negative.
@@ -15,8 +15,7 @@ pub struct Motion {
     pub covariance: Matrix3<f64>,
 }
 
-/// A differential drive. The wheels are `2 * half_separation_m` apart, as in
-/// P1, section 2.3.1.
+/// A differential drive. The wheels are `2 * half_separation_m` apart, as in P1, section 2.3.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wheels {
     /// Half the distance between the wheels, m.
@@ -26,20 +25,22 @@ pub struct Wheels {
 }
 
 impl Motion {
-    /// A robot at rest for `dt` seconds.
+    /// Returns the motion of a robot at rest for `dt` seconds.
     pub fn at_rest(dt: f64) -> Self {
         Self { dt, forward: 0.0, left: 0.0, turn: 0.0, covariance: Matrix3::zeros() }
     }
 
-    /// Dead reckoning from wheel speeds held for `dt` seconds (P1, section
-    /// 2.3.1). The chord is `v dt sinc(turn / 2)`, which has no singularity at
-    /// equal speeds; the printed form divides by their difference.
+    /// Integrates wheel speeds held for `dt` seconds (P1, section 2.3.1). The chord is `v dt
+    /// sinc(turn / 2)`, which has no singularity at equal speeds; the printed form divides by their
+    /// difference.
     pub fn from_wheels(left_mps: f64, right_mps: f64, wheels: &Wheels, dt: f64) -> Self {
         let d = wheels.half_separation_m;
         let turn = (right_mps - left_mps) / (2.0 * d) * dt;
         let chord = 0.5 * (right_mps + left_mps) * dt * sinc(0.5 * turn);
         let (sin, cos) = (0.5 * turn).sin_cos();
         let (sl, sr) = (wheels.slip * left_mps * dt, wheels.slip * right_mps * dt);
+        // Derivatives of (forward, left, turn) by the travel of each wheel, at zero turn. The
+        // wheels slip independently, so their covariances add up.
         let by_left = Vector3::new(0.5, 0.0, -0.5 / d);
         let by_right = Vector3::new(0.5, 0.0, 0.5 / d);
         let covariance =
@@ -47,8 +48,8 @@ impl Motion {
         Self { dt, forward: chord * cos, left: chord * sin, turn, covariance }
     }
 
-    /// The motion from one odometry pose to the next. `sigma_fraction` is the
-    /// standard deviation of each component as a fraction of the travel.
+    /// Returns the motion from one odometry pose to the next. `sigma_fraction` is the standard
+    /// deviation of each component as a fraction of the travel.
     pub fn between(
         before: &Isometry2<f64>,
         after: &Isometry2<f64>,
@@ -62,28 +63,29 @@ impl Motion {
         let covariance = Matrix3::from_diagonal(&Vector3::new(
             travel * travel,
             travel * travel,
+            // Driving straight also disturbs the heading: by 0.1 rad per metre of position error.
             rotation * rotation + 0.01 * travel * travel,
         ));
         Self { dt, forward, left, turn, covariance }
     }
 
-    /// Where a point that is fixed in the world is after the motion.
+    /// Returns the position, after the motion, of a point that is fixed in the world.
     pub fn apply_to_point(&self, point_in_robot: Point2<f64>) -> Point2<f64> {
         self.isometry().inverse_transform_point(&point_in_robot)
     }
 
-    /// How a velocity over ground looks after the motion: it is only rotated.
+    /// Returns a velocity over ground in the axes after the motion: it is only rotated.
     pub fn apply_to_velocity(&self, velocity: Vector2<f64>) -> Vector2<f64> {
         self.isometry().inverse_transform_vector(&velocity)
     }
 
-    /// The motion as a pose change: `odom_from_robot * isometry()` is the new pose.
+    /// Returns the motion as a pose change: `odom_from_robot * isometry()` is the new pose.
     pub fn isometry(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::new(self.forward, self.left), self.turn)
     }
 
-    /// The motion followed by another one; the covariances are added in the
-    /// axes of the first (first order, for short steps).
+    /// Returns the motion followed by another one; the covariances are added in the axes of the
+    /// first (first order, for short steps).
     pub fn then(&self, next: &Self) -> Self {
         let whole = self.isometry() * next.isometry();
         Self {
@@ -96,14 +98,15 @@ impl Motion {
     }
 }
 
-/// The pose on the floor of a 3-D pose: position and heading.
+/// Projects a 3-D pose onto the floor: position and heading.
 pub fn planar_pose(pose: &Isometry3<f64>) -> Isometry2<f64> {
     let forward = pose.rotation * Vector3::x();
     Isometry2::new(Vector2::new(pose.translation.x, pose.translation.y), forward.y.atan2(forward.x))
 }
 
-/// sin(x) / x, with its Taylor branch near zero.
+/// Computes sin(x) / x, with its Taylor series near zero.
 fn sinc(x: f64) -> f64 {
+    // Below 1e-4 the next term, x^4 / 120, is less than the rounding error.
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
 }
 
@@ -143,8 +146,8 @@ mod tests {
         }
     }
 
-    /// Only the left wheel turns, and slips by 2 % of its way: so far ahead or back, and
-    /// half of that over the half separation to the side.
+    /// Only the left wheel turns, and slips by 2 % of its travel: the standard deviation forward is
+    /// half of that slip, and that of the heading is half of it over the half separation.
     #[test]
     fn what_a_wheel_slips_is_uncertain_ahead_and_in_heading() {
         let d = WHEELS.half_separation_m;
@@ -171,7 +174,7 @@ mod tests {
         }
     }
 
-    /// 3 ahead and 4 aside in the axes of the first pose, which looks to the left.
+    /// The step is 3 m forward and 4 m to the side in the axes of the first pose, which faces left.
     #[test]
     fn odometry_poses_give_the_way_between_them_and_how_sure_it_is() {
         let before = Isometry2::new(Vector2::new(1.0, 2.0), std::f64::consts::FRAC_PI_2);

@@ -1,5 +1,5 @@
-/// The name among `available` that a mistyped `wanted` most likely meant, if
-/// any is near: fewer than half of its letters differ.
+/// Returns the name among `available` that is nearest to the mistyped `wanted`, if fewer than half
+/// of its letters differ.
 ///
 /// ```
 /// use tagalong_core::nearest;
@@ -16,7 +16,7 @@ pub fn nearest<'a>(wanted: &str, available: impl IntoIterator<Item = &'a str>) -
         .map(|(_, name)| name)
 }
 
-/// Levenshtein distance, one row at a time.
+/// Computes the Levenshtein distance, one row at a time.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

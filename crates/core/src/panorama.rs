@@ -6,20 +6,18 @@ use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
 /// A camera that looks up into a conical mirror.
 ///
-/// The **camera frame** is that of any camera, with z along the common axis:
-/// the pinhole is its origin, the image's top is -y. The robot mounts it
-/// [`upright`](Self::upright): z up, the image's top towards the front, the
-/// image's right towards the left, since it shows the ceiling from below.
+/// The **camera frame** is that of any camera, with z along the common axis: the pinhole is its
+/// origin, the image's top is -y. The robot mounts it [`upright`](Self::upright): z up, the image's
+/// top towards the front, the image's right towards the left, since it shows the ceiling from
+/// below.
 ///
-/// The cone stands above the pinhole with its apex down. In the half plane of
-/// one bearing the mirror is a straight line, so all rays leave as if from the
-/// mirror image of the pinhole; over all bearings these images form a ring
-/// beyond the axis. There is no single viewpoint. A ray at the angle `phi` from
-/// the axis leaves at the elevation `phi + 90 deg - 2 * half_angle`.
+/// The cone stands above the pinhole with its apex down. In the half plane of one bearing the
+/// mirror is a straight line, so all rays leave as if from the mirror image of the pinhole; over
+/// all bearings these images form a ring beyond the axis. There is no single viewpoint. A ray at
+/// the angle `phi` from the axis leaves at the elevation `phi + 90 deg - 2 * half_angle`.
 ///
-/// In a `sensor_msgs/CameraInfo`, K holds the focal length and the centre,
-/// `distortion_model` is [`MODEL`](Self::MODEL), and D the
-/// [`coefficients`](Self::coefficients).
+/// In a `sensor_msgs/CameraInfo`, K holds the focal length and the centre, `distortion_model` is
+/// [`MODEL`](Self::MODEL), and D the [`coefficients`](Self::coefficients).
 ///
 /// ```
 /// use tagalong_core::ConicalMirror;
@@ -35,30 +33,29 @@ use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 pub struct ConicalMirror {
     /// Focal length of the camera, pixels.
     pub focal_px: f64,
-    /// Where the axis of the mirror is seen, pixels.
+    /// Pixel of the mirror's axis.
     pub centre_px: Point2<f64>,
-    /// Between the axis and the mirror's surface, rad; more than 45 degrees.
+    /// Angle between the axis and the mirror's surface, rad; more than 45 degrees.
     pub half_angle_rad: f64,
     /// Height of the apex above the pinhole, m.
     pub apex_m: f64,
-    /// Radius of the innermost circle that is of use, pixels.
+    /// Radius of the innermost usable circle, pixels.
     pub inner_px: f64,
-    /// Radius of the outermost circle that is of use, pixels.
+    /// Radius of the outermost usable circle, pixels.
     pub outer_px: f64,
 }
 
 impl ConicalMirror {
-    /// The `distortion_model` of the calibration message.
+    /// Value of `distortion_model` in the calibration message.
     pub const MODEL: &str = "conical_mirror";
 
-    /// D of the calibration message: half angle (rad), height of the apex (m),
-    /// inner and outer radius (pixels).
+    /// Returns D of the calibration message: half angle (rad), height of the apex (m), inner and
+    /// outer radius (pixels).
     pub fn coefficients(&self) -> [f64; 4] {
         [self.half_angle_rad, self.apex_m, self.inner_px, self.outer_px]
     }
 
-    /// The mirror of a calibration message; `None` where the numbers are those
-    /// of no mirror.
+    /// Returns the mirror of a calibration message; `None` if the numbers describe no valid mirror.
     pub fn from_coefficients(focal_px: f64, centre_px: [f64; 2], d: &[f64]) -> Option<Self> {
         let &[half_angle_rad, apex_m, inner_px, outer_px] = d else { return None };
         let centre_px = Point2::from(centre_px);
@@ -66,14 +63,15 @@ impl ConicalMirror {
         mirror.is_sane().then_some(mirror)
     }
 
-    /// True if all numbers are finite and light gets from the mirror into the
-    /// camera everywhere between the two circles.
+    /// Returns true if all numbers are finite and every ray between the two circles meets the
+    /// mirror.
     pub fn is_sane(&self) -> bool {
         self.centre_px.iter().all(|v| v.is_finite())
             && self.focal_px.is_finite()
             && self.focal_px > 0.0
             && self.apex_m.is_finite()
             && self.apex_m > 0.0
+            // Above 45 degrees the rays at the centre point below the horizon.
             && self.half_angle_rad > FRAC_PI_4
             && self.half_angle_rad < FRAC_PI_2
             && self.inner_px >= 0.0
@@ -81,34 +79,34 @@ impl ConicalMirror {
             && (self.outer_px / self.focal_px).atan() < self.half_angle_rad
     }
 
-    /// The pose of a camera in the middle of the robot that looks up from
-    /// `height_m` above the floor, with the image's top to the front.
+    /// Returns the pose of a camera in the middle of the robot that looks up from `height_m` above
+    /// the floor, with the image's top to the front.
     pub fn upright(height_m: f64) -> Isometry3<f64> {
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
         let turn = UnitQuaternion::from_rotation_matrix(&turn);
         Isometry3::from_parts(Vector3::new(0.0, 0.0, height_m).into(), turn)
     }
 
-    /// Radius of the ring of viewpoints, and its height above the pinhole, m.
+    /// Returns the radius of the ring of viewpoints, and its height above the pinhole, m.
     pub fn ring_m(&self) -> (f64, f64) {
         let (sine, cosine) = self.half_angle_rad.sin_cos();
         (2.0 * self.apex_m * sine * cosine, 2.0 * self.apex_m * sine * sine)
     }
 
-    /// Elevation of what is seen on a circle about the centre, rad; above the
-    /// horizon is positive.
+    /// Returns the elevation of the rays on a circle about the centre, rad; positive above the
+    /// horizon.
     pub fn elevation(&self, radius_px: f64) -> f64 {
         (radius_px / self.focal_px).atan() + FRAC_PI_2 - 2.0 * self.half_angle_rad
     }
 
-    /// The circle on which an elevation is seen, pixels: the inverse of
+    /// Returns the radius of the circle of an elevation, pixels: the inverse of
     /// [`elevation`](Self::elevation).
     pub fn radius_px(&self, elevation_rad: f64) -> f64 {
         self.focal_px * (elevation_rad - FRAC_PI_2 + 2.0 * self.half_angle_rad).tan()
     }
 
-    /// Bearing (left of the image's top is positive) and elevation of a point in
-    /// the camera frame, rad. All else follows from these two.
+    /// Returns bearing (positive to the left of the image's top) and elevation of a point in the
+    /// camera frame, rad.
     pub fn direction(&self, point_in_camera: &Point3<f64>) -> (f64, f64) {
         let (ring, height) = self.ring_m();
         let p = point_in_camera;
@@ -116,15 +114,14 @@ impl ConicalMirror {
         (bearing, (p.z - height).atan2(p.xy().coords.norm() + ring))
     }
 
-    /// The pixel of the raw image that shows a direction.
+    /// Returns the pixel of the raw image in a direction.
     pub fn raw_pixel(&self, bearing_rad: f64, elevation_rad: f64) -> Point2<f64> {
         let (sine, cosine) = bearing_rad.sin_cos();
         let radius = self.radius_px(elevation_rad);
         Point2::new(self.centre_px.x + radius * sine, self.centre_px.y - radius * cosine)
     }
 
-    /// The viewpoint on the ring and the unit vector of a direction, in the
-    /// camera frame.
+    /// Returns the viewpoint on the ring and the unit vector of a direction, in the camera frame.
     pub fn ray(&self, bearing_rad: f64, elevation_rad: f64) -> (Point3<f64>, Vector3<f64>) {
         let (ring, height) = self.ring_m();
         let outward = Vector3::new(bearing_rad.sin(), -bearing_rad.cos(), 0.0);
@@ -133,75 +130,75 @@ impl ConicalMirror {
         (from, along * outward + Vector3::new(0.0, 0.0, up))
     }
 
-    /// How far from the axis the floor is seen at an elevation by a camera
-    /// `camera_height_m` above it; `None` at and above the horizon.
+    /// Returns the distance from the axis at which a ray of an elevation meets the floor, for a
+    /// camera `camera_height_m` above it; `None` at and above the horizon.
     pub fn floor_range_m(&self, elevation_rad: f64, camera_height_m: f64) -> Option<f64> {
         let (ring, height) = self.ring_m();
         (elevation_rad < 0.0).then(|| (camera_height_m + height) / (-elevation_rad).tan() - ring)
     }
 }
 
-/// The unwrapped image of a [`ConicalMirror`]: a column per bearing, a row per
-/// elevation, both evenly spaced.
+/// Unwrapped image of a [`ConicalMirror`]: a column per bearing, a row per elevation, both evenly
+/// spaced.
 ///
-/// The middle is the front, what is left of the robot is left of it, and the
-/// seam is behind. Pixel (0, 0) is the **centre** of the upper left pixel.
+/// The middle column is the front of the robot, columns left of it show the robot's left side, and
+/// the seam is behind. Pixel (0, 0) is the **centre** of the upper left pixel.
 ///
-/// **Across the seam.** Columns are counted modulo [`columns`](Self::columns). A
-/// region starts at a column from 0 up to that and keeps its width: across the
-/// seam it continues beyond the right edge, and is never cut there.
+/// **Across the seam.** Columns are counted modulo [`columns`](Self::columns). A region starts at a
+/// column from 0 up to that and keeps its width: across the seam it continues beyond the right
+/// edge, and is never cut there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Panorama {
     /// The mirror.
     pub mirror: ConicalMirror,
-    /// Columns, once around.
+    /// Columns of the full circle.
     pub columns: usize,
     /// Rows, from the outer circle at the top to the inner one.
     pub rows: usize,
 }
 
 impl Panorama {
-    /// Highest and lowest elevation at the edges of the image, rad.
+    /// Returns highest and lowest elevation at the edges of the image, rad.
     pub fn elevations(&self) -> [f64; 2] {
         [self.mirror.outer_px, self.mirror.inner_px].map(|radius| self.mirror.elevation(radius))
     }
 
-    /// Bearing of a column, rad, left of the front is positive.
+    /// Returns the bearing of a column, rad, positive to the left of the front.
     pub fn bearing(&self, column: f64) -> f64 {
         PI - TAU * (column + 0.5) / self.columns as f64
     }
 
-    /// Column of a bearing, from -0.5 up to `columns - 0.5`.
+    /// Returns the column of a bearing, from -0.5 up to `columns - 0.5`.
     pub fn column(&self, bearing_rad: f64) -> f64 {
         let turns = ((PI - bearing_rad) / TAU).rem_euclid(1.0);
         turns * self.columns as f64 - 0.5
     }
 
-    /// Elevation of a row, rad.
+    /// Returns the elevation of a row, rad.
     pub fn elevation(&self, row: f64) -> f64 {
         let [top, bottom] = self.elevations();
         top + (bottom - top) * (row + 0.5) / self.rows as f64
     }
 
-    /// Row of an elevation; it may lie outside the image.
+    /// Returns the row of an elevation; it may lie outside the image.
     pub fn row(&self, elevation_rad: f64) -> f64 {
         let [top, bottom] = self.elevations();
         (elevation_rad - top) / (bottom - top) * self.rows as f64 - 0.5
     }
 
-    /// The pixel that shows a point of the camera frame.
+    /// Returns the pixel of a point in the camera frame.
     pub fn pixel(&self, point_in_camera: &Point3<f64>) -> Point2<f64> {
         let (bearing, elevation) = self.mirror.direction(point_in_camera);
         Point2::new(self.column(bearing), self.row(elevation))
     }
 
-    /// Where a pixel of the unwrapped image lies in the raw one.
+    /// Returns the raw pixel of a pixel of the unwrapped image.
     pub fn raw_pixel(&self, column: f64, row: f64) -> Point2<f64> {
         self.mirror.raw_pixel(self.bearing(column), self.elevation(row))
     }
 
-    /// The viewing ray of a pixel in the camera frame: its point on the axis, and
-    /// a direction that goes one metre outwards.
+    /// Returns the viewing ray of a pixel in the camera frame: its point on the axis, and a
+    /// direction that goes one metre outwards.
     pub fn ray(&self, pixel: Point2<f64>) -> (Point3<f64>, Vector3<f64>) {
         let (ring, height) = self.mirror.ring_m();
         let (bearing, slope) = (self.bearing(pixel.x), self.elevation(pixel.y).tan());
@@ -209,9 +206,8 @@ impl Panorama {
         (Point3::new(0.0, 0.0, height + ring * slope), out)
     }
 
-    /// The head centre, in the camera frame, of the person that an upper-body
-    /// square at a distance of the face from the axis shows: the inverse of
-    /// [`upper_body`](Self::upper_body).
+    /// Returns the head centre, in the camera frame, of the person in an upper-body square, given
+    /// the distance of the face from the axis: the inverse of [`upper_body`](Self::upper_body).
     pub fn head_of(&self, upper_body: &Rect, face_range_m: f64) -> Point3<f64> {
         let top = Point2::new(upper_body.centre().x, upper_body.y);
         let (axis, out) = self.ray(top);
@@ -220,23 +216,24 @@ impl Panorama {
         Point3::new(range * out.x, range * out.y, top_m - HEAD_BELOW_TOP_M)
     }
 
-    /// The upper body of a person whose head centre is at `head` in the camera
-    /// frame, as [`Camera::upper_body`](crate::Camera::upper_body) has it for
-    /// other cameras: [`UPPER_BODY_SIDE_M`] wide and high at the distance of the
-    /// face. Not cut at the seam, nor at the upper and lower edge; empty where
-    /// the head touches the axis.
+    /// Returns the upper body of a person with the head centre `head` in the camera frame, defined
+    /// as by [`Camera::upper_body`](crate::Camera::upper_body): [`UPPER_BODY_SIDE_M`] wide and high
+    /// at the distance of the face. It is cut neither at the seam nor at the upper and lower edge,
+    /// and empty if the head touches the axis.
     pub fn upper_body(&self, head: &Point3<f64>) -> Rect {
         let range = head.xy().coords.norm() - HEAD_RADIUS_M;
         if range <= 0.05 {
             return Rect::default();
         }
         let (bearing, _) = self.mirror.direction(head);
+        // Rays start on the ring of viewpoints, not on the axis, hence `range + ring`.
         let (ring, height) = self.mirror.ring_m();
         let row = |z: f64| self.row((z - height).atan2(range + ring));
         let (top, bottom) =
             (head.z + HEAD_BELOW_TOP_M, head.z + HEAD_BELOW_TOP_M - UPPER_BODY_SIDE_M);
         let half_angle = (0.5 * UPPER_BODY_SIDE_M / range).atan();
         let width = 2.0 * half_angle / TAU * self.columns as f64;
+        // A region starts within the image, and continues across the seam.
         let left = (self.column(bearing) - 0.5 * width).rem_euclid(self.columns as f64);
         Rect::new(left, row(top), width, row(bottom) - row(top))
     }
@@ -341,7 +338,7 @@ mod tests {
         let fine = mirror(67.5);
         assert!(fine.is_sane());
         assert!(ConicalMirror { inner_px: 0.0, ..fine }.is_sane());
-        // Light that leaves the cone along its side does not get into the camera.
+        // Light that leaves the cone along its side does not reach the camera.
         let outermost = fine.focal_px * fine.half_angle_rad.tan();
         for broken in [
             ConicalMirror { focal_px: 0.0, ..fine },
@@ -360,8 +357,8 @@ mod tests {
         assert!(ConicalMirror { outer_px: 0.99 * outermost, ..fine }.is_sane());
     }
 
-    /// At half a right angle the mirror images of the pinhole lie on a ring as high as
-    /// the apex and as wide.
+    /// At a half angle of 45 degrees the mirror images of the pinhole lie on a ring as high as the
+    /// apex and as wide.
     #[test]
     fn the_ring_of_viewpoints_is_the_mirror_image_of_the_pinhole() {
         let mirror = ConicalMirror { half_angle_rad: FRAC_PI_4, ..mirror(67.5) };
@@ -396,7 +393,7 @@ mod tests {
         assert!((pixel - Point2::new(241.3 + 8.0, 238.0)).norm() < 1e-9, "{pixel}");
     }
 
-    /// The face of somebody 2.08 m away is at 2 m, where the square is 0.57 m wide.
+    /// The face of a person 2.08 m away is at 2 m, where the square is 0.57 m wide.
     #[test]
     fn the_square_is_as_wide_as_the_template_at_the_face() {
         let panorama = panorama();

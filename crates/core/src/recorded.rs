@@ -2,13 +2,13 @@ use nalgebra::Point3;
 
 use crate::Rect;
 
-/// Somebody whom a detector outside of Tagalong saw, as its log tells it.
+/// A detection by a detector outside of Tagalong, as recorded in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Recorded {
-    /// The box in the image, pixels; absent for detections in space.
+    /// Box in the image, pixels; absent for 3-D detections.
     pub region: Option<Rect>,
     /// Centre of the head in the robot frame, m; absent for boxes.
     pub head: Option<Point3<f64>>,
-    /// How sure the detector was, on its own scale.
+    /// Confidence on the detector's own scale.
     pub score: f64,
 }

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
 
-/// From the centre of a head to its top, m.
+/// Distance from the centre of a head to its top, m.
 const HALF_HEAD_M: f64 = 0.115;
 
 /// An upright rectangle in an image, in pixels. `x`, `y` is the upper left
@@ -21,37 +21,37 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// A rectangle from its upper left corner and its size.
+    /// Creates a rectangle from its upper left corner and its size.
     pub const fn new(x: f64, y: f64, width: f64, height: f64) -> Self {
         Self { x, y, width, height }
     }
 
-    /// Right edge.
+    /// Returns the right edge.
     pub fn right(&self) -> f64 {
         self.x + self.width
     }
 
-    /// Lower edge.
+    /// Returns the lower edge.
     pub fn bottom(&self) -> f64 {
         self.y + self.height
     }
 
-    /// Area in square pixels.
+    /// Returns the area in square pixels.
     pub fn area(&self) -> f64 {
         self.width * self.height
     }
 
-    /// Middle of the rectangle.
+    /// Returns the middle of the rectangle.
     pub fn centre(&self) -> Point2<f64> {
         Point2::new(self.x + 0.5 * self.width, self.y + 0.5 * self.height)
     }
 
-    /// True if the point lies inside (right and lower edge excluded).
+    /// Returns true if the point lies inside (right and lower edge excluded).
     pub fn contains(&self, point: Point2<f64>) -> bool {
         self.x <= point.x && point.x < self.right() && self.y <= point.y && point.y < self.bottom()
     }
 
-    /// The common part; of zero size where there is none.
+    /// Returns the common part; of zero size if there is none.
     pub fn intersection(&self, other: &Self) -> Self {
         let x = self.x.max(other.x);
         let y = self.y.max(other.y);
@@ -60,7 +60,7 @@ impl Rect {
         Self { x, y, width, height }
     }
 
-    /// Intersection over union, 0 to 1; 0 when both are empty.
+    /// Returns the intersection over union, 0 to 1; 0 when both are empty.
     ///
     /// ```
     /// use tagalong_core::Rect;
@@ -74,20 +74,20 @@ impl Rect {
         if union > 0.0 { common / union } else { 0.0 }
     }
 
-    /// The part inside an image of the given size.
+    /// Returns the part inside an image of the given size.
     pub fn clipped(&self, width: usize, height: usize) -> Self {
         self.intersection(&Self::new(0.0, 0.0, width as f64, height as f64))
     }
 
-    /// Grown by the fraction `by` of each side, about the same centre.
+    /// Returns the rectangle grown by the fraction `by` of each side, about the same centre.
     pub fn inflated(&self, by: f64) -> Self {
         let (dx, dy) = (self.width * by, self.height * by);
         Self::new(self.x - 0.5 * dx, self.y - 0.5 * dy, self.width + dx, self.height + dy)
     }
 
-    /// The upper-body square of a standing person of this height, in metres,
-    /// whose whole body fills this rectangle: for boxes of detectors and data
-    /// sets that know whole bodies only.
+    /// Returns the upper-body square of a standing person of the given height, in metres, if this
+    /// rectangle encloses the whole body: for boxes of detectors and data sets that annotate whole
+    /// bodies only.
     pub fn upper_body_of_standing(&self, height_m: f64) -> Self {
         let px_per_m = self.height / height_m;
         let side = UPPER_BODY_SIDE_M * px_per_m;
@@ -95,7 +95,7 @@ impl Rect {
         Self::new(self.centre().x - 0.5 * side, self.y - above, side, side)
     }
 
-    /// True if all four numbers are finite and the size is not negative.
+    /// Returns true if all four numbers are finite and the size is not negative.
     pub fn is_sane(&self) -> bool {
         [self.x, self.y, self.width, self.height].iter().all(|v| v.is_finite())
             && self.width >= 0.0

@@ -12,7 +12,7 @@ use crate::{
 pub enum Kind {
     /// Finds people in images.
     Detector,
-    /// Judges what a detector found.
+    /// Verifies detections.
     Verifier,
     /// Decides which detection belongs to which track.
     Associator,
@@ -20,7 +20,7 @@ pub enum Kind {
     Filter,
     /// Decides when tracks start, are confirmed, and end.
     Manager,
-    /// Steers after one of them.
+    /// Steers after the target.
     Controller,
 }
 
@@ -45,7 +45,7 @@ impl Kind {
     }
 }
 
-/// What a plugin may know when it is built.
+/// Information available to a plugin when it is built.
 #[derive(Clone, Debug)]
 pub struct Context {
     /// The seed of the run, already mixed with the plugin's place in the config.
@@ -57,8 +57,8 @@ pub struct Context {
 }
 
 impl Context {
-    /// A learned model: that of `file`, a path relative to the config, or the
-    /// plugin's own where the config names no file.
+    /// Returns a learned model: that of `file`, a path relative to the config, or the plugin's
+    /// built-in one if the config names no file.
     ///
     /// # Errors
     /// [`Error::Model`] for a file that cannot be read or that `parse` refuses.
@@ -90,13 +90,13 @@ enum Maker {
     Controller(Build<Box<dyn Controller>>),
 }
 
-/// One line of `tagalong list`, and what `tagalong config` prints.
+/// Entry of `tagalong list`, and output of `tagalong config`.
 pub struct PluginInfo {
     /// The name used in configs.
     pub name: &'static str,
-    /// What kind of plugin it is.
+    /// Kind of plugin.
     pub kind: Kind,
-    /// One line of what it does.
+    /// Description in one line.
     pub summary: &'static str,
     defaults: fn() -> String,
     schema: fn() -> serde_json::Value,
@@ -104,19 +104,19 @@ pub struct PluginInfo {
 }
 
 impl PluginInfo {
-    /// Its default settings as commented TOML.
+    /// Returns the default settings as commented TOML.
     pub fn defaults(&self) -> String {
         (self.defaults)()
     }
 
-    /// The JSON schema of its settings.
+    /// Returns the JSON schema of the settings.
     pub fn schema(&self) -> serde_json::Value {
         (self.schema)()
     }
 }
 
-/// All plugins of a program. There is no life before `main`: each plugin crate
-/// has a `register` function, and the program calls it.
+/// Registry of all plugins of a program. No code runs before `main`: each plugin crate has a
+/// `register` function, and the program calls it.
 ///
 /// ```
 /// # use tagalong_core::*;
@@ -223,9 +223,8 @@ impl Registry {
         self.add::<C>(name, Kind::Controller, summary, maker);
     }
 
-    /// Registers who makes a model file, under the name of the plugin that reads
-    /// it, or of the model where that is not all of the plugin; `C` are the
-    /// settings of the plugin.
+    /// Registers a trainer of a model file, under the name of the plugin that reads it, or of the
+    /// model if that is only a part of the plugin; `C` are the settings of the plugin.
     ///
     /// # Panics
     /// If there is a trainer of this name already.
@@ -249,6 +248,7 @@ impl Registry {
             name,
             kind,
             summary,
+            // Functions rather than values: most runs need neither defaults nor schema.
             defaults: commented_defaults::<C>,
             schema: || schemars::schema_for!(C).to_value(),
             maker,
@@ -257,15 +257,15 @@ impl Registry {
         assert!(previous.is_none(), "two plugins are called `{name}`");
     }
 
-    /// All plugins, by name.
+    /// Returns all plugins, by name.
     pub fn plugins(&self) -> impl Iterator<Item = &PluginInfo> {
         self.plugins.values()
     }
 
-    /// The plugin called `name`.
+    /// Returns the plugin called `name`.
     ///
     /// # Errors
-    /// If there is none: names the nearest one and all that there are.
+    /// If there is none: names the nearest one and all available ones.
     pub fn find(&self, name: &str) -> std::result::Result<&PluginInfo, ConfigError> {
         self.plugins.get(name).ok_or_else(|| {
             ConfigError::new(unknown("plugin", name, self.plugins.keys().copied().collect()))
@@ -371,7 +371,7 @@ impl Registry {
     /// Builds the trainer of a plugin from the plugin's settings.
     ///
     /// # Errors
-    /// A plugin that cannot be trained (names those that can), or bad settings.
+    /// A plugin that cannot be trained (lists those that can), or bad settings.
     pub fn build_trainer(
         &self,
         name: &str,
@@ -437,7 +437,7 @@ where
     })
 }
 
-/// "unknown thing `x`; did you mean `y`? available: a, b".
+/// Formats "unknown thing `x`; did you mean `y`? available: a, b".
 fn unknown(thing: &str, name: &str, available: Vec<&str>) -> String {
     let hint = nearest(name, available.iter().copied())
         .map_or(String::new(), |better| format!(" did you mean `{better}`?"));
@@ -513,7 +513,7 @@ mod tests {
         Context { seed: 0, base_dir: PathBuf::new(), wheels }
     }
 
-    /// A plugin of each kind, which finds, believes and moves nothing.
+    /// A plugin of each kind that does nothing.
     struct Idle;
 
     impl Detector for Idle {
@@ -643,7 +643,7 @@ mod tests {
         #[derive(Default, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         struct Height {
-            /// How tall, m.
+            /// Height, m.
             height_m: f64,
         }
         let mut registry = Registry::default();

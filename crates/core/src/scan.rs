@@ -2,21 +2,21 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
-/// One sweep of a laser scanner, as seen from the robot at the time of its frame.
+/// One sweep of a laser scanner, in the robot frame at the time of its frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaserScan {
     /// Pose of the scanner in the robot frame: x forward, y left, z up.
     pub robot_from_scanner: Isometry3<f64>,
     /// Angle from one ray to the next, rad; positive from right to left.
     pub increment_rad: f64,
-    /// Where rays met something, robot frame, m, in the order of the rays.
+    /// Points at which rays were reflected, robot frame, m, in the order of the rays.
     pub points: Arc<[Point3<f64>]>,
-    /// The number of the ray of each point: neighbours differ by one.
+    /// Ray number of each point: neighbours differ by one.
     pub rays: Arc<[u32]>,
 }
 
 impl LaserScan {
-    /// Returns a scan of points whose rays are not known: each is the neighbour of the next.
+    /// Returns a scan of points without known rays: consecutive points count as neighbours.
     pub fn of_points(points: impl Into<Arc<[Point3<f64>]>>) -> Self {
         let points = points.into();
         let rays = (0..points.len() as u32).collect();

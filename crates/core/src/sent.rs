@@ -2,43 +2,44 @@ use std::collections::VecDeque;
 
 use crate::{Motion, WheelSpeeds, Wheels};
 
-/// No more commands are remembered, however quickly the frames come.
+/// Largest number of remembered commands, at any frame rate.
 const MOST: usize = 256;
 
-/// The commands that the wheels have not answered to yet, for controllers that
-/// steer for where the robot is going to be.
+/// Commands that the wheels have not executed yet, for controllers that compensate for latency.
 #[derive(Clone, Debug)]
 pub struct Sent {
     latency_s: f64,
-    /// Commands and for how long each is the newest, s; newest first.
+    /// Commands and the time for which each is the newest, s; newest first.
     commands: VecDeque<(WheelSpeeds, f64)>,
 }
 
 impl Sent {
-    /// None yet; the wheels answer after `latency_s`.
+    /// Creates an empty history; the wheels respond after `latency_s`.
     pub fn new(latency_s: f64) -> Self {
         Self { latency_s, commands: VecDeque::new() }
     }
 
-    /// The newest command is `dt` older than the next one will be.
+    /// Adds `dt` to the time for which the newest command has been the newest.
     pub fn grow_older(&mut self, dt: f64) {
         if let Some((_, held_s)) = self.commands.front_mut() {
             *held_s += dt;
         }
     }
 
-    /// The newest command.
+    /// Adds the newest command.
     pub fn add(&mut self, command: WheelSpeeds) {
         self.commands.push_front((command, 0.0));
         self.commands.truncate(MOST);
     }
 
-    /// What the robot is going to do before it answers to the next command, and
-    /// forgets what it has done.
+    /// Returns the predicted motion of the robot until it responds to the next command, and
+    /// discards the commands that have been executed.
     pub fn forecast(&mut self, wheels: &Wheels) -> Motion {
         let mut to_come = Motion::at_rest(0.0);
         let mut known = 0;
+        // Commands are stored newest first, so each older one is prepended to the motion so far.
         for (command, held_s) in &self.commands {
+            // Of the oldest pending command only the rest of the latency is still to be driven.
             let dt = held_s.min(self.latency_s - to_come.dt);
             if to_come.dt >= self.latency_s {
                 break;
@@ -62,7 +63,7 @@ mod tests {
         WheelSpeeds { left: speed, right: speed }
     }
 
-    /// Commands that were each held for a tenth of a second, oldest first.
+    /// Builds a history of commands that were each held for a tenth of a second, oldest first.
     fn sent(latency_s: f64, speeds: &[f64]) -> Sent {
         let mut sent = Sent::new(latency_s);
         for speed in speeds {
@@ -88,7 +89,7 @@ mod tests {
         assert_eq!(Sent::new(0.3).forecast(&WHEELS), Motion::at_rest(0.3));
     }
 
-    /// First ahead, then a turn on the spot: the order decides where the robot is.
+    /// The robot drives forward, then turns on the spot: the order determines its position.
     #[test]
     fn older_commands_are_driven_first() {
         let mut sent = sent(0.2, &[1.0]);

@@ -7,32 +7,32 @@ use toml::{Spanned, de::DeValue};
 
 use crate::{Error, nearest};
 
-/// A TOML value that remembers where in the file it stood.
+/// A TOML value with its place in the file.
 pub type Value<'a> = Spanned<DeValue<'a>>;
 
-/// The settings of a plugin: a plain struct with documented fields, defaults,
-/// and `#[serde(default, deny_unknown_fields)]`.
+/// Settings of a plugin: a plain struct with documented fields, defaults, and `#[serde(default,
+/// deny_unknown_fields)]`.
 pub trait Settings: Default + Serialize + DeserializeOwned + JsonSchema + 'static {}
 
 impl<T: Default + Serialize + DeserializeOwned + JsonSchema + 'static> Settings for T {}
 
-/// A mistake in a config, with its place in the text.
+/// An error in a config, with its place in the text.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct ConfigError {
-    /// What is wrong and what would be right.
+    /// Description of the error and of valid values.
     pub message: String,
     /// Byte range in the text; `None` if it concerns the file as a whole.
     pub span: Option<ops::Range<usize>>,
 }
 
 impl ConfigError {
-    /// An error without a place.
+    /// Creates an error without a place.
     pub fn new(message: impl Into<String>) -> Self {
         Self { message: message.into(), span: None }
     }
 
-    /// The same error at `span`, unless it already has a place.
+    /// Returns the error at `span`, unless it already has a place.
     pub fn or_at(mut self, span: Option<ops::Range<usize>>) -> Self {
         self.span = self.span.or(span);
         self
@@ -47,8 +47,8 @@ impl ConfigError {
         Self { message: error.to_string(), span: Some(named.unwrap_or_else(|| value.span())) }
     }
 
-    /// The error as a person wants to read it: file, line, column, the line
-    /// itself with the place marked.
+    /// Formats the error for the terminal: file, line, column, and the line itself with the place
+    /// marked.
     pub fn render(&self, file: &str, text: &str) -> String {
         let Some(span) = self.span.clone().filter(|s| s.start <= text.len()) else {
             return format!("{file}: {}", self.message);
@@ -57,6 +57,7 @@ impl ConfigError {
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
         let source = text.lines().nth(line - 1).unwrap_or_default();
+        // A span may cover several lines; the marks end with the line that is shown.
         let room = source.chars().count().saturating_sub(column - 1).max(1);
         let marks = text.get(span).map_or(1, |s| s.chars().count()).clamp(1, room);
         let number = line.to_string();
@@ -226,6 +227,7 @@ pub fn parse_settings<T: Settings>(value: Option<Value<'_>>) -> Result<T, Config
 /// Adds "did you mean" to serde's "unknown field `a`, expected one of `b`, `c`".
 fn with_suggestion(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
+    // The unknown name is quoted first, then the valid ones.
     let unknown = if message.starts_with("unknown ") { quoted.next() } else { None };
     match unknown.and_then(|name| nearest(name, quoted)) {
         Some(better) => format!("{message}; did you mean `{better}`?"),
@@ -233,7 +235,7 @@ fn with_suggestion(message: &str) -> String {
     }
 }
 
-/// The defaults of `T` as TOML, each key under its documentation.
+/// Returns the defaults of `T` as TOML, each key under its documentation.
 pub fn commented_defaults<T: Settings>() -> String {
     let schema = schemars::schema_for!(T).to_value();
     let mut out = String::new();
@@ -254,8 +256,10 @@ fn write_table(
     let mut keys: Vec<&str> = table.keys().map(String::as_str).collect();
     if let Some(declared) = schema["properties"].as_object() {
         let order: Vec<&str> = declared.keys().map(String::as_str).collect();
+        // A TOML table is sorted by name, but the schema has the order of the fields.
         keys.sort_by_key(|key| order.iter().position(|name| name == key));
     }
+    // In TOML the plain keys of a table must stand before its subtables.
     let (tables, plain): (Vec<_>, Vec<_>) =
         keys.into_iter().partition(|key| table[*key].is_table());
     for key in plain {
@@ -288,7 +292,7 @@ fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
-/// A table that may be left out, as a comment, with the defaults of its keys.
+/// Writes a table that may be left out, as a comment, with the defaults of its keys.
 fn write_absent_table(
     out: &mut String,
     name: &str,
@@ -310,11 +314,12 @@ fn absent<'a>(schema: &'a serde_json::Value, table: &toml::Table) -> Vec<&'a str
     declared.map(String::as_str).filter(|key| !table.contains_key(*key)).collect()
 }
 
-/// The description of a property, and the schema that a reference points to.
+/// Returns the description of a property, and the schema that a reference points to.
 fn resolve<'a>(
     property: &'a serde_json::Value,
     root: &'a serde_json::Value,
 ) -> (Option<&'a str>, &'a serde_json::Value) {
+    // The schema of an optional table is `anyOf` a reference and null.
     let any = property["anyOf"].as_array().into_iter().flatten();
     let mut references = std::iter::once(property).chain(any).map(|p| &p["$ref"]);
     let target = references

@@ -2,44 +2,43 @@ use nalgebra::Point2;
 
 use crate::{Rect, TrackId};
 
-/// What a plugin shows of its inner workings. It is made for pictures alone, and
-/// only where somebody asks for it.
+/// Visualisation of a plugin's inner state. It is made on request only.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sketch {
-    /// Single places in the image: particles.
+    /// Points in the image: particles.
     pub points: Vec<SketchPoint>,
-    /// Bodies as they are imagined, as far as nobody nearer hides them.
+    /// Hypothetical bodies, without the parts that nearer bodies occlude.
     pub silhouettes: Vec<Silhouette>,
-    /// Maps that are no part of the image.
+    /// Maps that are not part of the image.
     pub maps: Vec<SketchMap>,
 }
 
-/// A place in the image at which somebody may be.
+/// Possible position of a person in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SketchPoint {
-    /// Who.
+    /// Track of the person.
     pub id: TrackId,
-    /// Where, pixels.
+    /// Position, pixels.
     pub pixel: Point2<f64>,
-    /// How much it counts beside the others, 0 to 1.
+    /// Weight relative to the other points, 0 to 1.
     pub weight: f64,
 }
 
-/// Somebody's imagined body.
+/// Silhouette of a hypothetical body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Silhouette {
-    /// Who.
+    /// Track of the person.
     pub id: TrackId,
-    /// The body as runs of rows, pixels.
+    /// Body as horizontal runs, pixels.
     pub runs: Vec<Rect>,
 }
 
-/// A map in shades, row after row.
+/// A map in shades of grey, row after row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SketchMap {
-    /// What it shows.
+    /// Title of the map.
     pub title: String,
-    /// Values of a row.
+    /// Number of values per row.
     pub columns: usize,
     /// Values, 0 (dark) to 1 (bright).
     pub values: Vec<f64>,

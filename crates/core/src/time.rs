@@ -1,16 +1,16 @@
 use std::fmt;
 
-/// A moment: nanoseconds since the epoch of the log.
+/// Point in time: nanoseconds since the epoch of the log.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug)]
 pub struct Stamp(u64);
 
 impl Stamp {
-    /// A stamp from nanoseconds.
+    /// Creates a stamp from nanoseconds.
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
-    /// Nanoseconds since the epoch.
+    /// Returns the nanoseconds since the epoch.
     pub const fn nanos(self) -> u64 {
         self.0
     }
@@ -27,8 +27,9 @@ impl Stamp {
         (i128::from(self.0) - i128::from(earlier.0)) as f64 * 1e-9
     }
 
-    /// The stamp `seconds` later (earlier if negative), saturating at both ends.
+    /// Returns the stamp `seconds` later (earlier if negative), saturating at both ends.
     pub fn plus_seconds(self, seconds: f64) -> Self {
+        // The sum may leave the range of `u64` on both sides.
         let nanos = i128::from(self.0) + (seconds * 1e9) as i128;
         Self(nanos.clamp(0, i128::from(u64::MAX)) as u64)
     }

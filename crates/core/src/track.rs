@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Estimate;
 
-/// The number of a track, unique within a run and never used again.
+/// Number of a track, unique within a run and never reused.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
 pub struct TrackId(pub u32);
 
@@ -14,22 +14,22 @@ impl fmt::Display for TrackId {
     }
 }
 
-/// A person as the pipeline knows them in this frame.
+/// State of a tracked person in this frame.
 #[derive(Clone, Debug)]
 pub struct Track {
-    /// Its number.
+    /// Number of the track.
     pub id: TrackId,
-    /// Where the person is believed to be.
+    /// State estimate of the person.
     pub estimate: Estimate,
-    /// Supported by evidence in this frame; otherwise predicted only.
+    /// True if evidence of this frame supports the track; otherwise it is predicted only.
     pub seen: bool,
-    /// Hidden behind a nearer tracked person in this frame.
+    /// True if a nearer tracked person hides the track in this frame.
     pub occluded: bool,
-    /// Seen often enough to be reported.
+    /// True once the track is reported.
     pub confirmed: bool,
     /// Frames since the track started.
     pub age: u32,
-    /// Seconds since it was last seen.
+    /// Seconds since the track was last supported by evidence.
     pub unseen_s: f64,
     /// Log-odds that this is a person, smoothed over the track.
     pub score: f64,

@@ -1,42 +1,40 @@
 use crate::{Detection, Frame, Result};
 
-/// What is known of a candidate that a trainer is shown.
+/// Label of a training candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Example {
-    /// Whether it is a person.
+    /// True for a person.
     pub is_person: bool,
-    /// Examples of one scene, subject or photograph share a group. A group is
-    /// never split between what is fitted and what is held out, because its
-    /// members resemble each other more than anything that is yet to be seen.
+    /// Group shared by the examples of one scene, subject or photograph. A group is never split
+    /// between the fitted and the held-out part, because its members resemble each other more than
+    /// unseen data.
     pub group: u64,
 }
 
-/// What a trainer made of its examples.
+/// Result of a fit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fitted {
-    /// The content of the model file, as the plugin reads it.
+    /// Content of the model file, in the plugin's format.
     pub model: String,
-    /// What the model's card says of the fit: counts, and the table of what was
-    /// tried with its cross-validated figures.
+    /// Figures for the model card: counts, and the table of the tried settings with their
+    /// cross-validated figures.
     pub figures: toml::Table,
 }
 
-/// Makes the model file of a plugin from labelled candidates
-/// ([`crate::Registry::trainer`]).
+/// Trains the model file of a plugin from labelled candidates ([`crate::Registry::trainer`]).
 ///
-/// Candidates come as a stream, so features are computed at once and frames are
-/// not kept. A trainer may be fitted, shown more, and fitted again: that is how
-/// a verifier learns from its own mistakes. The settings of a plugin that can
-/// be trained name the file under the key `model`.
+/// Candidates come as a stream, so features are computed at once and frames are not kept. A trainer
+/// may be fitted, given more examples, and fitted again: this allows a verifier to be trained on
+/// its own errors. The settings of a trainable plugin name the file under the key `model`.
 pub trait Trainer: Send {
-    /// Takes in one labelled candidate.
+    /// Adds one labelled candidate.
     ///
     /// # Errors
-    /// [`crate::Error::MissingImage`] if the frame lacks what the plugin needs.
+    /// [`crate::Error::MissingImage`] if the frame lacks an input that the plugin needs.
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()>;
 
-    /// Fits a model to all examples so far. The same examples in the same order
-    /// give the same bytes. `progress` is told the finished fraction, 0 to 1.
+    /// Fits a model to all examples so far. The same examples in the same order give the same
+    /// bytes. `progress` receives the finished fraction, 0 to 1.
     ///
     /// # Errors
     /// If the examples do not suffice: one class only, too few groups.

@@ -1,47 +1,49 @@
-//! Gentle AdaBoost: regression trees of few questions, one after the other, each
-//! fitted to what the sum of those before it gets wrong (J. Friedman, T. Hastie
-//! and R. Tibshirani, *Additive logistic regression*, Annals of Statistics 28,
-//! 2000, algorithm 4).
+//! Gentle AdaBoost: small regression trees, each fitted to the residual of the sum of those before
+//! it (J. Friedman, T. Hastie and R. Tibshirani, *Additive logistic regression*, Annals of
+//! Statistics 28, 2000, algorithm 4).
 
-/// Values of a feature are told apart this finely.
+/// Number of levels to which the values of a feature are quantised.
 const LEVELS: usize = 256;
-/// The samples that carry this part of the weight decide; the rest is done with.
+/// Fraction of the total weight that is kept by weight trimming; lighter samples do not take part
+/// in the choice of a question.
 const DECISIVE: f32 = 0.98;
 
-/// Values of features, feature by feature, each as one of 256 levels.
+/// Quantised values of features, feature by feature.
 #[derive(Clone, Debug, Default)]
 pub struct Levels {
     samples: usize,
     levels: Vec<u8>,
-    /// Value of level 0, and what a level is worth.
+    /// Value of level 0, and width of a level.
     scale: Vec<(f32, f32)>,
 }
 
 impl Levels {
-    /// No features yet, of so many samples.
+    /// Creates a table of so many samples and no features.
     pub fn new(samples: usize) -> Self {
         Self { samples, ..Self::default() }
     }
 
-    /// Features so far.
+    /// Returns the number of features so far.
     pub fn features(&self) -> usize {
         self.scale.len()
     }
 
-    /// Samples.
+    /// Returns the number of samples.
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// Adds a feature: its value in each sample. Levels reach three standard
-    /// deviations to either side of the mean; what is beyond is at the end.
+    /// Adds a feature: its value in each sample. The levels reach three standard deviations to
+    /// either side of the mean; values beyond are clamped to the ends.
     pub fn push(&mut self, values: impl Iterator<Item = f32> + Clone) {
         let count = self.samples.max(1) as f32;
         let mean = values.clone().sum::<f32>() / count;
         let variance = values.clone().map(|v| (v - mean).powi(2)).sum::<f32>() / count;
+        // The addend keeps the levels of a constant feature from having no width.
         let spread = 3.0 * variance.sqrt() + 1e-6;
         let (least, step) = (mean - spread, 2.0 * spread / LEVELS as f32);
         self.scale.push((least, step));
+        // The cast saturates, so that outliers land in the first or last level.
         self.levels.extend(values.take(self.samples).map(|v| ((v - least) / step) as u8));
         self.levels.resize(self.scale.len() * self.samples, 0);
     }
@@ -50,34 +52,34 @@ impl Levels {
         &self.levels[feature * self.samples..(feature + 1) * self.samples]
     }
 
-    /// Samples up to this level are below this value.
+    /// Returns the upper bound of the values in a level.
     fn threshold(&self, feature: usize, level: usize) -> f32 {
         let (least, step) = self.scale[feature];
         least + step * (level + 1) as f32
     }
 }
 
-/// Where a question leads to.
+/// Continuation of a tree after a question.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
-    /// Another question of the tree.
+    /// Index of another question of the tree.
     Question(usize),
-    /// The end, with this value, -1 to 1.
+    /// End of the path, with this value, -1 to 1.
     Leaf(f32),
 }
 
-/// A question of a tree.
+/// Node of a tree: a comparison of one feature with a threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Question {
-    /// Number of the feature.
+    /// Index of the feature.
     pub feature: usize,
-    /// Is its value below this?
+    /// Threshold: the answer is yes for values below it.
     pub below: f32,
-    /// If yes, if no.
+    /// Continuations for yes and for no.
     pub next: [Next; 2],
 }
 
-/// Boosting in progress: weights of the samples, and sums of the trees so far.
+/// State of the boosting: the weights of the samples, and the sums of the trees so far.
 pub struct Boosting<'a> {
     table: &'a Levels,
     truth: Vec<f32>,
@@ -86,8 +88,8 @@ pub struct Boosting<'a> {
 }
 
 impl<'a> Boosting<'a> {
-    /// Begins: both classes weigh the same. `is_person` says of each sample of the
-    /// table which class it is of.
+    /// Starts with equal total weights of both classes. `is_person` is the class of each sample of
+    /// the table.
     pub fn new(table: &'a Levels, is_person: impl Iterator<Item = bool>) -> Self {
         let sign = |is: bool| if is { 1.0 } else { -1.0 };
         let truth: Vec<f32> =
@@ -98,13 +100,13 @@ impl<'a> Boosting<'a> {
         Self { table, weights, sums: vec![0.0; truth.len()], truth }
     }
 
-    /// The sum of the trees so far, of each sample.
+    /// Returns the sum of the trees so far, for each sample.
     pub fn sums(&self) -> &[f32] {
         &self.sums
     }
 
-    /// Adds a tree with `depth` questions from its root to a leaf, about some of
-    /// the `features`. The first question is the root.
+    /// Adds a tree with `depth` questions from its root to a leaf, over the given `features`. The
+    /// first question is the root.
     pub fn grow(&mut self, features: &[usize], depth: usize) -> Vec<Question> {
         let everyone: Vec<u32> = (0..self.truth.len() as u32).collect();
         let decisive = self.decisive();
@@ -121,7 +123,7 @@ impl<'a> Boosting<'a> {
         tree
     }
 
-    /// The heaviest samples, in order.
+    /// Returns the heaviest samples, in the order of the table.
     fn decisive(&self) -> Vec<u32> {
         let mut sorted = self.weights.clone();
         sorted.sort_by(|a, b| b.total_cmp(a));
@@ -144,8 +146,8 @@ struct Growing<'a> {
 }
 
 impl Growing<'_> {
-    /// Adds a question that is fitted to the samples `chosen`, and further ones
-    /// below it; `all` samples that get there are given their value.
+    /// Adds a question that is fitted to the samples `chosen`, and further ones below it; `all`
+    /// samples that reach a leaf are given its value.
     fn node(&mut self, chosen: &[u32], all: &[u32], depth: usize) -> usize {
         let table = self.of.table;
         let (feature, level) = self.best(chosen);
@@ -160,6 +162,7 @@ impl Growing<'_> {
         let (chosen, all) = (parts(chosen), parts(all));
         for side in 0..2 {
             let [weight, sum] = self.weight(&chosen[side]);
+            // A pure leaf cannot be improved by a further question.
             let is_mixed = weight - sum.abs() > 1e-6;
             self.tree[at].next[side] = if depth > 1 && is_mixed {
                 Next::Question(self.node(&chosen[side], &all[side], depth - 1))
@@ -184,14 +187,14 @@ impl Growing<'_> {
         [weight, weight * self.of.truth[i as usize]]
     }
 
-    /// The feature and the level that leave the least squared error on both
-    /// sides.
+    /// Returns the feature and the level with the least squared error on both sides.
     fn best(&self, chosen: &[u32]) -> (usize, usize) {
         let weighted: Vec<(u32, [f32; 2])> =
             chosen.iter().map(|i| (*i, self.weighted(*i))).collect();
         let mut best = (f32::NEG_INFINITY, 0, 0);
         for &feature in self.features {
             let row = self.of.table.row(feature);
+            // One pass over the samples makes every cut of a feature a sum of bins.
             let mut histogram = [[0.0_f32; 2]; LEVELS];
             for (i, [weight, sum]) in &weighted {
                 let bin = &mut histogram[usize::from(row[*i as usize])];
@@ -207,11 +210,12 @@ impl Growing<'_> {
     }
 }
 
-/// Where to cut, and how much that explains.
+/// Returns the cut with the largest explained sum of squares, and that sum.
 fn cut(histogram: &[[f32; 2]; LEVELS]) -> (f32, usize) {
     let total = histogram.iter().fold([0.0, 0.0], |[w, s], bin| [w + bin[0], s + bin[1]]);
     let explained = |[weight, sum]: [f32; 2]| if weight > 1e-9 { sum * sum / weight } else { 0.0 };
     let (mut left, mut best) = ([0.0_f32; 2], (f32::NEG_INFINITY, 0));
+    // A cut above the last level would leave one side empty.
     for (level, bin) in histogram.iter().enumerate().take(LEVELS - 1) {
         left = [left[0] + bin[0], left[1] + bin[1]];
         let gain = explained(left) + explained([total[0] - left[0], total[1] - left[1]]);
@@ -237,7 +241,7 @@ mod tests {
         }
     }
 
-    /// Points in a square; those of one class are in a disc in its middle.
+    /// Generates points in a square; those of one class are in a disc in its middle.
     fn disc() -> (Vec<[f32; 2]>, Vec<bool>) {
         let number = |k: u64| (mix(k) >> 40) as f32 / (1_u64 << 24) as f32 - 0.5;
         let points: Vec<[f32; 2]> = (0..600).map(|k| [number(2 * k), number(2 * k + 1)]).collect();

@@ -1,6 +1,6 @@
 use crate::{Example, logistic};
 
-/// Log-odds as a straight line of the decision value.
+/// Log-odds as a linear function of the decision value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     /// Log-odds per unit of the decision value.
@@ -9,9 +9,9 @@ pub struct Line {
     pub offset: f64,
 }
 
-/// Platt's logistic calibration with smoothed targets (Platt 1999). Each class weighs
-/// the same, so the line gives the evidence without the prior. The values have
-/// to come from data that the machine was not fitted to.
+/// Fits Platt's logistic calibration with smoothed targets (Platt 1999). Both classes have equal
+/// weight, so that the line gives the log-likelihood ratio without the prior. The values have to
+/// come from data that the classifier was not fitted to.
 pub fn platt(values: &[(f64, bool)]) -> Line {
     let people = values.iter().filter(|(_, is_person)| *is_person).count() as f64;
     let others = values.len() as f64 - people;
@@ -19,6 +19,8 @@ pub fn platt(values: &[(f64, bool)]) -> Line {
         .iter()
         .map(|&(value, is_person)| {
             let count = if is_person { people } else { others };
+            // Platt's smoothing: targets short of 0 and 1 keep the slope finite for separable
+            // values.
             let sure = (count + 1.0) / (count + 2.0);
             let target = if is_person { sure } else { 1.0 - sure };
             Example { features: [value, 1.0], target, weight: 0.5 / count.max(1.0) }
@@ -34,7 +36,7 @@ mod tests {
 
     #[test]
     fn the_line_finds_the_log_odds_that_the_values_were_drawn_from() {
-        // Of 1,000 at each value, as many are people as 2 f - 1 log-odds say.
+        // Of 1,000 samples at each value, the number of people is that of log-odds 2 f - 1.
         let values: Vec<(f64, bool)> = (-20..=20)
             .flat_map(|k| {
                 let f = f64::from(k) / 10.0;

@@ -2,9 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tagalong_core::Example;
 
-/// Deals the groups out to `folds` parts, those with people and those without
-/// in turn, so that each part has both. The deal depends on the seed, not on
-/// the order of the examples.
+/// Deals the groups out to `folds` parts, those with people and those without in turn, so that each
+/// part has both. The deal depends on the seed, not on the order of the examples.
 pub fn parts(
     examples: impl Iterator<Item = Example>,
     folds: usize,
@@ -12,6 +11,7 @@ pub fn parts(
 ) -> BTreeMap<u64, usize> {
     let (mut all, mut with_people) = (BTreeSet::new(), BTreeSet::new());
     for example in examples {
+        // The set sorts by the mixed number first, which shuffles the groups reproducibly.
         let key = (mix(example.group ^ seed), example.group);
         all.insert(key);
         if example.is_person {
@@ -25,8 +25,8 @@ pub fn parts(
     deal(&with_people).into_iter().chain(deal(&without)).collect()
 }
 
-/// A number that looks random and depends on `seed` only (SplitMix64: Steele,
-/// Lea and Flood, OOPSLA 2014).
+/// Returns a number that looks random and depends on `seed` only (SplitMix64: Steele, Lea and
+/// Flood, OOPSLA 2014).
 pub fn mix(seed: u64) -> u64 {
     let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -34,28 +34,28 @@ pub fn mix(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// What a group of examples is for.
+/// Purpose of a group of examples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Use {
-    /// The figures of the card; no machine sees it.
+    /// The figures of the model card; no classifier is fitted to it.
     Figures,
-    /// The calibration of a machine that has not seen it.
+    /// The calibration of a classifier that has not seen it.
     Calibration,
-    /// Fitting the machine.
+    /// Fitting of the classifier.
     Fit,
 }
 
-/// The tenth that calibrates, if nobody asks for others.
+/// Tenth of the groups that calibrates by default.
 pub const CALIBRATION: u64 = 2;
 
-/// Which tenth of all groups a group is in, by chance: 0 to 9.
+/// Returns the pseudo-random tenth of all groups that a group is in, 0 to 9.
 fn tenth_of(group: u64) -> u64 {
     mix(group) % 10
 }
 
-/// What a group is for: two tenths are for the figures, those of `calibration` for the
-/// calibration, and the others for fitting. Other tenths in turn cross-validate, and
-/// leave the figures alone.
+/// Returns the purpose of a group: two tenths are for the figures, those of `calibration` for the
+/// calibration, and the others for fitting. Cross-validation passes other tenths in turn and never
+/// touches the figures.
 pub fn use_of(group: u64, calibration: &[u64]) -> Use {
     match tenth_of(group) {
         0 | 1 => Use::Figures,

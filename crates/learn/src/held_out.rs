@@ -1,5 +1,5 @@
-/// Chance that a person has a larger value than another candidate (area under
-/// the ROC curve); 0.5 where one of them is missing.
+/// Returns the probability that a person has a larger value than another candidate (area under the
+/// ROC curve); 0.5 where one class is missing.
 pub fn area(values: &[(f64, bool)]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -7,6 +7,7 @@ pub fn area(values: &[(f64, bool)]) -> f64 {
     for ties in sorted.chunk_by(|a, b| a.0 == b.0) {
         let here = ties.iter().filter(|(_, is_person)| *is_person).count() as f64;
         let not = ties.len() as f64 - here;
+        // A tie counts as half.
         below += here * (others + 0.5 * not);
         people += here;
         others += not;
@@ -14,7 +15,7 @@ pub fn area(values: &[(f64, bool)]) -> f64 {
     if people * others > 0.0 { below / (people * others) } else { 0.5 }
 }
 
-/// Fraction of a class whose value is positive.
+/// Returns the fraction of a class with a positive value.
 pub fn accepted(values: &[(f64, bool)], people: bool) -> f64 {
     let of_class = || values.iter().filter(|(_, is_person)| *is_person == people);
     of_class().filter(|(f, _)| *f > 0.0).count() as f64 / of_class().count().max(1) as f64

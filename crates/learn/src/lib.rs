@@ -1,11 +1,10 @@
-//! What trainers of plugins share, so that their cards can be compared: groups
-//! are dealt out to folds and never split ([`parts`]), held-out values become
-//! figures ([`area`], [`accepted`]) and log-odds ([`platt`], [`logistic`]), and pictures become more
-//! of them ([`mirrored`], [`shifted`]). Boosted trees are
-//! grown here, too ([`boost`]), and what is tried is tried on all cores
-//! ([`side_by_side`]).
+//! Shared parts of the plugins' trainers, so that their model cards can be compared: groups are
+//! dealt out to folds and never split ([`parts`]), held-out values become figures ([`area`],
+//! [`accepted`]) and log-odds ([`platt`], [`logistic`]), and each picture yields variants
+//! ([`mirrored`], [`shifted`]). Boosted trees are grown here, too ([`boost`]), and experiments run
+//! on all cores ([`side_by_side`]).
 //!
-//! What machines look at is the business of the plugins.
+//! The features are defined by the plugins.
 
 pub mod boost;
 mod calibrate;

@@ -1,22 +1,22 @@
 use nalgebra::{SMatrix, SVector};
 
-/// Steps of Newton's method at most.
+/// Maximum number of steps of Newton's method.
 const STEPS: usize = 100;
 
-/// Something with features, and how likely it is that it is one of ours.
+/// Feature vector with the probability of the positive class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Example<const N: usize> {
-    /// What is known of it; a feature that is always 1 makes an offset.
+    /// Features; one that is always 1 makes an offset.
     pub features: [f64; N],
-    /// The probability that it is one of ours, 0 to 1.
+    /// Probability of the positive class, 0 to 1.
     pub target: f64,
-    /// How much it counts.
+    /// Weight of the example in the loss.
     pub weight: f64,
 }
 
-/// The weights of the features whose weighted sum is the log-odds, by logistic
-/// regression: Newton's method with halved steps (Lin, Lin and Weng 2007). `ridge`
-/// times half the square of the weights is added to the loss.
+/// Fits the weights of a linear log-odds model by logistic regression: Newton's method with
+/// halved steps (Lin, Lin and Weng 2007). `ridge` times half the square of the weights is
+/// added to the loss.
 pub fn logistic<const N: usize>(examples: &[Example<N>], ridge: f64) -> [f64; N] {
     let mut weights = SVector::<f64, N>::zeros();
     for _ in 0..STEPS {
@@ -30,7 +30,7 @@ pub fn logistic<const N: usize>(examples: &[Example<N>], ridge: f64) -> [f64; N]
     weights.into()
 }
 
-/// One step of Newton's method, halved until the loss falls.
+/// Takes one step of Newton's method, halved until the loss falls.
 fn improved<const N: usize>(
     weights: &SVector<f64, N>,
     examples: &[Example<N>],
@@ -53,7 +53,7 @@ fn improved<const N: usize>(
         .unwrap_or(*weights)
 }
 
-/// Cross-entropy, in a form that cannot overflow, and the ridge.
+/// Returns the cross-entropy, in a form that cannot overflow, plus the ridge.
 fn loss<const N: usize>(weights: &SVector<f64, N>, examples: &[Example<N>], ridge: f64) -> f64 {
     let each = examples.iter().map(|Example { features, target, weight }| {
         let f = weights.dot(&SVector::from(*features));

@@ -2,8 +2,8 @@ use std::thread::available_parallelism;
 
 use tagalong_core::{Error, Result};
 
-/// Works on each thing in a thread of its own, as many at once as there are cores;
-/// `progress` is told the part that is done. The results are in the order of the things.
+/// Runs `work` on each item in a thread of its own, as many at once as there are cores; `progress`
+/// receives the fraction that is done. The results are in the order of the items.
 ///
 /// # Errors
 /// The first one of `work`, and [`Error::Other`] if it panics.
@@ -25,8 +25,8 @@ fn at_once<S: Sync, T: Send>(
     work: &(impl Fn(&S) -> Result<T> + Sync),
 ) -> Result<Vec<T>> {
     let died = |_| Err(Error::Other("the solver panicked".into()));
-    // All are joined before the first failure counts: one that panics and is not joined
-    // takes the rest down with it.
+    // All threads are joined before the first failure counts: a thread that panics and is not
+    // joined makes the scope panic.
     let results: Vec<Result<T>> = std::thread::scope(|scope| {
         let running: Vec<_> = things.iter().map(|thing| scope.spawn(move || work(thing))).collect();
         running.into_iter().map(|thread| thread.join().unwrap_or_else(died)).collect()

@@ -1,15 +1,15 @@
-//! More examples from one: mirrored, and shifted a little.
+//! Variants of an example: mirrored, and shifted a little.
 
 use tagalong_core::{GreyImage, Rect};
 
-/// The picture with left and right exchanged.
+/// Mirrors the picture horizontally.
 pub fn mirrored(grey: &GreyImage) -> GreyImage {
     let width = grey.width();
     GreyImage::from_fn(width, grey.height(), |x, y| grey.row(y)[width - 1 - x])
 }
 
-/// A square, moved right and down by fractions of its width, and so many times as large
-/// about its new centre.
+/// Shifts a square right and down by fractions of its width, and scales it by `growth` about its
+/// new centre.
 pub fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
     let (x, y) = (square.x + right * square.width, square.y + down * square.width);
     Rect { x, y, ..*square }.inflated(growth - 1.0)

@@ -1,46 +1,45 @@
-//! From `sensor_msgs/CameraInfo` to the lens of a camera.
+//! Lens of a camera from `sensor_msgs/CameraInfo`.
 
 use tagalong_core::{ConicalMirror, Distortion, Panorama, Pinhole};
 
 use crate::msgs::{CameraInfo, Header};
 
-/// A lens with the image it belongs to.
+/// Lens with the size of its image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {
-    /// The lens, in pixels of the image as delivered.
+    /// Lens, in pixels of the image as delivered.
     pub lens: Pinhole,
-    /// Columns of the image as delivered; 0 if the message does not say.
+    /// Columns of the image as delivered; 0 if the message does not give them.
     pub width: usize,
-    /// Rows of the image as delivered; 0 if the message does not say.
+    /// Rows of the image as delivered; 0 if the message does not give them.
     pub height: usize,
     /// Distance to the left camera of a stereo pair, m, from `P[3]`; `None` if 0.
     pub baseline_m: Option<f64>,
-    /// The mirror that the lens looks into, if there is one.
+    /// Mirror in front of the lens, if there is one.
     pub mirror: Option<Mirrored>,
 }
 
-/// What a camera with a conical mirror delivers.
+/// Image of a camera with a conical mirror.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mirrored {
-    /// The circular image as it is: `distortion_model` is
-    /// [`ConicalMirror::MODEL`], K and D are its own.
+    /// Circular image: `distortion_model` is [`ConicalMirror::MODEL`], K and D are those of the
+    /// mirror.
     Raw(ConicalMirror),
-    /// The image already unwrapped: `distortion_model` is [`UNWRAPPED`], and D
-    /// that of the mirror with both radii in focal lengths.
+    /// Unwrapped image: `distortion_model` is [`UNWRAPPED`], and D is that of the mirror with both
+    /// radii in focal lengths.
     Unwrapped(Panorama),
 }
 
-/// The `distortion_model` of an image of a conical mirror that was unwrapped
-/// before it was recorded, with a column per bearing and a row per elevation as
-/// in [`Panorama`]. D holds half angle (rad), height of the apex (m) and the
-/// tangents of the smallest and the largest angle from the axis; K is that of
-/// any image with evenly spaced angles, and follows from D.
+/// `distortion_model` of an image of a conical mirror that was unwrapped before it was recorded,
+/// with a column per bearing and a row per elevation as in [`Panorama`]. D holds half angle (rad),
+/// height of the apex (m) and the tangents of the smallest and the largest angle from the axis; K
+/// is that of any image with evenly spaced angles, and follows from D.
 pub const UNWRAPPED: &str = "conical_mirror_unwrapped";
 
 impl CameraInfo {
-    /// The calibration of a camera without mirror, as its driver would publish it;
-    /// [`intrinsics`] reads it back. `size` is columns and rows of the image, and
-    /// `aside_m` how far to the right of the left camera of a stereo pair it is, m.
+    /// Returns the calibration of a camera without mirror as its driver would publish it;
+    /// [`intrinsics`] reads it back. `size` is columns and rows of the image, and `aside_m` the
+    /// distance to the right of the left camera of a stereo pair, m.
     pub fn of_lens(header: &Header, lens: &Pinhole, size: (usize, usize), aside_m: f64) -> Self {
         let Pinhole { fx, fy, cx, cy, distortion } = *lens;
         let (model, d) = match distortion {
@@ -62,21 +61,21 @@ impl CameraInfo {
     }
 }
 
-/// Why a calibration cannot be used; the field is named.
+/// Reason for which a calibration cannot be used; the field is named.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
     /// K is all zero, which by REP 104 means uncalibrated.
     #[error("K is all zero: the camera is uncalibrated; calibrate it or publish its camera_info")]
     Uncalibrated,
-    /// A number that cannot be.
+    /// A number is outside of its range.
     #[error("{field} = {value}: {why}")]
     Field {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         value: f64,
-        /// What it must be.
+        /// Condition on the value.
         why: &'static str,
     },
     /// The distortion model is unknown or has the wrong number of coefficients.
@@ -86,20 +85,20 @@ pub enum CalibrationError {
          conical_mirror and conical_mirror_unwrapped (4, see `ConicalMirror`)"
     )]
     Distortion {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// Coefficients given.
+        /// Number of coefficients given.
         count: usize,
     },
-    /// The image does not have the size that was calibrated.
+    /// The size of the image is not that of the calibration.
     #[error(
         "calibrated for {calibrated_width}x{calibrated_height}, \
          but the images are {width}x{height}"
     )]
     Size {
-        /// Columns that the calibration gives.
+        /// Columns in the calibration.
         calibrated_width: usize,
-        /// Rows that the calibration gives.
+        /// Rows in the calibration.
         calibrated_height: usize,
         /// Columns of the image.
         width: usize,
@@ -108,8 +107,8 @@ pub enum CalibrationError {
     },
 }
 
-/// Reads a calibration. `rectified` says that the image was rectified already:
-/// then P holds for it, and it has no distortion.
+/// Reads a calibration. `rectified` states that the image was rectified already: then P holds for
+/// it, and it has no distortion.
 ///
 /// ROI and binning: K and P are given in pixels of the full image. A pixel of
 /// the delivered image covers `binning` of them, and pixel coordinates are those
@@ -139,7 +138,7 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     Ok(Intrinsics { baseline_m: baseline(p), ..delivered(info, full, distortion) })
 }
 
-/// The mirror of a calibration; binning makes its circles smaller.
+/// Returns the mirror of a calibration; binning makes its circles smaller.
 fn mirrored(info: &CameraInfo, seen: &Intrinsics) -> Result<Mirrored, CalibrationError> {
     let unusable = CalibrationError::Distortion {
         model: info.distortion_model.clone(),
@@ -147,6 +146,7 @@ fn mirrored(info: &CameraInfo, seen: &Intrinsics) -> Result<Mirrored, Calibratio
     };
     let &[half_angle, apex_m, inner, outer] = &info.d[..] else { return Err(unusable) };
     let raw = info.distortion_model == ConicalMirror::MODEL;
+    // K may be all zero here, because P is used for a rectified image.
     let scale = if raw { seen.lens.fx / info.k[0].max(f64::MIN_POSITIVE) } else { 1.0 };
     let d = [half_angle, apex_m, scale * inner, scale * outer];
     let (focal, centre) =
@@ -159,7 +159,7 @@ fn mirrored(info: &CameraInfo, seen: &Intrinsics) -> Result<Mirrored, Calibratio
     })
 }
 
-/// Fails unless the calibration belongs to images of this size.
+/// Checks that the calibration belongs to images of this size.
 ///
 /// # Errors
 /// [`CalibrationError::Size`].
@@ -190,7 +190,7 @@ fn check_finite(info: &CameraInfo) -> Result<(), CalibrationError> {
     Ok(())
 }
 
-/// R is a rotation, or all zero where the driver leaves it out.
+/// Checks that R is a rotation, or all zero where the driver leaves it out.
 fn check_rotation(r: &[f64; 9]) -> Result<(), CalibrationError> {
     if r.iter().all(|v| *v == 0.0) {
         return Ok(());
@@ -214,6 +214,7 @@ fn check_lens(
             return Err(CalibrationError::Field { field, value, why: "must be positive" });
         }
     }
+    // The outer borders of the pixels: half a pixel beyond the first and the last centre.
     for (field, value, size) in [(names[2], cx, info.width), (names[3], cy, info.height)] {
         if size > 0 && !(-0.5..=f64::from(size) - 0.5).contains(&value) {
             return Err(CalibrationError::Field { field, value, why: "must lie in the image" });
@@ -224,6 +225,7 @@ fn check_lens(
 
 fn distortion(info: &CameraInfo) -> Result<Distortion, CalibrationError> {
     let d = &info.d;
+    // All-zero coefficients are no distortion under any model, even an unknown one.
     if d.iter().all(|v| *v == 0.0) {
         return Ok(Distortion::None);
     }
@@ -237,7 +239,7 @@ fn distortion(info: &CameraInfo) -> Result<Distortion, CalibrationError> {
     }
 }
 
-/// `P[3] = -fx * baseline` for the right camera of a pair, 0 for any other.
+/// Returns the baseline: `P[3] = -fx * baseline` for the right camera of a pair, 0 for any other.
 fn baseline(p: &[f64; 12]) -> Option<f64> {
     (p[0] > 0.0 && p[3] != 0.0).then(|| -p[3] / p[0])
 }
@@ -246,6 +248,7 @@ fn delivered(info: &CameraInfo, full: [f64; 4], distortion: Distortion) -> Intri
     let [fx, fy, cx, cy] = full;
     let (bx, by) = (info.binning_x.max(1), info.binning_y.max(1));
     let roi = &info.roi;
+    // An empty region stands for the full image.
     let whole = roi.width == 0 || roi.height == 0;
     let (width, height) = if whole { (info.width, info.height) } else { (roi.width, roi.height) };
     let (x0, y0) = if whole { (0, 0) } else { (roi.x_offset, roi.y_offset) };
@@ -334,8 +337,8 @@ mod tests {
         let cut = CameraInfo { roi, binning_x: 2, binning_y: 4, ..info() };
         let seen = intrinsics(&cut, false).unwrap();
         assert_eq!((seen.width, seen.height), (200, 50));
-        // The centre of the first delivered pixel is the middle of the two full
-        // pixels 100 and 101, that is 100.5.
+        // The centre of the first delivered pixel is the middle of the two full pixels 100 and 101,
+        // that is 100.5.
         let column = |full: f64| (full - 320.0) / 500.0 * seen.lens.fx + seen.lens.cx;
         assert!((column(100.5) - 0.0).abs() < 1e-12);
         assert!((column(498.5) - 199.0).abs() < 1e-12);

@@ -4,7 +4,7 @@ use tagalong_core::check_settings;
 
 use crate::LogError;
 
-/// How a log is read. Topics that are not named are found by message type and
+/// Settings of the input from a log. Topics that are not named are found by message type and
 /// encoding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -19,38 +19,38 @@ pub struct InputSettings {
     pub depth_info_topic: Option<String>,
     /// Topic of the odometry; without one, tf from `odom_frame` to the robot is used.
     pub odometry_topic: Option<String>,
-    /// Topic of a laser scanner's scans (`sensor_msgs` LaserScan), for the governor of a
-    /// robot that is steered.
+    /// Topic of a laser scanner's scans (`sensor_msgs` LaserScan), for detectors that use them and
+    /// for the governor of a steered robot.
     pub laser_topic: Option<String>,
-    /// Topic of detections that another program recorded (`vision_msgs`
-    /// Detection2DArray or Detection3DArray), for `recorded-detections`.
+    /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
+    /// Detection3DArray), for `recorded-detections`.
     pub detections_topic: Option<String>,
     /// Topic of the right images of a stereo pair.
     pub right_topic: Option<String>,
-    /// Topic of the right camera's calibration, which has the baseline.
+    /// Topic of the right camera's calibration, which holds the baseline.
     pub right_info_topic: Option<String>,
-    /// Images whose stamps differ by no more than this belong together, s.
+    /// Maximum difference between the stamps of images that belong together, s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub pair_tolerance_s: f64,
-    /// The robot's frame: X forward, Y left, Z up, on the floor. Where tf has
-    /// `base_footprint` too, and this is left at `base_link`, that one is used.
+    /// Robot frame: X forward, Y left, Z up, on the floor. If tf has `base_footprint` too, and this
+    /// is left at `base_link`, `base_footprint` is used.
     pub base_frame: String,
-    /// The frame in which tf gives the robot's motion.
+    /// Frame in which tf gives the robot's motion.
     pub odom_frame: String,
-    /// Metres per unit of depth, where the log departs from the convention
-    /// (millimetres for 16UC1, metres for 32FC1); makes mono16 images depth.
+    /// Metres per unit of depth, if the log departs from the convention (millimetres for 16UC1,
+    /// metres for 32FC1); makes mono16 images depth.
     #[schemars(range(min = 1e-6, max = 1e3))]
     pub depth_unit_m: Option<f64>,
-    /// Columns and rows by which depth images are moved to lie on colour, where the
-    /// log's are not registered well (`tagalong doctor` measures it).
+    /// Columns and rows by which depth images are shifted to lie on colour, if those of the log are
+    /// not registered well (`tagalong doctor` measures it).
     #[schemars(inner(range(min = -1000, max = 1000)))]
     pub depth_offset_px: [i32; 2],
-    /// The pose of the camera, for logs whose tf does not give it, or gives it wrong.
+    /// Pose of the camera, for logs without it in tf, or with a wrong one.
     pub camera: Option<MountSettings>,
     /// Columns and rows to which the circular image of a conical mirror is unwrapped.
     #[schemars(inner(range(min = 8, max = 8192)))]
     pub panorama: [usize; 2],
-    /// Images that arrive up to this many frames late are put in order.
+    /// Number of frames by which an image may be late and is still put in order.
     #[schemars(range(max = 64))]
     pub reorder_frames: usize,
     /// Standard deviation of odometry as a fraction of the travel.
@@ -84,7 +84,7 @@ impl Default for InputSettings {
 }
 
 impl InputSettings {
-    /// Checks the numbers.
+    /// Checks the values.
     ///
     /// # Errors
     /// [`LogError::Settings`], which names the key.
@@ -93,17 +93,17 @@ impl InputSettings {
     }
 }
 
-/// Where the camera sits: above the robot's origin, looking forward.
+/// Pose of the camera: above the robot's origin, looking forward.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MountSettings {
     /// Height above the floor, m.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 100))]
     pub height_m: f64,
-    /// How far the camera looks down, degrees.
+    /// Angle of the optical axis below the horizon, degrees.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub pitch_down_deg: f64,
-    /// How far its right side is raised, degrees.
+    /// Roll, degrees; positive if its right side is raised.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub roll_deg: f64,
 }

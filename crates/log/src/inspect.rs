@@ -1,4 +1,4 @@
-//! What is in a log, for people and for scripts.
+//! Description of a log, for people and for scripts.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,82 +12,81 @@ use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing};
 use crate::{FrameSource, InputSettings, Inputs, Limits, LogError, LogFacts};
 
-/// One topic.
+/// Description of one topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TopicFacts {
-    /// Its name.
+    /// Name of the topic.
     pub topic: String,
-    /// Its message type.
+    /// Message type.
     #[serde(rename = "type")]
     pub schema: String,
-    /// How messages are encoded.
+    /// Message encoding.
     pub encoding: String,
-    /// Messages.
+    /// Number of messages.
     pub count: u64,
-    /// Messages that do not fit their type.
+    /// Number of messages that do not fit their type.
     pub undecodable: u64,
     /// Messages per second of log time; `None` with fewer than two.
     pub rate_hz: Option<f64>,
-    /// What its images are.
+    /// Description of its images, if it has any.
     pub image: Option<ImageFacts>,
     /// Frame id of the first message.
     pub frame_id: Option<String>,
-    /// When its images were captured; `None` with fewer than two.
+    /// Capture times of its images; `None` with fewer than two.
     pub timing: Option<Timing>,
 }
 
-/// The images of a topic.
+/// Description of the images of a topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImageFacts {
     /// `encoding` or `format`.
     pub pixels: String,
-    /// Columns and rows, where known without decoding.
+    /// Columns and rows, if known without decoding.
     pub size: Option<(u32, u32)>,
     /// `picture`, `depth` or `unknown`.
     pub content: &'static str,
 }
 
-/// What is in a log.
+/// Description of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
-    /// The topics chosen, the camera and its pose.
+    /// Chosen topics, the camera and its pose.
     pub facts: LogFacts,
-    /// From the first to the last message, s.
+    /// Time from the first to the last message, s.
     pub duration_s: f64,
     /// All topics.
     pub topics: Vec<TopicFacts>,
-    /// How depth lies in time beside colour.
+    /// Time offset of depth from colour.
     pub skew: Option<Skew>,
-    /// The transforms: each frame with its parent.
+    /// Transforms: each frame with its parent.
     pub transforms: BTreeMap<String, String>,
-    /// What a pipeline could use: `colour`, `depth`, `right`, `odometry`,
-    /// `laser`.
+    /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`.
     pub usable: Vec<&'static str>,
-    /// Why no frames can be made, if so.
+    /// Reason for which no frames can be made, if so.
     pub unusable: Option<String>,
     /// Counters of the walk through the file.
     pub counters: BTreeMap<&'static str, u64>,
-    /// What else is to be said.
+    /// Further remarks.
     pub notes: Vec<String>,
     /// True if something in the file is damaged.
     pub data_lost: bool,
 }
 
-/// A log that was looked into, ready to be read.
+/// Inspected log, ready to be read.
 pub struct Examination {
-    /// What is in it.
+    /// Description of the log.
     pub inspection: Inspection,
-    /// Its frames: with the inputs that were asked for, else with all that there are;
-    /// `None` if no frames can be made.
+    /// Frames of the log, with the requested inputs, else with all that there are; `None` if no
+    /// frames can be made.
     pub frames: Option<FrameSource>,
-    /// Why the frames are not those that were asked for.
+    /// Error with the requested inputs, if the frames are not made from them.
     pub refusal: Option<LogError>,
 }
 
-/// Looks into a log. A log without usable images is described all the same.
+/// Inspects a log. A log without usable images is described all the same.
 ///
 /// # Errors
-/// A file that cannot be opened or is not MCAP; settings that cannot work.
+/// A file that cannot be opened or is not MCAP; invalid settings.
 pub fn inspect(
     path: &Path,
     input: &InputSettings,
@@ -96,11 +95,10 @@ pub fn inspect(
     examine(path, input, limits, Inputs::ANY).map(|examined| examined.inspection)
 }
 
-/// Looks into a log, and opens it for a pipeline with those inputs.
+/// Inspects a log, and opens it for a pipeline with these inputs.
 ///
 /// # Errors
-/// As [`inspect`]; what the log lacks is no error but
-/// [`Examination::refusal`].
+/// As [`inspect`]; inputs that the log lacks are no error but in [`Examination::refusal`].
 pub fn examine(
     path: &Path,
     input: &InputSettings,
@@ -110,6 +108,7 @@ pub fn examine(
     input.check()?;
     let scan = Arc::new(Scan::read(path, input.depth_unit_m, limits)?);
     let open = |inputs| FrameSource::of_scan(Arc::clone(&scan), input, limits, inputs);
+    // Described with all inputs, even if the pipeline uses only some of them.
     let everything = open(Inputs::ANY);
     let mut inspection = Inspection::of_scan(&scan);
     match &everything {
@@ -124,7 +123,7 @@ pub fn examine(
 }
 
 impl Inspection {
-    /// What shows without frames.
+    /// Describes a log as far as possible without frames.
     fn of_scan(scan: &Scan) -> Self {
         let first = scan.topics.values().map(|topic| topic.first_log_time).min().unwrap_or(0);
         let last = scan.topics.values().map(|topic| topic.last_log_time).max().unwrap_or(0);
@@ -166,7 +165,7 @@ impl Inspection {
         self.skew = both.and_then(|(colour, depth)| Skew::between(colour, depth, tolerance_s));
     }
 
-    /// The topic of that name.
+    /// Returns the topic of that name.
     pub fn topic(&self, name: &str) -> Option<&TopicFacts> {
         self.topics.iter().find(|topic| topic.topic == name)
     }
@@ -185,6 +184,7 @@ fn topic_facts(name: &str, topic: &Topic) -> TopicFacts {
         encoding: topic.encoding.clone(),
         count: topic.count,
         undecodable: topic.undecodable,
+        // N messages span N - 1 periods.
         rate_hz: (topic.count > 1 && span > 0.0).then(|| (topic.count - 1) as f64 / span),
         image: topic.pixels.clone().map(|pixels| ImageFacts { pixels, size: topic.size, content }),
         frame_id: topic.frame_id.clone(),

@@ -1,19 +1,17 @@
-//! Logs in and out: MCAP files with ROS 2 messages.
+//! Input and output of logs: MCAP files with ROS 2 messages.
 //!
-//! Reading is done twice. The first pass decodes no image: it learns the topics,
-//! the calibrations and the static transforms of the whole log, counts what is
-//! damaged and hashes the file, so that everything a pipeline might miss is
-//! known before its first frame. The second pass is the [`FrameSource`]: it puts
-//! images in order, pairs them, looks up where camera and robot were, and hands
-//! out one [`LogFrame`] after the other. Memory holds a few frames, however long
-//! the log is.
+//! A log is read twice. The first pass decodes no image: it finds the topics, the calibrations and
+//! the static transforms of the whole log, counts damage and hashes the file, so that every missing
+//! input is known before the first frame. The second pass is the [`FrameSource`]: it puts images in
+//! order, pairs them, looks up the poses of camera and robot, and returns one [`LogFrame`] after
+//! the other. Memory holds a few frames, however long the log is.
 //!
-//! Messages that arrive now, over a network, take the same way: [`Listening`] is
-//! the first pass, [`LiveSource`] the second.
+//! Messages that arrive live, over a network, take the same way: [`Listening`] is the first pass,
+//! [`LiveSource`] the second.
 //!
-//! Nothing in a file is trusted: see [`mcap_walk`] for the container,
-//! [`msgs`] for messages, [`images`] for pictures and [`Limits`] for sizes. What
-//! is whole is used; what is lost is counted under a name.
+//! The contents of a file are not trusted: see [`mcap_walk`] for the container, [`msgs`] for
+//! messages, [`images`] for pictures and [`Limits`] for sizes. Intact data is used; lost data is
+//! counted under a name.
 
 pub mod camera_info;
 mod error;

@@ -1,21 +1,21 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a log may ask for. A file that asks for more is damaged or hostile: the
-/// part that asks is skipped and counted. The limits are absolute, never
-/// ratios: an honest file of dark frames compresses a thousandfold.
+/// Limits on the sizes that a log may claim. A file that claims more is damaged or hostile: that
+/// part is skipped and counted. The limits are absolute, never ratios, because a regular file of
+/// dark frames compresses a thousandfold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Longest record (a message with its image), bytes.
+    /// Maximum length of a record (a message with its image), bytes.
     pub record_bytes: u64,
-    /// Longest chunk after decompression, bytes.
+    /// Maximum length of a chunk after decompression, bytes.
     pub chunk_bytes: u64,
-    /// Longest message definition, bytes.
+    /// Maximum length of a message definition, bytes.
     pub schema_bytes: u64,
-    /// Largest width or height of an image, pixels.
+    /// Maximum width or height of an image, pixels.
     pub image_side_px: u32,
-    /// Largest decoded image, bytes.
+    /// Maximum size of a decoded image, bytes.
     pub image_bytes: u64,
 }
 

@@ -1,41 +1,41 @@
-//! Where the robot was when an image was taken.
+//! Pose of the robot at the time of an image.
 
 use std::collections::VecDeque;
 
 use nalgebra::{Isometry2, Matrix3};
 use tagalong_core::{Motion, Stamp};
 
-/// A silence longer than this makes poses stale, s.
+/// Gap in the odometry beyond which poses are stale, s.
 pub const MAX_GAP_S: f64 = 0.5;
-/// A step longer than this between neighbouring poses is a jump, m.
+/// Step between neighbouring poses beyond which the odometry has jumped, m.
 pub const MAX_STEP_M: f64 = 1.0;
-/// Behind the last pose the motion is continued for this long, s.
+/// Time for which the motion is continued behind the last pose, s.
 const EXTRAPOLATE_S: f64 = 0.2;
-/// Poses are kept for this long, s.
+/// Time for which poses are kept, s.
 const KEPT_S: f64 = 15.0;
-/// Poses kept at most.
+/// Maximum number of poses kept.
 const MAX_POSES: usize = 16_384;
-/// A clock that steps back further than this has jumped, s.
+/// Step back of the clock beyond which it has jumped, s.
 const CLOCK_JUMP_S: f64 = 1.0;
 
-/// A pose at a moment.
+/// Pose at a given time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseAt {
     /// `odom_from_robot`.
     pub pose: Isometry2<f64>,
-    /// No odometry was near: the pose is a guess.
+    /// True if no odometry was near in time and the pose is a guess.
     pub stale: bool,
 }
 
-/// The odometry of the last seconds.
+/// Odometry of the last seconds.
 #[derive(Clone, Debug, Default)]
 pub struct PoseBuffer {
     poses: VecDeque<(Stamp, Isometry2<f64>)>,
 }
 
 impl PoseBuffer {
-    /// Takes in a pose; false if it is not finite. After a jump of the clock
-    /// the old poses are forgotten.
+    /// Adds a pose; returns false if it is not finite. After a jump of the clock the old poses are
+    /// removed.
     pub fn push(&mut self, stamp: Stamp, pose: Isometry2<f64>) -> bool {
         let numbers = [pose.translation.x, pose.translation.y, pose.rotation.angle()];
         if numbers.iter().any(|v| !v.is_finite()) {
@@ -53,7 +53,7 @@ impl PoseBuffer {
         true
     }
 
-    /// Forgets everything.
+    /// Removes all poses.
     pub fn clear(&mut self) {
         self.poses.clear();
     }
@@ -67,13 +67,14 @@ impl PoseBuffer {
         }
     }
 
-    /// The pose at a moment, interpolated; `None` while there is no odometry.
+    /// Returns the pose at a given time, interpolated; `None` without odometry.
     pub fn at(&self, stamp: Stamp) -> Option<PoseAt> {
         let after = self.poses.partition_point(|(at, _)| *at < stamp);
         let before = after.checked_sub(1).map(|i| self.poses[i]);
         match (before, self.poses.get(after).copied()) {
             (Some(a), Some(b)) => Some(PoseAt {
                 pose: blend(a, b, stamp),
+                // A pose exactly at the stamp is valid, however long the gap before it.
                 stale: b.0 != stamp && b.0.seconds_since(a.0) > MAX_GAP_S,
             }),
             (Some(last), None) => Some(self.beyond(last, stamp)),
@@ -84,11 +85,12 @@ impl PoseBuffer {
         }
     }
 
-    /// Behind the last pose: the last motion goes on for a moment.
+    /// Extrapolates behind the last pose: the last motion goes on for a short time.
     fn beyond(&self, last: (Stamp, Isometry2<f64>), stamp: Stamp) -> PoseAt {
         let ahead = stamp.seconds_since(last.0);
         let known = self.poses.len().checked_sub(2).map(|i| self.poses[i]);
         let pose = match known {
+            // Two poses far apart in time do not give the present velocity.
             Some(previous) if last.0.seconds_since(previous.0) <= MAX_GAP_S => {
                 blend(previous, last, last.0.plus_seconds(ahead.min(EXTRAPOLATE_S)))
             }
@@ -97,17 +99,18 @@ impl PoseBuffer {
         PoseAt { pose, stale: ahead > MAX_GAP_S }
     }
 
-    /// True if the poses that tell the motion between two moments contain a jump.
+    /// Returns true if the poses between two times contain a jump.
     pub fn jumped_between(&self, from: Stamp, to: Stamp) -> bool {
         let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
         pairs.filter(|(a, b)| a.0 < to && from < b.0).any(|(a, b)| {
             (b.1.translation.vector - a.1.translation.vector).norm() > MAX_STEP_M
+                // A long step over a gap may be travel.
                 && b.0.seconds_since(a.0) <= MAX_GAP_S
         })
     }
 }
 
-/// On the straight line through two poses, also beyond its ends.
+/// Interpolates linearly between two poses, and extrapolates beyond them.
 fn blend(
     (t0, a): (Stamp, Isometry2<f64>),
     (t1, b): (Stamp, Isometry2<f64>),
@@ -122,8 +125,8 @@ fn blend(
     )
 }
 
-/// The motion over `dt` seconds during which odometry failed: at rest, with the
-/// uncertainty of a robot that may have driven at 1 m/s and turned at 1 rad/s.
+/// Returns the motion over `dt` seconds without valid odometry: at rest, with the uncertainty of a
+/// robot that may have driven at 1 m/s and turned at 1 rad/s, for at most 5 s.
 pub fn unknown_motion(dt: f64) -> Motion {
     let reach = dt.clamp(0.0, 5.0);
     Motion { covariance: Matrix3::identity() * (reach * reach), ..Motion::at_rest(dt) }

@@ -1,15 +1,15 @@
-//! Moves a depth image into the view of the colour camera.
+//! Registration of a depth image to the view of the colour camera.
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use tagalong_core::{Camera, DepthImage, Lens};
 
 /// Overlap of neighbouring splats, so that stretching leaves no holes.
 const OVERLAP: f64 = 1.1;
-/// Splats are never larger than this many pixels to a side.
+/// Maximum side of a splat, pixels.
 const MAX_SPLAT_PX: f64 = 8.0;
 
-/// Registers depth images of one camera to another one. The rays of the depth
-/// camera, the costly part for a distorted lens, are computed once.
+/// Registration of depth images of one camera to another one. The rays of the depth camera, the
+/// costly part for a distorted lens, are computed once.
 #[derive(Clone, Debug)]
 pub struct Registration {
     rays: Vec<Vector3<f64>>,
@@ -20,8 +20,8 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// From the lenses and sizes of both cameras (their poses on the robot are
-    /// not used) and the pose of the depth camera in the colour camera.
+    /// Prepares the registration from the lenses and sizes of both cameras (their poses on the
+    /// robot are not used) and the pose of the depth camera in the colour camera.
     pub fn new(depth: &Camera, colour: &Camera, colour_from_depth: Isometry3<f64>) -> Self {
         let ray = |x: usize, y: usize| depth.ray(Point2::new(x as f64, y as f64));
         let rays =
@@ -35,15 +35,15 @@ impl Registration {
         }
     }
 
-    /// True if the two cameras are still placed like this.
+    /// Returns true if the relative pose of the two cameras is still this one.
     pub fn is_for(&self, colour_from_depth: &Isometry3<f64>) -> bool {
         self.colour_from_depth == *colour_from_depth
     }
 
-    /// The depth image as the colour camera sees it, with nearer surfaces in
-    /// front of farther ones. Each reading covers a square as large as its pixel
-    /// is there, so that a larger colour image has no holes. `None` if the image
-    /// does not have the size of the depth camera.
+    /// Returns the depth image in the view of the colour camera, with nearer surfaces in front of
+    /// farther ones. Each reading covers a square of the size of its pixel in that view, so that a
+    /// larger colour image has no holes. `None` if the image does not have the size of the depth
+    /// camera.
     pub fn apply(&self, depth: &DepthImage) -> Option<DepthImage> {
         if (depth.width(), depth.height()) != self.depth_size {
             return None;
@@ -60,12 +60,13 @@ impl Registration {
     fn splat(&self, out: &mut DepthImage, ray: &Vector3<f64>, reading: f64) {
         let point = self.colour_from_depth * Point3::from(ray * reading);
         let Some(pixel) = self.colour.project_from_camera(&point) else { return };
+        // The upper limit keeps a reading close to the colour camera from covering the image.
         let side = (self.focal_ratio * reading / point.z * OVERLAP).clamp(1.0, MAX_SPLAT_PX);
         let columns = covered(pixel.x, side, out.width());
         let (width, z) = (out.width(), point.z as f32);
         for y in covered(pixel.y, side, out.height()) {
             for old in &mut out.pixels_mut()[y * width..][columns.clone()] {
-                // True also where nothing was seen so far.
+                // Also without a surface so far.
                 if old.is_nan() || z < *old {
                     *old = z;
                 }
@@ -79,7 +80,7 @@ fn focal(camera: &Camera) -> f64 {
     0.5 * (lens.fx + lens.fy)
 }
 
-/// The pixels whose centres lie within half a side of `centre`.
+/// Returns the pixels with centres within half a side of `centre`.
 fn covered(centre: f64, side: f64, size: usize) -> std::ops::Range<usize> {
     let from = (centre - 0.5 * side).ceil().clamp(0.0, size as f64) as usize;
     let to = ((centre + 0.5 * side).floor() + 1.0).clamp(0.0, size as f64) as usize;
@@ -104,8 +105,8 @@ mod tests {
         Camera::mounted(lens, width, height, 1.0, 0.0, 0.0)
     }
 
-    /// A wall at z = 4 m and a square board of 1 m at z = 2 m, both in the
-    /// coordinates of the depth camera, seen by ray casting from any camera.
+    /// Renders a wall at z = 4 m and a square board of 1 m at z = 2 m, both in the coordinates of
+    /// the depth camera, by ray casting from any camera.
     fn render(camera: &Camera, depth_from_camera: &Isometry3<f64>) -> DepthImage {
         DepthImage::from_fn(camera.width, camera.height, |x, y| {
             let ray = camera.ray(Point2::new(x as f64, y as f64));

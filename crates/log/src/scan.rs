@@ -1,4 +1,4 @@
-//! The first reading of a log: what is in it. No image is decoded.
+//! First pass over a log: its contents. No image is decoded.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -17,10 +17,10 @@ use crate::msgs::{
 use crate::tf::TfBuffer;
 use crate::{Limits, LogError};
 
-/// Image stamps kept of a topic, to measure rate and skew.
+/// Maximum number of image stamps kept per topic, to measure rate and skew.
 const MAX_STAMPS: usize = 20_000;
 
-/// What the messages of a topic are, as far as Tagalong cares.
+/// Message type of a topic, as far as Tagalong uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Type {
     Image,
@@ -35,7 +35,7 @@ pub(crate) enum Type {
 }
 
 impl Type {
-    /// By the name of the type, with or without its middle part.
+    /// Returns the type by its name, with or without its middle part.
     pub(crate) fn of(schema: &str) -> Self {
         let (package, name) = schema.split_once('/').unwrap_or(("", schema));
         match (package, name.rsplit('/').next().unwrap_or(name)) {
@@ -71,7 +71,7 @@ pub(crate) struct Topic {
     pub(crate) stamps: Vec<Stamp>,
 }
 
-/// What a log holds.
+/// Contents of a log.
 #[derive(Clone, Debug)]
 pub(crate) struct Scan {
     pub(crate) path: PathBuf,
@@ -79,9 +79,9 @@ pub(crate) struct Scan {
     pub(crate) sha256: String,
     pub(crate) channels: Vec<Arc<Channel>>,
     pub(crate) topics: BTreeMap<String, Topic>,
-    /// The first calibration of each topic.
+    /// First calibration of each topic.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
-    /// All static transforms, and of the moving ones which frames they connect.
+    /// All static transforms, and of the moving ones the frames that they connect.
     pub(crate) tf: TfBuffer,
     pub(crate) counters: Counters,
     pub(crate) notes: Vec<String>,
@@ -110,7 +110,7 @@ pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
     File::open(path).map_err(failed)
 }
 
-/// Passes bytes on and hashes them.
+/// Reader that passes bytes on and hashes them.
 struct Hashing<R> {
     reader: R,
     hash: Sha256,
@@ -127,9 +127,10 @@ impl<R: Read> Read for Hashing<R> {
 }
 
 impl<R: Read> Hashing<R> {
-    /// Reads what is left, and tells size and hash of everything.
+    /// Reads the rest, and returns size and hash of everything.
     fn finish(mut self) -> (u64, String) {
         let mut rest = vec![0; 1 << 16];
+        // The hash covers the whole file, also the part behind the last record.
         while matches!(self.read(&mut rest), Ok(count) if count > 0) {}
         let hash = self.hash.finalize();
         (self.bytes, hash.iter().map(|byte| format!("{byte:02x}")).collect())
@@ -137,8 +138,8 @@ impl<R: Read> Hashing<R> {
 }
 
 impl Scan {
-    /// Reads the whole log once; a second time if messages were met whose channel
-    /// became known only later.
+    /// Reads the whole log once; a second time if there were messages of channels that became known
+    /// only later.
     ///
     /// # Errors
     /// A file that cannot be opened or is not MCAP.
@@ -168,6 +169,7 @@ impl Scan {
         while let Some(message) = walker.next() {
             gathering.take(&message);
         }
+        // Topics without messages are listed, too.
         for channel in walker.channels() {
             gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
         }
@@ -189,12 +191,12 @@ impl Scan {
         })
     }
 
-    /// The frames of the images of a topic.
+    /// Returns the frame of the images of a topic.
     pub(crate) fn frame_of(&self, topic: &str) -> Option<&str> {
         self.topics.get(topic)?.frame_id.as_deref()
     }
 
-    /// The topics as lines of text.
+    /// Returns the topics as lines of text.
     pub(crate) fn listing(&self) -> String {
         let line = |(name, topic): (&String, &Topic)| {
             let pixels =
@@ -206,7 +208,7 @@ impl Scan {
     }
 }
 
-/// What is learnt of messages one after the other.
+/// Contents that are gathered message by message.
 #[derive(Default)]
 pub(crate) struct Gathering {
     topics: BTreeMap<String, Topic>,
@@ -221,7 +223,7 @@ impl Gathering {
         Self { depth_unit_m, ..Self::default() }
     }
 
-    /// What was gathered so far of a source that is no file.
+    /// Returns the contents so far of a source that is no file.
     pub(crate) fn scan(&self, name: &str) -> Scan {
         Scan {
             path: name.into(),
@@ -237,12 +239,12 @@ impl Gathering {
         }
     }
 
-    /// True once an image was seen.
+    /// Returns true once an image has arrived.
     pub(crate) fn has_image(&self) -> bool {
         self.topics.values().any(|topic| topic.pixels.is_some())
     }
 
-    /// A topic, entered if it is new.
+    /// Returns a topic; adds it if it is new.
     pub(crate) fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
         self.topics.entry(name.to_owned()).or_insert_with(|| Topic {
             kind: if encoding == "cdr" { Type::of(schema) } else { Type::Other },
@@ -282,6 +284,7 @@ impl Gathering {
     }
 
     fn take_info(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+        // Only the first calibration is used.
         if self.infos.contains_key(topic) {
             return Some(());
         }
@@ -296,6 +299,7 @@ impl Gathering {
         let is_static = is_static(topic);
         for transform in &message.transforms {
             let link = (transform.child_frame_id.clone(), transform.header.frame_id.clone());
+            // One sample of a moving transform is enough to know the link.
             if is_static || self.linked.insert(link) {
                 self.tf.insert(transform, is_static);
             }
@@ -304,7 +308,7 @@ impl Gathering {
     }
 }
 
-/// Static transforms have a topic of their own.
+/// Returns true for static transforms, which have a topic of their own.
 pub(crate) fn is_static(tf_topic: &str) -> bool {
     tf_topic.ends_with("tf_static")
 }

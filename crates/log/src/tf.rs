@@ -1,4 +1,4 @@
-//! Where frames are relative to each other, and when.
+//! Relative poses of frames over time.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -7,18 +7,18 @@ use tagalong_core::Stamp;
 
 use crate::msgs::TransformStamped;
 
-/// How far a moving transform may be from the moment that is asked for, s.
+/// Maximum time between a sample of a moving transform and a query, s.
 const REACH_S: f64 = 0.5;
-/// Moving transforms are kept for this long, s.
+/// Time for which moving transforms are kept, s.
 const KEPT_S: f64 = 15.0;
-/// Samples kept of one moving transform.
+/// Maximum number of samples kept of one moving transform.
 const MAX_SAMPLES: usize = 8192;
-/// Frames known at most; a log with more is broken.
+/// Maximum number of frames; a log with more is broken.
 const MAX_FRAMES: usize = 4096;
-/// Longest chain from a frame to the root.
+/// Maximum length of a chain from a frame to the root.
 const MAX_DEPTH: usize = 64;
 
-/// A link from a frame to its parent.
+/// Link from a frame to its parent.
 #[derive(Clone, Debug)]
 struct Link {
     parent: String,
@@ -32,14 +32,14 @@ pub struct TfBuffer {
     links: BTreeMap<String, Link>,
 }
 
-/// Frame names of ROS 1 started with a slash.
+/// Removes the leading slash that frame names of ROS 1 had.
 fn plain(name: &str) -> &str {
     name.trim_start_matches('/')
 }
 
 impl TfBuffer {
-    /// Takes in a transform; false if it is none (a number that is not finite, a
-    /// quaternion that is no rotation, a frame that is its own parent).
+    /// Adds a transform; returns false if it is invalid (a number that is not finite, a quaternion
+    /// that is no rotation, a frame that is its own parent) or there are too many frames.
     pub fn insert(&mut self, transform: &TransformStamped, is_static: bool) -> bool {
         let (child, parent) = (plain(&transform.child_frame_id), plain(&transform.header.frame_id));
         let Some(pose) = transform.transform.isometry() else { return false };
@@ -52,6 +52,7 @@ impl TfBuffer {
             moving: VecDeque::new(),
             fixed: None,
         });
+        // Samples under different parents cannot be interpolated.
         if link.parent != parent {
             link.parent = parent.to_owned();
             link.moving.clear();
@@ -64,32 +65,32 @@ impl TfBuffer {
         true
     }
 
-    /// Forgets what moves.
+    /// Removes the samples of moving transforms.
     pub fn clear_moving(&mut self) {
         self.links.values_mut().for_each(|link| link.moving.clear());
     }
 
-    /// Each frame that has a parent, with it.
+    /// Returns each frame that has a parent, with its parent.
     pub fn parents(&self) -> BTreeMap<String, String> {
         self.links.iter().map(|(child, link)| (child.clone(), link.parent.clone())).collect()
     }
 
-    /// True if the frame is a child or a parent of something.
+    /// Returns true if the frame is a child or a parent.
     pub fn knows(&self, frame: &str) -> bool {
         let frame = plain(frame);
         self.links.contains_key(frame) || self.links.values().any(|link| link.parent == frame)
     }
 
-    /// True if the two frames hang together, at whatever time.
+    /// Returns true if the two frames are connected, at any time.
     pub fn connects(&self, a: &str, b: &str) -> bool {
         let (up_a, up_b) = (self.ancestors(plain(a)), self.ancestors(plain(b)));
         up_a.iter().any(|frame| up_b.contains(frame))
     }
 
-    /// The pose of frame `source` in frame `target` at a moment: it takes
-    /// coordinates in `source` to coordinates in `target`. Moving transforms are
-    /// interpolated, and held for half a second before their first and behind
-    /// their last sample. `None` where the frames do not hang together.
+    /// Returns the pose of frame `source` in frame `target` at a given time: it maps coordinates in
+    /// `source` to coordinates in `target`. Moving transforms are interpolated, and held for half a
+    /// second before their first and behind their last sample. `None` if the frames are not
+    /// connected or a transform is not known at that time.
     pub fn lookup(&self, target: &str, source: &str, at: Stamp) -> Option<Isometry3<f64>> {
         let (up_t, up_s) = (self.ancestors(plain(target)), self.ancestors(plain(source)));
         let common = up_s.iter().find(|frame| up_t.contains(frame))?;
@@ -98,10 +99,11 @@ impl TfBuffer {
         Some(target.inverse() * source)
     }
 
-    /// The frame, its parent, and so on; ends at a loop.
+    /// Returns the frame, its parent, and so on; ends at a loop.
     fn ancestors<'a>(&'a self, frame: &'a str) -> Vec<&'a str> {
         let mut out = vec![frame];
         while let Some(link) = out.last().and_then(|last| self.links.get(*last)) {
+            // A loop of parents would never end.
             if out.len() > MAX_DEPTH || out.contains(&link.parent.as_str()) {
                 break;
             }
@@ -110,7 +112,7 @@ impl TfBuffer {
         out
     }
 
-    /// `to_from_frame` along a list of ancestors.
+    /// Returns `to_from_frame` along a list of ancestors.
     fn climb(&self, ancestors: &[&str], to: &str, at: Stamp) -> Option<Isometry3<f64>> {
         let mut pose = Isometry3::identity();
         for frame in ancestors.iter().take_while(|frame| **frame != to) {
@@ -151,11 +153,12 @@ impl Link {
             (Some(one), None) | (None, Some(one)) => near(one),
             (None, None) => None,
         };
+        // A link may be on both topics; the static one serves without a sample.
         moving.or(self.fixed)
     }
 }
 
-/// Straight in position, at constant speed in rotation.
+/// Interpolates linearly in position and at constant speed in rotation.
 fn interpolate(
     (t0, a): &(Stamp, Isometry3<f64>),
     (t1, b): &(Stamp, Isometry3<f64>),
@@ -164,7 +167,7 @@ fn interpolate(
     let span = t1.seconds_since(*t0);
     let part = if span > 0.0 { at.seconds_since(*t0) / span } else { 0.0 };
     let translation = a.translation.vector.lerp(&b.translation.vector, part);
-    // Between rotations that are nearly the same the result is not quite of length one.
+    // Between nearly equal rotations the length of the result is not exactly one.
     let mut rotation = a.rotation.try_slerp(&b.rotation, part, 1e-9).unwrap_or(a.rotation);
     rotation.renormalize();
     Isometry3::from_parts(translation.into(), rotation)

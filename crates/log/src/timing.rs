@@ -1,26 +1,25 @@
-//! How regularly images come, and whether those of two topics belong together,
-//! by their stamps.
+//! Regularity of images, and offsets between those of two topics, by their stamps.
 
 use serde::Serialize;
 use tagalong_core::Stamp;
 
-/// The stamps of one topic, in the order of arrival.
+/// Statistics of the stamps of one topic, in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Timing {
-    /// Median of the steps ahead, s.
+    /// Median of the steps forward, s.
     pub median_period_s: f64,
-    /// Longest step ahead, s.
+    /// Longest step forward, s.
     pub longest_gap_s: f64,
-    /// Steps back.
+    /// Number of steps back.
     pub steps_back: usize,
     /// Longest step back, s.
     pub longest_step_back_s: f64,
-    /// Stamps equal to the one before.
+    /// Number of stamps equal to the previous one.
     pub repeated: usize,
 }
 
 impl Timing {
-    /// `None` if no stamp is later than the one before it.
+    /// Computes the statistics; `None` if no stamp is later than the previous one.
     pub fn of(stamps: &[Stamp]) -> Option<Self> {
         let steps: Vec<f64> = stamps.windows(2).map(|w| w[1].seconds_since(w[0])).collect();
         let mut ahead: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
@@ -29,23 +28,24 @@ impl Timing {
             median_period_s: *ahead.get(ahead.len() / 2)?,
             longest_gap_s: *ahead.last()?,
             steps_back: steps.iter().filter(|step| **step < 0.0).count(),
+            // Adding 0 turns a negative zero into a positive one.
             longest_step_back_s: -steps.iter().copied().fold(0.0, f64::min) + 0.0,
             repeated: steps.iter().filter(|step| **step == 0.0).count(),
         })
     }
 }
 
-/// How the images of a second topic lie in time beside those of the first.
+/// Time offset of the images of a second topic from those of the first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Skew {
     /// Median of second minus first over neighbouring images, s.
     pub median_s: f64,
-    /// Part of the first topic's images with a second one within the tolerance.
+    /// Fraction of the first topic's images with a second one within the tolerance.
     pub paired: f64,
 }
 
 impl Skew {
-    /// Between the images of two topics; `None` if either has none.
+    /// Computes the offset between the images of two topics; `None` if either has none.
     pub fn between(first: &[Stamp], second: &[Stamp], tolerance_s: f64) -> Option<Self> {
         let mut second = second.to_vec();
         second.sort();
@@ -59,7 +59,7 @@ impl Skew {
     }
 }
 
-/// From a moment to the nearest of sorted stamps, s.
+/// Returns the offset from a given time to the nearest of sorted stamps, s.
 fn nearest(sorted: &[Stamp], at: Stamp) -> Option<f64> {
     let after = sorted.partition_point(|stamp| *stamp < at);
     let around = &sorted[after.saturating_sub(1)..(after + 1).min(sorted.len())];

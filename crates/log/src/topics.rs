@@ -1,4 +1,4 @@
-//! Which topics of a log are the colour images, the depth images, and so on.
+//! Choice of the topics of a log: colour images, depth images, and so on.
 
 use tagalong_core::{Input, Inputs, nearest};
 
@@ -6,7 +6,7 @@ use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
 use crate::{InputSettings, LogError};
 
-/// The topics that are read.
+/// Topics that are read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Chosen {
     pub(crate) colour: Option<String>,
@@ -21,7 +21,7 @@ pub(crate) struct Chosen {
 }
 
 impl Chosen {
-    /// True for a topic that is read.
+    /// Returns true for a topic that is read.
     pub(crate) fn has(&self, topic: &str) -> bool {
         let Self { colour, depth, right, colour_info, depth_info, right_info, .. } = self;
         [colour, depth, right, colour_info, depth_info, right_info]
@@ -31,14 +31,14 @@ impl Chosen {
     }
 }
 
-/// Chooses topics as named in the settings, else by type, encoding and name. A topic
-/// whose input is not used is not chosen, as if the log did not have it, but for one:
-/// frames are counted, timed and seen as the images of the colour topic are, and where
-/// there are none, those of the depth topic. In a log without images they are laser scans.
+/// Chooses topics as named in the settings, else by type, encoding and name. A topic of an unused
+/// input is not chosen, as if the log did not have it, with one exception: frames are numbered and
+/// timed by the images of the colour topic, and without it by those of the depth topic. In a log
+/// without images they are laser scans.
 ///
 /// # Errors
-/// [`LogError::Missing`] for a named topic that is not there, and for inputs
-/// that are required and found nowhere.
+/// [`LogError::Missing`] for a named topic that is not there, and for required inputs that are not
+/// found.
 pub(crate) fn choose(
     scan: &Scan,
     input: &InputSettings,
@@ -61,6 +61,7 @@ pub(crate) fn choose(
             .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true))),
         false => None,
     };
+    // The settings may name the right images as the colour topic.
     let right = right.filter(|topic| Some(topic) != colour.as_ref());
     let laser = match inputs.uses(Input::Laser) {
         true => named("laser_topic", &input.laser_topic, &[Type::LaserScan])?
@@ -149,7 +150,7 @@ fn is_image(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage)
 }
 
-/// A topic that the settings name.
+/// Returns a topic that the settings name.
 fn named(
     scan: &Scan,
     key: &str,
@@ -166,13 +167,14 @@ fn named(
     Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
 }
 
-/// The topic with the highest rank; of equals the one with the most messages,
-/// then the first by name.
+/// Returns the topic with the highest rank; of equal ones that with the most messages, then the
+/// first by name.
 fn best(scan: &Scan, rank: impl Fn(&str, &Topic) -> Option<i32>) -> Option<String> {
     let ranked =
         scan.topics.iter().filter(|(_, topic)| topic.count > 0).filter_map(|(name, topic)| {
             Some((rank(&name.to_lowercase(), topic)?, topic.count, name))
         });
+    // Reversed, because the last of equal maxima is returned.
     ranked.rev().max_by_key(|(rank, count, _)| (*rank, *count)).map(|(.., name)| name.clone())
 }
 
@@ -185,6 +187,7 @@ fn colour_rank(name: &str, topic: &Topic, right: bool) -> Option<i32> {
     if !is_image(topic) || topic.content != Content::Picture || is_right != right {
         return None;
     }
+    // A name for colour decides before one for a side, and before an uncompressed image.
     let mut rank = 0;
     rank += 8 * i32::from(has(name, &["color", "colour", "rgb"]));
     rank += 4 * i32::from(has(name, &["left", "front", "rect"]));
@@ -215,8 +218,8 @@ fn laser_rank(name: &str, topic: &Topic) -> Option<i32> {
     (topic.kind == Type::LaserScan).then_some(rank)
 }
 
-/// The calibration of an image topic: its `camera_info` sibling, else the only
-/// one with the same frame.
+/// Returns the calibration of an image topic: its `camera_info` sibling, else the only one with the
+/// same frame.
 fn info_of(scan: &Scan, image: &str) -> Option<String> {
     let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
     let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);

@@ -1,12 +1,10 @@
-//! Ground truth inside a log: who was where, as a simulator or an annotator
-//! knows it.
+//! Ground truth inside a log: positions of the people, from a simulator or an annotator.
 //!
-//! The channel [`TRUTH_TOPIC`] carries one JSON text per image, with the image's
-//! stamp (see [`TruthFrame`]). JSON, because no ROS message says "this one is
-//! hidden and does not count", and because it can be read in any viewer. We
-//! write it as a `std_msgs/String`: some readers of ROS 2 logs refuse a file
-//! that has any other kind of schema in it. Read is a plain JSON message, too
-//! (message encoding `json`, schema encoding `jsonschema`, schema name
+//! The channel [`TRUTH_TOPIC`] carries one JSON text per image, with the image's stamp (see
+//! [`TruthFrame`]). JSON is used because no ROS message has a field for "hidden and does not
+//! count", and because it can be read in any viewer. It is written as a `std_msgs/String`, because
+//! some readers of ROS 2 logs refuse a file with any other kind of schema. A plain JSON message can
+//! be read, too (message encoding `json`, schema encoding `jsonschema`, schema name
 //! [`TRUTH_SCHEMA`]).
 
 use std::io::Read as _;
@@ -20,47 +18,47 @@ use crate::msgs::{StringMsg, decode};
 use crate::scan::open_file;
 use crate::{Limits, LogError};
 
-/// The topic of the truth.
+/// Topic of the truth.
 pub const TRUTH_TOPIC: &str = "/truth/people";
 
-/// The name of its schema where it is plain JSON.
+/// Name of its schema in plain JSON.
 pub const TRUTH_SCHEMA: &str = "tagalong/TruthFrame";
 
-/// Everybody who was there at the moment of one image.
+/// All people at the time of one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TruthFrame {
     /// Stamp of the image, ns.
     pub stamp_ns: u64,
-    /// Everybody, those who do not count included.
+    /// All people, those that do not count included.
     pub people: Vec<TruthPerson>,
 }
 
-/// One person at one moment.
+/// One person at one time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TruthPerson {
-    /// Who it is, the same throughout the log.
+    /// Identity, the same throughout the log.
     pub id: i64,
     /// Centre of the head in the robot frame (X forward, Y left, Z up), m.
     pub head_in_robot_m: Option<[f64; 3]>,
-    /// The upper-body square clipped to the image: x, y, width, height, pixels.
-    /// Of a conical mirror it lies in the unwrapped panorama, and may continue
-    /// beyond the right edge (see `tagalong_core::Panorama`).
+    /// Upper-body square clipped to the image: x, y, width, height, pixels. With a conical mirror
+    /// it lies in the unwrapped panorama, and may continue beyond the right edge (see
+    /// `tagalong_core::Panorama`).
     pub upper_body_px: Option<[f64; 4]>,
-    /// The part of it that can be seen, likewise.
+    /// Visible part of it, likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub visible_px: Option<[f64; 4]>,
     /// Middle of the trunk in the robot frame, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torso_in_robot_m: Option<[f64; 3]>,
-    /// Who hides most of what cannot be seen of the upper body.
+    /// Identity of the person that hides most of the hidden part of the upper body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occluder: Option<i64>,
     /// Visible fraction of the upper body, 0 to 1.
     #[serde(default = "whole")]
     pub visible: f64,
-    /// Neither a miss nor a false alarm.
+    /// True if the person counts neither as a miss nor as a false alarm.
     #[serde(default)]
     pub ignore: bool,
 }
@@ -70,23 +68,22 @@ fn whole() -> f64 {
 }
 
 impl TruthFrame {
-    /// The message as bytes.
+    /// Returns the message as bytes.
     pub fn encode(&self) -> Vec<u8> {
         serde_json::to_vec(self).unwrap_or_default()
     }
 
-    /// The JSON schema of the message, for the log's schema record.
+    /// Returns the JSON schema of the message, for the log's schema record.
     pub fn schema() -> String {
         schemars::schema_for!(TruthFrame).to_value().to_string()
     }
 }
 
-/// Reads the truth of a log in the order of the stamps; `None` if the log has
-/// no such channel.
+/// Reads the truth of a log in the order of the stamps; `None` if the log has no such channel.
 ///
 /// # Errors
-/// A log that cannot be opened, or a message of the channel that is no
-/// [`TruthFrame`]: half a truth would make false figures.
+/// A log that cannot be opened, or a message of the channel that is no [`TruthFrame`], because an
+/// incomplete truth would give wrong figures.
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
     let mut walker = Walker::new(open_file(path)?, limits)
         .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
@@ -107,8 +104,7 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
     Ok(present.then_some(frames))
 }
 
-/// Reads truth that is a text with one [`TruthFrame`] in each line, in the order of
-/// the stamps.
+/// Reads truth from a text with one [`TruthFrame`] per line, in the order of the stamps.
 ///
 /// # Errors
 /// A file that cannot be read, or a line that is no [`TruthFrame`].

@@ -1,4 +1,4 @@
-//! Files written by others: rosbag2, libmcap, Python, the MCAP conformance suite.
+//! Files written by other programs: rosbag2, libmcap, Python, the MCAP conformance suite.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 use std::io::BufReader;
@@ -32,7 +32,7 @@ fn messages_and_images_are_those_that_were_written() {
     for (name, file) in files {
         let mut walker = walker(&folder.join(name));
         let listed = file["messages"].as_array().unwrap();
-        // The list is in log order, a file may be in another one.
+        // The list is in log order; a file may be in another one.
         let mut got: Vec<(u64, String, u64, String)> = Vec::new();
         while let Some(message) = walker.next() {
             let channel = &file["channels"][&message.channel.topic];

@@ -1,4 +1,4 @@
-//! Frames from small logs that were made up for the purpose.
+//! Frames from small invented logs.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod common;
@@ -15,7 +15,7 @@ use tagalong_log::{
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 const INFO: &str = "/camera/color/camera_info";
 
-/// A log with a calibration and a fixed camera.
+/// Starts a log with a calibration and a fixed camera.
 fn started() -> LogWriter {
     let mut log = LogWriter::plain();
     log.info(INFO, "colour", &camera(16, 12, 14.0));
@@ -179,8 +179,8 @@ fn odometry_is_taken_at_the_stamps_of_the_images() {
     assert_eq!(found[0].frame.motion.dt, 0.0);
 }
 
-/// A scanner 0.2 m ahead of the robot's middle sees a wall 5 m ahead of the start, ten
-/// times a second, while the robot drives towards it at 0.4 m/s.
+/// Simulates a scanner 0.2 m ahead of the robot's centre that measures a wall 5 m ahead of the
+/// start, ten times a second, while the robot drives towards it at 0.4 m/s.
 fn with_scanner(log: &mut LogWriter) {
     for i in 0..20 {
         let t = f64::from(i) * 0.1;
@@ -245,8 +245,8 @@ fn gaps_and_jumps_of_odometry_are_told() {
     let found = frames(&mut source);
     let stale: Vec<u64> =
         found.iter().filter(|found| found.odom_stale).map(|found| found.frame.index - 1).collect();
-    // Up to half a second the last motion is carried on; the frame behind a gap
-    // does not know how it came there.
+    // Up to half a second the last motion is continued; the motion of the frame behind a gap is
+    // unknown.
     assert_eq!(stale, [&(14..=30).collect::<Vec<u64>>()[..], &[44, 45]].concat());
     assert_eq!(count(&source, "odometry_gap_frames"), 16);
     assert_eq!(count(&source, "odometry_jump_frames"), 2);
@@ -366,7 +366,7 @@ fn the_pose_of_the_camera_can_be_given() {
     assert!((camera.pitch_down_rad().to_degrees() - 10.0).abs() < 1e-9);
     assert!((camera.roll_rad().to_degrees() + 3.0).abs() < 1e-9);
     assert!(source.facts().camera_source.contains("[input.camera]"));
-    // A wall gives no floor: with nothing else, the run cannot start.
+    // A wall gives no floor: without another source of the pose, the run cannot start.
     let (input, limits) = (InputSettings::default(), Limits::default());
     let error = FrameSource::open(&saved.path, &input, &limits, DEPTH).err().unwrap();
     assert!(error.to_string().contains("camera pose"), "{error}");
@@ -410,8 +410,8 @@ fn depth_is_moved_onto_colour_as_the_settings_say() {
     assert!(depth.get(2, 5).unwrap().is_nan() && depth.get(5, 10).unwrap().is_nan());
 }
 
-/// A floor 1.2 m below and a wall 4 m ahead of the colour camera, seen from a
-/// camera whose pose in the colour camera is given.
+/// Renders a floor 1.2 m below and a wall 4 m ahead of the colour camera, from a camera with the
+/// given pose in the colour camera.
 fn room(from: &Camera, colour_from_camera: &Isometry3<f64>) -> DepthImage {
     DepthImage::from_fn(from.width, from.height, |x, y| {
         let ray = colour_from_camera.rotation * from.ray(Point2::new(x as f64, y as f64));
@@ -528,7 +528,7 @@ fn a_file_that_shrinks_while_it_is_read_is_noticed() {
     assert_eq!(count(&source, "log_changed_while_read"), 1);
 }
 
-/// A log of colour and depth, whose second colour image is damaged behind its header.
+/// Writes a log of colour and depth with damage in the second colour image behind its header.
 fn with_damage() -> LogWriter {
     let mut log = started();
     for i in 0..3 {

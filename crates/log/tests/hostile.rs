@@ -1,5 +1,5 @@
-//! Damaged, lying and hostile files: nothing panics, hangs or takes memory that
-//! the file does not have; what is whole is delivered, what is lost is counted.
+//! Damaged and hostile files: nothing panics, hangs or takes more memory than the file has data;
+//! intact messages are delivered, lost ones are counted.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod common;
@@ -15,7 +15,7 @@ use tagalong_log::{FrameSource, InputSettings, Inputs, Limits};
 const MESSAGES: usize = 120;
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
-/// What a walk delivered: the numbers in the messages.
+/// Result of a walk: the numbers in the messages.
 struct Walk {
     numbers: Vec<usize>,
     counters: std::collections::BTreeMap<&'static str, u64>,
@@ -51,7 +51,7 @@ fn walk(bytes: &[u8]) -> Option<Walk> {
 }
 
 fn text(number: usize) -> String {
-    // Not the same in each message, so that compression does not swallow all.
+    // Different in each message, so that compression does not remove it.
     let noise: String =
         (0..40).map(|i| char::from(b'a' + ((number * 31 + i * i) % 26) as u8)).collect();
     format!("{number} {noise}")
@@ -67,7 +67,7 @@ fn healthy(compression: Option<Compression>) -> Vec<u8> {
     log.finish()
 }
 
-/// One top-level record.
+/// Makes one top-level record.
 fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
 }
@@ -114,7 +114,7 @@ fn chunk(compression: &str, uncompressed: u64, crc: u32, data: &[u8]) -> Vec<u8>
     record(6, &body.concat())
 }
 
-/// A file of a healthy start, something in the middle, and a healthy message.
+/// Makes a file of a valid start, `middle`, and a valid message.
 fn around(middle: &[u8]) -> Vec<u8> {
     let start = [header(), schema_record(1), channel_record(1, 1, b"/text"), message_record(1, 0)];
     [&start.concat()[..], middle, &message_record(1, 1), &end()].concat()
@@ -153,7 +153,7 @@ fn a_truncated_file_gives_its_complete_chunks() {
     }
 }
 
-/// A small generator with a seed (xorshift).
+/// Small random generator with a seed (xorshift).
 struct Random(u64);
 
 impl Random {
@@ -179,7 +179,7 @@ fn a_flipped_byte_never_delivers_a_wrong_message_unnoticed() {
                 assert!(place < 8, "{name}: refused for byte {place}");
                 continue;
             };
-            // Of chunks with a checksum nothing wrong gets through.
+            // Chunks with a checksum deliver no wrong message.
             let right = found.numbers.iter().all(|number| *number < MESSAGES);
             assert!(right, "{name}: flip at {place} delivered {:?}", found.numbers);
             if found.numbers.len() < MESSAGES {
@@ -187,7 +187,7 @@ fn a_flipped_byte_never_delivers_a_wrong_message_unnoticed() {
             }
             unnoticed += u32::from(!found.lost);
         }
-        // Indexes behind the data are not looked at: nothing is lost there.
+        // Indexes behind the data are not read: nothing is lost there.
         assert!(unnoticed < 400, "{name}: {unnoticed} of 600 flips were not noticed");
     }
 }
@@ -263,7 +263,7 @@ fn zstd(data: &[u8]) -> Vec<u8> {
     zstd::encode_all(data, 3).unwrap()
 }
 
-/// Zeros without end that nobody stores.
+/// Makes a compressed stream of zeros that would be much larger than the file.
 fn bomb(bytes: u64) -> Vec<u8> {
     let mut encoder = zstd::stream::write::Encoder::new(Vec::new(), 3).unwrap();
     std::io::copy(&mut std::io::repeat(0).take(bytes), &mut encoder).unwrap();
@@ -273,11 +273,11 @@ fn bomb(bytes: u64) -> Vec<u8> {
 
 #[test]
 fn a_bomb_is_refused_and_what_follows_is_read() {
-    // Honest about its size, which is beyond the limit: not even started.
+    // The stated size is beyond the limit: decompression is not even started.
     let data = bomb(300 << 20);
     let found = walk(&around(&chunk("zstd", 3 << 30, 0, &data))).unwrap();
     assert_eq!((found.count("oversized_chunks"), &found.numbers[..]), (1, &[0, 1][..]));
-    // Lying about it: stopped one byte behind what was promised.
+    // The stated size is wrong: decompression stops one byte behind it.
     for claimed in [4, 5000] {
         let found = walk(&around(&chunk("zstd", claimed, 0, &data))).unwrap();
         assert_eq!((found.count("damaged_chunks"), &found.numbers[..]), (1, &[0, 1][..]));

@@ -1,4 +1,4 @@
-//! Frames of messages that arrive, against those of the same messages in a log.
+//! Frames of messages that arrive live, compared with those of the same messages in a log.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod common;
@@ -13,7 +13,7 @@ use tagalong_log::{
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 
-/// A log with a calibration and a fixed camera.
+/// Starts a log with a calibration and a fixed camera.
 fn started() -> LogWriter {
     let mut log = LogWriter::plain();
     log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
@@ -21,7 +21,7 @@ fn started() -> LogWriter {
     log
 }
 
-/// Colour and depth ten times a second, odometry five times as often.
+/// Writes colour and depth ten times a second, odometry five times as often.
 fn drive(log: &mut LogWriter, frames: i32) {
     for i in 0..5 * frames {
         let t = f64::from(i) * 0.02;
@@ -50,7 +50,7 @@ fn listen(log: &[u8], input: &InputSettings, inputs: Inputs) -> Listening {
     listening
 }
 
-/// Hears the log once to start, and then once more for the frames.
+/// Replays the log once to start, and then once more for the frames.
 fn live(log: &[u8], inputs: Inputs) -> (Vec<LogFrame>, LiveSource) {
     let mut source = listen(log, &InputSettings::default(), inputs).start().unwrap();
     let mut frames = Vec::new();

@@ -45,7 +45,7 @@ fn unwrapped_info(width: u32, height: u32) -> CameraInfo {
     }
 }
 
-/// The first frame of a log with one image: bright left of the robot, else dark.
+/// Returns the first frame of a log with one image: bright left of the robot, else dark.
 fn first(
     info: &CameraInfo,
     width: u32,
@@ -78,7 +78,7 @@ fn panorama(found: &LogFrame) -> Panorama {
     *found.frame.camera.panorama().unwrap()
 }
 
-/// Brightness where a point one metre and a half to the left, or right, is seen.
+/// Returns the brightness at the pixel of a point one metre and a half to the left, or right.
 fn at_side(found: &LogFrame, y: f64) -> u8 {
     let pixel = found.frame.camera.project(&Point3::new(0.0, y, 1.0)).unwrap();
     let colour = found.frame.colour().unwrap().get(pixel.x.round() as i64, pixel.y.round() as i64);
@@ -87,7 +87,7 @@ fn at_side(found: &LogFrame, y: f64) -> u8 {
 
 #[test]
 fn a_circular_image_becomes_a_panorama() {
-    // The image's right shows what is left of the robot.
+    // The right side of the image shows the left side of the robot.
     let found = first(&raw_info(), SIDE, SIDE, |x, _| x > 60);
     let image = found.frame.colour().unwrap();
     assert_eq!((image.width(), image.height()), (480, 120));

@@ -1,4 +1,4 @@
-//! The logs of real people, with the default settings.
+//! Public logs with real people, with the default settings.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 use std::path::{Path, PathBuf};
@@ -99,8 +99,7 @@ fn the_baseline_of_a_stereo_pair_is_known() {
     assert_eq!(frame.right().unwrap().image.width(), frame.colour().unwrap().width());
 }
 
-/// The floor that is fitted where tf is not used agrees with the tf, which was
-/// measured by other means.
+/// The floor that is fitted without tf agrees with the tf, which was measured by other means.
 #[test]
 fn the_floor_gives_the_pose_of_the_camera() {
     let Some(folder) = logs() else { return };

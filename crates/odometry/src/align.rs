@@ -1,9 +1,9 @@
-//! From which pose does an image show the points of a keyframe where they are?
+//! Pose from which an image shows the points of a keyframe at their pixels.
 //!
-//! Gauss and Newton on the brightness around all points at once (Lucas and Kanade 1981;
-//! Forster, Pizzoli and Scaramuzza 2014 call it sparse image alignment), over the motion
-//! of a robot on a floor and the nod of its camera. A patch is moved and not warped: the
-//! keyframe is never far.
+//! Gauss-Newton on the brightness around all points at once (Lucas and Kanade 1981; Forster,
+//! Pizzoli and Scaramuzza 2014 call it sparse image alignment), over the motion of a robot on a
+//! floor and the pitch of its camera. A patch is shifted and not warped, because the keyframe is
+//! never far away.
 
 use nalgebra::{Isometry2, Isometry3, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use tagalong_core::{Camera, Pinhole};
@@ -11,33 +11,34 @@ use tagalong_core::{Camera, Pinhole};
 use crate::keyframe::{Keyframe, Point, Pyramid};
 use crate::patch::Difference;
 
-/// Steps at most, at either size of the image.
+/// Maximum number of steps at each of the two image sizes.
 const STEPS: usize = 12;
-/// A step that moves by less than this is the last one, m and rad.
+/// A step smaller than this ends the iteration, m and rad.
 const STILL: f64 = 2e-5;
-/// Pixels side by side are wrong together: so many count as one.
+/// Number of pixels that count as one measurement, because neighbouring errors are correlated.
 const ALIKE: f64 = 20.0;
-/// Standard deviation of the camera's nod, rad.
+/// Prior standard deviation of the camera's pitch, rad.
 const NOD_RAD: f64 = 0.02;
-/// Nearer than this to the camera nothing is compared, m.
+/// Minimum depth of a point that is compared, m.
 const NEAREST_M: f64 = 0.2;
-/// Fewer points than this say nothing.
+/// Minimum number of visible points for an estimate.
 const LEAST_POINTS: usize = 8;
-/// Wheels are wrong by no more standard deviations than this.
+/// Maximum deviation from the wheel odometry, in standard deviations.
 const MOST_SIGMAS: f64 = 3.5;
-/// Points that differ by more than this, as a multiple of the median, count for little.
+/// Scale of the robust weight, as a multiple of the median squared difference.
 const USUAL: f64 = 3.0;
 
-/// What the wheels say of the way from the keyframe.
+/// Motion since the keyframe by wheel odometry.
 pub struct Prior {
-    /// The robot, in its frame at the keyframe.
+    /// Pose of the robot, in its frame at the keyframe.
     pub pose: Isometry2<f64>,
     /// Standard deviations of forward, left and turn, m and rad.
     pub sigma: Vector3<f64>,
 }
 
 impl Prior {
-    /// True for a pose that wheels cannot be so wrong about: what moves is not the robot.
+    /// Returns true if the pose deviates from the wheel odometry by more than [`MOST_SIGMAS`]: then
+    /// something other than the robot moves.
     pub fn is_contradicted_by(&self, pose: &Isometry2<f64>) -> bool {
         let off = self.pose.inverse() * pose;
         let off = Vector3::new(off.translation.x, off.translation.y, off.rotation.angle());
@@ -45,30 +46,30 @@ impl Prior {
     }
 }
 
-/// From where an image was taken.
+/// Estimated pose from which an image was taken.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The robot, in its frame at the keyframe.
+    /// Pose of the robot, in its frame at the keyframe.
     pub pose: Isometry2<f64>,
-    /// How the camera nods, compared to the keyframe, rad.
+    /// Pitch of the camera relative to the keyframe, rad.
     pub nod: f64,
     /// Covariance of forward, left and turn.
     pub covariance: Matrix3<f64>,
-    /// Points of the keyframe that the image shows.
+    /// Number of points of the keyframe that the image shows.
     pub seen: usize,
 }
 
-/// Forward, left, turn, nod.
+/// State of the estimation: forward, left, turn, pitch.
 type State = Vector4<f64>;
 
-/// The normal equations.
+/// Normal equations of the brightness differences.
 struct Equations {
     matrix: Matrix4<f64>,
     vector: State,
     seen: usize,
 }
 
-/// A camera with two images, and a keyframe.
+/// Camera with the images of a frame, and the keyframe they are compared with.
 pub struct View<'a> {
     pub keyframe: &'a Keyframe,
     pub camera: &'a Camera,
@@ -78,17 +79,22 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// The pose, beginning with a guess of it and of the nod; `None` if too little is seen.
+    /// Estimates the pose, starting from a guess of the pose and the pitch; `None` if too few
+    /// points are visible.
     pub fn align(&self, prior: &Prior, guess: (Isometry2<f64>, f64)) -> Option<Fit> {
         let sigma = prior.sigma.push(NOD_RAD);
         let precision = Matrix4::from_diagonal(&sigma.map(|sigma| sigma.powi(-2)));
         let by_wheels = state(&prior.pose, 0.0);
         let mut at = state(&guess.0, guess.1);
         let mut last = None;
+        // Half size first: one pixel there is two of the full image, so that the linearised
+        // brightness holds for a guess that is farther off.
         for level in [1, 0] {
             for _ in 0..STEPS {
                 let Equations { matrix, vector, seen } = self.equations(level, &at)?;
                 let covariance = (matrix + precision).try_inverse()?;
+                // The wheel odometry enters as a Gaussian prior: directions without texture stay at
+                // it.
                 let step = covariance * (vector + precision * (at - by_wheels));
                 at -= step;
                 last = Some((covariance, seen));
@@ -103,12 +109,14 @@ impl View<'_> {
         is_finite.then(|| Fit { pose: pose(&at), nod: at.w, covariance, seen })
     }
 
-    /// What the image says at a state. Each point counts by how usual its difference is
-    /// (Geman and McClure).
+    /// Returns the normal equations at a state. The weight of a point falls with its mean squared
+    /// difference (Geman and McClure); `None` with too few points.
     fn equations(&self, level: usize, at: &State) -> Option<Equations> {
         let stance = Stance::new(at);
         let looks: Vec<Look> =
             self.keyframe.points.iter().filter_map(|p| self.look(p, level, &stance)).collect();
+        // At least one squared grey level, the order of quantisation: a perfect match would
+        // otherwise have infinite weight.
         let usual = median(looks.iter().map(|look| look.difference.mean_square))?.max(1.0);
         let mut equations =
             Equations { matrix: Matrix4::zeros(), vector: State::zeros(), seen: looks.len() };
@@ -120,7 +128,7 @@ impl View<'_> {
         Some(equations)
     }
 
-    /// How a point looks from a state, and how its pixel moves with it.
+    /// Returns the difference of a point at a state and the derivative of its pixel by the state.
     fn look<'p>(&self, point: &'p Point, level: usize, stance: &Stance) -> Option<Look<'p>> {
         let here = point.after(&stance.pose);
         let seen = stance.nod(&(self.camera_from_robot * here).coords);
@@ -150,12 +158,12 @@ impl View<'_> {
     }
 }
 
-/// A point of the keyframe in the image.
+/// Comparison of a point of the keyframe with the image.
 struct Look<'p> {
     difference: Difference,
-    /// Of its slopes: xx, xy, yy.
+    /// Sums of the products of the slopes of its patch: xx, xy, yy.
     products: &'p [f64; 3],
-    /// By how many columns and rows it moves with the state.
+    /// Derivative of the pixel's column by the state; `rows` is that of its row.
     columns: State,
     rows: State,
 }
@@ -171,7 +179,7 @@ impl Look<'_> {
     }
 }
 
-/// A state, ready to be applied to points.
+/// State with the sine and cosine of its pitch, ready to be applied to points.
 struct Stance {
     pose: Isometry2<f64>,
     nod_sin: f64,
@@ -184,7 +192,7 @@ impl Stance {
         Self { pose: pose(at), nod_sin, nod_cos }
     }
 
-    /// A turn about the camera's horizontal axis.
+    /// Rotates a vector about the camera's horizontal axis.
     fn nod(&self, v: &Vector3<f64>) -> Vector3<f64> {
         let (sin, cos) = (self.nod_sin, self.nod_cos);
         Vector3::new(v.x, cos * v.y - sin * v.z, sin * v.y + cos * v.z)
@@ -199,7 +207,7 @@ fn pose(state: &State) -> Isometry2<f64> {
     Isometry2::new(Vector2::new(state.x, state.y), state.z)
 }
 
-/// Of points enough to say anything.
+/// Returns the median; `None` of fewer than [`LEAST_POINTS`] values.
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     let middle = values.len() / 2;

@@ -1,4 +1,4 @@
-//! An image that later ones are compared with.
+//! Image that later images are compared with.
 
 use nalgebra::{Isometry2, Point2, Point3, Vector2};
 use tagalong_core::{Camera, DepthImage, GreyImage};
@@ -6,37 +6,37 @@ use tagalong_core::{Camera, DepthImage, GreyImage};
 use crate::OdometrySettings;
 use crate::patch::Patch;
 
-/// Pixels from a point to where its depth is compared.
+/// Distance at which the depth around a point is checked, px.
 const NEAR: i64 = 3;
-/// Depths of one surface differ by less than this fraction.
+/// Maximum relative difference between depths of one surface.
 const SAME_SURFACE: f32 = 0.05;
 
-/// What is lower lies on the floor, m.
+/// Height below which a point lies on the floor, m.
 const FLOOR_M: f64 = 0.15;
-/// Nothing is lower than this, m: its depth is wrong, as often along level edges, which
-/// look alike in both images of a pair wherever they are.
+/// Minimum height of a point, m. A lower one has a wrong depth, as is frequent along horizontal
+/// edges, where both images of a stereo pair look alike at any disparity.
 const LOWEST_M: f64 = -0.2;
 
-/// Images at full and at half the size.
+/// Images at full and at half size.
 pub type Pyramid<'a> = [&'a GreyImage; 2];
 
-/// Points of an image whose places are known.
+/// Points of an image with known positions.
 pub struct Keyframe {
     pub points: Vec<Point>,
 }
 
-/// A point, and what is around it.
+/// Point with the brightness around it.
 pub struct Point {
-    /// Robot frame at the time of the image, m.
+    /// Position in the robot frame at the time of the image, m.
     pub place: Point3<f64>,
-    /// At full and at half the size.
+    /// Patches at full and at half size.
     pub patches: [Patch; 2],
-    /// From its pixel, scaled, to the middle of either patch, px.
+    /// Offset from the scaled pixel to the centre of either patch, px.
     pub shifts: [Vector2<f64>; 2],
 }
 
 impl Keyframe {
-    /// The points of an image. People stand at these places on the floor, robot frame, m.
+    /// Selects the points of an image. `people` are positions on the floor, robot frame, m.
     pub fn new(
         settings: &OdometrySettings,
         camera: &Camera,
@@ -48,6 +48,8 @@ impl Keyframe {
         let cells = |size: usize| (0..size).step_by(cell);
         let (width, height) = (images[0].width(), images[0].height());
         let eye = camera.robot_from_camera.translation.vector.xy().into();
+        // Points at a person and behind one are left out because outlines move with the person, and
+        // floor points near a person because of the shadow.
         let stands_still = |point: &Point| {
             let line = [eye, point.place.xy()];
             let is_on_floor = point.place.z < FLOOR_M;
@@ -67,21 +69,22 @@ impl Keyframe {
 }
 
 impl Point {
-    /// Where it is after the robot has moved, robot frame, m.
+    /// Returns the position in the robot frame after the robot has moved, m.
     pub fn after(&self, pose: &Isometry2<f64>) -> Point3<f64> {
         let floor = pose.inverse_transform_point(&self.place.xy());
         Point3::new(floor.x, floor.y, self.place.z)
     }
 }
 
-/// From a place to a line on the floor that ends, m.
+/// Returns the distance from a point to a line segment on the floor, m.
 fn distance_m(place: &Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
     let (way, off) = (to - from, place - from);
+    // The minimum keeps a segment of zero length from dividing by zero.
     let part = (off.dot(&way) / way.norm_squared().max(1e-9)).clamp(0.0, 1.0);
     (off - way * part).norm()
 }
 
-/// The point of a cell: where the brightness changes most.
+/// Returns the point of a cell with the largest change of brightness and a valid depth.
 fn point(
     settings: &OdometrySettings,
     camera: &Camera,
@@ -90,6 +93,7 @@ fn point(
     corner: (usize, usize),
 ) -> Option<Point> {
     let range = settings.min_depth_m as f32..=settings.max_depth_m as f32;
+    // `slopes` compares pixels that are two apart; the setting is per pixel.
     let least = (2.0 * settings.min_slope) as f32;
     let (mut best, mut slope) = (None, least);
     for (x, y, steepness) in slopes(images[0], corner, settings.cell_px) {
@@ -106,6 +110,7 @@ fn point(
     if place.z < LOWEST_M {
         return None;
     }
+    // A pixel with an odd index lies half a pixel off the centre of its pixel at half size.
     let odd = |at: usize| -0.5 * (at % 2) as f64;
     Some(Point {
         place,
@@ -114,7 +119,7 @@ fn point(
     })
 }
 
-/// The pixels of a cell, and by how much the brightness changes over two pixels.
+/// Yields the pixels of a cell and the change of brightness over two pixels.
 fn slopes(
     image: &GreyImage,
     (left, top): (usize, usize),
@@ -131,7 +136,7 @@ fn slopes(
     })
 }
 
-/// The depth of a pixel, m, unless it is at the border of a surface.
+/// Returns the depth of a pixel, m, unless it is at the border of a surface.
 fn surface_m(depth: &DepthImage, x: usize, y: usize) -> Option<f32> {
     let (x, y) = (x as i64, y as i64);
     let here = depth.get(x, y)?;
@@ -155,7 +160,7 @@ mod tests {
         assert!((distance_m(&Point2::new(-3.0, 4.0), line) - 5.0).abs() < 1e-12, "behind the eye");
     }
 
-    /// Points of a chequered floor; its depth is measured as `scale` times what it is.
+    /// Returns the points of a chequered floor with a depth of `scale` times the true one.
     fn points_of_floor(
         settings: &OdometrySettings,
         people: &[Point2<f64>],

@@ -1,14 +1,13 @@
-//! The robot's own motion, as far as the images show it.
+//! Ego-motion from images, corrected from wheel odometry.
 //!
-//! Wheels that are half a percent larger than believed turn a robot by a degree in a
-//! metre, and whoever is five metres away is then ten centimetres beside their place in
-//! any frame but the robot's. What stands still in the images tells: [`VisualOdometry`]
-//! compares each image with one that was taken a few decimetres before, at points whose
-//! depth is known, and corrects the motion by the wheels. People are left out, and what
-//! is behind them: their outlines move with them.
+//! A wheel half a percent larger than calibrated turns a robot by about a degree per metre, and a
+//! person at 5 m is then some 10 cm off in any frame but the robot's. [`VisualOdometry`] compares
+//! each image with one taken a few decimetres earlier, at static points of known depth, and
+//! corrects the wheel odometry. Points at people, and behind them, are left out because their
+//! outlines move.
 //!
-//! A bare wall says nothing, and then the wheels are believed; what little is seen counts
-//! by how much it says.
+//! An image of a bare wall carries no information and leaves the wheel odometry as it is; otherwise
+//! the weight of the image grows with the texture that it shows.
 
 mod align;
 mod keyframe;
@@ -24,30 +23,30 @@ use align::{Fit, Prior, View};
 use keyframe::{Keyframe, Pyramid};
 pub use settings::OdometrySettings;
 
-/// The wheels are never believed to less than this, m and rad.
+/// Minimum standard deviations of the wheel odometry, m and rad.
 const LEAST_M: f64 = 1e-3;
 const LEAST_RAD: f64 = 3e-4;
-/// Part of the points of a keyframe that an image must show.
+/// Fraction of a keyframe's points that an image must show for the keyframe to be kept.
 const SHOWN: f64 = 0.6;
 
-/// Corrects odometry by what stands still in the images.
+/// Correction of wheel odometry by the static points of the images.
 pub struct VisualOdometry {
     settings: OdometrySettings,
     reference: Option<Reference>,
     half: GreyImage,
 }
 
-/// What images are compared with.
+/// Keyframe that images are compared with.
 struct Reference {
     keyframe: Keyframe,
     by_wheels: Way,
-    /// The robot in its frame at the keyframe, as far as is known.
+    /// Estimated pose of the robot in its frame at the keyframe.
     pose: Isometry2<f64>,
-    /// How the camera nods, compared to the keyframe, rad.
+    /// Pitch of the camera relative to the keyframe, rad.
     nod: f64,
 }
 
-/// The way since a keyframe, by the wheels alone.
+/// Path since the keyframe by wheel odometry alone.
 #[derive(Default)]
 struct Way {
     pose: Isometry2<f64>,
@@ -56,17 +55,17 @@ struct Way {
 }
 
 impl VisualOdometry {
-    /// Odometry by these settings.
+    /// Creates the odometry with these settings.
     pub fn new(settings: OdometrySettings) -> Self {
         Self { settings, reference: None, half: GreyImage::default() }
     }
 
-    /// The robot's motion since the frame before. `motion` is what the wheels say of it;
-    /// without one, nothing that was seen before is of use. `people` were at these places
-    /// on the floor in that frame, robot frame, m.
+    /// Returns the robot's motion since the previous frame. `motion` is that of the wheel odometry;
+    /// without it the keyframe is dropped. `people` are positions on the floor in the previous
+    /// frame, robot frame, m.
     ///
-    /// A frame without depth or with a panorama, and one that shows too little of what
-    /// stands still, leaves the motion as it is; the latter is counted in the funnel.
+    /// A frame without depth or with a panorama, or with too few static points, leaves the motion
+    /// as it is; the latter is counted in the funnel.
     pub fn see(
         &mut self,
         frame: &Frame,
@@ -90,6 +89,8 @@ impl VisualOdometry {
         let (reference, motion) = compared.unwrap_or((None, motion));
         let moved = motion.unwrap_or(Motion::at_rest(0.0));
         self.reference = reference.or_else(|| {
+            // The positions of the people are those of the previous frame; the keyframe is this
+            // one.
             let people: Vec<_> = people.iter().map(|place| moved.apply_to_point(*place)).collect();
             Reference::new(settings, frame, images, depth, &people, funnel)
         });
@@ -98,7 +99,7 @@ impl VisualOdometry {
 }
 
 impl Reference {
-    /// The frame itself; `None` if it shows too little.
+    /// Makes a keyframe of the frame; `None` if it has too few points.
     fn new(
         settings: &OdometrySettings,
         frame: &Frame,
@@ -114,8 +115,8 @@ impl Reference {
         is_enough.then_some(Self { keyframe, by_wheels, pose, nod: 0.0 })
     }
 
-    /// Corrects the motion to a frame; keeps the reference if the next frame can be
-    /// compared with it, too.
+    /// Corrects the motion to a frame; keeps the reference if the next frame can be compared with
+    /// it, too.
     fn compare(
         mut self,
         settings: &OdometrySettings,
@@ -147,7 +148,7 @@ impl Reference {
             forward: step.translation.x,
             left: step.translation.y,
             turn: step.rotation.angle(),
-            // Of two poses, each known as well.
+            // The difference of two poses of equal covariance.
             covariance: 2.0 * fit.covariance,
             ..motion
         };
@@ -171,7 +172,8 @@ impl Way {
         self.turned_rad += motion.turn.abs();
     }
 
-    /// What it says. Wheels are wrong by the same fraction all the way.
+    /// Returns the pose with its deviations. The scale error of a wheel is constant over the path,
+    /// so the deviations grow linearly with the distance.
     fn prior(&self, settings: &OdometrySettings) -> Prior {
         let far = settings.wheel_error * self.travel_m + LEAST_M;
         let turn = settings.heading_error_per_m * self.travel_m
@@ -181,7 +183,7 @@ impl Way {
     }
 }
 
-/// Means of two by two pixels.
+/// Halves an image: each pixel is the mean of two by two.
 fn halve(image: &GreyImage, half: &mut GreyImage) {
     let (width, height) = (image.width() / 2, image.height() / 2);
     if (half.width(), half.height()) != (width, height) {
@@ -192,6 +194,7 @@ fn halve(image: &GreyImage, half: &mut GreyImage) {
         let pairs = above.chunks_exact(2).zip(below.chunks_exact(2));
         for (mean, (above, below)) in row.iter_mut().zip(pairs) {
             let sum: u16 = above.iter().chain(below).map(|grey| u16::from(*grey)).sum();
+            // 2 added before the division rounds to nearest.
             *mean = ((sum + 2) / 4) as u8;
         }
     }

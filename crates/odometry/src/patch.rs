@@ -1,4 +1,4 @@
-//! What is around a point, and how it differs from what an image shows.
+//! Brightness around a point, and its difference from an image.
 
 use nalgebra::Vector2;
 use tagalong_core::GreyImage;
@@ -6,31 +6,31 @@ use tagalong_core::GreyImage;
 /// Side of a patch, px.
 const SIDE: usize = 7;
 const PIXELS: usize = SIDE * SIDE;
-/// From the middle to the border, px.
+/// Distance from the centre to the border of a patch, px.
 const HALF: usize = SIDE / 2;
 
-/// Brightness around a point, and its slopes, all without their means: cameras adapt to
-/// the light.
+/// Brightness around a point, and its slopes, each without its mean, because the exposure of
+/// cameras adapts.
 #[derive(Clone, Debug)]
 pub struct Patch {
     grey: [f32; PIXELS],
-    /// From column to column, and from row to row.
+    /// Slopes along the rows and along the columns, grey levels per pixel.
     slopes: [[f32; PIXELS]; 2],
     /// Sums of the products of the slopes: xx, xy, yy.
     pub products: [f64; 3],
 }
 
-/// How an image differs from a patch.
+/// Difference between an image and a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Of a pixel, grey levels squared.
+    /// Mean over the pixels, grey levels squared.
     pub mean_square: f64,
     /// Sums of the differences times either slope.
     pub along: [f64; 2],
 }
 
 impl Patch {
-    /// Around a pixel; `None` too near to the border of the image.
+    /// Cuts the patch around a pixel; `None` too near to the border of the image.
     pub fn new(image: &GreyImage, x: usize, y: usize) -> Option<Self> {
         let is_inside = |at: usize, size: usize| at > HALF && at + HALF + 1 < size;
         if !(is_inside(x, image.width()) && is_inside(y, image.height())) {
@@ -49,8 +49,8 @@ impl Patch {
         Some(Self { grey: each(&at), slopes, products })
     }
 
-    /// Compares it with what an image shows around a place, which may be between pixels;
-    /// `None` where the image ends.
+    /// Compares the patch with an image around a position that may lie between pixels; `None` where
+    /// the image ends.
     pub fn compare(&self, image: &GreyImage, middle: Vector2<f64>) -> Option<Difference> {
         let mut difference = without_mean(sample(image, middle)?);
         difference.iter_mut().zip(&self.grey).for_each(|(shown, own)| *shown -= own);
@@ -61,7 +61,7 @@ impl Patch {
     }
 }
 
-/// Brightness around a place.
+/// Samples the brightness around a position, bilinearly.
 fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
     let is_inside =
         |at: f64, size: usize| at >= HALF as f64 && at + ((HALF + 1) as f64) < size as f64;
@@ -71,6 +71,7 @@ fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
     let (left, top) = (middle.x as usize - HALF, middle.y as usize - HALF);
     let [across, down] = [middle.x, middle.y].map(|at| at.fract() as f32);
     let mut out = [0.0; PIXELS];
+    // Each interpolated row is the lower one of one output row and the upper one of the next.
     let mut above = between(image.row(top), left, across);
     for (row, out) in out.chunks_exact_mut(SIDE).enumerate() {
         let below = between(image.row(top + row + 1), left, across);
@@ -82,7 +83,7 @@ fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
     Some(out)
 }
 
-/// Between the pixels of a row.
+/// Interpolates between the pixels of a row.
 fn between(row: &[u8], left: usize, part: f32) -> [f32; SIDE] {
     let pixels = &row[left..=left + SIDE];
     std::array::from_fn(|i| {
@@ -111,7 +112,7 @@ mod tests {
         GreyImage::from_fn(width, height, |x, y| ((x * x * 31 + y * 57 + x * y * 13) % 251) as u8)
     }
 
-    /// The brightness between four pixels, one after the other.
+    /// Interpolates between four pixels, one position after the other.
     fn slow_sample(image: &GreyImage, middle: Vector2<f64>) -> Vec<f64> {
         let at = |x: f64, y: f64| f64::from(image.get(x as i64, y as i64).unwrap());
         let mut all = Vec::new();

@@ -2,41 +2,41 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result, check_settings};
 
-/// Odometry, corrected by what stands still in the images.
+/// Settings of the odometry that is corrected by images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometrySettings {
-    /// One point is taken of each square of this side, px.
+    /// Side of the square cells that yield at most one point each, px.
     #[schemars(range(min = 8, max = 256))]
     pub cell_px: usize,
-    /// Least change of brightness from pixel to pixel at a point, of 255.
+    /// Minimum change of brightness from pixel to pixel at a point, grey levels of 255.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_slope: f64,
-    /// Points are no nearer than this, m: what is near moves more often than walls do, ...
+    /// Minimum depth of a point, m: near things move more often than walls.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_depth_m: f64,
-    /// ... and no farther away than this, m.
+    /// Maximum depth of a point, m.
     pub max_depth_m: f64,
-    /// What is at a person or behind one, within this of the line of sight, is no point, m.
+    /// Points at a person or behind one, within this distance of the line of sight, are left out,
+    /// m.
     #[schemars(range(min = 0.0))]
     pub person_m: f64,
-    /// Nor is what lies on the floor within this of a person, m: shadows walk, too.
+    /// Floor points within this distance of a person are left out because of the shadow, m.
     #[schemars(range(min = 0.0))]
     pub shadow_m: f64,
-    /// With fewer points than this an image shows too little, and the odometry of the log
-    /// is believed.
+    /// Minimum number of points; with fewer the odometry of the log is left as it is.
     #[schemars(range(min = 8))]
     pub min_points: usize,
-    /// Images are compared with one that was taken no farther away than this, m, ...
+    /// Distance from the keyframe beyond which a new one is taken, m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_travel_m: f64,
-    /// ... nor with the robot turned by more, degrees.
+    /// Turn from the keyframe beyond which a new one is taken, degrees.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_turn_deg: f64,
-    /// Standard deviation of the way by the wheels, as a fraction of it.
+    /// Standard deviation of the path by wheel odometry, as a fraction of the path.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub wheel_error: f64,
-    /// Standard deviation of the heading by the wheels, rad for each metre of the way.
+    /// Standard deviation of the heading by wheel odometry, rad per metre of the path.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub heading_error_per_m: f64,
 }

@@ -1,4 +1,4 @@
-//! A robot drives before a wall, and its wheels are wrong.
+//! A robot with wrong wheel odometry drives in front of a textured wall.
 
 use std::sync::Arc;
 
@@ -10,19 +10,19 @@ use tagalong_core::{
 use crate::{OdometrySettings, VisualOdometry};
 
 const SIZE: (usize, usize) = (192, 144);
-/// Where the wall stands, m.
+/// Distance of the wall, m.
 const WALL_M: f64 = 4.0;
-/// Half the width of somebody.
+/// Half the width of the person, m.
 const BODY_M: f64 = 0.4;
 
-/// What there is to see.
+/// Simulated scene.
 #[derive(Clone, Copy)]
 struct World {
     /// Contrast of the wall, 0 to 1.
     contrast: f64,
-    /// Where somebody stands, world frame, m.
+    /// Position of the person, world frame, m.
     somebody: Option<Point2<f64>>,
-    /// How the camera nods, rad.
+    /// Pitch of the camera, rad.
     nod: f64,
 }
 
@@ -36,13 +36,13 @@ fn camera(nod: f64) -> Camera {
     Camera::mounted(lens(), SIZE.0, SIZE.1, 1.0, nod, 0.0)
 }
 
-/// Brightness of a surface, without edges that a small image would not show.
+/// Returns the brightness of a surface, without edges that a small image would not show.
 fn paint(u: f64, v: f64) -> f64 {
     let waves = [(3.1, 1.7, 0.3), (-2.3, 4.1, 1.1), (5.7, 2.9, 2.0), (1.3, -6.1, 0.7)];
     waves.iter().map(|(a, b, c)| (a * u + b * v + c).sin()).sum::<f64>() / 4.0
 }
 
-/// What a camera on a robot sees.
+/// Renders the images of the camera.
 fn draw(world: World, robot: Isometry2<f64>) -> (GreyImage, DepthImage) {
     let camera = camera(world.nod);
     let seen = |x: usize, y: usize| {
@@ -75,7 +75,7 @@ fn frame(index: u64, world: World, robot: Isometry2<f64>) -> Frame {
     Frame::new(index, stamp, Arc::new(camera(0.0)), Motion::at_rest(0.1), images)
 }
 
-/// The robot after so many steps of a curve.
+/// Returns the pose of the robot after `step` steps of a curve.
 fn real(step: usize) -> Isometry2<f64> {
     (0..step).fold(Isometry2::identity(), |pose, _| pose * real_step())
 }
@@ -84,7 +84,7 @@ fn real_step() -> Isometry2<f64> {
     Isometry2::new(Vector2::new(0.05, 0.0), 0.01)
 }
 
-/// The same by wheels that are wrong about the heading.
+/// Returns the same step by wheel odometry with a wrong heading.
 fn by_wheels() -> Motion {
     let wrong = real_step() * Isometry2::new(Vector2::zeros(), 0.004);
     Motion::between(&Isometry2::identity(), &wrong, 0.1, 0.02)
@@ -92,8 +92,8 @@ fn by_wheels() -> Motion {
 
 const STEPS: usize = 20;
 
-/// Where the robot believes to be in the end, and what was counted. `known`: whether it
-/// knows of the people.
+/// Returns the final estimated pose and the counts. `known` is true if the odometry is given the
+/// positions of the people.
 fn drive(world: impl Fn(usize) -> World, known: bool) -> (Isometry2<f64>, Funnel) {
     let mut odometry = VisualOdometry::new(OdometrySettings::default());
     let mut funnel = Funnel::default();
@@ -114,7 +114,7 @@ fn drive(world: impl Fn(usize) -> World, known: bool) -> (Isometry2<f64>, Funnel
     (believed, funnel)
 }
 
-/// How far off the place is, m, and the heading, rad.
+/// Returns the errors of the position, m, and of the heading, rad.
 fn error(believed: &Isometry2<f64>) -> (f64, f64) {
     let off = real(STEPS).inverse() * believed;
     (off.translation.vector.norm(), off.rotation.angle().abs())

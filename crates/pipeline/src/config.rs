@@ -1,6 +1,5 @@
-//! From TOML to a pipeline. The text is parsed once into values that remember
-//! where they stood; each plugin gets its own, so that every mistake is shown
-//! with its line.
+//! Building a pipeline from TOML. The text is parsed once into values that keep their spans; each
+//! plugin receives its own, so that every mistake is shown with its line.
 
 use std::ops::Range;
 use std::path::Path;
@@ -55,7 +54,7 @@ pub const DEFAULT_ASSOCIATOR: &str = "associate-hungarian";
 /// The track manager of a config that names none.
 pub const DEFAULT_MANAGER: &str = "manage-m-of-n";
 
-/// Keys of older configs, and what stands in their place.
+/// Keys of older configs, with their replacement.
 const RENAMED: [(&str, &str); 2] = [
     (
         "association",
@@ -65,13 +64,13 @@ const RENAMED: [(&str, &str); 2] = [
     ("lifecycle", "`[manager.config]`"),
 ];
 
-/// How a config is read.
+/// Options for reading a config.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Top-level tables that are not the pipeline's. They are left alone; see
+    /// Top-level tables that belong to other programs. They are ignored; see
     /// [`RunSettings::table`].
     pub foreign: Vec<String>,
-    /// A seed in place of the config's.
+    /// Seed that replaces the config's.
     pub seed: Option<u64>,
 }
 
@@ -81,21 +80,21 @@ impl Default for Options {
     }
 }
 
-/// What a config says beside the pipeline.
+/// Settings of a config beside the pipeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSettings {
     /// Seed of the run.
     pub seed: u64,
     /// The robot.
     pub robot: RobotSettings,
-    /// `[tune]`: the settings that may be fitted. A run takes no notice of them.
+    /// `[tune]`: the settings that may be fitted. A run ignores them.
     pub tune: Vec<Tunable>,
     document: Document,
 }
 
 impl RunSettings {
-    /// A top-level table that is not the pipeline's; the defaults where the
-    /// config does not have it.
+    /// Returns a top-level table that belongs to another program; the defaults where the config
+    /// does not have it.
     ///
     /// # Errors
     /// Unknown keys and wrong types, with their place in the config.
@@ -110,8 +109,7 @@ impl Pipeline {
     /// against `base_dir`.
     ///
     /// # Errors
-    /// Whatever is wrong with the config, with its place in the text; see
-    /// [`ConfigError::render`].
+    /// Any mistake in the config, with its place in the text; see [`ConfigError::render`].
     pub fn from_toml(
         text: &str,
         base_dir: &Path,
@@ -120,10 +118,10 @@ impl Pipeline {
         Self::from_toml_with(text, base_dir, registry, &Options::default())
     }
 
-    /// [`Pipeline::from_toml`] with options.
+    /// Builds the pipeline like [`Pipeline::from_toml`], with options.
     ///
     /// # Errors
-    /// As [`Pipeline::from_toml`].
+    /// As for [`Pipeline::from_toml`].
     pub fn from_toml_with(
         text: &str,
         base_dir: &Path,
@@ -150,6 +148,7 @@ impl Pipeline {
         let associator = builder.associator(root.remove("associator"))?;
         let (filter, filter_span) = builder.filter(root.remove("filter"))?;
         let manager = builder.manager(root.remove("manager"))?;
+        // These checks span several sections, so they follow the construction of all of them.
         check_detectors(&detectors, &places)?;
         check_weighing(&filter, &detectors, filter_span)?;
         let steering = builder.steering(root.remove("controller"))?;
@@ -196,6 +195,7 @@ fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigErr
         .collect();
     for key in root.keys() {
         let name: &str = key.get_ref();
+        // A key of an older version gets its replacement instead of a guess by spelling.
         if let Some((_, now)) = RENAMED.iter().find(|(old, _)| *old == name) {
             let message = format!("`{name}` is now {now}");
             return Err(ConfigError { message, span: Some(key.span()) });
@@ -211,6 +211,7 @@ fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigErr
 }
 
 fn own_settings(root: &DeTable<'_>, options: &Options) -> Result<PipelineSettings, ConfigError> {
+    // Only the pipeline's own keys are deserialised here: the type refuses unknown ones.
     let own: DeTable<'_> = root
         .iter()
         .filter(|(key, _)| OWN.contains(&key.get_ref().as_ref()))
@@ -223,7 +224,7 @@ fn own_settings(root: &DeTable<'_>, options: &Options) -> Result<PipelineSetting
     Ok(settings)
 }
 
-/// Where a detector section stands, as a whole and by key.
+/// Spans of a detector section, as a whole and by key.
 struct Place {
     section: Range<usize>,
     every: Option<Range<usize>>,
@@ -231,7 +232,7 @@ struct Place {
     roles: Option<Range<usize>>,
 }
 
-/// A plugin section taken apart.
+/// Parts of a plugin section.
 struct Section<'a, T> {
     settings: T,
     config: Option<Value<'a>>,
@@ -256,7 +257,7 @@ impl<'a, T: Settings> Section<'a, T> {
         self.table.get(key).map(Spanned::span)
     }
 
-    /// Adds the place of the plugin's name to an error that has none.
+    /// Adds the span of the plugin's name to an error that has none.
     fn at_plugin<P>(&self, built: Result<P, ConfigError>) -> Result<P, ConfigError> {
         let place = self.span_of("plugin").unwrap_or_else(|| self.span.clone());
         built.map_err(|error| error.or_at(Some(place)))
@@ -264,7 +265,7 @@ impl<'a, T: Settings> Section<'a, T> {
 }
 
 impl<'a> Section<'a, PluginSettings> {
-    /// Takes a section apart that may be left out, or name no plugin.
+    /// Splits a section that may be left out, or name no plugin.
     fn or_default(name: &str, value: Option<Value<'a>>, plugin: &str) -> Result<Self, ConfigError> {
         let empty = || Spanned::new(0..0, DeValue::Table(DeTable::new()));
         let mut section = Self::new(name, value.unwrap_or_else(empty))?;
@@ -282,8 +283,10 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// The seed depends on the run's and on the plugin's place in the config.
+    /// Returns the context of a plugin. Its seed depends on the run's and on the plugin's place in
+    /// the config.
     fn context(&self, section: usize, index: usize) -> Context {
+        // The section is in the upper half, so that no index within a section can collide with it.
         let place = ((section as u64) << 32) + index as u64;
         Context {
             seed: mix(mix(self.settings.seed) ^ place),
@@ -372,6 +375,8 @@ impl Builder<'_> {
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_controller(name, config, &context))?;
         let PipelineSettings { robot, governor, .. } = self.settings;
+        // The stopping distance is known before the first frame, so an unsafe config is refused
+        // here.
         if let Some(message) = too_near(plugin.stand_off_m(), robot, governor) {
             return Err(ConfigError { message, span: section.span_of("plugin") });
         }
@@ -380,13 +385,14 @@ impl Builder<'_> {
     }
 }
 
-/// Why the robot cannot stop before the person, if it cannot.
+/// Returns the message for a robot that cannot stop before it reaches the person, if so.
 fn too_near(
     stand_off_m: Option<f64>,
     robot: &RobotSettings,
     governor: &GovernorSettings,
 ) -> Option<String> {
     let stopping_m = governor.stopping_m(robot.max_speed_mps);
+    // Written as `>=` so that a distance that is not a number counts as too near.
     let stops = |distance: f64| distance >= stopping_m;
     let distance_m = stand_off_m.filter(|distance| !stops(*distance))?;
     Some(format!(
@@ -396,7 +402,7 @@ fn too_near(
     ))
 }
 
-/// The sections of an array of tables.
+/// Returns the sections of an array of tables.
 fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, ConfigError> {
     let Some(value) = value else { return Ok(Vec::new()) };
     let span = value.span();
@@ -409,7 +415,7 @@ fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, Conf
     }
 }
 
-/// Mistakes that parse.
+/// Refuses roles and schedules that parse but cannot work.
 fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), ConfigError> {
     for (slot, place) in detectors.iter().zip(places) {
         let DetectorSettings { plugin, roles, every, offset, .. } = &slot.settings;
@@ -440,7 +446,7 @@ fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), C
     Ok(())
 }
 
-/// Returns a role of the config that the detector does not offer, and the words for it.
+/// Returns a role of the config that the detector does not offer, with its description.
 fn missing_role(slot: &DetectorSlot) -> Option<(&'static str, &'static str)> {
     let offered = slot.plugin.plugin().capabilities();
     let roles = [
@@ -460,6 +466,7 @@ fn check_weighing(
     span: Range<usize>,
 ) -> Result<(), ConfigError> {
     let weighs = |slot: &DetectorSlot| slot.settings.roles.contains(&Role::Weigh);
+    // A filter that weighs scenes would have no measurement without such a detector.
     if !filter.plugin().weighs_scenes() || detectors.iter().any(weighs) {
         return Ok(());
     }
@@ -471,7 +478,7 @@ fn check_weighing(
     Err(ConfigError { message, span: Some(span) })
 }
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+/// Mixes a seed by one step of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
 fn mix(seed: u64) -> u64 {
     let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

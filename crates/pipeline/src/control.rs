@@ -10,7 +10,7 @@ use crate::{LockReport, LockState, PipelineSettings, RobotSettings, SearchSettin
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
 
-/// The controller, the lock on whom it follows, and the governor of its commands.
+/// Controller, target lock, and governor of the commands.
 pub(crate) struct Steering {
     controller: Guarded<dyn Controller>,
     lock: Lock,
@@ -23,7 +23,7 @@ pub(crate) struct Steering {
     last: Option<Stamp>,
 }
 
-/// What came of a frame.
+/// Result of one frame.
 pub(crate) struct Steered {
     pub(crate) command: Command,
     pub(crate) target: Option<TrackId>,
@@ -50,7 +50,7 @@ impl Steering {
         }
     }
 
-    /// After a jump of the clock nobody is where they were: wait.
+    /// Forgets all positions after a jump of the clock, and starts the wait of `FRESH_FRAMES`.
     pub(crate) fn reset(&mut self) {
         self.lock.reset();
         self.surroundings.clear();
@@ -62,12 +62,12 @@ impl Steering {
         self.lock.choose(track);
     }
 
-    /// The distance that the controller keeps, m, if it keeps one.
+    /// Returns the distance that the controller keeps, m, if it keeps one.
     pub(crate) fn stand_off_m(&self) -> Option<f64> {
         self.controller.plugin().stand_off_m()
     }
 
-    /// The controller's name and its inputs.
+    /// Returns the controller's name and its inputs.
     pub(crate) fn inputs(&self) -> (&str, Inputs) {
         (self.controller.name(), self.controller.plugin().inputs())
     }
@@ -80,8 +80,8 @@ impl Steering {
         &mut self.governor
     }
 
-    /// The command for a frame, and who is followed; `motion` is the robot's since
-    /// the last frame that was processed.
+    /// Returns the command for a frame, and the target; `motion` is the robot's since the last
+    /// frame that was processed.
     ///
     /// # Errors
     /// The controller panicked.
@@ -91,6 +91,8 @@ impl Steering {
         motion: &Motion,
         tracks: &[Track],
     ) -> Result<Steered, StepError> {
+        // Checked first: a jump of the odometry latches the fault before this frame's command is
+        // made.
         self.governor.check_odometry(&frame.motion);
         let settled = self.is_settled();
         let lock = self.lock.update(frame, motion, tracks, settled);
@@ -109,6 +111,7 @@ impl Steering {
         let place = |track: &Track| track.estimate.person.position.xy();
         let person = target.map(|track| &track.estimate.person);
         let (corridor, camera) = (self.governor.corridor(), &frame.camera);
+        // Obstacles are updated after the lock, because points of the target are no obstacles.
         self.surroundings.look(corridor, camera, frame.depth().ok(), motion, person);
         self.surroundings.feel(corridor, frame.laser().map(|scan| &scan.points[..]));
         self.surroundings.meet(tracks, followed);
@@ -116,6 +119,7 @@ impl Steering {
             self.surroundings.ahead(corridor, curvature, target.map(place))
         };
         let command = self.governor.govern(&wish, look);
+        // The search learns only now that its wish was blocked; it reacts in the next frame.
         self.search.hear(command.reason == Reason::Blocked, motion.dt);
         Ok(Steered { command, target: target.map(|track| track.id), lock })
     }
@@ -126,6 +130,7 @@ impl Steering {
         tracks: &[Track],
         target: Option<&Track>,
     ) -> Result<WheelSpeeds, StepError> {
+        // A controller plans around people; a tentative track may be noise.
         let confirmed: Vec<Track> = tracks.iter().filter(|t| t.confirmed).cloned().collect();
         let scene = Scene {
             frame,
@@ -137,8 +142,8 @@ impl Steering {
         self.controller.ask(frame.index, |controller| controller.command(&scene))
     }
 
-    /// What the wheels turn for: the controller's wish while somebody is followed,
-    /// the search's while the person is lost.
+    /// Chooses the wheel speeds and their purpose: the controller's wish while a target is
+    /// followed, the search's while it is lost.
     fn aim(&mut self, wheels: WheelSpeeds, tracks: &[Track]) -> (WheelSpeeds, Aim) {
         match self.lock.state() {
             LockState::Initial => (WheelSpeeds::STOP, Aim::Nobody),
@@ -160,7 +165,7 @@ impl Steering {
         self.search.wish(&self.search_settings, last, candidate, lost_s, &wheels)
     }
 
-    /// True once enough frames were processed since the last reset; counts one.
+    /// Counts a frame; returns true once enough frames were processed since the last reset.
     fn is_settled(&mut self) -> bool {
         self.fresh = self.fresh.saturating_add(1);
         self.fresh > FRESH_FRAMES

@@ -1,9 +1,8 @@
-//! From a TOML file to a running pipeline.
+//! Pipeline of a person-following robot, built from a TOML config.
 //!
-//! [`Pipeline::from_toml`] builds the plugins that a config names;
-//! [`Pipeline::step`] takes one frame through them and returns a
-//! [`FrameReport`] that says who was tracked and, for every candidate that was
-//! not, which test dropped it.
+//! [`Pipeline::from_toml`] builds the plugins that a config names; [`Pipeline::step`] takes one
+//! frame through them and returns a [`FrameReport`] with the tracks and, for every rejected
+//! candidate, the test that dropped it.
 //!
 //! # Invariants
 //!
@@ -13,22 +12,23 @@
 //!
 //! # The pipeline's own entries in the funnel
 //!
-//! | entry | what was dropped |
+//! | entry | dropped |
 //! |---|---|
 //! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
 //! | `odometry: ...` | a frame that shows too little to correct the wheels by |
 //! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |
 //! | `motion not finite` | a frame's odometry; the robot counts as standing |
 //! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
-//! | `gate`, `not the best sighting` | what a detector found near a track |
+//! | `gate`, `not the best sighting` | a detection found near a track |
 //! | `same person` | the weaker of two detections of one person |
-//! | `association not possible`, `associator` | a pair that no associator may form; a detection that it used up |
+//! | `association not possible`, `associator` | an impossible pair; a detection already used up |
 //! | `tracked already` | a detection at the place of a track that is seen there |
-//! | `score`, `verifier` | a candidate that is probably no person, by its detector or by the verifiers |
+//! | `score`, `verifier` | a candidate that its detector or the verifiers call no person |
 //! | `doubt`, `clutter`, `no track fits` | a candidate that the track manager refuses |
 //! | `filter` | a match that the filter did not accept |
-//! | `too many detections`, `no track numbers left` | what exceeds a limit |
-//! | `support of an unknown track`, `estimate of an unknown track`, `nis not finite` | a filter's mistakes |
+//! | `too many detections`, `no track numbers left` | an excess over a limit |
+//! | `support of an unknown track`, `estimate of an unknown track` | a filter's unknown track |
+//! | `nis not finite` | a filter's invalid innovation |
 //! | `command not finite` | a controller's command; the robot stops |
 //! | `track: ...` | a track, by the reason for which it ended |
 

@@ -7,7 +7,7 @@ use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 use crate::control::{Steered, Steering};
 use crate::{FrameReport, Orders, PipelineSettings};
 
-/// A tracker, and what drives the robot after one of its tracks.
+/// Tracker, with the controller that drives the robot after one of its tracks.
 pub struct Pipeline {
     pub(crate) settings: PipelineSettings,
     pub(crate) inputs: Inputs,
@@ -15,11 +15,11 @@ pub struct Pipeline {
     pub(crate) steering: Option<Steering>,
     pub(crate) resolved: String,
     pub(crate) failed: Option<u64>,
-    /// Where relative paths of the config start.
+    /// Folder against which relative paths of the config are resolved.
     pub(crate) base_dir: PathBuf,
 }
 
-/// The stages that [`FrameReport::timings`] names: those of the tracker, then the controller.
+/// Stages that [`FrameReport::timings`] names: those of the tracker, then the controller.
 const STAGES: [&str; 9] = {
     let [preprocess, predict, track, discover, associate, update, manage, learn] =
         tagalong_tracking::STAGES;
@@ -27,12 +27,12 @@ const STAGES: [&str; 9] = {
 };
 
 impl Pipeline {
-    /// Takes one frame through the pipeline. What the frame holds beside
-    /// [`Pipeline::inputs`] is not looked at.
+    /// Takes one frame through the pipeline. Data of the frame beyond [`Pipeline::inputs`] is
+    /// ignored.
     ///
     /// # Errors
-    /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then:
-    /// each further call fails.
+    /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then: each further call
+    /// fails.
     pub fn step(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
         if let Some(failed) = self.failed {
             return Err(StepError::Stopped { frame: failed });
@@ -48,75 +48,76 @@ impl Pipeline {
         report
     }
 
-    /// Returns the inputs that the plugins and the stages declare, but those that the
-    /// config does without: the program that makes frames need not read others.
+    /// Returns the inputs that the plugins and the stages declare, without those that the config
+    /// excludes: the frame source need not read others.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }
 
-    /// What the wheels may do at a time, by the clock of the frames' stamps: the
-    /// last command until it expires, zero after that, after a fault and before
-    /// the first frame. A control loop asks at its own rate. `None` without a
-    /// controller.
+    /// Returns the command in force at a time, by the clock of the frames' stamps: the last command
+    /// until it expires, zero after that, after a fault and before the first frame. A control loop
+    /// asks at its own rate. `None` without a controller.
     pub fn command_at(&self, now: Stamp) -> Option<Command> {
         Some(self.orders()?.at(now))
     }
 
-    /// A copy of what [`Pipeline::command_at`] answers from, for a thread of its own.
+    /// Returns a copy of the state behind [`Pipeline::command_at`], for use in another thread.
     pub fn orders(&self) -> Option<Orders> {
         Some(self.steering.as_ref()?.governor().orders())
     }
 
-    /// Follows the person of this track from the next frame on, and forgets whom
-    /// it followed before.
+    /// Follows the person of this track from the next frame on, and forgets the previous target.
     pub fn choose_target(&mut self, track: TrackId) {
         if let Some(steering) = &mut self.steering {
             steering.follow(track);
         }
     }
 
-    /// True if the config has a controller: frames lead to commands.
+    /// Returns true if the config has a controller: frames lead to commands.
     pub fn has_controller(&self) -> bool {
         self.steering.is_some()
     }
 
-    /// The distance that the controller keeps from the person, m, if there is a
-    /// controller and it keeps one.
+    /// Returns the distance that the controller keeps from the person, m, if there is a controller
+    /// and it keeps one.
     pub fn stand_off_m(&self) -> Option<f64> {
         self.steering.as_ref()?.stand_off_m()
     }
 
-    /// Why nothing moves until [`Pipeline::arm`], if so.
+    /// Returns the fault that holds the robot until [`Pipeline::arm`], if there is one.
     pub fn fault(&self) -> Option<&'static str> {
         self.steering.as_ref()?.governor().fault()
     }
 
-    /// Stops the robot until [`Pipeline::arm`]: somebody pressed a button, or
-    /// whoever makes the frames found a fault that no frame shows.
+    /// Stops the robot until [`Pipeline::arm`]: after a press of a stop button, or a fault that no
+    /// frame shows.
     pub fn disarm(&mut self, why: &'static str) {
         if let Some(steering) = &mut self.steering {
             steering.governor_mut().latch(why);
         }
     }
 
-    /// Lets the robot move again after a fault, once a person has looked. A
-    /// plugin that failed stays stopped, and with it the pipeline.
+    /// Lets the robot move again after a fault that a person has checked. A plugin that failed
+    /// stays stopped, and with it the pipeline.
     pub fn arm(&mut self) {
+        // A failed plugin may hold broken state, so a pipeline with one is never armed again.
         if let Some(steering) = self.steering.as_mut().filter(|_| self.failed.is_none()) {
             steering.governor_mut().arm();
         }
     }
 
-    /// Lets the filter show its work in [`FrameReport::sketch`]. That takes time,
-    /// which counts as that of the stage `update`, and changes nothing else.
+    /// Turns the filter's visualisation in [`FrameReport::sketch`] on or off. It takes time, which
+    /// counts as that of the stage `update`, and changes nothing else.
     pub fn sketch(&mut self, wanted: bool) {
         self.tracker.sketch(wanted);
     }
 
-    /// Shares what detectors and verifiers say of a frame with other pipelines that are
-    /// shown the very same frame and share, too: what was answered once is not worked out
-    /// again. The reports are the same; a search for settings takes less time.
+    /// Shares the answers of detectors and verifiers with other sharing pipelines that process the
+    /// very same frame, so that each answer is computed once. The reports are the same; a search
+    /// for settings takes less time.
     pub fn share_findings(&mut self) {
+        // Two plugins are interchangeable only with the same name, config, place, seed, base
+        // directory and robot.
         let resolved: toml::Table = toml::from_str(&self.resolved).unwrap_or_default();
         let around = format!(
             "{} {} {:?}",
@@ -132,6 +133,7 @@ impl Pipeline {
         let slots = self.tracker.detectors().iter().enumerate();
         let detectors = slots.map(|(at, slot)| {
             let forgets = !slot.plugin.plugin().remembers();
+            // An answer of a detector with memory depends on earlier frames, so it is not shared.
             forgets.then(|| identity("detectors", at))
         });
         let detectors = detectors.collect();
@@ -140,12 +142,12 @@ impl Pipeline {
         self.tracker.share_answers(Identities { detectors, verifiers });
     }
 
-    /// The stages that [`FrameReport::timings`] names, in their order.
+    /// Returns the names of the stages in [`FrameReport::timings`], in their order.
     pub fn stage_names(&self) -> &'static [&'static str] {
         &STAGES
     }
 
-    /// The config with every default filled in, as TOML.
+    /// Returns the config with every default filled in, as TOML.
     pub fn resolved(&self) -> String {
         self.resolved.clone()
     }
@@ -165,6 +167,8 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, frame: &Frame, report: &mut FrameReport) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
+        // A jump of the clock invalidates every position that the target lock and the governor
+        // remember.
         if matches!(report.outcome, Outcome::ResetBackward { .. } | Outcome::ResetForward { .. }) {
             steering.reset();
         }

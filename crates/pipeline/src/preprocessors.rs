@@ -1,4 +1,4 @@
-//! The stages that complete a frame: `[stereo]` and `[odometry]`.
+//! Stages that complete a frame: `[stereo]` and `[odometry]`.
 
 use nalgebra::Point2;
 use tagalong_core::{Frame, Funnel, Guarded, Motion, Result};
@@ -6,7 +6,7 @@ use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::{Preprocessed, Preprocessor};
 
-/// Depth of the stereo pair, for frames that have none.
+/// Depth from the stereo pair, for frames that have none.
 struct DepthOfPair(StereoDepth);
 
 impl Preprocessor for DepthOfPair {
@@ -25,7 +25,7 @@ impl Preprocessor for DepthOfPair {
     }
 }
 
-/// The robot's motion, corrected by what stands still in the images.
+/// Robot motion, corrected by static structure in the images.
 struct MotionOfImages(VisualOdometry);
 
 impl Preprocessor for MotionOfImages {
@@ -46,6 +46,7 @@ pub(crate) fn preprocessors(
     stereo: Option<StereoDepth>,
     odometry: Option<VisualOdometry>,
 ) -> Vec<Guarded<dyn Preprocessor>> {
+    // Stereo goes first, because odometry needs depth.
     let mut stages: Vec<Guarded<dyn Preprocessor>> = Vec::new();
     stages.extend(
         stereo.map(|s| Guarded::<dyn Preprocessor>::new("stereo", Box::new(DepthOfPair(s)))),

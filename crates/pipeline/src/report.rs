@@ -3,42 +3,41 @@ use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing};
 
 use crate::LockReport;
 
-/// Everything that one frame led to: the [`TrackingReport`], and where the pipeline has a
-/// controller, the target and the command.
+/// Result of one frame: the [`TrackingReport`] and, where the pipeline has a controller, the target
+/// and the command.
 #[derive(Clone, Debug)]
 pub struct FrameReport {
     /// Index of the frame.
     pub index: u64,
     /// Stamp of the frame.
     pub stamp: Stamp,
-    /// What its stamp led to.
+    /// Decision that its stamp led to.
     pub outcome: Outcome,
-    /// The robot's motion since the last processed frame, by its odometry, corrected by
-    /// what stands still in the images where the config asks for that; at rest where a
-    /// jump of the clock leaves it unknown.
+    /// Robot motion since the last processed frame, by its odometry, corrected by static structure
+    /// in the images where the config asks for that; at rest where a jump of the clock leaves it
+    /// unknown.
     pub motion: Motion,
-    /// All detections, and what became of each.
+    /// All detections, each with its fate.
     pub candidates: Vec<Candidate>,
-    /// Everything that was dropped, and by which test.
+    /// Number of dropped items per test.
     pub funnel: Funnel,
     /// All tracks, confirmed or not, near to far.
     pub tracks: Vec<Track>,
-    /// The person to follow, where the pipeline has a controller.
+    /// Track of the person to follow, where the pipeline has a controller.
     pub target: Option<TrackId>,
-    /// How sure it is who that is, where the pipeline has a controller.
+    /// State and confidence of the target lock, where the pipeline has a controller.
     pub lock: Option<LockReport>,
-    /// What the wheels may do, where the pipeline has a controller: its wish
-    /// within all limits, zero without a target, and why.
+    /// Command for the wheels with its reason, where the pipeline has a controller: its wish within
+    /// all limits, zero without a target.
     pub command: Option<Command>,
     /// Normalised innovation squared and its degrees of freedom.
     pub nis: Vec<(TrackId, f64, u32)>,
-    /// What was asked of the likelihood.
+    /// Likelihood evaluations of the frame.
     pub weighing: Weighing,
-    /// What the filter shows of its work, where [`crate::Pipeline::sketch`] asks
-    /// for it.
+    /// Visualisation of the filter, where [`crate::Pipeline::sketch`] asks for it.
     pub sketch: Sketch,
-    /// Milliseconds per stage. With those of `weighing` and of the plugins the only part
-    /// that differs between two runs.
+    /// Milliseconds per stage. With those of `weighing` and of the plugins the only part that
+    /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
     /// Milliseconds per plugin.
     pub plugin_timings: Vec<(String, f64)>,
@@ -47,7 +46,7 @@ pub struct FrameReport {
 }
 
 impl FrameReport {
-    /// Returns the report of a frame that led to nothing yet.
+    /// Returns an empty report for a frame.
     pub fn new(index: u64, stamp: Stamp) -> Self {
         TrackingReport::new(index, stamp).into()
     }

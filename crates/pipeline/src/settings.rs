@@ -8,37 +8,36 @@ use tagalong_tracking::{ClockSettings, MergeSettings, OcclusionSettings, Tracker
 
 use crate::{GovernorSettings, TargetSettings};
 
-/// The pipeline's own keys. Beside them a config has the plugin sections
-/// `[[detectors]]`, `[[verifiers]]`, `[filter]` and `[controller]`, each with
-/// the name of a `plugin` and its settings in the sub-table `config`.
+/// Keys of the pipeline itself. Beside them a config has the plugin sections `[[detectors]]`,
+/// `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` and `[controller]`, each with the name
+/// of a `plugin` and its settings in the sub-table `config`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PipelineSettings {
-    /// Seed of everything random. The same log, config and seed give the same
-    /// bytes.
+    /// Seed of everything random. The same log, config and seed give the same bytes.
     pub seed: u64,
-    /// Inputs that the pipeline does without, even where the log has them: `colour`,
-    /// `depth`, `right`, `laser`, `detections`.
+    /// Inputs that the pipeline ignores, even where the log has them: `colour`, `depth`, `right`,
+    /// `laser`, `detections`.
     pub without: Vec<Input>,
     /// The robot.
     pub robot: RobotSettings,
-    /// Depth from a stereo pair, for frames that have none. Left out: the log
-    /// carries depth, or nobody needs it.
+    /// Depth from a stereo pair, for frames that have none. Left out: the log carries depth, or no
+    /// plugin needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stereo: Option<StereoSettings>,
-    /// Odometry that is corrected by what stands still in the images. Left out: the
-    /// odometry of the log is believed.
+    /// Odometry that is corrected by static structure in the images. Left out: the odometry of the
+    /// log is used as it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<OdometrySettings>,
-    /// What to do about stamps that jump.
+    /// Treatment of stamps that jump.
     pub clock: ClockSettings,
-    /// Which detections, and which tracks, are of one person.
+    /// Tests for several detections, or several tracks, of one person.
     pub merge: MergeSettings,
-    /// Who is hidden behind whom.
+    /// Test for people hidden behind others.
     pub occlusion: OcclusionSettings,
-    /// Who is followed.
+    /// Choice and confirmation of the person to follow.
     pub target: TargetSettings,
-    /// What the robot may do, whatever the controller wishes.
+    /// Limits on the robot's motion, for any wish of the controller.
     pub governor: GovernorSettings,
 }
 
@@ -50,7 +49,7 @@ impl PipelineSettings {
     }
 }
 
-/// The robot's drive.
+/// Drive of the robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSettings {
@@ -72,13 +71,14 @@ impl Default for RobotSettings {
 }
 
 impl RobotSettings {
-    /// The drive in the words of core.
+    /// Returns the drive as the type of the core crate.
     pub fn wheels(&self) -> Wheels {
         Wheels { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }
     }
 }
 
-/// A `[[verifiers]]`, `[filter]` or `[controller]` section without its `config`.
+/// A `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` or `[controller]` section without its
+/// `config`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PluginSettings {

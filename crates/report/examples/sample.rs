@@ -1,4 +1,4 @@
-//! Writes a sample report, with JSON and CSV beside it, from made-up results:
+//! Writes a sample report, with JSON and CSV beside it, from invented results:
 //!
 //! ```text
 //! cargo run -p tagalong-report --example sample -- target/sample-report

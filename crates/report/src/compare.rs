@@ -1,32 +1,31 @@
-//! Where two pipelines differ.
+//! Differences between the events of two pipelines.
 
 use std::collections::BTreeMap;
 
 use crate::model::{Benchmark, EventRow, TaskResult};
 use crate::view::View;
 
-/// Events of two pipelines that are at most this far apart are the same.
+/// Maximum time between events of two pipelines that count as the same.
 pub const SAME_EVENT_S: f64 = 0.5;
 
-/// Something that happened to one of two pipelines only.
+/// Event of only one of two pipelines.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Difference<'a> {
-    /// The log.
+    /// Name of the log.
     pub log: &'a str,
-    /// The seed.
+    /// Seed of the task.
     pub seed: u64,
-    /// The pipeline to which it happened.
+    /// Pipeline with the event.
     pub pipeline: &'a str,
-    /// What happened.
+    /// The event.
     pub event: &'a EventRow,
 }
 
-/// Lists what happened to only one of the pipelines `a` and `b`, by log and
-/// seed, then in the order of time, on the logs that both finished.
+/// Lists the events of only one of the pipelines `a` and `b`, by log and seed, then by time, on the
+/// logs that both finished.
 ///
-/// Two events are the same if they are of one kind, concern the same person and
-/// lie at most half a second apart. Ids of tracks mean nothing from one pipeline
-/// to the next and are not compared.
+/// Two events are the same if they are of one kind, concern the same person and lie at most half a
+/// second apart. Ids of tracks are not comparable between pipelines and are ignored.
 pub fn compare<'a>(benchmark: &'a Benchmark, a: &str, b: &str) -> Vec<Difference<'a>> {
     compare_in(&View::new(benchmark), a, b)
 }
@@ -38,6 +37,7 @@ pub fn compare_in<'a>(view: &View<'a>, a: &str, b: &str) -> Vec<Difference<'a>> 
         let Some(of_b) = view.done(b).find(same) else { continue };
         let mut here = only_one(of_a, of_b);
         here.sort_by(|x, y| {
+            // Of equal times by pipeline, so that the order is always the same.
             x.event.t_s.total_cmp(&y.event.t_s).then_with(|| x.pipeline.cmp(y.pipeline))
         });
         all.extend(here);
@@ -46,7 +46,7 @@ pub fn compare_in<'a>(view: &View<'a>, a: &str, b: &str) -> Vec<Difference<'a>> 
     all
 }
 
-/// Kind of an event and the person concerned.
+/// Kind of an event and the id of the person.
 type Key<'a> = (&'a str, Option<i64>);
 
 fn only_one<'a>(a: &'a TaskResult, b: &'a TaskResult) -> Vec<Difference<'a>> {
@@ -71,7 +71,7 @@ fn only_one<'a>(a: &'a TaskResult, b: &'a TaskResult) -> Vec<Difference<'a>> {
     out
 }
 
-/// Events that can be placed in time, in the order of time.
+/// Returns the events with a finite time by kind and person, in the order of time.
 fn by_key(task: &TaskResult) -> BTreeMap<Key<'_>, Vec<&EventRow>> {
     let mut map: BTreeMap<Key<'_>, Vec<&EventRow>> = BTreeMap::new();
     for event in task.events.iter().filter(|e| e.t_s.is_finite()) {
@@ -81,8 +81,9 @@ fn by_key(task: &TaskResult) -> BTreeMap<Key<'_>, Vec<&EventRow>> {
     map
 }
 
-/// Pairs two lists in the order of time; taking the earliest possible partner
-/// leaves as few as possible alone, since all may wait equally long.
+/// Pairs two lists in the order of time and returns the events without a partner. Taking the
+/// earliest possible partner leaves as few as possible alone, because the allowed distance is the
+/// same for all.
 fn unmatched<'a>(a: &[&'a EventRow], b: &[&'a EventRow]) -> (Vec<&'a EventRow>, Vec<&'a EventRow>) {
     let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
     let (mut i, mut j) = (0, 0);
@@ -113,7 +114,7 @@ mod tests {
         EventRow { t_s, kind: "miss".into(), person: Some(1), ..EventRow::default() }
     }
 
-    /// The most pairs that any pairing has, by trying all.
+    /// Returns the largest number of pairs of any pairing, by trying all.
     fn most_pairs(a: &[f64], b: &[f64]) -> usize {
         let Some((&first, rest)) = a.split_first() else { return 0 };
         let without = most_pairs(rest, b);

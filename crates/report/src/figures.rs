@@ -1,10 +1,10 @@
-//! The figures of the headline: what they are called and which way is better.
+//! Figures of the headline: their names, units and directions.
 
 use tagalong_eval::Scores;
 
 use crate::model::TaskResult;
 
-/// Where tracks and truth were compared.
+/// Space in which tracks and truth were compared.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Place {
     Image,
@@ -14,7 +14,7 @@ pub enum Place {
 impl Place {
     pub const ALL: [Self; 2] = [Self::Image, Self::Floor];
 
-    /// As the keys of figures begin.
+    /// Returns the prefix of the keys of figures.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Image => "image",
@@ -30,53 +30,53 @@ impl Place {
     }
 }
 
-/// A figure of a task.
+/// Figure of a task.
 pub struct Figure {
-    /// As [`Scores`] names it.
+    /// Name as in [`Scores`].
     pub name: &'static str,
-    /// `s` or `m`; nothing for rates and counts.
+    /// Unit: `s` or `m`; empty for rates and counts.
     pub unit: &'static str,
     pub decimals: usize,
     pub higher_is_better: bool,
-    /// Between these values it lies.
+    /// Range of its values.
     pub range: [f64; 2],
-    /// What it says, in one line.
+    /// Meaning, in one line.
     pub meaning: &'static str,
-    /// Where it is shown.
+    /// Spaces in which it is shown.
     pub places: &'static [Place],
-    /// Pipelines are compared by it in pairs.
+    /// True if pipelines are compared by it in pairs.
     pub compared: bool,
     of: fn(&Scores) -> Option<f64>,
 }
 
 impl Figure {
-    /// The figure of a task, if it is a number.
+    /// Returns the figure of a task, if it is finite.
     pub fn of(&self, place: Place, task: &TaskResult) -> Option<f64> {
         place.scores(task).and_then(self.of).filter(|v| v.is_finite())
     }
 
-    /// What it is called in `report.json`.
+    /// Returns the key in `report.json`.
     pub fn key(&self, place: Place) -> String {
         format!("{}.{}", place.key(), self.name)
     }
 
-    /// True if `a` is better than `b`.
+    /// Returns true if `a` is better than `b`.
     pub fn better(&self, a: f64, b: f64) -> bool {
         if self.higher_is_better { a > b } else { a < b }
     }
 
-    /// The figures of a place.
+    /// Returns the figures of a space.
     pub fn at(place: Place) -> impl Iterator<Item = &'static Self> {
         FIGURES.iter().filter(move |f| f.places.contains(&place))
     }
 }
 
-/// The figure that ranks pipelines.
+/// Figure that ranks the pipelines.
 pub const MAIN: &Figure = &FIGURES[0];
 
 const BOTH: &[Place] = &Place::ALL;
 
-/// Of times, distances and counts.
+/// Range of times, distances and counts.
 const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
 
 const RATE: Figure = Figure {

@@ -1,4 +1,4 @@
-//! The results as files for programs: JSON and CSV.
+//! Results as files for programs: JSON and CSV.
 
 use std::collections::BTreeSet;
 
@@ -10,9 +10,9 @@ use crate::model::{Benchmark, Outcome, TaskResult};
 use crate::summary::Summary;
 use crate::view::View;
 
-/// `report.json`: one task a line in a fixed order, and the [`Summary`] under
-/// `summary`. Pictures are left out, since they belong to the page. The text can
-/// be read back as a [`Benchmark`], for instance as the baseline of a gate.
+/// Returns the text of `report.json`: one task per line in a fixed order, and the [`Summary`] under
+/// `summary`. Pictures are left out, since they belong to the page. The text can be read back as a
+/// [`Benchmark`], for instance as the baseline of a gate.
 ///
 /// # Errors
 ///
@@ -33,9 +33,9 @@ fn task_json(task: &TaskResult) -> serde_json::Result<String> {
     serde_json::to_string(&task)
 }
 
-/// `report.csv`: a header and one row per task (RFC 4180). Figures in the image
-/// begin with `image.`, those on the floor with `metres.`; what makes no sense
-/// for a task is empty.
+/// Returns the text of `report.csv`: a header and one row per task (RFC 4180). Figures in the image
+/// begin with `image.`, those on the floor with `metres.`; figures without a meaning for a task are
+/// empty.
 pub fn csv(benchmark: &Benchmark) -> String {
     let names = figure_names();
     let mut rows = vec![header(&names)];
@@ -44,6 +44,7 @@ pub fn csv(benchmark: &Benchmark) -> String {
 }
 
 fn figure_names() -> BTreeSet<String> {
+    // From the default, so that all names are there even if no task has the figure.
     flat(&Scores::default()).keys().cloned().collect()
 }
 
@@ -117,6 +118,7 @@ fn number(value: Option<&Value>) -> String {
 
 fn line(cells: &[String]) -> String {
     let quoted: Vec<String> = cells.iter().map(|cell| quote(cell)).collect();
+    // RFC 4180 ends lines with CRLF.
     quoted.join(",") + "\r\n"
 }
 

@@ -1,10 +1,9 @@
 //! Benchmark results as a self-contained web page, as JSON and as a table.
 //!
-//! A [`Benchmark`] holds one [`TaskResult`] per pipeline, log and seed.
-//! [`html`] makes a page of it that asks the network for nothing, works without
-//! JavaScript, in light and dark and on paper; [`json`] and [`csv`] are for
-//! programs. [`Summary`] holds the means and their intervals, [`compare`] lists
-//! where two pipelines differ.
+//! A [`Benchmark`] holds one [`TaskResult`] per pipeline, log and seed. [`html`] makes a page of it
+//! that needs no network, works without JavaScript, in light and dark and on paper; [`json`] and
+//! [`csv`] are for programs. [`Summary`] holds the means and their intervals, [`compare`] lists the
+//! differences between two pipelines.
 //!
 //! ```
 //! use tagalong_report::{Benchmark, TaskResult, html};
@@ -17,10 +16,9 @@
 //!
 //! # Why times are kept apart
 //!
-//! Everything in a [`Benchmark`] follows from configs, logs and seeds, so the
-//! files made from it are the same bytes wherever and however often it is run.
-//! [`Timings`] are not, so they come beside it, and the page shows them only if
-//! the machine had nothing else to do.
+//! Everything in a [`Benchmark`] follows from configs, logs and seeds, so the files made from it
+//! are the same bytes on every machine and in every run. [`Timings`] are not, so they are a file of
+//! their own, and the page shows them only if the machine was otherwise idle.
 
 mod chart;
 mod compare;

@@ -3,94 +3,93 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tagalong_eval::{Consistency, CurvePoint, Event, EventKind, Scores};
 
-/// The results of a benchmark: pipelines x logs x seeds.
+/// Results of a benchmark: pipelines x logs x seeds.
 ///
-/// Nothing in here depends on the machine or on how many tasks ran at once:
-/// the same inputs give the same bytes. Times are kept apart, in [`Timings`].
+/// The contents do not depend on the machine or on the number of tasks that ran at once: the same
+/// inputs give the same bytes. Times are kept apart, in [`Timings`].
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Benchmark {
     /// Version of Tagalong that ran the tasks.
     pub version: String,
-    /// One result per task, in any order.
+    /// Results, one per task, in any order.
     pub tasks: Vec<TaskResult>,
 }
 
-/// One pipeline on one log with one seed.
+/// Result of one pipeline on one log with one seed.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct TaskResult {
     /// Name of the pipeline: the file name of its config without ending.
     pub pipeline: String,
     /// Name of the log: its file name without ending.
     pub log: String,
-    /// The seed.
+    /// Seed of the pipeline.
     pub seed: u64,
-    /// Content hash of everything that the result depends on, in hex; the key
-    /// into [`Timings::tasks`].
+    /// Content hash of everything that the result depends on, in hex; the key into
+    /// [`Timings::tasks`].
     pub hash: String,
-    /// What went into the hash: what it is (`config`, `log`, `truth`) and the
-    /// SHA-256 of it, in hex.
+    /// Inputs of the hash: the kind (`config`, `log`, `truth`) and the SHA-256 of each, in hex.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
-    /// How it ended.
+    /// Outcome of the task.
     pub outcome: Outcome,
-    /// Frames that the pipeline processed.
+    /// Number of frames that the pipeline processed.
     pub frames: u64,
-    /// Length of the recording, in seconds of its own stamps.
+    /// Length of the recording by its own stamps, in seconds.
     pub duration_s: f64,
-    /// Part of the log was lost or could not be used.
+    /// True if part of the log was lost or could not be used.
     pub data_lost: bool,
     /// Figures in the image (IoU), if the truth has boxes.
     pub image: Option<Scores>,
-    /// Figures on the floor (metres), if the truth has places.
+    /// Figures on the floor (metres), if the truth has positions.
     pub metres: Option<Scores>,
     /// Miss rate over false positives per image; empty without boxes.
     #[serde(default)]
     pub lamr_curve: Vec<CurvePoint>,
-    /// Whether the filter's covariance fits its innovations, if it reports any.
+    /// Consistency of the filter's covariance with its innovations, if it reports any.
     pub nis: Option<Consistency>,
-    /// Which test dropped how many candidates, in the order of the stages.
+    /// Number of candidates dropped by each test, in the order of the stages.
     #[serde(default)]
     pub funnel: Vec<Dropped>,
-    /// The confirmed tracks on the floor.
+    /// Confirmed tracks on the floor.
     #[serde(default)]
     pub tracks: Vec<Trajectory>,
-    /// The people that count on the floor, in the same frame.
+    /// People that count on the floor, in the same frame.
     #[serde(default)]
     pub truth: Vec<Trajectory>,
-    /// What happened, in the order of time.
+    /// Events, in the order of time.
     #[serde(default)]
     pub events: Vec<EventRow>,
 }
 
-/// How a task ended.
+/// Outcome of a task.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "ended")]
 pub enum Outcome {
-    /// It ran to the end of the log.
+    /// The task ran to the end of the log.
     #[default]
     Done,
-    /// It stopped with an error or a panic.
+    /// The task stopped with an error or a panic.
     Failed {
-        /// The error, for people to read.
+        /// Error message.
         why: String,
     },
-    /// It was never begun, because the log lacks what the pipeline needs.
+    /// The task was not started, because the log lacks an input of the pipeline.
     Skipped {
-        /// What is missing.
+        /// Missing input.
         why: String,
     },
 }
 
-/// A test and how many candidates it dropped.
+/// Test and the number of candidates it dropped.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Dropped {
-    /// The test.
+    /// Name of the test.
     pub test: String,
-    /// Candidates dropped by it.
+    /// Number of candidates dropped by it.
     pub count: u64,
 }
 
-/// Where somebody was on the floor over time.
+/// Positions of a person or a track on the floor over time.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Trajectory {
     /// Id of the person or of the track.
@@ -100,7 +99,7 @@ pub struct Trajectory {
     pub points: Vec<[f64; 3]>,
 }
 
-/// Something worth looking at in a recording.
+/// Event of a recording that is worth a look.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct EventRow {
     /// 1-based index of the frame in which it begins.
@@ -114,16 +113,15 @@ pub struct EventRow {
     pub track: Option<i64>,
     /// Id of the person in the truth, if there is one.
     pub person: Option<i64>,
-    /// What happened, as a sentence.
+    /// Description, as a sentence.
     pub text: String,
-    /// A small picture of the place, PNG in base64 (the standard alphabet).
+    /// Small image of the position, PNG in base64 (the standard alphabet).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub picture_png_base64: Option<String>,
 }
 
 impl EventRow {
-    /// Describes an event of a log whose first frame has the stamp `start_ns`;
-    /// without a picture.
+    /// Describes an event of a log with a first frame at `start_ns`; without a picture.
     pub fn new(event: &Event, start_ns: i64) -> Self {
         let (kind, person, track) = match event.kind {
             EventKind::Miss { person, track } => ("miss", Some(person), track),
@@ -163,36 +161,36 @@ fn sentence(kind: &EventKind) -> String {
     }
 }
 
-/// How long the tasks took. A file of its own, because it is never the same twice.
+/// Processing times of the tasks. A file of its own, because it is never the same twice.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Timings {
-    /// The machine had nothing else to do. Otherwise the times mean nothing,
-    /// and the report leaves them out.
+    /// True if the machine was otherwise idle. If not, the times are meaningless, and the report
+    /// leaves them out.
     pub exclusive: bool,
-    /// The machine, for people to read: processor, cores, system.
+    /// Description of the machine: processor, cores, system.
     pub machine: String,
     /// Times by [`TaskResult::hash`].
     pub tasks: BTreeMap<String, TaskTiming>,
 }
 
-/// How long the frames of one task took, reading and decoding not included.
+/// Processing times of the frames of one task, reading and decoding not included.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct TaskTiming {
-    /// Half of the frames took less, in milliseconds.
+    /// Median time per frame, in milliseconds.
     pub frame_ms_p50: f64,
-    /// 95 % of the frames took less, in milliseconds.
+    /// 95th percentile of the time per frame, in milliseconds.
     pub frame_ms_p95: f64,
-    /// The stages, in the order of the pipeline.
+    /// Times of the stages, in the order of the pipeline.
     pub stages: Vec<StageTiming>,
 }
 
-/// How long one stage took per frame.
+/// Processing times of one stage per frame.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct StageTiming {
-    /// The stage.
+    /// Name of the stage.
     pub stage: String,
-    /// Half of the frames took less, in milliseconds.
+    /// Median time per frame, in milliseconds.
     pub p50_ms: f64,
-    /// 95 % of the frames took less, in milliseconds.
+    /// 95th percentile of the time per frame, in milliseconds.
     pub p95_ms: f64,
 }

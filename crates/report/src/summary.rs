@@ -1,4 +1,4 @@
-//! What the results come to: means, intervals, and who is best.
+//! Means and intervals of the results, and the best pipelines.
 
 use std::collections::BTreeMap;
 
@@ -11,87 +11,85 @@ use crate::figures::{Figure, Place};
 use crate::model::{Benchmark, Outcome, TaskResult};
 use crate::view::View;
 
-/// What a benchmark comes to.
+/// Summary of a benchmark.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
-    /// One entry per pipeline, by name.
+    /// Entries of the pipelines, by name.
     pub pipelines: Vec<PipelineSummary>,
-    /// One entry per pair of pipelines and figure, for pairs with common logs.
+    /// Entries per pair of pipelines and figure, for pairs with common logs.
     pub pairs: Vec<PairSummary>,
 }
 
-/// What the results of one pipeline come to.
+/// Summary of the results of one pipeline.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct PipelineSummary {
-    /// The pipeline.
+    /// Name of the pipeline.
     pub pipeline: String,
-    /// Tasks that ran to their end.
+    /// Number of tasks that ran to their end.
     pub done: u64,
-    /// Tasks that failed.
+    /// Number of tasks that failed.
     pub failed: u64,
-    /// Tasks that could not be begun.
+    /// Number of tasks that could not be started.
     pub skipped: u64,
-    /// Figures by `image.NAME` or `metres.NAME`, as [`tagalong_eval::Scores`]
-    /// names them.
+    /// Figures by `image.NAME` or `metres.NAME`, with the names of [`tagalong_eval::Scores`].
     pub figures: BTreeMap<String, Estimate>,
-    /// Fraction of the people who were found at all, with an interval (95 %) by the
-    /// spread between logs; one seed per log, so that nobody counts twice.
+    /// Fraction of the people that were found at all, with an interval (95 %) by the spread between
+    /// logs; one seed per log, so that each person counts once.
     pub people_found: Option<Interval>,
-    /// People in `people_found`.
+    /// Number of people in `people_found`.
     pub people: u64,
 }
 
-/// The mean of a figure over logs (over the seeds of each log first).
+/// Mean of a figure over logs (over the seeds of each log first).
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The mean.
+    /// Mean over the logs.
     pub mean: f64,
-    /// Its 95 % interval over logs (Student); none for a single log, and for logs with
-    /// the same value.
+    /// 95 % interval over logs (Student); `None` for a single log, and for logs with the same
+    /// value.
     pub interval: Option<[f64; 2]>,
-    /// Logs in the mean.
+    /// Number of logs in the mean.
     pub logs: u64,
-    /// No other pipeline with as many logs is better, and there is another one.
+    /// True if no other pipeline with as many logs is better, and there is another one.
     pub best: bool,
 }
 
-/// How much `b` differs from `a` in one figure, on the logs that both have.
+/// Difference of `b` from `a` in one figure, on the logs that both have.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct PairSummary {
-    /// The one pipeline.
+    /// First pipeline.
     pub a: String,
-    /// The other.
+    /// Second pipeline.
     pub b: String,
-    /// The figure, as in [`PipelineSummary::figures`].
+    /// Key of the figure, as in [`PipelineSummary::figures`].
     pub figure: String,
-    /// Logs that both have.
+    /// Number of logs that both have.
     pub logs: u64,
     /// Mean of `b - a`.
     pub difference: f64,
-    /// Its 95 % interval over logs (Student); none for a single log, and for logs with
-    /// the same difference.
+    /// 95 % interval over logs (Student); `None` for a single log, and for logs with the same
+    /// difference.
     pub interval: Option<[f64; 2]>,
-    /// Probability of a difference this large if there were none, by the sign-flip
-    /// test over logs.
+    /// Probability of a difference this large if there were none, by the sign-flip test over logs.
     pub p_value: f64,
-    /// The same, corrected for all pairs that are compared by this figure (Holm).
+    /// P-value corrected for all pairs that are compared by this figure (Holm).
     pub p_corrected: f64,
 }
 
 impl PairSummary {
-    /// True if the corrected p-value is below 0.05, which takes six logs at least.
+    /// Returns true if the corrected p-value is below 0.05, which takes six logs at least.
     pub fn is_clear(&self) -> bool {
         is_significant(self.p_corrected)
     }
 }
 
 impl Summary {
-    /// Forms the means and intervals of a benchmark.
+    /// Computes the means and intervals of a benchmark.
     ///
-    /// Pipelines are compared by means over logs, not over frames: a long log
-    /// says no more about a pipeline than a short one of another place. Failed
-    /// and skipped tasks do not enter, which is why only pipelines with the
-    /// greatest number of logs can be best.
+    /// Pipelines are compared by means over logs, not over frames, because a long log carries no
+    /// more information about a pipeline than a short one of another place. Failed and skipped
+    /// tasks do not enter, which is why only pipelines with the greatest number of logs can be
+    /// best.
     pub fn new(benchmark: &Benchmark) -> Self {
         let view = View::new(benchmark);
         let mut pipelines: Vec<_> = view.pipelines.iter().map(|p| pipeline(&view, p)).collect();
@@ -101,13 +99,13 @@ impl Summary {
         Self { pipelines, pairs: pairs(&view) }
     }
 
-    /// The entry of a pipeline.
+    /// Returns the entry of a pipeline.
     pub fn pipeline(&self, name: &str) -> Option<&PipelineSummary> {
         self.pipelines.iter().find(|p| p.pipeline == name)
     }
 }
 
-/// The figure of a pipeline on each of its logs, mean over seeds.
+/// Returns the figure of a pipeline on each of its logs, mean over seeds.
 pub fn per_log<'a>(
     view: &View<'a>,
     pipeline: &str,
@@ -154,6 +152,7 @@ fn estimate(values: &[f64], figure: &Figure) -> Option<Estimate> {
     let [least, most] = figure.range;
     let interval = mean_interval(values)?;
     Some(Estimate {
+        // A Student interval may reach beyond the possible values, for instance above 1.
         mean: interval.estimate,
         interval: interval.within(least, most).ends(),
         logs: values.len() as u64,
@@ -161,12 +160,13 @@ fn estimate(values: &[f64], figure: &Figure) -> Option<Estimate> {
     })
 }
 
-/// People found and people there, for each log.
+/// Returns the numbers of people found and of people present, for each log.
 fn people(view: &View<'_>, pipeline: &str) -> Vec<[u64; 2]> {
     let counts = |task: &TaskResult| {
         let scores = task.image.as_ref().or(task.metres.as_ref())?;
         Some([scores.truth_ids.saturating_sub(scores.never_confirmed), scores.truth_ids])
     };
+    // One seed per log: the same people again would make the interval too narrow.
     let tasks = view.logs.iter().filter_map(|log| view.drawn(pipeline, log));
     tasks.filter_map(counts).collect()
 }
@@ -177,6 +177,7 @@ fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: Place) {
         pipelines.iter().filter_map(|p| p.figures.get(&key).copied()).collect();
     let most = with.iter().map(|e| e.logs).max().unwrap_or(0);
     let rivals: Vec<f64> = with.iter().filter(|e| e.logs == most).map(|e| e.mean).collect();
+    // Without a rival no pipeline is the best.
     if rivals.len() < 2 {
         return;
     }
@@ -200,8 +201,7 @@ fn pairs(view: &View<'_>) -> Vec<PairSummary> {
     pairs
 }
 
-/// With many pairs some differ by chance: the p-values of each figure are corrected
-/// for that.
+/// Corrects the p-values of each figure, because of many pairs some differ by chance.
 fn correct(pairs: &mut [PairSummary]) {
     let mut of_figure: BTreeMap<String, Vec<&mut PairSummary>> = BTreeMap::new();
     for pair in pairs {

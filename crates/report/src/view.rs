@@ -2,10 +2,10 @@ use std::collections::BTreeSet;
 
 use crate::model::{Benchmark, Outcome, TaskResult};
 
-/// A benchmark in an order that does not depend on how its tasks were run.
+/// Benchmark in an order that does not depend on the way its tasks were run.
 pub struct View<'a> {
     pub version: &'a str,
-    /// By pipeline, log, seed and hash.
+    /// Tasks by pipeline, log, seed and hash.
     pub tasks: Vec<&'a TaskResult>,
     pub pipelines: Vec<&'a str>,
     pub logs: Vec<&'a str>,
@@ -14,6 +14,7 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     pub fn new(benchmark: &'a Benchmark) -> Self {
         let mut tasks: Vec<&TaskResult> = benchmark.tasks.iter().collect();
+        // With the hash last, the order never depends on that of the input.
         tasks.sort_by_key(|t| (&t.pipeline, &t.log, t.seed, &t.hash));
         let names = |of: fn(&TaskResult) -> &str| {
             tasks.iter().map(|&t| of(t)).collect::<BTreeSet<_>>().into_iter().collect()
@@ -22,18 +23,18 @@ impl<'a> View<'a> {
         Self { version: &benchmark.version, tasks, pipelines, logs }
     }
 
-    /// The finished tasks of a pipeline.
+    /// Returns the finished tasks of a pipeline.
     pub fn done(&self, pipeline: &str) -> impl Iterator<Item = &'a TaskResult> {
         self.of(pipeline).filter(|t| t.outcome == Outcome::Done)
     }
 
-    /// All tasks of a pipeline.
+    /// Returns all tasks of a pipeline.
     pub fn of(&self, pipeline: &str) -> impl Iterator<Item = &'a TaskResult> {
         self.tasks.iter().copied().filter(move |t| t.pipeline == pipeline)
     }
 
-    /// The finished task of a pipeline on a log with the lowest seed: what is
-    /// drawn where one picture must do.
+    /// Returns the finished task of a pipeline on a log with the lowest seed, for charts with one
+    /// task per log.
     pub fn drawn(&self, pipeline: &str, log: &str) -> Option<&'a TaskResult> {
         self.done(pipeline).find(|t| t.log == log)
     }

@@ -1,4 +1,4 @@
-//! The page and the files beside it, on made-up results.
+//! The page and the files beside it, on invented results.
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 mod common;
@@ -15,7 +15,7 @@ fn two_by_three() -> Benchmark {
     common::benchmark(&["alpha", "beta"], &["hall", "lab", "yard"])
 }
 
-/// What the page asks for from elsewhere.
+/// Returns the references of the page to other resources.
 fn requests(page: &str) -> Vec<String> {
     let links = page.match_indices("http").map(|(at, _)| &page[at..]);
     let urls = page.match_indices("url(").map(|(at, _)| &page[at..]);
@@ -225,7 +225,8 @@ fn pair_of<'a>(summary: &'a Summary, a: &str, b: &str) -> &'a PairSummary {
     summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == "image.HOTA").unwrap()
 }
 
-/// Each of `pipelines` with a level on so many logs of which none is like another.
+/// Makes results of each of `pipelines` at its level on so many logs, with a different value on
+/// each.
 fn on_logs(count: usize, pipelines: &[(&str, f64)]) -> Benchmark {
     let names: Vec<String> = (0..count).map(|log| format!("log {log}")).collect();
     let of_log = |(at, log)| {

@@ -18,27 +18,27 @@ pub const SYSTEMS: &[System] = &[
 /// A published system.
 #[derive(Clone, Copy, Debug)]
 pub struct System {
-    /// The name of its config.
+    /// Name of its config.
     pub name: &'static str,
-    /// One line about it, with the paper.
+    /// Description in one line, with the paper.
     pub about: &'static str,
     /// Its tables and figures.
     pub experiments: &'static [Experiment],
 }
 
-/// What stands for one table or figure of a paper.
+/// Reproduction of one table or figure of a paper.
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
-    /// How it is named on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// One line about it.
+    /// Description in one line.
     pub about: &'static str,
-    /// Does it.
+    /// Function that runs the experiment.
     pub run: fn(&Lab) -> Result<Findings, ReproduceError>,
 }
 
 impl Experiment {
-    /// Does it, and names in each table the seeds of what was drawn for it.
+    /// Runs the experiment, and adds to each table a note with the seeds of the simulated scenes.
     ///
     /// # Errors
     /// As the experiment.
@@ -53,7 +53,7 @@ impl Experiment {
     }
 }
 
-/// Scenes with the same seeds stand together.
+/// Formats the note on seeds; scenes with the same seeds are listed together.
 fn seeds_note(drawn: &[Drawn]) -> String {
     let mut groups: Vec<(Seeds, Vec<&str>)> = Vec::new();
     for Drawn { scene, seeds } in drawn {
@@ -66,19 +66,19 @@ fn seeds_note(drawn: &[Drawn]) -> String {
     format!("Drawn for this. {}.", groups.iter().map(group).collect::<Vec<_>>().join("; "))
 }
 
-/// An experiment with what it found.
+/// An experiment with its findings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Found {
-    /// Its name.
+    /// Name of the experiment.
     pub experiment: &'static str,
-    /// The scenes that were drawn for it.
+    /// Scenes that were simulated for it.
     pub drawn: Vec<Drawn>,
-    /// What was found.
+    /// Its findings.
     #[serde(flatten)]
     pub findings: Findings,
 }
 
-/// What an experiment found.
+/// Findings of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Findings {
     /// Tables, the most important first.
@@ -88,12 +88,12 @@ pub struct Findings {
     pub pictures: Vec<Picture>,
 }
 
-/// A picture of findings.
+/// A chart of findings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     /// Name of the file, without extension.
     pub name: String,
-    /// The picture, SVG.
+    /// Content, SVG.
     pub svg: String,
 }
 
@@ -103,7 +103,7 @@ impl From<Table> for Findings {
     }
 }
 
-/// The system of this name.
+/// Returns the system of this name.
 pub fn system(name: &str) -> Option<&'static System> {
     SYSTEMS.iter().find(|system| system.name == name)
 }
@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(note, expected);
     }
 
-    /// One table with the seeds of the scenes, and one of nothing.
+    /// Runs an experiment with one table of seeds, and an empty one.
     fn drawing(lab: &Lab) -> Result<Findings, ReproduceError> {
         let scenes = lab.scenes("turntable", &[], lab.seeds(2))?;
         let cells = scenes.iter().map(|scene| crate::Cell::number(scene.seed as f64, 0)).collect();

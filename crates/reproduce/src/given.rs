@@ -1,5 +1,5 @@
-//! P2's filter and association alone: boxes that somebody else detected in the
-//! sequences of MOT15, beside what SORT published with the same boxes.
+//! P2's filter and association alone: given detections on the sequences of MOT15, beside the
+//! published results of SORT with the same boxes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,14 +16,14 @@ use tagalong_trials::Contender;
 use crate::lab::read;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// The config.
+/// Name of the config.
 const RECORDED: &str = "recorded";
-/// Where it is told of its detector ...
+/// Place in the config where the settings of the detector begin ...
 const DETECTOR: &str = "config = { ";
-/// ... and what is said in addition: which boxes, and that they are whole bodies.
+/// ... and the setting that is inserted there, after the path: the boxes are of whole bodies.
 const BODY: &str = "body = \"full-box\"";
-/// MOTA of SORT, per cent, in the sequences of its validation set (its README); 34.0 in
-/// all six together.
+/// MOTA of SORT, per cent, in the sequences of its validation set (its README); 34.0 in all six
+/// together.
 const SORT: [(&str, f64); 6] = [
     ("ADL-Rundle-8", 28.6),
     ("ETH-Pedcross2", 45.4),
@@ -35,23 +35,23 @@ const SORT: [(&str, f64); 6] = [
 const SORT_ALL: f64 = 34.0;
 const COLUMNS: [&str; 5] = ["MOTA, %", "IDF1, %", "HOTA, %", "switches", "frames/s"];
 
-/// A sequence: who was there, and the boxes that everybody gets.
+/// A sequence: the annotated people, and the given boxes.
 struct Given {
     info: SequenceInfo,
     truth: String,
     detections: PathBuf,
 }
 
-/// How the boxes of one sequence were tracked.
+/// Results on one sequence.
 struct Tracked {
     name: String,
     tally: Tally,
     frames: u64,
-    /// Time of the processor in all steps, ms.
+    /// Processor time of all steps, ms.
     worked_ms: f64,
 }
 
-/// The table.
+/// Builds the table.
 pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let config = lab.contender(RECORDED)?;
     let sequences = sequences(lab)?;
@@ -77,6 +77,7 @@ pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     rows.push(published("these six", SORT_ALL));
     rows.push(row("these six", &six));
     rows.push(row("all eleven", &tracked.iter().collect::<Vec<_>>()));
+    // Without the data the published rows would stand alone.
     if tracked.is_empty() {
         rows.clear();
     }
@@ -105,7 +106,7 @@ fn row(name: &str, all: &[&Tracked]) -> Row {
     Row::ours(format!("{RECORDED}, {name}"), cells)
 }
 
-/// The sequences of MOT15 that are there, in the order of their names.
+/// Returns the available sequences of MOT15, in the order of their names.
 fn sequences(lab: &Lab<'_>) -> Result<Vec<Given>, ReproduceError> {
     let Some(root) = lab.data.as_ref().map(|data| data.join("mot")) else { return Ok(Vec::new()) };
     let Ok(entries) = fs::read_dir(root.join("gt/MOT15-train")) else { return Ok(Vec::new()) };
@@ -123,6 +124,7 @@ impl Given {
         let path = folder.join("seqinfo.ini");
         let info = parse_info(&read(&path)?, &path.display().to_string()).map_err(other)?;
         let detections = root.join("sort-detections").join(&info.name).join("det.txt");
+        // Made absolute, because the pipeline resolves paths against the folder of the config.
         let detections = fs::canonicalize(&detections).unwrap_or(detections);
         Ok(Self { truth: read(&folder.join("gt/gt.txt"))?, detections, info })
     }
@@ -134,6 +136,7 @@ impl Given {
         let mut pipeline = config.pipeline(lab.registry, 1)?;
         let (mut reports, mut worked_ms) = (Vec::new(), 0.0);
         for frame in self.frames() {
+            // Time of this thread alone, so that other load on the machine does not count.
             let before = ThreadTime::now();
             reports.push(pipeline.step(&frame).map_err(other)?);
             worked_ms += 1e3 * before.elapsed().as_secs_f64();
@@ -149,8 +152,8 @@ impl Given {
         })
     }
 
-    /// A stamp each, no image, and a camera of which only the size is known (a view of
-    /// 53 degrees, at breast height).
+    /// Returns frames with a stamp each and without images, and a camera with the size of the
+    /// images (a field of view of 53 degrees, at breast height).
     fn frames(&self) -> impl Iterator<Item = Frame> + use<> {
         let (width, height) = (self.info.width as usize, self.info.height as usize);
         let lens = Pinhole {
@@ -168,8 +171,7 @@ impl Given {
         })
     }
 
-    /// Truth and what was reported, side by side; predicted boxes do not count, as with
-    /// SORT.
+    /// Returns truth and reported boxes side by side; predicted boxes do not count, as with SORT.
     fn against_truth(&self, reports: &[FrameReport]) -> Result<Sequence, FormatError> {
         let mut timeline = Timeline::new();
         let truth = parse_truth(&self.truth, "gt.txt", Rules::Mot15)?;

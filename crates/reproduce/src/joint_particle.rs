@@ -11,7 +11,7 @@ use crate::scatter::Scatter;
 use crate::variant::{parsed, with_values};
 use crate::{Cell, Experiment, Findings, Lab, Picture, ReproduceError, Row, System, Table};
 
-/// The system.
+/// The system of P3.
 pub const SYSTEM: System = System {
     name: "joint-particle",
     about: "P3: joint particles, overlapping silhouettes, likelihood maps",
@@ -49,26 +49,26 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// The scenes are seen by a stereo pair, which has no colour.
+/// Setting of all scenes: a stereo pair, which has no colour.
 const SEEN_BY: [(&str, &str); 1] = [("camera.kind", "stereo")];
-/// The config whose `[stereo]` stage gives all their depth, and whose settings of the
-/// detector are made for it.
+/// Config with the `[stereo]` stage that computes all their depth, and with settings of the
+/// detector that suit it.
 const STEREO: &str = "stereo-ekf";
 const PRINTED: &str = "joint-particle-as-printed";
 /// Sigma for the dissimilarity with the size of the window inside of the root, m.
 const RMS_SIGMA: &str = "0.15";
-/// An estimate farther from a head than this on the floor is no estimate of it, m.
+/// Largest distance between an estimate and its head on the floor, m.
 const FAR_M: f64 = 1.0;
-/// Who is seen less than this is hidden (the default of `[occlusion]`).
+/// Least visible part of a person that counts as seen (the default of `[occlusion]`).
 const SEEN: f64 = 0.4;
-/// Table I: matches a frame, matching ms, total ms, error in pixels, success %.
+/// Table I: matches per frame, matching ms, total ms, error in pixels, success %.
 const TABLE_1: [(&str, [f64; 5]); 4] = [
     ("(a) every particle", [625.0, 247.0, 328.0, 7.18, 97.8]),
     ("(b) reference table", [1281.0, 475.0, 555.0, 8.08, 97.1]),
     ("(c) 50 particles", [50.0, 20.0, 101.0, 8.27, 97.1]),
     ("(c) 30 particles", [30.0, 11.0, 93.0, 8.36, 91.4]),
 ];
-/// The methods of the table and what stands beside them.
+/// The methods of the table and those compared with them.
 const METHODS: [&str; 7] = [
     "joint-particle-all",
     "joint-particle-table",
@@ -79,20 +79,20 @@ const METHODS: [&str; 7] = [
     "depth-ekf",
 ];
 
-/// What one contender made of one crossing.
+/// Result of one contender on one crossing.
 #[derive(Default)]
 struct Result {
-    /// Everybody had a track before silhouettes overlapped; otherwise this is
-    /// no trial, for P3 starts from tracks.
+    /// True if every person had a track before silhouettes overlapped; other crossings are no
+    /// trial, because P3 starts from tracks.
     is_trial: bool,
     in_image: bool,
-    /// The same in the frames in which somebody is seen, and so on the floor.
+    /// Success across the line of sight, and on the floor, in the frames in which the person is
+    /// seen.
     across_seen: bool,
     floor_seen: bool,
     pixels: Vec<f64>,
     metres: Vec<f64>,
-    /// Frames in which squares overlap: scenes that were weighed, ms for that,
-    /// ms for everything.
+    /// For each frame with overlapping squares: weighed scenes, ms of weighing, ms in total.
     costs: Vec<[f64; 3]>,
 }
 
@@ -141,8 +141,8 @@ const ROOT: [(&str, &str); 2] = [
     ("detectors.0.config.likelihood_sigma", RMS_SIGMA),
 ];
 
-/// One misprint repaired at a time, all of them, then the filter beside the misprints,
-/// then another likelihood, then the best.
+/// Compares the printed form with one misprint corrected at a time, with all corrected, with the
+/// filter corrected as well, with another likelihood, and with the best pipeline.
 fn misprints(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let printed = lab.contender(PRINTED)?;
     let all = [KERNEL, NOISE, ROOT[0], ROOT[1]];
@@ -192,7 +192,7 @@ const TRIED: [&[(&str, &str)]; 14] = [
     &[ROOT[0], ("detectors.0.config.likelihood_sigma", "0.6")],
 ];
 
-/// How the printed form does with other values of what P3 does not print.
+/// Compares values of the parameters that P3 does not print, for the printed form.
 fn fit(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let printed = lab.contender(PRINTED)?;
     let contender = |values: &[(&str, &str)]| {
@@ -211,7 +211,7 @@ fn fit(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     Ok(trials.table("Free parameters of the printed form", false).into())
 }
 
-/// Settings of the `[stereo]` stage, and the contenders with those of a detector in its
+/// Returns the settings of the `[stereo]` stage, and the contenders with those of a detector in its
 /// depth.
 fn in_stereo(
     lab: &Lab,
@@ -233,10 +233,10 @@ fn in_stereo(
     Ok((stereo, contenders?))
 }
 
-/// All contenders on the draws of one scene.
+/// Results of all contenders on the draws of one scene.
 struct Trials {
     contenders: Vec<Contender>,
-    /// One a draw and contender.
+    /// One result per draw and contender.
     results: Vec<Vec<Result>>,
     notes: Vec<String>,
 }
@@ -321,6 +321,7 @@ impl Trials {
             share(self.of(at).filter(|r| r.is_trial && r.across_seen).count()),
             share(self.of(at).filter(|r| r.is_trial && r.floor_seen).count()),
             Cell::number(trials as f64, 0),
+            // Here a draw that is no trial counts as a failure.
             share_of(self.results.len(), across),
         ]
     }
@@ -365,7 +366,7 @@ fn p3(numbers: &[f64; 5]) -> Vec<Cell> {
     ]
 }
 
-/// Not a number where there are none.
+/// Returns the mean; NaN of no values.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -375,6 +376,7 @@ fn results(trial: Trial) -> std::result::Result<Vec<Result>, TrialError> {
 }
 
 fn result(trial: &Trial, run: &Run) -> Result {
+    // A person needs a track by the first overlap, because P3 starts from tracks.
     let rules = Crossing { settle_s: first_overlap_s(trial), ..Crossing::default() };
     let across = crossing(trial, run, &Crossing { across_only: true, ..rules });
     let while_seen = |across_only| {
@@ -401,7 +403,7 @@ fn result(trial: &Trial, run: &Run) -> Result {
     result
 }
 
-/// When two people's squares overlap for the first time, s.
+/// Returns the time of the first overlap of two people's squares, s.
 fn first_overlap_s(trial: &Trial) -> f64 {
     let first = trial.moments.iter().find(|moment| overlaps(moment));
     first.map_or(0.0, |moment| moment.stamp.nanos() as f64 / 1e9)
@@ -410,6 +412,7 @@ fn first_overlap_s(trial: &Trial) -> f64 {
 fn estimate(truth: &Truth, tracks: &[Track]) -> Option<Point3<f64>> {
     let away = |place: &Point3<f64>| (place - truth.head_in_robot).xy().norm();
     let places = tracks.iter().filter(|t| t.confirmed).map(|t| t.estimate.person.position);
+    // A track farther away belongs to another person, and its error says nothing.
     places.filter(|p| away(p) < FAR_M).min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
@@ -417,7 +420,7 @@ fn pixels_apart(camera: &Camera, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64
     Some((camera.project(a)? - camera.project(b)?).norm())
 }
 
-/// True if two people's upper-body squares overlap.
+/// Returns true if two people's upper-body squares overlap.
 fn overlaps(moment: &Moment) -> bool {
     let squares: Vec<_> = moment.truth.iter().filter_map(|truth| truth.upper_body).collect();
     let meets = |(at, square): (usize, &tagalong_core::Rect)| {

@@ -10,105 +10,107 @@ use tagalong_trials::{Contender, Trial, TrialError, each, in_order};
 
 /// Fewest seeds of a quick experiment.
 const FEWEST: u64 = 1;
-/// A quick experiment has one seed where a whole one has this many.
+/// Divisor of the number of seeds for a quick experiment.
 const QUICK: u64 = 50;
 
-/// Why an experiment has no findings.
+/// Failure of an experiment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReproduceError {
-    /// A config, scene or log that cannot be read.
+    /// A config, scene or log cannot be read.
     #[error("cannot read {path}: {why}")]
     Unreadable {
         /// The file.
         path: String,
-        /// What the system said.
+        /// Error of the operating system.
         why: String,
     },
-    /// A scene with a mistake, shown with its place.
+    /// A scene has an error, shown with its place.
     #[error("{0}")]
     Scene(String),
-    /// A pipeline that failed.
+    /// A pipeline failed.
     #[error(transparent)]
     Trial(#[from] TrialError),
-    /// Anything else.
+    /// Any other failure.
     #[error("{0}")]
     Other(String),
 }
 
-/// Hears how far an experiment is.
+/// Receives the progress of an experiment.
 pub trait Progress: Sync {
-    /// So many steps begin.
+    /// Begins a phase of `steps` steps.
     fn begin(&self, steps: usize, what: &str);
-    /// One is done.
+    /// Completes one step.
     fn step(&self);
 }
 
-/// A scene that was drawn, and with which seeds.
+/// A simulated scene with its seeds.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Drawn {
-    /// The scene.
+    /// Name of the scene.
     pub scene: String,
-    /// Its seeds.
+    /// Seeds of the scene.
     pub seeds: Seeds,
 }
 
-/// The scenes that a lab has drawn.
+/// Scenes that a lab has simulated.
 #[derive(Debug, Default)]
 pub struct DrawnScenes(Mutex<Vec<Drawn>>);
 
 impl DrawnScenes {
     fn add(&self, drawn: Drawn) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // Several tables of one experiment may use the same scenes.
         if !all.contains(&drawn) {
             all.push(drawn);
         }
     }
 
-    /// Returns those drawn since the last call.
+    /// Returns the scenes simulated since the last call.
     pub(crate) fn take(&self) -> Vec<Drawn> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// What experiments work with.
+/// Environment of the experiments.
 pub struct Lab<'a> {
-    /// All plugins.
+    /// Registry of all plugins.
     pub registry: &'a Registry,
-    /// The folder with the configs, and with the folder of `scenes`.
+    /// Folder of the configs, which holds the folder `scenes`.
     pub configs: PathBuf,
-    /// The folder with real logs and labelled images, if there is one.
+    /// Folder of real logs and labelled images, if there is one.
     pub data: Option<PathBuf>,
-    /// A minute's version.
+    /// True for a quick version of about a minute.
     pub quick: bool,
-    /// As many seeds a scene, where the user says so.
+    /// Number of seeds per scene, if the user sets it.
     pub seeds: Option<u64>,
-    /// The first of them within the split: others are other draws.
+    /// First seed within the split: others give other draws.
     pub first_seed: u64,
-    /// The scenes drawn so far.
+    /// Scenes simulated so far.
     pub drawn: DrawnScenes,
-    /// Trials that run at once.
+    /// Number of trials that run at once.
     pub jobs: usize,
-    /// Who hears how far it is.
+    /// Receiver of the progress.
     pub progress: &'a dyn Progress,
 }
 
 impl Lab<'_> {
-    /// Seeds for an experiment that takes `whole` where nobody asks for fewer.
+    /// Returns the number of seeds for an experiment that takes `whole` by default.
     pub fn seeds(&self, whole: u64) -> u64 {
         match self.seeds {
             Some(asked) => asked,
+            // `min`, because a quick run never has more seeds than the whole experiment.
             None if self.quick => (whole / QUICK).max(FEWEST).min(whole),
             None => whole,
         }
     }
 
-    /// A scene of the split `test` with so many seeds from the first one on; `set`
-    /// replaces values by dotted keys, like `camera.kind=stereo`.
+    /// Returns the draws of a scene of the split `test` with `seeds` seeds from the first one on;
+    /// `set` replaces values by dotted keys, like `camera.kind=stereo`.
     ///
     /// # Errors
-    /// A scene that cannot be read, a mistake in it or in `set`, and seeds that the
-    /// split does not have.
+    /// A scene that cannot be read, an error in it or in `set`, and seeds that the split does not
+    /// have.
     pub fn scenes(
         &self,
         name: &str,
@@ -118,7 +120,8 @@ impl Lab<'_> {
         self.scenes_of(Split::Test, name, set, seeds)
     }
 
-    /// As [`Lab::scenes`], of another split: settings are chosen on `validation`.
+    /// Returns the draws of a scene as [`Lab::scenes`], of another split: settings are chosen on
+    /// `validation`.
     ///
     /// # Errors
     /// As [`Lab::scenes`].
@@ -146,7 +149,7 @@ impl Lab<'_> {
         seeds.numbers().map(scene).collect()
     }
 
-    /// The shipped configs of these names.
+    /// Returns the shipped configs of these names.
     ///
     /// # Errors
     /// A config that cannot be read.
@@ -154,7 +157,7 @@ impl Lab<'_> {
         names.iter().map(|name| self.contender(name)).collect()
     }
 
-    /// The shipped config of this name.
+    /// Returns the shipped config of this name.
     ///
     /// # Errors
     /// A config that cannot be read.
@@ -164,11 +167,12 @@ impl Lab<'_> {
         let text = flattened(&text, &self.configs).map_err(|error| {
             ReproduceError::Other(error.render(&path.display().to_string(), &text))
         })?;
+        // Paths in a config are relative to its folder.
         Ok(Contender { folder: self.configs.clone(), ..Contender::new(name, text) })
     }
 
-    /// Takes all contenders over all scenes and keeps what `keep` makes of each
-    /// trial, in the order of the scenes.
+    /// Runs all contenders on all scenes and keeps the results of `keep` for each trial, in the
+    /// order of the scenes.
     ///
     /// # Errors
     /// As [`each`].
@@ -186,8 +190,8 @@ impl Lab<'_> {
 }
 
 impl Lab<'_> {
-    /// As [`Lab::trials`], with depth from the scenes' stereo pairs by these settings,
-    /// computed once for all contenders.
+    /// Runs all contenders as [`Lab::trials`], with depth from the scenes' stereo pairs by these
+    /// settings, computed once for all contenders.
     ///
     /// # Errors
     /// As [`in_order`].

@@ -1,16 +1,15 @@
-//! The tables of the published systems, beside what Tagalong finds.
+//! Tables of the published systems, beside the results of Tagalong.
 //!
-//! A [`System`] is a published tracker; each of its [`Experiment`]s stands for one
-//! table or figure of its paper and makes [`Findings`]: tables with rows of
-//! published numbers and rows of ours, and pictures. What the experiments need,
-//! drawn scenes, configs, pipelines over many seeds, they get from the [`Lab`].
+//! A [`System`] is a published tracker; each of its [`Experiment`]s reproduces one table or figure
+//! of its paper and returns [`Findings`]: tables with rows of published numbers and rows of
+//! measured ones, and charts. The [`Lab`] provides the simulated scenes, the configs, and runs of
+//! pipelines over many seeds.
 //!
-//! Scenes are drawn from the split `test`: settings and models are chosen on
-//! others. The same seeds give the same tables on any number of threads, apart
-//! from times.
+//! Scenes are simulated from the split `test`: settings and models are chosen on others. The same
+//! seeds give the same tables on any number of threads, apart from times.
 //!
-//! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>`
-//! in the file of its system and name it in the system's list.
+//! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>` in the file of
+//! its system and name it in the system's list.
 
 mod findings;
 mod given;

@@ -1,4 +1,4 @@
-//! Annotated logs of real people, beside drawn scenes.
+//! Experiments on annotated logs of real people, beside those on simulated scenes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,22 +14,22 @@ use tagalong_trials::{Contender, Judge};
 use crate::lab::read;
 use crate::{Lab, ReproduceError};
 
-/// What truth files are called, after the name of their log.
+/// Suffix of truth files, after the name of their log.
 const TRUTH: &str = ".people.csv";
 
-/// What one contender said about a log.
+/// Results of one contender on a log.
 pub(crate) struct Recorded {
-    /// One report a frame that the log delivered.
+    /// Reports of the frames that the log delivered.
     pub(crate) reports: Vec<FrameReport>,
-    /// How its boxes lie on those of the people.
+    /// Match of its boxes with those of the people.
     pub(crate) tally: Tally,
-    /// Time that a processor worked on it, reading not included, ms.
+    /// Processor time, reading not included, ms.
     pub(crate) worked_ms: f64,
 }
 
-/// Takes all contenders over each annotated log of colour and depth images; for each
-/// contender what it said about each log. Without real data there are no logs. A
-/// contender gets the images that it declares.
+/// Runs all contenders on each annotated log of colour and depth images, and returns for each
+/// contender the results on each log. Without real data there are no logs. A contender receives the
+/// images that it declares.
 pub(crate) fn recorded(
     lab: &Lab<'_>,
     contenders: &[Contender],
@@ -49,14 +49,14 @@ pub(crate) fn recorded(
     contenders.iter().map(over_all).collect()
 }
 
-/// A log, and who is in which of its frames.
+/// A log with its annotated people by frame.
 struct Log {
     name: String,
     path: PathBuf,
     people: BTreeMap<u32, Vec<Truth>>,
 }
 
-/// The annotated logs in the order of their names.
+/// Returns the annotated logs in the order of their names.
 fn logs(lab: &Lab<'_>) -> Result<Vec<Log>, ReproduceError> {
     let Some(data) = &lab.data else { return Ok(Vec::new()) };
     let Ok(entries) = fs::read_dir(data.join("logs")) else { return Ok(Vec::new()) };
@@ -94,6 +94,7 @@ impl Log {
         while let Some(item) = source.next_frame() {
             let camera = &item.frame.camera;
             let size = (camera.width, camera.height);
+            // Reading the log is not part of the measured time.
             let before = ThreadTime::now();
             let report = pipeline.step(&item.frame).map_err(|error| failed(error.to_string()))?;
             worked_ms += 1e3 * before.elapsed().as_secs_f64();
@@ -118,7 +119,7 @@ impl Log {
         Frame { stamp_ns: stamp_ns as i64, truths, reports: reports(), ignore_regions: Vec::new() }
     }
 
-    /// Whoever is in a frame that the log does not deliver was missed.
+    /// Tallies the frames; people in a frame that the log does not deliver count as missed.
     fn tally(&self, mut frames: BTreeMap<u32, Frame>) -> Result<Tally, ReproduceError> {
         for number in self.people.keys() {
             frames.entry(*number).or_insert_with(|| self.frame(*number, 0, Vec::new));

@@ -1,5 +1,4 @@
-//! P2: upper bodies by gradients, a compressive tracker and a Kalman filter in
-//! the image.
+//! P2: upper bodies by gradients, a compressive tracker and a Kalman filter in the image.
 
 use std::ops::Range;
 
@@ -12,7 +11,7 @@ use crate::given::given;
 use crate::recorded::{Recorded, recorded};
 use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
 
-/// The system.
+/// The system of P2.
 pub const SYSTEM: System = System {
     name: "rgbd-compressive",
     about: "P2: upper bodies in RGB-D images, compressive tracking, a Kalman filter",
@@ -55,7 +54,7 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// The parts, then the whole, then what it is to be compared with.
+/// The parts, the whole, and the pipelines for comparison.
 const PIPELINES: [&str; 9] = [
     "rgbd-faces",
     "rgbd-upper-bodies",
@@ -67,68 +66,67 @@ const PIPELINES: [&str; 9] = [
     "rgbd-best",
     "depth-ekf",
 ];
-/// What works on colour alone.
+/// Pipelines for logs without depth.
 const WITHOUT_DEPTH: [&str; 2] = ["mono", "rgbd-compressive"];
-/// Simulated logs of each kind; the paper has 17 and 18. Half as many that last twice as
-/// long take the same time.
+/// Number of simulated static logs; the paper has 17, and 18 moving ones. Half as many of twice the
+/// length take the same time.
 const STATIC_LOGS: u64 = 8;
-/// See `STATIC_LOGS`; they come from three kinds of rooms.
+/// Number of simulated moving logs, from three kinds of rooms.
 const MOVING_LOGS: u64 = 9;
 const ROOMS: [&str; 3] = ["office", "corridor", "cafeteria"];
-/// The pipeline whose boxes are counted.
+/// Pipeline for which boxes are counted.
 const FOLLOWER: &str = "rgbd-compressive";
-/// How long each lasts; see the experiment `length`.
+/// Duration of each log; see the experiment `length`.
 const DRAWN: [(&str, &str); 1] = [("duration_s", "12")];
-/// Logs whose miss rate is followed as they grow, and how long they become.
+/// Number of logs for the miss rate by length, and their full duration.
 const GROWING_LOGS: u64 = 4;
 const GROWING_S: &str = "48";
-/// Of them so many seconds are judged.
+/// Durations of the parts that are judged.
 const LENGTHS_S: [f64; 5] = [48.0, 24.0, 12.0, 6.0, 3.0];
 const GROWING: [&str; 2] = ["rgbd-compressive", "rgbd-best"];
 
-/// Logs of one person each, in which boxes around the person are counted, and how long
-/// they last.
+/// Number of logs of one person each, in which boxes around the person are counted, and their
+/// duration.
 const BOXED_LOGS: u64 = 2;
 const BOXED_S: &str = "3";
-/// How far around the expected place boxes are searched, widths. The papers' boxes are
-/// some 64 pixels wide and searched pixel by pixel: 0.75 widths are 48 pixels and 7,200
-/// boxes.
+/// Radii of the search around the expected position, widths. The papers' boxes are some 64 pixels
+/// wide and searched pixel by pixel: 0.75 widths are 48 pixels and 7,200 boxes.
 const RADII: [f64; 4] = [0.2, 0.4, 0.75, 1.5];
-/// The search of `rgbd-compressive`: so far, and coarsely first.
+/// Radius of the search of `rgbd-compressive`, which starts on a coarse grid.
 const COARSE: f64 = 0.4;
-/// How far from the person's distance what a box shows may be, m. The first is P2's.
+/// Tolerances of the depth of a box against the distance of the person, m. The first is P2's.
 const TOLERANCES_M: [f64; 2] = [0.5, 0.1];
-/// Tests that depth and geometry make of windows, and the one that follows.
+/// Tests of windows by depth and geometry, and the test that follows.
 const BY_DEPTH: [&str; 3] =
     ["window: size and depth", "window: goes on above", "window: head height"];
 const BY_GRADIENTS: &str = "window: gradients";
-/// The same of boxes around tracks.
+/// Tests of boxes around tracks, and the one that follows.
 const BOXES: [&str; 2] = ["box: outside", "box: depth"];
 const COMPARED: &str = "box: another is surer";
 
-/// People at once, in the table of times.
+/// Numbers of people in the table of times.
 const CROWDS: [&str; 4] = ["1", "2", "4", "8"];
-/// What is timed.
+/// Pipelines that are timed.
 const TIMED: [&str; 3] = ["rgbd-compressive", "rgbd-compressive-as-printed", "rgbd-best"];
-/// Scenes of each crowd, and how long each lasts.
+/// Number of scenes of each crowd, and their duration.
 const TIMED_SCENES: u64 = 3;
 const TIMED_S: &str = "4";
 
-/// How one pipeline did on one scene or log.
+/// Results of one pipeline on one scene or log.
 struct Done {
     tally: Tally,
     work: Work,
 }
 
-/// What one pipeline had to do.
+/// Work of one pipeline.
 #[derive(Clone, Copy, Default)]
 struct Work {
     frames: u64,
-    /// Time that a processor worked.
+    /// Processor time.
     ms: f64,
-    /// Windows that could have been looked at, and that were.
+    /// Candidate windows, and those that were classified.
     windows: [u64; 2],
-    /// Boxes around tracks that could have been compared, and that were.
+    /// Candidate boxes around tracks, and those that were compared.
     boxes: [u64; 2],
     /// Frames in which such boxes were searched.
     searched: u64,
@@ -145,6 +143,7 @@ impl Work {
         Self {
             frames: reports.len() as u64,
             ms,
+            // Each window either fails a test of depth or reaches the gradients.
             windows: [by_depth + looked_at, looked_at],
             boxes: [compared + BOXES.map(count).iter().sum::<u64>(), compared],
             searched: reports.iter().filter(is_searched).count() as u64,
@@ -161,7 +160,8 @@ impl Work {
         })
     }
 
-    /// Frames a second; windows and boxes a frame, and how many of each depth leaves.
+    /// Returns frames per second; windows and boxes per frame, and how many of each remain after
+    /// the depth tests.
     fn cells(&self) -> [Cell; 5] {
         let a_frame = |count: u64| match count {
             0 => Cell::default(),
@@ -180,6 +180,7 @@ fn fixed(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
 }
 
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
+    // At least one scene of each kind of room.
     let seeds = lab.seeds(MOVING_LOGS).div_ceil(ROOMS.len() as u64);
     let mut scenes = Vec::new();
     for room in ROOMS {
@@ -222,22 +223,22 @@ fn table(
     Ok(Table { title: title.into(), columns, rows, notes }.into())
 }
 
-/// The columns of [`Work::cells`].
+/// Columns of [`Work::cells`].
 const WORK: [&str; 5] =
     ["frames/s", "windows a frame", "windows with depth", "boxes a frame", "boxes with depth"];
-/// The judge of real and of drawn people.
+/// Judge of real and of simulated people.
 const JUDGE: Judge = Judge { similarity: Similarity::Iou, max_range_m: 6.0, coasting: true };
 const TIMES: &str =
     "Frames a second are of the time that one core worked; a busy machine makes it work slower.";
 
-/// Frames a second of the paper, behind so many columns that it says nothing of.
+/// Returns a published row with frames per second only, after `before` empty columns.
 fn published(name: &str, hz: f64, before: usize) -> Row {
     let mut cells = vec![Cell::default(); before + WORK.len()];
     cells[before] = Cell::number(hz, 1);
     Row::published(name, cells)
 }
 
-/// What the real logs are.
+/// Describes the real logs in a note.
 fn describe(real: &[Vec<Recorded>]) -> String {
     let Some(first) = real.first().filter(|logs| !logs.is_empty()) else {
         return "The real logs are skipped: there are none in the folder of data.".into();
@@ -247,7 +248,7 @@ fn describe(real: &[Vec<Recorded>]) -> String {
     format!("{logs} real logs with {frames} frames, annotated by hand; cameras at rest")
 }
 
-/// The miss rate of the first seconds of the same logs, and of their two halves.
+/// Compares the miss rates of the first seconds of the same logs, and of the second half.
 fn length(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&GROWING)?;
     let set = [("duration_s", GROWING_S)];
@@ -272,10 +273,11 @@ fn length(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     Ok(Table { title, columns, rows, notes }.into())
 }
 
-/// For each contender the tallies of the first seconds, longest first, and last that of
-/// the second half.
+/// Returns for each contender the tallies of the first seconds, longest first, and last that of the
+/// second half.
 fn growing(trial: Trial) -> Result<Vec<Vec<Tally>>, TrialError> {
     let frames = trial.moments.len();
+    // The longest duration is that of the whole log.
     let first = |seconds: f64| 0..(frames as f64 * seconds / LENGTHS_S[0]).round() as usize;
     let mut tallies = vec![Vec::new(); trial.runs.len()];
     for frames in LENGTHS_S.map(first).into_iter().chain(std::iter::once(frames / 2..frames)) {
@@ -287,7 +289,7 @@ fn growing(trial: Trial) -> Result<Vec<Vec<Tally>>, TrialError> {
     Ok(tallies)
 }
 
-/// Some frames of a trial.
+/// Returns some frames of a trial.
 fn part(trial: &Trial, frames: Range<usize>) -> Trial {
     let of = |run: &Run| Run {
         pipeline: run.pipeline.clone(),
@@ -303,7 +305,7 @@ fn part(trial: &Trial, frames: Range<usize>) -> Trial {
     }
 }
 
-/// Boxes around one person, pixel by pixel.
+/// Counts the boxes around one person, pixel by pixel.
 fn boxes(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let set = [("crowd", "1"), ("duration_s", BOXED_S)];
     let scenes = lab.scenes("crowd", &set, lab.seeds(BOXED_LOGS))?;
@@ -327,6 +329,7 @@ fn boxes(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         for tolerance in 0..TOLERANCES_M.len() {
             let Work { boxes: [all, left], searched, .. } = work(tolerance);
             let a_search = |count: u64| Cell::number(count as f64 / searched as f64, 0);
+            // The number of all boxes does not depend on the tolerance.
             if tolerance == 0 {
                 cells.push(a_search(all));
             }
@@ -350,7 +353,7 @@ fn boxes(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         .into())
 }
 
-/// The pipeline, which searches so far around a person.
+/// Returns the pipeline with another search around a person.
 fn searching(contender: Contender, radius: f64, each_pixel: bool, tolerance_m: f64) -> Contender {
     let section = "plugin = \"compressive\"\n";
     let config = format!(
@@ -378,12 +381,13 @@ fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     Ok(Table { title: "Without depth".into(), columns, rows, notes }.into())
 }
 
-/// The same pipeline, which does without the depth images of the logs.
+/// Returns the same pipeline without the depth images of the logs.
 fn without_depth(contender: Contender) -> Contender {
     let key = "without = [\"depth\"]";
     if contender.config.contains(key) {
         return contender;
     }
+    // A top-level key must stand before the first table of the config.
     Contender { config: format!("{key}\n{}", contender.config), ..contender }
 }
 
@@ -397,7 +401,7 @@ fn done(trial: Trial) -> Result<Vec<Done>, TrialError> {
     trial.runs.iter().map(of).collect()
 }
 
-/// Log-average miss rate, IDF1 and MOTA.
+/// Returns log-average miss rate, IDF1 and MOTA.
 fn scores<'a>(tallies: impl Iterator<Item = &'a Tally>) -> [Cell; 3] {
     let tallies: Vec<&Tally> = tallies.collect();
     if tallies.is_empty() {

@@ -2,15 +2,15 @@
 
 use std::fmt::Write as _;
 
-/// Names on two axes, the first of them logarithmic.
+/// Named points on two axes, the first of them logarithmic.
 pub struct Scatter<'a> {
-    /// What it shows.
+    /// Title of the chart.
     pub title: &'a str,
     /// Name of the logarithmic axis, with its unit.
     pub across: &'a str,
     /// Name of the other axis, with its unit; it starts at 0.
     pub up: &'a str,
-    /// Name, place across (above 0), place up.
+    /// Name, position across (above 0), position up.
     pub points: Vec<(String, f64, f64)>,
 }
 
@@ -20,18 +20,20 @@ const HEIGHT: f64 = 420.0;
 const MARGIN: [f64; 4] = [70.0, 60.0, 130.0, 56.0];
 
 impl Scatter<'_> {
-    /// The chart; points without a place are left out.
+    /// Renders the chart; points that are not finite, or not positive across, are left out.
     pub fn svg(&self) -> String {
         let usable = |p: &&(String, f64, f64)| p.1.is_finite() && p.1 > 0.0 && p.2.is_finite();
         let points: Vec<_> = self.points.iter().filter(usable).collect();
         let low = points.iter().map(|p| p.1.log10().floor()).fold(f64::INFINITY, f64::min);
         let high = points.iter().map(|p| p.1.log10().ceil()).fold(f64::NEG_INFINITY, f64::max);
+        // Headroom above the highest point.
         let top = 1.15 * points.iter().map(|p| p.2).fold(0.0, f64::max);
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
              font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{WIDTH}\" \
              height=\"{HEIGHT}\" fill=\"white\"/>\n"
         );
+        // A single decade, or no height at all, would divide by zero.
         let frame = Frame { low, decades: (high - low).max(1.0), top: top.max(1e-9) };
         text(&mut svg, WIDTH / 2.0, 24.0, "middle", self.title);
         text(&mut svg, WIDTH / 2.0, HEIGHT - 12.0, "middle", self.across);
@@ -50,7 +52,7 @@ impl Scatter<'_> {
     }
 }
 
-/// Where numbers are in the picture.
+/// Transformation from values to the picture.
 struct Frame {
     low: f64,
     decades: f64,
@@ -82,13 +84,14 @@ impl Frame {
     }
 }
 
-/// A place for a label, at or below the wanted one, that no earlier label covers.
+/// Returns a position for a label, at or below the wanted one, that no earlier label covers.
 fn free_place(labels: &mut Vec<(f64, f64)>, wanted: (f64, f64)) -> (f64, f64) {
     let mut place = wanted;
     let covers = |at: &(f64, f64), by: &(f64, f64)| {
         (at.0 - by.0).abs() < LABEL_PX.0 && (at.1 - by.1).abs() < LABEL_PX.1
     };
     while labels.iter().any(|label| covers(&place, label)) {
+        // Small steps keep a label near its point.
         place.1 += LABEL_PX.1 / 4.0;
     }
     labels.push(place);

@@ -1,39 +1,39 @@
 use serde::Serialize;
 use tagalong_eval::{CONFIDENCE, Interval, clustered_share, wilson};
 
-/// A table: published numbers and ours.
+/// A table of published and measured numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Table {
-    /// What it shows, with the table or figure of the paper.
+    /// Title, with the table or figure of the paper.
     pub title: String,
-    /// The columns after the names of the rows, with units.
+    /// Names of the columns after the names of the rows, with units.
     pub columns: Vec<String>,
-    /// The rows.
+    /// Rows of the table.
     pub rows: Vec<Row>,
-    /// What has to be known to believe the numbers: what was drawn, how often,
-    /// what an interval is, what is not comparable.
+    /// Conditions of the numbers: scenes, number of draws, meaning of the intervals, limits of the
+    /// comparison.
     pub notes: Vec<String>,
 }
 
-/// One row.
+/// A row of a table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
-    /// What the numbers belong to.
+    /// Name of the row.
     pub name: String,
-    /// They are the paper's, not ours.
+    /// True if the numbers are the paper's.
     pub published: bool,
-    /// One a column.
+    /// One cell per column.
     pub cells: Vec<Cell>,
 }
 
-/// One number, perhaps.
+/// One number, or none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Cell {
-    /// The number; none where there is nothing to say.
+    /// The number; none if it is not known.
     pub value: Option<f64>,
-    /// Standard deviation of what the number is the mean of.
+    /// Standard deviation of the values of which the number is the mean.
     pub deviation: Option<f64>,
-    /// Its confidence interval, of 95 %.
+    /// Confidence interval of 95 %.
     pub interval: Option<[f64; 2]>,
     /// Digits behind the point.
     #[serde(skip)]
@@ -41,12 +41,12 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// A number, shown with so many digits behind the point.
+    /// Creates a cell of a number, shown with `digits` digits after the point.
     pub fn number(value: f64, digits: usize) -> Self {
         Self { value: value.is_finite().then_some(value), digits, ..Self::default() }
     }
 
-    /// Mean and standard deviation; nothing of nothing.
+    /// Creates a cell of mean and standard deviation; empty without values.
     pub fn mean(values: &[f64], digits: usize) -> Self {
         if values.is_empty() {
             return Self::default();
@@ -57,7 +57,7 @@ impl Cell {
         Self { deviation: Some(variance.sqrt()), ..Self::number(mean, digits) }
     }
 
-    /// An estimate with its interval, if there is one.
+    /// Creates a cell of an estimate with its interval, if there is one.
     pub fn estimate(interval: Option<Interval>, digits: usize) -> Self {
         interval.map_or_else(Self::default, |of| Self {
             interval: of.ends(),
@@ -65,19 +65,20 @@ impl Cell {
         })
     }
 
-    /// So many of so many in per cent, with its Wilson interval; nothing of
-    /// nothing. For what is independent, like one answer a draw.
+    /// Creates a cell of `count` out of `of` in per cent, with its Wilson interval; empty if `of`
+    /// is 0. For independent samples, like one result per draw.
     pub fn share(count: u64, of: u64, digits: usize) -> Self {
+        // Two digits more, because `percent` removes two.
         Self::estimate(wilson(count, of, CONFIDENCE), digits + 2).percent()
     }
 
-    /// Returns all of these `[so many, of so many]` in per cent, with the interval that their
-    /// spread gives: for what comes in clusters, like the frames of a draw.
+    /// Returns all of these `[count, of]` in per cent, with the interval by the spread
+    /// between clusters, like the frames of a draw.
     pub fn clustered(clusters: &[[u64; 2]], digits: usize) -> Self {
         Self::estimate(clustered_share(clusters), digits + 2).percent()
     }
 
-    /// The same times a hundred: a fraction as per cent.
+    /// Converts a fraction to per cent.
     #[must_use]
     pub fn percent(self) -> Self {
         let times = |value: f64| 100.0 * value;
@@ -104,12 +105,12 @@ impl Cell {
 }
 
 impl Row {
-    /// Numbers that were measured.
+    /// Creates a row of measured numbers.
     pub fn ours(name: impl Into<String>, cells: Vec<Cell>) -> Self {
         Self { name: name.into(), published: false, cells }
     }
 
-    /// Numbers of a paper.
+    /// Creates a row of published numbers.
     pub fn published(name: impl Into<String>, cells: Vec<Cell>) -> Self {
         Self { name: name.into(), published: true, cells }
     }
@@ -120,10 +121,11 @@ impl Row {
 }
 
 impl Table {
-    /// For a terminal.
+    /// Formats the table for a terminal.
     pub fn text(&self) -> String {
         let lines = self.lines();
         let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
+        // Characters, not bytes: the sign of a deviation has two bytes.
         let widest = |at: usize| {
             lines.iter().filter_map(|line| line.get(at)).map(|cell| cell.chars().count()).max()
         };
@@ -141,7 +143,7 @@ impl Table {
         out
     }
 
-    /// For a page of the documentation.
+    /// Formats the table for a page of the documentation.
     pub fn markdown(&self) -> String {
         let mut lines = self.lines().into_iter();
         let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
@@ -155,7 +157,7 @@ impl Table {
         out + if self.notes.is_empty() { "" } else { "\n" }
     }
 
-    /// Header and rows, as texts.
+    /// Returns header and rows, as texts.
     fn lines(&self) -> Vec<Vec<String>> {
         let header = std::iter::once(String::new()).chain(self.columns.iter().cloned());
         let line = |row: &Row| {

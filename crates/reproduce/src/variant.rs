@@ -1,25 +1,25 @@
-//! Contenders whose configs have other values.
+//! Contenders with changed values in their configs.
 
 use tagalong_trials::Contender;
 use toml::{Table, Value};
 
 use crate::ReproduceError;
 
-/// The config of a contender as a table.
+/// Parses the config of a contender.
 ///
 /// # Errors
-/// A config that is no TOML.
+/// A config that is not TOML.
 pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
     let unreadable =
         |error: toml::de::Error| ReproduceError::Other(format!("{}: {error}", contender.name));
     contender.config.parse().map_err(unreadable)
 }
 
-/// The contender under another name, with other values, TOML, at dotted keys; a number
-/// is a place in an array. Tables on the way are made where they are missing.
+/// Returns the contender under another name, with other values, TOML, at dotted keys; a number is
+/// an index into an array. Missing tables are created.
 ///
 /// # Errors
-/// A config or a value that is no TOML, or a key whose way is barred.
+/// A config or a value that is not TOML, or a key that leads through another type.
 pub(crate) fn with_values(
     contender: &Contender,
     name: &str,

@@ -1,5 +1,5 @@
-//! Matches a pair of image files so many times, on one thread, and says how long
-//! the fastest took, ms. Used by `benches/peers/stereo_opencv.py`.
+//! Matches a pair of image files several times on one thread and prints the time of the fastest
+//! run, ms. Used by `benches/peers/stereo_opencv.py`.
 //!
 //! `cargo run --release -p tagalong-stereo --example time_pair METHOD LEFT RIGHT DISPARITIES RUNS`
 

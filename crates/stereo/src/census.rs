@@ -1,17 +1,16 @@
-//! The census transform: each pixel becomes a string of bits that say which of
-//! its neighbours are darker than it is. Two views of one thing get nearly the
-//! same string, whatever their exposure and gain.
+//! Census transform: each pixel becomes a bit string of its darker neighbours. Two views of one
+//! point get nearly the same string, whatever their exposure and gain.
 //!
 //! R. Zabih and J. Woodfill, *Non-parametric local transforms for computing
 //! visual correspondence*, ECCV 1994, section 3.
 
 use crate::rows::{Rows, mirror};
 
-/// Bytes in the string of a pixel.
+/// Number of bytes in the string of a pixel.
 pub const BYTES: usize = 3;
 
-/// The neighbours that a pixel is compared with, as (column, row) offsets: all
-/// of a 5x5 window but its centre.
+/// Neighbours that a pixel is compared with, as (column, row) offsets: a 5x5 window without its
+/// centre.
 pub const NEIGHBOURS: [(i32, i32); 8 * BYTES] = neighbours();
 
 const fn neighbours() -> [(i32, i32); 8 * BYTES] {
@@ -28,17 +27,18 @@ const fn neighbours() -> [(i32, i32); 8 * BYTES] {
     all
 }
 
-/// The strings of one row, one plane a byte.
+/// Bit strings of one row, in one plane per byte.
 #[derive(Clone, Debug, Default)]
 pub struct CensusRow {
-    /// Per byte of the string, the columns, and behind them the room asked for.
+    /// Planes by byte of the string: one value per column, followed by the padding of a mirrored
+    /// row.
     pub planes: [Vec<u8>; BYTES],
 }
 
 impl CensusRow {
-    /// Computes a row. A neighbour counts as darker only if it is so by more
-    /// than `noise`. A mirrored row is written from right to left, and the value
-    /// of the first column is repeated so many times behind it.
+    /// Computes a row. A neighbour counts as darker only if the difference is more than `noise`. A
+    /// mirrored row is written from right to left, and the value of the first column is repeated
+    /// `mirrored` times behind it.
     pub fn compute(&mut self, rows: &Rows, noise: u8, mirrored: Option<usize>) {
         let width = rows.width();
         for (byte, plane) in self.planes.iter_mut().enumerate() {

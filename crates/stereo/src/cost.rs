@@ -6,7 +6,7 @@ use crate::census::{BYTES, CensusRow};
 use crate::level::Level;
 use crate::rows::Rows;
 
-/// What is compared of a row of an image.
+/// Quantities of an image row that are compared.
 #[derive(Clone, Debug, Default)]
 pub struct Features {
     rows: Rows,
@@ -16,13 +16,13 @@ pub struct Features {
 }
 
 impl Features {
-    /// Of row `y`, what [`bits`] compares; see [`CensusRow::compute`].
+    /// Computes the census strings of row `y`, for [`bits`]; see [`CensusRow::compute`].
     pub fn census(&mut self, image: &GreyImage, y: usize, noise: u8, mirrored: Option<usize>) {
         self.rows.load(image, y);
         self.census.compute(&self.rows, noise, mirrored);
     }
 
-    /// Of row `y`, what [`blend`] compares.
+    /// Computes the quantities of row `y` that [`blend`] compares.
     pub fn all(&mut self, image: &GreyImage, y: usize, noise: u8, mirrored: Option<usize>) {
         self.census(image, y, noise, mirrored);
         self.brightness.brightness(&self.rows, mirrored);
@@ -30,12 +30,12 @@ impl Features {
     }
 }
 
-/// Writes, for each column `x` and disparity `d`, in how many bits the left
-/// pixel `x` and the right pixel `x - d` differ. `right` is mirrored. Left of
-/// the image's first column its border goes on.
+/// Writes the number of differing bits between the left pixel `x` and the right pixel `x - d`, for
+/// each column `x` and disparity `d`. `right` is mirrored. Left of the first column the border of
+/// the image is continued.
 ///
-/// The costs take the place of a row that leaves a window, in the row itself and in
-/// the sums of columns: at once, while they are in registers.
+/// The costs replace the row that leaves the window, in the row itself and in the column sums, in
+/// one pass while they are in registers.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg",
     "x86_64+avx2"
@@ -58,16 +58,16 @@ pub fn bits<const D: usize>(
     }
 }
 
-/// Greatest difference of brightness that counts: beyond, a pixel shows something
-/// else, however great it is.
+/// Upper limit of the difference in brightness; beyond, the pixels show different points, however
+/// large the difference.
 pub const MOST_BRIGHTNESS: u8 = 32;
-/// Greatest difference of slope that counts, and what it costs.
+/// Upper limit of the difference in slope, and its weight.
 pub const MOST_SLOPE: u8 = 8;
 pub const SLOPE_WEIGHT: u8 = 3;
 
-/// As [`bits`], and the differences of brightness and slope; half of it all. The
-/// bits alone make up small patterns where there are none, the differences alone
-/// mind unequal cameras. Weights are such that the Middlebury pairs come out best.
+/// Computes the costs of [`bits`] plus the differences of brightness and slope, and halves the sum.
+/// The bits alone respond to noise in smooth areas, the differences alone to unequal cameras. The
+/// weights were chosen on the Middlebury pairs.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512bitalg",
     "x86_64+avx2"
@@ -79,6 +79,8 @@ pub fn blend<const D: usize>(left: &Features, right: &Features, costs: &mut [[u8
         differing(&left.census, &right.census, x, from, &mut cost);
         add::<D, MOST_BRIGHTNESS, 1>(&left.brightness, &right.brightness, x, from, &mut cost);
         add::<D, MOST_SLOPE, SLOPE_WEIGHT>(&left.slope, &right.slope, x, from, &mut cost);
+        // At most 24 + 32 + 3 * 8 = 80, half of which fits in a byte five times, once for each
+        // path.
         *costs = cost.map(|cost| cost >> 1);
     }
 }
@@ -99,8 +101,7 @@ fn differing<const D: usize>(
     }
 }
 
-/// Adds the difference, which is none if one may take the other's value within
-/// half a pixel.
+/// Adds the difference, which is 0 if one value lies in the other's range within half a pixel.
 #[inline(always)]
 fn add<const D: usize, const MOST: u8, const WEIGHT: u8>(
     left: &Level,

@@ -8,21 +8,21 @@ use crate::rectification::Rectification;
 use crate::reduce::Reducer;
 use crate::{Disparities, Dropped, Matcher, StereoSettings};
 
-/// Frames between two looks at whether the pair is rectified.
+/// Number of frames between two checks of the rectification.
 const CHECK_EVERY: u64 = 30;
 
 /// Brightness up to which an image is black.
 const BLACK: u8 = 8;
 /// Brightness from which on a pixel is saturated.
 const SATURATED: u8 = 250;
-/// Part of an image that may be saturated.
+/// Maximum fraction of saturated pixels.
 const MAX_SATURATED: f64 = 0.9;
-/// Greatest ratio of the mean brightness of two cameras that are set alike.
+/// Maximum ratio of the mean brightness of equally exposed cameras.
 const MAX_RATIO: f64 = 1.2;
-/// Least difference between the brightest and the darkest pixel.
+/// Minimum difference between the brightest and the darkest pixel.
 const MIN_CONTRAST: u8 = 8;
 
-/// Gives frames with a right image their depth.
+/// Computes the depth of frames with a right image.
 #[derive(Debug)]
 pub struct StereoDepth {
     settings: StereoSettings,
@@ -51,14 +51,13 @@ impl StereoDepth {
         })
     }
 
-    /// The depth of a frame's left image, of the same size: metres along the
-    /// optical axis, NaN = unknown. Why pixels, or all of the image, have none
-    /// is counted in the funnel.
+    /// Returns the depth of a frame's left image, of the same size: metres along the optical axis,
+    /// NaN = unknown. The reasons for unknown pixels, or for an image without any depth, are
+    /// counted in the funnel.
     ///
     /// # Errors
-    /// [`Error::MissingImage`] without a right or a left image;
-    /// [`Error::Other`] if they differ in size, the camera is no pinhole, or
-    /// its focal length or the baseline is none.
+    /// [`Error::MissingImage`] without a right or a left image; [`Error::Other`] if they differ in
+    /// size, the camera is no pinhole, or its focal length or the baseline is not positive.
     pub fn depth(&mut self, frame: &Frame, funnel: &mut Funnel) -> Result<Arc<DepthImage>> {
         let right = frame.right()?;
         let left = frame.grey()?;
@@ -79,6 +78,7 @@ impl StereoDepth {
         );
         let focal_baseline = fx * scale * right.baseline_m;
         let max_disparity = max_disparity(&self.settings, focal_baseline);
+        // Not for each frame, because the search in all directions is slow.
         if self.frames.is_multiple_of(CHECK_EVERY) {
             self.rectification = Rectification::measure(left, right_image, max_disparity.min(255));
         }
@@ -101,7 +101,7 @@ impl StereoDepth {
         Ok(Arc::clone(&self.depth))
     }
 
-    /// How the images of a recent pair lay to each other.
+    /// Returns the rectification measured on a recent pair.
     pub fn rectification(&self) -> Rectification {
         self.rectification
     }
@@ -123,6 +123,7 @@ fn reduced_size(image: &GreyImage, width: usize) -> (usize, usize) {
     if from <= width {
         return (from, height);
     }
+    // Rounded up, so that a flat image keeps at least one row.
     (width, (height * width).div_ceil(from))
 }
 
@@ -141,8 +142,7 @@ fn max_disparity(settings: &StereoSettings, focal_baseline: f64) -> usize {
     }
 }
 
-/// The image to write depth to: the one of an earlier frame if nobody holds it
-/// any more.
+/// Returns the image to write depth to: that of the previous frame unless it is still shared.
 fn unshared(depth: &mut Arc<DepthImage>, width: usize, height: usize) -> &mut DepthImage {
     let fits = (depth.width(), depth.height()) == (width, height);
     if !fits || Arc::get_mut(depth).is_none() {
@@ -151,22 +151,22 @@ fn unshared(depth: &mut Arc<DepthImage>, width: usize, height: usize) -> &mut De
     Arc::make_mut(depth)
 }
 
-/// Sums up something of all pixels, at most 255 of each. A row's sum cannot overflow, and
-/// a test for that is no vector instruction.
+/// Sums a quantity of at most 255 over all pixels. The sum of a row cannot overflow, and a check
+/// for it would keep the loop from becoming vector instructions.
 fn count_up(image: &GreyImage, of: impl Fn(u8) -> u32) -> u64 {
     let rows = image.pixels().chunks(image.width().max(1));
     rows.map(|row| u64::from(row.iter().fold(0_u32, |sum, p| sum.wrapping_add(of(*p))))).sum()
 }
 
-/// True if one image is so much brighter that semi-global matching, which compares
-/// brightness, too, does worse.
+/// Returns true if one image is so much brighter that semi-global matching, which also compares
+/// brightness, does worse.
 fn are_unequal(left: &GreyImage, right: &GreyImage) -> bool {
     let sum = |image: &GreyImage| count_up(image, u32::from);
     let (left, right) = (sum(left) as f64, sum(right) as f64);
     left.max(right) > MAX_RATIO * left.min(right)
 }
 
-/// Why nothing can be seen in a pair.
+/// Returns the reason for which a pair cannot be matched.
 fn unusable(
     left: &GreyImage,
     right: &GreyImage,
@@ -202,8 +202,8 @@ fn count(dropped: &Dropped, funnel: &mut Funnel) {
     funnel.drop_many("stereo pixels: speckle", dropped.speckle);
 }
 
-/// Writes the depths, each to the pixels that its own was made of; returns how
-/// many were out of range.
+/// Writes the depths at full size, each to the pixels that were reduced to its own; returns the
+/// number that were out of range.
 fn write(
     disparities: &Disparities<'_>,
     focal_baseline: f32,
@@ -227,7 +227,7 @@ fn write(
     out
 }
 
-/// Turns the disparities of a row into depths; returns how many were out of range.
+/// Converts the disparities of a row into depths; returns the number out of range.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn to_depth(row: &mut [f32], focal_baseline: f32, range: &RangeInclusive<f32>) -> u32 {
     let (nearest, farthest) = (*range.start(), *range.end());
@@ -235,7 +235,7 @@ fn to_depth(row: &mut [f32], focal_baseline: f32, range: &RangeInclusive<f32>) -
     for depth in row {
         let metres = focal_baseline / *depth;
         let inside = (metres >= nearest) & (metres <= farthest);
-        // A sum that may overflow is no vector instruction.
+        // A sum with an overflow check is no vector instruction.
         out = out.wrapping_add(u32::from(!inside & !metres.is_nan()));
         *depth = if inside { metres } else { f32::NAN };
     }

@@ -1,14 +1,13 @@
 //! Closes small holes of a surface.
 
-/// The greatest holes that are filled.
+/// Maximum size of holes that are filled.
 #[derive(Clone, Copy, Debug)]
 pub struct Most {
     /// Pixels along a row ...
     pub px: usize,
-    /// ... or distances of the cameras, whichever is more: a thing at disparity
-    /// `d` has `d` pixels for each.
+    /// ... or baselines, whichever is more: an object at disparity `d` has `d` pixels per baseline.
     pub baselines: f32,
-    /// Difference of the ends, px.
+    /// Difference of disparity between the ends, px.
     pub step: f32,
 }
 
@@ -19,9 +18,8 @@ impl Most {
     }
 }
 
-/// Fills holes along a row that are small enough, by a straight line between them; returns how many pixels that
-/// were. What only one camera sees lies between a near and a far surface, and so
-/// stays open.
+/// Fills small holes along a row by linear interpolation; returns the number of pixels filled. An
+/// area that only one camera sees lies between a near and a far surface, and so stays open.
 pub fn holes(image: &mut [f32], width: usize, most: &Most) -> u64 {
     let rows = image.chunks_exact_mut(width.max(1));
     rows.map(|row| fill_row(row, most)).sum()
@@ -41,7 +39,7 @@ fn fill_row(row: &mut [f32], most: &Most) -> u64 {
     filled
 }
 
-/// The next column from `at` on that is so.
+/// Returns the next column from `at` on that satisfies the condition.
 fn next(row: &[f32], at: usize, is_so: impl Fn(f32) -> bool) -> Option<usize> {
     row[at..].iter().position(|v| is_so(*v)).map(|columns| at + columns)
 }

@@ -1,31 +1,31 @@
-//! Brightness and its slope along a row, with what they may be within half a
-//! pixel, so that two cameras that sample an edge at different places still agree.
+//! Brightness and its slope along a row, with their ranges within half a pixel, so that two cameras
+//! that sample an edge at different positions still agree.
 //!
 //! S. Birchfield and C. Tomasi, *A pixel dissimilarity measure that is insensitive
 //! to image sampling*, PAMI 1998, equations 1 to 3.
 
 use crate::rows::{Rows, mirror};
 
-/// A quantity along a row of an image.
+/// Quantity along a row of an image.
 #[derive(Clone, Debug, Default)]
 pub struct Level {
-    /// Its value at each pixel ...
+    /// Value at each pixel ...
     pub own: Vec<u8>,
-    /// ... and the least and the greatest up to half a pixel away.
+    /// ... and the minimum and the maximum up to half a pixel away.
     pub least: Vec<u8>,
     pub most: Vec<u8>,
     padded: Vec<u8>,
 }
 
 impl Level {
-    /// The brightness; `mirrored` as for the census.
+    /// Computes the brightness; `mirrored` as for the census.
     pub fn brightness(&mut self, rows: &Rows, mirrored: Option<usize>) {
         self.padded.clear();
         self.padded.extend_from_slice(&rows.from(-1, 0)[..rows.width() + 2]);
         self.finish(mirrored);
     }
 
-    /// Half of Sobel's slope, 128 where it is flat.
+    /// Computes half of Sobel's slope, 128 where it is flat.
     pub fn slope(&mut self, rows: &Rows, mirrored: Option<usize>) {
         let width = rows.width();
         self.padded.clear();
@@ -64,8 +64,8 @@ fn slopes(sides: [(&[u8], &[u8]); 3], slopes: &mut [u8]) {
     }
 }
 
-/// The least and the greatest of each value and its means with both neighbours;
-/// `padded` has one more value on both sides.
+/// Computes the minimum and the maximum of each value and its means with both neighbours; `padded`
+/// has one more value on both sides.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn extremes(padded: &[u8], least: &mut [u8], most: &mut [u8]) {
     let width = least.len();

@@ -1,25 +1,22 @@
-//! From a rectified stereo pair to disparity, and from there to depth.
+//! Disparity and depth of a rectified stereo pair.
 //!
-//! [`StereoDepth`] gives a frame with a right image its depth; [`Matcher`] finds
-//! the disparities.
+//! [`StereoDepth`] computes the depth of a frame with a right image; [`Matcher`] computes the
+//! disparities.
 //!
 //! # One pass, a row at a time
 //!
-//! Both methods compare census strings, which do not mind that two cameras
-//! differ in exposure; the semi-global one adds how brightness and its slope
-//! differ. Both sum up the costs of all disparities of one row before
-//! they go on to the next. A volume of costs, 12 million of them for a small
-//! image, would not fit in a cache; a row does. That is why semi-global matching
-//! has no paths from below. All costs are bytes, many of which fit in a vector
-//! register, and the loops over the disparities of a pixel are of fixed length,
-//! so that the compiler turns them into vector instructions; which ones is
-//! decided when the program runs.
+//! Both methods compare census strings, which tolerate cameras that differ in exposure; the
+//! semi-global one adds the differences in brightness and in its slope. Both sum up the costs of
+//! all disparities of one row before they go on to the next. A cost volume, 12 million values for a
+//! small image, would not fit in a cache; a row does. That is why semi-global matching has no paths
+//! from below. All costs are bytes, many of which fit in a vector register, and the loops over the
+//! disparities of a pixel are of fixed length, so that the compiler turns them into vector
+//! instructions; the instruction set is chosen at run time.
 //!
 //! # Threads
 //!
-//! An image is cut into strips of rows that are worked on independently. Where
-//! the cuts are does not depend on the number of threads, and so neither do the
-//! disparities.
+//! An image is cut into strips of rows that are processed independently. The cuts do not depend on
+//! the number of threads, and so neither do the disparities.
 
 mod census;
 mod cost;
@@ -47,20 +44,20 @@ pub use matcher::{Disparities, Matcher};
 pub use rectification::Rectification;
 pub use settings::{MAX_DISPARITIES, Method, StereoSettings};
 
-/// Pixels without a disparity, by the reason.
+/// Number of pixels without a disparity, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// Its match would lie outside of the right image.
+    /// The match would lie outside of the right image.
     pub outside: u64,
     /// Another match is nearly as good: no texture, or a repeated one.
     pub not_unique: u64,
-    /// The right image disagrees: mostly what only one camera sees.
+    /// The match from right to left differs: mostly areas that only one camera sees.
     pub left_right: u64,
-    /// It is smooth, and nothing beside it has its disparity.
+    /// The pixel is smooth, and its disparity is not that of its textured neighbours.
     pub unsupported: u64,
-    /// It belongs to a patch that is too small.
+    /// The disparity belongs to a patch that is too small.
     pub speckle: u64,
-    /// It was dropped, and then filled from both sides.
+    /// The pixel had no disparity and was then filled from both sides.
     pub filled: u64,
 }
 

@@ -8,11 +8,11 @@ use crate::strip::{Output, Pair, Strip};
 use crate::texture::TextureTest;
 use crate::{Dropped, StereoSettings, fill};
 
-/// Rows of a strip. Strips do not depend on the number of threads, so that the
-/// disparities do not, either.
+/// Rows of a strip. Strips do not depend on the number of threads, so that the disparities do not,
+/// either.
 const STRIP_ROWS: usize = 192;
 
-/// Finds the disparities of rectified pairs; keeps its buffers between them.
+/// Matcher of rectified pairs; keeps its buffers between them.
 #[derive(Debug)]
 pub struct Matcher {
     settings: StereoSettings,
@@ -28,15 +28,14 @@ pub struct Matcher {
 /// Disparities of the left image of a pair, row by row.
 #[derive(Clone, Copy, Debug)]
 pub struct Disparities<'a> {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// How far each pixel is shifted to the left in the right image, px; NaN =
-    /// unknown.
+    /// Shift of each pixel to the left in the right image, px; NaN = unknown.
     pub values: &'a [f32],
-    /// How sure that is, 0 to 255: by how much the best match is better than
-    /// the second best.
+    /// Confidence of each disparity, 0 to 255: the relative distance of the second best cost from
+    /// the best.
     pub confidences: &'a [u8],
-    /// Pixels without a disparity, by the reason.
+    /// Number of pixels without a disparity, by reason.
     pub dropped: Dropped,
 }
 
@@ -60,11 +59,12 @@ impl Matcher {
         })
     }
 
-    /// The disparities from 0 to at least `max_disparity` px. More are looked
-    /// for, up to the next power of two, since it costs nothing.
+    /// Computes the disparities from 0 to at least `max_disparity` px. The range is rounded up to
+    /// the next power of two, 16 at least, at no cost.
     ///
     /// # Errors
-    /// If the images differ in size, or `max_disparity` is above 255.
+    /// [`Error::Settings`] if `max_disparity` is above 255; [`Error::Other`] if the images differ
+    /// in size.
     pub fn disparities(
         &mut self,
         left: &GreyImage,
@@ -84,6 +84,7 @@ impl Matcher {
         let (pixels, step) = (settings.speckle_pixels, settings.speckle_step as f32);
         let mut dropped = Dropped::default();
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
+        // Refined before the filters, which compare disparities to fractions of a pixel.
         if settings.refine_px > 0 {
             self.refiner.apply([left, right], settings.refine_px, &mut self.disparities);
         }
@@ -103,6 +104,7 @@ impl Matcher {
     }
 
     fn fill(&mut self, left: &GreyImage, right: &GreyImage, max_disparity: usize) -> Result<()> {
+        // One instance per power of two: loops of fixed length become vector instructions.
         let run = match max_disparity {
             0..16 => Self::run::<16>,
             16..32 => Self::run::<32>,
@@ -142,6 +144,7 @@ impl Matcher {
         };
         std::thread::scope(|scope| {
             let mut shares = jobs.chunks_mut(each);
+            // This thread takes the first share itself.
             let own = shares.next();
             for share in shares {
                 scope.spawn(|| work(share));
@@ -151,7 +154,7 @@ impl Matcher {
     }
 }
 
-/// What is wrong if the images differ in size.
+/// Returns an error if the images differ in size.
 pub(crate) fn size_error(left: &GreyImage, right: &GreyImage) -> Option<Error> {
     let [l, r] = [left, right].map(|image| (image.width(), image.height()));
     (l != r).then(|| {
@@ -170,7 +173,7 @@ fn threads(wanted: usize) -> usize {
     }
 }
 
-/// The large penalty falls with the difference in brightness: a jump of the
+/// Computes the penalties. The large one falls with the difference in brightness: a jump of the
 /// disparity is likely where the image has an edge (equation 14 of the paper).
 fn penalties(settings: &StereoSettings) -> Penalties {
     let StereoSettings { small_penalty, large_penalty, edge_penalty, .. } = *settings;

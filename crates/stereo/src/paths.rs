@@ -1,40 +1,40 @@
-//! Semi-global matching: the cost of a disparity is summed up along straight
-//! paths that end in a pixel, with a small penalty for disparities that change
-//! by one and a larger one for greater changes.
+//! Semi-global matching: the cost of a disparity is summed up along straight paths that end in a
+//! pixel, with a small penalty for disparities that change by one and a larger one for greater
+//! changes.
 //!
 //! H. Hirschmueller, *Stereo processing by semiglobal matching and mutual
 //! information*, PAMI 2008, section 2.3, equation 13. Paths come from the left,
 //! the right and the row above (three directions), so that one pass over the
 //! rows is enough and no cost volume is kept.
 //!
-//! All numbers are bytes. What equation 13 subtracts to keep them small is
-//! subtracted when a value is stored, so that a stored value is the excess over
-//! the best disparity of that pixel.
+//! All numbers are bytes. The minimum that equation 13 subtracts to keep them small is subtracted
+//! when a value is stored, so that a stored value is the excess over the best disparity of that
+//! pixel.
 
-/// Bytes between the pixels of a row, that stand for disparities which are none.
+/// Bytes between the pixels of a row, for disparities outside of the range.
 const GAP: usize = 16;
 
-/// What it costs to change the disparity along a path.
+/// Penalties for a change of the disparity along a path.
 #[derive(Clone, Debug)]
 pub struct Penalties {
-    /// To change it by one.
+    /// Penalty of a change by one.
     pub small: u8,
-    /// To change it by more, by the difference in brightness of the pixels.
+    /// Penalty of a larger change, by the difference in brightness of the pixels.
     pub large: [u8; 256],
 }
 
-/// The excess costs of a path in one row, and of one pixel outside of the image
-/// on both sides.
+/// Excess costs of a path in one row, with one pixel more on both sides of the image.
 #[derive(Clone, Debug, Default)]
 pub struct Excess {
     cells: Vec<u8>,
 }
 
 impl Excess {
-    /// Starts anew: no path has come here yet.
+    /// Resets the costs to those before the first pixel of a path.
     pub fn reset<const D: usize>(&mut self, pixels: usize) {
         self.cells.clear();
         for _ in 0..pixels + 2 {
+            // The largest cost never wins a minimum, so that no end of the range needs a test.
             self.cells.resize(self.cells.len() + GAP, u8::MAX);
             self.cells.resize(self.cells.len() + D, 0);
         }
@@ -42,9 +42,9 @@ impl Excess {
     }
 }
 
-/// One step of a path. `before` are the excess costs of the pixel before, from
-/// one below the first disparity to one above the last; `after` becomes those
-/// of this pixel.
+/// Takes one step of a path. `before` are the excess costs of the previous pixel, from one below
+/// the first disparity to one above the last; returns those of this pixel and adds its costs to
+/// `sum`.
 #[inline(always)]
 fn step<const D: usize>(
     cost: &[u8; D],
@@ -59,7 +59,7 @@ fn step<const D: usize>(
     ahead(cost, &own, &beside, small, large, sum)
 }
 
-/// As [`step`], from a pixel whose costs are still in registers.
+/// Takes the same step as [`step`], from a pixel with costs that are still in registers.
 #[inline(always)]
 fn step_on<const D: usize>(
     cost: &[u8; D],
@@ -68,6 +68,7 @@ fn step_on<const D: usize>(
     large: u8,
     sum: &mut [u8; D],
 ) -> [u8; D] {
+    // At the ends a disparity is its own neighbour, which never wins with the penalty added.
     let beside = std::array::from_fn(|d| own[d.saturating_sub(1)].min(own[(d + 1).min(D - 1)]));
     ahead(cost, own, &beside, small, large, sum)
 }
@@ -97,21 +98,21 @@ fn ahead<const D: usize>(
     after
 }
 
-/// Where the excess costs of pixel `x` begin, one disparity early.
+/// Returns the index of the excess costs of pixel `x`, one disparity early.
 #[inline(always)]
 const fn place<const D: usize>(x: usize) -> usize {
     GAP - 1 + x * (D + GAP)
 }
 
-/// What it costs to jump between pixels of these brightnesses.
+/// Returns the penalty of a jump between pixels of these brightnesses.
 #[inline(always)]
 fn jump(penalties: &Penalties, a: u8, b: u8) -> u8 {
     penalties.large[usize::from(a.abs_diff(b))]
 }
 
-/// Writes the sums of the costs of all paths in a row: `excess` are those from above
-/// left, above and above right. A path along the row waits for its own last step;
-/// meanwhile the others go on.
+/// Writes the sums of the costs of all paths in a row: `excess` are those from above left, above
+/// and above right. The two paths along the row run at the same time, from both ends, because each
+/// waits for its own previous step.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 pub fn sums<const D: usize>(
     costs: &[[u8; D]],
@@ -122,11 +123,11 @@ pub fn sums<const D: usize>(
 ) {
     let (last, small) = (costs.len() - 1, penalties.small);
     let [mut from_left, mut from_right] = [[0; D]; 2];
-    // The path from above left reads next where it writes: it waits for a pixel.
+    // The path from above left reads next where it writes, so its result is stored one pixel later.
     let mut waiting = [0; D];
     for x in 0..=last {
         let (cost, before, here) = (&costs[x], place::<D>(x), place::<D>(x + 1));
-        // The path from the right was here first in the right half.
+        // The path from the right has already added to the right half.
         let mut sum = if 2 * x <= last { [0; D] } else { sums[x] };
         let large = |from: usize| jump(penalties, row[x], row_above[from]);
         let (west, east) = (x.saturating_sub(1), (x + 1).min(last));

@@ -1,31 +1,31 @@
-//! Is a pair rectified, and is the left image the left one?
+//! Checks that a pair is rectified and not swapped.
 //!
-//! A matcher looks along rows and to one side only, so that it cannot tell. Some
-//! distinct points of the left image are therefore looked for in all directions.
+//! A matcher searches along rows and to one side only, so that it cannot detect either. Some
+//! distinct points of the left image are therefore searched for in all directions.
 
 use tagalong_core::GreyImage;
 
 /// Half the side of the patch around a point, px.
 const RADIUS: usize = 5;
-/// How far up and down points are looked for, px.
+/// Vertical search range, px.
 const UP_DOWN: i32 = 4;
 /// Columns and rows of cells, from each of which one point is taken.
 const CELLS: (usize, usize) = (8, 6);
-/// So many points must be found again before anything is said.
+/// Minimum number of matched points for a result.
 const MIN_POINTS: usize = 8;
-/// Least mean change of brightness across a patch, in both directions.
+/// Minimum mean change of brightness across a patch, in both directions.
 const MIN_TEXTURE: u32 = 4;
-/// The best place must be better than any other by this factor.
+/// Maximum cost of the best match relative to any other one.
 const DISTINCT: f32 = 0.7;
 
-/// How the images of a pair lie to each other.
+/// Relative position of the images of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rectification {
-    /// Points of the left image that were found in the right one.
+    /// Number of points of the left image that were found in the right one.
     pub points: usize,
-    /// How much lower they are there, px (median); 0 if there are too few.
+    /// Median offset downwards in the right image, px; 0 if there are too few points.
     pub vertical_px: f64,
-    /// The part of them that is further right there, which cannot be unless
+    /// Fraction of the points that are further right in the right image, which is impossible unless
     /// the images are swapped.
     pub reversed: f64,
 }
@@ -40,6 +40,7 @@ impl Rectification {
         }
         let mut down: Vec<f64> = found.iter().map(|s| s.down).collect();
         down.sort_by(f64::total_cmp);
+        // One pixel of tolerance: points at infinity have disparity 0 and noise.
         let reversed = found.iter().filter(|s| s.left < -1).count();
         Self {
             points: found.len(),
@@ -48,19 +49,19 @@ impl Rectification {
         }
     }
 
-    /// True if the left image is from the right camera.
+    /// Returns true if the left image is from the right camera.
     pub fn is_swapped(&self) -> bool {
         self.points >= MIN_POINTS && self.reversed > 0.5
     }
 }
 
-/// Where a point is in the right image, compared with the left one, px.
+/// Position of a point in the right image relative to the left one, px.
 struct Shift {
     left: i32,
     down: f64,
 }
 
-/// The point with the most texture in both directions, of each cell.
+/// Yields the point with the most texture in both directions, of each cell.
 fn points(image: &GreyImage) -> impl Iterator<Item = (usize, usize)> {
     let border = RADIUS + UP_DOWN as usize;
     let (width, height) =
@@ -68,6 +69,7 @@ fn points(image: &GreyImage) -> impl Iterator<Item = (usize, usize)> {
     let (columns, rows) = (CELLS.0.min(width), CELLS.1.min(height));
     (0..columns * rows).filter_map(move |cell| {
         let (column, row) = (cell % columns, cell / columns);
+        // Every fourth pixel is enough to find a textured one.
         let xs = (column * width / columns..(column + 1) * width / columns).step_by(4);
         let ys = (row * height / rows..(row + 1) * height / rows).step_by(4);
         let all = ys.flat_map(|y| xs.clone().map(move |x| (x + border, y + border)));
@@ -76,7 +78,7 @@ fn points(image: &GreyImage) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// Mean change from pixel to pixel, in the direction with the smaller one.
+/// Returns the mean change from pixel to pixel, in the direction with the smaller one.
 fn texture(image: &GreyImage, (x, y): (usize, usize)) -> u32 {
     let (mut across, mut down) = (0, 0);
     for row in y - RADIUS..=y + RADIUS {
@@ -89,8 +91,7 @@ fn texture(image: &GreyImage, (x, y): (usize, usize)) -> u32 {
     across.min(down) / (2 * RADIUS as u32 + 1).pow(2)
 }
 
-/// Looks for a point of the left image; `None` unless one place is clearly the
-/// best.
+/// Searches for a point of the left image; `None` unless one match is clearly the best.
 fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32) -> Option<Shift> {
     let radius = RADIUS as i32;
     let shifts: Vec<i32> = (-reach..=reach)
@@ -105,6 +106,7 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
         .map(|(shift, down)| (cost(shift, down), shift, down))
         .collect();
     let best = *all.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    // Matches beside the best one are part of the same minimum and no rivals.
     let far = |c: &&(f32, i32, i32)| (c.1 - best.1).abs() > 2 || (c.2 - best.2).abs() > 2;
     let rival = all.iter().filter(far).map(|c| c.0).fold(f32::INFINITY, f32::min);
     let inside = best.2.abs() < UP_DOWN;
@@ -116,7 +118,7 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
     })
 }
 
-/// Mean difference of two patches, apart from their mean brightness.
+/// Returns the mean difference of two patches, apart from their mean brightness.
 fn difference(a: &GreyImage, b: &GreyImage, at_a: (usize, usize), at_b: (usize, usize)) -> f32 {
     const SIDE: usize = 2 * RADIUS + 1;
     let rows = |image: &GreyImage, (x, y): (usize, usize), row: usize| -> [i32; SIDE] {

@@ -1,4 +1,4 @@
-//! Smaller images, by the mean over the area of each new pixel.
+//! Reduction of images by the mean over the area of each new pixel.
 
 use tagalong_core::GreyImage;
 
@@ -10,8 +10,7 @@ pub struct Reducer {
 }
 
 impl Reducer {
-    /// The image at `width` x `height` pixels, neither of them greater than its
-    /// own.
+    /// Reduces the image to `width` x `height` pixels, neither of them greater than its own.
     pub fn reduce(&mut self, image: &GreyImage, width: usize, height: usize) -> &GreyImage {
         if (self.reduced.width(), self.reduced.height()) != (width, height) {
             self.reduced = GreyImage::filled(width, height, 0);
@@ -34,8 +33,8 @@ impl Reducer {
     }
 }
 
-/// The cells that cell `at` of `to` covers when there are `from` of them, each
-/// with its share.
+/// Yields the cells that cell `at` of `to` covers when there are `from` of them, each with its
+/// share.
 fn shares(at: usize, to: usize, from: usize) -> impl Iterator<Item = (usize, f32)> {
     let size = from as f32 / to as f32;
     let (begin, end) = (at as f32 * size, (at + 1) as f32 * size);

@@ -1,39 +1,39 @@
-//! Fractions of a pixel from the images themselves, by least squares over a window
-//! on the same surface. The sums of matching costs are bytes, and the parabola
-//! through three of them follows the noise of the images.
+//! Sub-pixel disparities from the images themselves, by least squares over a window on the same
+//! surface. The sums of matching costs are bytes, and the parabola through three of them follows
+//! the noise of the images.
 //!
-//! B. Lucas and T. Kanade, *An iterative image registration technique with an
-//! application to stereo vision*, IJCAI 1981, section 4, one step, along the row.
-//! The right camera may be more sensitive, by a factor that the contrast of each row
-//! tells; the brightness of each row of the window may differ by a constant. Where
-//! brightness says nothing, a disparity stays what it was: a mean over the window
-//! would blur the step between a person and the wall behind, which is less than a
-//! pixel beyond 4 m.
+//! B. Lucas and T. Kanade, *An iterative image registration technique with an application to stereo
+//! vision*, IJCAI 1981, section 4, one step, along the row. The right camera may be more sensitive,
+//! by a factor that is estimated from the contrast of each row; the brightness of each row of the
+//! window may differ by a constant. Without texture a disparity stays as it was: a mean over the
+//! window would blur the step between a person and the wall behind, which is less than a pixel
+//! beyond 4 m.
 //!
-//! The outline of a round thing lies behind its front, by the radius of a head for a
-//! head, and has the strongest slopes. They count less than their square, so that a
-//! face is where its faint features are.
+//! The outline of a round object lies behind its front, by the radius of a head for a head, and has
+//! the strongest slopes. They count less than their square, so that the disparity of a face is that
+//! of its faint features.
 
 use tagalong_core::GreyImage;
 
-/// Neighbours whose disparities differ by at most this are of one surface, px.
+/// Maximum difference between neighbouring disparities of one surface, px.
 const SAME_PX: f32 = 1.0;
-/// Weight of a disparity as it was: the variance of the noise of a pixel, in grey
-/// levels, over that of the disparity, in pixels.
+/// Weight of the previous disparity: the variance of the noise of a pixel, in grey levels, over
+/// that of the disparity, in pixels.
 const PRIOR: f32 = 20.0;
-/// A slope beyond this many grey levels counts little more than one of it.
+/// Slope beyond which the weight hardly grows, grey levels.
 const STRONG: f32 = 6.0;
-/// Variance of brightness to which the noise of a row is nothing.
+/// Variance added to that of each row, so that noise does not decide the gain of a row without
+/// contrast.
 const FAINT: f32 = 4.0;
 /// Mean brightness.
 const MIDDLE: f32 = 128.0;
-/// A disparity changes by at most this, px: brightness is no straight line for long.
+/// Maximum change of a disparity, px: brightness is linear over a short distance only.
 const MOST_PX: f32 = 0.5;
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 16;
-/// Pixels that are worked on at once.
+/// Number of pixels that are processed at once.
 const LANES: usize = 16;
-/// Stands for an unknown disparity where numbers must be finite.
+/// Value of an unknown disparity where numbers must be finite.
 const UNKNOWN: f32 = 1e6;
 
 /// Refines disparities; keeps its buffers.
@@ -43,25 +43,26 @@ pub struct Refiner {
     right: Vec<[f32; 2]>,
     padded: Vec<u8>,
     row: Equations,
-    /// Of the window's row around each pixel; there is room behind the last.
+    /// Sums of the window's row around each pixel; with padding behind the last.
     sums: Sums,
     was: Vec<f32>,
 }
 
-/// By pixel: the squared slopes, and their product with the disparity.
+/// Squared slopes of each pixel, and their product with the disparity.
 #[derive(Debug, Default)]
 struct Sums {
     squares: Vec<f32>,
     products: Vec<f32>,
 }
 
-/// Some values that lie side by side.
+/// Returns adjacent values.
 #[inline(always)]
 fn lanes(row: &[f32], from: usize) -> &[f32; LANES] {
     &row[from..].as_chunks().0[0]
 }
 
-/// 1 where two disparities are of one surface; 0 for an unknown one.
+/// Returns 1 if two disparities are of one surface, otherwise 0; an unknown one differs from any
+/// known one.
 #[inline(always)]
 fn same(a: f32, b: f32) -> f32 {
     if (a - b).abs() <= SAME_PX { 1.0 } else { 0.0 }
@@ -94,8 +95,8 @@ impl Refiner {
     }
 }
 
-/// Of each pixel the brightness, with weights 1, 2, 1, so that lines between pixels
-/// follow it, and its change from pixel to pixel; of the last one twice.
+/// Computes the brightness of each pixel, with weights 1, 2, 1, so that linear interpolation
+/// follows it, and its change from pixel to pixel; the last one is repeated.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
     let width = row.len();
@@ -113,8 +114,8 @@ fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
     levels[width] = levels[width - 1];
 }
 
-/// What the pixels of a row say of their disparity `d`: `g d = q`, in grey levels, of
-/// strong slopes less. There is room for a window on both sides.
+/// Linear equations of the pixels of a row for their disparity `d`: `g d = q`, in grey levels,
+/// reduced for strong slopes. There is padding for a window on both sides.
 #[derive(Debug, Default)]
 struct Equations {
     d: Vec<f32>,
@@ -140,13 +141,13 @@ impl Equations {
     }
 }
 
-/// From this power of two on, the last bits of a number are a whole number as it is. A
-/// cast, which looks for what does not fit, is no vector instruction.
+/// From this power of two on, the last bits of a float are the integer itself. A saturating cast is
+/// no vector instruction.
 const WHOLE: f32 = 8_388_608.0;
 const LAST_BITS: u32 = WHOLE as u32 - 1;
 
-/// Brightness and slope of the right image where the left pixels are in it; its
-/// border goes on.
+/// Interpolates brightness and slope of the right image at the matches of the left pixels; its
+/// border is continued.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn between(
     right: &[[f32; 2]],
@@ -160,7 +161,7 @@ fn between(
     let columns = &mut columns[..width];
     let (slope, level) = (&mut slope[..width], &mut level[..width]);
     let last = (width - 1) as f32;
-    // Where that is first, apart from the images: so far it is vector instructions.
+    // The columns first, without access to the images: this loop becomes vector instructions.
     for x in 0..width {
         let at = (x as i32 as f32 - disparities[x]).clamp(0.0, last);
         columns[x] = (at.floor() + WHOLE).to_bits() & LAST_BITS;
@@ -185,8 +186,8 @@ fn solve_for(left: &[[f32; 2]], disparities: &[f32], gain: f32, g: &mut [f32], q
     }
 }
 
-/// By how much the contrast of a row is greater in the right image, where there are
-/// matches.
+/// Returns the factor by which the contrast of a row is greater in the right image, over the pixels
+/// with a match.
 fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
     let [mut n, mut l, mut r, mut ll, mut rr] = [0.0_f32; 5];
     for ((own, d), other) in left.iter().zip(disparities).zip(right) {
@@ -202,7 +203,7 @@ fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
     (contrast(r, rr) / contrast(l, ll)).sqrt().clamp(0.5, 2.0)
 }
 
-/// Sums up over the windows' part of a row that is of one surface, around the means.
+/// Sums up over the part of a window's row that is of one surface, around the means.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &mut Sums) {
     for (i, at) in place.step_by(LANES).enumerate() {
@@ -225,6 +226,7 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
         let products = &mut out.products[at..].as_chunks_mut::<LANES>().0[0];
         for lane in 0..LANES {
             let mean = g[lane] / n[lane];
+            // Rounding can make the variance of equal slopes negative.
             squares[lane] = (gg[lane] - mean * g[lane]).max(0.0);
             products[lane] = gq[lane] - mean * q[lane];
         }
@@ -255,6 +257,7 @@ fn down(was: &[f32], sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), ro
         for lane in 0..LANES {
             let change = products[lane] / squares[lane] - own[lane];
             let d = own[lane] + change.clamp(-MOST_PX, MOST_PX);
+            // Not `max`, which would turn an unknown disparity (NaN) into 0.
             solved[lane] = if d < 0.0 { 0.0 } else { d };
         }
         new.copy_from_slice(&solved[..new.len()]);

@@ -1,18 +1,18 @@
-//! Some rows of an image at a time, with its border going on outside of it.
+//! Some rows of an image at a time, with its border continued outside of it.
 
 use tagalong_core::GreyImage;
 
-/// Rows and columns that can be looked at on each side.
+/// Number of rows and columns that can be read on each side.
 const REACH: usize = 2;
 
-/// A row of an image with its neighbours.
+/// Row of an image with its neighbours.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
     padded: [Vec<u8>; 2 * REACH + 1],
 }
 
 impl Rows {
-    /// Moves to row `y`.
+    /// Loads row `y` and its neighbours.
     pub fn load(&mut self, image: &GreyImage, y: usize) {
         for (row, padded) in self.padded.iter_mut().enumerate() {
             let y = (y + row).saturating_sub(REACH).min(image.height() - 1);
@@ -20,13 +20,13 @@ impl Rows {
         }
     }
 
-    /// Columns of the image.
+    /// Returns the number of columns of the image.
     pub fn width(&self) -> usize {
         self.padded[0].len().saturating_sub(2 * REACH)
     }
 
-    /// What lies `dx` columns right of and `dy` rows below the row's pixels, each
-    /// at most 2; more values follow behind the last pixel's.
+    /// Returns the values `dx` columns right of and `dy` rows below the row's pixels, each at most
+    /// 2; more values follow after the last pixel's.
     pub fn from(&self, dx: i32, dy: i32) -> &[u8] {
         let at = |offset: i32| (REACH as i32 + offset) as usize;
         &self.padded[at(dy)][at(dx)..]
@@ -40,8 +40,7 @@ fn pad(row: &[u8], padded: &mut Vec<u8>) {
     padded.resize(row.len() + 2 * REACH, row[row.len() - 1]);
 }
 
-/// Turns a row around if that is asked for, and repeats its last value so many
-/// times behind it.
+/// Reverses a row if `mirrored` is given, and repeats its last value so many times behind it.
 pub fn mirror(row: &mut Vec<u8>, mirrored: Option<usize>) {
     let Some(room) = mirrored else { return };
     row.reverse();

@@ -2,62 +2,60 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result, check_settings};
 
-/// How disparities are found.
+/// Method of stereo matching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// The best match of a window: fast; holes where there is no texture.
+    /// Best match of a window: fast; holes where there is no texture.
     Block,
     /// Costs summed up along paths: smoother, with fewer holes.
     #[default]
     SemiGlobal,
 }
 
-/// From a rectified stereo pair to depth.
+/// Settings of the depth from a rectified stereo pair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StereoSettings {
-    /// `block` (fast) or `semi-global` (smooth, fewer holes).
+    /// Matching method: `block` (fast) or `semi-global` (smooth, fewer holes).
     pub method: Method,
-    /// Pairs that are wider are reduced to this width, px, and their depth is
-    /// brought back to their size.
+    /// Maximum width at which pairs are matched, px; wider ones are reduced to it, and their depth
+    /// is enlarged to their size.
     #[schemars(range(min = 16, max = 8192))]
     pub width: usize,
-    /// Nearest depth that is looked for, m. Half of it is twice the work.
+    /// Minimum depth, m. Half of it is twice the work.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_depth_m: f64,
-    /// Greatest depth that is given, m.
+    /// Maximum depth, m.
     pub max_depth_m: f64,
-    /// Largest disparity that is looked for, px at the reduced width; 0 takes
-    /// what `min_depth_m` asks for.
+    /// Maximum disparity, px at the reduced width; 0 derives it from `min_depth_m`.
     #[schemars(range(max = 255))]
     pub max_disparity: usize,
-    /// Differences in brightness up to this are taken for noise, of 255.
+    /// Difference in brightness up to which it is taken for noise, of 255.
     pub noise: u8,
-    /// Least distance of the second best match from the best, as a fraction of
-    /// its cost, 0 to 1.
+    /// Minimum distance of the second best match from the best, as a fraction of its cost, 0 to 1.
     #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1))]
     pub uniqueness: f64,
-    /// Largest difference between the disparities of a point in the left and
-    /// in the right image, px at the reduced width.
+    /// Maximum difference between the disparities of a point in the left and in the right image, px
+    /// at the reduced width.
     pub left_right: u8,
-    /// Least change of brightness across a textured pixel (half of Sobel's sum: twice
-    /// the height of a step). Others keep their disparity only between textured
-    /// ones that have it, too; 0 keeps them all.
+    /// Minimum change of brightness across a textured pixel (half of Sobel's sum: twice the height
+    /// of a step). Other pixels keep their disparity only if it is that of their textured
+    /// neighbours in the row; 0 keeps them all.
     pub texture: u8,
-    /// Patches of fewer pixels than this are taken for errors.
+    /// Minimum size of a patch, pixels; smaller ones are taken for errors.
     pub speckle_pixels: usize,
-    /// Neighbours whose disparities differ by at most this are of one patch, px.
+    /// Maximum difference between neighbouring disparities of one patch, px.
     #[schemars(range(min = 0.0))]
     pub speckle_step: f64,
-    /// Holes of at most so many pixels along a row are filled, px at the reduced
-    /// width, if their ends are of one patch; 0 leaves them.
+    /// Maximum length of holes along a row that are filled, px at the reduced width, if their ends
+    /// are of one patch; 0 leaves them open.
     pub fill_px: usize,
-    /// So are holes up to this wide, in distances of the two cameras.
+    /// Maximum length of such holes in baselines, if that is longer.
     #[schemars(range(min = 0.0))]
     pub fill_baselines: f64,
-    /// Half the side of the window over which disparities are refined from the
-    /// brightness itself, px at the reduced width; 0 leaves them.
+    /// Half the side of the window over which disparities are refined from the brightness itself,
+    /// px at the reduced width; 0 leaves them.
     #[schemars(range(max = 16))]
     pub refine_px: usize,
     /// Block: side of the window, px; odd, at most 9.
@@ -69,10 +67,10 @@ pub struct StereoSettings {
     pub large_penalty: u8,
     /// ... and where it has a strong edge.
     pub edge_penalty: u8,
-    /// Vertical offset of the images from which on a warning is given, px.
+    /// Vertical offset of the images above which a warning is given, px.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_vertical_px: f64,
-    /// Threads; 0 takes one for each core. The result does not depend on it.
+    /// Number of threads; 0 takes one for each core. The result does not depend on it.
     #[schemars(range(max = 64))]
     pub threads: usize,
 }
@@ -104,7 +102,7 @@ impl Default for StereoSettings {
     }
 }
 
-/// Most disparities that are looked for.
+/// Maximum number of disparities.
 pub const MAX_DISPARITIES: usize = 256;
 
 impl StereoSettings {

@@ -1,23 +1,23 @@
-//! Removes small patches of disparities that do not fit their surroundings.
+//! Removal of small patches of disparities that do not fit their surroundings.
 
-/// Finds patches by runs: a run is a stretch of a row without a jump; runs of
-/// neighbouring rows that touch without a jump are of one patch.
+/// Finds patches by runs: a run is a stretch of a row without a jump; runs of neighbouring rows
+/// that touch without a jump are of one patch.
 #[derive(Debug, Default)]
 pub struct SpeckleFilter {
     /// First and one past last column of each run, row by row.
     runs: Vec<(u32, u32)>,
-    /// The run that each run is joined to; itself for a root.
+    /// Run that each run is joined to; itself for a root.
     joined: Vec<u32>,
-    /// Pixels of the patch, at its root.
+    /// Number of pixels of the patch, at its root.
     pixels: Vec<u32>,
     /// First run of each row, and one past the last.
     rows: Vec<usize>,
 }
 
 impl SpeckleFilter {
-    /// Sets patches of fewer than `min_pixels` pixels to NaN, and returns how
-    /// many pixels that were. Pixels side by side or above each other are of
-    /// one patch if their values differ by at most `step`.
+    /// Sets patches of fewer than `min_pixels` pixels to NaN, and returns the number of such
+    /// pixels. Pixels side by side or above each other are of one patch if their values differ by
+    /// at most `step`.
     pub fn apply(&mut self, image: &mut [f32], width: usize, min_pixels: usize, step: f32) -> u64 {
         self.runs.clear();
         self.joined.clear();
@@ -75,6 +75,7 @@ impl SpeckleFilter {
 
     fn root(&mut self, mut run: usize) -> usize {
         while self.joined[run] as usize != run {
+            // Halving the path keeps later searches short.
             self.joined[run] = self.joined[self.joined[run] as usize];
             run = self.joined[run] as usize;
         }

@@ -1,4 +1,4 @@
-//! The work on a strip of rows, which is all that a thread does at a time.
+//! Matching of a strip of rows, the unit of work of a thread.
 
 use tagalong_core::GreyImage;
 
@@ -7,7 +7,7 @@ use crate::paths::{Excess, Penalties};
 use crate::winner::{Found, FromRight, Winners};
 use crate::{Dropped, Method, StereoSettings, cost, paths, window};
 
-/// Rows above a strip from which the paths into it come.
+/// Number of rows above a strip from which the paths into it start.
 const RUN_UP: usize = 16;
 
 /// Buffers for the rows of a strip.
@@ -21,14 +21,14 @@ pub struct Strip {
     from_right: FromRight,
     /// Excess costs of the paths from above left, above and above right.
     excess: [Excess; 3],
-    /// Costs of the rows in the window, and their sums.
+    /// Costs of the rows in the window, and their sums over each column.
     ring: Vec<Vec<u8>>,
     columns: Vec<u8>,
-    /// What was dropped.
+    /// Number of dropped pixels, by reason.
     pub dropped: Dropped,
 }
 
-/// What is the same for all strips of a pair.
+/// Inputs that all strips of a pair share.
 pub struct Pair<'a> {
     pub left: &'a GreyImage,
     pub right: &'a GreyImage,
@@ -36,7 +36,7 @@ pub struct Pair<'a> {
     pub penalties: &'a Penalties,
 }
 
-/// Where a strip leaves its disparities and confidences.
+/// Output rows of a strip.
 pub struct Output<'a> {
     pub first_row: usize,
     pub disparities: &'a mut [f32],
@@ -77,6 +77,7 @@ impl Strip {
         let (width, height) = (pair.left.width(), pair.left.height());
         let side = pair.settings.window;
         let radius = side / 2;
+        // A sum over 9x9 pixels with 24 bits each is at most 1944, and 121 after the shift.
         let shift = u32::from(side > 3) + 2 * u32::from(side > 7) + u32::from(side > 5);
         self.columns.clear();
         self.columns.resize(width * D, 0);
@@ -108,7 +109,7 @@ impl Strip {
         cost::blend(&self.left, &self.right, self.costs.as_chunks_mut::<D>().0);
     }
 
-    /// Writes the disparities of a row, where they stand the tests.
+    /// Writes the disparities of a row that pass the tests.
     fn decide<const D: usize>(&mut self, pair: &Pair<'_>, row: usize, output: &mut Output<'_>) {
         let place = row * pair.left.width()..(row + 1) * pair.left.width();
         let disparities = &mut output.disparities[place.clone()];

@@ -1,33 +1,31 @@
-//! Drops disparities that nothing supports.
+//! Removal of disparities without support from texture.
 //!
-//! Where an image is smooth, costs tell nothing, and paths carry the disparity of
-//! a person's outline far into a bare wall. An outline belongs to the nearer
-//! surface. So a smooth pixel keeps its disparity only if it is that of its textured
-//! neighbours in the row, or of the farther one of them: the inside of a person is
-//! bounded by the person on both sides, the wall beside is not. What is too far is
-//! dropped as what is too near: noise that is cut on one side only leaves all
-//! surfaces too far.
+//! Where an image is smooth, costs carry no information, and paths extend the disparity of a
+//! person's outline far into a bare wall. An outline belongs to the nearer surface. So a smooth
+//! pixel keeps its disparity only if it is that of its textured neighbours in the row, or of the
+//! farther one of them: the inside of a person is bounded by the person on both sides, the wall
+//! beside is not. Disparities that are too small are dropped like those that are too large: noise
+//! that is cut on one side only would leave all surfaces too far.
 
 use tagalong_core::GreyImage;
 
-/// Disparities that differ by less than this, px, or by less than a tenth, are of
-/// one surface: people are not flat.
+/// Difference between disparities of one surface, px, or as a fraction: people are not flat.
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
 
-/// Judges pixels by row; keeps its buffers.
+/// Filter of pixels by row; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct TextureTest {
-    /// All bits of those that are textured and have a disparity.
+    /// Mask of each pixel: all bits set if it is textured and has a disparity.
     textured: Vec<u32>,
-    /// The disparity of the last textured pixel up to each one, and of the next.
+    /// Disparity of the last textured pixel up to each one, and of the next.
     before: Vec<f32>,
     behind: Vec<f32>,
 }
 
 impl TextureTest {
-    /// Sets the disparities of an image that nothing supports to NaN, and returns
-    /// how many. `least` is the least slope of a textured pixel; 0 leaves them all.
+    /// Sets the unsupported disparities of an image to NaN, and returns their number. `least` is
+    /// the minimum slope of a textured pixel; 0 leaves them all.
     pub fn apply(&mut self, image: &GreyImage, least: u8, disparities: &mut [f32]) -> u64 {
         if least == 0 {
             return 0;
@@ -41,7 +39,7 @@ impl TextureTest {
         .sum()
     }
 
-    /// As above, for a row of the image with its neighbours.
+    /// Filters one row of the image, given its neighbours.
     fn judge(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u8) -> u64 {
         for buffer in [&mut self.before, &mut self.behind] {
             buffer.resize(row.len(), f32::NAN);
@@ -62,15 +60,15 @@ impl TextureTest {
     }
 }
 
-/// Carries the disparities of textured pixels on. All bits at once, since no one can
-/// foresee which pixels are textured, a processor neither.
+/// Carries the disparity of the last textured pixel on. By bit masks, because branches on the
+/// texture would be mispredicted.
 #[inline(always)]
 const fn carried(last: &mut u32, own: f32, textured: u32) -> f32 {
     *last = (own.to_bits() & textured) | (*last & !textured);
     f32::from_bits(*last)
 }
 
-/// Clears the bits of those without a disparity.
+/// Clears the masks of pixels without a disparity.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn leave_known(row: &[f32], textured: &mut [u32]) {
     for (textured, own) in textured.iter_mut().zip(row) {
@@ -78,13 +76,13 @@ fn leave_known(row: &[f32], textured: &mut [u32]) {
     }
 }
 
-/// How much disparities of one surface differ at most.
+/// Returns the maximum difference between disparities of one surface.
 #[inline(always)]
 fn tolerance(disparity: f32) -> f32 {
     SAME_PX.max(SAME_PART * disparity)
 }
 
-/// The disparity between two textured pixels; NaN where there is only one.
+/// Returns the expected disparity between two textured pixels; NaN if there is only one.
 #[inline(always)]
 fn expected(a: f32, b: f32) -> f32 {
     let far = if a < b { a } else { b };
@@ -100,15 +98,15 @@ fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
     for (x, value) in row.iter_mut().enumerate() {
         let expected = expected(before[x], behind[x]);
         let stays = (*value - expected).abs() <= tolerance(expected);
-        // A sum that may overflow is no vector instruction.
+        // A sum with an overflow check is no vector instruction.
         dropped = u32::wrapping_add(dropped, u32::from(!stays & !value.is_nan()));
         *value = if stays { *value } else { f32::NAN };
     }
     dropped
 }
 
-/// Finds the pixels across which brightness changes by at least so much: half of
-/// Sobel's sum. The first and the last column have a neighbour on one side only.
+/// Finds the pixels across which brightness changes by at least `least`: half of Sobel's sum. The
+/// first and the last column have a neighbour on one side only.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [u32]) {
     let rise = |a: u8, b: u8| i16::from(b).wrapping_sub(i16::from(a));

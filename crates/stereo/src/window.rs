@@ -2,8 +2,8 @@
 //! by running sums, so that the work does not depend on the window's size. The sum
 //! of a column must fit in a byte: at most ten rows of 24 bits.
 
-/// Sums of windows of `2 * radius + 1` columns, shifted right by `shift` so
-/// that they fit in a byte. Outside of the image its border goes on.
+/// Writes the sums of windows of `2 * radius + 1` columns, shifted right by `shift` to fit in a
+/// byte. Outside of the image its border is continued.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 pub fn slide_along<const D: usize>(
     columns: &[[u8; D]],

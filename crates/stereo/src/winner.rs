@@ -1,40 +1,38 @@
-//! From the costs of all disparities of a row to the best ones.
+//! Best disparities of a row from the costs of all of them.
 
-/// The best disparities of a row, column by column.
+/// Best disparities of a row, column by column.
 #[derive(Clone, Debug, Default)]
 pub struct Winners {
-    /// The disparity with the lowest cost, px: the least of them.
+    /// Disparity with the lowest cost, px; the smallest one of several.
     pub disparity: Vec<u8>,
-    /// Its cost ...
+    /// Lowest cost ...
     pub cost: Vec<u8>,
-    /// ... and those of the disparities below and above; its own where there
-    /// is none.
+    /// ... and those of the disparities below and above; the same one outside of the range.
     pub below: Vec<u8>,
     pub above: Vec<u8>,
-    /// The lowest cost of a disparity that is not beside the best one.
+    /// Lowest cost of a disparity that is not beside the best one.
     pub second: Vec<u8>,
 }
 
-/// What was found of a row.
+/// Disparities and confidences of a row.
 pub struct Found<'a> {
-    /// Disparities to a fraction of a pixel, px; NaN where there is none.
+    /// Disparities to a fraction of a pixel, px; NaN = unknown.
     pub disparities: &'a mut [f32],
-    /// How far the second best cost is above the best one, as a fraction of the
-    /// second, 0 to 255.
+    /// Distance of the second best cost from the best one, as a fraction of the second, 0 to 255.
     pub confidences: &'a mut [u8],
 }
 
-/// Pixels without a disparity.
+/// Number of pixels without a disparity, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Refused {
-    /// Their match would lie outside of the right image.
+    /// The match would lie outside of the right image.
     pub outside: u32,
     /// Another match is nearly as good.
     pub not_unique: u32,
 }
 
 impl Winners {
-    /// Room for the columns of a row.
+    /// Resizes the buffers to the columns of a row.
     pub fn resize(&mut self, width: usize) {
         let Self { disparity, cost, below, above, second } = self;
         for row in [disparity, cost, below, above, second] {
@@ -50,31 +48,33 @@ impl Winners {
         neighbours(sums, self);
     }
 
-    /// Writes the disparities that lie within the right image and whose second best
-    /// cost is higher by at least the fraction `uniqueness` of it.
+    /// Writes the disparities that lie within the right image and have a second best cost that is
+    /// higher by at least the fraction `uniqueness` of it.
     pub fn judge(&self, uniqueness: f32, found: &mut Found<'_>) -> Refused {
         judge(self, uniqueness, found)
     }
 
-    /// Drops the disparities of pixels whose match in the right image has another
-    /// best disparity, among those that won in the left one: off by more than
-    /// `tolerance`; returns how many that were.
+    /// Drops the disparities that differ by more than `tolerance` from that of their match in the
+    /// right image, which is the best among those of the left pixels matched to it; returns their
+    /// number.
     pub fn look_from_right(
         &self,
         tolerance: u8,
         FromRight { best, back }: &mut FromRight,
         disparities: &mut [f32],
     ) -> u32 {
-        // Right columns by how far they are right of the farthest match to the left.
+        // Index of right columns: offset by the longest shift to the left.
         const REACH: usize = 256;
         let width = self.disparity.len();
         let (disparity, cost) = (&self.disparity[..width], &self.cost[..width]);
-        // An iterator that counts looks for an overflow, which takes as long as the rest.
+        // Iterators that count check for an overflow, which takes as long as the rest.
         let match_of = |x: usize| x.wrapping_add(REACH - usize::from(disparity[x]));
         best.clear();
         best.resize(width + REACH, u16::MAX);
         for x in 0..width {
             let best = &mut best[match_of(x)];
+            // Cost in the high byte, disparity in the low one: the minimum of both is one
+            // comparison.
             *best = (*best).min(u16::from_be_bytes([cost[x], disparity[x]]));
         }
         back.resize(width, 0);
@@ -86,12 +86,12 @@ impl Winners {
     }
 }
 
-/// A row as it is seen from the right image; buffers.
+/// Buffers for a row seen from the right image.
 #[derive(Debug, Default)]
 pub struct FromRight {
     /// Best cost and its disparity by column of the right image.
     best: Vec<u16>,
-    /// That disparity where the pixels of the left image have their matches.
+    /// That disparity at the matches of the left image's pixels.
     back: Vec<u8>,
 }
 
@@ -110,7 +110,7 @@ fn leave_agreeing(there: &[u8], back: &[u8], tolerance: u8, disparities: &mut [f
 // One loop for each of a row's results: of all three in one loop, the compiler makes
 // vector instructions of none or of one, and which one changes with every line.
 
-/// The lowest costs.
+/// Writes the lowest costs.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn lowest<const D: usize>(sums: &[[u8; D]], cost: &mut [u8]) {
     for (sums, cost) in sums.iter().zip(cost) {
@@ -118,7 +118,7 @@ fn lowest<const D: usize>(sums: &[[u8; D]], cost: &mut [u8]) {
     }
 }
 
-/// The first disparities that have these costs.
+/// Writes the first disparities with these costs.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn first<const D: usize>(sums: &[[u8; D]], cost: &[u8], disparity: &mut [u8]) {
     for ((sums, cost), disparity) in sums.iter().zip(cost).zip(disparity) {
@@ -126,7 +126,7 @@ fn first<const D: usize>(sums: &[[u8; D]], cost: &[u8], disparity: &mut [u8]) {
     }
 }
 
-/// The lowest costs of disparities that are not beside these.
+/// Writes the lowest costs of disparities that are not beside these.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn rivals<const D: usize>(sums: &[[u8; D]], disparity: &[u8], second: &mut [u8]) {
     for ((sums, at), second) in sums.iter().zip(disparity).zip(second) {
@@ -134,7 +134,7 @@ fn rivals<const D: usize>(sums: &[[u8; D]], disparity: &[u8], second: &mut [u8])
     }
 }
 
-/// The costs of the disparities below and above these.
+/// Writes the costs of the disparities below and above these.
 fn neighbours<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
     let (below, above) = (winners.below.iter_mut(), winners.above.iter_mut());
     for (((sums, at), below), above) in sums.iter().zip(&winners.disparity).zip(below).zip(above) {
@@ -143,10 +143,10 @@ fn neighbours<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
     }
 }
 
-/// Fewer costs than this, and the compiler makes no vector instructions of their loops.
+/// Minimum number of costs for which the compiler makes vector instructions of the loops.
 const ENOUGH: usize = 64;
 
-/// Enough costs: the highest for disparities that are none.
+/// Pads the costs to [`ENOUGH`], with the highest cost for disparities out of range.
 #[inline(always)]
 fn filled<const D: usize>(sums: &[u8; D]) -> [u8; ENOUGH] {
     let mut all = [u8::MAX; ENOUGH];
@@ -167,6 +167,7 @@ fn least<const D: usize>(values: &[u8; D]) -> u8 {
 fn place<const D: usize>(sums: &[u8; D], cost: u8) -> u8 {
     let mut last = 0;
     for (d, sum) in sums.iter().enumerate() {
+        // Numbered from the end, the first of equal costs is a maximum, which needs no branch.
         let from_end = (D - 1 - d) as u8;
         last = last.max(if *sum == cost { from_end } else { 0 });
     }
@@ -179,6 +180,7 @@ fn rival<const D: usize>(sums: &[u8; D], at: u8) -> u8 {
     let near = at.saturating_add(1).wrapping_sub(below);
     let mut others = [0; D];
     for d in 0..D {
+        // Below the range the difference wraps to a large number: one comparison tests both ends.
         let is_beside = (d as u8).wrapping_sub(below) <= near;
         others[d] = sums[d] | u8::from(is_beside).wrapping_neg();
     }
@@ -203,14 +205,15 @@ fn judge(winners: &Winners, uniqueness: f32, found: &mut Found<'_>) -> Refused {
         not_unique_count = not_unique_count.wrapping_add(u32::from(not_unique));
         let value = f32::from(d) + offset(below[x].into(), cost[x].into(), above[x].into());
         values[x] = if outside | not_unique { f32::NAN } else { value };
+        // The lower bound keeps two costs of 0 from dividing by zero.
         confidences[x] = (255.0 * ahead / rival.max(1.0)) as u8;
     }
     Refused { outside: outside_count, not_unique: not_unique_count }
 }
 
-/// The fraction of a pixel, by a parabola through three costs. It leans to whole
-/// pixels; two lines of equal slope, which do not, follow the noise of the sums more,
-/// and were further off in all.
+/// Returns the fraction of a pixel by a parabola through three costs. It is biased to whole pixels;
+/// two lines of equal slope, which are not, follow the noise of the sums more and had the larger
+/// error overall.
 #[inline(always)]
 fn offset(below: f32, cost: f32, above: f32) -> f32 {
     let rise = below + above - 2.0 * cost;

@@ -9,17 +9,17 @@ use tagalong_core::{
 use tagalong_stereo::{Method, StereoDepth, StereoSettings};
 
 const SIZE: (usize, usize) = (96, 64);
-/// Images of depth, 25 kB each, would be four times as much.
+/// Limit of the growth, bytes; leaked depth images, 25 kB each, would be four times as much.
 const MOST_BYTES: i64 = 300_000;
 
-/// What the process has of its own, bytes; `None` where nobody says.
+/// Returns the resident memory of the process, bytes; `None` if the system does not report it.
 fn resident_bytes() -> Option<i64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find(|line| line.starts_with("RssAnon:"))?;
     line.split_whitespace().nth(1)?.parse::<i64>().ok().map(|kib| kib * 1024)
 }
 
-/// A pair whose texture is another one in each frame.
+/// Generates a pair with another texture in each frame.
 fn frame(index: u64) -> Frame {
     let pattern = |x: usize, y: usize| {
         let h = ((x / 3) as u32).wrapping_mul(0x9E37_79B1) ^ ((y / 3) as u32 + index as u32);

@@ -1,4 +1,4 @@
-//! Disparities of the Middlebury pairs, judged as OpenCV's were.
+//! Disparities of the Middlebury pairs, compared with those of OpenCV.
 #![allow(clippy::unwrap_used, reason = "a broken test may stop loudly")]
 #![allow(clippy::print_stdout, reason = "the figures are what one wants to see")]
 
@@ -7,17 +7,17 @@ use std::path::Path;
 use tagalong_core::GreyImage;
 use tagalong_stereo::{Matcher, Method, StereoSettings};
 
-/// A pair, and what `StereoSGBM` of OpenCV 4.14 leaves bad on it.
+/// Pair of images, and the bad pixels of OpenCV 4.14 on it.
 struct Pair {
     name: &'static str,
-    /// Grey levels a pixel of disparity, in the image of the truth.
+    /// Grey levels per pixel of disparity, in the image of the truth.
     scale: f32,
     disparities: usize,
-    /// Bad pixels of all with a truth, %: off by more than 1 and 2 px.
+    /// Bad pixels by `StereoSGBM` among all with a truth, %: off by more than 1 and 2 px.
     sgbm: [f64; 2],
-    /// The same by its `StereoBM`.
+    /// The same by `StereoBM`.
     bm: [f64; 2],
-    /// The same of those that are visible in both views.
+    /// The same by `StereoSGBM` among those that are visible in both views.
     sgbm_visible: [f64; 2],
 }
 
@@ -56,7 +56,7 @@ const PAIRS: [Pair; 4] = [
     },
 ];
 
-/// Grey as OpenCV makes it from colour.
+/// Converts colour to grey as OpenCV does.
 fn grey(path: &Path) -> GreyImage {
     let image = image::open(path).unwrap().to_rgb8();
     let pixels = image.pixels().map(|p| {
@@ -67,7 +67,7 @@ fn grey(path: &Path) -> GreyImage {
         .unwrap()
 }
 
-/// Pixels of the left view that a nearer one hides in the right view.
+/// Marks the pixels of the left view that a nearer one hides in the right view.
 fn hidden(truth: &[f32]) -> Vec<bool> {
     let seen_at = |x: usize| x as i64 - truth[x].round() as i64;
     let mut nearest = vec![0.0_f32; truth.len()];
@@ -81,9 +81,8 @@ fn hidden(truth: &[f32]) -> Vec<bool> {
     (0..truth.len()).map(hides).collect()
 }
 
-/// Bad pixels, %: of all off by more than 1 and 2 px, and of the visible ones.
-/// A pixel without a disparity is bad; one left of the disparity range or
-/// without a truth is none.
+/// Returns the bad pixels, %: of all off by more than 1 and 2 px, and of the visible ones. A pixel
+/// without a disparity is bad; one left of the disparity range or without a truth does not count.
 fn bad(found: &[f32], truth: &[f32], width: usize, disparities: usize) -> [f64; 4] {
     let (mut count, mut pixels) = ([0_u32; 4], [0_u32; 2]);
     for (found, truth) in found.chunks(width).zip(truth.chunks(width)) {
@@ -100,11 +99,11 @@ fn bad(found: &[f32], truth: &[f32], width: usize, disparities: usize) -> [f64; 
     std::array::from_fn(|i| 100.0 * f64::from(count[i]) / f64::from(pixels[i / 2]))
 }
 
-/// What became of a pair.
+/// Errors on a pair.
 struct Judged {
     /// See [`bad`].
     bad: [f64; 4],
-    /// Disparities that are off by more than 2 px, % of those that there are.
+    /// Fraction of the disparities that are off by more than 2 px, % of the valid ones.
     wrong: f64,
 }
 
@@ -129,7 +128,7 @@ fn judge(folder: &Path, pair: &Pair, settings: &StereoSettings) -> Judged {
     Judged { bad, wrong }
 }
 
-/// A pixel without a disparity is bad here, so none may be dropped for being smooth.
+/// Returns settings that drop no smooth pixel, because one without a disparity is bad here.
 fn dense(method: Method) -> StereoSettings {
     StereoSettings { method, texture: 0, ..StereoSettings::default() }
 }
@@ -144,8 +143,8 @@ fn semi_global_is_no_worse_than_opencv() {
     }
 }
 
-/// Windows differ in where they fail: where there is no texture, ours leave holes
-/// and `StereoBM` with its larger window guesses.
+/// The methods fail in different places: without texture, ours leave holes and `StereoBM` with its
+/// larger window guesses.
 #[test]
 fn windows_fail_nowhere_as_badly_as_opencv_where_it_is_worst() {
     let Some(folder) = tagalong_testdata::find("stereo") else { return };
@@ -156,7 +155,7 @@ fn windows_fail_nowhere_as_badly_as_opencv_where_it_is_worst() {
     }
 }
 
-/// What the test of texture drops is more often wrong than what it leaves.
+/// The disparities that the texture test drops are more often wrong than those that it keeps.
 #[test]
 fn of_what_the_defaults_leave_less_is_wrong() {
     let Some(folder) = tagalong_testdata::find("stereo") else { return };

@@ -1,10 +1,9 @@
-//! Where tests find recorded data, and what they do without.
+//! Access of tests to recorded data.
 //!
-//! Recordings of people are not part of this repository: they lie beside it, in
-//! `../shared/data`. A test that needs some asks [`find`], and ends early where they are
-//! absent. That is said on the terminal, past the capture of `cargo test`, so that a test
-//! that passed and a test that skipped can be told apart; and where [`REQUIRE`] is set to
-//! `1`, it fails.
+//! Recordings of people are not part of this repository: they lie beside it, in `../shared/data`. A
+//! test that needs some calls [`find`], and returns early if they are absent. A message on the
+//! terminal, which bypasses the capture of `cargo test`, distinguishes a skipped test from a passed
+//! one; if [`REQUIRE`] is set to `1`, the test fails instead.
 //!
 //! ```no_run
 //! let Some(log) = tagalong_testdata::find("logs/um.mcap") else { return };
@@ -13,14 +12,14 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The environment variable that makes a skip a failure where it is `1`.
+/// Environment variable that turns a skip into a failure if it is `1`.
 pub const REQUIRE: &str = "TAGALONG_REQUIRE_DATA";
 
-/// Returns the path of a file or folder of the recorded data, named from `../shared/data`;
-/// `None`, after a message, where it is absent.
+/// Returns the path of a file or folder of the recorded data, relative to `../shared/data`; `None`,
+/// after a message, if it is absent.
 ///
 /// # Panics
-/// Where it is absent and [`REQUIRE`] is `1`.
+/// If it is absent and [`REQUIRE`] is `1`.
 pub fn find(name: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let is_required = std::env::var_os(REQUIRE).is_some_and(|value| value == "1");
@@ -28,15 +27,14 @@ pub fn find(name: &str) -> Option<PathBuf> {
     match look_for(&root.join(name), &test, is_required) {
         Ok(path) => Some(path),
         Err(said) => {
-            // Not `eprintln!`, which `cargo test` keeps to itself. Where nobody listens,
-            // nothing is lost.
+            // Not `eprintln!`, which `cargo test` captures. A closed terminal is no reason to fail.
             std::io::stderr().write_all(said.as_bytes()).ok();
             None
         }
     }
 }
 
-/// Returns the path, or what to say.
+/// Returns the path, or the message about its absence.
 #[expect(clippy::panic, reason = "a skip that is not allowed fails the test")]
 fn look_for(path: &Path, test: &str, is_required: bool) -> Result<PathBuf, String> {
     if path.exists() {

@@ -4,25 +4,25 @@ use tagalong_core::{Frame, Funnel, Motion, Stamp};
 
 use crate::{ClockSettings, Outcome};
 
-/// Frame periods that the usual one is taken from.
+/// Number of frame periods from which the usual one is computed.
 const PERIODS: usize = 9;
-/// So many periods must be known before there is a usual one.
+/// Least number of known periods for a usual one.
 const MIN_PERIODS: usize = 3;
 
-/// What to do with a frame.
+/// Decision about a frame.
 pub(crate) enum Tick {
-    /// Nothing.
+    /// The frame is not processed.
     Skip(Outcome),
-    /// Process it; without a motion, tracks cannot be predicted to it.
+    /// The frame is processed; without a motion, tracks cannot be predicted to it.
     Go(Outcome, Option<Motion>),
 }
 
-/// Decides by its stamp whether a frame is processed, and over what motion the
-/// tracks are predicted to it.
+/// Decides by its stamp if a frame is processed, and over which motion the tracks are predicted to
+/// it.
 pub(crate) struct Clock {
     settings: ClockSettings,
     last: Option<Stamp>,
-    /// Motion of frames that were skipped.
+    /// Motion of the frames that were skipped.
     pending: Option<Motion>,
     periods: VecDeque<f64>,
 }
@@ -40,6 +40,8 @@ impl Clock {
             Outcome::OutOfOrder => funnel.drop_many("frame: out of order", 1),
             _ => return self.go(frame.stamp, outcome, motion),
         }
+        // The robot moved during a skipped frame, too, so its motion is added to that of the next
+        // one.
         self.pending = Some(motion);
         Tick::Skip(outcome)
     }
@@ -54,15 +56,17 @@ impl Clock {
                 self.periods.pop_front();
             }
         }
+        // A jump of the clock leaves the time step unknown, and with it the prediction.
         match outcome {
             Outcome::ResetBackward { .. } | Outcome::ResetForward { .. } => Tick::Go(outcome, None),
             _ => Tick::Go(outcome, dt.map(|dt| Motion { dt, ..motion })),
         }
     }
 
-    /// The motion since the last processed frame.
+    /// Returns the motion since the last processed frame.
     fn whole_motion(&self, frame: &Frame, funnel: &mut Funnel) -> Motion {
         let mut motion = frame.motion;
+        // One number that is not finite would spread to the states of all tracks.
         if !is_finite(&motion) {
             funnel.drop_many("motion not finite", 1);
             motion = Motion::at_rest(0.0);
@@ -73,6 +77,8 @@ impl Clock {
     fn outcome(&self, stamp: Stamp) -> Outcome {
         let Some(last) = self.last else { return Outcome::Tracked };
         let by_s = stamp.seconds_since(last);
+        // A slow camera may exceed the limits in every frame, so three usual periods are never a
+        // gap.
         let usual = 3.0 * self.usual_period_s();
         if stamp == last {
             Outcome::Duplicate
@@ -89,7 +95,7 @@ impl Clock {
         }
     }
 
-    /// Median time between frames; 0 while too few are known.
+    /// Returns the median time between frames; 0 while too few are known.
     fn usual_period_s(&self) -> f64 {
         let mut periods: Vec<f64> = self.periods.iter().copied().collect();
         if periods.len() < MIN_PERIODS {

@@ -1,20 +1,20 @@
-//! The detections of one frame on their way through the tracker.
+//! Detections of one frame, with the decisions of the tracker about them.
 
 use tagalong_core::{Associations, Detection, Funnel, Matched, Track, TrackId};
 
 use crate::{Candidate, Fate, MergeSettings};
 
-/// A detection about which nothing is decided yet.
+/// A detection with its decision, if any.
 #[derive(Clone, Debug)]
 pub(crate) struct PendingDetection {
     pub(crate) detection: Detection,
-    /// Index of the detector that made it.
+    /// Index of its detector.
     pub(crate) detector: usize,
-    /// Its score before the verifiers.
+    /// Its score before verification.
     pub(crate) detector_log_odds: f64,
-    /// Found by a search of the whole image.
+    /// True if a search of the whole image found it.
     pub(crate) discovered: bool,
-    /// `None` while nothing is decided.
+    /// Decision about the detection; `None` while it is open.
     pub(crate) fate: Option<Fate>,
 }
 
@@ -35,7 +35,7 @@ impl PendingDetection {
     }
 }
 
-/// All detections of one frame, and which of them belong to which tracks.
+/// All detections of one frame, and their associations with tracks.
 #[derive(Default)]
 pub(crate) struct DetectionSet {
     all: Vec<PendingDetection>,
@@ -85,12 +85,12 @@ impl DetectionSet {
         self.heaviest(id).map(|index| &self.all[index].detection)
     }
 
-    /// Returns the indices of detections about which nothing is decided.
+    /// Returns the indices of the detections without a decision.
     pub(crate) fn undecided(&self) -> Vec<usize> {
         (0..self.all.len()).filter(|i| self.all[*i].fate.is_none()).collect()
     }
 
-    /// Returns the detections about which nothing is decided.
+    /// Returns the detections without a decision.
     pub(crate) fn undecided_detections(&self) -> Vec<Detection> {
         self.undecided().into_iter().map(|i| self.all[i].detection.clone()).collect()
     }
@@ -103,8 +103,8 @@ impl DetectionSet {
         self.all[index].fate = Some(fate);
     }
 
-    /// Keeps one detection for each person, the one with the best score: two detectors may
-    /// have found the same one, and so may the searches near two tracks.
+    /// Keeps one detection per person, the one with the best score: two detectors may have found
+    /// the same person, and so may the searches near two tracks.
     pub(crate) fn merge(&mut self, settings: &MergeSettings) {
         let mut order = self.undecided();
         order.sort_by(|a, b| self.score(*b).total_cmp(&self.score(*a)));
@@ -123,7 +123,7 @@ impl DetectionSet {
         }
     }
 
-    /// Drops the lowest scores where there are too many.
+    /// Drops the detections with the lowest scores if there are too many.
     pub(crate) fn limit(&mut self, most: usize) {
         let mut open = self.undecided();
         let excess = self.all.len().saturating_sub(most).min(open.len());
@@ -133,11 +133,12 @@ impl DetectionSet {
         }
     }
 
-    /// Takes over what the associator decided about the detections at the indices `open`.
+    /// Applies the decisions of the associator about the detections at the indices `open`.
     pub(crate) fn take_over(&mut self, answer: &Associations, tracks: &[Track], open: &[usize]) {
         for pair in &answer.pairs {
             self.pairs.push((tracks[pair.track].id, open[pair.detection], pair.weight));
         }
+        // A detection that several tracks share is reported with the most probable one.
         for &index in open {
             let of_detection = self.pairs.iter().filter(|(_, detection, _)| *detection == index);
             if let Some((id, ..)) = of_detection.max_by(|a, b| a.2.total_cmp(&b.2)) {
@@ -149,7 +150,7 @@ impl DetectionSet {
         }
     }
 
-    /// Drops what was given to tracks that the filter does not support after all.
+    /// Drops the detections of tracks that the filter does not support.
     pub(crate) fn reject(&mut self, is_supported: impl Fn(TrackId) -> bool, test: &'static str) {
         self.pairs.retain(|(id, ..)| is_supported(*id));
         for pending in &mut self.all {
@@ -161,7 +162,7 @@ impl DetectionSet {
         }
     }
 
-    /// Returns the candidates of the report; what was dropped is counted.
+    /// Returns the candidates of the report, and counts dropped ones.
     pub(crate) fn into_candidates(self, funnel: &mut Funnel) -> Vec<Candidate> {
         let candidate = |pending: PendingDetection| {
             let fate = pending.fate.unwrap_or(Fate::Dropped("score"));
@@ -178,19 +179,21 @@ impl DetectionSet {
     }
 }
 
-/// Returns true if two detections are of one person.
+/// Returns true if two detections belong to one person.
 fn is_same_person(a: &Detection, b: &Detection, settings: &MergeSettings) -> bool {
     let apart = (a.position - b.position).xy();
     if apart.norm() < settings.same_person_m {
         return true;
     }
+    // Two people in one line of sight overlap as well; they are kept apart if their positions
+    // differ by more than their covariances allow.
     let spread = (a.covariance + b.covariance).fixed_view::<2, 2>(0, 0).into_owned();
     let contradicts =
         spread.cholesky().is_none_or(|s| apart.dot(&s.solve(&apart)) > CHI_SQUARED_2_99);
     !contradicts && a.region.iou(&b.region) > settings.same_person_iou
 }
 
-/// The 99 % point of chi-squared with two degrees of freedom.
+/// 99 % point of chi-squared with two degrees of freedom.
 const CHI_SQUARED_2_99: f64 = 9.21;
 
 #[cfg(test)]
@@ -262,7 +265,7 @@ mod tests {
         ids.iter().map(track).collect()
     }
 
-    /// Track 7 has two alternatives; track 9 shares the second one, and spends the third.
+    /// Track 7 has two alternatives; track 9 shares the second one, and the third is spent.
     #[test]
     fn a_detection_goes_to_the_track_that_it_is_most_probably_of() {
         let mut set = DetectionSet::default();

@@ -1,4 +1,4 @@
-//! Tracks of one person.
+//! Duplicate tracks of one person.
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -6,7 +6,7 @@ use std::ops::Bound;
 use nalgebra::Point2;
 use tagalong_core::TrackId;
 
-/// Frames that are remembered of a pair, and frames of them in which it has to be near.
+/// Mask of the frames that are remembered for a pair, and least number of them in which it is near.
 const WINDOW: u8 = 0b11111;
 const NEAR_FRAMES: u32 = 3;
 
@@ -14,13 +14,14 @@ const NEAR_FRAMES: u32 = 3;
 /// tracker of the SPENCER project.
 #[derive(Default)]
 pub(crate) struct DuplicateFinder {
-    /// For pairs that were near each other: in which of the last frames, newest lowest.
+    /// History of each pair that was near: one bit per frame, newest lowest.
     near: BTreeMap<(TrackId, TrackId), u8>,
 }
 
 impl DuplicateFinder {
-    /// Returns (older, younger) pairs of one person; a track is in one pair at most. Tracks
-    /// that `is_hidden` may be predicted to be where another person is seen, and are left out.
+    /// Returns (older, younger) pairs of one person; an ended track is in no further pair. Tracks
+    /// that `is_hidden` are left out, because they may be predicted to the position of another
+    /// person.
     pub(crate) fn find(
         &mut self,
         places: &BTreeMap<TrackId, Point2<f64>>,
@@ -80,7 +81,7 @@ mod tests {
         }
     }
 
-    /// Near in every third frame only, then in three of four.
+    /// The two are near in every third frame only, then in three of four.
     #[test]
     fn two_people_who_pass_each_other_are_not_one() {
         let mut finder = DuplicateFinder::default();

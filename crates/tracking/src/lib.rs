@@ -1,6 +1,6 @@
-//! The tracker: [`Tracker::step`] takes one frame through all stages, in the order in which
-//! the modules stand below, and returns a [`TrackingReport`] with the tracks and, for every
-//! candidate that led to none, the test that dropped it.
+//! Tracker: [`Tracker::step`] takes one frame through all stages, in the order of the table below,
+//! and returns a [`TrackingReport`] with the tracks and, for every candidate that led to none, the
+//! test that dropped it.
 //!
 //! | stage | module | decided by |
 //! |---|---|---|
@@ -15,17 +15,17 @@
 //! | tracks started, confirmed, ended | `table` | the track manager |
 //! | tracks of one person merged | `duplicates` | [`MergeSettings`] |
 //!
-//! The tracker itself decides nothing about people: it asks the plugins in this order, checks
-//! their answers, and counts what they drop.
+//! The tracker itself decides nothing about people: it calls the plugins in this order, checks
+//! their results, and counts the candidates that they drop.
 //!
 //! # Invariants
 //!
-//! * Time never runs backwards into a plugin.
+//! * Time never runs backwards for a plugin.
 //! * The number of a track is never used twice, not even after a reset.
 //! * Nothing is dropped silently: each loss is counted in the funnel.
 //! * No number that is not finite leaves the tracker.
-//! * Coasting is no mode: a predicted occlusion, a verifier's wrong no and a detector's miss
-//!   look the same to the filter, namely as no evidence.
+//! * Coasting is no separate mode: a predicted occlusion, a wrong rejection by a verifier and a
+//!   miss of a detector look the same to the filter, namely as no evidence.
 //! * Timings influence nothing.
 
 mod clock;

@@ -1,4 +1,4 @@
-//! What plugins said of a frame, for other pipelines that are shown the same frame.
+//! Results of plugins for a frame, shared with other pipelines that process the same frame.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use tagalong_core::{Derived, Detection, Frame, Funnel, Result, Search};
 
-/// Answers by question. They live as long as their frame.
+/// Results by query. They live as long as their frame.
 #[derive(Default)]
 struct Memo {
     found: Mutex<BTreeMap<String, (Vec<Detection>, Funnel)>>,
@@ -19,16 +19,17 @@ impl Derived for Memo {
     }
 }
 
-/// Who answers: all that an answer depends on, beside the frame and the question.
+/// Identities of plugins: all data on which a result depends, except the frame and the query.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identities {
-    /// Of each detector; none of one that remembers, whose answers are its own.
+    /// Identity of each detector; none for a detector with memory, because its results cannot be
+    /// shared.
     pub detectors: Vec<Option<String>>,
-    /// Of each verifier.
+    /// Identity of each verifier.
     pub verifiers: Vec<String>,
 }
 
-/// Returns what `find` finds, or what was found when the same was asked before.
+/// Returns the result of `find`, or the stored result of the same query.
 pub(crate) fn found(
     identity: &str,
     frame: &Frame,
@@ -53,7 +54,7 @@ pub(crate) fn found(
     Ok(found)
 }
 
-/// Returns what `judge` says of a candidate, or what was said of the same before.
+/// Returns the result of `judge` for a candidate, or the stored result of the same query.
 pub(crate) fn margin(
     identity: &str,
     frame: &Frame,
@@ -70,11 +71,12 @@ pub(crate) fn margin(
     Ok(margin)
 }
 
-/// Numbers are written so that different ones look different.
+/// Builds a key from the `Debug` form, in which different numbers have different text.
 fn key(identity: &str, question: &impl Debug) -> String {
     format!("{identity}\n{question:?}")
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    // Entries are inserted whole, so a map that another pipeline's panic poisoned is still valid.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

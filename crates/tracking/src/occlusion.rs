@@ -1,42 +1,43 @@
-//! Who is hidden behind whom (P4, section III-C): silhouettes are painted at
-//! the predicted places, near over far.
+//! Occlusion of people by nearer ones (P4, section III-C): silhouettes are rendered at the
+//! predicted positions, from near to far.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use tagalong_core::{Camera, Detection, Estimate, Frame, Rect};
 
 use crate::OcclusionSettings;
 
-/// Points a side at which a silhouette is looked at.
+/// Samples per side of the region of a silhouette.
 const SAMPLES: usize = 16;
 
-/// A range with a larger standard deviation, m, was not told.
+/// Standard deviation of the range, m, above which the detector gave the direction alone.
 const RANGE_UNTOLD_M: f64 = 2.0;
 
-/// Somebody found in this frame, who may hide others.
+/// A person that may occlude others, as detected or as predicted.
 pub(crate) struct Cover {
     region: Rect,
     range_m: f64,
     sigma_m: f64,
 }
 
-/// Why a person may not be found.
+/// Visibility of a person at the predicted position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Visibility {
-    /// There is no reason.
+    /// The person can be detected.
     Visible,
-    /// Hidden behind somebody.
+    /// Hidden behind a nearer person.
     Hidden,
     /// Outside the image.
     Outside,
 }
 
 impl Cover {
-    /// Somebody where a detector found them.
+    /// Creates the occluder of a detection.
     pub(crate) fn of(seen: &Detection, camera: &Camera) -> Self {
         Self::new(seen.region, &seen.position, &seen.covariance, camera)
     }
 
-    /// The same person where they are expected, if the detector told the direction alone.
+    /// Returns the occluder at the expected position instead, if the detector gave the direction
+    /// alone.
     pub(crate) fn or(self, expected: Self) -> Self {
         if self.sigma_m > RANGE_UNTOLD_M { expected } else { self }
     }
@@ -48,27 +49,28 @@ impl Cover {
         camera: &Camera,
     ) -> Self {
         let ray = ray(position, camera);
+        // A point at the camera has no direction; the lower limit avoids a division by zero.
         let direction = ray / ray.norm().max(1e-9);
         let variance = (direction.transpose() * covariance * direction).x;
+        // Rounding may make the variance slightly negative, which would give a root that is NaN.
         Self { region, range_m: ray.norm(), sigma_m: variance.max(0.0).sqrt() }
     }
 }
 
-/// Distance of a point in the robot frame from the camera, m.
+/// Returns the distance of a point in the robot frame from the camera, m.
 pub(crate) fn range_m(position: &Point3<f64>, camera: &Camera) -> f64 {
     ray(position, camera).norm()
 }
 
-/// From the camera to a point in the robot frame, m.
+/// Returns the vector from the camera to a point in the robot frame, m.
 fn ray(position: &Point3<f64>, camera: &Camera) -> Vector3<f64> {
     position.coords - camera.robot_from_camera.translation.vector
 }
 
-/// Whether a person at `position`, expected at `region`, can be seen.
+/// Returns the visibility of a person at `position`, expected at `region`.
 ///
-/// The gap in range is held against the uncertainty of the nearer person only:
-/// that of the hidden one grows while they are hidden, which must not end the
-/// occlusion.
+/// The gap in range is compared with the uncertainty of the nearer person only: that of the hidden
+/// one grows during the occlusion, which must not end it.
 pub(crate) fn visibility(
     region: &Rect,
     position: &Point3<f64>,
@@ -77,7 +79,8 @@ pub(crate) fn visibility(
     settings: &OcclusionSettings,
 ) -> Visibility {
     if camera.is_blind() {
-        // Without an image there is no silhouette; a laser scan does not tell who is hidden.
+        // Without an image there is no silhouette; a laser scan does not tell which people are
+        // hidden.
         return Visibility::Visible;
     }
     let Shown { all, inside, visible } = shown(region, position, covers, camera, settings);
@@ -89,8 +92,8 @@ pub(crate) fn visibility(
     }
 }
 
-/// The part of a person at `position`, expected at `region`, that nobody hides, 0 to 1;
-/// what is outside of the image does not count.
+/// Returns the fraction of a person at `position`, expected at `region`, that is not occluded, 0 to
+/// 1; the part outside of the image does not count.
 pub(crate) fn part_shown(
     region: &Rect,
     position: &Point3<f64>,
@@ -102,9 +105,9 @@ pub(crate) fn part_shown(
     if inside > 0 { f64::from(visible) / f64::from(inside) } else { 1.0 }
 }
 
-/// Of somebody half hidden the half that shows is found, and its middle lies up to half
-/// the width of the hidden part aside: covariance in the robot frame, m². A filter that
-/// believes such a place goes on with the pace of whoever passes by.
+/// Returns the covariance, in the robot frame, m², of the lateral error of a half-hidden person:
+/// the detection covers the visible half, and its middle is off by up to half the width of the
+/// hidden part. Without it, a filter takes on the velocity of the person that passes in front.
 pub(crate) fn aside(
     part_shown: f64,
     position: &Point3<f64>,
@@ -112,17 +115,18 @@ pub(crate) fn aside(
     settings: &OcclusionSettings,
 ) -> Matrix3<f64> {
     let ray = ray(position, camera);
+    // A person straight above the camera has no lateral direction; the covariance is then zero.
     let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
     let off = across * (0.5 * settings.body_width_m * (1.0 - part_shown));
     off * off.transpose()
 }
 
-/// How much of a silhouette shows, in points.
+/// Visible part of a silhouette, in samples.
 struct Shown {
     all: u32,
-    /// Inside of the image.
+    /// Samples inside of the image.
     inside: u32,
-    /// And not behind anybody.
+    /// Samples inside of the image and not occluded.
     visible: u32,
 }
 
@@ -142,7 +146,7 @@ fn shown(
     let (mut all, mut inside, mut visible) = (0_u32, 0_u32, 0_u32);
     for point in silhouette(region) {
         all += 1;
-        // A panorama goes on beyond its edges.
+        // A panorama continues beyond its edges.
         let near = |x: f64| Point2::new(camera.column_near(point.x, x), point.y);
         if image.contains(near(image.centre().x)) {
             inside += 1;
@@ -153,7 +157,7 @@ fn shown(
     Shown { all, inside, visible }
 }
 
-/// Points spread evenly over head and shoulders.
+/// Returns samples spread evenly over head, shoulders and trunk.
 fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
     let region = *region;
     let step = 1.0 / SAMPLES as f64;
@@ -164,9 +168,9 @@ fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
     grid.filter(move |point| is_on_body(&region, *point))
 }
 
-/// True on the silhouette of the person whose upper-body square is `region`:
-/// head and shoulders as wide as the upper-body template of Jafari et al.
-/// (ICRA 2014), and the trunk below them.
+/// Returns true on the silhouette of the person with the upper-body square `region`: head and
+/// shoulders as wide as the upper-body template of Jafari et al. (ICRA 2014), and the trunk below
+/// them.
 fn is_on_body(region: &Rect, point: Point2<f64>) -> bool {
     let across = ((point.x - region.x) / region.width - 0.5).abs();
     let down = (point.y - region.y) / region.height;
@@ -180,13 +184,13 @@ fn is_on_body(region: &Rect, point: Point2<f64>) -> bool {
     across < half_width
 }
 
-/// Returns the cover of somebody who is where the filter says.
+/// Returns the occluder of a person at the estimated position.
 pub(crate) fn cover(estimate: &Estimate, frame: &Frame) -> Cover {
     let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
     Cover::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
 }
 
-/// Returns the cover of somebody who was expected there, and seen.
+/// Returns the occluder of a detected person with a known estimate.
 pub(crate) fn cover_seen(seen: &Detection, expected: &Estimate, frame: &Frame) -> Cover {
     Cover::of(seen, &frame.camera).or(cover(expected, frame))
 }
@@ -288,7 +292,7 @@ mod tests {
         assert_eq!(behind(near, 0.05, Point3::new(-2.0, 0.0, 1.6)), Visibility::Outside);
     }
 
-    /// Head, neck, shoulders and trunk of somebody whose square is one unit wide.
+    /// The expected widths are those of head, neck, shoulders and trunk of a square one unit wide.
     #[test]
     fn a_silhouette_is_a_head_on_shoulders_over_a_trunk() {
         let square = Rect::new(10.0, 20.0, 1.0, 1.0);
@@ -305,7 +309,7 @@ mod tests {
         assert!(!on(0.0, 2.6), "and there it ends");
     }
 
-    /// A screen before somebody 4 m ahead, from some column on: how much of them shows.
+    /// Returns the visible part of a person 4 m ahead behind an occluder that begins at a column.
     fn half_hidden(from_column: f64) -> (f64, Visibility) {
         let camera = camera();
         let far = Point3::new(4.0, 0.0, 1.6);
@@ -324,7 +328,7 @@ mod tests {
     fn of_whom_enough_shows_is_visible() {
         let camera = camera();
         let square = camera.upper_body(&Point3::new(4.0, 0.0, 1.6));
-        // The silhouette of the screen is its trunk: 0.42 of its width to both sides.
+        // The silhouette of the occluder is its trunk: 0.42 of its width to both sides.
         let edge = |part: f64| square.x + part * square.width - 0.08 * 900.0;
         let (half, seen) = half_hidden(edge(0.5));
         assert!((half - 0.5).abs() < 0.05, "{half}");

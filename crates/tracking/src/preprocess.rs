@@ -3,25 +3,24 @@ use tagalong_core::{Frame, Funnel, Guarded, Motion, StepError};
 
 use crate::stage::StageLog;
 
-/// What a preprocessor completed.
+/// Output of a preprocessor.
 #[derive(Default)]
 pub struct Preprocessed {
-    /// The frame with what it lacked; `None` if it is used as it is.
+    /// The completed frame; `None` if it is used unchanged.
     pub frame: Option<Frame>,
     /// A better estimate of the robot's motion since the last processed frame; `None` if there
     /// is none.
     pub motion: Option<Motion>,
 }
 
-/// Completes frames before people are searched for in them: depth from a stereo pair, or
-/// egomotion from the images.
+/// Completes frames before detection: depth from a stereo pair, or egomotion from the images.
 pub trait Preprocessor: Send {
     /// Completes a frame. `motion` is the robot's motion since the last processed frame, `None`
     /// after a jump of the clock; `people` are the positions of all tracks before that motion,
-    /// m on the floor, by number.
+    /// m on the floor, sorted by track number.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::MissingImage`] if the frame lacks what is needed.
+    /// [`tagalong_core::Error::MissingImage`] if the frame lacks a required input.
     fn process(
         &mut self,
         frame: &Frame,
@@ -31,7 +30,7 @@ pub trait Preprocessor: Send {
     ) -> tagalong_core::Result<Preprocessed>;
 }
 
-/// Takes a frame through all preprocessors; each sees what those before it completed.
+/// Takes a frame through all preprocessors; each receives the output of those before it.
 pub(crate) fn preprocess(
     preprocessors: &mut [Guarded<dyn Preprocessor>],
     frame: &Frame,

@@ -2,10 +2,10 @@ use tagalong_core::{Detection, Funnel, Motion, Sketch, Stamp, Track, TrackId};
 
 use crate::Weighing;
 
-/// What became of a detection.
+/// Fate of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// It was given to this track.
+    /// It was associated with this track.
     Matched(TrackId),
     /// It started this track.
     Started(TrackId),
@@ -13,16 +13,16 @@ pub enum Fate {
     Dropped(&'static str),
 }
 
-/// A detection and what became of it.
+/// A detection and its fate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// The detection; its score includes the verifiers' margins.
+    /// The detection; its score includes the log-odds of the verifiers.
     pub detection: Detection,
-    /// What became of it.
+    /// Its fate.
     pub fate: Fate,
 }
 
-/// What the stamp of a frame led to.
+/// Outcome of the check of a frame's stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Outcome {
@@ -32,14 +32,14 @@ pub enum Outcome {
     Duplicate,
     /// Slightly older than the frame before: not processed.
     OutOfOrder,
-    /// After a gap: processed, but tracks that were not confirmed ended.
+    /// After a gap: processed, but tentative tracks ended.
     Gap {
         /// Time since the frame before, s.
         by_s: f64,
     },
     /// The clock was set back: all tracks ended, then the frame was processed.
     ResetBackward {
-        /// How far, s.
+        /// Step of the clock, s.
         by_s: f64,
     },
     /// The clock jumped ahead: all tracks ended, then the frame was processed.
@@ -50,35 +50,35 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// False for frames that left no trace in the pipeline.
+    /// Returns false for frames that left no trace in the pipeline.
     pub fn is_processed(&self) -> bool {
         !matches!(self, Self::Duplicate | Self::OutOfOrder)
     }
 }
 
-/// Everything that one frame led to.
+/// Results of one frame.
 #[derive(Clone, Debug)]
 pub struct TrackingReport {
     /// Index of the frame.
     pub index: u64,
     /// Stamp of the frame.
     pub stamp: Stamp,
-    /// What its stamp led to.
+    /// Outcome of the check of its stamp.
     pub outcome: Outcome,
-    /// The robot's motion since the last processed frame, as the preprocessors estimate it; at
-    /// rest where a jump of the clock leaves it unknown.
+    /// The robot's motion since the last processed frame, as the preprocessors estimate it; at rest
+    /// if a jump of the clock leaves it unknown.
     pub motion: Motion,
-    /// All detections, and what became of each.
+    /// All detections with their fates.
     pub candidates: Vec<Candidate>,
-    /// Everything that was dropped, and by which test.
+    /// Number of dropped candidates, by test.
     pub funnel: Funnel,
-    /// All tracks, confirmed or not, near to far.
+    /// All tracks, confirmed or not, from near to far.
     pub tracks: Vec<Track>,
     /// Normalised innovation squared and its degrees of freedom.
     pub nis: Vec<(TrackId, f64, u32)>,
-    /// What was asked of the likelihood.
+    /// Cost of the scene likelihood.
     pub weighing: Weighing,
-    /// What the filter shows of its work, where [`crate::Tracker::sketch`] asks for it.
+    /// Visualisation of the filter, if [`crate::Tracker::sketch`] requests it.
     pub sketch: Sketch,
     /// Milliseconds by stage. With those of `weighing` and of the plugins the only part that
     /// differs between two runs.
@@ -90,7 +90,7 @@ pub struct TrackingReport {
 }
 
 impl TrackingReport {
-    /// Returns the report of a frame that led to nothing yet.
+    /// Returns the report of a frame without results.
     pub fn new(index: u64, stamp: Stamp) -> Self {
         Self {
             index,

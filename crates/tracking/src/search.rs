@@ -1,4 +1,4 @@
-//! Detectors asked about a frame, and verifiers about their answers.
+//! Detection in a frame, and verification of the detections.
 
 use tagalong_core::{
     Detector, Frame, Funnel, Guarded, Likelihood, Search, StepError, Track, Verifier,
@@ -8,7 +8,7 @@ use crate::detections::PendingDetection;
 use crate::memo::{self, Identities};
 use crate::{DetectorSettings, Fate, Role};
 
-/// Log-odds that stand for certainty. Larger ones would drown all others.
+/// Log-odds that stand for certainty. Larger ones would outweigh all other evidence.
 const CERTAIN: f64 = 100.0;
 
 /// A detector and its settings.
@@ -25,7 +25,7 @@ impl DetectorSlot {
         self.settings.roles.contains(&role)
     }
 
-    /// Returns true if the detector works on the frame with this count from 0.
+    /// Returns true if the detector runs on the frame with this count from 0.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
         frame % u64::from(self.settings.every.max(1)) == u64::from(self.settings.offset)
     }
@@ -35,12 +35,12 @@ impl DetectorSlot {
 pub(crate) struct SearchStage {
     pub(crate) detectors: Vec<DetectorSlot>,
     pub(crate) verifiers: Vec<Guarded<dyn Verifier>>,
-    /// Set where answers are shared with other pipelines.
+    /// Identities of the plugins if their results are shared with other pipelines.
     pub(crate) shared: Option<Identities>,
 }
 
 impl SearchStage {
-    /// Returns the detectors that work on the frame with this count from 0.
+    /// Returns the detectors that run on the frame with this count from 0.
     pub(crate) fn due(&self, frame: u64) -> Vec<usize> {
         (0..self.detectors.len()).filter(|i| self.detectors[*i].is_due(frame)).collect()
     }
@@ -55,8 +55,8 @@ impl SearchStage {
         self.detectors.iter().find(|slot| slot.has(Role::Weigh))?.plugin.plugin().likelihood()
     }
 
-    /// Returns the best detection of one track that fails no test, if there is one, and the
-    /// others with the tests that they failed.
+    /// Returns the best detection of one track that fails no test, if there is one, and the others
+    /// with the tests that they failed.
     pub(crate) fn find_track(
         &mut self,
         frame: &Frame,
@@ -85,7 +85,7 @@ impl SearchStage {
         Ok((best, dropped))
     }
 
-    /// Asks a detector, and the verifiers about its answers.
+    /// Runs a detector, and the verifiers on its detections.
     pub(crate) fn detect(
         &mut self,
         frame: &Frame,
@@ -144,5 +144,5 @@ impl SearchStage {
     }
 }
 
-/// The test that the weaker of two detections of one track fails.
+/// Name of the test that the weaker of two detections of one track fails.
 const NOT_BEST: &str = "not the best sighting";

@@ -1,21 +1,20 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What to do about stamps that jump.
+/// Handling of stamps that jump.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClockSettings {
-    /// A frame that is older than the one before by at most this many seconds
-    /// came out of order and is dropped; one that is older by more says that
-    /// the clock was set back, and all tracks end.
+    /// A frame that is older than the previous one by at most this many seconds came out of order
+    /// and is dropped. If it is older by more, the clock was set back, and all tracks end.
     #[schemars(range(min = 0.0))]
     pub max_back_s: f64,
-    /// A longer pause than this, in seconds, and than three usual frame
-    /// periods, is a gap: tracks that are not confirmed end.
+    /// A pause longer than this, in seconds, and than three usual frame periods, is a gap:
+    /// tentative tracks end.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap_s: f64,
-    /// After a pause that is longer than this, in seconds, and than three
-    /// usual frame periods, all tracks end.
+    /// After a pause longer than this, in seconds, and than three usual frame periods, all tracks
+    /// end.
     pub reset_gap_s: f64,
 }
 
@@ -25,24 +24,23 @@ impl Default for ClockSettings {
     }
 }
 
-/// Which detections, and which tracks, are of one person.
+/// Merging of detections, and of tracks, of one person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MergeSettings {
-    /// Two detections nearer to each other on the floor than this are of one person, m; the
-    /// one with the higher score is kept.
+    /// Two detections nearer to each other on the floor than this belong to one person, m; the one
+    /// with the higher score is kept.
     #[schemars(range(min = 0.0))]
     pub same_person_m: f64,
-    /// Two detections that overlap by more than this are of one person, unless their
-    /// positions contradict it.
+    /// Two detections that overlap by more than this belong to one person, unless their positions
+    /// contradict it.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub same_person_iou: f64,
     /// Most detections in a frame; the ones with the lowest scores are dropped.
     #[schemars(range(min = 1))]
     pub max_detections: usize,
-    /// Two tracks that are nearer to each other on the floor than this, m, in 3 of 5 frames
-    /// are of one person, and the older number is kept. A detection so near to a track that
-    /// is seen starts no track.
+    /// Two tracks nearer to each other on the floor than this, m, in 3 of 5 frames belong to one
+    /// person, and the older one is kept. A detection so near to a supported track starts no track.
     #[schemars(range(min = 0.0))]
     pub duplicate_m: f64,
     /// Most tracks at a time; the ones with the lowest scores end.
@@ -62,36 +60,34 @@ impl Default for MergeSettings {
     }
 }
 
-/// The tracker's own settings.
+/// Settings of the tracker itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackerSettings {
-    /// What to do about stamps that jump.
+    /// Handling of stamps that jump.
     pub clock: ClockSettings,
-    /// Which detections, and which tracks, are of one person.
+    /// Merging of detections, and of tracks, of one person.
     pub merge: MergeSettings,
-    /// Which tracks are hidden behind others.
+    /// Occlusion of tracks by nearer ones.
     pub occlusion: OcclusionSettings,
 }
 
-/// Who is hidden behind whom.
+/// Occlusion of people by nearer ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OcclusionSettings {
-    /// A person of whom a smaller part than this is visible behind nearer
-    /// people is hidden; one of whom a smaller part is inside the image has
-    /// left it.
+    /// A person is hidden if a smaller part than this is visible behind nearer people, and has left
+    /// the image if a smaller part is inside.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub min_visible: f64,
-    /// Only a person who is nearer by at least this hides another one, m ...
+    /// A person hides another one only if nearer by at least this, m ...
     #[schemars(range(min = 0.0))]
     pub min_gap_m: f64,
-    /// ... and by at least this many standard deviations of that person's
-    /// range.
+    /// ... and by at least this many standard deviations of the nearer person's range.
     #[schemars(range(min = 0.0))]
     pub min_gap_sigmas: f64,
-    /// Width of a body, m. Of somebody half hidden the half that shows is found, and its
-    /// middle lies up to half the width of the hidden part aside: the sighting is widened
-    /// by that. 0: it is not.
+    /// Width of a body, m. The detection of a half-hidden person covers the visible half, and its
+    /// middle is off by up to half the width of the hidden part: its covariance is increased by
+    /// that. 0: it is not.
     #[schemars(range(min = 0.0))]
     pub body_width_m: f64,
 }
@@ -102,17 +98,17 @@ impl Default for OcclusionSettings {
     }
 }
 
-/// What a detector is used for.
+/// Role of a detector.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// Who is here that is not known yet?
+    /// It finds people that are not tracked yet.
     Discover,
-    /// Where is this one now?
+    /// It finds a tracked person again.
     Follow,
-    /// How well does an imagined scene explain the image?
+    /// Its likelihood weighs hypothetical scenes against the image.
     Weigh,
 }
 
@@ -122,14 +118,14 @@ pub enum Role {
 pub struct DetectorSettings {
     /// The plugin's name.
     pub plugin: String,
-    /// What it is used for: `discover`, `follow`, `weigh`.
+    /// Its roles: `discover`, `follow`, `weigh`.
     pub roles: Vec<Role>,
-    /// It works on every n-th frame ...
+    /// It runs on every n-th frame ...
     pub every: u32,
     /// ... starting with this one, counted from 0.
     pub offset: u32,
-    /// Verifiers are asked about its sightings. Off for a detector that knows somebody
-    /// again where verifiers cannot look.
+    /// True if its detections are verified. Off for a detector that recognises tracked people in
+    /// views for which the verifiers are not made.
     pub verify: bool,
 }
 

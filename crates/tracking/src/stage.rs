@@ -4,7 +4,7 @@ use tagalong_core::{Funnel, TrackId};
 
 use crate::Weighing;
 
-/// What the stages of one frame leave behind beside their results.
+/// Side results of the stages of one frame.
 pub(crate) struct StageLog {
     pub(crate) funnel: Funnel,
     pub(crate) nis: Vec<(TrackId, f64, u32)>,
@@ -26,7 +26,7 @@ impl StageLog {
         }
     }
 
-    /// Counts the time since the last stage for this one, and hands its result on.
+    /// Adds the time since the last stage to this one, and returns its result.
     pub(crate) fn timed<T>(&mut self, stage: &'static str, result: T) -> T {
         let now = Instant::now();
         self.timings.push((stage, (now - self.lap).as_secs_f64() * 1e3));

@@ -1,4 +1,4 @@
-//! The tracks, with what is known of each beside the filter's state.
+//! Table of the tracks, with the data of each beside the filter's state.
 
 use std::collections::BTreeMap;
 
@@ -6,11 +6,11 @@ use tagalong_core::{Camera, Estimate, Observation, Track, TrackHealth, TrackId};
 
 use crate::occlusion::range_m;
 
-/// What is kept of a track.
+/// Data of one track.
 #[derive(Clone, Debug)]
 struct Record {
     health: TrackHealth,
-    /// Index of the detector that found it last.
+    /// Index of the detector that found the track last.
     detector: usize,
     observation: Observation,
     age: u32,
@@ -38,7 +38,7 @@ impl TrackTable {
         self.records.contains_key(&id)
     }
 
-    /// Returns the number of the next track; `None` when all are used up.
+    /// Returns the number of the next track; `None` when all numbers are used up.
     pub(crate) fn next_id(&self) -> Option<TrackId> {
         self.started.checked_add(1).map(TrackId)
     }
@@ -55,7 +55,7 @@ impl TrackTable {
         self.records.remove(&id);
     }
 
-    /// Lets time pass for all tracks.
+    /// Advances the age of all tracks.
     pub(crate) fn age(&mut self, dt_s: f64) {
         for record in self.records.values_mut() {
             record.age = record.age.saturating_add(1);
@@ -63,7 +63,7 @@ impl TrackTable {
         }
     }
 
-    /// Notes what a frame says of a track, and the detector that found it, if one did.
+    /// Records the observation of a track, and the detector that found it, if any.
     pub(crate) fn observe(&mut self, id: TrackId, observed: Observation, by: Option<usize>) {
         let Some(record) = self.records.get_mut(&id) else { return };
         record.observation = observed;
@@ -88,7 +88,8 @@ impl TrackTable {
         self.records.get(&id).map(|record| record.detector)
     }
 
-    /// Returns the tracks that are too many, lowest scores first, and of equals the youngest.
+    /// Returns the tracks in excess of `most`, lowest scores first, and of equal ones the youngest
+    /// first.
     pub(crate) fn too_many(&self, most: usize) -> Vec<TrackId> {
         let records = self.records.iter();
         let mut all: Vec<_> = records.map(|(id, record)| (record.health.log_odds, *id)).collect();
@@ -97,7 +98,7 @@ impl TrackTable {
         all.into_iter().take(excess).map(|(_, id)| id).collect()
     }
 
-    /// Returns the tracks of these estimates, near to far.
+    /// Returns the tracks of these estimates, from near to far.
     pub(crate) fn tracks(
         &self,
         estimates: BTreeMap<TrackId, Estimate>,

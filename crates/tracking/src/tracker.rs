@@ -21,13 +21,13 @@ use crate::{
     DetectorSlot, Fate, MergeSettings, Outcome, Preprocessor, Role, TrackerSettings, TrackingReport,
 };
 
-/// The stages that [`TrackingReport::timings`] names, in their order.
+/// Stages that [`TrackingReport::timings`] names, in their order.
 pub const STAGES: [&str; 8] =
     ["preprocess", "predict", "track", "discover", "associate", "update", "manage", "learn"];
 
-/// What a tracker is made of.
+/// Components of a tracker.
 pub struct Parts {
-    /// Stages that complete a frame first, in their order.
+    /// Preprocessors, in their order.
     pub preprocessors: Vec<Guarded<dyn Preprocessor>>,
     /// Detectors with their roles.
     pub detectors: Vec<DetectorSlot>,
@@ -41,7 +41,7 @@ pub struct Parts {
     pub manager: Guarded<dyn TrackManager>,
 }
 
-/// Plugins, and the tracks that they keep.
+/// Tracker: the plugins, and their tracks.
 pub struct Tracker {
     settings: TrackerSettings,
     preprocessors: Vec<Guarded<dyn Preprocessor>>,
@@ -59,15 +59,15 @@ pub struct Tracker {
     sketches: bool,
 }
 
-/// What became of one frame.
+/// Result of one frame.
 pub struct Tracked {
     /// The report.
     pub report: TrackingReport,
-    /// The frame as the preprocessors completed it; `None` if it was used as it came.
+    /// The frame as the preprocessors completed it; `None` if it was used unchanged.
     pub completed: Option<Frame>,
 }
 
-/// The tracks as the filter believes them after the update of one frame.
+/// State of the tracks after the update of one frame.
 struct Posterior {
     supports: BTreeMap<TrackId, Support>,
     estimates: BTreeMap<TrackId, Estimate>,
@@ -96,7 +96,7 @@ impl Tracker {
     /// Takes one frame through all stages.
     ///
     /// # Errors
-    /// [`StepError`] if a plugin fails or panics. The tracker is of no use then.
+    /// [`StepError`] if a plugin fails or panics. The tracker cannot be used afterwards.
     pub fn step(&mut self, frame: &Frame) -> Result<Tracked, StepError> {
         let mut log = StageLog::new();
         let mut report = TrackingReport::new(frame.index, frame.stamp);
@@ -134,14 +134,14 @@ impl Tracker {
         Ok(Tracked { report, completed })
     }
 
-    /// Lets the filter show its work in [`TrackingReport::sketch`]. That takes time, which
-    /// counts as that of the stage `update`, and changes nothing else.
+    /// Switches the visualisation in [`TrackingReport::sketch`] on or off. Its time counts as that
+    /// of the stage `update`; it changes no other result.
     pub fn sketch(&mut self, wanted: bool) {
         self.sketches = wanted;
     }
 
-    /// Shares the answers of detectors and verifiers with other trackers that are shown the
-    /// very same frame and share, too.
+    /// Shares the results of detectors and verifiers with other trackers that process the very same
+    /// frame and share theirs.
     pub fn share_answers(&mut self, identities: Identities) {
         self.search.shared = Some(identities);
     }
@@ -164,12 +164,13 @@ impl Tracker {
     ) -> Result<(Option<Frame>, Option<Motion>), StepError> {
         let mut people: Vec<(TrackId, Point2<f64>)> =
             self.last.iter().map(|t| (t.id, t.estimate.person.position.xy())).collect();
+        // The tracks are sorted by range, but preprocessors receive them by number.
         people.sort_by_key(|(id, _)| *id);
         let people: Vec<Point2<f64>> = people.into_iter().map(|(_, place)| place).collect();
         preprocess(&mut self.preprocessors, frame, motion, &people, log)
     }
 
-    /// Ends the tracks that a jump of the clock cuts off.
+    /// Ends the tracks that a jump of the clock interrupts.
     fn reset_after(
         &mut self,
         outcome: Outcome,
@@ -182,11 +183,13 @@ impl Tracker {
             Outcome::Gap { .. } => (self.table.tentative_ids(), "track: gap in the log"),
             Outcome::Tracked | Outcome::Duplicate | Outcome::OutOfOrder => return Ok(()),
         };
+        // The positions that a manager remembers are relative to the robot. Its motion over the gap
+        // is uncertain.
         self.manager.ask(frame.index, |manager| manager.reset())?;
         ids.into_iter().try_for_each(|id| self.end(frame, id, test, log))
     }
 
-    /// Returns all tracks, predicted into the robot's new frame, near to far.
+    /// Returns all tracks, predicted into the robot's new frame, from near to far.
     fn predict(
         &mut self,
         frame: &Frame,
@@ -208,7 +211,8 @@ impl Tracker {
         Gate { dt_s: motion.map_or(0.0, |motion| motion.dt), start_log_odds }
     }
 
-    /// Searches for each track, near to far, but for those that a found, nearer person hides.
+    /// Searches for each track, from near to far, except for those that a nearer, detected person
+    /// hides.
     fn search_tracks(
         &mut self,
         frame: &Frame,
@@ -224,6 +228,7 @@ impl Tracker {
         }
         let mut covers: Vec<Cover> = Vec::new();
         let associator = &mut self.associator;
+        // From near to far, so that an occluder is found before the tracks behind it.
         for track in predicted {
             let settings = &self.settings.occlusion;
             let Estimate { region, person, .. } = &track.estimate;
@@ -251,7 +256,7 @@ impl Tracker {
         Ok(detections)
     }
 
-    /// Searches the image for people that were not found yet.
+    /// Searches the image for new people.
     fn search_image(
         &mut self,
         frame: &Frame,
@@ -268,8 +273,8 @@ impl Tracker {
         Ok(())
     }
 
-    /// Gives detections to tracks, all at once: a search near one track that found another
-    /// person must not steal that person's detection.
+    /// Associates all detections with tracks at once: a search near one track that found another
+    /// person must not take that person's detection from another track.
     fn associate(
         &mut self,
         frame: &Frame,
@@ -283,6 +288,7 @@ impl Tracker {
         let mut answer = self
             .associator
             .ask(frame.index, |associator| associator.associate(predicted, &found, gate))?;
+        // The associator is a plugin; pairs outside of the gate must not reach the filter.
         let impossible = remove_impossible(&mut answer, predicted, &found, gate);
         log.funnel.drop_many("association not possible", impossible);
         detections.take_over(&answer, predicted, &open);
@@ -290,7 +296,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// Lets detections of half-hidden people say less of the position.
+    /// Increases the covariances of detections of half-hidden people.
     fn inflate_occluded(&self, frame: &Frame, predicted: &[Track], detections: &mut DetectionSet) {
         let settings = &self.settings.occlusion;
         if settings.body_width_m == 0.0 {
@@ -306,12 +312,13 @@ impl Tracker {
             };
             match detections.change_of_track(track.id, inflate) {
                 Some(found) => covers.push(cover_seen(found, &track.estimate, frame)),
+                // A confirmed track still hides the people behind it when it is missed.
                 None => covers.extend(track.confirmed.then(|| cover(&track.estimate, frame))),
             }
         }
     }
 
-    /// Hands the evidence to the filter.
+    /// Updates the filter with the evidence of the frame.
     fn update(
         &mut self,
         frame: &Frame,
@@ -328,6 +335,7 @@ impl Tracker {
         if self.sketches {
             report.sketch = self.filter.call(frame.index, |filter| filter.sketch(&evidence))?;
         }
+        // The filter is a plugin; it may report tracks that have ended or never existed.
         let before = supports.len();
         supports.retain(|id, _| self.table.contains(*id));
         log.funnel.drop_many("support of an unknown track", (before - supports.len()) as u64);
@@ -342,7 +350,7 @@ impl Tracker {
         Ok(Posterior { supports, estimates: self.estimates(frame, log)? })
     }
 
-    /// Starts, confirms and ends tracks, and returns those that go on.
+    /// Starts, confirms and ends tracks, and returns the remaining ones.
     fn manage(
         &mut self,
         frame: &Frame,
@@ -352,6 +360,7 @@ impl Tracker {
         log: &mut StageLog,
     ) -> Result<Vec<Track>, StepError> {
         let started = self.start_tracks(frame, &posterior, detections)?;
+        // The first report of a new track includes its estimate.
         if !started.is_empty() {
             posterior.estimates = self.estimates(frame, log)?;
         }
@@ -375,7 +384,7 @@ impl Tracker {
         Ok(self.table.tracks(posterior.estimates, &frame.camera))
     }
 
-    /// Ends duplicates and what exceeds the limit.
+    /// Ends duplicates and tracks in excess of the limit.
     fn prune(
         &mut self,
         frame: &Frame,
@@ -383,6 +392,7 @@ impl Tracker {
         log: &mut StageLog,
     ) -> Result<(), StepError> {
         let MergeSettings { duplicate_m, max_tracks, .. } = self.settings.merge;
+        // The manager has just ended some of the tracks in `estimates`.
         let alive = estimates.iter().filter(|(id, _)| self.table.contains(**id));
         let places: BTreeMap<TrackId, Point2<f64>> =
             alive.map(|(id, estimate)| (*id, estimate.person.position.xy())).collect();
@@ -400,7 +410,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// Offers detections that belong to no track to the manager.
+    /// Offers detections without a track to the manager.
     fn start_tracks(
         &mut self,
         frame: &Frame,
@@ -433,7 +443,7 @@ impl Tracker {
         Ok(started)
     }
 
-    /// Starts a track of a detection, if the manager agrees.
+    /// Starts a track from a detection, if the manager agrees.
     fn initiate(
         &mut self,
         frame: &Frame,
@@ -457,7 +467,7 @@ impl Tracker {
         Ok(Fate::Started(id))
     }
 
-    /// Notes what the frame says of each track.
+    /// Records the observation of each track.
     fn observe_tracks(
         &mut self,
         frame: &Frame,
@@ -468,11 +478,12 @@ impl Tracker {
     ) {
         let Posterior { supports, estimates } = posterior;
         let supported = supports.keys().chain(started).filter_map(|id| estimates.get(id));
+        // Only people found in this frame hide others: a coasting track may be at another place.
         let covers: Vec<Cover> = supported.map(|estimate| cover(estimate, frame)).collect();
         for (id, estimate) in estimates.iter().filter(|(id, _)| !started.contains(id)) {
             let found = detections.of_track(*id);
             let (observation, by) = match (supports.contains_key(id), found) {
-                // An associator that weighs alternatives may think a miss more probable.
+                // An associator that weighs alternatives may give a miss the higher probability.
                 (true, Some(found)) if detections.weight_of_track(*id) >= 0.5 => {
                     let log_odds = found.detection.score;
                     (Observation::Detected { log_odds }, Some(found.detector))
@@ -484,7 +495,7 @@ impl Tracker {
         }
     }
 
-    /// Returns why a track without evidence has none.
+    /// Returns the reason for which a track has no evidence.
     fn unsupported(
         &self,
         frame: &Frame,
@@ -503,14 +514,14 @@ impl Tracker {
         }
     }
 
-    /// Returns true if the detector that found the track last, or the filter itself, looked at
-    /// this frame. The silence of a detector on a frame that is another's turn is no miss.
+    /// Returns true if the detector that found the track last, or the filter itself, processed this
+    /// frame. A frame on which a detector does not run is no miss for its tracks.
     fn was_searched(&self, due: &[usize], id: TrackId) -> bool {
         let by_filter = self.filter.plugin().weighs_scenes();
         by_filter || self.table.detector(id).is_none_or(|detector| due.contains(&detector))
     }
 
-    /// Lets appearance models adapt.
+    /// Adapts the appearance models.
     fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<(), StepError> {
         for slot in &mut self.search.detectors {
             slot.plugin.call(frame.index, |detector| detector.learn(frame, tracks))?;
@@ -518,8 +529,8 @@ impl Tracker {
         Ok(())
     }
 
-    /// Returns the filter's estimates of all tracks. One that is missing or not finite ends its
-    /// track: no such number leaves the tracker.
+    /// Returns the filter's estimates of all tracks. A missing estimate or one that is not finite
+    /// ends its track, so that no such number leaves the tracker.
     fn estimates(
         &mut self,
         frame: &Frame,
@@ -549,6 +560,7 @@ impl Tracker {
         self.filter.ask(frame.index, |filter| filter.stop(id))?;
         self.manager.ask(frame.index, |manager| manager.stop(id))?;
         self.table.end(id);
+        // The consistency figures of the report cover the remaining tracks only.
         log.nis.retain(|(track, ..)| *track != id);
         log.funnel.drop_many(test, 1);
         log.ended.push(id);

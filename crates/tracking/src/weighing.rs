@@ -3,16 +3,16 @@ use std::time::Instant;
 
 use tagalong_core::{Frame, Likelihood, Person, Rect, Result};
 
-/// How much was asked of the likelihood in one frame.
+/// Cost of the scene likelihood in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weighing {
-    /// Imagined scenes that were compared with the image.
+    /// Hypothetical scenes that were compared with the image.
     pub scenes: u64,
-    /// What that took, ms; a part of the stage `update`. Differs between runs.
+    /// Time of the comparison, ms; a part of the stage `update`. Differs between runs.
     pub ms: f64,
 }
 
-/// A likelihood that counts what is asked of it.
+/// A likelihood that counts the scenes and measures the time.
 pub(crate) struct Metered<'a> {
     inner: &'a dyn Likelihood,
     scenes: AtomicU64,

@@ -1,27 +1,26 @@
 //! The floor, fitted to the points of a depth image.
 //!
-//! Planes through three points are tried (RANSAC; Fischler and Bolles, CACM 1981)
-//! in a fixed order that does not depend on chance, the best one is refined by
-//! least squares over its inliers. The floor is not the largest plane but the
-//! *lowest* large one: points below a plane count against it.
+//! Planes through three points are tried (RANSAC; Fischler and Bolles, CACM 1981) in a fixed
+//! pseudo-random order, and the best one is refined by least squares over its inliers. The floor is
+//! not the largest plane but the *lowest* large one: points below a plane count against it.
 
 use nalgebra::{Matrix3, Point2, Point3, Unit, Vector3};
 use tagalong_core::{Camera, DepthImage};
 
-/// What a floor may look like.
+/// Settings of the ground estimation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundSettings {
-    /// Lowest and highest camera, m.
+    /// Minimum and maximum height of the camera, m.
     pub height_m: (f64, f64),
-    /// Largest angle between the image's upward direction and the vertical, rad.
+    /// Maximum angle between the image's upward direction and the vertical, rad.
     pub max_tilt_rad: f64,
-    /// Distance of an inlier at 0 m and its growth with the square of depth, m.
+    /// Inlier distance at 0 m, m, and its growth with the square of depth.
     pub tolerance_m: (f64, f64),
-    /// Readings farther than this are not used, m.
+    /// Maximum depth of a reading that is used, m.
     pub max_depth_m: f64,
-    /// Fewest inliers, as a fraction of the points.
+    /// Minimum number of inliers, as a fraction of the points.
     pub min_inliers: f64,
-    /// Planes tried.
+    /// Number of planes tried.
     pub trials: usize,
 }
 
@@ -45,36 +44,36 @@ impl GroundSettings {
     }
 }
 
-/// Where the camera is above the floor.
+/// Pose of the camera relative to the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
     /// Upward normal of the floor in the camera frame.
     pub up_in_camera: Vector3<f64>,
     /// Height of the camera above the floor, m.
     pub height_m: f64,
-    /// Part of the points that lie on the floor.
+    /// Fraction of the points that lie on the floor.
     pub inliers: f64,
 }
 
 impl Ground {
-    /// How far the optical axis points below the horizon, rad.
+    /// Returns the angle of the optical axis below the horizon, rad.
     pub fn pitch_down_rad(&self) -> f64 {
         (-self.up_in_camera.z).clamp(-1.0, 1.0).asin()
     }
 
-    /// Roll, rad; positive when the camera's right side is higher.
+    /// Returns the roll, rad; positive when the camera's right side is higher.
     pub fn roll_rad(&self) -> f64 {
         self.up_in_camera.x.atan2(-self.up_in_camera.y)
     }
 
-    /// Height of a point of the camera frame above the floor, m.
+    /// Returns the height of a point of the camera frame above the floor, m.
     pub fn height_of(&self, point_in_camera: &Point3<f64>) -> f64 {
         self.up_in_camera.dot(&point_in_camera.coords) + self.height_m
     }
 }
 
-/// Fits the floor to a depth image of a camera (whose pose is not used).
-/// `None` where no plane qualifies.
+/// Fits the floor to a depth image of a camera, without use of its pose. Returns `None` if no plane
+/// qualifies.
 pub fn ground_of_depth(
     depth: &DepthImage,
     camera: &Camera,
@@ -94,9 +93,10 @@ pub fn ground_of_depth(
     ground_of_points(&points, settings)
 }
 
-/// Fits the floor to points of the camera frame (x right, y down, z forward).
-/// `None` where no plane qualifies.
+/// Fits the floor to points of the camera frame (x right, y down, z forward). Returns `None` if no
+/// plane qualifies.
 pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
+    // A fixed seed: the same image always gives the same floor.
     let mut random = Sequence(0x9e37_79b9_7f4a_7c15);
     let thinned: Vec<_> = points.iter().step_by(points.len() / 1000 + 1).copied().collect();
     let mut best: Option<(f64, Ground)> = None;
@@ -110,8 +110,8 @@ pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Op
         }
     }
     let mut plane = best?.1;
-    // Narrower each time: the foot of a wall is within the full tolerance, too,
-    // and would tilt the floor.
+    // Narrower each time, because the foot of a wall is within the full tolerance, too, and would
+    // tilt the floor.
     for part in [1.0, 0.6, 0.4, 0.3, 0.3] {
         plane = refined(&plane, points, &settings.narrowed(part))?;
     }
@@ -135,13 +135,14 @@ fn is_inlier(plane: &Ground, point: &Point3<f64>, settings: &GroundSettings) -> 
     plane.height_of(point).abs() < tolerance(point, settings)
 }
 
-/// Points on the plane, the nearer the better (MSAC; Torr and Zisserman, CVIU
-/// 2000), less twice the points well below it.
+/// Scores a plane by the points on it, the nearer the better (MSAC; Torr and Zisserman, CVIU 2000),
+/// less twice the points well below it.
 fn score(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> f64 {
     let votes = points.iter().map(|point| {
         let (height, near) = (plane.height_of(point), tolerance(point, settings));
         if height.abs() < near {
             1.0 - (height / near).powi(2)
+        // Nothing lies below a floor; a margin of three tolerances leaves room for noise.
         } else if height < -3.0 * near {
             -2.0
         } else {
@@ -151,7 +152,7 @@ fn score(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> f
     votes.sum()
 }
 
-/// The plane of least squares through the inliers.
+/// Returns the least-squares plane through the inliers.
 fn refined(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
     let inliers = || points.iter().filter(|p| is_inlier(plane, p, settings));
     let count = inliers().count();
@@ -162,18 +163,19 @@ fn refined(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) ->
     let scatter: Matrix3<f64> =
         inliers().map(|p| (p.coords - mean) * (p.coords - mean).transpose()).sum();
     let eigen = scatter.symmetric_eigen();
+    // The normal is the direction of the smallest scatter.
     let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     through(&mean, normal)
 }
 
-/// The plane through a point with a normal, which is turned upwards.
+/// Returns the plane through a point with the given normal, which is turned upwards.
 fn through(point: &Vector3<f64>, normal: Vector3<f64>) -> Option<Ground> {
     let up = Unit::try_new(normal, 1e-9)?.into_inner();
     let up = if up.y > 0.0 { -up } else { up };
     Some(Ground { up_in_camera: up, height_m: -up.dot(point), inliers: 0.0 })
 }
 
-/// A fixed sequence of well-spread numbers (xorshift).
+/// Fixed sequence of pseudo-random numbers (xorshift).
 struct Sequence(u64);
 
 impl Sequence {
@@ -200,7 +202,7 @@ mod tests {
 
     use super::*;
 
-    /// A room by ray casting: floor, a wall at 5 m, a table top 0.75 m high.
+    /// Renders the depth of a scene by ray casting: floor, a wall at 5 m, a table top 0.75 m high.
     fn room(camera: &Camera) -> DepthImage {
         DepthImage::from_fn(camera.width, camera.height, |x, y| {
             let pixel = Point2::new(x as f64, y as f64);
@@ -234,7 +236,7 @@ mod tests {
             };
             let floor = (0..120).flat_map(|y| (0..160).map(move |x| (x, y)));
             let part = floor.filter(|(x, y)| on_floor(*x, *y)).count() as f64 / 19_200.0;
-            // A strip of floor at the lower border tells nothing reliable.
+            // A strip of floor at the lower border is too small for a reliable fit.
             prop_assume!(part > 0.2);
             let found = ground_of_depth(&depth, &camera, &GroundSettings::default()).unwrap();
             prop_assert!((found.height_m - height).abs() < 0.03, "{found:?} {height}");

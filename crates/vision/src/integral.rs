@@ -1,19 +1,19 @@
 use tagalong_core::{Derived, Frame, GreyImage, Result};
 
-/// Sums of grey values over upright rectangles, four look-ups each.
+/// Integral image: sums of grey values over upright rectangles by four look-ups each.
 ///
-/// The sums are kept modulo 2³²: of a rectangle of up to 16 million pixels the
-/// sum is right, however large the image.
+/// The sums are kept modulo 2³²: the sum over a rectangle of up to 16 million pixels is right,
+/// however large the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Integral {
     width: usize,
     height: usize,
-    /// One row and one column more than the image; the first ones are 0.
+    /// Sums with one row and one column more than the image; the first ones are 0.
     sums: Vec<u32>,
 }
 
 impl Integral {
-    /// Sums up an image.
+    /// Computes the sums of an image.
     pub fn new(image: &GreyImage) -> Self {
         let (width, height) = (image.width(), image.height());
         let stride = width + 1;
@@ -32,35 +32,37 @@ impl Integral {
         Self { width, height, sums }
     }
 
-    /// Columns of the image.
+    /// Returns the number of columns of the image.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows of the image.
+    /// Returns the number of rows of the image.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The sums of what lies above and left of each corner of the pixels, row by
-    /// row, [`Integral::stride`] to a row.
+    /// Returns the sums above and to the left of each corner of the pixels, row by row,
+    /// [`Integral::stride`] to a row.
     pub fn sums(&self) -> &[u32] {
         &self.sums
     }
 
-    /// Numbers in a row of [`Integral::sums`]: one more than columns.
+    /// Returns the length of a row of [`Integral::sums`]: one more than the columns.
     pub fn stride(&self) -> usize {
         self.width + 1
     }
 
-    /// The sum over columns `left..right` and rows `top..bottom`, as far as they
-    /// lie in the image.
+    /// Returns the sum over columns `left..right` and rows `top..bottom`, as far as they lie in the
+    /// image.
     pub fn sum(&self, left: usize, top: usize, right: usize, bottom: usize) -> u32 {
         let at =
             |x: usize, y: usize| self.sums[y.min(self.height) * self.stride() + x.min(self.width)];
         if right <= left || bottom <= top {
             return 0;
         }
+        // The intermediate differences may be negative; modulo 2³² the result is right all the
+        // same.
         at(right, bottom)
             .wrapping_sub(at(left, bottom))
             .wrapping_sub(at(right, top))

@@ -1,12 +1,12 @@
-/// Axes of a point: columns, and rows.
+/// Number of axes of a point: columns, and rows.
 const AXES: usize = 2;
 
-/// Cuts points of a grid into islands and hands out one after the other, row by row.
-/// Whole columns or rows of at least `gap - 1` places without a point lie between two
-/// islands; within one no such cut is left.
+/// Cuts points of a grid into islands and passes each of them to `take`, sorted row by row. At
+/// least `gap - 1` whole columns or rows without a point lie between two islands; within one no
+/// such cut is left.
 ///
-/// What has to be done around each of a few points is thus done around islands, and not
-/// over the rectangle of all of them.
+/// Work around each of a few points is thus done around islands, and not over the bounding
+/// rectangle of all of them.
 pub fn islands<T>(
     points: &mut [T],
     at: impl Fn(&T) -> [i64; AXES] + Copy,
@@ -32,6 +32,7 @@ fn cut<T>(
     points.sort_unstable_by_key(|point| at(point)[axis]);
     let count = points.len();
     for part in points.chunk_by_mut(|a, b| at(b)[axis] - at(a)[axis] < gap) {
+        // A cut along one axis can open a gap along the other, so both are tried again.
         let failed = if part.len() == count { failed + 1 } else { 1 };
         cut(part, at, gap, 1 - axis, failed, take);
     }
@@ -54,7 +55,7 @@ mod tests {
         (along().min().unwrap(), along().max().unwrap())
     }
 
-    /// An empty strip that goes through all points, found place by place.
+    /// Returns true if an empty strip goes through all points, tested position by position.
     fn can_be_cut(points: &[[i64; 2]], gap: i64) -> bool {
         (0..2).any(|axis| {
             let (first, last) = bounds(points, axis);

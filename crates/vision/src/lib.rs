@@ -1,6 +1,6 @@
 //! Image arithmetic that several plugins share.
 //!
-//! Each fast kernel here has a slow, obvious twin in its tests.
+//! Each fast kernel has a slow, obvious reference in its tests.
 
 pub mod ground;
 mod integral;

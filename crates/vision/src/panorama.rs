@@ -1,23 +1,22 @@
 //! Unwrapping of the circular image of a conical mirror.
 //!
-//! Towards the middle of the circle one raw pixel covers many columns of the
-//! panorama; there it is interpolated. Towards the rim a pixel of the panorama
-//! covers several raw ones; taking one of them would alias, so each row is read
-//! from a raw image that was halved as often as still leaves it as fine as the
-//! row (Williams, "Pyramidal parametrics", SIGGRAPH 1983, without the blending of
-//! levels: a row has one level). All places and weights are computed once.
+//! Towards the centre of the circle one raw pixel covers many columns of the panorama; there it is
+//! interpolated. Towards the rim a pixel of the panorama covers several raw ones. Sampling only one
+//! of them would alias, so each row is read from a raw image that was halved as often as its
+//! resolution still is that of the row (Williams, "Pyramidal parametrics", SIGGRAPH 1983, without
+//! the blending of levels: a row has one level). All positions and weights are computed once.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use tagalong_core::{Error, Image, Images, Panorama, Result};
 
-/// A pixel that can be interpolated.
+/// Pixel type that can be interpolated.
 pub trait Blend: Copy + Default {
-    /// The mean of four, rounded.
+    /// Returns the mean of four, rounded.
     fn mean(four: [Self; 4]) -> Self;
-    /// Bilinear: upper left, upper right, lower left, lower right, with the way
-    /// to the right and down in 256ths.
+    /// Interpolates bilinearly between upper left, upper right, lower left and lower right, with
+    /// the offsets to the right and down in 256ths.
     fn bilinear(four: [Self; 4], across: u32, down: u32) -> Self;
 }
 
@@ -52,22 +51,22 @@ impl Blend for [u8; 3] {
     }
 }
 
-/// Where a pixel of the panorama is read.
+/// Position in a level from which a pixel of the panorama is read.
 #[derive(Clone, Copy, Debug)]
 struct Tap {
-    /// The upper left of four pixels, within its level.
+    /// Index of the upper left of four pixels, within its level.
     at: u32,
-    /// Way to the right and down, 256ths of a pixel.
+    /// Offsets to the right and down, 256ths of a pixel.
     across: u8,
     down: u8,
 }
 
-/// The raw image, or what it became when it was halved.
+/// Size and position of the raw image or of a halved one.
 #[derive(Clone, Copy, Debug)]
 struct Level {
     width: usize,
     height: usize,
-    /// Where it starts among the halved images; the raw image is not kept.
+    /// Offset among the halved images; the raw image is not stored.
     start: usize,
 }
 
@@ -80,8 +79,9 @@ impl Level {
         self.width * self.height
     }
 
-    /// Columns or rows to a place between two of `size`, and the way beyond it.
+    /// Splits a position into the index of the lower of two pixels and the offset beyond it.
     fn split(place: f64, size: usize) -> (usize, u8) {
+        // The upper bound keeps the pixel after `cell` within the image.
         let most = size as f64 - 1.0 - 1.0 / 256.0;
         let fine = (place.clamp(0.0, most) * 256.0).round() as usize;
         let cell = (fine / 256).min(size - 2);
@@ -89,7 +89,7 @@ impl Level {
     }
 }
 
-/// Unwraps raw images of one camera. It keeps the memory that it needs.
+/// Unwraps raw images of one camera, with buffers that are kept between images.
 ///
 /// ```
 /// use tagalong_core::{ConicalMirror, GreyImage, Panorama};
@@ -106,7 +106,7 @@ impl Level {
 pub struct Unwrapper<P> {
     columns: usize,
     levels: Vec<Level>,
-    /// The level of each row.
+    /// Level of each row.
     rows: Vec<usize>,
     taps: Vec<Tap>,
     halved: Vec<P>,
@@ -137,10 +137,10 @@ impl<P: Blend> Unwrapper<P> {
         Ok(Self { columns: panorama.columns, levels, rows, taps, halved })
     }
 
-    /// Unwraps `raw` into `out`, which is made anew only if its size is wrong.
+    /// Unwraps `raw` into `out`, which is reallocated only if its size is wrong.
     ///
     /// # Errors
-    /// [`Error::Other`] if the raw image has another size than was announced.
+    /// [`Error::Other`] if the size of the raw image differs from that given to [`Self::new`].
     pub fn apply(&mut self, raw: &Image<P>, out: &mut Image<P>) -> Result<()> {
         let Level { width, height, .. } = self.levels[0];
         if (raw.width(), raw.height()) != (width, height) {
@@ -183,8 +183,8 @@ impl<P: Blend> Unwrapper<P> {
     }
 }
 
-/// Unwraps whatever one camera delivers, colour or grey: [`Unwrapper`]s that are
-/// made when they are first needed.
+/// Unwrapping of colour and grey images of one camera by [`Unwrapper`]s that are made when they are
+/// first needed.
 #[derive(Clone, Debug, Default)]
 pub struct Unwrapping {
     colour: Option<(Panorama, Unwrapper<[u8; 3]>)>,
@@ -192,8 +192,8 @@ pub struct Unwrapping {
 }
 
 impl Unwrapping {
-    /// The images with the circular ones of the mirror unwrapped; a mirror has
-    /// neither depth nor a right image.
+    /// Returns the images with the circular ones of the mirror unwrapped; a mirror has neither
+    /// depth nor a right image.
     ///
     /// # Errors
     /// As [`Unwrapper::new`] and [`Unwrapper::apply`].
@@ -228,8 +228,8 @@ fn halve_row<P: Blend>((upper, lower): (&[P], &[P]), to: &mut [P]) {
     }
 }
 
-/// How often the raw image may be halved and still be as fine as a row: by the
-/// geometric mean of the raw pixels per column and per row of the panorama.
+/// Returns the number of halvings that keep the raw image as fine as a row: by the geometric mean
+/// of the raw pixels per column and per row of the panorama.
 fn coarseness(panorama: &Panorama, row: usize) -> usize {
     let radius = |row: f64| panorama.mirror.radius_px(panorama.elevation(row));
     let row = row as f64;
@@ -238,7 +238,7 @@ fn coarseness(panorama: &Panorama, row: usize) -> usize {
     (across * down).sqrt().max(1.0).log2() as usize
 }
 
-/// The raw image and up to `halvings` smaller ones of 2 x 2 pixels at least.
+/// Returns the levels: the raw image and up to `halvings` smaller ones of 2 x 2 pixels at least.
 fn pyramid(width: usize, height: usize, halvings: usize) -> Vec<Level> {
     let mut levels = vec![Level { width, height, start: 0 }];
     let mut start = 0;
@@ -280,7 +280,7 @@ mod tests {
         Panorama { mirror, columns, rows }
     }
 
-    /// The mean of the block of raw pixels that a pixel of a level stands for.
+    /// Returns the mean of the block of raw pixels that a pixel of a level stands for.
     fn block(raw: &GreyImage, level: usize, x: i64, y: i64) -> f64 {
         let side = 1i64 << level;
         let (width, height) = (raw.width() as i64 / side, raw.height() as i64 / side);
@@ -290,7 +290,7 @@ mod tests {
         sum / (side * side) as f64
     }
 
-    /// One pixel of the panorama, straight from the definition.
+    /// Computes one pixel of the panorama directly from the definition.
     fn slowly(raw: &GreyImage, panorama: &Panorama, column: usize, row: usize) -> f64 {
         let level = coarseness(panorama, row);
         let scale = f64::from(1u32 << level);

@@ -1,21 +1,21 @@
-//! How good images are: readings of depth, light of pictures.
+//! Quality of images: depth readings and exposure.
 
 use tagalong_core::{DepthImage, GreyImage};
 
-/// The readings of depth images.
+/// Statistics of the readings of depth images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthQuality {
     /// Median reading, m.
     pub median_m: f64,
-    /// Part of the pixels without a reading.
+    /// Fraction of the pixels without a reading.
     pub without: f64,
-    /// Median step between neighbouring values that occur within a tenth of the
-    /// median, m; `None` where they all agree.
+    /// Median step between neighbouring distinct values within a tenth of the median, m; `None` if
+    /// they are all equal.
     pub step_m: Option<f64>,
 }
 
 impl DepthQuality {
-    /// Of several images together; `None` without a reading.
+    /// Computes the statistics of several images together; `None` without a reading.
     pub fn of<'a>(images: impl IntoIterator<Item = &'a DepthImage>) -> Option<Self> {
         let (mut readings, mut pixels) = (Vec::new(), 0usize);
         for image in images {
@@ -33,7 +33,7 @@ impl DepthQuality {
     }
 }
 
-/// Of sorted readings, the median step between different values near one.
+/// Returns the median step between distinct values near one, of sorted readings.
 fn step(sorted: &[f32], near: f32) -> Option<f64> {
     let around = &sorted[sorted.partition_point(|z| *z < 0.9 * near)..];
     let around = &around[..around.partition_point(|z| *z <= 1.1 * near)];
@@ -43,23 +43,23 @@ fn step(sorted: &[f32], near: f32) -> Option<f64> {
     steps.get(steps.len() / 2).map(|step| f64::from(*step))
 }
 
-/// Grey levels below this are black, and from this on saturated.
+/// Grey level below which a pixel is black, and from which on it is saturated.
 const BLACK: u8 = 16;
 const WHITE: u8 = 250;
 
-/// The light of a picture.
+/// Statistics of the exposure of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
-    /// Part of the pixels that are black.
+    /// Fraction of the pixels that are black.
     pub black: f64,
-    /// Part of the pixels that are saturated.
+    /// Fraction of the pixels that are saturated.
     pub white: f64,
     /// Standard deviation of the grey levels.
     pub contrast: f64,
 }
 
 impl Exposure {
-    /// Of one picture.
+    /// Computes the statistics of one image.
     pub fn of(grey: &GreyImage) -> Self {
         let pixels = grey.pixels();
         let count = pixels.len().max(1) as f64;

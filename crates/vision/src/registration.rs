@@ -1,27 +1,26 @@
-//! Does depth lie on colour? Measured by how the outlines of things in depth fall
-//! on edges of the intensity image.
+//! Check of the registration of depth to colour, by the overlap of depth outlines with edges of the
+//! intensity image.
 //!
-//! An outline in depth is a jump between neighbouring readings of a row (or of a
-//! column); what was not read between them, the shadow beside a near thing, is
-//! stepped over, and the outline belongs to the nearer side. Where depth is
-//! registered, the intensity changes across most outlines; moved by a few pixels
-//! it does not. So the mean change of intensity across all outlines, as a
-//! function of where the outlines are moved to, peaks at the offset.
+//! An outline in depth is a jump between neighbouring readings of a row (or of a column). Pixels
+//! without a reading between them, the shadow beside a near object, are stepped over, and the
+//! outline belongs to the nearer side. Where depth is registered, the intensity changes across most
+//! outlines; shifted by a few pixels it does not. So the mean change of intensity across all
+//! outlines, as a function of the shift of the outlines, peaks at the offset.
 
 use tagalong_core::{DepthImage, GreyImage};
 
-/// How outlines are compared.
+/// Settings of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OverlapSettings {
-    /// Offsets that are tried, to either side, pixels.
+    /// Largest offset that is tried, to either side, pixels.
     pub reach_px: usize,
-    /// Readings that differ by more than this fraction are on two things.
+    /// Relative difference of readings beyond which they are on two objects.
     pub jump: f32,
     /// Longest run without a reading between the two sides of an outline, pixels.
     pub shadow_px: usize,
-    /// Readings farther than this are not used, m.
+    /// Maximum depth of a reading that is used, m.
     pub max_depth_m: f32,
-    /// Changes of intensity count up to this, grey levels.
+    /// Upper limit to which changes of intensity are clamped, grey levels.
     pub ceiling: u8,
 }
 
@@ -31,27 +30,25 @@ impl Default for OverlapSettings {
     }
 }
 
-/// Where depth lies on colour.
+/// Offset between depth and colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
     /// Columns and rows by which depth has to be moved to lie on colour.
     pub px: [i32; 2],
-    /// Standard error of either, by leaving out one part of the images after the
-    /// other, pixels.
+    /// Standard errors of both, by leaving out one part of the images after the other, pixels.
     pub error_px: [f64; 2],
-    /// How much more the intensity changes across the outlines there than where
-    /// they are, as a fraction.
+    /// Relative increase of the intensity change across the outlines from no offset to this one.
     pub gain: f64,
-    /// How much more it changes there than on average over all offsets.
+    /// Relative increase from the average over all offsets.
     pub contrast: f64,
-    /// Outline pixels that were compared.
+    /// Number of outline pixels that were compared.
     pub outlines: u64,
 }
 
-/// Parts of the images that are left out in turn: quarters, and every other frame.
+/// Number of parts that are left out in turn: the quarters of even and of odd frames.
 const PARTS: usize = 8;
 
-/// Sums over frames how outlines fall on edges.
+/// Sums over frames of the intensity changes across outlines.
 #[derive(Clone, Debug)]
 pub struct EdgeOverlap {
     settings: OverlapSettings,
@@ -60,17 +57,17 @@ pub struct EdgeOverlap {
     parts: [(Vec<u64>, u64); PARTS],
 }
 
-/// An outline pixel: its place, and true where it was crossed along a column.
+/// Outline pixel: its column and row, and true if it was crossed along a column.
 type Outline = (usize, usize, bool);
 
 impl EdgeOverlap {
-    /// Before the first frame.
+    /// Creates the sums before the first frame.
     pub fn new(settings: OverlapSettings) -> Self {
         let side = 2 * settings.reach_px + 1;
         Self { settings, frames: 0, parts: std::array::from_fn(|_| (vec![0; side * side], 0)) }
     }
 
-    /// Takes in a frame; images of two sizes are left alone.
+    /// Adds a frame; images of different size are ignored.
     pub fn add(&mut self, grey: &GreyImage, depth: &DepthImage) {
         let size = (grey.width(), grey.height());
         if size != (depth.width(), depth.height()) {
@@ -86,7 +83,7 @@ impl EdgeOverlap {
         self.frames += 1;
     }
 
-    /// The offset, if there are outlines enough to tell one.
+    /// Returns the offset, if there are outlines and edges.
     pub fn offset(&self) -> Option<Offset> {
         let all = self.without(None);
         let outlines: u64 = self.parts.iter().map(|(_, count)| count).sum();
@@ -108,8 +105,8 @@ impl EdgeOverlap {
         })
     }
 
-    /// Mean change across the outlines for each offset, smoothed a little, without
-    /// one of the parts.
+    /// Returns the mean change across the outlines for each offset, smoothed, without one of the
+    /// parts.
     fn without(&self, left_out: Option<usize>) -> Vec<f64> {
         let side = 2 * self.settings.reach_px + 1;
         let kept = || self.parts.iter().enumerate().filter(|(i, _)| Some(*i) != left_out);
@@ -130,7 +127,7 @@ impl EdgeOverlap {
     }
 }
 
-/// Standard error of a figure from its values without one part each (Quenouille;
+/// Returns the standard error of a figure from its values without one part each (Quenouille;
 /// Tukey).
 fn jackknife(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let count = values.clone().count() as f64;
@@ -139,7 +136,7 @@ fn jackknife(values: impl Iterator<Item = f64> + Clone) -> f64 {
     ((count - 1.0).max(0.0) / count.max(1.0) * spread).sqrt()
 }
 
-/// Mean over three by three offsets, so that a jagged peak does not decide.
+/// Returns the mean over three by three offsets, so that a jagged peak does not decide.
 fn smoothed(scores: &[f64], side: usize) -> Vec<f64> {
     let near = |at: usize| at.saturating_sub(1)..(at + 2).min(side);
     let mean = |x: usize, y: usize| {
@@ -176,9 +173,10 @@ impl Changes {
         }
     }
 
-    /// Adds the changes at all offsets of an outline that keeps inside the image
-    /// at all of them.
+    /// Adds the changes at all offsets of an outline pixel that stays inside the image at all of
+    /// them.
     fn collect(&self, (x, y, down): Outline, reach: usize, (sums, count): &mut (Vec<u64>, u64)) {
+        // Otherwise the offsets would be means over different outlines.
         let inside = |at: usize, size: usize| at >= reach && at + reach < size;
         if !(inside(x, self.width) && inside(y, self.height)) {
             return;
@@ -195,7 +193,7 @@ impl Changes {
     }
 }
 
-/// The outline pixels of a depth image.
+/// Returns the outline pixels of a depth image.
 fn outlines(depth: &DepthImage, settings: &OverlapSettings) -> Vec<Outline> {
     let (width, height) = (depth.width(), depth.height());
     let mut found = Vec::new();
@@ -208,7 +206,7 @@ fn outlines(depth: &DepthImage, settings: &OverlapSettings) -> Vec<Outline> {
     found
 }
 
-/// Walks along a line of readings and tells the nearer side of each jump.
+/// Walks along a line of readings and reports the nearer side of each jump to `tell`.
 fn jumps(
     length: usize,
     settings: &OverlapSettings,
@@ -238,8 +236,8 @@ mod tests {
 
     use super::*;
 
-    /// A dark board and a bright one before a wall of texture, with depth moved by
-    /// an offset.
+    /// Renders a dark board and a bright one in front of a textured wall, with depth shifted by an
+    /// offset.
     fn scene(offset: [i64; 2], boards: &[(i64, i64, i64)]) -> (GreyImage, DepthImage) {
         let board = |x: i64, y: i64| {
             boards.iter().position(|(left, top, side)| {
@@ -273,7 +271,7 @@ mod tests {
         }
     }
 
-    /// The same sums as [`EdgeOverlap`] makes, offset by offset.
+    /// Computes the same sums as [`EdgeOverlap`], offset by offset.
     fn slowly(grey: &GreyImage, depth: &DepthImage, dx: i64, dy: i64) -> u64 {
         let settings = OverlapSettings::default();
         let reach = settings.reach_px as i64;

@@ -3,7 +3,7 @@ use tagalong_core::DepthImage;
 /// Running sums of a row up to, and without, one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Valid pixels.
+    /// Number of valid pixels.
     pub count: u32,
     /// Sum of their values.
     pub sum: u32,
@@ -12,28 +12,27 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Sum over the pixels of `(value - t)²`.
+    /// Returns the sum over the pixels of `(value - t)²`.
     #[inline]
     pub fn squared_error(&self, t: f64) -> f64 {
         let n = f64::from(self.count);
+        // Rounding can make the expanded square slightly negative.
         (n * t * t - 2.0 * t * f64::from(self.sum) + self.squares as f64).max(0.0)
     }
 
-    /// Mean value; 0 if there is no valid pixel.
+    /// Returns the mean value; 0 if there is no valid pixel.
     #[inline]
     pub fn mean(&self) -> f64 {
         f64::from(self.sum) / f64::from(self.count.max(1))
     }
 }
 
-/// An inverse-depth image, reduced by a whole factor, with running sums along
-/// each row.
+/// Inverse-depth image, reduced by an integer factor, with running sums along each row.
 ///
-/// A template that is constant along runs of a row is then matched exactly in
-/// a few operations per row instead of a few per pixel, whatever its size.
-/// Inverse depth is what stereo and structured light measure: its noise is the
-/// same at every range, and a far background is a small number instead of a
-/// large one.
+/// A template that is constant along runs of a row is then matched exactly in a few operations per
+/// row instead of a few per pixel, whatever its size. Inverse depth is the quantity that stereo and
+/// structured light measure: its noise is the same at every range, and a far background is a small
+/// number instead of a large one.
 #[derive(Clone, Debug)]
 pub struct RowSums {
     width: usize,
@@ -44,13 +43,13 @@ pub struct RowSums {
 }
 
 impl RowSums {
-    /// The value of a point at 1 m; a point at depth `z` has `UNITS / z`.
+    /// Value of a point at 1 m; a point at depth `z` has `UNITS / z`.
     pub const UNITS: f64 = 2000.0;
-    /// Nearest depth that is represented, m; nearer readings count as invalid.
+    /// Minimum depth that is represented, m; nearer readings count as invalid.
     pub const MIN_DEPTH_M: f64 = 0.25;
 
-    /// Reduces `depth` by `scale` (at least 1) and sums it up. Each reduced
-    /// pixel is the first valid one of its block, so that small holes close.
+    /// Reduces `depth` by `scale` (at least 1) and sums it up. Each reduced pixel is the first
+    /// valid one of its block, so that small holes close.
     pub fn new(depth: &DepthImage, scale: usize) -> Self {
         let scale = scale.max(1);
         let (width, height) = (depth.width() / scale, depth.height() / scale);
@@ -65,7 +64,7 @@ impl RowSums {
             sums.push(running);
             sums.extend(row.iter().map(|value| {
                 let value = u32::from(*value);
-                // Rows are too short for any of it to overflow; a test for that takes time.
+                // Rows are too short for an overflow, and checking for one takes time.
                 running.count = running.count.wrapping_add(u32::from(value != 0));
                 running.sum = running.sum.wrapping_add(value);
                 running.squares =
@@ -76,30 +75,29 @@ impl RowSums {
         Self { width, height, scale, values, sums }
     }
 
-    /// Reduced columns.
+    /// Returns the number of reduced columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Reduced rows.
+    /// Returns the number of reduced rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Pixels of the depth image per reduced pixel, along each axis.
+    /// Returns the number of pixels of the depth image per reduced pixel, along each axis.
     pub fn scale(&self) -> usize {
         self.scale
     }
 
-    /// The value at a reduced pixel: `None` outside, `Some(0)` where there is
-    /// no reading.
+    /// Returns the value at a reduced pixel: `None` outside, `Some(0)` without a reading.
     #[inline]
     pub fn value(&self, x: i64, y: i64) -> Option<u16> {
         let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
         (x < self.width && y < self.height).then(|| self.values[y * self.width + x])
     }
 
-    /// The values of row `y`; 0 is no reading.
+    /// Returns the values of row `y`; 0 is no reading.
     ///
     /// # Panics
     /// If `y` is not below the height.
@@ -108,14 +106,13 @@ impl RowSums {
         &self.values[y * self.width..(y + 1) * self.width]
     }
 
-    /// Depth in metres at a reduced pixel; `None` outside and where there is
-    /// no reading.
+    /// Returns the depth at a reduced pixel, m; `None` outside and without a reading.
     #[inline]
     pub fn depth_m(&self, x: i64, y: i64) -> Option<f64> {
         self.value(x, y).filter(|v| *v > 0).map(|v| Self::UNITS / f64::from(v))
     }
 
-    /// Sums over the pixels `from..to` of row `y`.
+    /// Returns the sums over the pixels `from..to` of row `y`.
     ///
     /// # Panics
     /// If the run is not inside the row.
@@ -128,23 +125,24 @@ impl RowSums {
     }
 }
 
-/// Fills what is still empty in a reduced row from one row of its blocks.
+/// Fills the empty pixels of a reduced row from one row of its blocks.
 fn fill_row(row: &mut [u16], depth: &[f32], scale: usize) {
     let nearest = RowSums::MIN_DEPTH_M as f32;
     for column in 0..scale {
         for (out, block) in row.iter_mut().zip(depth.chunks_exact(scale)) {
             let z = block[column];
             let value = whole(RowSums::UNITS as f32 / z.max(nearest) + 0.5);
+            // No branches: the loop becomes vector instructions.
             let is_wanted = (*out == 0) & (z >= nearest);
             *out = if is_wanted { value } else { *out };
         }
     }
 }
 
-/// The whole part of a number from 0 to below 2^16. A cast, which looks for what does
-/// not fit, is no vector instruction.
+/// Returns the integer part of a number from 0 to below 2^16. A saturating cast would keep the loop
+/// from becoming vector instructions.
 fn whole(number: f32) -> u16 {
-    // From this power of two on, the last bits of a number are a whole number as it is.
+    // From this power of two on, the last bits of the float are the integer itself.
     const WHOLE: f32 = 8_388_608.0;
     let near = number + WHOLE - WHOLE;
     let below = if near > number { near - 1.0 } else { near };

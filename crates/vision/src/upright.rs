@@ -1,18 +1,18 @@
 use nalgebra::{Point2, Point3, Vector2};
 use tagalong_core::{Camera, DepthImage, GreyImage};
 
-/// An upright plane through a person's head, across the line of sight, as an image
-/// shows it: the whole of somebody, always at the same scale and from the floor up.
+/// Upright plane through a person's head, perpendicular to the line of sight, sampled from an
+/// image: the whole body, always at the same scale and from the floor up.
 ///
-/// Which pixel is where follows from the camera's pose, so coats hang from poles here,
-/// plants grow out of pots, and people have legs, however near or far they are.
+/// The pixel of each cell follows from the camera's pose, so that the stand of a coat, the pot of a
+/// plant and the legs of a person are at the same cells at any distance.
 #[derive(Clone, Debug)]
 pub struct Upright {
-    /// The left and the right end of each row.
+    /// Left and right end of each row.
     rows: [[End; 2]; Self::ROWS],
 }
 
-/// An end of a row: the pixel, and how far it is along the optical axis, m.
+/// End of a row: its pixel and its depth along the optical axis, m.
 #[derive(Clone, Copy, Debug)]
 struct End {
     pixel: Point2<f64>,
@@ -21,26 +21,26 @@ struct End {
 
 /// Intensities on the plane.
 pub struct UprightGrey {
-    /// Row by row from the top, from left to right. Cells outside the image continue its
-    /// border.
+    /// Intensities, row by row from the top, from left to right. Cells outside the image continue
+    /// its border.
     pub grey: [f32; Upright::CELLS],
-    /// Whether the image shows the cell.
+    /// True for each cell that lies inside the image.
     pub is_seen: [bool; Upright::CELLS],
 }
 
 impl Upright {
-    /// Rows of cells, from [`Self::TOP_M`] down to the floor, ...
+    /// Number of rows of cells, from [`Self::TOP_M`] down to the floor.
     pub const ROWS: usize = 80;
-    /// ... and columns; the head is in the middle.
+    /// Number of columns; the head is in the middle.
     pub const COLUMNS: usize = 36;
-    /// Cells of the plane.
+    /// Number of cells.
     pub const CELLS: usize = Self::ROWS * Self::COLUMNS;
-    /// From cell to cell, m.
+    /// Distance between cells, m.
     pub const STEP_M: f64 = 0.025;
     /// Height of the first row above the floor, m.
     pub const TOP_M: f64 = 2.0;
 
-    /// The plane through a head in the robot frame; `None` if part of it is behind the
+    /// Creates the plane through a head in the robot frame; `None` if part of it is behind the
     /// camera.
     pub fn new(camera: &Camera, head: &Point3<f64>) -> Option<Self> {
         let eye = camera.robot_from_camera.translation.vector.xy();
@@ -61,7 +61,7 @@ impl Upright {
         Some(Self { rows })
     }
 
-    /// The intensities; `None` in an image without pixels.
+    /// Samples the intensities; `None` in an image without pixels.
     pub fn grey(&self, image: &GreyImage) -> Option<UprightGrey> {
         let (width, height) = (image.width(), image.height());
         if width == 0 || height == 0 {
@@ -81,8 +81,8 @@ impl Upright {
         Some(out)
     }
 
-    /// How far what is seen in every n-th cell of every n-th row is behind the plane, along
-    /// the optical axis, m; `None` where the depth is not known.
+    /// Yields the depth of the image minus that of the plane, at every n-th cell of every n-th row,
+    /// along the optical axis, m; `None` without a depth reading.
     pub fn behind_m<'a>(
         &'a self,
         depth: &'a DepthImage,
@@ -111,8 +111,7 @@ impl Upright {
     }
 }
 
-/// A row of the plane. A straight line of the plane is one of the image, nearly evenly
-/// spaced.
+/// Row of the plane. A straight line of the plane is one of the image, nearly evenly spaced.
 #[derive(Clone, Copy)]
 struct Line {
     from: End,
@@ -123,6 +122,7 @@ struct Line {
 impl Line {
     fn at(&self, column: usize) -> End {
         let steps = column as f64;
+        // The plane is perpendicular to the line of sight, so that depth hardly varies along a row.
         End {
             pixel: self.from.pixel + self.pixel_step * steps,
             ahead_m: self.from.ahead_m + self.ahead_step_m * steps,
@@ -130,10 +130,10 @@ impl Line {
     }
 }
 
-/// The nearest of so many pixels, and whether that is where the place is.
+/// Returns the nearest of `size` pixels, and true if the position lies inside the image.
 fn nearest(place: f64, size: usize) -> (usize, bool) {
     let is_inside = place >= -0.5 && place < size as f64 - 0.5;
-    // What is positive is rounded by cutting it off.
+    // The cast truncates, which rounds a positive number down.
     let number = ((place + 0.5) as i32).max(0) as usize;
     (number.min(size.saturating_sub(1)), is_inside)
 }
@@ -150,7 +150,7 @@ mod tests {
         Camera::mounted(lens, 320, 320, 1.2, 0.0, 0.0)
     }
 
-    /// What the image shows beside each other on the plane, 3 m away.
+    /// A cell shows the intensity of its position on the plane, 3 m away.
     #[test]
     fn a_cell_has_the_intensity_of_its_place() {
         let image = GreyImage::from_fn(320, 320, |x, y| (x / 4 + y / 2) as u8);

@@ -1,6 +1,6 @@
-//! A verifier that trusts people by the contrast of their picture: a person has
-//! some, a blank wall has none. Beside it stand an associator and a track manager, the two
-//! kinds that decide which tracks there are.
+//! A verifier that judges people by the contrast of their image: a person has some, a blank wall
+//! has none. Beside it stand an associator and a track manager, the two kinds of plugin that decide
+//! which tracks there are.
 
 pub mod nearest;
 pub mod patient;
@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Detection, Frame, Input, Inputs, Registry, Result, Verifier};
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "own-contrast";
 
 /// Registers the plugins.
@@ -28,8 +28,8 @@ pub fn register(registry: &mut Registry) {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Standard deviation of the grey values at which person and no person are
-    /// equally likely.
+    /// Standard deviation of the grey values at which a person and no person
+    /// are equally likely.
     pub even_contrast: f64,
 }
 
@@ -39,7 +39,7 @@ impl Default for Config {
     }
 }
 
-/// Log-odds by the contrast inside of the region.
+/// Verifier by the contrast inside of the region.
 pub struct OwnContrast {
     config: Config,
 }
@@ -54,6 +54,7 @@ impl Verifier for OwnContrast {
         let inside = candidate.region.clipped(grey.width(), grey.height());
         let (left, right) = (inside.x as usize, inside.right() as usize);
         let (top, bottom) = (inside.y as usize, inside.bottom() as usize);
+        // A region outside of the image is no evidence.
         if right <= left || bottom <= top {
             return Ok(0.0);
         }
@@ -61,6 +62,7 @@ impl Verifier for OwnContrast {
         let count = ((right - left) * (bottom - top)) as f64;
         let mean = values().sum::<f64>() / count;
         let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+        // One image must not decide alone; the clamp also bounds the logarithm of zero contrast.
         Ok((variance.sqrt() / self.config.even_contrast).ln().clamp(-3.0, 3.0))
     }
 }

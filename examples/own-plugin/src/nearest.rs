@@ -1,4 +1,4 @@
-//! An associator: the nearest pair first, then the nearest of what is left.
+//! An associator: the nearest pair first, then the nearest of the remaining ones.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ impl Default for Config {
     }
 }
 
-/// The associator.
+/// Associator by distance.
 pub struct OwnNearest(pub Config);
 
 fn distance(track: &Track, detection: &Detection) -> f64 {
@@ -37,6 +37,7 @@ impl Associator for OwnNearest {
             let near = found.iter().enumerate().filter(|(_, detection)| fits(detection));
             pairs.extend(near.map(|(column, d)| (distance(track, d), row, column)));
         }
+        // Ties are broken by index: the same input has to give the same answer.
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         let mut given = vec![None; tracks.len()];
         for (_, row, column) in pairs {

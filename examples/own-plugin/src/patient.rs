@@ -10,7 +10,7 @@ use tagalong_core::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// A track ends when it was not seen for longer, s.
+    /// A track ends when it was not seen for longer than this, s.
     pub patience_s: f64,
 }
 
@@ -20,7 +20,7 @@ impl Default for Config {
     }
 }
 
-/// The track manager.
+/// Track manager with one rule.
 pub struct OwnPatient(pub Config);
 
 impl TrackManager for OwnPatient {

@@ -1,4 +1,4 @@
-//! The plugin keeps the promises of its kind.
+//! The plugins pass the checks of their kinds.
 
 #[test]
 fn it_conforms() {
@@ -8,7 +8,7 @@ fn it_conforms() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// The configs beside them are right, and mean these plugins.
+/// The configs beside them are valid, and select these plugins.
 #[test]
 fn the_program_knows_them() {
     let program = env!("CARGO_BIN_EXE_own-plugin");

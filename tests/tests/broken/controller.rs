@@ -7,7 +7,7 @@ pub fn register(registry: &mut Registry, name: &'static str) {
     register_with_fault!(registry, controller, name, plugin);
 }
 
-/// Drives and turns in proportion to distance and bearing.
+/// Controller with speeds in proportion to distance and bearing.
 struct Proportional {
     fault: &'static str,
     mood: f64,

@@ -11,14 +11,14 @@ pub fn register(registry: &mut Registry, name: &'static str) {
     register_with_fault!(registry, detector, name, plugin);
 }
 
-/// Takes every lump of points at head height and before the wall for a head.
+/// Detector that takes every cluster of points at head height and before the wall for a head.
 struct Heads {
     fault: &'static str,
     mood: f64,
     remembered: Vec<Point3<f64>>,
 }
 
-/// Points at the height of the drawn heads, in the robot frame.
+/// Returns the points at the height of the simulated heads, in the robot frame.
 fn points(frame: &Frame) -> Result<Vec<Point3<f64>>> {
     let depth = frame.depth()?;
     let mut points = Vec::new();
@@ -34,7 +34,7 @@ fn points(frame: &Frame) -> Result<Vec<Point3<f64>>> {
     Ok(points)
 }
 
-/// Means of lumps of more than 50 points.
+/// Returns the means of clusters of more than 50 points, moved to the centre of the head.
 fn heads(frame: &Frame) -> Result<Vec<Point3<f64>>> {
     let mut lumps: Vec<(Vector3<f64>, f64)> = Vec::new();
     for point in points(frame)? {
@@ -48,6 +48,7 @@ fn heads(frame: &Frame) -> Result<Vec<Point3<f64>>> {
         }
     }
     let eye = frame.camera.robot_from_camera.translation.vector;
+    // The points lie on the visible side of the head, on average 0.6 radii before its centre.
     let deeper = |mean: Vector3<f64>| mean + (mean - eye).normalize() * (0.6 * HEAD_RADIUS_M);
     let large = lumps.into_iter().filter(|(_, n)| *n > 50.0);
     Ok(large.map(|(sum, n)| deeper(sum / n).into()).collect())

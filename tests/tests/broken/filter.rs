@@ -63,6 +63,7 @@ impl PersonFilter for Kalman {
         let gain = *covariance * h.transpose() * s.try_inverse().unwrap_or_default();
         *mean += gain * (seen.position.coords - h * *mean);
         let kept = Covariance::identity() - gain * h;
+        // Joseph's form stays positive definite under rounding.
         let updated =
             kept * *covariance * kept.transpose() + gain * seen.covariance * gain.transpose();
         *covariance = 0.5 * (updated + updated.transpose());
@@ -82,7 +83,7 @@ impl PersonFilter for Kalman {
     }
 }
 
-/// The faults that concern more than one person.
+/// Filter with the faults that concern more than one person.
 struct Faulty {
     fault: &'static str,
     inner: PerPerson<Kalman>,

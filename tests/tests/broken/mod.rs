@@ -1,5 +1,5 @@
-//! A healthy little plugin of each kind, and copies of it with one fault each.
-//! The fault is chosen by the name under which the plugin is registered.
+//! A small healthy plugin of each kind, and copies of it with one fault each. The fault is chosen
+//! by the name under which the plugin is registered.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,7 +11,7 @@ pub mod detector;
 pub mod filter;
 pub mod verifier;
 
-/// Settings as they should be.
+/// Valid settings.
 #[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Healthy {
@@ -19,7 +19,7 @@ pub struct Healthy {
     gain: f64,
 }
 
-/// Prints a key that it does not read.
+/// Settings that print a key that they do not read.
 #[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Renamed {
@@ -28,7 +28,7 @@ pub struct Renamed {
     gain: f64,
 }
 
-/// Swallows keys that it does not know.
+/// Settings that accept unknown keys.
 #[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Tolerant {
@@ -42,15 +42,13 @@ pub struct Undocumented {
     gain: f64,
 }
 
-/// A number that is another one with every plugin built: the fault `moody`
-/// makes output depend on it.
+/// Returns another number for every plugin built: the fault `moody` makes output depend on it.
 pub fn mood() -> f64 {
     static BUILT: AtomicU32 = AtomicU32::new(1);
     f64::from(BUILT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// Registers `plugin` under `name`, with the general fault of that name if
-/// there is one.
+/// Registers `plugin` under `name`, with the general fault of that name if there is one.
 macro_rules! register_with_fault {
     ($registry:expr, $kind:ident, $name:expr, $plugin:expr) => {{
         use tagalong_core::Error;

@@ -7,7 +7,7 @@ pub fn register(registry: &mut Registry, name: &'static str) {
     register_with_fault!(registry, verifier, name, plugin);
 }
 
-/// Believes in dark things.
+/// Verifier with higher log-odds for darker regions.
 struct Brightness {
     fault: &'static str,
     mood: f64,

@@ -1,4 +1,4 @@
-//! A detector of people in a laser scan: two segments side by side that are as wide as legs.
+//! Detector of people in a laser scan: two segments side by side that are as wide as legs.
 
 use nalgebra::{Matrix3, Point2, Point3};
 use schemars::JsonSchema;
@@ -12,7 +12,7 @@ use tagalong_core::{
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Rays whose points are farther apart end a segment, m.
+    /// Distance between the points of neighbouring rays that ends a segment, m.
     jump_m: f64,
     /// Width of a leg, m.
     leg_m: [f64; 2],
@@ -26,7 +26,7 @@ impl Default for Config {
     }
 }
 
-/// Pairs of segments that are as wide as legs.
+/// Detector of pairs of segments that are as wide as legs.
 pub struct Legs(pub Config);
 
 impl Legs {
@@ -57,7 +57,7 @@ impl Detector for Legs {
             legs.windows(2).filter(|pair| (least..most).contains(&(pair[0] - pair[1]).norm()));
         let detection = |pair: &[Point2<f64>]| {
             let at = nalgebra::center(&pair[0], &pair[1]);
-            // Legs do not tell how tall somebody is.
+            // Legs contain no information on a person's height.
             let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 1e3].into());
             let position = Point3::new(at.x, at.y, 1.6);
             Detection { region: Rect::default(), position, covariance, score: 1.5, source: "legs" }

@@ -1,6 +1,6 @@
-//! A detector without an image: people by their legs in a laser scan, in fifty lines
-//! (`legs.rs`), and the `tagalong` command with it. A log that has scans and no images makes a
-//! frame of each scan.
+//! A detector without an image: people by their legs in a laser scan, in fifty lines (`legs.rs`),
+//! and the `tagalong` command with it. A log that has scans and no images makes a frame of each
+//! scan.
 //!
 //! ```text
 //! cargo run --release -p tagalong-cli --example laser_legs -- \

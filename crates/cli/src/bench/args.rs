@@ -5,7 +5,7 @@ use clap::{Args, Subcommand};
 pub use super::rooms::RoomsArgs;
 use crate::args::Format;
 
-/// The arguments of `tagalong bench`.
+/// Arguments of `tagalong bench`.
 #[derive(Args, Debug)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct BenchArgs {
@@ -22,10 +22,10 @@ pub struct BenchArgs {
     pub folder: FolderArgs,
 }
 
-/// The steps.
+/// Steps of a benchmark.
 #[derive(Debug, Subcommand)]
 pub enum Step {
-    /// Lists the tasks, one JSON object a line
+    /// Lists the tasks, one JSON object per line
     #[command(after_help = "Example:\n  tagalong bench plan --logs-dir logs -o bench")]
     Plan {
         #[command(flatten)]
@@ -42,7 +42,7 @@ pub enum Step {
         #[command(flatten)]
         folder: FolderArgs,
     },
-    /// Makes report.html, report.json and report.csv of the results
+    /// Makes report.html, report.json and report.csv from the results
     #[command(after_help = "Example:\n  tagalong bench report -o bench --baseline old.json \
                             --fail-if 'HOTA<-0.01' --fail-if 'IDSW>0'")]
     Report {
@@ -51,13 +51,13 @@ pub enum Step {
         #[command(flatten)]
         folder: FolderArgs,
     },
-    /// Chooses settings by all rooms but one, and scores them in that one
+    /// Fits settings on all rooms but one, and scores them in that one
     #[command(long_flag = "leave-one-room-out", after_help = super::rooms::HELP)]
     Rooms(RoomsArgs),
     /// Writes the results as the folder tree that TrackEval scores
     #[command(after_help = "Example:\n  tagalong bench export -o bench --trackeval tree")]
     Export {
-        /// Where the tree goes.
+        /// Folder for the tree.
         #[arg(long, value_name = "DIR")]
         trackeval: PathBuf,
         #[command(flatten)]
@@ -65,7 +65,7 @@ pub enum Step {
     },
 }
 
-/// Where a benchmark lives.
+/// Folder of a benchmark.
 #[derive(Args, Clone, Debug)]
 pub struct FolderArgs {
     /// The folder of the benchmark: plan.jsonl, results, report.
@@ -73,14 +73,14 @@ pub struct FolderArgs {
     pub output: PathBuf,
 }
 
-/// What is compared.
+/// Compared pipelines and logs.
 #[derive(Args, Clone, Debug)]
 pub struct PlanArgs {
-    /// The pipelines [default: every config in configs that a log suits].
+    /// The pipelines [default: every config in configs that suits a log].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
-    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl,
-    /// NAME.boxes.csv, or in it.
+    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv, or in
+    /// it.
     #[arg(long, num_args = 1.., value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// Every log with truth in this folder.
@@ -92,7 +92,7 @@ pub struct PlanArgs {
     pub seeds: u64,
 }
 
-/// How tasks are run.
+/// Execution of the tasks.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
     /// Tasks that run at once; the results are the same.
@@ -105,22 +105,22 @@ pub struct RunArgs {
     /// Run tasks again that failed before.
     #[arg(long)]
     pub retry_failed: bool,
-    /// Measure times, one task at a time: the machine has nothing else to do.
+    /// Measure times, one task at a time, on an otherwise idle machine.
     #[arg(long)]
     pub timing: bool,
 }
 
-/// What is said of the results.
+/// Content of the report.
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
     #[command(flatten)]
     pub gate: GateArgs,
-    /// How to print; JSON is what is in report.json.
+    /// Output format; JSON is the text of report.json.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
 
-/// When a benchmark is worse than it was.
+/// Conditions under which a benchmark counts as worse than its baseline.
 #[derive(Args, Clone, Debug)]
 pub struct GateArgs {
     /// An earlier report.json to compare with.
@@ -133,7 +133,7 @@ pub struct GateArgs {
 }
 
 impl BenchArgs {
-    /// All steps, one seed, without a gate.
+    /// Returns the arguments for all steps, with one seed and without a gate.
     pub fn of(configs: Vec<PathBuf>, logs: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             step: None,

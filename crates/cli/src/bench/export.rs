@@ -10,11 +10,11 @@ use tagalong_eval::{Frame, Sequence};
 use super::store::{Recording, Store, put};
 use crate::outcome::Failure;
 
-/// The name of the benchmark in the tree.
+/// Name of the benchmark in the tree.
 const BENCHMARK: &str = "Tagalong";
 
-/// Writes the tree: a tracker is a pipeline with a seed. Returns how many
-/// trackers and sequences it has.
+/// Writes the tree, in which a tracker is a pipeline with a seed. Returns the numbers of trackers
+/// and sequences.
 ///
 /// # Errors
 /// If there is no result with boxes, or the disk fails.
@@ -43,6 +43,7 @@ fn trackers(store: &Store) -> Result<BTreeMap<String, Recordings>, Failure> {
         let Some(recording) = store.result(&task.hash).and_then(|stored| stored.recording) else {
             continue;
         };
+        // TrackEval has no seeds: each one becomes a tracker.
         let name = format!("{}-seed{}", task.pipeline, task.seed);
         trackers.entry(name).or_default().push(entry(&task.log_name, recording));
     }
@@ -59,7 +60,7 @@ fn entry(name: &str, recording: Recording) -> (SequenceInfo, Sequence) {
     (SequenceInfo { name: name.to_owned(), rate_hz, length, width, height }, sequence)
 }
 
-/// TrackEval compares boxes.
+/// Removes entries without a box: TrackEval compares boxes alone.
 fn boxes_only(frame: &mut Frame) {
     frame.truths.retain(|truth| truth.region.is_some());
     frame.reports.retain(|report| report.region.is_some());

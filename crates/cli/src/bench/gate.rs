@@ -1,4 +1,4 @@
-//! Is it worse than it was?
+//! Comparison with an earlier benchmark.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,13 +13,13 @@ use super::args::GateArgs;
 use crate::outcome::Failure;
 use crate::scoring::read_text;
 
-/// A change of a figure that is not accepted.
+/// Change of a figure that is not accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     text: String,
     on_floor: bool,
     figure: String,
-    /// Changes below the bound are not accepted; otherwise those above it.
+    /// True if changes below the bound are not accepted; otherwise those above it.
     below: bool,
     bound: f64,
 }
@@ -28,7 +28,7 @@ impl Rule {
     /// Reads a rule such as `HOTA<-0.01` or `metres.IDSW>0`.
     ///
     /// # Errors
-    /// What is wrong with it, and what would be right.
+    /// The mistake, with a correct example.
     pub fn parse(text: &str) -> Result<Self, Failure> {
         let wrong = |why: String| Failure::usage(format!("--fail-if {text}: {why}"));
         let Some(at) = text.find(['<', '>']) else {
@@ -40,6 +40,7 @@ impl Rule {
             Some(("image", figure)) => (false, figure),
             _ => (false, name),
         };
+        // A default result has every figure, so it lists the valid names.
         let known = figures(&Scores::default());
         if !known.contains_key(figure) {
             let hint = nearest(figure, known.keys().map(String::as_str));
@@ -54,7 +55,7 @@ impl Rule {
         Ok(Self { text: text.to_owned(), on_floor, figure: figure.to_owned(), below, bound })
     }
 
-    /// What is worse in a task, if anything.
+    /// Returns the deterioration of a task, if there is one.
     fn judge(&self, old: &TaskResult, new: &TaskResult) -> Option<String> {
         let value = |task: &TaskResult| {
             let scores = if self.on_floor { task.metres } else { task.image };
@@ -62,6 +63,7 @@ impl Rule {
         };
         match (value(old), value(new)) {
             (None, _) => None,
+            // A figure that disappeared is a deterioration; one that never was cannot be judged.
             (Some(old), None) => Some(format!("{}: was {old:.4}, is not there", self.text)),
             (Some(old), Some(new)) => {
                 let change = new - old;
@@ -79,7 +81,7 @@ fn figures(scores: &Scores) -> Map<String, Value> {
     }
 }
 
-/// What the gate compares with.
+/// Baseline and rules of a comparison.
 pub struct Gate {
     baseline: Benchmark,
     rules: Vec<Rule>,
@@ -96,11 +98,12 @@ impl Gate {
         Ok(Some(Self { baseline: baseline(path)?, rules }))
     }
 
-    /// A table of what got worse, if anything did. Tasks are the same if
-    /// pipeline, log and seed have the same names.
+    /// Returns a table of the deteriorations, if there are any. Tasks are the same if pipeline, log
+    /// and seed have the same names.
     pub fn worse(&self, now: &Benchmark) -> Option<String> {
         let mut new: BTreeMap<_, _> = now.tasks.iter().map(|task| (key(task), task)).collect();
         let mut table = String::new();
+        // A task that failed in the baseline cannot get worse.
         for old in self.baseline.tasks.iter().filter(|task| task.outcome == Outcome::Done) {
             let (pipeline, log, seed) = key(old);
             for line in self.complaints(old, new.remove(&key(old))) {

@@ -1,10 +1,9 @@
-//! `tagalong bench`: pipelines x logs x seeds, in steps that can be taken
-//! apart.
+//! `tagalong bench`: pipelines x logs x seeds, in separate steps.
 //!
-//! A plan lists tasks, each with a hash of everything that its result depends
-//! on. A result is a file named by that hash, so that running again costs
-//! nothing, several processes or machines can share a folder, and a changed
-//! config never meets an old result. A report only reads results.
+//! A plan lists tasks, each with a hash of everything that its result depends on. A result is a
+//! file named by that hash, so that running again costs nothing, several processes or machines can
+//! share a folder, and a changed config is never paired with an old result. A report only reads
+//! results.
 
 mod args;
 mod export;
@@ -28,10 +27,10 @@ use work::Tally;
 use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 
-/// `tagalong bench`.
+/// Runs `tagalong bench`.
 ///
 /// # Errors
-/// What cannot be read or written; tasks that failed; a gate that closed.
+/// Files that cannot be read or written; tasks that failed; a gate that closed.
 pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
     match &args.step {
         None => everything(args, registry),
@@ -64,14 +63,16 @@ fn store(folder: &FolderArgs) -> Store {
     Store::new(&folder.output)
 }
 
-/// A failed task does not keep the others from being reported.
+/// Runs all steps. A failed task does not keep the others from being reported.
 fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
+    // The gate is read first: a wrong rule should not cost a whole benchmark.
     let gate = Gate::read(&args.report.gate)?;
     make_plan(&args.plan, &args.folder, registry)?;
     let tally = work::work(&args.run, &store(&args.folder), registry)?;
     if let Some(signal) = tally.signal {
         return Ok(Ended::BySignal(signal));
     }
+    // A single task has no complete set of results to report.
     if args.run.task.is_none() {
         make_report(&args.folder, args.report.format, gate.as_ref())?;
     }

@@ -1,4 +1,4 @@
-//! Small pictures of what went wrong.
+//! Small pictures of tracking errors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,13 +11,13 @@ use tagalong_report::EventRow;
 use super::store::Stored;
 use super::watch::importance;
 
-/// Pictures of one task.
+/// Most pictures of one task.
 const MOST: usize = 40;
 
-/// The longer side of a picture, pixels.
+/// Longer side of a picture, pixels.
 const SIDE: usize = 96;
 
-/// Which events of which task want a picture of a frame, and of what part.
+/// Requested pictures: the frame, the event and the part of the image.
 #[derive(Default)]
 pub struct Wanted {
     by_frame: BTreeMap<u64, Vec<Order>>,
@@ -30,7 +30,7 @@ struct Order {
 }
 
 impl Wanted {
-    /// The most important events of all tasks.
+    /// Requests the most important events of all tasks.
     pub fn of(stored: &[Stored]) -> Self {
         let mut wanted = Self::default();
         for (task, stored) in stored.iter().enumerate() {
@@ -47,7 +47,7 @@ impl Wanted {
         wanted
     }
 
-    /// The last frame that is wanted.
+    /// Returns the last requested frame.
     pub fn last(&self) -> Option<u64> {
         self.by_frame.last_key_value().map(|(frame, _)| *frame)
     }
@@ -61,15 +61,16 @@ impl Wanted {
     }
 }
 
-/// Indices of the events to show, in order.
+/// Returns the indices of the events to show, in order.
 fn chosen(events: &[EventRow]) -> BTreeSet<usize> {
     let mut all: Vec<usize> = (0..events.len()).collect();
+    // The last rank holds the ordinary events, which need no picture.
     all.retain(|index| importance(&events[*index].kind) < 3);
     all.sort_by_key(|index| (importance(&events[*index].kind), *index));
     all.into_iter().take(MOST).collect()
 }
 
-/// Around the person, else around the track.
+/// Returns the region around the person, or else around the track.
 fn part(event: &EventRow, frame: &Frame) -> Option<Rect> {
     let person = frame.truths.iter().find(|truth| Some(truth.id) == event.person);
     let track = frame.reports.iter().find(|report| Some(report.id) == event.track);
@@ -77,7 +78,7 @@ fn part(event: &EventRow, frame: &Frame) -> Option<Rect> {
     Some(Rect::new(region.x, region.y, region.width, region.height).inflated(1.0))
 }
 
-/// A part of the colour (or grey) image as PNG in base64.
+/// Returns a part of the colour (or grey) image as PNG in base64.
 fn picture(images: &Images, part: &Rect) -> Option<String> {
     let (width, height) = match (&images.colour, &images.grey) {
         (Some(colour), _) => (colour.width(), colour.height()),
@@ -88,6 +89,7 @@ fn picture(images: &Images, part: &Rect) -> Option<String> {
     if part.width < 1.0 || part.height < 1.0 {
         return None;
     }
+    // Only shrinks: enlarged pixels would add bytes but no detail.
     let shrink = (part.width.max(part.height) / SIDE as f64).max(1.0);
     let columns = ((part.width / shrink) as usize).max(1);
     let rows = ((part.height / shrink) as usize).max(1);
@@ -106,7 +108,7 @@ fn picture(images: &Images, part: &Rect) -> Option<String> {
     encode(&pixels, columns, rows)
 }
 
-/// The mean colour of a block of pixels.
+/// Returns the mean colour of a block of pixels.
 fn mean(images: &Images, xs: std::ops::Range<usize>, ys: std::ops::Range<usize>) -> [u8; 3] {
     let (mut sum, mut count) = ([0u32; 3], 0u32);
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {

@@ -1,4 +1,4 @@
-//! Which pipelines run on which logs, and what identifies each of these tasks.
+//! Tasks of a benchmark: pipelines on logs, each with an identifying hash.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,7 +16,7 @@ use crate::config_file::{ConfigFile, OuterSettings};
 use crate::outcome::{Failure, say};
 use crate::suggest::{self, check_log_path, toml_files};
 
-/// How files that a config names are called among the inputs.
+/// Prefix of the inputs that are files named by a config.
 const FILE: &str = "file ";
 
 /// One pipeline on one log with one seed.
@@ -28,70 +28,70 @@ pub struct Task {
     pub hash: String,
     /// Name of the pipeline.
     pub pipeline: String,
-    /// Its config.
+    /// Path of its config.
     pub config: PathBuf,
     /// Name of the log.
     pub log_name: String,
-    /// The log.
+    /// Path of the log.
     pub log: PathBuf,
-    /// Its truth.
+    /// Path of its truth.
     pub truth: PathBuf,
-    /// The boxes of the truth are whole bodies.
+    /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
-    /// The seed.
+    /// Seed of the run.
     pub seed: u64,
-    /// What went into the hash, by name.
+    /// Hashed inputs, by name.
     pub inputs: BTreeMap<String, String>,
-    /// The program that planned it.
+    /// Version of the program that planned it.
     pub version: String,
-    /// Why it cannot run, if it cannot.
+    /// Reason for which it cannot run, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skip: Option<String>,
 }
 
-/// A config that was read, and its inputs.
+/// Config that was read, and its inputs.
 pub struct Candidate {
     /// The config.
     pub file: ConfigFile,
-    /// Where it lies.
+    /// Path of the config.
     pub path: PathBuf,
     first_seed: u64,
     /// Its tables around the pipeline.
     pub outer: OuterSettings,
-    /// The inputs of its pipeline.
+    /// Inputs of its pipeline.
     pub inputs: Inputs,
     /// Its settings that may be fitted.
     pub tune: Vec<Tunable>,
 }
 
 impl Candidate {
-    /// Opens a log as this pipeline reads it.
+    /// Opens a log with this pipeline's settings.
     ///
     /// # Errors
-    /// A log that lacks what the pipeline needs, or that cannot be read.
+    /// A log that lacks an input that the pipeline needs, or that cannot be read.
     pub fn open(&self, log: &Path) -> Result<FrameSource, LogError> {
         FrameSource::open(log, &self.outer.input, &self.outer.limits, self.inputs)
     }
 
-    /// Returns how it reads logs: pipelines of which this is equal see the same frames.
+    /// Returns a key of its reading settings: pipelines with the same key see the same frames.
     pub fn reading(&self) -> String {
         format!("{:?}", (&self.outer.input, &self.outer.limits, self.inputs))
     }
 }
 
-/// A log and its truth.
+/// Log with its truth.
 pub struct Annotated {
-    /// The log.
+    /// Path of the log.
     pub log: PathBuf,
     /// Its name in tables.
     pub name: String,
-    /// Of the log.
+    /// Hash of the log.
     pub sha256: String,
-    /// Its truth.
+    /// Path of its truth.
     pub truth: PathBuf,
-    /// Of the truth.
+    /// Hash of the truth.
     pub truth_sha256: String,
-    /// The boxes of the truth are whole bodies.
+    /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
 }
 
@@ -110,6 +110,7 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
         let mut tried = BTreeMap::new();
         for config in &configs {
             let key = config.reading();
+            // Opening a log is slow, so the answer is shared by configs that read it the same way.
             let skip = match tried.get(&key) {
                 Some(known) => Option::clone(known),
                 None => tried.entry(key).or_insert(why_not(config, log)?).clone(),
@@ -128,10 +129,11 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
 /// Reads the config of a task again.
 ///
 /// # Errors
-/// If it, or its truth, is not what it was when the task was planned.
+/// If it, or its truth, changed since the task was planned.
 pub fn reread(task: &Task, registry: &Registry) -> Result<Candidate, Failure> {
     let candidate = candidate(&task.config, registry)?;
     let mut now = task.inputs.clone();
+    // The file list is built anew: the config may name other files now.
     now.retain(|name, _| !name.starts_with(FILE));
     now.insert("config".into(), config_hash(&candidate, task.seed, registry)?);
     now.insert("truth".into(), sha256_of_file(&task.truth)?);
@@ -147,7 +149,7 @@ fn files(candidate: &Candidate) -> Result<BTreeMap<String, String>, Failure> {
     file_hashes(&candidate.file)
 }
 
-/// Hashes the files that a config names, such as models.
+/// Returns the hashes of the files that a config names, such as models.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -156,8 +158,8 @@ pub fn file_hashes(config: &ConfigFile) -> Result<BTreeMap<String, String>, Fail
     named.map(|(name, path)| Ok((format!("{FILE}{name}"), sha256_of_file(&path)?))).collect()
 }
 
-/// The version of this very program: plugins may differ while the number does
-/// not, so its bytes belong to it.
+/// Returns the version of this very program: plugins may differ while the number does not, so a
+/// hash of its bytes belongs to it.
 ///
 /// # Errors
 /// If the program cannot read itself.
@@ -180,6 +182,7 @@ fn task(
         ("truth".to_owned(), log.truth_sha256.clone()),
     ]);
     inputs.extend(files(config)?);
+    // The hash names the result, so it covers the program and the seed as well.
     let everything = format!("{version}\n{seed}\n{}\n{inputs:?}", log.whole_bodies);
     Ok(Task {
         k: 0,
@@ -197,14 +200,14 @@ fn task(
     })
 }
 
-/// Comments and order do not matter, defaults that changed do.
+/// Returns the hash of the resolved config: comments and order do not matter, changed defaults do.
 fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<String, Failure> {
     let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
     let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved());
     Ok(sha256(text.as_bytes()))
 }
 
-/// Says why the config cannot run on the log, if it cannot.
+/// Returns the reason for which the config cannot run on the log, if there is one.
 ///
 /// # Errors
 /// A log that cannot be read at all.
@@ -213,6 +216,8 @@ pub fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Fa
         Ok(_) => Ok(None),
         Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
             let text = error.to_string();
+            // The first line names the problem, the others give advice; the folder must not reach
+            // the report.
             let first = text.lines().next().unwrap_or_default();
             Ok(Some(first.replace(&log.log.display().to_string(), &log.name)))
         }
@@ -236,6 +241,7 @@ pub fn shipped(registry: &Registry) -> Result<Vec<Candidate>, Failure> {
     for path in toml_files(Path::new("configs")) {
         match candidate(&path, registry) {
             Ok(candidate) => found.push(candidate),
+            // A broken config of the folder should not keep the others from running.
             Err(why) => say(&format!("note: left out: {}", why.message)),
         }
     }
@@ -248,7 +254,7 @@ pub fn shipped(registry: &Registry) -> Result<Vec<Candidate>, Failure> {
 /// Reads a config.
 ///
 /// # Errors
-/// What is wrong with it.
+/// Any mistake in it.
 pub fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
     let file = ConfigFile::read(path)?;
     let (pipeline, settings) = file.pipeline(registry, None)?;
@@ -297,9 +303,10 @@ pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
     })
 }
 
-/// The log with its truth, if it has any.
+/// Returns the log with its truth, if it has any.
 fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
     let beside = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
+    // Files beside the log take precedence, so that they can replace the log's own truth.
     let people = beside("people.csv").or_else(|| beside("truth.jsonl"));
     let (truth, whole_bodies) = match (people, beside("boxes.csv")) {
         (Some(people), _) => (people, false),
@@ -317,10 +324,10 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
     }))
 }
 
-/// Refuses a name that stands for two things: names stand in tables.
+/// Refuses a name that is used twice: names identify rows of tables.
 ///
 /// # Errors
-/// The name.
+/// The repeated name.
 pub fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Failure> {
     let mut seen = std::collections::BTreeSet::new();
     for name in names {
@@ -331,18 +338,19 @@ pub fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Fai
     Ok(())
 }
 
-/// SHA-256 in hexadecimal.
+/// Returns the SHA-256 in hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 of a file's bytes.
+/// Returns the SHA-256 of a file's bytes.
 ///
 /// # Errors
 /// A file that cannot be read.
 pub fn sha256_of_file(path: &Path) -> Result<String, Failure> {
     let failed = |error| Failure::failed(format!("cannot read {}: {error}", path.display()));
     let mut file = File::open(path).map_err(failed)?;
+    // Read in blocks: a log may be larger than the memory.
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {
         match file.read(&mut buffer).map_err(failed)? {

@@ -1,4 +1,4 @@
-//! From results to a report.
+//! Report of a benchmark from its results.
 
 use std::fmt::Write as _;
 
@@ -45,19 +45,20 @@ fn result(store: &Store, task: &Task) -> Option<TaskResult> {
     }
 }
 
-/// The times, if those of all tasks were taken, on one machine.
+/// Returns the times, if those of all tasks were taken.
 fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
     let done = benchmark.tasks.iter().filter(|task| task.outcome == Outcome::Done);
     let all: Option<Vec<(String, StoredTiming)>> =
         done.map(|task| Some((task.hash.clone(), store.timing(&task.hash)?))).collect();
     let all = all?;
     let machine = all.first()?.1.machine.clone();
+    // Times of several machines cannot be compared, which the report has to say.
     let exclusive = all.iter().all(|(_, timing)| timing.machine == machine);
     let tasks = all.into_iter().map(|(hash, stored)| (hash, stored.timing)).collect();
     Some(Timings { exclusive, machine, tasks })
 }
 
-/// Writes the files of the report; the JSON of report.json.
+/// Writes the files of the report; returns the JSON of report.json.
 ///
 /// # Errors
 /// A disk that fails.
@@ -74,7 +75,7 @@ pub fn write(store: &Store, benchmark: &Benchmark) -> Result<String, Failure> {
     Ok(json)
 }
 
-/// The main figures, for a person at the terminal.
+/// Returns the main figures, for a terminal.
 pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     let name_width = |name: fn(&TaskResult) -> &str| {
         benchmark.tasks.iter().map(|task| name(task).len()).max().unwrap_or(0).max(8)

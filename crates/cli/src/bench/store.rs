@@ -1,4 +1,4 @@
-//! What lies in the folder of a benchmark, and how it gets there.
+//! Files in the folder of a benchmark.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use tagalong_report::{TaskResult, TaskTiming};
 use super::plan::Task;
 use crate::outcome::{Failure, make_room_for};
 
-/// The folder of a benchmark.
+/// Folder of a benchmark.
 #[derive(Clone, Debug)]
 pub struct Store {
     folder: PathBuf,
@@ -20,13 +20,13 @@ pub struct Store {
 /// One result file.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Stored {
-    /// What the report shows.
+    /// Content for the report.
     pub result: TaskResult,
-    /// What was scored, for other evaluators; absent if the task failed.
+    /// Scored sequence, for other evaluators; absent if the task failed.
     pub recording: Option<Recording>,
 }
 
-/// A scored sequence, and what the formats want to know beside it.
+/// Scored sequence, with the facts that the formats need beside it.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Recording {
     /// Truth and reports of all frames.
@@ -42,19 +42,19 @@ pub struct Recording {
 /// One file of times.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct StoredTiming {
-    /// The machine.
+    /// Description of the machine.
     pub machine: String,
     /// Its times.
     pub timing: TaskTiming,
 }
 
 impl Store {
-    /// The folder, which need not exist yet.
+    /// Returns the store of a folder, which need not exist yet.
     pub fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned() }
     }
 
-    /// A file of the benchmark.
+    /// Returns the path of a file of the benchmark.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
@@ -67,7 +67,7 @@ impl Store {
         put(&self.path(name), bytes)
     }
 
-    /// The plan.
+    /// Returns the plan.
     ///
     /// # Errors
     /// If there is none, or it is damaged.
@@ -85,17 +85,17 @@ impl Store {
         text.lines().enumerate().map(line).collect()
     }
 
-    /// The result of a task, if it is there and whole.
+    /// Returns the result of a task, if it exists and is whole.
     pub fn result(&self, hash: &str) -> Option<Stored> {
         self.get(&result_name(hash))
     }
 
-    /// True if there is a result.
+    /// Returns true if there is a result.
     pub fn has_result(&self, hash: &str) -> bool {
         self.path(&result_name(hash)).is_file()
     }
 
-    /// Keeps a result.
+    /// Stores a result.
     ///
     /// # Errors
     /// A disk that fails.
@@ -104,12 +104,12 @@ impl Store {
         self.put(&result_name(hash), &json)
     }
 
-    /// The times of a task, if they were taken.
+    /// Returns the times of a task, if they were taken.
     pub fn timing(&self, hash: &str) -> Option<StoredTiming> {
         self.get(&timing_name(hash))
     }
 
-    /// Keeps times.
+    /// Stores times.
     ///
     /// # Errors
     /// A disk that fails.
@@ -118,8 +118,9 @@ impl Store {
         self.put(&timing_name(hash), &json)
     }
 
-    /// A file of the benchmark as JSON, if it is there and whole.
+    /// Returns a file of the benchmark as JSON, if it exists and is whole.
     pub fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
+        // A damaged file counts as missing.
         serde_json::from_slice(&fs::read(self.path(name)).ok()?).ok()
     }
 }
@@ -132,8 +133,8 @@ fn timing_name(hash: &str) -> String {
     format!("timings/{hash}.json")
 }
 
-/// Writes under a name of this process and renames: several processes may
-/// write the same result, and all of them are right.
+/// Writes under a name of this process and renames: several processes may write the same result,
+/// and all of them are right.
 ///
 /// # Errors
 /// A disk that fails.

@@ -1,4 +1,4 @@
-//! What one pipeline said about the frames of one log.
+//! Reports of one pipeline on the frames of one log.
 
 use std::collections::BTreeMap;
 
@@ -18,10 +18,10 @@ use crate::scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comp
 /// Confidence of the bounds on the normalised innovation squared.
 const CONFIDENCE: f64 = 0.95;
 
-/// The name under which the time of a whole frame is kept.
+/// Name under which the time of a whole frame is kept.
 const WHOLE_FRAME: &str = "frame";
 
-/// Gathers what a pipeline says, frame by frame.
+/// Collector of a pipeline's reports, frame by frame.
 #[derive(Default)]
 pub struct Watch {
     reports: Reports,
@@ -34,16 +34,18 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Takes in what was said of a frame.
+    /// Adds the report of a frame.
     pub fn take(&mut self, item: &LogFrame, report: &FrameReport) {
         self.funnel.merge(&report.funnel);
         self.nis.extend(report.nis.iter().map(|(_, nis, freedom)| (*nis, *freedom)));
         self.time(report);
+        // A duplicate or late frame has no tracks of its own to score.
         if !report.outcome.is_processed() {
             return;
         }
         self.frames += 1;
         let number = u32::try_from(report.index).unwrap_or(u32::MAX);
+        // A track that is only predicted has no box that could be scored.
         for track in report.tracks.iter().filter(|track| track.confirmed && track.seen) {
             self.track(item, number, track);
         }
@@ -74,7 +76,7 @@ impl Watch {
         self.times.add(WHOLE_FRAME, report.timings.iter().map(|(_, ms)| ms).sum());
     }
 
-    /// The times of the frames.
+    /// Returns the times of the frames.
     pub fn timing(&self) -> TaskTiming {
         let all = self.times.summary();
         let of = |stage: &str| all.get(stage).map_or((0.0, 0.0), |t| (t.p50_ms, t.p95_ms));
@@ -86,7 +88,7 @@ impl Watch {
         TaskTiming { frame_ms_p50, frame_ms_p95, stages: stages.collect() }
     }
 
-    /// Scores everything. `result` already says what was run.
+    /// Scores everything. `result` already names the task.
     ///
     /// # Errors
     /// Truth that contradicts itself, in a sentence.
@@ -112,8 +114,8 @@ impl Watch {
     }
 }
 
-/// Fills in figures and events, by boxes and by places as far as the truth has
-/// them; the events are those of the boxes if it has both.
+/// Fills in figures and events, by boxes and by positions as far as the truth has them; the events
+/// are those of the boxes if it has both.
 fn score(sequence: &Sequence, truth: &TruthFile, result: &mut TaskResult) -> Result<(), String> {
     let measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
         let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
@@ -140,6 +142,7 @@ fn score(sequence: &Sequence, truth: &TruthFile, result: &mut TaskResult) -> Res
 
 /// Judges the values with the most frequent number of degrees of freedom.
 fn consistency(nis: &[(f64, u32)]) -> Option<Consistency> {
+    // Bounds exist for one number of degrees of freedom only, so the rare others are left out.
     let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
     nis.iter().for_each(|(_, freedom)| *counts.entry(*freedom).or_default() += 1);
     let (&freedom, _) = counts.iter().max_by_key(|(_, count)| **count)?;
@@ -155,7 +158,7 @@ fn paths(paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>, shots: &Shots) -> Vec<Traje
         .collect()
 }
 
-/// The people that count, in the odometry frame.
+/// Returns the trajectories of the people that count, in the odometry frame.
 fn truth_paths(sequence: &Sequence, shots: &Shots) -> Vec<Trajectory> {
     let mut paths: BTreeMap<i64, Vec<(u32, [f64; 2])>> = BTreeMap::new();
     for (number, frame) in (1..).zip(&sequence.frames) {
@@ -168,13 +171,13 @@ fn truth_paths(sequence: &Sequence, shots: &Shots) -> Vec<Trajectory> {
     self::paths(paths, shots)
 }
 
-/// Millimetres and milliseconds are enough for a drawing.
+/// Rounds to millimetres and milliseconds, which are enough for a plot.
 fn point(number: u32, [x, y]: [f64; 2], shots: &Shots) -> [f64; 3] {
     let seconds = shots.stamp_ns(number, Rate(1.0)) as f64 * 1e-9;
     [seconds, x, y].map(|value| (value * 1e3).round() / 1e3)
 }
 
-/// What happened is more telling than that somebody was found in the end.
+/// Returns the rank of a kind of event, 0 first: identity errors, false tracks, misses, all others.
 pub fn importance(kind: &str) -> u8 {
     match kind {
         "switch" | "wrong-person" => 0,

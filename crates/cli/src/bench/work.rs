@@ -19,22 +19,22 @@ use crate::outcome::{Failure, say};
 use crate::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use crate::signals::Signals;
 
-/// How the tasks ended.
+/// Summary of the tasks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Tasks that were asked for and can run.
+    /// Tasks that were requested and can run.
     pub asked: usize,
     /// Of these, tasks that were run now.
     pub ran: usize,
-    /// Tasks whose result says that they failed.
+    /// Tasks that failed, by their results.
     pub failed: usize,
-    /// Part of some log was lost.
+    /// True if part of some log was lost.
     pub lost: bool,
-    /// Somebody wanted to stop.
+    /// Signal that asked to stop.
     pub signal: Option<u8>,
 }
 
-/// A task and its config.
+/// Task with its config.
 struct Ready {
     task: Task,
     config: Candidate,
@@ -43,11 +43,11 @@ struct Ready {
 /// Tasks that share a pass over a log.
 type Group = Vec<Ready>;
 
-/// Runs what has no result yet.
+/// Runs the tasks that have no result yet.
 ///
 /// # Errors
-/// A plan of another program, a task that is not in it, a disk that fails.
-/// A pipeline that fails is no error: its result says so.
+/// A plan of another program, a task that is not in it, a disk that fails. A pipeline that fails is
+/// no error: its result says so.
 pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally, Failure> {
     let signals = Signals::listen()?;
     let asked = asked(args, store)?;
@@ -76,9 +76,10 @@ fn jobs(args: &RunArgs) -> usize {
     if args.timing { 1 } else { usize::from(args.jobs) }
 }
 
-/// The tasks that were asked for and can run.
+/// Returns the tasks that were requested and can run.
 fn asked(args: &RunArgs, store: &Store) -> Result<Vec<Task>, Failure> {
     let mut tasks = store.plan()?;
+    // Another program may give other results under the hashes of this plan.
     let program = version()?;
     if let Some(task) = tasks.iter().find(|task| task.version != program) {
         let planned = &task.version;
@@ -106,8 +107,8 @@ fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {
         || args.timing && store.timing(&task.hash).is_none()
 }
 
-/// Tasks that see the same frames: of one log, read the same way. Not those
-/// with other inputs, or a result would depend on the company of its task.
+/// Groups the tasks that see the same frames: of one log, read the same way. Tasks with other
+/// inputs are kept apart, or a result would depend on the company of its task.
 fn groups(
     tasks: Vec<Task>,
     registry: &Registry,
@@ -119,6 +120,7 @@ fn groups(
         let config = reread(&task, registry)?;
         let outer = &config.outer;
         let mut key = format!("{:?}", (&task.log, &outer.input, &outer.limits, config.inputs));
+        // For times, each task has the machine to itself.
         if alone {
             key += &task.hash;
         }
@@ -140,7 +142,7 @@ pub fn spread<T>(mut groups: Vec<Vec<T>>, jobs: usize) -> VecDeque<Vec<T>> {
     groups.into()
 }
 
-/// Shows how many tasks are done, where somebody looks on.
+/// Returns a progress bar for tasks, visible on a terminal.
 pub fn bar(tasks: usize) -> ProgressBar {
     let bar = ProgressBar::new(tasks as u64);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} tasks {msg} {eta}") {
@@ -149,7 +151,7 @@ pub fn bar(tasks: usize) -> ProgressBar {
     bar
 }
 
-/// What all jobs share.
+/// State that all jobs share.
 struct Desk<'a> {
     store: &'a Store,
     registry: &'a Registry,
@@ -168,7 +170,7 @@ fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), 
                 return;
             }
             if let Err(failure) = desk.run(group) {
-                // The disk fails for everybody: let the others end, too.
+                // The disk fails for every job: let the others end, too.
                 queue.lock().unwrap_or_else(PoisonError::into_inner).clear();
                 *trouble.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
             }
@@ -184,10 +186,11 @@ fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), 
 }
 
 impl Desk<'_> {
-    /// Runs a group and keeps its results. A log that cannot be read fails its
-    /// tasks and nothing else.
+    /// Runs a group and stores its results. A log that cannot be read fails its tasks and nothing
+    /// else.
     fn run(&self, group: Group) -> Result<(), Failure> {
         self.bar.set_message(group[0].task.log_name.clone());
+        // A panic while reading or scoring fails this group; the other groups go on.
         let done = catch_unwind(AssertUnwindSafe(|| self.results(&group)));
         let all = match done {
             Ok(Ok(Some(all))) => all,
@@ -208,7 +211,7 @@ impl Desk<'_> {
         Ok(())
     }
 
-    /// The results of a group, in its order; `None` if somebody wants to stop.
+    /// Returns the results of a group, in its order; `None` after a stop signal.
     fn results(&self, group: &Group) -> Result<Option<Vec<Kept>>, String> {
         let first = &group[0].task;
         let options = TruthOptions { upper_body: first.whole_bodies, ..TruthOptions::default() };
@@ -235,13 +238,14 @@ impl Desk<'_> {
     }
 }
 
-/// A result, and the times if all went well.
+/// Result, and the times if the task succeeded.
 type Kept = (Stored, Option<StoredTiming>);
 
 fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
     let outer = &ready.config.outer;
     let source = FrameSource::open(&ready.task.log, &outer.input, &outer.limits, inputs)
         .map_err(|error| error.to_string())?;
+    // The hash of the task covers the log, so a changed log must not be scored under it.
     if ready.task.inputs.get("log") != Some(&source.facts().sha256) {
         return Err("the log changed since the task was planned; plan again".into());
     }
@@ -250,9 +254,9 @@ fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
 
 /// One pipeline on its way through the frames.
 pub struct Lane {
-    /// The pipeline, or why there is none any more.
+    /// The pipeline, or the error that ended it.
     pub pipeline: Result<Pipeline, String>,
-    /// What it said so far.
+    /// Its reports so far.
     pub watch: Watch,
 }
 
@@ -267,7 +271,7 @@ impl Lane {
         Self { pipeline, watch: Watch::default() }
     }
 
-    /// Shows it the next frame. A pipeline that fails takes no more of them.
+    /// Passes it the next frame. A pipeline that failed takes no more of them.
     pub fn step(&mut self, item: &tagalong_log::LogFrame) {
         let Ok(pipeline) = &mut self.pipeline else { return };
         match pipeline.step(&item.frame) {
@@ -291,7 +295,7 @@ impl Lane {
     }
 }
 
-/// What is known of a task before it runs.
+/// Returns the result of a task before it runs.
 pub fn blank(task: &Task) -> TaskResult {
     TaskResult {
         pipeline: task.pipeline.clone(),
@@ -309,6 +313,7 @@ fn failed(task: &Task, why: &str) -> Kept {
 }
 
 /// Goes through the log once more for the pictures of the events.
+// A second pass, because the important events are known only after the scoring.
 fn illustrate(ready: &Ready, stored: &mut [Stored]) -> Result<(), String> {
     let wanted = Wanted::of(stored);
     let Some(last) = wanted.last() else { return Ok(()) };
@@ -322,7 +327,7 @@ fn illustrate(ready: &Ready, stored: &mut [Stored]) -> Result<(), String> {
     Ok(())
 }
 
-/// The processor, for people to read.
+/// Returns a description of the processor.
 fn machine() -> String {
     let about = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = about.lines().find_map(|line| line.strip_prefix("model name"));

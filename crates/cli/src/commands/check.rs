@@ -13,10 +13,10 @@ use crate::suggest::check_log_path;
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;
 
-/// `tagalong check CONFIG [LOG]`.
+/// Runs `tagalong check CONFIG [LOG]`.
 ///
 /// # Errors
-/// What is wrong with the config, or why the log does not suit it.
+/// A mistake in the config, or the reason for which the log does not suit it.
 pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: Format) -> Outcome {
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
@@ -46,7 +46,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     Ok(Ended::Well)
 }
 
-/// Tries the first frames of the log; returns what the reader has to say.
+/// Tries the first frames of the log; returns the reader's notes.
 fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Vec<String>, Failure> {
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
@@ -57,6 +57,7 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Vec
         pipeline.step(&item.frame).map_err(Failure::failed)?;
         tried += 1;
     }
+    // A log that opens but yields no frame is no fit.
     if tried == 0 {
         return Err(Failure::failed(format!("{}: no frame that can be used", log.display())));
     }
@@ -67,7 +68,7 @@ fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {
     inputs.of(usage).map(|input| input.name()).collect()
 }
 
-/// "needs colour and depth; uses laser where the log has it".
+/// Formats inputs as "needs colour and depth; uses laser where the log has it".
 fn in_words(inputs: Inputs) -> String {
     let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
     let needs = match needs.is_empty() {

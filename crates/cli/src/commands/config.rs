@@ -7,17 +7,16 @@ use crate::keys;
 use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::reproduce::TableFormat;
 
-/// The name under which the keys around the plugins are printed.
+/// Name under which the keys around the plugins are printed.
 const PIPELINE: &str = "pipeline";
 
-/// The name under which all keys are printed.
+/// Name under which all keys are printed.
 const ALL: &str = "all";
 
-/// The name under which the settings are printed that belong to the tests of the
-/// rejection funnel.
+/// Name under which the settings of the rejection funnel's tests are printed.
 const FUNNEL: &str = "funnel";
 
-/// How plugins are named in a config.
+/// Example of the plugin sections of a config.
 const PLUGIN_SECTIONS: &str = "\
 # The plugins (see `tagalong list`). The settings of each one stand in `config`; `tagalong config
 # NAME` prints them.
@@ -34,14 +33,14 @@ const PLUGIN_SECTIONS: &str = "\
 # config = {}
 ";
 
-/// Everything around the plugins, with its defaults.
+/// Returns everything around the plugins, with its defaults.
 pub fn pipeline_defaults() -> String {
     let own = commented_defaults::<PipelineSettings>();
     let outer = commented_defaults::<OuterSettings>();
     format!("{own}\n{PLUGIN_SECTIONS}{outer}")
 }
 
-/// `tagalong config PLUGIN`.
+/// Runs `tagalong config PLUGIN`.
 ///
 /// # Errors
 /// If there is no such plugin: names the nearest one.
@@ -56,7 +55,7 @@ pub fn config(registry: &Registry, plugin: &str, format: TableFormat) -> Outcome
     Ok(Ended::Well)
 }
 
-/// `tagalong schema`.
+/// Runs `tagalong schema`.
 ///
 /// # Errors
 /// If stdout cannot be written.

@@ -14,42 +14,41 @@ use crate::scoring::{
 };
 use crate::suggest::check_log_path;
 
-/// The arguments of `tagalong eval`.
+/// Arguments of `tagalong eval`.
 #[derive(Args, Debug)]
 pub struct EvalArgs {
-    /// Who was there: MOTChallenge text, people.csv, KITTI labels, a log with the
-    /// channel /truth/people, or what it would carry, line by line (.jsonl).
+    /// Ground truth: MOTChallenge text, people.csv, KITTI labels, a log with the channel
+    /// /truth/people, or the messages of that channel, line by line (.jsonl).
     #[arg(long, value_name = "FILE")]
     pub truth: PathBuf,
-    /// Who was reported: MOTChallenge text, KITTI labels, tracks-metres.csv, or
-    /// the folder of a run.
+    /// Reported tracks: MOTChallenge text, KITTI labels, tracks-metres.csv, or the folder of a run.
     #[arg(long, value_name = "FILE")]
     pub tracks: PathBuf,
-    /// What is compared: boxes in the image, or places on the floor.
+    /// Similarity measure: boxes in the image, or positions on the floor.
     #[arg(long, value_enum, default_value_t)]
     pub similarity: SimilarityChoice,
-    /// The log of the truth, for stamps and the camera's pose [default: the one
-    /// that the run names, beside the truth].
+    /// The log of the truth, for stamps and the camera's pose [default: the one that the run names,
+    /// beside the truth].
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
     /// Read that log with the `[input]` and `[limits]` of this config.
     #[arg(long)]
     pub config: Option<PathBuf>,
-    /// Whose rules say what MOTChallenge truth means.
+    /// Rules by which MOTChallenge truth is read.
     #[arg(long, value_enum, default_value_t)]
     pub rules: RulesChoice,
     /// The truth's boxes are whole bodies; compare the upper bodies of them.
     #[arg(long)]
     pub upper_body: bool,
-    /// Frames per second where no file tells [default: 30; KITTI 10].
+    /// Frames per second where no file states them [default: 30; KITTI 10].
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
-    /// How to print.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
 
-/// What makes a truth and a report alike.
+/// Similarity of a truth and a report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum SimilarityChoice {
     /// Intersection over union of the boxes.
@@ -68,7 +67,7 @@ impl From<SimilarityChoice> for Similarity {
     }
 }
 
-/// `tagalong eval`.
+/// Runs `tagalong eval`.
 ///
 /// # Errors
 /// Files that cannot be read or do not fit together.
@@ -91,16 +90,16 @@ pub fn eval(args: &EvalArgs) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Why LAMR and AP are no figures of such tracks.
+/// Note on tracks for which LAMR and AP are meaningless.
 const CONSTANT_SCORES: &str = "all reports have the same score; LAMR and AP mean nothing then: \
                                no threshold tells sure reports from unsure ones";
 
-/// What is printed: the figures, and how they came about.
+/// Printed result: the figures, the rules and the notes.
 #[derive(Serialize)]
 struct Said<'a> {
     #[serde(flatten)]
     scores: &'a Scores,
-    /// Whose rules say what the truth means, where several are in use.
+    /// Name of the rules for reading the truth, where several are in use.
     rules: Option<&'static str>,
     notes: &'a [String],
 }
@@ -113,7 +112,7 @@ fn rules(truth: &TruthFile) -> Option<&'static str> {
 struct Judged {
     sequence: Sequence,
     truth: TruthFile,
-    /// What was read in another way than the writers of the files may have thought.
+    /// Notes on lines that may have been read in another way than intended.
     notes: Vec<String>,
 }
 
@@ -122,6 +121,7 @@ fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
     let mut truth = TruthFile::read(&args.truth, options)?;
     let tracks = Tracks::read(&args.tracks, truth.info.as_ref().map(|info| info.length))?;
     let shots = shots(args, &truth, &tracks)?;
+    // No camera pose relates the two frames, so a distance would mean nothing.
     if args.similarity == SimilarityChoice::Metres && truth.is_kitti() && tracks.in_robot_frame {
         return Err(Failure::usage(
             "KITTI gives places in the camera's frame and the tracks theirs in the robot's: \
@@ -142,8 +142,8 @@ fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
     Ok(Judged { sequence, truth, notes })
 }
 
-/// Where no file states the length of a sequence, its last frame is the last one that
-/// anybody names.
+/// Returns a note if tracks go on after the last known frame. Where no file states the length of a
+/// sequence, it ends with the last frame in any file.
 fn longer(args: &EvalArgs, known: u32, tracks: &Tracks) -> Option<String> {
     let (&last, _) = tracks.reports.last_key_value()?;
     let shown = args.tracks.display();
@@ -162,7 +162,7 @@ fn rate(args: &EvalArgs, truth: &TruthFile) -> Result<Rate, Failure> {
     Err(Failure::usage(format!("--rate is {rate}; it must be above 0")))
 }
 
-/// The frames of the log, if one is named, or found where it is of use.
+/// Returns the frames of the log, if one is named, or found where it is needed.
 fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, Failure> {
     let found = args.log.clone().or_else(|| match truth.is_in_log() {
         true => Some(args.truth.clone()),
@@ -203,8 +203,9 @@ fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {
     })
 }
 
-/// One figure a line, in the order of the fields, then the rules and the notes.
+/// Formats one figure per line, in the order of the fields, then the rules and the notes.
 fn as_text(said: &Said<'_>) -> String {
+    // The JSON text keeps the order of the fields, which a parsed map would not.
     let json = serde_json::to_string(said.scores).unwrap_or_default();
     let mut out = String::new();
     let inside = json.trim_start_matches('{').trim_end_matches('}');

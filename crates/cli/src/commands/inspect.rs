@@ -5,7 +5,7 @@ use crate::config_file::{ConfigFile, OuterSettings};
 use crate::outcome::{Ended, Outcome, print};
 use crate::suggest::check_log_path;
 
-/// `tagalong inspect LOG`.
+/// Runs `tagalong inspect LOG`.
 ///
 /// # Errors
 /// A log that cannot be read at all.

@@ -5,7 +5,7 @@ use tagalong_core::Registry;
 use crate::args::Format;
 use crate::outcome::{Ended, Outcome, print};
 
-/// `tagalong list`.
+/// Runs `tagalong list`.
 ///
 /// # Errors
 /// If stdout cannot be written.

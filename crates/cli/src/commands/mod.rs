@@ -1,4 +1,4 @@
-//! The subcommands that answer a question.
+//! Subcommands that answer a question.
 
 mod check;
 mod config;

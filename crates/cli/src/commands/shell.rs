@@ -6,7 +6,7 @@ use clap_complete::Shell;
 use crate::args::Cli;
 use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 
-/// `tagalong completions`.
+/// Runs `tagalong completions`.
 ///
 /// # Errors
 /// If stdout cannot be written.
@@ -17,7 +17,7 @@ pub fn completions(shell: Shell) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// `tagalong man`.
+/// Runs `tagalong man`.
 ///
 /// # Errors
 /// A folder that cannot be made or written.

@@ -1,4 +1,4 @@
-//! What the checks look at: gathered once, in one pass over the frames.
+//! Input of the checks: gathered once, in one pass over the frames.
 
 use std::sync::Arc;
 
@@ -10,47 +10,47 @@ use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
 
 use super::trial::Trial;
 
-/// Frames that are measured, spread over those that are read.
+/// Number of measured frames, spread over those that are read.
 const SAMPLES: u64 = 24;
 
-/// Depth images that are kept to be summed up.
+/// Number of depth images that are kept for a summary.
 const KEPT_DEPTHS: usize = 8;
 
-/// Everything that is known of a config and a log.
+/// Facts about a config and a log.
 pub struct Evidence {
-    /// What the log holds.
+    /// Contents of the log.
     pub inspection: Inspection,
-    /// Why the pipeline cannot have what it requires.
+    /// Reason for which the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
     /// `[input]` of the config.
     pub input: InputSettings,
-    /// The inputs of the pipeline.
+    /// Inputs of the pipeline.
     pub inputs: Inputs,
-    /// What was measured in frames.
+    /// Measurements in frames.
     pub samples: Samples,
-    /// What the pipeline made of them.
+    /// Result of the pipeline.
     pub trial: Trial,
 }
 
 /// Measurements of frames that are spread over the log.
 pub struct Samples {
     every: u64,
-    /// Frames that were measured.
+    /// Number of measured frames.
     pub count: usize,
-    /// The camera of the first one.
+    /// Camera of the first one.
     pub camera: Option<Arc<Camera>>,
-    /// The light of each.
+    /// Exposure of each.
     pub exposures: Vec<Exposure>,
     /// Some of the depth images.
     pub depths: Vec<Arc<DepthImage>>,
-    /// How depth lies on colour.
+    /// Overlap of the edges of depth and colour.
     pub overlap: EdgeOverlap,
-    /// The floor in each where it was found, with the camera of that frame.
+    /// Floor in each frame where it was found, with the camera of that frame.
     pub floors: Vec<(Ground, Arc<Camera>)>,
 }
 
 impl Samples {
-    /// Before the first of about so many frames.
+    /// Returns empty samples for about so many frames.
     pub fn of(frames: u64) -> Self {
         Self {
             every: (frames / SAMPLES).max(1),
@@ -77,6 +77,7 @@ impl Samples {
         if self.depths.len() < KEPT_DEPTHS {
             self.depths.push(Arc::clone(depth));
         }
+        // Edges and floor are measured in pinhole images only.
         if frame.camera.panorama().is_some() {
             return;
         }

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// How bad it is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
@@ -10,14 +10,14 @@ pub enum Severity {
     Ok,
     /// Could not be measured on this log.
     Unknown,
-    /// Costs people in some frames.
+    /// Causes missed people in some frames.
     Warn,
-    /// Explains why nobody, or the wrong thing, is found.
+    /// Explains missing or false detections.
     Bad,
 }
 
 impl Severity {
-    /// Of a deviation, by the limits from which on it matters.
+    /// Returns the severity of a deviation, by the two limits.
     pub fn beyond(deviation: f64, warn: f64, bad: f64) -> Self {
         if deviation >= bad {
             Self::Bad
@@ -28,7 +28,7 @@ impl Severity {
         }
     }
 
-    /// As it is printed.
+    /// Returns the printed word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -39,42 +39,42 @@ impl Severity {
     }
 }
 
-/// One thing that was looked at.
+/// Result of one check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was looked at, for scripts.
+    /// Name of the check, for scripts.
     pub id: &'static str,
-    /// How bad it is.
+    /// Severity of the result.
     pub severity: Severity,
-    /// What was measured, with units.
+    /// Measured values, with units.
     pub measured: String,
     /// The same as numbers; the names end in the unit.
     pub figures: BTreeMap<&'static str, f64>,
-    /// Why it matters.
+    /// Reason for which it matters.
     pub why: &'static str,
-    /// What to change: a line of the config where there is one.
+    /// Remedy: a line of the config where there is one.
     pub remedy: Option<String>,
 }
 
 impl Finding {
-    /// A finding that needs no remedy yet.
+    /// Returns a finding without figures and remedy.
     pub fn new(id: &'static str, severity: Severity, measured: impl Into<String>) -> Self {
         let measured = measured.into();
         Self { id, severity, measured, figures: BTreeMap::new(), why: "", remedy: None }
     }
 
-    /// With a number.
+    /// Adds a number.
     pub fn figure(mut self, name: &'static str, value: f64) -> Self {
         self.figures.insert(name, value);
         self
     }
 
-    /// With the reason why it matters.
+    /// Adds the reason for which it matters.
     pub fn why(self, why: &'static str) -> Self {
         Self { why, ..self }
     }
 
-    /// With what to change, where something is wrong.
+    /// Adds the remedy, if the finding is a problem.
     pub fn remedy(self, remedy: impl Into<String>) -> Self {
         let remedy = (self.severity >= Severity::Warn).then(|| remedy.into());
         Self { remedy, ..self }

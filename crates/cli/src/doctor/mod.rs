@@ -1,4 +1,4 @@
-//! `tagalong doctor`: why is nobody detected, or the wrong thing?
+//! `tagalong doctor`: explains missing or false detections.
 
 mod checks;
 mod evidence;
@@ -26,56 +26,56 @@ use crate::outcome::{Ended, Failure, Outcome, make_folder, print};
 use crate::run::progress::Progress;
 use crate::suggest::check_log_path;
 
-/// The arguments of `tagalong doctor`.
+/// Arguments of `tagalong doctor`.
 #[derive(Args, Debug)]
 pub struct DoctorArgs {
     /// The pipeline, a TOML file.
     pub config: PathBuf,
     /// The log, an MCAP file with ROS 2 messages.
     pub log: PathBuf,
-    /// Write pictures of what each test dropped into this folder.
+    /// Write pictures of the candidates that each test dropped into this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Replace the pictures of an earlier visit in the same folder.
     #[arg(long)]
     pub overwrite: bool,
-    /// Frames that are looked at, from the first one on.
+    /// Number of frames to examine, from the first one on.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: u64,
-    /// How to print.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
 
-/// Everything that the doctor says.
+/// Complete result of the doctor.
 #[derive(Debug, Serialize)]
 struct Diagnosis {
     config: PathBuf,
     log: PathBuf,
-    /// Frames that were looked at.
+    /// Number of examined frames.
     frames: u64,
     findings: Vec<Finding>,
     funnel: Vec<Drop>,
 }
 
-/// A line of the rejection funnel.
+/// Line of the rejection funnel.
 #[derive(Debug, Serialize)]
 struct Drop {
     test: &'static str,
     count: u64,
-    /// What to look at.
+    /// Advice on the test.
     look: Option<String>,
-    /// The settings that belong to it, with their present values.
+    /// Settings that belong to it, with their present values.
     settings: Vec<String>,
-    /// Pictures of what was dropped.
+    /// Pictures of the dropped candidates.
     pictures: Option<PathBuf>,
 }
 
-/// Looks at a log through the eyes of a pipeline, and says what is wrong.
+/// Runs the checks and a pipeline on a log, and reports the problems.
 ///
 /// # Errors
-/// A config or a log that cannot be read; a folder that cannot be written. What is
-/// wrong with the log is no error, but exit code 3.
+/// A config or a log that cannot be read; a folder that cannot be written. A problem with the log
+/// is no error, but exit code 3.
 pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     let config = ConfigFile::read(&args.config)?;
     let (mut pipeline, _) = config.pipeline(registry, None)?;
@@ -85,7 +85,7 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
         RunDir::check(folder, args.overwrite, &args.log).map_err(Failure::usage)?;
     }
     let inputs = pipeline.inputs();
-    // Light is judged, and pictures are drawn, of logs whose colour is not used, too.
+    // Light is judged, and pictures are rendered, also where the pipeline does not use colour.
     let read = inputs.accept(Input::Colour);
     let found = examine(&args.log, &outer.input, &outer.limits, read)?;
     let mut evidence = Evidence {
@@ -114,19 +114,20 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     Ok(if is_bad { Ended::WithFindings } else { Ended::Well })
 }
 
-/// Images on the topic that makes the frames.
+/// Returns the number of images on the topic that makes the frames.
 fn expected_frames(inspection: &tagalong_log::Inspection) -> u64 {
     let facts = &inspection.facts;
     let topic = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref());
     topic.and_then(|topic| inspection.topic(topic)).map_or(0, |topic| topic.count)
 }
 
-/// One pass over the frames.
+/// Makes one pass over the frames.
 fn look(mut frames: FrameSource, pipeline: &mut Pipeline, args: &DoctorArgs, out: &mut Evidence) {
     let progress = Progress::new();
     for number in 0..args.frames {
         let Some(item) = frames.next_frame() else { break };
         out.samples.take(number, &item);
+        // Without its inputs the pipeline cannot run, but the images can still be measured.
         if out.refusal.is_none() {
             out.trial.step(pipeline, &item.frame, args.output.is_some());
         }
@@ -137,7 +138,7 @@ fn look(mut frames: FrameSource, pipeline: &mut Pipeline, args: &DoctorArgs, out
     out.inspection.data_lost = frames.data_lost();
 }
 
-/// What the pipeline dropped, most first, with what can be done about it.
+/// Returns the tests by the number of dropped candidates, most first, with the remedies.
 fn funnel(
     trial: &Trial,
     pipeline: &Pipeline,

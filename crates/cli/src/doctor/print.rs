@@ -6,7 +6,7 @@ use super::{Diagnosis, Drop};
 /// Lines of the funnel that are shown.
 const FUNNEL_LINES: usize = 8;
 
-/// The diagnosis, for a person at the terminal.
+/// Returns the diagnosis, for a terminal.
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut out = String::new();
     let (config, log) = (diagnosis.config.display(), diagnosis.log.display());

@@ -1,22 +1,22 @@
-//! Which setting belongs to which test of the funnel: data, not code.
+//! Settings of each test of the funnel: data, not code.
 
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-/// The table as it is kept.
+/// Text of the table.
 pub const TABLE: &str = include_str!("remedies.toml");
 
-/// What can be done about the candidates that a test drops.
+/// Remedy for the candidates that a test drops.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Remedy {
-    /// The test; one that ends in `*` is the beginning of names.
+    /// Name of the test; one that ends in `*` is a prefix.
     pub test: String,
-    /// The plugin that has the settings, where others have some of that name.
+    /// Plugin that has the settings, where others have some of that name.
     plugin: Option<String>,
-    /// The settings.
+    /// Keys of the settings.
     pub settings: Vec<String>,
-    /// What to look at.
+    /// Advice on the test.
     pub look: String,
 }
 
@@ -25,13 +25,13 @@ struct File {
     drop: Vec<Remedy>,
 }
 
-/// All of them, in the order of the stages.
+/// Returns all remedies, in the order of the stages.
 #[expect(clippy::expect_used, reason = "the table is part of the program, and a test reads it")]
 pub fn all() -> Vec<Remedy> {
     toml::from_str::<File>(TABLE).expect("the built-in table is right").drop
 }
 
-/// The table as Markdown.
+/// Returns the table as Markdown.
 pub fn markdown() -> String {
     let mut out = String::from("| test in the funnel | settings | look at |\n|---|---|---|\n");
     for remedy in all() {
@@ -43,7 +43,7 @@ pub fn markdown() -> String {
     out
 }
 
-/// What can be done about a test, if the table knows it.
+/// Returns the remedy for a test, if the table has one.
 pub fn of(test: &str) -> Option<Remedy> {
     all().into_iter().find(|remedy| remedy.is_for(test))
 }
@@ -55,7 +55,7 @@ impl Remedy {
             .map_or(self.test == test, |beginning| test.starts_with(beginning))
     }
 
-    /// The settings where they stand in a resolved config, with their values.
+    /// Returns the settings with their sections in a resolved config, and their values.
     pub fn lines(&self, resolved: &Table) -> Vec<String> {
         let mut lines = Vec::new();
         for (section, value) in resolved {
@@ -73,7 +73,7 @@ impl Remedy {
         lines
     }
 
-    /// The settings in one section: its own keys, or those of its plugin.
+    /// Adds the settings in one section: its own keys, or those of its plugin.
     fn section(&self, name: &str, table: &Table, lines: &mut Vec<String>) {
         let plugin = table.get("plugin").and_then(Value::as_str);
         if plugin.is_some() && self.plugin.is_some() && self.plugin.as_deref() != plugin {

@@ -1,4 +1,4 @@
-//! Contact sheets: what each test dropped, to be looked at.
+//! Contact sheets of the candidates that each test dropped.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,11 +12,10 @@ use crate::overlay::write_png;
 /// Pictures beside each other.
 const COLUMNS: usize = 4;
 
-/// Room between pictures, pixels.
+/// Gap between pictures, pixels.
 const GAP_PX: usize = 4;
 
-/// Writes a sheet for each test of which there are pictures; returns where they
-/// are, by test.
+/// Writes a sheet for each test that has pictures; returns the paths, by test.
 ///
 /// # Errors
 /// A sentence that names the file.
@@ -35,7 +34,7 @@ pub fn write(trial: &Trial, folder: &Path) -> Result<BTreeMap<&'static str, Path
     Ok(written)
 }
 
-/// The test's name with nothing but letters, digits and dashes.
+/// Returns the test's name with only letters, digits and dashes.
 fn file_name(test: &str) -> String {
     let words = test.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("-")
@@ -45,6 +44,7 @@ fn sheet(title: &str, examples: &[Example]) -> Canvas {
     let side = examples.iter().map(|example| example.picture.width()).max().unwrap_or(0);
     let (cell, title_px) = (side + GAP_PX, LINE_PX as usize + GAP_PX);
     let rows = examples.len().div_ceil(COLUMNS);
+    // At least two pictures wide, which leaves room for the title.
     let width = COLUMNS.min(examples.len().max(2)) * cell + GAP_PX;
     let mut canvas = Canvas::new(width, rows * cell + title_px + GAP_PX, [24, 24, 28]);
     let ink = Ink::solid([255, 255, 255]);

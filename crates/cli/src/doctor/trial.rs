@@ -1,4 +1,4 @@
-//! A short run of the pipeline: who is found, and what each test drops.
+//! Short run of the pipeline: people that it finds, and candidates that each test drops.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,36 +7,36 @@ use tagalong_pipeline::{Fate, FrameReport, Pipeline};
 
 use crate::overlay::background;
 
-/// Pictures kept of what one test dropped.
+/// Most pictures of one test.
 const EXAMPLES: usize = 16;
 
-/// A picture of something that a test dropped.
+/// Picture of a dropped candidate.
 pub struct Example {
     /// Index of the frame.
     pub frame: u64,
-    /// The place that was dropped, and its surroundings.
+    /// Region that was dropped, with its surroundings.
     pub picture: RgbImage,
 }
 
-/// What the pipeline made of the frames.
+/// Result of the pipeline on the frames.
 #[derive(Default)]
 pub struct Trial {
-    /// Frames that it was given.
+    /// Number of frames that it was given.
     pub frames: u64,
-    /// Frames in which a confirmed person was seen.
+    /// Number of frames in which a confirmed person was seen.
     pub with_people: u64,
     /// Confirmed persons.
     pub people: BTreeSet<u32>,
-    /// What was dropped.
+    /// Number of drops per test.
     pub funnel: Funnel,
-    /// What of it can be shown, by test.
+    /// Example pictures, by test.
     pub examples: BTreeMap<&'static str, Spread<Example>>,
-    /// The plugin's mistake that ended it.
+    /// Error of the plugin that ended it.
     pub failure: Option<String>,
 }
 
 impl Trial {
-    /// Gives the pipeline a frame; nothing after a mistake of a plugin.
+    /// Passes a frame to the pipeline; does nothing after the error of a plugin.
     pub fn step(&mut self, pipeline: &mut Pipeline, frame: &Frame, with_pictures: bool) {
         if self.failure.is_some() {
             return;
@@ -67,21 +67,22 @@ impl Trial {
     }
 }
 
-/// One place a test and frame.
+/// Returns one dropped region per test.
 fn dropped(report: &FrameReport) -> BTreeMap<&'static str, Rect> {
     let examples = report.funnel.entries().iter().filter_map(|e| Some((e.test, e.example?)));
     let candidates = report.candidates.iter().filter_map(|candidate| match candidate.fate {
         Fate::Dropped(test) => Some((test, candidate.detection.region)),
         _ => None,
     });
+    // Candidates come last and replace the funnel's example of the same test.
     examples.chain(candidates).filter(|(_, place)| place.area() > 0.0).collect()
 }
 
-/// Side of a picture, pixels, and what part of it the place takes.
+/// Side of a picture, pixels, and the part of it that the region takes.
 const SIDE_PX: usize = 144;
 const PART: f64 = 0.6;
 
-/// The place in the image of the frame, enlarged or reduced to one size.
+/// Returns the region of the image, enlarged or reduced to one size.
 fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
     let image = background(frame.images())?;
     let scale = place.width.max(place.height) / (PART * SIDE_PX as f64);
@@ -98,7 +99,7 @@ fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
     }))
 }
 
-/// Keeps a few of many, spread evenly over all.
+/// Collection that keeps a few of many items, spread evenly over all.
 pub struct Spread<T> {
     kept: Vec<T>,
     every: u64,
@@ -112,13 +113,15 @@ impl<T> Default for Spread<T> {
 }
 
 impl<T> Spread<T> {
-    /// Takes one in if it is its turn.
+    /// Takes an item if it is its turn.
     pub fn offer(&mut self, make: impl FnOnce() -> Option<T>) {
         let is_due = self.offered.is_multiple_of(self.every);
         self.offered += 1;
         if !is_due {
             return;
         }
+        // When it is full, every other item goes and the stride doubles, so that the rest stays
+        // even.
         if self.kept.len() == EXAMPLES {
             let mut number = 0;
             self.kept.retain(|_| {
@@ -126,6 +129,7 @@ impl<T> Spread<T> {
                 number % 2 == 1
             });
             self.every *= 2;
+            // With the doubled stride this item may no longer be due.
             if !(self.offered - 1).is_multiple_of(self.every) {
                 return;
             }
@@ -133,7 +137,7 @@ impl<T> Spread<T> {
         self.kept.extend(make());
     }
 
-    /// What was kept.
+    /// Returns the kept items.
     pub fn kept(&self) -> &[T] {
         &self.kept
     }

@@ -3,15 +3,14 @@ use tagalong_pipeline::{Differences, LooksSettings};
 
 use super::Followed;
 
-/// Weight of the squares of the weights: one sighting's worth.
+/// Ridge penalty on the squared weights, equal to one example.
 const RIDGE: f64 = 1.0;
-/// Smaller weights say nothing.
+/// Smallest weight that is divided by.
 const LEAST: f64 = 1e-3;
-/// A weight and an offset for each of torso, legs, texture and height, and a weight
-/// for the rivals.
+/// A weight and an offset for each of torso, legs, texture and height, and a weight for the rivals.
 const FEATURES: usize = 9;
 
-/// The settings with which the lock's probabilities fit best to who it was.
+/// Fits the settings of the lock's probabilities to the true identities.
 pub fn looks(results: &[Followed]) -> LooksSettings {
     let sightings = results.iter().flat_map(|followed| &followed.ridden.likeness);
     let examples: Vec<Example<FEATURES>> = sightings
@@ -32,7 +31,7 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
     }
 }
 
-/// What is not known has no weight and no offset.
+/// Returns the features of an example; an unknown difference has no weight and no offset.
 fn features(differences: &Differences) -> [f64; FEATURES] {
     let of = |difference: Option<f64>| difference.map_or([0.0; 2], |d| [-d, 1.0]);
     let [torso, legs, texture] = [differences.torso, differences.legs, differences.texture].map(of);
@@ -43,8 +42,9 @@ fn features(differences: &Differences) -> [f64; FEATURES] {
     all
 }
 
-/// `weight * (even - difference)` instead of `offset - weight * difference`.
+/// Converts `offset - weight * difference` to `weight * (even - difference)`.
 fn term(weight: f64, offset: f64) -> [f64; 2] {
+    // Keeps the quotient finite where the fit finds no evidence.
     let weight = if weight.abs() < LEAST { LEAST } else { weight };
     [rounded(offset / weight), rounded(weight)]
 }
@@ -53,7 +53,7 @@ fn rounded(value: f64) -> f64 {
     (1e3 * value).round() * 1e-3
 }
 
-/// What stands in a config.
+/// Returns the settings as lines for a config.
 pub fn toml(looks: &LooksSettings) -> String {
     let body = toml::to_string(looks).unwrap_or_default();
     format!("\n# Fitted to these rides:\n[target.looks]\n{body}")
@@ -73,8 +73,8 @@ mod tests {
         Followed { suite, pipeline, ridden, took_ms: Vec::new(), story: Vec::new() }
     }
 
-    /// The odds that somebody is the person depend on the upper body alone, and
-    /// every fourth time it is not seen.
+    /// The odds that a track is the person depend on the upper body alone, and in every fourth
+    /// example it is not visible.
     #[test]
     fn what_tells_people_apart_gets_the_weight() {
         let mut likeness = Vec::new();

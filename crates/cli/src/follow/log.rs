@@ -9,14 +9,14 @@ use tagalong_trials::{Drawn, TrialError, Witness};
 use crate::signals::Signals;
 use crate::simulate::Recorder;
 
-/// Writes a ride down, where somebody wants that, until somebody stops it.
+/// Writer of a ride's log, if one is requested; it ends early at a stop signal.
 pub struct RideLog {
     recorder: Option<Recorder>,
     failed: Option<WriteError>,
     signals: Signals,
 }
 
-/// What the wheels were told, and why; one JSON text for each frame.
+/// Command and reason of one frame, as a JSON text.
 #[derive(Serialize)]
 struct FrameJson {
     stamp_ns: u64,
@@ -34,6 +34,7 @@ struct FrameJson {
 impl RideLog {
     /// Writes to a file, if there is one.
     pub fn new(file: Option<&Path>, scene: &Scene, signals: Signals) -> Self {
+        // This simulation only supplies the cameras' poses; the ride runs its own.
         let create = |path| Recorder::create(path, scene, &Simulation::new(scene, 1));
         let (recorder, failed) = match file.map(create).transpose() {
             Ok(recorder) => (recorder, None),
@@ -45,7 +46,7 @@ impl RideLog {
     /// Completes the file.
     ///
     /// # Errors
-    /// The first thing that could not be written.
+    /// The first error in writing.
     pub fn finish(self) -> Result<(), TrialError> {
         let finished = self.recorder.map_or(Ok(()), Recorder::finish);
         let failed = self.failed.map_or(finished, Err);
@@ -71,6 +72,7 @@ impl Witness for RideLog {
     }
 
     fn goes_on(&self) -> bool {
+        // A ride without its log is of no use, so a failed disk ends it.
         self.failed.is_none() && self.signals.received().is_none()
     }
 }

@@ -24,10 +24,10 @@ use crate::reproduce::TableFormat;
 use crate::signals::Signals;
 use crate::simulate;
 
-/// Where the scenes are that are ridden where none is named, and how they begin.
+/// Folder and name prefix of the default scenes.
 const SCENES: (&str, &str) = ("configs/scenes", "follow-");
 
-/// The arguments of `tagalong follow`.
+/// Arguments of `tagalong follow`.
 #[derive(Args, Debug)]
 pub struct FollowArgs {
     /// The pipeline; it needs a [controller].
@@ -49,7 +49,7 @@ pub struct FollowArgs {
     /// The split that the seeds belong to; settings are chosen on `validation`.
     #[arg(long, value_name = "SPLIT", default_value = "test")]
     pub split: Split,
-    /// From a command to what the wheels do about it, ms, instead of the scene's.
+    /// Delay from a command to the motion of the wheels, ms, instead of the scene's.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(0..=2000))]
     pub latency_ms: Option<u16>,
     /// Lose this fraction of the images, instead of the scene's.
@@ -69,7 +69,7 @@ pub struct FollowArgs {
     /// Print the settings [target.looks] that fit these rides best; use the split `train`.
     #[arg(long)]
     pub fit: bool,
-    /// How to print.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
 }
@@ -79,32 +79,32 @@ fn fraction(text: &str) -> Result<f64, String> {
     if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("must be in 0 to 1".into()) }
 }
 
-/// One pipeline on one draw of a scene.
+/// One pipeline on one random variant of a scene.
 struct Job {
     suite: String,
     scene: Scene,
     contender: Contender,
 }
 
-/// What came of it.
+/// Result of a job.
 #[derive(Clone, Debug, Serialize)]
 pub struct Followed {
-    /// The scene.
+    /// Name of the scene.
     pub suite: String,
-    /// The pipeline.
+    /// Name of the pipeline.
     pub pipeline: String,
-    /// How it went.
+    /// Scores of the ride.
     #[serde(flatten)]
     pub ridden: Ridden,
     /// Time for each frame, ms.
     #[serde(skip)]
     pub took_ms: Vec<f64>,
-    /// What happened, in words.
+    /// Events of the ride, as text.
     #[serde(skip)]
     pub story: Vec<String>,
 }
 
-/// What the files and programs get.
+/// Content of the JSON output.
 #[derive(Serialize)]
 struct Findings<'a> {
     seeds: Seeds,
@@ -114,11 +114,11 @@ struct Findings<'a> {
     rides: &'a [Followed],
 }
 
-/// Rides and prints how it went.
+/// Runs the rides and prints the scores.
 ///
 /// # Errors
-/// Scenes and configs that cannot be used are exit code 2; plugins that fail and
-/// files that cannot be written are 1.
+/// Scenes and configs that cannot be used are exit code 2; plugins that fail and files that cannot
+/// be written are 1.
 pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
     let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
@@ -146,7 +146,7 @@ fn failure(error: TrialError) -> Failure {
     }
 }
 
-/// Every pipeline on every seed of every scene.
+/// Returns every pipeline on every seed of every scene.
 fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>, Failure> {
     let mut jobs = Vec::new();
     let contenders = contenders(args, registry)?;
@@ -175,7 +175,7 @@ fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, 
     std::iter::once(&args.config).chain(&args.against).map(read).collect()
 }
 
-/// The scenes that are named, or all there are.
+/// Returns the named scenes, or all default ones.
 fn scenes(args: &FollowArgs) -> Result<Vec<PathBuf>, Failure> {
     if !args.scenes.is_empty() {
         return Ok(args.scenes.clone());
@@ -197,6 +197,7 @@ fn variant(args: &FollowArgs, seed: u64) -> Variant {
     let faults = [("robot.latency_s", latency), ("faults.dropped", args.drop)];
     let faults = faults
         .into_iter()
+        // Debug formatting keeps the point of whole numbers, which TOML needs for a float.
         .filter_map(|(key, value)| Some((key.to_owned(), format!("{:?}", value?))));
     let set = args.set.iter().cloned().chain(faults).collect();
     Variant { seed: Some(seed), split: Some(args.split), set }
@@ -246,6 +247,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
         TableFormat::Json => print(&json)?,
         TableFormat::Markdown => print(&joined(Table::markdown))?,
         TableFormat::Text => {
+            // The course of events is readable for a single ride only.
             if let [one] = results {
                 print(&(one.story.join("\n") + "\n\n"))?;
             }

@@ -1,8 +1,8 @@
 use tagalong_pipeline::FrameReport;
 use tagalong_trials::Ride;
 
-/// What happened on a ride: a line for each change of whom the robot follows and
-/// of why it moves as it does.
+/// Returns the course of a ride: a line for each change of the target and of the reason for the
+/// motion.
 pub fn story(ride: &Ride) -> Vec<String> {
     let mut before = None;
     let mut lines = Vec::new();

@@ -8,8 +8,8 @@ use super::Followed;
 /// Steps of the reliability curve.
 const BINS: usize = 10;
 
-/// How the rides went, scene by scene and over all scenes; and, where there was
-/// a lock, how far its probabilities can be believed.
+/// Returns the scores of the rides, scene by scene and over all scenes, and the reliability of the
+/// lock's probabilities where there was a lock.
 pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     let judge = RideJudge::default();
     let columns = [
@@ -30,6 +30,7 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
     let mut suites = unique(results.iter().map(|result| result.suite.as_str()));
     let mut rows: Vec<Row> = Vec::new();
+    // The empty name stands for all scenes together.
     if suites.len() > 1 {
         suites.push("");
     }
@@ -85,7 +86,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let rides: Vec<&Ridden> = results.iter().map(|result| &result.ridden).collect();
     let count = rides.len() as u64;
     let times = |a: fn(&Ridden) -> f64, b: fn(&Ridden) -> f64| {
-        // Rides that have nothing of it say nothing about it.
+        // Rides without any of that time would be a division by zero.
         let of: Vec<&Ridden> = rides.iter().copied().filter(|ride| b(ride) > 0.0).collect();
         let ratio = |drawn: &[usize]| {
             let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(of[i])).sum::<f64>();
@@ -95,6 +96,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     };
     let refound: Vec<[u64; 2]> = rides
         .iter()
+        // Resampling whole rides respects that the seconds of one ride are not independent.
         .map(|ride| {
             let all = ride.episodes.iter().filter_map(|e| judge.refound(e, ride.time_s));
             all.fold([0, 0], |[good, of], one| [good + u64::from(one), of + 1])
@@ -128,8 +130,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     ]
 }
 
-/// Of those whom the lock thought to be the person with some probability, how
-/// many were.
+/// Returns the share of true matches among the tracks to which the lock gave some probability.
 fn reliability(results: &[Followed], pipeline: &str, seeds: Seeds) -> Option<Table> {
     let of: Vec<&Ridden> =
         results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
@@ -167,7 +168,7 @@ fn reliability(results: &[Followed], pipeline: &str, seeds: Seeds) -> Option<Tab
     })
 }
 
-/// Each name once, in the order of its first place.
+/// Returns each name once, in the order of its first place.
 fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut all = Vec::new();
     for name in names {
@@ -178,8 +179,8 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     all
 }
 
-/// What the lock thought of each sighting, and whether it was the person, with
-/// the differences that it was made of; nothing stands for what is not known.
+/// Returns the lock's probability of each detection, its truth, and the differences behind it; an
+/// unknown difference is an empty field.
 pub fn likeness_csv(results: &[Followed]) -> String {
     let mut out =
         "suite,pipeline,seed,same,probability,torso,legs,texture,height_m,rivals\n".to_owned();

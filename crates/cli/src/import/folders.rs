@@ -1,4 +1,4 @@
-//! Folders of images, as they are and as the MOTChallenge has them.
+//! Folders of images, plain or in the layout of the MOTChallenge.
 
 use std::fs;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use super::ImportArgs;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
 use crate::outcome::Failure;
 
-/// A folder of images, with one of depth if the options say so.
+/// Reads a folder of images, with one of depth if the options say so.
 ///
 /// # Errors
 /// Folders that cannot be read, or do not hold the same number of images.
@@ -17,6 +17,7 @@ pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
     let mut sequence = of_files(args, pictures(&args.path)?, args.fps)?;
     let Some(folder) = &args.depth else { return Ok(sequence) };
     let depth = pictures(folder)?;
+    // Images are paired by their order, so the counts must agree.
     if depth.len() != sequence.moments.len() {
         return Err(Failure::failed(format!(
             "{} holds {} images and {} holds {}; there must be one for each",
@@ -28,11 +29,12 @@ pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
     }
     sequence.depth_unit_m = args.depth_unit;
     sequence.moments.extend(steady(depth, Eye::Depth, args.fps));
+    // The log is written in the order of time, colour before depth.
     sequence.moments.sort_by_key(|moment| (moment.stamp, moment.eye));
     Ok(sequence)
 }
 
-/// A sequence of the MOTChallenge: its images, and its truth where it is there.
+/// Reads a sequence of the MOTChallenge: its images, and its truth where it is there.
 ///
 /// # Errors
 /// Files that are missing or wrong.
@@ -64,7 +66,7 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
     Ok(sequence)
 }
 
-/// Images at a steady rate, with the camera that the options tell of.
+/// Reads images at a steady rate, with the camera of the options.
 fn of_files(args: &ImportArgs, files: Vec<PathBuf>, fps: f64) -> Result<Sequence, Failure> {
     let columns = match files.first() {
         Some(first) => size(first)?.0,
@@ -76,14 +78,16 @@ fn of_files(args: &ImportArgs, files: Vec<PathBuf>, fps: f64) -> Result<Sequence
         mount: args.height.map(|height| level(height, args.tilt)),
         ..Sequence::default()
     };
+    // Without a focal length the image still serves trackers that work in pixels.
     if sequence.calibration.is_none() {
         sequence.notes.push("no --focal and no --view: places in metres will be guesses".into());
     }
     Ok(sequence)
 }
 
-/// A camera so high above the floor that looks ahead, and down by so many degrees.
+/// Returns the pose of a camera at a height above the floor that looks ahead, and down by an angle.
 pub fn level(height_m: f64, down_deg: f64) -> nalgebra::Isometry3<f64> {
+    // The lens does not matter for the pose; any valid one will do.
     let lens = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Distortion::None };
     Camera::mounted(lens, 1, 1, height_m, down_deg.to_radians(), 0.0).robot_from_camera
 }

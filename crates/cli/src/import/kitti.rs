@@ -1,6 +1,5 @@
-//! KITTI tracking (Geiger et al., CVPR 2012): `image_02` and `image_03` are the
-//! rectified colour pair, `calib` has their projections, `label_02` boxes of
-//! people, `oxts` where the car was.
+//! KITTI tracking (Geiger et al., CVPR 2012): `image_02` and `image_03` are the rectified colour
+//! pair, `calib` has their projections, `label_02` boxes of people, `oxts` the poses of the car.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -15,9 +14,9 @@ use crate::outcome::Failure;
 
 const LAYOUT: &str =
     "the `training` or `testing` folder of KITTI tracking, and that a sequence of it";
-/// Images a second.
+/// Images per second.
 const HZ: f64 = 10.0;
-/// The cameras are this far above the road, m.
+/// Height of the cameras above the road, m.
 const HEIGHT_M: f64 = 1.65;
 
 /// Reads a sequence.
@@ -27,6 +26,7 @@ const HEIGHT_M: f64 = 1.65;
 pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     let (folder, name) = (&args.path, &args.sequence);
     let [left, right] = projections(&folder.join("calib").join(format!("{name}.txt")))?;
+    // The fourth column of a projection is minus the focal length times the camera's offset.
     let baseline_m = (left[3] - right[3]) / left[0];
     let files = |camera: &str| pictures(&folder.join(camera).join(name));
     let mut moments: Vec<_> = steady(files("image_02")?, Eye::Left, HZ).collect();
@@ -54,7 +54,7 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     })
 }
 
-/// P2 and P3, row by row.
+/// Returns P2 and P3, row by row.
 fn projections(path: &Path) -> Result<[[f64; 12]; 2], Failure> {
     let text = text(path, LAYOUT)?;
     let read = |name: &str| {
@@ -73,8 +73,8 @@ fn projections(path: &Path) -> Result<[[f64; 12]; 2], Failure> {
 /// Columns of a label: frame, id, type, truncated, occluded, alpha, and the box.
 const BOX: std::ops::Range<usize> = 6..10;
 
-/// The boxes of people as MOTChallenge truth: pedestrians count; whoever sits or
-/// rides is neither a miss nor a false alarm.
+/// Returns the boxes of people as MOTChallenge truth: pedestrians count; a sitting or riding person
+/// is neither a miss nor a false alarm.
 fn boxes(path: &Path) -> Result<String, Failure> {
     let text = text(path, LAYOUT)?;
     let mut out = String::new();
@@ -100,6 +100,7 @@ fn boxes(path: &Path) -> Result<String, Failure> {
         let _ = writeln!(
             out,
             "{},{id},{left},{top},{width:.3},{height:.3},{counts},{class},-1",
+            // KITTI counts frames from 0, MOTChallenge from 1.
             frame.saturating_add(1)
         );
     }
@@ -109,8 +110,8 @@ fn boxes(path: &Path) -> Result<String, Failure> {
 /// Radius of the earth as KITTI's own tools take it, m.
 const EARTH_M: f64 = 6_378_137.0;
 
-/// Latitude, longitude and heading as poses on a plane (Mercator, true in length
-/// at the first latitude), from the first one on.
+/// Converts latitude, longitude and heading to poses on a plane (Mercator, true in length at the
+/// first latitude), relative to the first one.
 fn drive(path: &Path) -> Result<Vec<Placed>, Failure> {
     let text = text(path, LAYOUT)?;
     let mut first: Option<Isometry3<f64>> = None;

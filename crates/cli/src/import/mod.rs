@@ -1,7 +1,7 @@
 //! `tagalong import`: data sets and folders of images become logs.
 //!
-//! Each kind is a module that reads its layout into a [`Sequence`]; one writer
-//! makes a log of it. Nothing else in Tagalong knows these layouts.
+//! Each kind is a module that reads its layout into a [`Sequence`]; one writer makes a log of it.
+//! No other part of Tagalong knows these layouts.
 
 mod folders;
 mod kitti;
@@ -19,7 +19,7 @@ use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, s
 use crate::signals::Signals;
 use crate::suggest::converter;
 
-/// What is imported.
+/// Layout of the imported data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
     /// A folder of the TUM RGB-D benchmark: rgb.txt, depth.txt, groundtruth.txt.
@@ -34,13 +34,13 @@ pub enum Kind {
     Bag,
 }
 
-/// The arguments of `tagalong import`.
+/// Arguments of `tagalong import`.
 #[derive(Args, Debug)]
 pub struct ImportArgs {
-    /// What it is.
+    /// Layout of the data.
     #[arg(value_enum)]
     pub kind: Kind,
-    /// Where it is.
+    /// File or folder to import.
     pub path: PathBuf,
     /// The log to write [default: runs/<name>.mcap].
     #[arg(short, long, value_name = "LOG")]
@@ -48,22 +48,22 @@ pub struct ImportArgs {
     /// Replace the log if it exists.
     #[arg(long)]
     pub overwrite: bool,
-    /// kitti: which sequence.
+    /// kitti: number of the sequence.
     #[arg(long, value_name = "NUMBER", default_value = "0000")]
     pub sequence: String,
-    /// images: images a second.
+    /// images: images per second.
     #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = positive)]
     pub fps: f64,
-    /// Focal length, pixels; places in metres need it, or --view.
+    /// Focal length, pixels; positions in metres need it, or --view.
     #[arg(long, value_name = "PX", value_parser = positive)]
     pub focal: Option<f64>,
-    /// Horizontal view, degrees; another way to say --focal.
+    /// Horizontal field of view, degrees; an alternative to --focal.
     #[arg(long, value_name = "DEG", conflicts_with = "focal", value_parser = angle)]
     pub view: Option<f64>,
     /// Height of the camera above the floor, m.
     #[arg(long, value_name = "M", value_parser = positive)]
     pub height: Option<f64>,
-    /// How far the camera looks down, degrees.
+    /// Downward tilt of the camera, degrees.
     #[arg(
         long,
         value_name = "DEG",
@@ -75,10 +75,10 @@ pub struct ImportArgs {
     /// images: folder of 16-bit PNG depth images, one for each image.
     #[arg(long, value_name = "DIR")]
     pub depth: Option<PathBuf>,
-    /// images: metres for each unit of depth.
+    /// images: metres per unit of depth.
     #[arg(long, value_name = "M", default_value_t = 0.001, requires = "depth", value_parser = positive)]
     pub depth_unit: f64,
-    /// How to print what was written.
+    /// Output format of the result.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
@@ -89,19 +89,21 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn angle(text: &str) -> Result<f64, String> {
+    // The focal length goes to zero as the view approaches 180 degrees.
     positive(text).and_then(|v| if v < 175.0 { Ok(v) } else { Err("must be below 175".into()) })
 }
 
-/// Imports.
+/// Imports a data set.
 ///
 /// # Errors
-/// A path that is not what it should be, or a file in it that cannot be read: exit
-/// code 1; a log that exists or cannot be written: 2.
+/// A path with unexpected content, or a file in it that cannot be read: exit code 1; a log that
+/// exists or cannot be written: 2.
 pub fn import(args: &ImportArgs) -> Outcome {
     let path = &args.path;
     if !path.exists() {
         return Err(Failure::failed(format!("{}: no such file or folder", path.display())));
     }
+    // A bag is not converted here, so it needs no output file.
     if args.kind == Kind::Bag {
         return converted(path, args.format);
     }
@@ -130,7 +132,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Prints how a bag is converted.
+/// Prints the command that converts a bag.
 fn converted(bag: &Path, format: Format) -> Outcome {
     let commands = converter(bag);
     print(&match format {
@@ -156,7 +158,7 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     Ok(sequence)
 }
 
-/// Truth goes beside the log, where `eval` and `bench` look for it.
+/// Writes the truth beside the log, where `eval` and `bench` look for it.
 fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
     for (ending, text) in &sequence.beside {
         let path = log.with_extension(ending);

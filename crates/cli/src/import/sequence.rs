@@ -1,4 +1,4 @@
-//! What every layout is read into.
+//! Common form of all layouts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,11 +9,10 @@ use tagalong_core::Stamp;
 use super::ImportArgs;
 use crate::outcome::Failure;
 
-/// The moment at which a sequence without a clock starts.
+/// Start time of a sequence without a clock.
 pub const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
 
-/// A focal length in both directions and the centre, pixels, and the distortion by
-/// `plumb_bob`.
+/// Focal lengths in both directions and the centre, pixels, and the distortion by `plumb_bob`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     /// Focal lengths, pixels.
@@ -24,64 +23,64 @@ pub struct Calibration {
     pub distortion: [f64; 5],
 }
 
-/// Which image of a camera a file is.
+/// Kind of an image of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Eye {
-    /// The colour image, or the left one of a pair.
+    /// Colour image, or the left one of a pair.
     Left,
-    /// The right one.
+    /// Right image of a pair.
     Right,
-    /// Depth.
+    /// Depth image.
     Depth,
 }
 
-/// An image file and when it was captured.
+/// Image file with its capture time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// When.
+    /// Capture time.
     pub stamp: Stamp,
-    /// Which image.
+    /// Kind of the image.
     pub eye: Eye,
-    /// The file.
+    /// Path of the file.
     pub file: PathBuf,
 }
 
-/// Where the camera was.
+/// Pose at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// When.
+    /// Time of the pose.
     pub stamp: Stamp,
-    /// The robot, on the floor, in the odometry frame.
+    /// Pose of the robot, on the floor, in the odometry frame.
     pub odom_from_robot: Isometry3<f64>,
-    /// The camera on it; `None`: as always.
+    /// Pose of the camera on it; `None` if it does not move.
     pub robot_from_camera: Option<Isometry3<f64>>,
 }
 
-/// A sequence of images, of whatever layout.
+/// Sequence of images, independent of the layout.
 #[derive(Default)]
 pub struct Sequence {
-    /// The images, in the order of time.
+    /// Images, in the order of time.
     pub moments: Vec<Moment>,
-    /// The lens, if it is known.
+    /// Lens, if it is known.
     pub calibration: Option<Calibration>,
     /// Distance of the right camera from the left one, m.
     pub baseline_m: f64,
-    /// Metres for each unit of depth.
+    /// Metres per unit of depth.
     pub depth_unit_m: f64,
-    /// The camera on the robot, where it does not move.
+    /// Pose of the camera on the robot, where it does not move.
     pub mount: Option<Isometry3<f64>>,
-    /// Where the robot was.
+    /// Poses of the robot.
     pub placed: Vec<Placed>,
     /// Files that go beside the log: their ending, and their text.
     pub beside: Vec<(&'static str, String)>,
-    /// What is to be said.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
 /// Reads a text file of a layout.
 ///
 /// # Errors
-/// A file that is not there: the folder is not of that layout.
+/// A missing file: the folder is not of that layout.
 pub fn text(path: &Path, layout: &str) -> Result<String, Failure> {
     fs::read_to_string(path).map_err(|error| {
         let shown = path.display();
@@ -89,10 +88,10 @@ pub fn text(path: &Path, layout: &str) -> Result<String, Failure> {
     })
 }
 
-/// The numbers of a line between blanks.
+/// Returns the blank-separated numbers of a line.
 ///
 /// # Errors
-/// Names the file and the line.
+/// A word that is no number, with the file and the line.
 pub fn numbers<'a>(
     words: impl Iterator<Item = &'a str>,
     path: &Path,
@@ -106,7 +105,7 @@ pub fn numbers<'a>(
         .collect()
 }
 
-/// The JPEG and PNG files of a folder, by name.
+/// Returns the JPEG and PNG files of a folder, by name.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -119,18 +118,19 @@ pub fn pictures(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     };
     let mut files: Vec<_> =
         entries.flatten().map(|entry| entry.path()).filter(is_picture).collect();
+    // The order of a directory depends on the file system.
     files.sort();
     Ok(files)
 }
 
-/// Files at a steady rate.
+/// Returns files at a steady rate.
 pub fn steady(files: Vec<PathBuf>, eye: Eye, hz: f64) -> impl Iterator<Item = Moment> {
     let at = move |index: usize| EPOCH.plus_seconds(index as f64 / hz);
     files.into_iter().enumerate().map(move |(i, file)| Moment { stamp: at(i), eye, file })
 }
 
 impl ImportArgs {
-    /// The lens that the options tell of, for images of so many columns.
+    /// Returns the lens of the options, for images of so many columns.
     pub fn calibration(&self, columns: u32) -> Option<Calibration> {
         let half = 0.5 * f64::from(columns);
         let by_view = self.view.map(|view| half / (0.5 * view.to_radians()).tan());
@@ -139,7 +139,7 @@ impl ImportArgs {
     }
 }
 
-/// Columns and rows of an image file.
+/// Returns the columns and rows of an image file.
 ///
 /// # Errors
 /// A file that is no image.

@@ -1,6 +1,6 @@
-//! Folders of the TUM RGB-D benchmark (Sturm et al., IROS 2012): `rgb.txt` and
-//! `depth.txt` list images with their times, `groundtruth.txt` the poses of the
-//! camera in a room whose floor is z = 0; depth has 5000 units to the metre.
+//! Folders of the TUM RGB-D benchmark (Sturm et al., IROS 2012): `rgb.txt` and `depth.txt` list
+//! images with their times, `groundtruth.txt` the poses of the camera in a room with the floor at z
+//! = 0; depth has 5000 units per metre.
 
 use std::path::Path;
 
@@ -29,6 +29,7 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     let mut notes = Vec::new();
     let columns = 640;
     let calibration = args.calibration(columns).unwrap_or_else(|| calibration(folder, &mut notes));
+    // True poses of the camera take precedence over a constant mount.
     let mount = args.height.filter(|_| placed.is_empty()).map(|height| level(height, args.tilt));
     let calibration = Some(calibration);
     Ok(Sequence {
@@ -42,7 +43,7 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     })
 }
 
-/// The colour cameras as the benchmark publishes them, by the name of the folder.
+/// Returns the colour camera as the benchmark publishes it, by the name of the folder.
 fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     let name = folder.to_string_lossy();
     let of = |focal, centre, distortion| Calibration { focal, centre: Some(centre), distortion };
@@ -63,7 +64,7 @@ fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     of([525.0, 525.0], [319.5, 239.5], [0.0; 5])
 }
 
-/// The lines of a list that are no comments, with their numbers.
+/// Returns the lines of a list that are no comments, with their numbers.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let numbered = (1..).zip(text.lines().map(str::trim));
     numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
@@ -85,9 +86,10 @@ fn images(folder: &Path, list: &str, eye: Eye) -> Result<Vec<Moment>, Failure> {
         .collect()
 }
 
-/// Seconds with a fraction, without rounding them.
+/// Parses seconds with a fraction, without rounding them.
 fn stamp(word: &str, path: &Path, line: usize) -> Result<Stamp, Failure> {
     let wrong = || Failure::failed(format!("{}:{line}: `{word}` is no time", path.display()));
+    // A double cannot hold nanoseconds of today's times, so the digits are parsed as integers.
     let (seconds, fraction) = word.split_once('.').unwrap_or((word, "0"));
     let nanos = format!("{fraction:0<9}");
     let seconds: u64 = seconds.parse().map_err(|_| wrong())?;
@@ -96,7 +98,7 @@ fn stamp(word: &str, path: &Path, line: usize) -> Result<Stamp, Failure> {
     all.map(Stamp::from_nanos).ok_or_else(wrong)
 }
 
-/// The robot is the place on the floor below the camera, heading where it looks.
+/// Returns the poses of the robot: the point on the floor below the camera, heading where it looks.
 fn poses(path: &Path) -> Result<Vec<Placed>, Failure> {
     let text = text(path, LAYOUT)?;
     lines(&text)

@@ -1,4 +1,4 @@
-//! From a sequence to a log with the topics that robots use.
+//! Writes a sequence as a log with the topics that robots use.
 
 use std::fs;
 use std::path::Path;
@@ -32,7 +32,7 @@ pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), 
     }
     let mut places = sequence.placed.iter().peekable();
     for moment in sequence.moments.iter().take_while(|_| signals.received().is_none()) {
-        // A place goes before the image that it is for.
+        // A pose goes before the image that it is for.
         while let Some(placed) = places.next_if(|placed| placed.stamp <= moment.stamp) {
             place(&mut log, placed).map_err(Failure::failed)?;
         }
@@ -70,7 +70,7 @@ fn transforms<'a>(
     TFMessage { transforms: links.into_iter().map(stamped).collect() }
 }
 
-/// One image with its calibration.
+/// Writes one image with its calibration.
 fn picture(log: &mut MessageLog, sequence: &Sequence, moment: &Moment) -> Result<(), Failure> {
     let is_pair = sequence.baseline_m > 0.0;
     let (camera, frame, aside_m) = match moment.eye {
@@ -89,6 +89,7 @@ fn picture(log: &mut MessageLog, sequence: &Sequence, moment: &Moment) -> Result
     let data = fs::read(&moment.file).map_err(|error| {
         Failure::failed(format!("cannot read {}: {error}", moment.file.display()))
     })?;
+    // By content: file endings in data sets are not reliable.
     let format = if data.starts_with(b"\x89PNG") { "png" } else { "jpeg" }.to_owned();
     let image = if is_pair { "image_rect_color" } else { "image_raw" };
     let message = CompressedImage { header, format, data: &data };
@@ -104,6 +105,7 @@ fn info(
 ) -> Option<CameraInfo> {
     let lens = sequence.calibration?;
     let [fx, fy] = lens.focal;
+    // Pixel centres have whole coordinates, so the middle of the image is half a pixel less.
     let middle = [width, height].map(|side| 0.5 * (f64::from(side) - 1.0));
     let [cx, cy] = lens.centre.unwrap_or(middle);
     let distortion = Distortion::PlumbBob(lens.distortion);
@@ -111,7 +113,7 @@ fn info(
     Some(CameraInfo::of_lens(header, &lens, (width as usize, height as usize), aside_m))
 }
 
-/// A 16-bit PNG as millimetres.
+/// Writes a 16-bit PNG as millimetres.
 fn depth(
     log: &mut MessageLog,
     unit_m: f64,
@@ -130,6 +132,7 @@ fn depth(
             )));
         }
     };
+    // Saturates at 65.535 m, the largest value of 16 bits in millimetres.
     let millimetres = |value: &u16| (f64::from(*value) * unit_m * 1e3).round().min(65535.0) as u16;
     let data: Vec<u8> = image.as_raw().iter().flat_map(|v| millimetres(v).to_le_bytes()).collect();
     let (width, height) = image.dimensions();

@@ -2,22 +2,22 @@ use font8x8::legacy::BASIC_LEGACY;
 use nalgebra::Point2;
 use tagalong_core::{Rect, RgbImage};
 
-/// A colour and how much of it covers what is below, 0 to 1.
+/// Colour with its opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ink {
     /// Red, green, blue.
     pub rgb: [u8; 3],
-    /// Opacity.
+    /// Opacity, 0 to 1.
     pub opacity: f32,
 }
 
 impl Ink {
-    /// A covering colour.
+    /// Returns an opaque colour.
     pub const fn solid(rgb: [u8; 3]) -> Self {
         Self { rgb, opacity: 1.0 }
     }
 
-    /// The same colour, fainter.
+    /// Returns the same colour, fainter.
     pub const fn faint(self, opacity: f32) -> Self {
         Self { rgb: self.rgb, opacity }
     }
@@ -26,23 +26,23 @@ impl Ink {
 /// Height of a line of text, pixels.
 pub const LINE_PX: f64 = 10.0;
 
-/// A picture to draw on. Everything outside it is cut off.
+/// Picture to paint on. Everything outside it is cut off.
 pub struct Canvas {
     image: RgbImage,
 }
 
 impl Canvas {
-    /// A canvas of one colour.
+    /// Returns a canvas of one colour.
     pub fn new(width: usize, height: usize, rgb: [u8; 3]) -> Self {
         Self { image: RgbImage::filled(width, height, rgb) }
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.image.height()
     }
 
-    /// What was drawn.
+    /// Returns the picture.
     pub fn into_image(self) -> RgbImage {
         self.image
     }
@@ -58,7 +58,7 @@ impl Canvas {
         }
     }
 
-    /// One pixel.
+    /// Paints one pixel.
     pub fn dot(&mut self, x: i64, y: i64, ink: Ink) {
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
         let width = self.image.width();
@@ -72,8 +72,9 @@ impl Canvas {
         }
     }
 
-    /// A line of one pixel's width.
+    /// Paints a line of one pixel's width.
     pub fn line(&mut self, from: Point2<f64>, to: Point2<f64>, ink: Ink) {
+        // Clipped first: a far point would otherwise cost millions of steps outside the canvas.
         let whole = Rect::new(
             -1.0,
             -1.0,
@@ -88,14 +89,14 @@ impl Canvas {
         }
     }
 
-    /// Lines through all points.
+    /// Paints lines through all points.
     pub fn path(&mut self, points: &[Point2<f64>], ink: Ink) {
         for pair in points.windows(2) {
             self.line(pair[0], pair[1], ink);
         }
     }
 
-    /// The outline of a rectangle, `thick` pixels wide, growing inwards.
+    /// Paints the outline of a rectangle, `thick` pixels wide, growing inwards.
     pub fn outline(&mut self, rect: &Rect, thick: u32, ink: Ink) {
         for inset in 0..thick {
             let by = 2.0 * f64::from(inset);
@@ -106,7 +107,7 @@ impl Canvas {
         }
     }
 
-    /// A filled rectangle.
+    /// Paints a filled rectangle.
     pub fn fill(&mut self, rect: &Rect, ink: Ink) {
         let inside = rect.clipped(self.image.width(), self.image.height());
         for y in inside.y as i64..inside.bottom() as i64 {
@@ -116,7 +117,7 @@ impl Canvas {
         }
     }
 
-    /// A filled disc.
+    /// Paints a filled disc.
     pub fn disc(&mut self, centre: Point2<f64>, radius: f64, ink: Ink) {
         let reach = radius.ceil() as i64;
         let (cx, cy) = (centre.x.round() as i64, centre.y.round() as i64);
@@ -129,8 +130,8 @@ impl Canvas {
         }
     }
 
-    /// A line of text on a dark bar; `at` is its upper left corner. Text that
-    /// would leave the canvas is moved inside.
+    /// Paints a line of text on a dark bar; `at` is its upper left corner. Text that would leave
+    /// the canvas is moved inside.
     pub fn text(&mut self, at: Point2<f64>, text: &str, ink: Ink) {
         let width = 8.0 * text.chars().count() as f64;
         let room = (self.image.width() as f64 - width - 1.0, self.image.height() as f64 - LINE_PX);
@@ -144,6 +145,7 @@ impl Canvas {
     }
 
     fn letter(&mut self, x: i64, y: i64, letter: char, ink: Ink) {
+        // The font has ASCII only.
         let glyph = BASIC_LEGACY.get(letter as usize).unwrap_or(&BASIC_LEGACY['?' as usize]);
         for (dy, row) in (0..).zip(glyph) {
             for dx in (0..8).filter(|dx| row >> dx & 1 == 1) {
@@ -153,7 +155,7 @@ impl Canvas {
     }
 }
 
-/// The part of a line inside `bounds` (Liang and Barsky), if there is one.
+/// Returns the part of a line inside `bounds` (Liang and Barsky), if there is one.
 fn clip(from: Point2<f64>, to: Point2<f64>, bounds: &Rect) -> Option<(Point2<f64>, Point2<f64>)> {
     let along = to - from;
     let (mut enter, mut leave) = (0.0f64, 1.0f64);

@@ -12,13 +12,14 @@ const FAR_M: f32 = 8.0;
 const REJECTED: Ink = Ink::solid([200, 200, 200]).faint(0.55);
 const TITLE: Ink = Ink::solid([255, 255, 255]);
 
-/// The camera's image with everything drawn on it.
+/// Renders the camera's image with all overlays.
 pub fn draw(scene: &Scene, trails: &Trails) -> Canvas {
     let (width, height) = (scene.camera.width, scene.camera.height);
     let mut canvas = Canvas::new(width, height, [0; 3]);
     if let Some(picture) = background(&scene.images) {
         canvas.paste(&picture, 0, 0);
     }
+    // Tracks come last, so that nothing hides them.
     draw_sketch(&mut canvas, &scene.report.sketch);
     draw_rejected(&mut canvas, scene);
     draw_trails(&mut canvas, scene, trails);
@@ -30,7 +31,7 @@ pub fn draw(scene: &Scene, trails: &Trails) -> Canvas {
     canvas
 }
 
-/// The best picture of the scene that the log carries.
+/// Returns the best picture of the scene in the log: colour, grey, or shaded depth.
 pub fn background(images: &Images) -> Option<RgbImage> {
     if let Some(colour) = &images.colour {
         return Some(RgbImage::clone(colour));
@@ -41,7 +42,7 @@ pub fn background(images: &Images) -> Option<RgbImage> {
     images.depth.as_deref().map(shaded)
 }
 
-/// Near is bright, far is dark, no reading is a dark red.
+/// Shades depth: near is bright, far is dark, no reading is a dark red.
 fn shaded(depth: &DepthImage) -> RgbImage {
     depth.map(|metres| {
         if metres.is_finite() {
@@ -57,8 +58,8 @@ fn title(scene: &Scene) -> String {
     format!("frame {}  {} s  {people} seen", scene.report.index, scene.report.stamp)
 }
 
-/// What the filter imagines (P3, Figures 5 to 7): bodies, particles, and maps in
-/// the lower left corner.
+/// Renders the state of the filter (P3, Figures 5 to 7): bodies, particles, and maps in the lower
+/// left corner.
 fn draw_sketch(canvas: &mut Canvas, sketch: &Sketch) {
     for body in &sketch.silhouettes {
         let ink = colour_of(body.id.0).faint(0.4);
@@ -74,11 +75,11 @@ fn draw_sketch(canvas: &mut Canvas, sketch: &Sketch) {
     }
 }
 
-/// Side of a map's cell, and what is left free around a map, pixels.
+/// Side of a map's cell, and margin around a map, pixels.
 const CELL_PX: f64 = 2.0;
 const MAP_MARGIN_PX: f64 = 4.0;
 
-/// One map with its title, above `bottom`; returns its height, pixels.
+/// Renders one map with its title, above `bottom`; returns its height, pixels.
 fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
     let rows = map.values.len().div_ceil(map.columns.max(1));
     let height = CELL_PX * rows as f64;
@@ -93,13 +94,14 @@ fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
     height + LINE_PX
 }
 
-/// What was dropped, with the test that dropped it.
+/// Renders the dropped candidates, with the test that dropped them.
 fn draw_rejected(canvas: &mut Canvas, scene: &Scene) {
     for candidate in &scene.report.candidates {
         if let Fate::Dropped(test) = candidate.fate {
             label(canvas, &candidate.detection.region, test);
         }
     }
+    // A funnel entry without a visible candidate is shown once, with its count.
     for entry in scene.report.funnel.entries() {
         let shown = scene.report.candidates.iter().any(|c| c.fate == Fate::Dropped(entry.test));
         if let Some(region) = entry.example.filter(|_| !shown) {
@@ -120,7 +122,7 @@ fn draw_trails(canvas: &mut Canvas, scene: &Scene, trails: &Trails) {
     }
 }
 
-/// Seen: a thick box; predicted only: a thin one; tentative: grey.
+/// Renders a track. Seen: a thick box; predicted only: a thin one; tentative: grey.
 fn draw_track(canvas: &mut Canvas, track: &Track) {
     let ink = if track.confirmed { colour_of(track.id.0) } else { REJECTED };
     let region = &track.estimate.region;

@@ -1,8 +1,8 @@
-//! Pictures of what the pipeline saw and believed, one a frame.
+//! Pictures of the pipeline's detections and tracks, one per frame.
 //!
-//! On the left the camera's image (depth in shades where there is no colour)
-//! with upper-body boxes, ids and trails; what was dropped is drawn faintly with
-//! the test that dropped it. On the right the same people from above.
+//! On the left the camera's image (depth in shades where there is no colour) with upper-body boxes,
+//! ids and trails; dropped candidates are rendered faintly with the test that dropped them. On the
+//! right the same people from above.
 
 pub mod canvas;
 mod image_view;
@@ -21,31 +21,31 @@ use tagalong_core::{Camera, Images, RgbImage};
 use tagalong_pipeline::FrameReport;
 use trails::Trails;
 
-/// Everything that a picture of one frame shows.
+/// Data that a picture of one frame shows.
 pub struct Scene {
-    /// The camera.
+    /// Camera of the frame.
     pub camera: Arc<Camera>,
-    /// The images; shared, not copied.
+    /// Images of the frame; shared, not copied.
     pub images: Images,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: Isometry2<f64>,
-    /// What the pipeline said.
+    /// Report of the pipeline.
     pub report: FrameReport,
 }
 
-/// Draws the pictures of a run into a folder.
+/// Renderer of the pictures of a run, into a folder.
 pub struct Overlay {
     folder: PathBuf,
     trails: Trails,
 }
 
 impl Overlay {
-    /// Draws into `folder`, which exists.
+    /// Renders into `folder`, which exists.
     pub fn new(folder: PathBuf) -> Self {
         Self { folder, trails: Trails::default() }
     }
 
-    /// Draws one frame as `000001.png` and so on, by the frame's index.
+    /// Renders one frame as `000001.png` and so on, by the frame's index.
     ///
     /// # Errors
     /// A sentence that names the file.
@@ -62,12 +62,12 @@ fn picture(scene: &Scene, trails: &Trails) -> RgbImage {
     let plan_width = plan_view::width_px(height);
     let mut canvas = Canvas::new(width + plan_width, height, [24, 24, 28]);
     plan_view::draw(&mut canvas, width, scene, trails);
-    // The image comes second and covers what the plan view drew beyond its part.
+    // The image comes second and covers the parts of the plan view beyond its area.
     canvas.paste(&image_view::draw(scene, trails).into_image(), 0, 0);
     canvas.into_image()
 }
 
-/// A colour for a track: neighbours in number are far apart in hue.
+/// Returns the colour of a track: neighbours in number are far apart in hue.
 fn colour_of(id: u32) -> Ink {
     const COLOURS: [[u8; 3]; 10] = [
         [255, 99, 71],
@@ -89,6 +89,7 @@ pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), png::EncodingError
     let file = BufWriter::new(File::create(path)?);
     let mut encoder = png::Encoder::new(file, image.width() as u32, image.height() as u32);
     encoder.set_color(png::ColorType::Rgb);
+    // One picture per frame: the time to compress matters more than the size.
     encoder.set_compression(png::Compression::Fast);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(image.pixels().as_flattened())?;

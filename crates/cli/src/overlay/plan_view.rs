@@ -16,12 +16,12 @@ const AXIS: Ink = Ink::solid([150, 150, 160]);
 const VIEW: Ink = Ink::solid([110, 130, 170]);
 const TENTATIVE: Ink = Ink::solid([150, 150, 150]);
 
-/// Columns of the view beside an image with `height` rows.
+/// Returns the columns of the view beside an image with `height` rows.
 pub fn width_px(height: usize) -> usize {
     (height * 4 / 5).max(16)
 }
 
-/// Metres on the floor to pixels: ahead is up, left is left.
+/// Map from metres on the floor to pixels: ahead is up, left is left.
 struct Plan {
     robot: Point2<f64>,
     px_per_m: f64,
@@ -46,7 +46,7 @@ impl Plan {
     }
 }
 
-/// Draws the people from above, to the right of column `left`.
+/// Renders the people from above, to the right of column `left`.
 pub fn draw(canvas: &mut Canvas, left: usize, scene: &Scene, trails: &Trails) {
     let plan = Plan::new(left, scene.camera.height);
     draw_grid(canvas, &plan);
@@ -61,7 +61,7 @@ pub fn draw(canvas: &mut Canvas, left: usize, scene: &Scene, trails: &Trails) {
     }
 }
 
-/// A line every metre, its number every second one.
+/// Renders a line every metre, its number every second one.
 fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
     let sides = (0.5 * plan.width / plan.px_per_m).ceil();
     for metre in -(sides as i32)..=sides as i32 {
@@ -80,13 +80,14 @@ fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
     }
 }
 
-/// The two edges of what the camera sees, on the floor plan.
+/// Renders the two edges of the field of view, on the floor plan.
 fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &Scene) {
     let camera = &scene.camera;
     let eye = Point3::from(camera.robot_from_camera.translation.vector);
     for column in [0.0, camera.width as f64 - 1.0] {
         let ray = camera.ray(Point2::new(column, 0.5 * camera.height as f64));
         let ray_in_robot = camera.robot_from_camera.rotation * ray;
+        // 12 m reach beyond the corners of the view.
         let end = eye + ray_in_robot * 12.0;
         canvas.line(plan.of(&eye), plan.of(&end), VIEW);
     }
@@ -98,6 +99,7 @@ fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
     let at = plan.of(&person.position);
     let opacity = if track.seen { 1.0 } else { 0.5 };
     canvas.disc(at, if target { 6.0 } else { 4.0 }, ink.faint(opacity));
+    // The line ends where the person will be in one second.
     let soon = person.position.xy() + person.velocity;
     canvas.line(at, plan.pixel(soon.x, soon.y), ink.faint(opacity));
     let covariance = track.estimate.covariance.fixed_view::<2, 2>(0, 0).into_owned();
@@ -106,10 +108,11 @@ fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
     canvas.text(at + Vector2::new(8.0, -4.0), &text, ink);
 }
 
-/// Two standard deviations around a place on the floor.
+/// Returns the ellipse of two standard deviations around a position on the floor.
 fn ellipse(plan: &Plan, centre: &Point3<f64>, covariance: Matrix2<f64>) -> Vec<Point2<f64>> {
     let eigen = SymmetricEigen::new(covariance);
     let axes = eigen.eigenvectors;
+    // Rounding can make an eigenvalue of a narrow ellipse slightly negative.
     let sigma = eigen.eigenvalues.map(|v| 2.0 * v.max(0.0).sqrt());
     (0..=24)
         .map(|i| {

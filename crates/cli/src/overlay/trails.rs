@@ -8,20 +8,21 @@ use super::Scene;
 /// Points kept of a trail.
 const LENGTH: usize = 60;
 
-/// Where the heads of confirmed people were, in the odometry frame.
+/// Past head positions of confirmed people, in the odometry frame.
 #[derive(Default)]
 pub struct Trails {
     places: BTreeMap<TrackId, VecDeque<Point3<f64>>>,
 }
 
 impl Trails {
-    /// Adds where people are now and forgets tracks that ended.
+    /// Adds the present positions and forgets tracks that ended.
     pub fn follow(&mut self, scene: &Scene) {
         let tracks = &scene.report.tracks;
         self.places.retain(|id, _| tracks.iter().any(|track| track.id == *id));
         for track in tracks.iter().filter(|track| track.confirmed) {
             let trail = self.places.entry(track.id).or_default();
             let head = track.estimate.person.position;
+            // Kept in the odometry frame, because the robot frame moves under the trail.
             let floor = scene.odom_from_robot * head.xy();
             trail.push_back(Point3::new(floor.x, floor.y, head.z));
             if trail.len() > LENGTH {
@@ -30,7 +31,7 @@ impl Trails {
         }
     }
 
-    /// The trails in the robot frame as it is now.
+    /// Returns the trails in the present robot frame.
     pub fn in_robot(&self, scene: &Scene) -> Vec<(TrackId, Vec<Point3<f64>>)> {
         let into_robot = |p: &Point3<f64>| {
             let floor = scene.odom_from_robot.inverse_transform_point(&p.xy());

@@ -1,5 +1,5 @@
-//! Where depth puts the edge of a person against where it is. Structured light
-//! frays it, stereo matching with windows fattens it.
+//! Edges of people in depth against their true places. Structured light frays them, stereo matching
+//! with windows fattens them.
 
 use tagalong_core::{DepthImage, Rect};
 use tagalong_sim::Truth;
@@ -7,7 +7,7 @@ use tagalong_trials::{Drawn, TrialError};
 
 use super::{Check, depth, deviation, drawn, mean, scene};
 
-/// A camera, and what is wanted of it.
+/// Camera, and the limits of its check.
 pub struct Rig {
     group: &'static str,
     /// `[camera]` of the scene.
@@ -23,23 +23,24 @@ pub const RGBD: Rig = Rig {
     mean_px: [-2.0, 2.0],
 };
 
-/// A matched pair: what is near grows by half of the matcher's window.
+/// Matched pair: near objects grow by half of the matcher's window.
 pub const STEREO: Rig = Rig {
     group: "silhouettes in depth (stereo pair)",
     camera: "kind = \"stereo\"",
     mean_px: [0.0, 5.0],
 };
 
-/// Depth within this of the trunk is the person, m.
+/// Distance from the trunk within which depth is the person's, m.
 const BODY_M: f32 = 0.4;
-/// The edge is looked for up to this far outside of the true one, pixels.
+/// Largest distance outside of the true edge at which the measured one is searched for, pixels.
 const REACH_PX: i64 = 12;
-/// Histogram of displacements: from here to its negative, pixels.
+/// Last bin of the histogram of displacements, which runs from its negative, pixels.
 const BINS: i64 = 3;
 
 pub fn checks(rig: &Rig, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let Rig { group, camera, mean_px } = *rig;
     let mut offsets = Vec::new();
+    // A few seeds at least: one standing person has only three edges per image.
     for seed in 1..=seeds.max(4) {
         let standing = format!(
             "seed = {seed}\nduration_s = 0.25\n[room]\nsize_m = [9.0, 6.0]\n\
@@ -72,7 +73,7 @@ fn name(bin: i64) -> String {
     }
 }
 
-/// Left, right and upper edge of everybody who is wholly seen.
+/// Returns the displacements of the left, right and upper edge of every wholly visible person.
 fn displacements(drawn: &Drawn) -> Vec<f64> {
     let Some(depth) = depth(&drawn.frame) else { return Vec::new() };
     let of = |person: &Truth| {
@@ -90,7 +91,7 @@ fn displacements(drawn: &Drawn) -> Vec<f64> {
     drawn.truth.iter().filter_map(of).flatten().flatten().collect()
 }
 
-/// The bounds of what is as far away as the trunk.
+/// Returns the bounds of the pixels that are as far away as the trunk.
 fn extent(depth: &DepthImage, seen: &Rect, trunk_m: f32) -> Option<Rect> {
     let (left, right) = (seen.x as i64 - REACH_PX, seen.right() as i64 + REACH_PX);
     let (top, bottom) = (seen.y as i64 - REACH_PX, seen.bottom() as i64);

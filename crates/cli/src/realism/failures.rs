@@ -1,6 +1,6 @@
-//! What is known to fail must fail here, too: the detector without a verifier
-//! takes furniture for people, and the printed filter runs ahead of whoever a
-//! moving robot looks at.
+//! Known failures that must occur in simulation, too: the detector without a verifier takes
+//! furniture for people, and the printed filter gives wrong velocities to a person before a moving
+//! robot.
 
 use nalgebra::Point2;
 use tagalong_core::Registry;
@@ -32,7 +32,7 @@ fn ekf() -> Contender {
     Contender::new("depth-ekf", EKF)
 }
 
-/// Detections that were believed, per image.
+/// Returns the number of accepted detections in rooms without people, per image.
 fn false_alarms(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
     let short = |scene| Scene { duration_s: 6.0, ..scene };
     let scenes: Vec<Scene> = scenes(EMPTY, seeds).into_iter().map(short).collect();
@@ -48,7 +48,7 @@ fn is_believed(candidate: &Candidate) -> bool {
     matches!(candidate.fate, Fate::Matched(_) | Fate::Started(_))
 }
 
-/// The part of single coat stands, three metres ahead, that are believed.
+/// Returns the share of single coat stands, three metres ahead, with an accepted detection.
 fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
     let stand = |seed: u64| {
         scene(&format!(
@@ -57,6 +57,7 @@ fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
             45 * seed % 360
         ))
     };
+    // Eight seeds cover all headings, 45 degrees apart.
     let scenes: Vec<Scene> = (1..=seeds.max(8)).map(stand).collect();
     let stand_at = Point2::new(3.0, 0.0);
     let taken = |trial: Trial| {
@@ -67,8 +68,8 @@ fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
     Ok(mean(&each(&scenes, &[ekf()], registry, threads(None), taken, |_| ())?))
 }
 
-/// Mean error of the forward velocity of somebody who stands, m/s, by the
-/// corrected and by the printed filter, before a robot at rest and a moving one.
+/// Checks the mean error of the forward velocity of a standing person, m/s, by the corrected and by
+/// the printed filter, before a robot at rest and a moving one.
 fn printed_filter(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let contenders = [ekf(), Contender::new("depth-ekf-as-printed", AS_PRINTED)];
     let standing = |path: &str| {
@@ -84,6 +85,7 @@ fn printed_filter(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialEr
         let keep = |trial: Trial| Ok([velocity_bias(&trial, 0), velocity_bias(&trial, 1)]);
         let all = each(&scenes, &contenders, registry, threads(None), keep, |_| ())?;
         let bias = |at: usize| mean(&all.iter().map(|both| both[at]).collect::<Vec<f64>>()).abs();
+        // The printed filter must fail before a moving robot, and only there.
         let limits = [[0.0, 0.15], if path == "[]" { [0.0, 0.15] } else { [0.4, f64::INFINITY] }];
         for ((name, at), limits) in [("corrected", 0), ("printed", 1)].into_iter().zip(limits) {
             let what = format!("velocity bias, {name} filter, {robot}");
@@ -93,7 +95,7 @@ fn printed_filter(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialEr
     Ok(checks)
 }
 
-/// Of the tracks near the one person there is, once they have settled.
+/// Returns the mean forward velocity of the tracks near the only person, once they have settled.
 fn velocity_bias(trial: &Trial, at: usize) -> f64 {
     let Run { reports, .. } = &trial.runs[at];
     let mut speeds = Vec::new();

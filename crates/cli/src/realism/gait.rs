@@ -1,7 +1,6 @@
-//! Steps of drawn people against the walking model of Boulic, Magnenat-Thalmann
-//! & Thalmann (1990): with leg lengths per second `RV`, a cycle of two steps
-//! takes `1.346 / sqrt(RV)` seconds, and the body rises and sinks by
-//! `0.03 RV` leg lengths.
+//! Steps of simulated people against the walking model of Boulic, Magnenat-Thalmann & Thalmann
+//! (1990): with leg lengths per second `RV`, a cycle of two steps takes `1.346 / sqrt(RV)` seconds,
+//! and the body rises and sinks by `0.03 RV` leg lengths.
 
 use nalgebra::Point3;
 use tagalong_trials::TrialError;
@@ -9,12 +8,12 @@ use tagalong_trials::TrialError;
 use super::{Check, drawn, mean, scene};
 
 const GROUP: &str = "gait";
-/// Speeds that people are asked for, m/s.
+/// Requested speeds of the people, m/s.
 const SPEEDS_MPS: [f64; 3] = [0.8, 1.1, 1.4];
 /// Their height, m, and the leg's part of it.
 const HEIGHT_M: f64 = 1.7;
 const LEG: f64 = 0.491;
-/// Looks per second.
+/// Samples per second.
 const RATE_HZ: f64 = 50.0;
 
 pub fn checks() -> Result<Vec<Check>, TrialError> {
@@ -58,7 +57,7 @@ fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-/// The head of somebody who walks past a robot at rest, in full stride.
+/// Returns the head positions of a person walking past a robot at rest, in full stride.
 fn heads(speed_mps: f64) -> Vec<Point3<f64>> {
     let text = format!(
         "duration_s = 8.0\n[room]\nsize_m = [18.0, 6.0]\n[camera]\nwidth = 16\nheight = 12\n\
@@ -67,16 +66,18 @@ fn heads(speed_mps: f64) -> Vec<Point3<f64>> {
          height_m = {HEIGHT_M:.2}\n"
     );
     let all = drawn(&scene(&text)).filter_map(|d| d.truth.first().map(|t| t.head_in_robot));
+    // The first two seconds are those in which the person gathers speed.
     all.skip((2.0 * RATE_HZ) as usize).collect()
 }
 
-/// How often a series rises through its mean, per second, from the first to the
-/// last time that it does.
+/// Returns the rate at which a series rises through its mean, per second, from the first to the
+/// last crossing.
 fn crossings_per_s(values: &[f64]) -> f64 {
     let centre = mean(values);
     let rises = |pair: &[f64]| pair[0] < centre && pair[1] >= centre;
     let at: Vec<f64> = (0..values.len().saturating_sub(1))
         .filter(|i| rises(&values[*i..*i + 2]))
+        // Interpolated, because a step is only some 25 samples long.
         .map(|i| i as f64 + (centre - values[i]) / (values[i + 1] - values[i]))
         .collect();
     match at.as_slice() {

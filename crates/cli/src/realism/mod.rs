@@ -1,6 +1,6 @@
-//! `tagalong simulate --realism`: is the drawn world hard in the ways in which
-//! the real one is? Each check is a figure, what is wanted of it, and whether it
-//! holds; one that does not is said as loudly as one that does.
+//! `tagalong simulate --realism`: checks that the simulated world is hard in the ways in which the
+//! real one is. Each check is a figure, its limits, and whether it holds; one that does not is
+//! reported as clearly as one that does.
 
 mod edges;
 mod failures;
@@ -20,25 +20,25 @@ use tagalong_trials::{Draw, Drawn, TrialError};
 use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, print};
 
-/// A figure and what is wanted of it.
+/// Figure with its limits.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// What it belongs to.
+    /// Group of the check.
     pub group: &'static str,
-    /// What was measured.
+    /// Description of the figure.
     pub what: String,
     /// The figure; absent where it could not be measured.
     pub value: Option<f64>,
-    /// Its unit.
+    /// Unit of the figure.
     pub unit: &'static str,
-    /// What is wanted, in words.
+    /// Limits, in words.
     pub wanted: String,
-    /// Whether that holds; absent where nothing is wanted, or nothing measured.
+    /// True if the figure is within the limits; absent without limits or figure.
     pub holds: Option<bool>,
 }
 
 impl Check {
-    /// A figure that should lie between two others.
+    /// Returns the check of a figure that should lie between two others.
     pub fn between(
         group: &'static str,
         what: impl Into<String>,
@@ -55,7 +55,7 @@ impl Check {
         Self { group, what: what.into(), value: Some(value), unit, wanted, holds }
     }
 
-    /// A figure to look at.
+    /// Returns a figure without limits, for information.
     pub fn told(
         group: &'static str,
         what: impl Into<String>,
@@ -66,14 +66,14 @@ impl Check {
         Self { group, what, value: Some(value), unit, wanted, holds: None }
     }
 
-    /// Something that could not be measured, and why.
+    /// Returns a check that could not be measured, with the reason.
     pub fn skipped(group: &'static str, why: impl Into<String>) -> Self {
         let (what, wanted) = (why.into(), String::new());
         Self { group, what, value: None, unit: "", wanted, holds: None }
     }
 }
 
-/// Which part of the checks, how thoroughly.
+/// Part of the checks; takes the number of seeds.
 type Part = fn(&Registry, u64) -> Result<Vec<Check>, TrialError>;
 
 /// All parts, by name.
@@ -87,10 +87,10 @@ const PARTS: [(&str, Part); 7] = [
     ("depth patches", |_, seeds| patches::checks(seeds)),
 ];
 
-/// Measures everything and prints it; `seeds` draws where a scene is random.
+/// Runs all checks and prints them, with so many `seeds` where a scene is random.
 ///
 /// # Errors
-/// A plugin that fails on a drawn frame.
+/// A plugin that fails on a simulated frame.
 pub fn realism(registry: &Registry, seeds: u64, format: Format) -> Outcome {
     let bar = ProgressBar::new(PARTS.len() as u64);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} checks {msg}") {
@@ -147,19 +147,20 @@ fn scene(text: &str) -> Scene {
     scene_with(text, &Variant::default())
 }
 
-/// The same scene with as many seeds: other luck, and all that varies drawn anew.
+/// Returns the same scene with as many seeds: other noise, and new values of everything that
+/// varies.
 fn scenes(text: &str, seeds: u64) -> Vec<Scene> {
     let variant = |seed| Variant { seed: Some(seed), ..Variant::default() };
     (0..seeds).map(|seed| scene_with(text, &variant(seed))).collect()
 }
 
-/// All frames of a scene; those of a stereo pair with the depth that the stage
-/// of the pipelines finds.
+/// Returns all frames of a scene; those of a stereo pair with the depth that the stage of the
+/// pipelines computes.
 fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn> + use<> {
     drawn_with(scene, StereoSettings::default())
 }
 
-/// The same with depth by other settings of the stage.
+/// Returns the same with depth by other settings of the stage.
 fn drawn_with(scene: &Scene, settings: StereoSettings) -> impl Iterator<Item = Drawn> + use<> {
     let mut draw = Draw::new(scene, crate::simulate::threads(None));
     let is_pair = scene.camera.kind == CameraKind::Stereo;
@@ -172,7 +173,7 @@ fn drawn_with(scene: &Scene, settings: StereoSettings) -> impl Iterator<Item = D
     })
 }
 
-/// The depth that a pipeline would see.
+/// Returns the depth that a pipeline would receive.
 fn depth(frame: &Frame) -> Option<&DepthImage> {
     frame.depth().ok()
 }

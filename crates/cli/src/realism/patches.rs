@@ -1,11 +1,10 @@
-//! A two-sample test: can a simple classifier tell drawn people from real ones
-//! by their depth? An area under its curve of one half is "no", one is "always".
+//! Two-sample test: a simple classifier tries to separate simulated people from real ones by their
+//! depth. An area under the ROC curve of one half means that it cannot, one that it always can.
 //!
-//! Each sample is the depth in the upper-body square of somebody who is wholly
-//! seen. Its features are the medians of a 6x6 grid against the trunk, the part
-//! of readings in a 3x3 grid, and the roughness. A linear discriminant is
-//! trained on all recordings but one, and on all drawn rooms but some, and
-//! asked about the rest.
+//! Each sample is the depth in the upper-body square of a wholly visible person. Its features are
+//! the medians of a 6x6 grid relative to the trunk, the share of readings in a 3x3 grid, and the
+//! roughness. A linear discriminant is trained on all recordings but one, and on all simulated
+//! rooms but some, and tested on the rest.
 
 use std::path::{Path, PathBuf};
 
@@ -18,14 +17,14 @@ use tagalong_trials::TrialError;
 use super::{Check, drawn, mean, scene};
 
 const GROUP: &str = "drawn against real depth patches";
-/// Where recordings with annotated people lie, seen from the repository.
+/// Folder of the recordings with annotated people, relative to the repository.
 const LOGS: &str = "../shared/data/logs";
 /// Recordings with depth and annotated people.
 const REAL: [&str; 3] = ["filinha", "lab2-camera2", "um"];
 /// Cells of the grid of depths, and of the grid of readings, along a side.
 const CELLS: usize = 6;
 const FILLS: usize = 3;
-/// Depth further from the trunk than this counts as this, m.
+/// Bound on the difference of depth from the trunk, m.
 const FAR_M: f32 = 1.0;
 /// Ridge of the discriminant, part of the mean variance.
 const RIDGE: f64 = 0.05;
@@ -52,14 +51,14 @@ pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
     ])
 }
 
-/// Frames without depth are of no use; colour is not looked at.
+/// Frames without depth are useless here; colour is not needed.
 const DEPTH: Inputs = Inputs::NONE.require(Input::Depth);
 
 fn log(name: &str) -> PathBuf {
     Path::new(LOGS).join(format!("{name}.mcap"))
 }
 
-/// The people of a recording who are wholly seen; `None` where it is absent.
+/// Returns the samples of the wholly visible people of a recording; `None` where it is absent.
 fn recording(log: &Path) -> Option<Vec<Sample>> {
     let text = std::fs::read_to_string(log.with_extension("people.csv")).ok()?;
     let rows = people::parse(&text, "people.csv").ok()?;
@@ -78,7 +77,7 @@ fn recording(log: &Path) -> Option<Vec<Sample>> {
     Some(samples)
 }
 
-/// Drawn rooms, in as many folds as there are recordings.
+/// Returns samples from simulated rooms, in as many folds as there are recordings.
 fn rooms(folds: usize, seeds: u64) -> Vec<Vec<Sample>> {
     let mut all = vec![Vec::new(); folds];
     for seed in 1..=seeds.max(2 * folds as u64) {
@@ -99,7 +98,7 @@ fn rooms(folds: usize, seeds: u64) -> Vec<Vec<Sample>> {
     all
 }
 
-/// What is looked at in an upper-body square; `None` if it is hardly there.
+/// Returns the features of an upper-body square; `None` if it is hardly in the image.
 fn features(depth: &DepthImage, square: &Rect) -> Option<Sample> {
     let square = square.clipped(depth.width(), depth.height());
     if square.width < 24.0 || square.height < 24.0 {
@@ -127,7 +126,7 @@ fn cells(side: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..side).flat_map(move |row| (0..side).map(move |column| (row, column)))
 }
 
-/// The pixels of one cell of a grid over the square, row by row.
+/// Returns the pixels of one cell of a grid over the square, row by row.
 fn cell(depth: &DepthImage, square: &Rect, side: usize, row: usize, column: usize) -> Vec<f32> {
     let edge = |from: f64, length: f64, index: usize| {
         (from + length * index as f64 / side as f64) as usize
@@ -148,14 +147,14 @@ fn median(values: &[f32]) -> Option<f32> {
     finite.get(finite.len() / 2).copied()
 }
 
-/// Median step between neighbours, in parts of a thousandth of the squared range.
+/// Returns the median step between neighbours, in thousandths of the squared range.
 fn roughness(pixels: &[f32], trunk_m: f32) -> f64 {
     let steps: Vec<f32> = pixels.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     f64::from(median(&steps).unwrap_or(0.0) / (trunk_m * trunk_m).max(0.1)) * 1e3
 }
 
-/// Mean area under the curve over folds that the discriminant did not see. With
-/// a single fold there is nothing to leave out: every other sample is.
+/// Returns the mean area under the ROC curve over held-out folds. With a single fold, every other
+/// sample is held out.
 fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
     if a.len() < 2 {
         let halves = |all: &[Vec<Sample>]| -> Vec<Vec<Sample>> {
@@ -177,7 +176,7 @@ fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
     mean(&areas.collect::<Vec<f64>>())
 }
 
-/// Fisher's linear discriminant with a ridge, larger on `a`.
+/// Returns Fisher's linear discriminant with a ridge, larger on `a`.
 fn discriminant(a: &[Sample], b: &[Sample]) -> Option<DVector<f64>> {
     let size = a.first()?.len();
     let centre = |all: &[Sample]| all.iter().sum::<DVector<f64>>() / all.len() as f64;
@@ -191,11 +190,12 @@ fn discriminant(a: &[Sample], b: &[Sample]) -> Option<DVector<f64>> {
     let (of_a, of_b) = (centre(a), centre(b));
     let mut within = scatter(a, &of_a) + scatter(b, &of_b);
     let ridge = RIDGE * within.trace() / size as f64;
+    // The ridge also keeps the matrix positive definite if a feature never varies.
     (0..size).for_each(|i| within[(i, i)] += ridge.max(1e-9));
     Some(within.cholesky()?.solve(&(of_a - of_b)))
 }
 
-/// How often a score of `a` is above one of `b`; ties are half.
+/// Returns the share of pairs in which the score of `a` is above that of `b`; ties are half.
 fn area(a: &[f64], b: &[f64]) -> Option<f64> {
     let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
     let wins = pairs.map(|(x, y)| if x > y { 1.0 } else { f64::from(u8::from(x == y)) * 0.5 });

@@ -1,7 +1,6 @@
-//! Depth of a flat wall: how much it scatters, how much of it is there, how far
-//! it is off. Stereo and structured light both say that the scatter of depth
-//! grows with its square, `z² s / (f B)` for a scatter `s` of the disparity. The
-//! wall is looked at askew, so that it covers many steps of the disparity.
+//! Depth of a flat wall: its scatter, its fill rate and its offset. For stereo and structured light
+//! the scatter of depth grows with its square, `z² s / (f B)` for a scatter `s` of the disparity.
+//! The wall is seen askew, so that it covers many steps of the disparity.
 
 use nalgebra::{Matrix3, Vector3};
 use tagalong_core::DepthImage;
@@ -12,23 +11,22 @@ use super::{Check, depth, deviation, drawn_with, mean, scene};
 
 /// Distances of the wall, m.
 const RANGES_M: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-/// How far the camera looks aside, degrees.
+/// Angle of the camera to the wall's normal, degrees.
 const ASKEW_DEG: f64 = 20.0;
 
-/// A camera, and what is wanted of it.
+/// Camera, and the limits of its check.
 pub struct Rig {
     group: &'static str,
     /// `kind` of the camera in the scene.
     kind: &'static str,
     baseline_m: f64,
-    /// Half of the part of the columns and of the rows that look at nothing but
-    /// the wall.
+    /// Half of the part of the columns and of the rows that show only the wall.
     window: [f64; 2],
     /// Least and greatest scatter of the disparity, pixels.
     sigma_px: [f64; 2],
     /// Least part of the wall that has depth up to 4 m.
     fill: f64,
-    /// A wall in one colour has little depth.
+    /// True if a wall in one colour has little depth.
     needs_texture: bool,
 }
 
@@ -43,7 +41,7 @@ pub const RGBD: Rig = Rig {
     needs_texture: false,
 };
 
-/// A matched pair before a wall with texture.
+/// Matched pair before a wall with texture.
 pub const STEREO: Rig = Rig {
     group: "depth of a wall (stereo pair)",
     kind: "stereo",
@@ -54,12 +52,12 @@ pub const STEREO: Rig = Rig {
     needs_texture: true,
 };
 
-/// What is measured on a wall.
+/// Measurements of a wall.
 struct Wall {
     range_m: f64,
     /// Standard deviation from the best plane, m.
     residual_m: f64,
-    /// The plane at the centre against the wall, m.
+    /// Offset of the plane at the centre from the wall, m.
     bias_m: f64,
     /// Fraction of pixels with a reading.
     fill: f64,
@@ -109,6 +107,7 @@ fn of_wall(rig: &Rig, wall: &Wall) -> [Check; 3] {
 }
 
 fn measure(rig: &Rig, range_m: f64, wallpaper: bool) -> Option<Wall> {
+    // The robot stands 1 m from the wall behind it.
     let length_m = range_m + 1.0;
     let room = format!("[room]\nsize_m = [{length_m}, 14.0]\nwallpaper = {wallpaper}\n");
     let Rig { kind, baseline_m, .. } = *rig;
@@ -120,8 +119,8 @@ fn measure(rig: &Rig, range_m: f64, wallpaper: bool) -> Option<Wall> {
     );
     let mut fits = Vec::new();
     let mut focal_px = 0.0;
-    // The faint wallpaper does not pass for texture where people are looked for;
-    // here the matcher is asked what it makes of it.
+    // The pipelines' texture threshold rejects the faint wallpaper; here the matcher itself is
+    // under test.
     let settings = StereoSettings { texture: 0, ..StereoSettings::default() };
     for drawn in drawn_with(&scene(&text), settings) {
         focal_px = drawn.frame.camera.focal_px();
@@ -132,6 +131,7 @@ fn measure(rig: &Rig, range_m: f64, wallpaper: bool) -> Option<Wall> {
     }
     let of = |pick: fn(&Fit) -> f64| mean(&fits.iter().map(pick).collect::<Vec<f64>>());
     let residual_m = of(|fit| fit.residual_m);
+    // The askew optical axis meets the wall farther away.
     let centre_m = range_m / ASKEW_DEG.to_radians().cos();
     Some(Wall {
         range_m,
@@ -148,7 +148,7 @@ struct Fit {
     fill: f64,
 }
 
-/// The best plane through the middle of the image: `1 / z = a + b u + c v`.
+/// Fits the best plane through the middle of the image: `1 / z = a + b u + c v`.
 fn fit(depth: &DepthImage, window: [f64; 2]) -> Option<Fit> {
     let (w, h) = (depth.width(), depth.height());
     let middle = |side: usize, half: f64| {
@@ -164,6 +164,7 @@ fn fit(depth: &DepthImage, window: [f64; 2]) -> Option<Fit> {
     };
     let points: Vec<(Vector3<f64>, f64)> =
         vs.flat_map(|v| us.clone().filter_map(move |u| pixel(u, v))).collect();
+    // A plane is linear in the inverse depth, so the fit is a linear least-squares problem.
     let normal: Matrix3<f64> = points.iter().map(|(p, _)| p * p.transpose()).sum();
     let right: Vector3<f64> = points.iter().map(|(p, z)| p / *z).sum();
     let plane = normal.cholesky()?.solve(&right);

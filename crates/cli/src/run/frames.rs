@@ -10,18 +10,18 @@ use crate::signals::Signals;
 /// Frames that are decoded ahead; each holds its images.
 const AHEAD: usize = 2;
 
-/// How long a reader that hangs on its input is waited for.
+/// Longest wait for a reader that hangs on its input.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// A frame, and how much of the log is read, 0 to 1.
+/// Frame with the reading progress.
 pub struct Item {
     /// The frame.
     pub frame: LogFrame,
-    /// The part of the log that is read.
+    /// Part of the log that is read, 0 to 1.
     pub progress: f64,
 }
 
-/// The frames of a log, decoded here or in a thread of their own.
+/// Frames of a log, decoded here or in a separate thread.
 pub enum Frames {
     /// One after the other.
     Here(Box<FrameSource>),
@@ -35,11 +35,12 @@ impl Frames {
         if threads < 2 {
             return Self::Here(Box::new(source));
         }
+        // Bounded, because each waiting frame holds its images.
         let (sender, receiver) = sync_channel(AHEAD);
         Self::Ahead(receiver, thread::spawn(move || read_all(source, &sender)))
     }
 
-    /// The next frame; `None` at the end, or when somebody wants to stop.
+    /// Returns the next frame; `None` at the end, or after a stop signal.
     pub fn next(&mut self, signals: &Signals) -> Option<Item> {
         loop {
             if signals.received().is_some() {
@@ -47,8 +48,7 @@ impl Frames {
             }
             match self {
                 Self::Here(source) => return read_one(source),
-                // A reader that waits for a slow pipe must not keep us from
-                // noticing a signal.
+                // A reader that waits for a slow pipe must not keep us from noticing a signal.
                 Self::Ahead(items, _) => match items.recv_timeout(Duration::from_millis(50)) {
                     Err(RecvTimeoutError::Timeout) => {}
                     received => return received.ok(),
@@ -57,7 +57,7 @@ impl Frames {
         }
     }
 
-    /// The source, with what it counted; `None` if it hangs on its input.
+    /// Returns the source, with its counters; `None` if it hangs on its input.
     ///
     /// # Errors
     /// If the reader panicked.
@@ -66,6 +66,7 @@ impl Frames {
             Self::Here(source) => return Ok(Some(*source)),
             Self::Ahead(items, reader) => (items, reader),
         };
+        // Without a receiver, a reader that waits to send gives up.
         drop(items);
         let waiting = Instant::now();
         while !reader.is_finished() && waiting.elapsed() < PATIENCE {

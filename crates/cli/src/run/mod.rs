@@ -1,4 +1,4 @@
-//! `tagalong run`: a log and a config go in, a directory of results comes out.
+//! `tagalong run`: reads a log and a config, writes a directory of results.
 
 mod frames;
 mod pictures;
@@ -32,8 +32,8 @@ use crate::suggest::check_log_path;
 /// Runs a pipeline over a log.
 ///
 /// # Errors
-/// A config, log or output directory that cannot be used; a plugin that fails
-/// on a frame; a disk that fails.
+/// A config, log or output directory that cannot be used; a plugin that fails on a frame; a disk
+/// that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
     if args.log.is_none() {
@@ -48,12 +48,14 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let mut pipeline = job.pipeline;
     pipeline.sketch(args.overlay);
     let stopped = work(&mut pipeline, &mut frames, &mut desk, &mut pictures, &signals);
+    // An error of the run is returned only after the threads have finished.
     pictures.finish()?;
     let source = frames.finish()?;
     desk.close(args, job.report, source, stopped?, &signals)
 }
 
-/// Reading ahead pays from the second core on, drawing aside from the third.
+/// Returns the number of cores: reading ahead pays from the second one on, rendering in parallel
+/// from the third.
 fn default_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
@@ -78,7 +80,7 @@ impl Job {
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
-        // A picture shows colour, whether or not the pipeline looks at it.
+        // A picture shows colour, whether or not the pipeline uses it.
         let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
@@ -88,7 +90,7 @@ impl Job {
     }
 }
 
-/// `runs/<log>-<config>`.
+/// Returns `runs/<log>-<config>`.
 fn default_folder(args: &RunArgs, config: &ConfigFile) -> PathBuf {
     let log = args.log().file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Path::new("runs").join(format!("{log}-{}", config.stem()))
@@ -116,13 +118,13 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
     }
 }
 
-/// A directory that cannot be made or filled is the user's choice to change.
+/// Returns the failure of a directory that cannot be made or filled: the user may choose another.
 fn refused(error: WriteError) -> Failure {
     Failure::usage(error)
 }
 
-/// One frame after the other until the log, the pipeline or the user's
-/// patience ends. `Some` is the plugin's mistake that ended it.
+/// Processes one frame after the other until the log ends, the pipeline fails or a signal comes.
+/// `Some` is the error of the plugin that ended it.
 fn work(
     pipeline: &mut Pipeline,
     frames: &mut Frames,
@@ -164,7 +166,7 @@ fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-/// Where results are gathered and written.
+/// Writers and counters of the results.
 struct Desk {
     log: TrackLog,
     overlay: Option<Overlay>,
@@ -184,7 +186,7 @@ impl Desk {
         Ok(Self { log, overlay, tally: Tally::default(), timings: Timings::default() })
     }
 
-    /// Takes in what the pipeline said of a frame.
+    /// Adds the report of a frame.
     fn take(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
         self.tally.add(report);
         for (stage, ms) in &report.timings {
@@ -208,7 +210,7 @@ impl Desk {
         Ok(())
     }
 
-    /// Ends the files and says what was found.
+    /// Finishes the files and prints a summary.
     fn close(
         self,
         args: &RunArgs,
@@ -220,6 +222,8 @@ impl Desk {
         self.tally.fill(&mut report);
         describe_source(&mut report, source);
         describe_end(&mut report, stopped.as_ref(), signals);
+        // Without a single processed frame the output would be an empty directory that looks like a
+        // result.
         if report.frames.processed == 0 && stopped.is_some() {
             self.log.discard().map_err(Failure::failed)?;
             return verdict(args, &report, stopped, signals);
@@ -237,7 +241,7 @@ impl Desk {
     }
 }
 
-/// What the reader knows at the end.
+/// Adds the counters and notes of the reader.
 fn describe_source(report: &mut RunReport, source: Option<FrameSource>) {
     let Some(source) = source else {
         report.notes.push("the reader was still waiting for its input".into());
@@ -257,7 +261,7 @@ fn describe_end(report: &mut RunReport, stopped: Option<&StepError>, signals: &S
     }
 }
 
-/// What the metadata record of `tracks.mcap` says.
+/// Returns the metadata record of `tracks.mcap`.
 fn about(report: &RunReport) -> BTreeMap<String, String> {
     BTreeMap::from([
         ("version".into(), report.tagalong.into()),
@@ -267,7 +271,7 @@ fn about(report: &RunReport) -> BTreeMap<String, String> {
     ])
 }
 
-/// The exit code, and the reason for a bad one.
+/// Returns the exit code, and the reason for a failure.
 fn verdict(
     args: &RunArgs,
     report: &RunReport,
@@ -278,7 +282,7 @@ fn verdict(
         say(&format!("note: {note}"));
     }
     match stopped {
-        // The mistake is the plugin's, and what came before it is written.
+        // The error is the plugin's, and the results before it are written.
         Some(error @ StepError::Panic { .. }) => {
             return Err(Failure { code: 3, message: error.to_string() });
         }

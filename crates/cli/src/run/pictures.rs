@@ -4,42 +4,42 @@ use std::thread::{self, JoinHandle};
 use crate::outcome::Failure;
 use crate::overlay::{Overlay, Scene};
 
-/// Pictures that wait to be drawn; each holds its images.
+/// Pictures that wait to be rendered; each holds its images.
 const WAITING: usize = 2;
 
-/// Draws pictures, or none, here or in a thread of its own.
+/// Renderer of pictures, here or in a separate thread.
 pub enum Pictures {
-    /// Nobody asked for pictures.
+    /// No pictures requested.
     None,
     /// One after the other.
     Here(Overlay),
-    /// Beside the pipeline.
+    /// In parallel with the pipeline.
     Aside(SyncSender<Scene>, JoinHandle<Result<(), String>>),
 }
 
 impl Pictures {
-    /// Draws aside if there are three threads or more.
+    /// Renders in a separate thread if there are three threads or more.
     pub fn new(overlay: Option<Overlay>, threads: usize) -> Self {
         let Some(mut overlay) = overlay else { return Self::None };
         if threads < 3 {
             return Self::Here(overlay);
         }
+        // Bounded: slow rendering holds the pipeline back instead of filling the memory.
         let (sender, scenes) = sync_channel::<Scene>(WAITING);
         let draw_all = move || scenes.iter().try_for_each(|scene| overlay.draw(&scene));
         Self::Aside(sender, thread::spawn(draw_all))
     }
 
-    /// Draws what `scene` makes.
+    /// Renders the scene that `scene` makes.
     ///
     /// # Errors
-    /// If the picture cannot be written. Beside the pipeline that is told by
-    /// [`Pictures::finish`].
+    /// If the picture cannot be written. A parallel renderer reports that in [`Pictures::finish`].
     pub fn draw(&mut self, scene: impl FnOnce() -> Scene) -> Result<(), Failure> {
         match self {
             Self::None => Ok(()),
             Self::Here(overlay) => overlay.draw(&scene()).map_err(Failure::failed),
             Self::Aside(sender, _) => {
-                // A drawer that is gone left its reason for `finish`.
+                // A renderer that ended left its error for `finish`.
                 let _ = sender.send(scene());
                 Ok(())
             }

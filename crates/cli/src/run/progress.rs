@@ -3,13 +3,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
-/// A progress bar, drawn only where stderr is a terminal.
+/// Progress bar, visible only where stderr is a terminal.
 pub struct Progress {
     bar: ProgressBar,
 }
 
 impl Progress {
-    /// A bar at its beginning.
+    /// Returns a bar at its beginning.
     pub fn new() -> Self {
         let bar = ProgressBar::new(STEPS);
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3}% {msg} {eta}") {
@@ -18,7 +18,7 @@ impl Progress {
         Self { bar }
     }
 
-    /// Shows how far the run is.
+    /// Shows the progress of the run.
     pub fn show(&self, fraction: f64, frame: u64, people: usize) {
         self.bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
         self.bar.set_message(format!("frame {frame}, {people} in view"));

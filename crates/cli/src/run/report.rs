@@ -4,39 +4,39 @@ use serde::Serialize;
 use tagalong_core::Funnel;
 use tagalong_pipeline::{Fate, FrameReport, Outcome};
 
-/// `report.json`: what a run found, what it dropped and why. Two runs of the
+/// `report.json`: results of a run, and its dropped candidates with the reasons. Two runs of the
 /// same log, config and seed give the same bytes.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunReport {
     /// Version of Tagalong.
     pub tagalong: &'static str,
-    /// How it ended: `complete`, `stopped by signal 2`, or what failed.
+    /// End of the run: `complete`, `stopped by signal 2`, or the error.
     pub ended: String,
-    /// The config.
+    /// File of the config.
     pub config: FileFacts,
-    /// The seed that was used.
+    /// Seed that was used.
     pub seed: u64,
-    /// The log.
+    /// File of the log.
     pub log: FileFacts,
-    /// Part of the log was lost or could not be used.
+    /// True if part of the log was lost or could not be used.
     pub data_lost: bool,
-    /// What became of the frames.
+    /// Frames by their outcome.
     pub frames: Frames,
-    /// The persons that were confirmed, by number.
+    /// Persons that were confirmed, by number.
     pub persons: BTreeMap<u32, PersonFacts>,
-    /// What became of the candidates.
+    /// Candidates by their fate.
     pub candidates: Candidates,
-    /// Which test dropped how many candidates, in the order of the stages.
+    /// Number of candidates that each test dropped, in the order of the stages.
     pub funnel: Vec<FunnelLine>,
-    /// What the reader lost or skipped, by name.
+    /// Number of lost or skipped items of the reader, by name.
     pub counters: BTreeMap<String, u64>,
-    /// What was said once.
+    /// Notes for the user.
     pub notes: Vec<String>,
     /// Consistency of the filter, if it has an innovation.
     pub nis: Option<Nis>,
 }
 
-/// A file, without its folder: the report does not depend on where it lay.
+/// File, without its folder: the report does not depend on its place.
 #[derive(Clone, Debug, Serialize)]
 pub struct FileFacts {
     /// Name of the file.
@@ -45,7 +45,7 @@ pub struct FileFacts {
     pub sha256: String,
 }
 
-/// Frames by what their stamp led to.
+/// Frames by the outcome of their stamp.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Frames {
     /// Frames that the reader delivered.
@@ -68,7 +68,7 @@ pub struct Frames {
     pub with_person: u64,
 }
 
-/// One person.
+/// Facts about one person.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PersonFacts {
     /// First frame as a confirmed track.
@@ -93,25 +93,24 @@ pub struct Candidates {
 /// One line of the funnel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FunnelLine {
-    /// The test.
+    /// Name of the test.
     pub test: &'static str,
-    /// Candidates that it dropped.
+    /// Number of candidates that it dropped.
     pub count: u64,
 }
 
-/// Normalised innovation squared: for a consistent filter the mean equals the
-/// degrees of freedom.
+/// Normalised innovation squared: for a consistent filter the mean equals the degrees of freedom.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Nis {
-    /// Updates.
+    /// Number of updates.
     pub updates: u64,
-    /// The mean.
+    /// Mean of the values.
     pub mean: f64,
-    /// Degrees of freedom, mean.
+    /// Mean of the degrees of freedom.
     pub degrees_of_freedom: f64,
 }
 
-/// Sums up frame reports.
+/// Sums over the frame reports.
 #[derive(Default)]
 pub struct Tally {
     frames: Frames,
@@ -128,7 +127,7 @@ impl Tally {
         self.frames.odometry_stale += u64::from(odometry_stale);
     }
 
-    /// Adds what the pipeline said of it.
+    /// Adds the pipeline's report of it.
     pub fn add(&mut self, report: &FrameReport) {
         self.add_outcome(&report.outcome);
         self.funnel.merge(&report.funnel);
@@ -194,7 +193,7 @@ impl Tally {
 }
 
 impl RunReport {
-    /// As `report.json`.
+    /// Returns the text of `report.json`.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }

@@ -9,10 +9,10 @@ const FUNNEL_LINES: usize = 6;
 /// Persons that are listed one by one.
 const PERSON_LINES: usize = 12;
 
-/// Counters that say what was read, not what was lost.
+/// Counters of read items, as opposed to lost ones.
 const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
-/// What a run found, for a person at the terminal.
+/// Returns the results of a run, for a terminal.
 pub fn text(report: &RunReport, folder: &Path, overlay: bool) -> String {
     let mut out = String::new();
     let frames = &report.frames;
@@ -46,7 +46,7 @@ fn persons(out: &mut String, report: &RunReport) {
     }
 }
 
-/// The tests that dropped most.
+/// Writes the tests that dropped most.
 fn funnel(out: &mut String, report: &RunReport) {
     let mut lines: Vec<_> = report.funnel.iter().collect();
     lines.sort_by_key(|line| std::cmp::Reverse(line.count));

@@ -2,16 +2,16 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// Shortest time that is told apart, ms.
+/// Resolution of times, ms.
 const SHORTEST_MS: f64 = 1e-3;
 
-/// Each bin ends this much later than the one before: figures are right to 1 %.
+/// Ratio of the ends of neighbouring bins: figures are right to 1 %.
 const RATIO: f64 = 1.02;
 
 /// Bins, up to about an hour.
 const BINS: usize = 1120;
 
-/// How long the stages took, in memory that does not grow with the log.
+/// Times of the stages, in memory that does not grow with the log.
 #[derive(Default)]
 pub struct Timings {
     stages: BTreeMap<String, Histogram>,
@@ -23,18 +23,18 @@ struct Histogram {
     max_ms: f64,
 }
 
-/// The times of one stage.
+/// Times of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageTimes {
-    /// Frames measured.
+    /// Number of measured frames.
     pub frames: u64,
-    /// Half of the frames took less, ms.
+    /// Median, ms.
     pub p50_ms: f64,
-    /// 95 % of the frames took less, ms.
+    /// 95th percentile, ms.
     pub p95_ms: f64,
-    /// The mean, ms.
+    /// Mean, ms.
     pub mean_ms: f64,
-    /// The slowest frame, ms.
+    /// Slowest frame, ms.
     pub max_ms: f64,
 }
 
@@ -49,7 +49,7 @@ impl Timings {
         }
     }
 
-    /// What was measured, by stage.
+    /// Returns the times, by stage.
     pub fn summary(&self) -> BTreeMap<&str, StageTimes> {
         self.stages.iter().map(|(name, h)| (name.as_str(), h.summary())).collect()
     }
@@ -61,6 +61,7 @@ impl Histogram {
     }
 
     fn add(&mut self, ms: f64) {
+        // Logarithmic bins have the same relative error at every length of time.
         let bin = (ms / SHORTEST_MS).max(1.0).ln() / RATIO.ln();
         self.counts[(bin as usize).min(BINS - 1)] += 1;
         self.sum_ms += ms;
@@ -78,7 +79,7 @@ impl Histogram {
         }
     }
 
-    /// The middle of the bin in which the quantile lies.
+    /// Returns the middle of the bin in which the quantile lies.
     fn quantile(&self, frames: u64, fraction: f64) -> f64 {
         let rank = (fraction * frames as f64).ceil() as u64;
         let mut seen = 0;

@@ -1,4 +1,4 @@
-//! From files of truth and tracks to a sequence that can be scored.
+//! Reads files of truth and tracks into a sequence that can be scored.
 
 mod shots;
 mod tracks;
@@ -19,14 +19,14 @@ use crate::outcome::Failure;
 /// Reports by the number of their frame, from 1.
 pub type Reports = BTreeMap<u32, Vec<Report>>;
 
-/// The stamps of frames that no log tells.
+/// Frame rate for sequences without a log, Hz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate(pub f64);
 
 /// Puts truth and reports of all frames side by side.
 ///
-/// Frames that the log has but did not deliver (their depth was lost, say) are
-/// there, too: whoever was in them was missed.
+/// Frames that the log has but did not deliver (their depth was lost, say) are included: the people
+/// in them were missed.
 pub fn assemble(
     name: &str,
     truth: &TruthFile,
@@ -49,9 +49,9 @@ pub fn assemble(
     Sequence { name: name.to_owned(), frames: frames.collect() }
 }
 
-/// The part of a sequence that a similarity can compare: reports without the
-/// place it looks at are left out, and people who are not in the image where boxes are
-/// compared; `None` if the truth lacks places, or has no boxes at all.
+/// Returns the part of a sequence that a similarity can compare: reports without the compared
+/// quantity are left out, as are people without a box where boxes are compared; `None` if the truth
+/// lacks positions, or has no boxes at all.
 pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequence> {
     let has_truth = |truth: &Truth| match similarity {
         Similarity::Iou => truth.region.is_some(),
@@ -63,6 +63,7 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
     };
     let mut truths = sequence.frames.iter().flat_map(|frame| &frame.truths);
     let is_comparable = match similarity {
+        // Without people in the truth every report is a false positive: still comparable.
         Similarity::Iou => truths.clone().next().is_none() || truths.any(has_truth),
         Similarity::Metres => truths.all(has_truth),
     };
@@ -74,7 +75,7 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
     is_comparable.then_some(kept)
 }
 
-/// The comparison that the truth's protocol asks for.
+/// Returns the comparison that the truth's protocol asks for.
 pub fn comparison(truth: &TruthFile, similarity: Similarity) -> Comparison {
     match truth.is_kitti() && similarity == Similarity::Iou {
         true => kitti::comparison(similarity),
@@ -97,7 +98,7 @@ fn without_area<'a>(
     )
 }
 
-/// Returns notes on KITTI labels that are read in another way than they may be meant.
+/// Returns notes on KITTI labels that may be read in another way than intended.
 fn odd_labels(name: &str, labels: &[kitti::Label]) -> Vec<String> {
     let anonymous = OddLines::among(labels.iter().map(|label| (label.line, label.is_anonymous())));
     let left_out = anonymous.map(|OddLines { count, first, of }| {
@@ -110,7 +111,7 @@ fn odd_labels(name: &str, labels: &[kitti::Label]) -> Vec<String> {
     without_area(name, boxes).into_iter().chain(left_out).collect()
 }
 
-/// A text file.
+/// Reads a text file.
 ///
 /// # Errors
 /// A file that cannot be read, by name.
@@ -126,7 +127,7 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     })
 }
 
-/// A rectangle in the words of the metrics.
+/// Converts a rectangle to the type of the metrics.
 pub fn region(rect: &tagalong_core::Rect) -> Region {
     Region::new(rect.x, rect.y, rect.width, rect.height)
 }

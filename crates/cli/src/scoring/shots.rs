@@ -6,7 +6,7 @@ use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 use super::Rate;
 use crate::outcome::Failure;
 
-/// What a frame of a log says about time and place.
+/// Time and pose of a frame of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
     /// Number of the colour image, from 1.
@@ -22,7 +22,7 @@ pub struct Shot {
 }
 
 impl Shot {
-    /// What is remembered of a frame.
+    /// Extracts the time and the poses of a frame.
     pub fn of(item: &LogFrame) -> Self {
         let frame = &item.frame;
         Self {
@@ -35,21 +35,22 @@ impl Shot {
     }
 }
 
-/// The frames that a log delivered, by number.
+/// Frames that a log delivered, by number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shots {
     shots: Vec<Shot>,
-    /// Stamps that never run backwards, ns since the first: after a jump of the
-    /// clock the time goes on with one millisecond.
+    /// Stamps that never run backwards, ns since the first: after a jump back of the clock the time
+    /// goes on with one millisecond.
     elapsed_ns: Vec<i64>,
 }
 
 impl Shots {
-    /// Reads a log for its frames.
+    /// Reads the frames of a log.
     ///
     /// # Errors
     /// A log that cannot be used.
     pub fn read(path: &Path, input: &InputSettings, limits: &Limits) -> Result<Self, Failure> {
+        // The right image would add nothing but the time to decode it.
         let inputs = Inputs::ANY.without(Input::Right);
         let mut source = FrameSource::open(path, input, limits, inputs)?;
         let mut shots = Self::default();
@@ -72,35 +73,35 @@ impl Shots {
         self.shots.push(shot);
     }
 
-    /// The first frame.
+    /// Returns the first frame.
     pub fn first(&self) -> Option<&Shot> {
         self.shots.first()
     }
 
-    /// All frames, in their order.
+    /// Returns all frames, in their order.
     pub fn iter(&self) -> impl Iterator<Item = &Shot> {
         self.shots.iter()
     }
 
-    /// The number of the last frame; 0 without any.
+    /// Returns the number of the last frame; 0 without any.
     pub fn last(&self) -> u32 {
         self.shots.last().map_or(0, |shot| shot.number)
     }
 
-    /// The frame with this number, or the nearest one before it, or the first.
+    /// Returns the frame with this number, or the nearest one before it, or the first.
     pub fn at(&self, number: u32) -> Option<&Shot> {
         let after = self.shots.partition_point(|shot| shot.number <= number);
         self.shots.get(after.saturating_sub(1))
     }
 
-    /// The frame whose stamp is nearest and no farther away than `within_ns`.
+    /// Returns the frame with the nearest stamp, if that is no farther away than `within_ns`.
     pub fn near(&self, stamp_ns: u64, within_ns: u64) -> Option<&Shot> {
         let off = |shot: &&Shot| shot.stamp_ns.abs_diff(stamp_ns);
         self.shots.iter().min_by_key(off).filter(|shot| off(shot) <= within_ns)
     }
 
-    /// Time of a frame since the first one, ns; of frames that were not
-    /// delivered by their neighbours, of all frames by `rate` without a log.
+    /// Returns the time of a frame since the first one, ns; frames that were not delivered are
+    /// interpolated, and without a log all frames are spaced by `rate`.
     pub fn stamp_ns(&self, number: u32, rate: Rate) -> i64 {
         let spaced = |frames: i64| (frames as f64 / rate.0 * 1e9).round() as i64;
         let after = self.shots.partition_point(|shot| shot.number < number);
@@ -118,20 +119,21 @@ impl Shots {
         }
     }
 
-    /// Mean time between two images, ns.
+    /// Returns the mean time between two images, ns.
     fn spacing_ns(&self) -> i64 {
         let (first, last) = (self.shots.first(), self.shots.last());
         let steps = last.map_or(0, |l| l.number) - first.map_or(0, |f| f.number);
         let elapsed = self.elapsed_ns.last().copied().unwrap_or(0);
+        // A single frame has no spacing; 10 Hz is assumed.
         if steps > 0 { (elapsed / i64::from(steps)).max(1) } else { 100_000_000 }
     }
 
-    /// Time from the first to the last frame, s.
+    /// Returns the time from the first to the last frame, s.
     pub fn duration_s(&self) -> f64 {
         self.elapsed_ns.last().copied().unwrap_or(0) as f64 * 1e-9
     }
 
-    /// Frames per second.
+    /// Returns the frames per second.
     pub fn rate_hz(&self) -> f64 {
         1e9 / self.spacing_ns() as f64
     }

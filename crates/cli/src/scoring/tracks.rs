@@ -11,17 +11,17 @@ use crate::outcome::Failure;
 /// Tracks as a tracker wrote them.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
-    /// By the number of the frame.
+    /// Reports by the number of the frame.
     pub reports: Reports,
-    /// The log that a run worked on, if the tracks are those of a run.
+    /// Name of the log of a run, if the tracks are those of a run.
     pub log_name: Option<String>,
-    /// Positions are in the robot frame.
+    /// True if positions are in the robot frame.
     pub in_robot_frame: bool,
-    /// What was read in another way than its writer may have thought.
+    /// Notes on lines that may have been read in another way than intended.
     pub notes: Vec<String>,
 }
 
-/// The part of a run's `report.json` that is looked at.
+/// Part of a run's `report.json` that is used.
 #[derive(Deserialize)]
 struct RunFacts {
     log: LogName,
@@ -33,18 +33,18 @@ struct LogName {
 }
 
 impl Tracks {
-    /// Reads tracks: MOTChallenge or KITTI text, `tracks-metres.csv`, or the
-    /// folder of a run; `length` is how many frames the sequence has, if that is known.
+    /// Reads tracks: MOTChallenge or KITTI text, `tracks-metres.csv`, or the folder of a run;
+    /// `length` is the number of frames in the sequence, if that is known.
     ///
     /// # Errors
-    /// A file that cannot be read, or that TrackEval would refuse; names the file and the
-    /// line.
+    /// A file that cannot be read, or that TrackEval would refuse; names the file and the line.
     pub fn read(path: &Path, length: Option<u32>) -> Result<Self, Failure> {
         if path.is_dir() {
             return Self::of_run(path, length);
         }
         let (text, name) = (read_text(path)?, path.display().to_string());
         let first = text.lines().next().unwrap_or_default();
+        // Of all formats, only `tracks-metres.csv` begins with this column.
         if first.starts_with("stamp_ns") {
             let reports = places(&text, &name, length)?;
             return Ok(Self { reports, in_robot_frame: true, ..Self::default() });
@@ -65,7 +65,7 @@ impl Tracks {
         Ok(Self { reports, notes: notes.into_iter().collect(), ..Self::default() })
     }
 
-    /// KITTI counts frames from 0, everybody else from 1.
+    /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
     fn of_kitti(text: &str, name: &str) -> Result<Self, Failure> {
         let labels = kitti::parse(text, name).map_err(Failure::failed)?;
         let mut timeline = Timeline::new();
@@ -93,6 +93,7 @@ impl Tracks {
 }
 
 fn is_kitti(first: &str) -> bool {
+    // The third field of KITTI is a class name, where MOTChallenge has a number.
     let class = first.split_whitespace().nth(2);
     !first.contains(',') && class.is_some_and(|field| field.parse::<f64>().is_err())
 }
@@ -105,7 +106,7 @@ fn gather(rows: impl IntoIterator<Item = (u32, Report)>) -> Reports {
     reports
 }
 
-/// Only tracks that were seen: a box is written of no other.
+/// Returns the positions of the seen tracks: `tracks.csv` has boxes of these alone.
 fn places(text: &str, name: &str, length: Option<u32>) -> Result<Reports, Failure> {
     let rows = metres::parse(text, name).map_err(Failure::failed)?;
     if let Some(length) = length {
@@ -115,7 +116,7 @@ fn places(text: &str, name: &str, length: Option<u32>) -> Result<Reports, Failur
     Ok(gather(seen.map(|row| row.report(metres::Floor::Robot))))
 }
 
-/// Gives boxes their places, and adds tracks that have a place but no box.
+/// Adds the positions to the boxes, and tracks that have a position but no box.
 fn merge(reports: &mut Reports, places: Reports) {
     for (number, places) in places {
         let frame = reports.entry(number).or_default();

@@ -12,16 +12,16 @@ use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, rea
 use super::{Shots, odd_labels, read_text, region, without_area};
 use crate::outcome::Failure;
 
-/// Truth of a log belongs to the image whose stamp is this near, ns.
+/// Largest difference between the stamps of an image and its truth in a log, ns.
 const SAME_MOMENT_NS: u64 = 5_000_000;
 
-/// How tall a person in a whole-body box is taken to be, m.
+/// Assumed height of a person in a whole-body box, m.
 const STANDING_HEIGHT_M: f64 = 1.7;
 
-/// Who is there in a frame, and what of it is not annotated.
+/// People in a frame, and its regions without annotation.
 pub type People = (Vec<Truth>, Vec<Region>);
 
-/// Whose rules say what MOTChallenge truth means.
+/// Rules for reading MOTChallenge truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum RulesChoice {
     /// MOT17 if all boxes have a class of it, MOT15 if none has; a mixture is refused.
@@ -35,16 +35,16 @@ pub enum RulesChoice {
     Mot20,
 }
 
-/// How truth is read.
+/// Options for reading truth.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TruthOptions {
-    /// The rules of MOTChallenge text.
+    /// Rules of MOTChallenge text.
     pub rules: RulesChoice,
-    /// Boxes are of whole standing people: their upper bodies are compared.
+    /// True if boxes are of whole standing people: their upper bodies are compared.
     pub upper_body: bool,
 }
 
-/// Where a person was, as far as the file says.
+/// Position of a person, as far as the file has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Place {
     Unknown,
@@ -60,32 +60,32 @@ enum Kind {
     People,
     Kitti,
     Log,
-    /// What a log would carry, as a text.
+    /// Messages of a log's truth channel, as text lines.
     Lines,
 }
 
-/// A frame as annotated; the key of the map is its number, or its stamp.
+/// Frame as annotated; the key of the map is its number, or its stamp.
 #[derive(Clone, Debug, Default)]
 struct Annotated {
     people: Vec<(Truth, Place)>,
     ignore_regions: Vec<Region>,
 }
 
-/// A file of truth.
+/// File of truth.
 #[derive(Clone, Debug)]
 pub struct TruthFile {
     kind: Kind,
     frames: BTreeMap<u64, Annotated>,
     /// The `seqinfo.ini` beside it.
     pub info: Option<SequenceInfo>,
-    /// The rules that its rows were read with, if it is MOTChallenge text.
+    /// Rules that its rows were read with, if it is MOTChallenge text.
     pub rules: Option<mot::Rules>,
-    /// What was read in another way than its writer may have thought.
+    /// Notes on lines that may have been read in another way than intended.
     pub notes: Vec<String>,
 }
 
 impl TruthFile {
-    /// Reads truth, whatever its format.
+    /// Reads truth of any format.
     ///
     /// # Errors
     /// A file that cannot be read; names the file and the line.
@@ -146,7 +146,7 @@ impl TruthFile {
         Ok(file)
     }
 
-    /// KITTI counts frames from 0, everybody else from 1.
+    /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
     fn of_kitti(path: &Path) -> Result<Self, Failure> {
         let (text, name) = (read_text(path)?, path.display().to_string());
         let labels = kitti::parse(&text, &name).map_err(Failure::failed)?;
@@ -192,35 +192,35 @@ impl TruthFile {
         }
     }
 
-    /// True if the rules of KITTI apply.
+    /// Returns true if the rules of KITTI apply.
     pub fn is_kitti(&self) -> bool {
         self.kind == Kind::Kitti
     }
 
-    /// True if the floor positions are to be had with the camera's pose only.
+    /// Returns true if floor positions need the camera's pose.
     pub fn needs_pose(&self) -> bool {
         let mut people = self.frames.values().flat_map(|frame| &frame.people);
         people.any(|(_, place)| matches!(place, Place::HeadInCamera(_)))
     }
 
-    /// True if frames are told by stamp: only the log knows their numbers.
+    /// Returns true if frames are identified by stamps: only the log knows their numbers.
     pub fn needs_stamps(&self) -> bool {
         matches!(self.kind, Kind::Log | Kind::Lines)
     }
 
-    /// True if the file of truth is the log itself.
+    /// Returns true if the file of truth is the log itself.
     pub fn is_in_log(&self) -> bool {
         self.kind == Kind::Log
     }
 
-    /// The number of the last frame that is known to exist.
+    /// Returns the number of the last frame that is known to exist.
     pub fn last(&self, shots: &Shots) -> u32 {
         let stated = self.info.as_ref().map_or(0, |info| info.length);
         let annotated = self.frames.keys().filter_map(|key| self.number(*key, shots)).max();
         stated.max(annotated.unwrap_or(0))
     }
 
-    /// Annotated moments without an image of the log.
+    /// Returns the number of annotated moments without an image of the log.
     pub fn without_image(&self, shots: &Shots) -> usize {
         self.frames.keys().filter(|key| self.number(**key, shots).is_none()).count()
     }
@@ -232,7 +232,7 @@ impl TruthFile {
         }
     }
 
-    /// The people by the number of the frame, on the floor where that can be.
+    /// Returns the people by the number of the frame, on the floor where that is possible.
     pub fn frames(&self, shots: &Shots) -> BTreeMap<u32, People> {
         let mut all = BTreeMap::new();
         for (key, frame) in &self.frames {
@@ -249,7 +249,7 @@ impl TruthFile {
 }
 
 impl Place {
-    /// In the robot frame; heads are moved from their surface to their centre.
+    /// Returns the position in the robot frame; heads are moved from their surface to their centre.
     fn on_floor(self, robot_from_camera: Option<&Isometry3<f64>>) -> Option<[f64; 2]> {
         match self {
             Self::Unknown => None,
@@ -257,6 +257,7 @@ impl Place {
             Self::HeadInCamera(surface) => {
                 let surface = Point3::from(surface);
                 let ray = surface.coords.try_normalize(1e-6)?;
+                // Depth sees the surface; tracks estimate the centre of the head.
                 let centre = surface + ray * HEAD_RADIUS_M;
                 let head = robot_from_camera? * centre;
                 Some([head.x, head.y])
@@ -275,9 +276,10 @@ fn of_person(person: &TruthPerson) -> (Truth, Place) {
     (truth, person.head_in_robot_m.map_or(Place::Unknown, |[x, y, _]| Place::Floor([x, y])))
 }
 
-/// Tells formats apart by how they begin.
+/// Distinguishes formats by their first line.
 fn kind_of(path: &Path) -> Result<Kind, Failure> {
     match path.extension().and_then(|extension| extension.to_str()) {
+        // A log is binary, so its ending decides; the text formats have no reliable ending.
         Some("mcap") => return Ok(Kind::Log),
         Some("jsonl") => return Ok(Kind::Lines),
         _ => {}
@@ -293,7 +295,7 @@ fn kind_of(path: &Path) -> Result<Kind, Failure> {
     })
 }
 
-/// The `seqinfo.ini` of a MOTChallenge folder: beside `gt.txt` or above `gt`.
+/// Returns the `seqinfo.ini` of a MOTChallenge folder: beside `gt.txt` or above `gt`.
 fn sequence_info(truth: &Path) -> Result<Option<SequenceInfo>, Failure> {
     let folders = truth.ancestors().skip(1).take(2);
     let Some(path) = folders.map(|f| f.join("seqinfo.ini")).find(|path| path.is_file()) else {

@@ -12,13 +12,12 @@ use crate::overlay::write_png;
 
 /// Pictures of one scene.
 const PICTURES: u64 = 6;
-/// Depth that is drawn black, m.
+/// Depth that is rendered black, m.
 const FAR_M: f32 = 8.0;
 
-/// Draws some moments of a scene, evenly spread, with the truth on them: the
-/// image on the left, depth or the right image beside it; of a mirror the
-/// unwrapped image and the raw one. What cameras in the room see is a picture of
-/// its own.
+/// Renders some moments of a scene, evenly spread, with the truth on them: the image on the left,
+/// depth or the right image beside it; of a mirror the unwrapped image and the raw one. Images of
+/// cameras in the room go to a separate picture.
 pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result<(), Failure> {
     make_folder(folder)?;
     let mut unwrapping = Unwrapping::of(&simulation)?;
@@ -34,6 +33,7 @@ pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result
             }
             Event::Odometry(_) => continue,
         };
+        // Half an interval in: the pictures then lie in the middle of equal parts of the scene.
         if shot.captured_ns < drawn * every_ns + every_ns / 2 {
             continue;
         }
@@ -53,14 +53,14 @@ fn save(path: &Path, image: &RgbImage) -> Result<(), Failure> {
         .map_err(|why| Failure::failed(format!("cannot write {}: {why}", path.display())))
 }
 
-/// From the circular image of a mirror to the one that the truth speaks of.
+/// Converter from the circular image of a mirror to the panorama that the truth refers to.
 struct Unwrapping {
     unwrapper: Unwrapper<[u8; 3]>,
     unwrapped: RgbImage,
 }
 
 impl Unwrapping {
-    /// `None` for a camera without a mirror.
+    /// Returns `None` for a camera without a mirror.
     fn of(simulation: &Simulation) -> Result<Option<Self>, Failure> {
         let Some(panorama) = simulation.panorama() else { return Ok(None) };
         let camera = simulation.camera();
@@ -79,7 +79,7 @@ fn picture(shot: &Shot, unwrapping: Option<&mut Unwrapping>) -> Result<RgbImage,
     Ok(beside(&[Arc::new(annotated(unwrapped, &shot.truth)), Arc::new(first)]))
 }
 
-/// Pictures in a row.
+/// Joins pictures in a row.
 fn beside(pictures: &[Arc<RgbImage>]) -> RgbImage {
     let width = pictures.iter().map(|p| p.width()).sum();
     let height = pictures.iter().map(|p| p.height()).max().unwrap_or(0);
@@ -111,7 +111,7 @@ fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
     canvas.into_image()
 }
 
-/// Beyond the right edge of a panorama it goes on at the left.
+/// Outlines a rectangle. Beyond the right edge of a panorama it goes on at the left.
 fn outline(canvas: &mut Canvas, rect: &Rect, width: f64, ink: Ink) {
     canvas.outline(rect, 1, ink);
     if rect.right() > width {
@@ -130,7 +130,7 @@ fn side_by_side(images: &Images) -> (RgbImage, RgbImage) {
     (first.unwrap_or_default(), second.unwrap_or_default())
 }
 
-/// Near is bright, no reading is red.
+/// Shades depth: near is bright, no reading is red.
 fn shades(depth: &DepthImage) -> RgbImage {
     depth.map(|z| {
         let shade = (255.0 * (1.0 - z / FAR_M)).clamp(0.0, 255.0) as u8;

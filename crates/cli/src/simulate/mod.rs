@@ -1,4 +1,4 @@
-//! `tagalong simulate`: from a scene to a log or to pictures.
+//! `tagalong simulate`: renders a scene to a log or to pictures.
 
 mod gallery;
 mod record;
@@ -19,7 +19,7 @@ use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, s
 use crate::realism::realism;
 use crate::signals::Signals;
 
-/// The arguments of `tagalong simulate`.
+/// Arguments of `tagalong simulate`.
 #[derive(Args, Debug)]
 pub struct SimulateArgs {
     /// The scene, a TOML file.
@@ -37,32 +37,32 @@ pub struct SimulateArgs {
     /// Set a value of the scene, like camera.kind=stereo or people.0.speed_mps=0.8.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub set: Vec<(String, String)>,
-    /// Draw pictures with the truth into this folder instead of writing a log.
+    /// Render pictures with the truth into this folder instead of writing a log.
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub gallery: Option<PathBuf>,
-    /// Threads that draw; the log is the same [default: as many as there are].
+    /// Threads that render; the log is the same [default: as many as there are].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
-    /// Draw no scene, but check how real drawn worlds are, and print it.
+    /// Simulate no scene, but check how realistic simulated worlds are, and print it.
     #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "split", "set", "threads"])]
     pub realism: bool,
-    /// Draws of each random scene of the checks.
+    /// Random variants of each random scene of the checks.
     #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
           value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
     /// Replace the log if it is there.
     #[arg(long)]
     pub overwrite: bool,
-    /// How the log or the checks are told.
+    /// Output format of the result.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
 
-/// Draws the scene.
+/// Simulates the scene.
 ///
 /// # Errors
-/// A scene that cannot be read or is wrong, and a place where no log can be, are
-/// exit code 2; a disk that fails is 1.
+/// A scene that cannot be read or is wrong, and an output path that cannot be written, are exit
+/// code 2; a disk that fails is 1.
 pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
     let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
     let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
@@ -119,7 +119,7 @@ pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
         .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))
 }
 
-/// As many threads as asked for, else as many as there are.
+/// Returns the requested number of threads, or else the number of cores.
 pub fn threads(asked: Option<u8>) -> usize {
     asked.map_or_else(|| available_parallelism().map_or(1, usize::from), usize::from)
 }
@@ -128,11 +128,10 @@ fn default_log(scene: &Path) -> PathBuf {
     Path::new("runs").join(scene.file_stem().unwrap_or_default()).with_extension("mcap")
 }
 
-/// Writes all that the robot records, as long as it `goes_on`; returns the number of
-/// images.
+/// Writes everything that the robot records, as long as it `goes_on`; returns the number of images.
 ///
 /// # Errors
-/// [`WriteError`] if the disk says no.
+/// [`WriteError`] if the file cannot be written.
 pub fn record(
     mut simulation: Simulation,
     scene: &Scene,
@@ -183,7 +182,7 @@ mod tests {
         assert!((seen.skew.unwrap().median_s - 0.015).abs() < 1e-6, "{:?}", seen.skew);
     }
 
-    /// Trials skip the log; they must see what a pipeline sees that reads it.
+    /// Trials skip the log; they must give the same frames as a pipeline that reads it.
     #[test]
     fn a_recorded_scene_gives_the_frames_of_a_trial() {
         let scene = Scene::parse(SCENE).unwrap();

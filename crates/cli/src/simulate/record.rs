@@ -16,27 +16,26 @@ use tagalong_sim::{
     Event, LaserSettings, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot,
 };
 
-/// The moment at which every drawn log starts.
+/// Start time of every simulated log.
 const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
 const LASER_FRAME: &str = "laser";
 const CAMERA_FRAME: &str = "camera_color_optical_frame";
-/// The wheels of the encoders, left and right.
+/// Joints of the wheel encoders, left and right.
 const WHEEL_JOINTS: [&str; 2] = ["left_wheel_joint", "right_wheel_joint"];
-/// As cameras of robots send it.
+/// JPEG quality that cameras of robots use.
 const JPEG_QUALITY: u8 = 85;
-/// Where the scene itself is kept.
+/// Topic of the scene itself.
 const SCENE_TOPIC: &str = "/simulation/scene";
-/// What a pipeline that drives makes of each image.
+/// Topic of a driving pipeline's reports, one per image.
 const PURSUIT_TOPIC: &str = "/follow/frames";
-/// Where the robot really is in the room. Nothing under `/truth` is for trackers.
+/// Topic of the robot's true pose in the room. Topics under `/truth` are not for trackers.
 const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
-/// Where the webcams really hang in the room: to find that out is the task of
-/// whoever measures with them.
+/// Topic of the webcams' true poses in the room; `tagalong triangulate` has to measure them.
 const TRUE_WEBCAMS_TOPIC: &str = "/truth/tf_static";
-/// The coordinates of the room.
+/// Frame of the room's coordinates.
 const WORLD_FRAME: &str = "world";
 
-/// Writes what the robot records, under the topics that robots use.
+/// Writer of the robot's recordings, under the topics that robots use.
 pub struct Recorder {
     log: MessageLog,
     camera: Camera,
@@ -49,7 +48,7 @@ impl Recorder {
     /// Starts a log with the scene and the mount of its cameras.
     ///
     /// # Errors
-    /// [`WriteError`] if the disk says no.
+    /// [`WriteError`] if the file cannot be written.
     pub fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, WriteError> {
         let mut log = MessageLog::create(path)?;
         let text = toml::to_string(scene).unwrap_or_default();
@@ -74,10 +73,10 @@ impl Recorder {
         Ok(Self { log, camera, mirror, laser: simulation.laser().cloned(), webcams })
     }
 
-    /// Writes one thing.
+    /// Writes one event.
     ///
     /// # Errors
-    /// [`WriteError`] if the disk says no.
+    /// [`WriteError`] if the file cannot be written.
     pub fn write(&mut self, event: &Event) -> Result<(), WriteError> {
         match event {
             Event::Odometry(reading) => self.odometry(reading),
@@ -86,11 +85,11 @@ impl Recorder {
         }
     }
 
-    /// Writes what a pipeline made of an image that was captured then, since the
-    /// start, and what it told the wheels.
+    /// Writes a pipeline's report of an image, with the command, by the capture time since the
+    /// start.
     ///
     /// # Errors
-    /// [`WriteError`] if the disk says no.
+    /// [`WriteError`] if the file cannot be written.
     pub fn pursuit(&mut self, captured_ns: u64, json: String) -> Result<(), WriteError> {
         self.log.send(PURSUIT_TOPIC, after(captured_ns), &StringMsg { data: json })
     }
@@ -98,7 +97,7 @@ impl Recorder {
     /// Completes the file.
     ///
     /// # Errors
-    /// [`WriteError`] if the disk says no.
+    /// [`WriteError`] if the file cannot be written.
     pub fn finish(self) -> Result<(), WriteError> {
         self.log.finish()
     }
@@ -122,6 +121,7 @@ impl Recorder {
             self.colour("/camera/color", recorded, &header, colour)?;
         }
         if let Some(depth) = &images.depth {
+            // Depth has a capture time of its own, and cannot be recorded before it.
             let (header, recorded) = (
                 Header::new(after(shot.depth_ns), CAMERA_FRAME),
                 recorded.max(after(shot.depth_ns)),
@@ -187,7 +187,7 @@ impl Recorder {
         Image { header: header.clone(), height, width, encoding, is_bigendian: 0, step, data }
     }
 
-    /// The calibration of a camera that stands `aside_m` to the right.
+    /// Writes the calibration of a camera that stands `aside_m` to the right.
     fn info(
         &mut self,
         name: &str,
@@ -231,13 +231,13 @@ fn jpeg(image: &RgbImage) -> Vec<u8> {
     out
 }
 
-/// 0 is "no reading", as in REP 118.
+/// Converts to millimetres; 0 is "no reading", as in REP 118.
 fn millimetres(depth_m: f32) -> [u8; 2] {
     let millimetres = if depth_m.is_finite() { (1000.0 * depth_m).round() as u16 } else { 0 };
     millimetres.to_le_bytes()
 }
 
-/// Static transforms to sensors from the frame that their poses are given in.
+/// Returns static transforms to sensors from the frame of their poses.
 fn mount(parent: &str, sensors: impl IntoIterator<Item = (String, Isometry3<f64>)>) -> TFMessage {
     let transform = |(child_frame_id, pose): (String, Isometry3<f64>)| TransformStamped {
         header: Header::new(EPOCH, parent),
@@ -261,7 +261,7 @@ fn scan(captured: Stamp, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
     }
 }
 
-/// A pose on the floor.
+/// Returns a pose on the floor.
 fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
     let at = Translation3::new(planar.translation.x, planar.translation.y, 0.0);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());

@@ -1,4 +1,4 @@
-//! The card of a model: what it was trained on and what it is worth.
+//! Card of a model: its training data and its scores.
 
 use std::fmt::Write as _;
 
@@ -7,45 +7,45 @@ use serde::Serialize;
 use super::TrainArgs;
 use super::held_out::{Effect, Share};
 
-/// What one round of training showed to the trainer.
+/// Counts of the candidates of one round.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Harvest {
     /// Candidates with a label.
     pub seen: u64,
-    /// Wrongly judged by the model of the round before.
+    /// Candidates that the model of the round before judged wrongly.
     pub mistakes: u64,
     /// People that were added.
     pub people: u64,
-    /// Others that were added.
+    /// Other candidates that were added.
     pub others: u64,
 }
 
-/// The card.
+/// Card of a verifier.
 #[derive(Clone, Debug, Serialize)]
 pub struct Card {
-    /// The plugin that reads the model.
+    /// Plugin that reads the model.
     pub plugin: String,
-    /// A minute's version.
+    /// True for the quick version of the training.
     pub quick: bool,
-    /// The seed.
+    /// Seed of the training.
     pub seed: u64,
-    /// Scenes that were drawn for the first round.
+    /// Number of scenes simulated for the first round.
     pub scenes: u64,
-    /// What it was trained on.
+    /// Training data.
     pub trained_on: Vec<String>,
-    /// What was added in each round.
+    /// Added candidates of each round.
     pub rounds: Vec<Harvest>,
-    /// What the trainer says.
+    /// Figures of the trainer.
     pub fit: toml::Table,
-    /// On rooms that nothing was trained on.
+    /// Scores in held-out rooms.
     pub held_out_rooms: Effect,
-    /// On logs that nothing was trained on.
+    /// Scores on held-out logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_logs: Option<Effect>,
 }
 
 impl Card {
-    /// A card without figures.
+    /// Returns a card without figures.
     pub fn new(args: &TrainArgs, scenes: u64, trained_on: Vec<String>) -> Self {
         Self {
             plugin: args.plugin.clone(),
@@ -60,7 +60,7 @@ impl Card {
         }
     }
 
-    /// The card as TOML.
+    /// Returns the card as TOML.
     pub fn to_text(&self) -> String {
         let text = toml::to_string(self).unwrap_or_default();
         format!(
@@ -68,7 +68,7 @@ impl Card {
         )
     }
 
-    /// The figures that matter most, for people.
+    /// Returns the main figures, for a terminal.
     pub fn summary(&self) -> String {
         let mut out = String::new();
         let logs = self.held_out_logs.iter().map(|effect| ("held-out logs", effect));
@@ -92,26 +92,26 @@ impl Card {
     }
 }
 
-/// The card of a detector that looks at windows.
+/// Card of a window detector.
 #[derive(Clone, Debug, Serialize)]
 pub struct WindowCard {
-    /// The plugin that reads the model.
+    /// Plugin that reads the model.
     plugin: String,
-    /// A minute's version.
+    /// True for the quick version of the training.
     quick: bool,
-    /// The seed.
+    /// Seed of the training.
     seed: u64,
-    /// What it was trained on.
+    /// Training data.
     trained_on: Vec<String>,
-    /// Photographs altogether; a fifth of their groups is held out for the
-    /// figures, and a tenth for the calibration.
+    /// Number of photographs; a fifth of their groups is held out for the figures, and a tenth for
+    /// the calibration.
     photographs: usize,
-    /// What the trainer says.
+    /// Figures of the trainer.
     fit: toml::Table,
 }
 
 impl WindowCard {
-    /// A card; `folders` are those of the data that were read.
+    /// Returns a card; `folders` are those of the data that were read.
     pub fn new(args: &TrainArgs, folders: &[&str], photographs: usize, fit: toml::Table) -> Self {
         Self {
             plugin: args.plugin.clone(),
@@ -123,7 +123,7 @@ impl WindowCard {
         }
     }
 
-    /// The card as TOML.
+    /// Returns the card as TOML.
     pub fn to_text(&self) -> String {
         toml::to_string(self).unwrap_or_default()
     }

@@ -1,5 +1,5 @@
-//! Faces: those of FDDB in their pictures, those of CBCL as crops, and pictures
-//! without anybody.
+//! Training data of faces: those of FDDB in their pictures, those of CBCL as crops, and pictures
+//! without people.
 
 use std::fs;
 use std::io::Read as _;
@@ -11,32 +11,33 @@ use tagalong_core::{Example, GreyImage, Rect};
 use super::photos::{Take, candidate, fingerprint, frame, photos, read};
 use crate::outcome::Failure;
 
-/// The trainer of cascades.
+/// Name of the trainer of cascades.
 pub const NAME: &str = "cascade";
 
-/// What is read of a folder of data.
+/// Folders of the data that are read.
 pub const FOLDERS: [&str; 4] =
     ["faces/fddb", "faces/cbcl-train", "people/inria-64x128/neg", "negatives"];
 
-/// Of the half width of a face: the side of its window ...
+/// Side of a face's window, in half widths of the face ...
 const SIDE: f64 = 1.7;
-/// ... and how far the middle of the window is below that of the ellipse. So the
-/// crops of CBCL show faces, from the brows to the chin.
+/// ... and the distance of its middle below that of the ellipse. So the crops of CBCL show faces,
+/// from the brows to the chin.
 const BELOW: f64 = 0.2;
-/// What a block of a tar archive is long, bytes.
+/// Length of a block of a tar archive, bytes.
 const BLOCK: usize = 512;
-/// The archive may not be longer than this when it is unpacked, bytes.
+/// Most unpacked bytes of the archive.
 const MOST_BYTES: u64 = 200_000_000;
 
-/// Shows all faces and pictures of a folder of data, or one in `share`.
+/// Passes all faces and pictures of a folder of data, or one in `share`, to `take`.
 ///
 /// # Errors
-/// Files that are not there or cannot be read, and those of `take`.
+/// Missing or unreadable files, and those of `take`.
 pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let mut count = fddb(data, share, take)?;
     count += cbcl(&data.join("faces/cbcl-train.tar.gz"), share, take)?;
     let both = [photos(data, false), photos(data, true)];
     let empty = both.into_iter().flatten().filter(|photo| !photo.is_person());
+    // The remainder by 5 marks the held-out groups, so the share is taken from the quotient.
     for photo in empty.filter(|photo| photo.group / 5 % share == 0) {
         photo.visit(0, take)?;
         count += 1;
@@ -44,10 +45,10 @@ pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> 
     Ok(count)
 }
 
-/// The pictures of FDDB; its table says where the faces are.
+/// Passes the pictures of FDDB, with the positions of the faces from its table.
 ///
 /// # Errors
-/// As [`visit`].
+/// As for [`visit`].
 pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let (table, folder) = (data.join("faces/fddb.csv"), data.join("faces/fddb"));
     let wrong = |why: String| Failure::failed(format!("{}: {why}", table.display()));
@@ -65,6 +66,7 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
         let (Some(file), [Some(major), Some(minor), Some(x), Some(y)]) = (file, numbers) else {
             return Err(wrong(format!("cannot read `{line}`")));
         };
+        // The ellipse may lie on its side; the smaller radius is the half width.
         let half = major.min(minor);
         let (side, below) = (SIDE * half, BELOW * half);
         let window = Rect::new(x - 0.5 * side, y + below - 0.5 * side, side, side);
@@ -85,11 +87,12 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     Ok(count)
 }
 
-/// The crops of CBCL, of faces and of others.
+/// Passes the crops of CBCL, of faces and of other things.
 fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let wrong = |why: String| Failure::failed(format!("{}: {why}", archive.display()));
     let file = fs::File::open(archive).map_err(|error| wrong(error.to_string()))?;
     let mut bytes = Vec::new();
+    // A damaged or hostile archive must not fill the memory.
     let unpacked = GzDecoder::new(file).take(MOST_BYTES).read_to_end(&mut bytes);
     unpacked.map_err(|error| wrong(error.to_string()))?;
     let mut count = 0;
@@ -111,7 +114,7 @@ fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     Ok(count)
 }
 
-/// Names and contents of the files of a tar archive.
+/// Returns the names and contents of the files of a tar archive.
 fn members(mut archive: &[u8]) -> Vec<(&str, &[u8])> {
     let mut found = Vec::new();
     while let Some((header, rest)) = archive.split_at_checked(BLOCK) {

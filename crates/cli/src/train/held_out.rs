@@ -1,4 +1,4 @@
-//! What a verifier does to rooms and logs that it was not trained on.
+//! Effect of a verifier on rooms and logs that it was not trained on.
 
 use std::collections::BTreeSet;
 
@@ -11,18 +11,18 @@ use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 use super::seen::{Known, Label, Seen, label};
 use crate::outcome::Failure;
 
-/// A track is of a person who is this near on the floor, m ...
+/// Distance on the floor within which a track is of a person, m ...
 const TRACKED_M: f64 = 0.5;
-/// ... and false if nobody is within this, m.
+/// ... and false if every person is farther away than this, m.
 const FALSE_M: f64 = 0.9;
 
-/// A share with its 95 % interval (Wilson), as if all of it were independent: for
-/// sightings, which are not, it is too narrow.
+/// Share with its 95 % interval (Wilson), as if all of it were independent: for detections, which
+/// are not, it is too narrow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Share {
-    /// So many ...
+    /// Number of successes ...
     pub count: u64,
-    /// ... of so many.
+    /// ... among this many.
     pub of: u64,
     /// Lower end of the interval of the fraction.
     pub lower: f64,
@@ -39,33 +39,32 @@ impl Share {
     }
 }
 
-/// What the verifier did: on proposals of the detector with low thresholds, by
-/// the sign of its margin alone; on sightings that the pipeline without it
-/// accepted; and on the confirmed tracks of both pipelines.
+/// Effect of a verifier: on proposals of the detector with low thresholds, by the sign of its
+/// margin alone; on detections that the pipeline without it accepted; and on the confirmed tracks
+/// of both pipelines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Effect {
-    /// Proposals of nobody that it rejects.
+    /// Rejected proposals without a person.
     pub false_proposals_rejected: Share,
-    /// Proposals of people that it rejects.
+    /// Rejected proposals of people.
     pub people_proposals_rejected: Share,
-    /// Accepted sightings of nobody that it rejects.
+    /// Rejected among the accepted detections without a person.
     pub false_sightings_removed: Share,
-    /// Accepted sightings of people that it rejects.
+    /// Rejected among the accepted detections of people.
     pub people_sightings_lost: Share,
-    /// Accepted sightings of a part of a person, such as a backpack, that it
-    /// rejects.
+    /// Rejected among the accepted detections of a part of a person, such as a backpack.
     pub part_sightings_removed: Share,
-    /// Frames times confirmed tracks of nobody: gone, of those without it.
+    /// Frames times false confirmed tracks: removed, among those without the verifier.
     pub false_track_frames_removed: Share,
-    /// Confirmed tracks of nobody: fewer, of those without it.
+    /// False confirmed tracks: removed, among those without the verifier.
     pub false_tracks_removed: Share,
-    /// Frames times people under a confirmed track: lost, of those without it.
+    /// Frames times people under a confirmed track: lost, among those without the verifier.
     pub tracked_people_lost: Share,
     /// People that a confirmed track covers at any time: lost.
     pub people_never_tracked: Share,
 }
 
-/// The pipelines, side by side.
+/// Pipelines that are compared, side by side.
 pub struct Comparison {
     proposer: Pipeline,
     plain: Pipeline,
@@ -74,14 +73,14 @@ pub struct Comparison {
     start_score: f64,
 }
 
-/// Counts over all that was seen.
+/// Counts over all frames.
 #[derive(Default)]
 pub struct Tally {
-    /// Rejected and accepted sightings of people, nobody, and parts.
+    /// Rejected and all detections of people, nothing, and parts.
     sightings: [(u64, u64); 3],
     /// The same of proposals.
     proposals: [(u64, u64); 3],
-    /// Of the pipeline without the verifier, and with it.
+    /// Counts of the pipeline without the verifier, and with it.
     tracks: [Tracks; 2],
     both: u64,
     scenes: u64,
@@ -96,8 +95,7 @@ struct Tracks {
 }
 
 impl Comparison {
-    /// Fresh pipelines: one that proposes, one without the verifier, one with
-    /// it.
+    /// Builds the pipelines: one that proposes, one without the verifier, one with it.
     ///
     /// # Errors
     /// A config that is wrong.
@@ -115,7 +113,7 @@ impl Comparison {
         })
     }
 
-    /// Takes all of them through one frame.
+    /// Passes one frame to all of them.
     ///
     /// # Errors
     /// A plugin that fails.
@@ -143,7 +141,7 @@ impl Comparison {
 }
 
 impl Tally {
-    /// Numbers of people and tracks begin again.
+    /// Starts a new scene, in which the numbers of people and tracks begin again.
     pub fn next_scene(&mut self) {
         self.scenes += 1;
     }
@@ -172,10 +170,11 @@ impl Tally {
         self.both += covered[0].intersection(&covered[1]).count() as u64;
     }
 
-    /// The figures.
+    /// Returns the figures.
     pub fn effect(&self) -> Effect {
         let share = |(count, of)| Share::new(count, of);
         let [plain, verified] = &self.tracks;
+        // A verifier may also cause false tracks; more of them count as none removed.
         let fewer = |before: u64, after: u64| Share::new(before.saturating_sub(after), before);
         let people = plain.people.len() as u64;
         let kept = plain.people.intersection(&verified.people).count() as u64;
@@ -207,7 +206,7 @@ fn count(rows: &mut [(u64, u64); 3], label: Label, rejected: bool) {
     row.1 += 1;
 }
 
-/// The people who count and have a track on them.
+/// Returns the people that count and have a track on them.
 fn covered_by(tracks: &[&Track], people: &[Known]) -> BTreeSet<i64> {
     let is_covered = |known: &&Known| {
         !known.ignore && tracks.iter().any(|t| (floor(t) - known.floor).norm() <= TRACKED_M)
@@ -215,7 +214,7 @@ fn covered_by(tracks: &[&Track], people: &[Known]) -> BTreeSet<i64> {
     people.iter().filter(is_covered).map(|known| known.id).collect()
 }
 
-/// True for a track in the image with nobody around.
+/// Returns true for a track without a person nearby.
 fn is_false(track: &Track, people: &[Known]) -> bool {
     people.iter().all(|known| (floor(track) - known.floor).norm() > FALSE_M)
 }

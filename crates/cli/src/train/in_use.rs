@@ -1,5 +1,4 @@
-//! The pipelines that a verifier is trained for: one for colour and depth, one for
-//! stereo pairs.
+//! Pipelines that a verifier is trained for: one for colour and depth, one for stereo pairs.
 
 use std::fs;
 use std::path::Path;
@@ -12,18 +11,18 @@ use crate::outcome::Failure;
 
 const RGBD: &str = include_str!("../../../../configs/depth-ekf.toml");
 const STEREO: &str = include_str!("../../../../configs/stereo-best.toml");
-/// What changes where candidates are wanted.
+/// Changes of the config for collecting candidates.
 const HARVEST: &str = include_str!("harvest.toml");
 
-/// A config in use, without verifiers and controller.
+/// Config in use, without verifiers and controller.
 pub struct InUse {
     config: Table,
-    /// Candidates are wanted that this config would not propose.
+    /// True if candidates are wanted that this config would not propose.
     is_lowered: bool,
 }
 
 impl InUse {
-    /// The one for a kind of camera.
+    /// Returns the config for a kind of camera.
     ///
     /// # Errors
     /// A config that is no TOML.
@@ -33,7 +32,7 @@ impl InUse {
         Ok(Self { config: without_verifiers(config), is_lowered: true })
     }
 
-    /// A config of a file, which proposes what it proposes, whatever the camera.
+    /// Returns the config of a file, with its own thresholds, for any camera.
     ///
     /// # Errors
     /// A file that cannot be read or is no TOML.
@@ -44,21 +43,21 @@ impl InUse {
         Ok(Self { config: without_verifiers(config), is_lowered: false })
     }
 
-    /// How depth is made of a pair.
+    /// Returns the settings for depth from a pair.
     ///
     /// # Errors
-    /// Settings that are none.
+    /// Invalid settings.
     pub fn stereo(&self) -> Result<StereoSettings, Failure> {
         let settings = self.config.get("stereo").cloned().unwrap_or_else(|| Table::new().into());
         settings.try_into().map_err(Failure::failed)
     }
 
-    /// The config as it is in use.
+    /// Returns the config as it is in use.
     pub fn plain(&self) -> String {
         self.config.to_string()
     }
 
-    /// The config with a verifier.
+    /// Returns the config with a verifier.
     pub fn verified(&self, plugin: &str, settings: Table) -> String {
         let verifier = Table::from_iter([
             ("plugin".to_owned(), Value::from(plugin)),
@@ -69,10 +68,10 @@ impl InUse {
         config.to_string()
     }
 
-    /// The config with thresholds so low that much is proposed.
+    /// Returns the config with thresholds so low that it proposes many candidates.
     ///
     /// # Errors
-    /// A config whose first detector is none.
+    /// A config without a detector.
     pub fn proposing(&self) -> Result<String, Failure> {
         let mut harvest: Table = HARVEST.parse().map_err(Failure::failed)?;
         let mut config = self.config.clone();

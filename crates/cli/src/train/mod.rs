@@ -1,10 +1,9 @@
-//! `tagalong train`: from drawn rooms, annotated logs and photographs to the
-//! model file of a plugin, and a card that says where it comes from and what it
-//! is worth.
+//! `tagalong train`: trains the model file of a plugin on simulated rooms, annotated logs and
+//! photographs, and writes a card with its origin and its scores.
 //!
-//! A verifier is trained on what the detector proposes, since that is what it
-//! will be asked about. The first model is then shown new rooms, and what it
-//! gets wrong there, or is unsure of, is added before the next fit.
+//! A verifier is trained on the proposals of the detector, since these are its later inputs. The
+//! first model is then applied to new rooms, and candidates that it judges wrongly or with a small
+//! margin are added before the next fit.
 
 mod card;
 mod faces;
@@ -40,7 +39,7 @@ use self::seen::{Label, Seen, in_log, in_scene, label};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::simulate::threads;
 
-/// A margin below this is unsure: log-odds.
+/// Margin below which a judgement is unsure: log-odds.
 const UNSURE: f64 = 1.0;
 
 /// Annotated logs for training ...
@@ -48,52 +47,51 @@ const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
 /// ... and one of another room, which is held out.
 const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 
-/// The arguments of `tagalong train`.
+/// Arguments of `tagalong train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
     /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
     /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`.
     pub plugin: String,
-    /// Where the model goes; its card is written beside it
-    /// [default: configs/models/<plugin>.toml].
+    /// Output file of the model; its card is written beside it [default:
+    /// configs/models/<plugin>.toml].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// A folder of real data (logs, people, negatives); without it, only drawn
-    /// rooms are used.
+    /// A folder of real data (logs, people, negatives); without it, only simulated rooms are used.
     #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,
     /// Settings of the plugin, a TOML file.
     #[arg(long, value_name = "FILE")]
     pub settings: Option<PathBuf>,
-    /// A minute's version, to see that it works; the model is poor.
+    /// A quick training, to see that it works; the model is poor.
     #[arg(long)]
     pub quick: bool,
-    /// Scenes that are drawn for the first round of a verifier [default: 256]; more of
-    /// them take longer, and help a model that has much to learn.
+    /// Scenes that are simulated for the first round of a verifier [default: 256]; more of them
+    /// take longer, and help a large model.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(4..=900))]
     pub scenes: Option<u64>,
-    /// Further rounds of a verifier, in which what the model gets wrong is added
+    /// Further rounds of a verifier, each of which adds the model's mistakes to the training data
     /// [default: 2].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=8))]
     pub rounds: Option<u64>,
-    /// A config whose detector proposes the candidates of a verifier, as it is, instead
-    /// of those of `depth-ekf` and `stereo-best` with low thresholds.
+    /// A config with the detector that proposes the candidates of a verifier, as it is, instead of
+    /// those of `depth-ekf` and `stereo-best` with low thresholds.
     #[arg(long, value_name = "CONFIG")]
     pub proposes: Option<PathBuf>,
-    /// Everything random depends on it.
+    /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
 }
 
-/// How much is drawn.
+/// Amount of simulated data.
 struct Plan {
     /// Scenes of the first round and of each further one.
     scenes: [u64; 2],
     rounds: usize,
     test_scenes: u64,
-    /// Few images a second: many moments tell more than many neighbours.
+    /// Few images per second: distant moments are more informative than neighbouring ones.
     look: Look,
-    /// Tracks want more of them.
+    /// Rate and duration for tests; tracks need more images.
     test_look: Look,
 }
 
@@ -117,7 +115,7 @@ impl Plan {
         }
     }
 
-    /// The numbers of the scenes of a round; none comes twice.
+    /// Returns the numbers of the scenes of a round; no number is repeated.
     fn numbers(&self, round: usize, seed: u64) -> std::ops::Range<u64> {
         let [first, further] = self.scenes;
         let before = if round == 0 { 0 } else { first + (round as u64 - 1) * further };
@@ -127,7 +125,7 @@ impl Plan {
     }
 }
 
-/// What a session of training has at hand.
+/// State of one training.
 struct Session<'a> {
     args: &'a TrainArgs,
     registry: &'a Registry,
@@ -137,13 +135,14 @@ struct Session<'a> {
     bar: ProgressBar,
 }
 
-/// `tagalong train`.
+/// Runs `tagalong train`.
 ///
 /// # Errors
-/// A plugin that cannot be trained and wrong settings are exit code 2; files
-/// that cannot be read or written are 1.
+/// A plugin that cannot be trained and wrong settings are exit code 2; files that cannot be read or
+/// written are 1.
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let session = Session::new(args, registry)?;
+    // Its samples come from the truth and not from proposals, so it skips the rounds below.
     if args.plugin == panorama::NAME {
         return panorama::train(&session, args);
     }
@@ -161,6 +160,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
         let fitted = trainer
             .fit(&mut |part| session.bar.set_position((1000.0 * part) as u64))
             .map_err(Failure::failed)?;
+        // Written first: the verifier loads the model from its file.
         write(&session.model, &fitted.model)?;
         doubter = Some(session.verifier()?);
         card.rounds.push(harvest);
@@ -222,13 +222,14 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// The verifier with the model of the last round.
+    /// Returns the verifier with the model of the last round.
     fn verifier(&self) -> Result<Box<dyn Verifier>, Failure> {
         with_value(&self.with_model()?, |value| {
             self.registry.build_verifier(&self.args.plugin, value, &self.context())
         })
     }
 
+    // An absolute path, because relative ones start at the config's folder.
     fn with_model(&self) -> Result<toml::Table, Failure> {
         let absolute = std::path::absolute(&self.model).map_err(Failure::failed)?;
         let mut settings = self.settings.clone();
@@ -236,8 +237,8 @@ impl<'a> Session<'a> {
         Ok(settings)
     }
 
-    /// Shows the trainer candidates: all of them in the first round, after
-    /// that what the verifier gets wrong or is unsure of.
+    /// Passes candidates to the trainer: all of them in the first round, after that those that the
+    /// verifier judges wrongly or is unsure of.
     fn harvest(
         &self,
         round: usize,
@@ -251,6 +252,7 @@ impl<'a> Session<'a> {
                 let margin = verifier.margin(frame, candidate).map_err(Failure::failed)?;
                 let right = if example.is_person { margin } else { -margin };
                 harvest.mistakes += u64::from(right < 0.0);
+                // Only mistakes and unsure cases are added: the model is right about the rest.
                 if right >= UNSURE {
                     return Ok(());
                 }
@@ -274,6 +276,7 @@ impl<'a> Session<'a> {
         }
         let Some(data) = &self.args.data else { return Ok(harvest) };
         self.tell(round, "reading logs and photographs");
+        // The logs do not change, so later rounds would repeat their candidates.
         if round == 0 {
             let proposing = self.in_use(CameraKind::Rgbd)?.proposing()?;
             for log in TRAIN_LOGS {
@@ -282,6 +285,7 @@ impl<'a> Session<'a> {
                 self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
             }
         }
+        // The remainder by 5 marks the held-out groups, so the share is taken from the quotient.
         let share = if self.args.quick { 8 } else { 1 };
         let photos = photos(data, false);
         self.bar.set_length(photos.len() as u64);
@@ -292,7 +296,7 @@ impl<'a> Session<'a> {
         Ok(harvest)
     }
 
-    /// The pipeline that a verifier is trained for.
+    /// Returns the pipeline that a verifier is trained for.
     fn in_use(&self, kind: CameraKind) -> Result<InUse, Failure> {
         match &self.args.proposes {
             Some(path) => InUse::as_it_is(path),
@@ -305,7 +309,7 @@ impl<'a> Session<'a> {
         in_log(&path.with_extension("mcap"), &path.with_extension("people.csv"), see)
     }
 
-    /// The pipeline in use, without and with the verifier.
+    /// Returns the pipeline in use, without and with the verifier.
     fn comparison(&self, in_use: &InUse) -> Result<Comparison, Failure> {
         let verified = in_use.verified(&self.args.plugin, self.with_model()?);
         let configs = [in_use.proposing()?, in_use.plain(), verified];
@@ -343,7 +347,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Hands on what the detector proposes and the truth can label.
+/// Passes on the detector's proposals that the truth can label.
 fn propose(
     pipeline: &mut Pipeline,
     seen: &Seen,
@@ -367,7 +371,7 @@ fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
     built.map(|(pipeline, _)| pipeline).map_err(Failure::usage)
 }
 
-/// Fewer combinations, for those who only want to see that it works.
+/// Returns settings with fewer combinations, for a quick trial.
 fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",

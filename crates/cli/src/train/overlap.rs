@@ -1,4 +1,4 @@
-//! Do pictures that are tested look like pictures that are trained with?
+//! Tests that pictures for testing do not resemble pictures for training.
 
 use std::path::Path;
 
@@ -12,11 +12,10 @@ use crate::outcome::Failure;
 
 /// Columns and rows of a small picture.
 const SMALL: (usize, usize) = (10, 20);
-/// Pictures with a larger correlation show the same; different people on one meadow reach
-/// 0.904.
+/// Correlation above which two pictures show the same; different people on one meadow reach 0.904.
 const SAME: f32 = 0.92;
 
-/// A small picture of unit length and without its mean.
+/// Returns a small picture of unit length and without its mean.
 fn small(grey: &GreyImage) -> Vec<f32> {
     let mut small = mean_cells(grey, SMALL.0, SMALL.1);
     to_unit_length(&mut small);
@@ -27,7 +26,7 @@ fn mirrored(small: &[f32]) -> Vec<f32> {
     small.chunks(SMALL.0).flat_map(|row| row.iter().rev()).copied().collect()
 }
 
-/// Pictures that show people, and what they are for.
+/// Returns the pictures that show people, with their use.
 fn with_people(visit: impl FnOnce(Take<'_>) -> Result<(), Failure>) -> Vec<(Use, Vec<f32>)> {
     let mut shown = Vec::new();
     let taken = visit(&mut |frame: &Frame, _: &Detection, example: Example| {
@@ -41,8 +40,8 @@ fn with_people(visit: impl FnOnce(Take<'_>) -> Result<(), Failure>) -> Vec<(Use,
     shown
 }
 
-/// The largest correlation of a picture that is not trained with to one that is, or to its
-/// mirror image; at least some are of either kind.
+/// Returns the largest correlation of a picture that is not trained with to one that is, or to its
+/// mirror image; asserts that there are enough of either kind.
 fn most_alike(shown: &[(Use, Vec<f32>)]) -> f32 {
     let of = |is_fit: bool| shown.iter().filter(move |(use_, _)| (*use_ == Use::Fit) == is_fit);
     assert!(of(true).count() > 100 && of(false).count() > 50, "{}", shown.len());
@@ -54,7 +53,7 @@ fn most_alike(shown: &[(Use, Vec<f32>)]) -> f32 {
     alike.fold(f32::MIN, f32::max)
 }
 
-/// Of photographs of some kind.
+/// Returns the same for photographs of some kind.
 fn most_alike_photos(data: &Path, kind: impl Fn(&Photo) -> bool) -> f32 {
     let visit = |take: Take<'_>| {
         let all = [photos(data, false), photos(data, true)];

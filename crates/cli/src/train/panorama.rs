@@ -1,5 +1,5 @@
-//! `tagalong train omni-distance`: distances in the panorama of a conical mirror,
-//! from people in drawn rooms whose places are known.
+//! `tagalong train omni-distance`: distances in the panorama of a conical mirror, from people in
+//! simulated rooms with known positions.
 
 use nalgebra::Matrix3;
 use tagalong_core::{Detection, Example, Frame, Rect, Trainer};
@@ -10,24 +10,24 @@ use super::{Session, TrainArgs, write};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::simulate::threads;
 
-/// What `tagalong train` is asked for.
+/// Name of the model on the command line.
 pub const NAME: &str = "omni-distance";
 
-/// Rooms with two people, one after the other: another room, other people and another
-/// mirror with every seed.
+/// Scene with two people, one after the other: another room, other people and another mirror with
+/// every seed.
 const ROOM: &str = include_str!("../../../../configs/scenes/omni-room.toml");
-/// Groups from here on are strangers.
+/// First group number of the people in other rooms.
 const STRANGER: u64 = 100;
-/// Time for which each person of the first room is seen, s: each gets a head of their
+/// Time for which each person of the first room is seen, s: each gets a regression head of their
 /// own.
 const KNOWN_S: f64 = 40.0;
-/// Other rooms, for the general head, and the time for which each of their people is
+/// Number of other rooms, for the general head, and the time for which each of their people is
 /// seen, s.
 const STRANGE: (u64, f64) = (15, 10.0);
-/// The time of a quick training, which has the first room only, s.
+/// Time per person in a quick training, which has the first room only, s.
 const QUICK_S: f64 = 12.0;
 
-/// A room to draw.
+/// Room to simulate.
 struct Room {
     seed: u64,
     each_s: f64,
@@ -46,16 +46,16 @@ impl Room {
     /// Returns the scene: the empty room, the first person, then the second.
     fn scene(&self) -> Result<Scene, Failure> {
         let variant = Variant::of_split(Split::Train, self.seed);
+        // The webcams would cost time, and nothing is trained on their images.
         let scene = Scene::parse_with(ROOM, &variant).map_err(Failure::failed)?;
         Ok(Scene { webcams: Vec::new(), ..scene.in_turn(self.each_s) })
     }
 }
 
-/// Draws, fits, writes model and card.
+/// Simulates, fits, writes model and card.
 ///
 /// # Errors
-/// Scenes that do not parse, samples that do not suffice, files that cannot be
-/// written.
+/// Scenes that do not parse, too few samples, files that cannot be written.
 pub fn train(session: &Session<'_>, args: &TrainArgs) -> Outcome {
     let mut trainer = session.trainer()?;
     let rooms = rooms(args.quick, args.seed);
@@ -91,10 +91,11 @@ fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
     )
 }
 
-/// Shows everybody in a room to the trainer.
+/// Passes every person in a room to the trainer.
 fn show(session: &Session<'_>, room: &Room, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let scene = room.scene()?;
     session.bar.set_length((scene.duration_s * scene.camera.rate_hz) as u64);
+    // Each room has its own range of group numbers, because ids of people begin anew.
     let first = if room.seed == session.args.seed { 0 } else { STRANGER * (1 + room.seed) };
     let mut draw = Draw::new(&scene, threads(None));
     while let Some(drawn) = draw.next_frame() {
@@ -120,6 +121,7 @@ fn take(
         };
         trainer.add(frame, &candidate, example).map_err(Failure::failed)
     };
+    // Frames without people are needed, too: the trainer learns the background from them.
     add(nalgebra::Point3::origin(), Example { is_person: false, group: first })?;
     for person in truth.iter().filter(|person| !person.ignore) {
         let group = first + u64::from(person.id);

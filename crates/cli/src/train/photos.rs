@@ -1,4 +1,4 @@
-//! Photographs without depth: crops of people, and pictures without anybody.
+//! Photographs without depth: crops of people, and pictures without people.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,22 +13,22 @@ use tagalong_core::{
 use super::rooms::Chance;
 use crate::outcome::Failure;
 
-/// Squares cut from a photograph without anybody.
+/// Squares cut from a photograph without people.
 const SQUARES: usize = 2;
 
-/// A person in a crop of INRIA is 96 of 128 rows tall and begins at row 16.
+/// Body in a crop of INRIA: 96 of 128 rows tall, from row 16 on.
 const INRIA_BODY: Rect = Rect::new(0.0, 16.0, 64.0, 96.0);
-/// The height that makes a body 1.7 m.
+/// Assumed height of a body, m.
 const STANDING_M: f64 = 1.7;
 
-/// How a candidate of a photograph is taken in.
+/// Callback for the candidates of a photograph.
 pub type Take<'a> = &'a mut dyn FnMut(&Frame, &Detection, Example) -> Result<(), Failure>;
 
-/// A photograph, and whether it shows a person.
+/// Photograph, with or without a person.
 pub struct Photo {
     path: PathBuf,
     kind: Kind,
-    /// Photographs that resemble each other share it.
+    /// Number that similar photographs share.
     pub group: u64,
 }
 
@@ -39,8 +39,7 @@ enum Kind {
     Nobody,
 }
 
-/// All photographs of a folder of data, in order; those that are held out, or
-/// the others.
+/// Returns all photographs of a folder of data, in order; those that are held out, or the others.
 pub fn photos(data: &Path, held_out: bool) -> Vec<Photo> {
     let mut all = Vec::new();
     let folders = [
@@ -58,6 +57,7 @@ pub fn photos(data: &Path, held_out: bool) -> Vec<Photo> {
         all.extend(each.map(|(path, group)| Photo { path, kind, group }));
     }
     all.extend(busts(&data.join("people/head-shoulder-50")));
+    // Whole groups are held out, so that no person is in both parts.
     all.retain(|photo| (photo.group % 5 == 0) == held_out);
     all
 }
@@ -72,7 +72,7 @@ fn pictures(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The photograph of a crop: crops have its name and a letter or a number behind it.
+/// Returns the photograph of a crop: crops have its name and a letter or a number behind it.
 fn photograph(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let name = match stem.rsplit_once('_') {
@@ -82,7 +82,7 @@ fn photograph(path: &Path) -> String {
     name.to_owned()
 }
 
-/// Groups of crops: photographs with numbers one after the other were taken one after the
+/// Returns the groups of crops: photographs with consecutive numbers were taken one after the
 /// other, and often show the same people.
 fn runs(crops: &[PathBuf]) -> Vec<u64> {
     let numbered = |path: &PathBuf| {
@@ -104,15 +104,14 @@ fn runs(crops: &[PathBuf]) -> Vec<u64> {
     crops.iter().map(first).collect()
 }
 
-/// FNV-1a: a number for a name.
+/// Returns a number for a name (FNV-1a).
 pub fn fingerprint(name: &str) -> u64 {
     name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
     })
 }
 
-/// Crops of heads and shoulders; near-duplicates and mirror images share a
-/// group.
+/// Returns the crops of heads and shoulders; near-duplicates and mirror images share a group.
 fn busts(folder: &Path) -> Vec<Photo> {
     let files: Vec<(PathBuf, GreyImage)> = pictures(folder)
         .into_iter()
@@ -123,6 +122,8 @@ fn busts(folder: &Path) -> Vec<Photo> {
     for i in 0..files.len() {
         for j in 0..i {
             if group_of[i] != group_of[j] && looks[i].is_like(&looks[j]) {
+                // Whole groups are merged: likeness of pairs is not transitive, membership has to
+                // be.
                 let (from, to) = (group_of[i], group_of[j]);
                 group_of.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
             }
@@ -137,7 +138,7 @@ fn busts(folder: &Path) -> Vec<Photo> {
     .collect()
 }
 
-/// What a small version of a picture looks like, wherever its cut lies by a few pixels.
+/// Appearance of a small version of a picture, tolerant of a shift of its cut by a few pixels.
 struct Looks {
     middle: Patch,
     /// All patches of that size of the picture, and of its mirror image.
@@ -152,8 +153,8 @@ impl Looks {
     const SMALL: usize = 16;
     /// ... and of its patches.
     const PATCH: usize = 12;
-    /// Patches with a larger correlation show the same, or people who look so much alike
-    /// that it does no harm to keep them together. Found by eye.
+    /// Correlation above which patches show the same, or people so similar that it does no harm to
+    /// keep them together. Found by eye.
     const ALIKE: f32 = 0.86;
 
     fn of(image: &GreyImage) -> Self {
@@ -181,15 +182,16 @@ fn patch(brightness: impl Fn(usize, usize) -> f32) -> Patch {
     patch
 }
 
-/// Takes the mean off, and scales what is left to unit length.
+/// Subtracts the mean, and scales the rest to unit length.
 pub fn to_unit_length(values: &mut [f32]) {
     let mean = values.iter().sum::<f32>() / values.len() as f32;
     values.iter_mut().for_each(|v| *v -= mean);
+    // An even patch has no length to divide by.
     let length = values.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
     values.iter_mut().for_each(|v| *v /= length);
 }
 
-/// Mean brightness in each cell of a grid over an image, row by row.
+/// Returns the mean brightness in each cell of a grid over an image, row by row.
 pub fn mean_cells(image: &GreyImage, columns: usize, rows: usize) -> Vec<f32> {
     let part = |i: usize, of: usize, size: usize| {
         let from = i * size / of;
@@ -205,7 +207,7 @@ pub fn mean_cells(image: &GreyImage, columns: usize, rows: usize) -> Vec<f32> {
     (0..columns * rows).map(|at| mean(at % columns, at / columns)).collect()
 }
 
-/// A picture as grey values.
+/// Reads a picture as grey values.
 ///
 /// # Errors
 /// A file that is no picture.
@@ -218,19 +220,19 @@ pub fn read(path: &Path) -> Result<GreyImage, Failure> {
 }
 
 impl Photo {
-    /// True if it shows a person from head to feet.
+    /// Returns true if it shows a person from head to feet.
     #[cfg(test)]
     pub fn is_body(&self) -> bool {
         self.kind == Kind::Body
     }
 
-    /// True if it shows a person.
+    /// Returns true if it shows a person.
     pub fn is_person(&self) -> bool {
         self.kind != Kind::Nobody
     }
 
-    /// Hands out its candidates; those of pictures without anybody are other
-    /// ones in each round.
+    /// Passes its candidates to `take`; those of pictures without people differ from round to
+    /// round.
     ///
     /// # Errors
     /// A picture that cannot be read, and those of `take`.
@@ -254,6 +256,7 @@ impl Photo {
             }
             Kind::Bust => vec![Rect::new(0.0, 0.0, width, height).inflated(-0.08)],
             Kind::Nobody => {
+                // Other squares in each round, but the same ones in each run.
                 let mut chance = Chance(self.group ^ round);
                 let least = width.min(height).min(40.0);
                 let most = (0.6 * width.min(height)).max(least);
@@ -270,7 +273,7 @@ impl Photo {
     }
 }
 
-/// A picture as a frame of some camera.
+/// Returns a picture as a frame of some camera.
 pub fn frame(grey: GreyImage) -> Frame {
     let (width, height) = (grey.width(), grey.height());
     let (cx, cy) = (0.5 * width as f64, 0.5 * height as f64);
@@ -280,7 +283,7 @@ pub fn frame(grey: GreyImage) -> Frame {
     Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
 }
 
-/// A candidate of which only the region is known.
+/// Returns a candidate of which only the region is known.
 pub fn candidate(region: Rect) -> Detection {
     let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), Matrix3::identity());
     Detection { region, position, covariance, score: 0.0, source: "photograph" }

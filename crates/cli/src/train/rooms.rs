@@ -1,5 +1,5 @@
-//! Scenes for training and for testing: rooms drawn at random from a seed, and
-//! the suites that everything else is tried in, each by its own seeds.
+//! Scenes for training and for testing: random rooms from a seed, and the suites that are used for
+//! all other tests, each with its own seeds.
 
 use tagalong_core::ConfigError;
 use tagalong_sim::{
@@ -17,7 +17,7 @@ const LOOK_ALIKES: [FurnitureKind; 6] = [
     FurnitureKind::CardboardFigure,
 ];
 
-/// The suites that take turns.
+/// Suites that take turns.
 const SUITES: [&str; 9] = [
     include_str!("../../../../configs/scenes/empty-clutter.toml"),
     include_str!("../../../../configs/scenes/office.toml"),
@@ -30,22 +30,23 @@ const SUITES: [&str; 9] = [
     include_str!("../../../../configs/scenes/following.toml"),
 ];
 
-/// How a scene is looked at.
+/// Rate and duration of a scene's images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// Images a second.
+    /// Images per second.
     pub rate_hz: f64,
-    /// For how long, s.
+    /// Duration, s.
     pub duration_s: f64,
 }
 
-/// A scene of a split: a random room or the next suite in turn, half of them as
-/// colour and depth, half of them as a stereo pair.
+/// Returns a scene of a split: a random room or the next suite in turn, half of them as colour and
+/// depth, half of them as a stereo pair.
 ///
 /// # Errors
 /// A number that is no seed.
 pub fn scene(split: Split, number: u64, look: Look) -> Result<Scene, ConfigError> {
     let (turn, is_room) = (number / 2, number.is_multiple_of(2));
+    // The camera changes more slowly than the rest, so that every suite gets both kinds.
     let kind = if (turn / 2).is_multiple_of(2) { CameraKind::Rgbd } else { CameraKind::Stereo };
     let seed = split.seed(number)?;
     let mut scene = if is_room {
@@ -59,8 +60,8 @@ pub fn scene(split: Split, number: u64, look: Look) -> Result<Scene, ConfigError
     Ok(scene)
 }
 
-/// A room with so many people, all of it in view. Size, light, camera, furniture
-/// and everybody's way and looks depend on the seed.
+/// Returns a room with so many people, all of it in view. Size, light, camera, furniture and the
+/// paths and appearance of the people depend on the seed.
 fn room(seed: u64, people: usize) -> Scene {
     let mut chance = Chance(seed);
     let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
@@ -103,14 +104,14 @@ fn room(seed: u64, people: usize) -> Scene {
     }
 }
 
-/// What the robot looks at from its start.
+/// View of the robot from its start.
 struct View {
     start: [f64; 2],
     room: [f64; 2],
 }
 
 impl View {
-    /// A place in view, within the detector's range and inside the room.
+    /// Returns a random place in view, within the detector's range and inside the room.
     fn place(&self, chance: &mut Chance) -> [f64; 2] {
         let (distance, angle) = (chance.between(1.8, 5.5), chance.between(-0.5, 0.5));
         let inside = |at: f64, size: f64| at.clamp(0.5, size - 0.5);
@@ -138,8 +139,7 @@ fn walker(chance: &mut Chance, view: &View) -> PersonSettings {
     }
 }
 
-/// Chance that depends on a seed only (SplitMix64: Steele, Lea and Flood,
-/// OOPSLA 2014).
+/// Random numbers that depend on a seed only (SplitMix64: Steele, Lea and Flood, OOPSLA 2014).
 pub struct Chance(pub u64);
 
 impl Chance {
@@ -150,8 +150,9 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// A number between two others.
+    /// Returns a number between two others.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        // The upper 53 bits: as many as a double has.
         low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 

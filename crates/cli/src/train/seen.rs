@@ -1,4 +1,4 @@
-//! Frames with the truth beside them, from drawn rooms and from annotated logs.
+//! Frames with the truth beside them, from simulated rooms and from annotated logs.
 
 use std::path::Path;
 
@@ -13,48 +13,48 @@ use tagalong_trials::Draw;
 use crate::outcome::Failure;
 use crate::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 
-/// A frame and who is in it.
+/// Frame with the people in it.
 pub struct Seen {
     /// The frame.
     pub frame: Frame,
-    /// Everybody, also those who do not count.
+    /// All people, also those that do not count.
     pub people: Vec<Known>,
 }
 
-/// Where somebody really is.
+/// True position of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
-    /// Who.
+    /// Number of the person.
     pub id: i64,
-    /// Below the head, on the floor of the robot frame, m.
+    /// Position below the head, on the floor of the robot frame, m.
     pub floor: Point2<f64>,
-    /// The upper body in the image.
+    /// Upper body in the image.
     pub region: Option<Rect>,
-    /// Neither a miss nor a false alarm.
+    /// True if neither a miss nor a false alarm.
     pub ignore: bool,
 }
 
-/// What a candidate is.
+/// Label of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Label {
-    /// The head and shoulders of this person.
+    /// Head and shoulders of this person.
     Person(i64),
-    /// Something else of a person: a backpack, an arm.
+    /// Another part of a person: a backpack, an arm.
     Part,
-    /// Too near to somebody to be called one or the other.
+    /// Too near to a person for a clear label.
     Unclear,
-    /// Nobody is there.
+    /// No person is there.
     Nobody,
 }
 
-/// A person's head is this near on the floor, m ...
+/// Distance on the floor within which a candidate is a person's head, m ...
 const SAME_M: f64 = 0.4;
-/// ... and the square overlaps this much.
+/// ... with at least this overlap of the squares.
 const SAME_OVERLAP: f64 = 0.4;
-/// Nobody is nearer than this to something that is nobody, m.
+/// Distance to the nearest person beyond which a candidate is a clear negative, m.
 const NOBODY_M: f64 = 0.9;
 
-/// What the candidate is, by the truth.
+/// Returns the label of a candidate, by the truth.
 pub fn label(candidate: &Detection, people: &[Known]) -> Label {
     let at = candidate.position.xy();
     let off = |known: &&Known| (known.floor - at).norm();
@@ -72,13 +72,13 @@ pub fn label(candidate: &Detection, people: &[Known]) -> Label {
     }
 }
 
-/// What is done with each frame.
+/// Callback for each frame.
 pub type See<'a> = &'a mut dyn FnMut(&Seen) -> Result<(), Failure>;
 
-/// Goes through a drawn scene. A stereo pair is matched, as a pipeline would.
+/// Goes through a simulated scene. A stereo pair is matched, as a pipeline would.
 ///
 /// # Errors
-/// Settings that are none, and those of `see`.
+/// Invalid settings, and those of `see`.
 pub fn in_scene(
     scene: &Scene,
     threads: usize,

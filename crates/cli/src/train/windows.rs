@@ -1,5 +1,5 @@
-//! Detectors that look at windows: they are trained on photographs of people,
-//! and search pictures without anybody for their own mistakes.
+//! Training of window detectors on photographs of people; they search pictures without people for
+//! their own false positives.
 
 use std::path::Path;
 
@@ -9,10 +9,10 @@ use super::{Session, faces, write};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_core::{Detection, Example, Frame, Trainer};
 
-/// What is read of a folder of data.
+/// Folders of the data that are read.
 const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
 
-/// Shows the trainer all photographs; it keeps some of them apart by itself.
+/// Passes all photographs to the trainer, which holds out some of them by itself.
 pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
     let Some(data) = &session.args.data else {
         let why = "is trained on photographs: name their folder with --data";
@@ -42,7 +42,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     Ok(Ended::Well)
 }
 
-/// Shows all photographs of people and of nobody, or one in `share`.
+/// Passes all photographs with and without people, or one in `share`.
 fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let mut all = photos(data, false);
     all.extend(photos(data, true));

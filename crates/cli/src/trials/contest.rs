@@ -3,23 +3,23 @@ use tagalong_eval::{Clear, Identity};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Crossing, Judge, Trial, TrialError, crossing, each};
 
-/// What is kept of one contender on one draw of a scene.
+/// Result of one contender on one random variant of a scene.
 #[derive(Clone, Debug)]
 pub struct Result {
     /// CLEAR MOT.
     pub clear: Clear,
-    /// Identity.
+    /// Identity measures.
     pub identity: Identity,
-    /// Errors in the robot frame, m.
+    /// Position errors in the robot frame, m.
     pub errors_m: Vec<f64>,
-    /// Everybody was tracked in all frames, by one track each.
+    /// True if every person was tracked in all frames, by one track each.
     pub success: bool,
 }
 
-/// One result for each contender, for each draw.
+/// Returns one result for each contender, for each random variant.
 ///
 /// # Errors
-/// As [`Trial::new`].
+/// As for [`Trial::new`].
 pub fn run(
     scenes: &[Scene],
     contenders: &[Contender],

@@ -1,4 +1,4 @@
-//! `tagalong trials`: pipelines on many draws of the same scenes.
+//! `tagalong trials`: pipelines on many random variants of the same scenes.
 
 mod contest;
 mod table;
@@ -16,7 +16,7 @@ use crate::config_file::ConfigFile;
 use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::simulate;
 
-/// Scenes on which nobody should be perfect.
+/// Scenes on which no pipeline should be perfect.
 const HARD: [&str; 6] = [
     "crossing-parallel",
     "crossing-oblique",
@@ -29,7 +29,7 @@ const HARD: [&str; 6] = [
 /// Pipelines that are compared where none are named.
 const PIPELINES: [&str; 3] = ["depth-ekf", "depth-ekf-as-printed", "naive"];
 
-/// The arguments of `tagalong trials`.
+/// Arguments of `tagalong trials`.
 #[derive(Args, Debug)]
 pub struct TrialsArgs {
     /// The scenes [default: the hard ones of configs/scenes].
@@ -44,19 +44,18 @@ pub struct TrialsArgs {
     /// Replaces a value in each scene: a dotted key, like `crowd=5`.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = simulate::key_and_value)]
     pub set: Vec<(String, String)>,
-    /// Draws each scene with this many seeds of the split.
+    /// Simulates each scene with this many seeds of the split.
     #[arg(long, value_name = "N", default_value_t = 10,
           value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: u64,
-    /// The first of these seeds, counted within the split: another one gives other
-    /// draws.
+    /// The first of these seeds, counted within the split: another one gives other random variants.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub first_seed: u64,
     /// Trials that run at once; the results are the same [default: as many as
     /// there are cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
-    /// How to print.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
@@ -110,13 +109,14 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
     let paths = or_default(named, "configs", &PIPELINES);
     let read = |path: &PathBuf| {
         let file = ConfigFile::read(path)?;
+        // Built once now, so that a mistake shows before the first trial.
         file.pipeline(registry, None)?;
         Ok(file.contender())
     };
     paths.iter().map(read).collect()
 }
 
-/// A scene with the seeds.
+/// Returns a scene with each of the seeds.
 fn suite(path: &Path, args: &TrialsArgs, seeds: Seeds) -> Result<(String, Vec<Scene>), Failure> {
     let variant =
         |seed| Variant { seed: Some(seed), split: Some(args.split), set: args.set.clone() };

@@ -10,50 +10,51 @@ use tagalong_trials::Contender;
 
 use super::contest::Result;
 
-/// Contenders on suites.
+/// Scores of contenders on suites.
 #[derive(Clone, Debug, Serialize)]
 pub struct Table {
-    /// With which each suite was drawn.
+    /// Seeds with which each suite was simulated.
     pub seeds: Seeds,
-    /// One row a suite and contender.
+    /// One row per suite and contender.
     pub rows: Vec<Row>,
-    /// Each contender against the baseline, the last one.
+    /// Gains of each contender over the baseline, the last one.
     pub gains: Vec<GainRow>,
-    /// Columns of the names of suites and contenders.
+    /// Widths of the columns with the names of suites and contenders.
     #[serde(skip)]
     widths: [usize; 2],
 }
 
-/// One contender on one suite; intervals have 95 % confidence and are over draws.
+/// Scores of one contender on one suite; intervals have 95 % confidence and are over random
+/// variants.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// The scene.
+    /// Name of the scene.
     pub suite: String,
-    /// The contender.
+    /// Name of the contender.
     pub pipeline: String,
-    /// Draws.
+    /// Number of random variants.
     pub draws: usize,
-    /// Accuracy.
+    /// MOTA.
     pub mota: Option<Interval>,
     /// Identity F1.
     pub idf1: Option<Interval>,
     /// Errors on the floor, robot frame.
     pub error: Option<PositionError>,
-    /// Draws in which everybody in view was tracked in all frames within 22 cm
+    /// Share of variants in which every person in view was tracked in all frames within 22 cm
     /// (Wilson).
     pub success: Option<Interval>,
     /// Identity switches.
     pub switches: u64,
 }
 
-/// How much a contender gains over the baseline on the same draws.
+/// Gain of a contender over the baseline on the same random variants.
 #[derive(Clone, Debug, Serialize)]
 pub struct GainRow {
-    /// The scene.
+    /// Name of the scene.
     pub suite: String,
-    /// The contender.
+    /// Name of the contender.
     pub pipeline: String,
-    /// The baseline.
+    /// Name of the baseline.
     pub baseline: String,
     /// Gain of IDF1.
     pub idf1: Gain,
@@ -62,19 +63,20 @@ pub struct GainRow {
 }
 
 impl Table {
-    /// An empty table for these names.
+    /// Returns an empty table for these names.
     pub fn new<'a>(
         seeds: Seeds,
         suites: impl Iterator<Item = &'a String>,
         contenders: impl Iterator<Item = &'a String>,
     ) -> Self {
+        // Eight is the width of the heading `pipeline`.
         let widest = |lengths: Option<usize>| lengths.unwrap_or(0).max(8);
         let widths =
             [widest(suites.map(String::len).max()), widest(contenders.map(String::len).max())];
         Self { seeds, rows: Vec::new(), gains: Vec::new(), widths }
     }
 
-    /// Adds a suite: for each draw one result a contender.
+    /// Adds a suite: for each random variant one result per contender.
     pub fn add(&mut self, suite: &str, contenders: &[Contender], results: &[Vec<Result>]) {
         let column = |at: usize| results.iter().map(|draw| &draw[at]).collect::<Vec<_>>();
         for (at, contender) in contenders.iter().enumerate() {
@@ -94,18 +96,19 @@ impl Table {
                 p_corrected: gain.p_value,
             }));
         }
+        // Corrected anew after each suite, because the number of comparisons has grown.
         let p_values: Vec<f64> = self.gains.iter().map(|gain| gain.idf1.p_value).collect();
         for (gain, corrected) in self.gains.iter_mut().zip(holm(&p_values)) {
             gain.p_corrected = corrected;
         }
     }
 
-    /// For programs.
+    /// Returns the table as JSON.
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 
-    /// The names of the columns, for people.
+    /// Returns the names of the columns, for a terminal.
     pub fn header(&self) -> String {
         let [first, second] = self.widths;
         format!(
@@ -114,7 +117,7 @@ impl Table {
         )
     }
 
-    /// The rows of the suite that was added last.
+    /// Returns the rows of the suite that was added last.
     pub fn last_rows(&self) -> String {
         let Some(suite) = self.rows.last().map(|row| &row.suite) else { return String::new() };
         self.rows.iter().filter(|row| row.suite == *suite).map(|row| self.line(row)).collect()
@@ -136,7 +139,7 @@ impl Table {
         )
     }
 
-    /// What follows from the rows.
+    /// Returns the notes and the gains below the rows.
     pub fn summary(&self) -> String {
         let mut out = format!(
             "\n{}\nintervals: 95 %, over draws (Student; Wilson where all is right)\n{}\n",
@@ -161,8 +164,9 @@ impl Table {
         out
     }
 
-    /// A suite that somebody solves asks for a harder one.
+    /// Returns a note on suites that a pipeline solves, which are too easy.
     fn perfection(&self) -> String {
+        // Prints as 1.000.
         let perfect = |row: &&Row| row.mota.is_some_and(|mota| mota.estimate >= 0.9995);
         let named = self.rows.iter().filter(perfect);
         let all: Vec<String> =

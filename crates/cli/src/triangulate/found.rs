@@ -1,4 +1,4 @@
-//! What is printed, and the table of places.
+//! Printed results, and the table of positions.
 
 use std::fmt::Write as _;
 
@@ -8,20 +8,20 @@ use tagalong_triangulate::{Calibrated, Cameras, Fix, Known};
 
 use crate::args::Format;
 
-/// A camera as it was calibrated.
+/// Camera as it was calibrated.
 #[derive(Serialize)]
 struct CameraFound {
     at_m: [f64; 2],
     heading_deg: f64,
     pitch_down_deg: f64,
     focal_px: f64,
-    /// Known places that it saw.
+    /// Number of known places that it saw.
     places: usize,
-    /// Root of the mean square of its bearings' misfits.
+    /// Root mean square of the misfits of its bearings.
     misfit_deg: f64,
 }
 
-/// How far measured places are from known ones.
+/// Distances of measured places from known ones.
 #[derive(Serialize)]
 struct Distance {
     mean_cm: f64,
@@ -29,23 +29,23 @@ struct Distance {
     places: usize,
 }
 
-/// What `tagalong triangulate` found out.
+/// Result of `tagalong triangulate`.
 #[derive(Serialize)]
 pub(super) struct Found {
     cameras: Vec<CameraFound>,
     as_guessed: Distance,
     calibrated: Distance,
     held_out: Distance,
-    /// Moments whose place was measured.
+    /// Number of moments with a measured place.
     measured: usize,
-    /// Images of the robot whose truth was written.
+    /// Number of the robot's images with written truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) truth_frames: Option<usize>,
 }
 
 impl Found {
-    /// The cameras as guessed and as calibrated, the places used for that and
-    /// those held out.
+    /// Compares the cameras as guessed and as calibrated, at the places used for that and at those
+    /// held out.
     pub(super) fn new(
         calibrated: &Calibrated,
         [guess, cameras]: [&Cameras; 2],
@@ -74,7 +74,7 @@ impl Found {
         }
     }
 
-    /// As it is printed.
+    /// Formats the result.
     pub(super) fn show(&self, format: Format) -> String {
         match format {
             Format::Text => self.text(),
@@ -130,7 +130,7 @@ impl Distance {
     }
 }
 
-/// All places, as CSV.
+/// Returns all places, as CSV.
 pub(super) fn csv(fixes: &[(Stamp, Fix)]) -> String {
     let mut out = String::from("stamp_ns,x_m,y_m,sigma_m,cameras,misfit_deg\n");
     for (stamp, fix) in fixes {

@@ -1,4 +1,4 @@
-//! `tagalong triangulate`: where a coloured hat is, by fixed cameras in a log.
+//! `tagalong triangulate`: positions of a coloured hat, by fixed cameras in a log.
 
 mod found;
 mod seen;
@@ -22,12 +22,12 @@ use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::suggest::check_log_path;
 
-/// Images of one moment differ by no more than this, s.
+/// Largest difference of the stamps of one moment, s.
 const TOGETHER_S: f64 = 0.05;
-/// A known place holds for images this near in time, s.
+/// Largest difference in time between a known place and an image, s.
 const KNOWN_WITHIN_S: f64 = 0.2;
 
-/// The arguments of `tagalong triangulate`.
+/// Arguments of `tagalong triangulate`.
 #[derive(Args, Debug)]
 pub struct TriangulateArgs {
     /// The log.
@@ -37,47 +37,47 @@ pub struct TriangulateArgs {
     /// The images of the first are on the topic `/webcam_1/image_raw/compressed`.
     #[arg(long, value_name = "FILE")]
     pub cameras: PathBuf,
-    /// Places that are known: a CSV file with `seconds,x_m,y_m`, the seconds
-    /// counted from the first image. A drawn log knows all places itself.
+    /// Known places: a CSV file with `seconds,x_m,y_m`, the seconds counted from the first image. A
+    /// simulated log has its own.
     #[arg(long, value_name = "FILE")]
     pub known: Option<PathBuf>,
-    /// Where the places go, as CSV, in coordinates of the room.
+    /// Output file of the places, as CSV, in coordinates of the room.
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Writes where the person with the hat was, as the robot should see it, in
-    /// one line of JSON for each of the robot's images: NAME.truth.jsonl beside
-    /// NAME.mcap is the truth of `bench`, and of `eval --truth`.
+    /// Output file of the person's positions as seen from the robot, in one line of JSON for each
+    /// of the robot's images: NAME.truth.jsonl beside NAME.mcap is the truth of `bench`, and of
+    /// `eval --truth`.
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
-    /// Where the robot stands at its first image, in coordinates of the room: x
-    /// and y, m, and its heading, degrees. A drawn log knows it itself.
+    /// Pose of the robot at its first image, in coordinates of the room: x and y, m, and its
+    /// heading, degrees. A simulated log has its own.
     #[arg(long, value_name = "X,Y,DEGREES", allow_hyphen_values = true)]
     pub robot: Option<Standing>,
-    /// Height of the centre of the head under the hat, m: cameras that measure
-    /// bearings do not tell it.
+    /// Height of the centre of the head under the hat, m: cameras that measure bearings cannot
+    /// measure it.
     #[arg(long, value_name = "METRES", default_value_t = 1.6)]
     pub head: f64,
     /// Hue of the hat, degrees: 0 red, 120 green, 240 blue.
     #[arg(long, value_name = "DEGREES", default_value_t = 120.0)]
     pub hue: f64,
-    /// Every how many known places one is used to calibrate; the others are held out.
+    /// Calibrate with one in so many known places; the others are held out.
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub every: usize,
-    /// How to print what was found.
+    /// Output format of the result.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
 
-/// The cameras of a guess; a scene is one, too.
+/// Guessed cameras; a scene file has them, too.
 #[derive(serde::Deserialize)]
 struct Guess {
     webcams: Vec<WebcamSettings>,
 }
 
-/// `tagalong triangulate`.
+/// Runs `tagalong triangulate`.
 ///
 /// # Errors
-/// Files that cannot be read, a log without webcams, places that do not suffice.
+/// Files that cannot be read, a log without webcams, too few places.
 pub fn triangulate(args: &TriangulateArgs) -> Outcome {
     check_log_path(&args.log)?;
     let guess = guess(&args.cameras)?;
@@ -123,7 +123,7 @@ fn put(path: &Path, text: &str) -> Result<(), Failure> {
     fs::write(path, text).map_err(|error| Failure::failed(format!("{}: {error}", path.display())))
 }
 
-/// What all cameras saw at one moment.
+/// Groups the sightings of all cameras by moment.
 fn moments(hats: &[(Stamp, Sight)]) -> Vec<(Stamp, Vec<Sight>)> {
     let mut moments: Vec<(Stamp, Vec<Sight>)> = Vec::new();
     for (stamp, sight) in hats {
@@ -139,7 +139,7 @@ fn moments(hats: &[(Stamp, Sight)]) -> Vec<(Stamp, Vec<Sight>)> {
 
 type Places = BTreeMap<u64, Point2<f64>>;
 
-/// The places of a file, by stamp.
+/// Reads the places of a file, by stamp.
 fn known_places(path: &Path, seen: &Seen) -> Result<Places, Failure> {
     let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
     let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
@@ -151,6 +151,7 @@ fn known_places(path: &Path, seen: &Seen) -> Result<Places, Failure> {
             [seconds, x, y] if seconds >= 0.0 && x.is_finite() && y.is_finite() => {
                 places.insert(first.saturating_add((1e9 * seconds) as u64), Point2::new(x, y));
             }
+            // The first line may be a heading.
             _ if number == 0 => {}
             _ => return Err(wrong(format!("line {}: not `seconds,x_m,y_m`", number + 1))),
         }
@@ -158,7 +159,7 @@ fn known_places(path: &Path, seen: &Seen) -> Result<Places, Failure> {
     Ok(places)
 }
 
-/// The places that a drawn log with one person knows.
+/// Returns the true places of a simulated log with one person.
 fn true_places(log: &Path, seen: &Seen) -> Result<Places, Failure> {
     let truth = read_truth(log, &Limits::default())?.unwrap_or_default();
     let mut places = Places::new();
@@ -178,7 +179,7 @@ fn true_places(log: &Path, seen: &Seen) -> Result<Places, Failure> {
     Ok(places)
 }
 
-/// Moments whose place is known.
+/// Returns the moments with a known place.
 fn known(moments: &[(Stamp, Vec<Sight>)], places: &Places) -> Vec<Known> {
     let within = (1e9 * KNOWN_WITHIN_S) as u64;
     let nearest = |at: u64| {
@@ -193,7 +194,7 @@ fn known(moments: &[(Stamp, Vec<Sight>)], places: &Places) -> Vec<Known> {
         .collect()
 }
 
-/// One in `every` places to calibrate with, and the others.
+/// Splits the places into one in `every` to calibrate with, and the others.
 fn divided(known: Vec<Known>, every: usize) -> (Vec<Known>, Vec<Known>) {
     let (used, held): (Vec<_>, Vec<_>) =
         known.into_iter().enumerate().partition(|(at, _)| at % every.max(1) == 0);

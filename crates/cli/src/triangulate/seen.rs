@@ -1,4 +1,4 @@
-//! What the cameras of a log saw.
+//! Sightings of the hat in the camera images of a log.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,25 +15,25 @@ use tagalong_triangulate::{HatColour, Sight, Station, find_hat};
 
 use crate::outcome::Failure;
 
-/// Where a drawn log says how the robot really stands.
+/// Topic of the robot's true pose in a simulated log.
 const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
 
-/// What the cameras saw.
+/// Sightings of all cameras.
 #[derive(Default)]
 pub(super) struct Seen {
-    /// By camera: stamps and pixels of the hat.
+    /// Stamps and pixels of the hat, by camera.
     pub(super) hats: Vec<(Stamp, Sight)>,
-    /// Focal lengths and centres, where the log tells them.
+    /// Focal lengths and centres, where the log has them.
     lenses: BTreeMap<usize, (f64, Point2<f64>)>,
     sizes: BTreeMap<usize, (usize, usize)>,
-    /// Where the robot really was in the room, by stamp, ns.
+    /// True pose of the robot in the room, by stamp, ns.
     pub(super) robot: BTreeMap<u64, Isometry2<f64>>,
     /// Stamp of the first image.
     pub(super) first: Option<Stamp>,
 }
 
 impl Seen {
-    /// Looks for the hat in all images of so many cameras.
+    /// Searches for the hat in all images of so many cameras.
     pub(super) fn read(log: &Path, cameras: usize, colour: &HatColour) -> Result<Self, Failure> {
         let failed = |why: String| Failure::failed(format!("{}: {why}", log.display()));
         let file = File::open(log).map_err(|error| failed(error.to_string()))?;
@@ -43,6 +43,7 @@ impl Seen {
         while let Some(message) = walker.next() {
             seen.take(&message, cameras, colour, &limits);
         }
+        // Messages of several cameras come in no fixed order.
         seen.hats.sort_by_key(|(stamp, sight)| (*stamp, sight.station));
         Ok(seen)
     }
@@ -75,12 +76,13 @@ impl Seen {
         let Pixels::Colour(image) = pixels else { return };
         self.sizes.insert(station, (image.width(), image.height()));
         self.first = Some(self.first.map_or(stamp, |first| first.min(stamp)));
+        // The centre of a hat at the image's edge would be wrong.
         if let Some(hat) = find_hat(&image, colour).filter(|hat| !hat.cut) {
             self.hats.push((stamp, Sight { station, pixel: hat.centre }));
         }
     }
 
-    /// The guess as stations, with the lenses of the log where it has them.
+    /// Converts the guess to stations, with the lenses of the log where it has them.
     pub(super) fn stations(&self, guess: &[WebcamSettings]) -> Vec<Station> {
         let station = |(number, guess): (usize, &WebcamSettings)| {
             let (width, height) =
@@ -101,7 +103,7 @@ impl Seen {
     }
 }
 
-/// The number of a webcam, from 0, and what follows it in a topic.
+/// Returns the number of a webcam, from 0, and the rest of its topic.
 fn webcam(topic: &str) -> Option<(usize, &str)> {
     let (number, rest) = topic.strip_prefix("/webcam_")?.split_once('/')?;
     Some((number.parse::<usize>().ok()?.checked_sub(1)?, rest))

@@ -1,4 +1,4 @@
-//! What was measured, as the truth of what the robot sees.
+//! Truth for the robot's images, from the measured places.
 
 use std::str::FromStr;
 
@@ -12,13 +12,13 @@ use super::seen::Seen;
 use crate::outcome::Failure;
 use crate::scoring::{Shot, Shots};
 
-/// Between two places with a longer time between them the person may have been
-/// anywhere: there they neither count as missed nor as a false alarm, s.
+/// Longest time between two places, s; in a longer one the person may have been anywhere, and
+/// counts neither as missed nor as a false alarm.
 const LONGEST_GAP_S: f64 = 1.0;
-/// The number of the person with the hat.
+/// Number of the person with the hat.
 const PERSON: i64 = 1;
 
-/// Where the robot stands: `x,y,heading`, in metres and degrees.
+/// Pose of the robot: `x,y,heading`, in metres and degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Standing(Isometry2<f64>);
 
@@ -36,8 +36,8 @@ impl FromStr for Standing {
     }
 }
 
-/// The truth of each image of the robot. Before the first and after the last
-/// place nobody is there.
+/// Returns the truth of each image of the robot. Before the first and after the last place there is
+/// no person.
 pub(super) fn frames(
     args: &TriangulateArgs,
     seen: &Seen,
@@ -46,6 +46,7 @@ pub(super) fn frames(
     let shots = Shots::read(&args.log, &InputSettings::default(), &Limits::default())?;
     let frame = |shot: &Shot| {
         let robot = match (args.robot, shots.first()) {
+            // From the start on, odometry gives the robot's pose.
             (Some(Standing(start)), Some(first)) => {
                 start * first.odom_from_robot.inverse() * shot.odom_from_robot
             }
@@ -71,8 +72,8 @@ pub(super) fn frames(
     })
 }
 
-/// Where the person was at a time, between the places before and after it, and
-/// whether that is a guess.
+/// Returns the position of the person at a time, interpolated between the places before and after
+/// it, and true if the gap is too long for that.
 fn at(stamp: Stamp, fixes: &[(Stamp, Fix)]) -> Option<(Point2<f64>, bool)> {
     let after = fixes.partition_point(|(at, _)| *at < stamp);
     let (to_at, to) = fixes.get(after)?;
@@ -85,7 +86,7 @@ fn at(stamp: Stamp, fixes: &[(Stamp, Fix)]) -> Option<(Point2<f64>, bool)> {
     Some((from.place + part * (to.place - from.place), gap_s > LONGEST_GAP_S))
 }
 
-/// One line of JSON for each image.
+/// Returns one line of JSON for each image.
 pub(super) fn lines(frames: &[TruthFrame]) -> String {
     let line = |frame: &TruthFrame| String::from_utf8(frame.encode()).unwrap_or_default() + "\n";
     frames.iter().map(line).collect()

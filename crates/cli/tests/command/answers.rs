@@ -1,4 +1,4 @@
-//! The subcommands that answer a question, and runs over real logs.
+//! Subcommands that answer a question, and runs over real logs.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,13 +1,12 @@
-//! Every command with every kind of bad input: one clear message that names the
-//! file, and the right exit code: 1 for data that cannot be used, 2 for settings
-//! and outputs that cannot.
+//! Every command with every kind of bad input: one clear message that names the file, and the right
+//! exit code: 1 for data that cannot be used, 2 for settings and outputs that cannot.
 
 use std::fs;
 use std::path::Path;
 
 use crate::common::{Drawn, code, config, own_plugin, people, text, unread};
 
-/// What stands where a file is asked for.
+/// Content in place of a valid file.
 const BAD_FILES: [(&str, &str); 4] = [
     ("a missing file", "missing.EXT"),
     ("a file of words", "words.EXT"),
@@ -15,8 +14,7 @@ const BAD_FILES: [(&str, &str); 4] = [
     ("a folder", "folder.EXT"),
 ];
 
-/// Commands with a place for a file, its extension, and the exit code where the
-/// file is bad.
+/// Commands with a place for a file, its extension, and the exit code where the file is bad.
 const FILES: [(&str, &str, i32); 16] = [
     ("run nearest.toml FILE -o out", "mcap", 1),
     ("run FILE good.mcap -o out", "toml", 2),
@@ -36,8 +34,7 @@ const FILES: [(&str, &str, i32); 16] = [
     ("triangulate FILE --cameras hat.toml", "mcap", 1),
 ];
 
-/// What is empty and yet right: settings without a word are defaults, and whoever
-/// found nobody has no tracks.
+/// Empty files that are valid: settings without keys are defaults, and tracks may be empty.
 const FINE: [&str; 6] = [
     "inspect good.mcap --config empty.toml",
     "eval --truth good.boxes.csv --tracks empty.csv",
@@ -47,7 +44,7 @@ const FINE: [&str; 6] = [
     "trials empty.toml --seeds 1 --configs nearest.toml",
 ];
 
-/// Other mistakes: what it is, the command, the exit code, and what is said.
+/// Other mistakes: description, command, exit code, and part of the message.
 const OTHERS: [(&str, &str, i32, &str); 23] = [
     ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
     ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
@@ -111,7 +108,7 @@ fn lay_out(home: &Path) {
     image::RgbImage::new(8, 8).save(home.join("photos/1.png")).unwrap();
 }
 
-/// Runs a command; returns what is wrong with how it answers.
+/// Runs a command; returns a description of its wrong answer, if it is wrong.
 fn complaint(home: &Path, line: &str, expected: i32, says: &str) -> Option<String> {
     let output = own_plugin().args(line.split(' ')).current_dir(home).output().unwrap();
     let told = text(&output.stderr);
@@ -155,7 +152,7 @@ fn every_command_answers_bad_input_with_a_clear_message() {
     assert!(left.is_empty(), "refused commands left {left:?}");
 }
 
-/// `| head -1` ends a command quietly, whatever it prints.
+/// `| head -1` ends a command quietly, for all output.
 #[test]
 fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
     let home = tempfile::tempdir().unwrap();
@@ -180,7 +177,7 @@ fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
     }
 }
 
-/// What is printed for programs is JSON and nothing else.
+/// Output for programs is JSON and nothing else.
 #[test]
 fn json_is_printed_by_every_command_that_prints_data() {
     let home = tempfile::tempdir().unwrap();

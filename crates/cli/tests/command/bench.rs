@@ -1,5 +1,5 @@
-//! `tagalong bench` over drawn logs: nothing is computed twice, nothing depends
-//! on how many jobs there are, and one bad pipeline does not spoil the rest.
+//! `tagalong bench` over simulated logs: nothing is computed twice, no result depends on the number
+//! of jobs, and one bad pipeline does not spoil the rest.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -261,7 +261,7 @@ fn the_gate_closes_on_what_got_worse() {
     ok(home.bench(&[&logs[..], &["-o", "old"]].concat()));
     let gate = ["--baseline", "old/report.json", "--fail-if", "HOTA<-0.01", "FN>0"];
     ok(home.bench(&[&logs[..], &["-o", "same"], &gate].concat()));
-    // Nothing is nearer than this: nobody is found.
+    // Nothing is nearer than this: no person is found.
     home.config("near", "config = { max_depth_m = 1.0 }");
     let output = home.bench(&[&logs[..], &["-o", "new"], &gate].concat());
     assert_eq!(code(&output), 1);

@@ -1,4 +1,4 @@
-//! `tagalong demo` and `tagalong trials`: what they refuse, and what they print.
+//! `tagalong demo` and `tagalong trials`: their refusals, and their output.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
-//! The doctor finds what is wrong with logs that were broken on purpose, and has
-//! nothing to say about good ones.
+//! The doctor finds the problems of logs that were broken on purpose, and has no complaints about
+//! good ones.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -29,7 +29,7 @@ fn good() -> &'static Path {
     })
 }
 
-/// The exit code, and what was said.
+/// The exit code, and the diagnosis.
 fn doctor(config: &Path, log: &Path, extra: &[&str]) -> (i32, Value) {
     let mut command = tagalong();
     command.arg("doctor").arg(config).arg(log).args(["--format", "json"]).args(extra);
@@ -47,14 +47,14 @@ fn finding<'a>(said: &'a Value, id: &str) -> &'a Value {
     findings.iter().find(|f| f["id"] == id).unwrap_or_else(|| panic!("no {id} in {said:#}"))
 }
 
-/// What is worse than unknown.
+/// Findings that are worse than unknown.
 fn complaints(said: &Value) -> Vec<&str> {
     let findings = said["findings"].as_array().unwrap().iter();
     let worse = findings.filter(|f| f["severity"] == "warn" || f["severity"] == "bad");
     worse.map(|f| f["id"].as_str().unwrap()).collect()
 }
 
-/// A log broken in one way, and what is to be said about it.
+/// A log broken in one way, and the expected finding.
 struct Case {
     name: &'static str,
     changes: Changes,
@@ -263,7 +263,7 @@ fn a_good_log_is_let_go() {
     }
 }
 
-/// The remedy is a line of the config; with it nothing is wrong any more.
+/// The remedy is a line of the config; with it the finding disappears.
 #[test]
 fn the_remedy_for_shifted_depth_cures_it() {
     let home = tempfile::tempdir().unwrap();
@@ -299,13 +299,13 @@ fn each_test_of_the_funnel_has_its_settings_and_its_pictures() {
         assert!(picture.width() > 144 && picture.height() > 144, "{path}");
     }
     assert!(drops.iter().any(|drop| drop["pictures"].is_string()));
-    // The folder is the user's: what is in it stays.
+    // The folder is the user's: its files stay.
     let again = tagalong().arg("doctor").arg(config()).arg(good()).arg("-o").arg(&folder).output();
     assert_eq!(code(&again.unwrap()), 2);
 }
 
-/// The real logs that were corrected are right, and the same logs with their
-/// depth moved back by 9 pixels are not.
+/// The real logs that were corrected are right, and the same logs with their depth moved back by 9
+/// pixels are not.
 #[test]
 fn real_logs_are_registered_and_moved_ones_are_not() {
     let Some(um) = tagalong_testdata::find("logs/um.mcap") else { return };

@@ -196,7 +196,7 @@ fn rules_odd_boxes_and_constant_scores_are_said() {
     let printed = text(&printed.stdout);
     assert!(printed.contains("\nnote: tracks.txt: 1 of 3 boxes have no area"), "{printed}");
     assert!(printed.contains("LAMR and AP mean nothing") && printed.contains("MOT17"), "{printed}");
-    // Scores with an order: nothing to say.
+    // Scores with an order: no note is needed.
     let ordered = TRACKS.replacen("90,1,", "90,0.5,", 1);
     let said = json(&scored(&truth_with("1"), &ordered, &["--format", "json"]));
     assert!(said["notes"].as_array().unwrap().is_empty(), "{said}");

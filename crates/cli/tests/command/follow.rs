@@ -1,4 +1,4 @@
-//! `tagalong follow`: what it prints and writes, and what it refuses.
+//! `tagalong follow`: its output and files, and its refusals.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
         let notes = table["notes"].to_string();
         assert!(notes.contains("each scene with 1 seed of the split test from 3 on"), "{notes}");
     }
-    // Of one ride only whether it was kept has an interval.
+    // With one ride, only the share of kept rides has an interval.
     let cells = near["tables"][0]["rows"][0]["cells"].as_array().unwrap();
     let with: Vec<usize> = (0..cells.len()).filter(|&k| !cells[k]["interval"].is_null()).collect();
     assert_eq!(with, [1], "{cells:?}");

@@ -1,5 +1,5 @@
-//! Data sets become logs: tiny folders of each layout, written here, and read
-//! back as a pipeline reads them.
+//! Data sets become logs: tiny folders of each layout, written here, and read back as a pipeline
+//! reads them.
 
 use std::fs;
 use std::path::Path;
@@ -125,7 +125,7 @@ fn a_folder_of_images_has_the_camera_of_the_options() {
     assert!((frame.camera.pitch_down_rad().to_degrees() - 5.0).abs() < 1e-6);
     assert_eq!(frame.depth().unwrap().get(0, 0), Some(2.5));
     assert!((frame.stamp.seconds_since(found[0].frame.stamp) - 0.15).abs() < 1e-9);
-    // What is there is not overwritten unasked.
+    // Existing files are not overwritten unasked.
     let (code, said) = import(home.path(), &args);
     assert!(code == 2 && said.contains("--overwrite"), "{said}");
 }

@@ -1,5 +1,5 @@
-//! A pipeline receives exactly the images that it declares: one without depth gives the
-//! same bytes on a log with depth and on the same log without.
+//! A pipeline receives exactly the images that it declares: one without depth gives the same bytes
+//! on a log with depth and on the same log without.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn root() -> PathBuf {
 struct Home(tempfile::TempDir);
 
 impl Home {
-    /// Somebody who crosses a small room, seen by an RGB-D camera.
+    /// A person crossing a small room, seen by an RGB-D camera.
     fn simulated() -> Self {
         let home = tempfile::tempdir().unwrap();
         let scene = "seed = 3\nduration_s = 2.0\n[room]\nsize_m = [7.0, 5.0]\nclutter = 2\n\
@@ -28,7 +28,7 @@ impl Home {
         home.strip()
     }
 
-    /// A recording of the real world; `None`, said, where there is none.
+    /// A real recording; `None`, with a message, where there is none.
     fn real(log: &str) -> Option<Self> {
         let log = tagalong_testdata::find(&format!("logs/{log}"))?;
         let home = tempfile::tempdir().unwrap();
@@ -51,8 +51,8 @@ impl Home {
         (code(&output), text(&output.stderr) + &text(&output.stdout))
     }
 
-    /// Everything that a run with this config says of people in the log: its tracks in
-    /// both files, and all that its report says of candidates.
+    /// All results on people of a run with this config: its tracks in both files, and the
+    /// candidates in its report.
     fn run(&self, config: &str, log: &str) -> [String; 3] {
         fs::write(self.path("config.toml"), config).unwrap();
         let (code, said) = self.tell(&["run", "config.toml", log, "-o", "out", "--overwrite"]);
@@ -68,7 +68,7 @@ fn config(name: &str) -> String {
     fs::read_to_string(root().join("configs").join(format!("{name}.toml"))).unwrap()
 }
 
-/// One that never uses depth, and one that is told not to.
+/// One config that never uses depth, and one with `without`.
 fn without_depth() -> [String; 2] {
     let told = format!("without = [\"depth\"]\n{}", config("rgbd-compressive"));
     [config("mono"), told]

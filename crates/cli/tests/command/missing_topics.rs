@@ -1,11 +1,11 @@
-//! A topic that is missing is told before a run starts: what is wanted, what is
-//! there, and the nearest name (fault T6).
+//! A missing topic is reported before a run starts: the wanted topic, the existing ones, and the
+//! nearest name (fault T6).
 
 use std::path::Path;
 
 use crate::common::{Drawn, code, config, own_plugin, text};
 
-/// Runs with these settings; the exit code and what was told.
+/// Runs with these settings; returns the exit code and the message.
 fn run(home: &Path, log: &str, input: &str) -> (i32, String) {
     config(home, &format!("[input]\n{input}"));
     let output =

@@ -1,12 +1,12 @@
-//! Users' mistakes at the boundary of the process: each gets its exit code and
-//! a message that says what is wrong and what to do.
+//! Users' mistakes at the boundary of the process: each gets its exit code and a message with the
+//! problem and the remedy.
 
 use std::fs;
 use std::path::Path;
 
 use crate::common::{Drawn, code, config, own_plugin, tagalong, text, unread};
 
-/// A mistake: arguments, exit code, and what the message must contain.
+/// A mistake: arguments, exit code, and required parts of the message.
 struct Mistake {
     name: &'static str,
     args: Vec<&'static str>,
@@ -19,7 +19,7 @@ fn mistake(name: &'static str, args: &str, code: i32, says: &'static [&'static s
     Mistake { name, args: args.split(' ').collect(), code, says }
 }
 
-/// Everything that the mistakes need, in one folder.
+/// Writes all files that the mistakes need, in one folder.
 fn lay_out(home: &Path) {
     Drawn::of(3).write(&home.join("good.mcap"));
     Drawn { depth: false, ..Drawn::of(3) }.write(&home.join("no-depth.mcap"));

@@ -1,5 +1,4 @@
-//! The shipped `configs/recorded.toml` on a log in which another program has
-//! recorded its boxes.
+//! The shipped `configs/recorded.toml` on a log in which another program has recorded its boxes.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +11,7 @@ fn shipped() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/recorded.toml")
 }
 
-/// Runs over a log and scores what came out.
+/// Runs over a log and scores the tracks.
 fn scores(log: &Drawn, similarity: &str) -> Value {
     let folder = tempfile::tempdir().unwrap();
     log.write(&folder.path().join("walk.mcap"));

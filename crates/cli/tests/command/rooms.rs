@@ -1,5 +1,5 @@
-//! `tagalong bench --leave-one-room-out` over drawn logs: a room has no say in what is
-//! chosen for it, and nothing is computed twice.
+//! `tagalong bench --leave-one-room-out` over simulated logs: a room has no influence on its own
+//! settings, and nothing is computed twice.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::common::{Drawn, code, own_plugin, people, text};
 
-/// The detector of the config sees nobody; one value of two lets it see the walker.
+/// The detector of the config misses the walker; one value of two lets it detect them.
 const TUNE: &str = "config = { max_depth_m = 2.0 }";
 const VALUES: &str = "\"detectors.0.config.max_depth_m\" = [2.0, 4.0]";
 const KEY: &str = "detectors.0.config.max_depth_m";
@@ -63,7 +63,7 @@ impl Home {
         self.command(arguments).output().unwrap()
     }
 
-    /// What is said of the first pipeline.
+    /// The report on the first pipeline.
     fn fitted(&self, arguments: &[&str]) -> Value {
         let output = self.rooms(&[&["--format", "json"], arguments].concat());
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
@@ -94,7 +94,7 @@ fn a_room_has_no_say_in_what_is_chosen_without_it() {
     assert_eq!(chosen(&before), [4.0, 4.0, 4.0]);
     assert!(mota(&before, 0, "without") > 0.5 && mota(&before, 1, "with_all") > 0.5, "{before}");
     assert_eq!(mota(&before, 0, "shipped"), 0.0, "nobody is seen");
-    // Another truth of room A: whoever sees the walker is wrong nine times in twelve.
+    // Another truth of room A: a detection of the walker is wrong nine times in twelve.
     home.write(
         "logs/a.people.csv",
         &people(12).lines().take(4).map(|l| format!("{l}\n")).collect::<String>(),

@@ -1,5 +1,5 @@
-//! Whole runs over a drawn log: the files, their formats, and that they are the
-//! same every time.
+//! Whole runs over a simulated log: the files, their formats, and that they are the same every
+//! time.
 
 use std::fs;
 use std::path::{Path, PathBuf};

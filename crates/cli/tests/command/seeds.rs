@@ -1,5 +1,5 @@
-//! Tables of drawn scenes: other draws on request, their names, and what few of them
-//! may claim.
+//! Tables of simulated scenes: other random variants on request, their names, and the limits of
+//! claims from few of them.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::common::{code, tagalong, text};
 
-/// One person who passes at a distance that differs from seed to seed.
+/// One person passing at a distance that differs from seed to seed.
 const SCENE: &str = "duration_s = 1.5\n[camera]\nwidth = 120\nheight = 90\ncolour = false\n\
     [robot]\nstart = [1.0, 3.0]\n[[people]]\npath = [[3.2, 2.4], [3.8, 4.0]]\nspeed_mps = 0.8\n";
 const CONFIGS: [&str; 2] = ["depth-ekf.toml", "naive.toml"];

@@ -1,4 +1,4 @@
-//! What shells and `man` get.
+//! Completions for shells, and pages for `man`.
 
 use std::fs;
 

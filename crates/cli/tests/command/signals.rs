@@ -21,7 +21,7 @@ fn slow_run(home: &Path) -> Child {
         .unwrap()
 }
 
-/// Waits until something has reached the disk.
+/// Waits until the file has some content.
 fn wait_for(file: &Path) {
     let started = Instant::now();
     while fs::metadata(file).map_or(0, |about| about.len()) == 0 {

@@ -1,4 +1,4 @@
-//! `tagalong simulate`: the logs it writes, and what it says to wrong scenes.
+//! `tagalong simulate`: the logs it writes, and its answers to wrong scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};

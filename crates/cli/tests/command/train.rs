@@ -1,5 +1,5 @@
-//! `tagalong train`: the same bytes for the same seed, a model that its plugin
-//! reads, and answers to wrong usage.
+//! `tagalong train`: the same bytes for the same seed, a model that its plugin reads, and answers
+//! to wrong usage.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `tagalong triangulate`, from a drawn log with webcams to the truth of that log.
+//! `tagalong triangulate`, from a simulated log with webcams to the truth of that log.
 
 use std::fs;
 use std::path::Path;
@@ -7,15 +7,15 @@ use tagalong_log::{Limits, TruthFrame, read_truth, read_truth_lines};
 
 use crate::common::{code, tagalong, text};
 
-/// A room in which somebody with a green hat walks before four webcams; the robot's
-/// own images are too small for anything.
+/// A room in which a person with a green hat walks before four webcams; the robot's own images are
+/// too small for anything.
 const ROOM: &str = "seed = 3\nduration_s = 26.0\n[room]\nsize_m = [10.0, 5.0]\n[camera]\n\
     kind = \"panorama\"\nwidth = 64\nheight = 64\nrate_hz = 8.0\nheight_m = 1.55\n\
     [robot]\nstart = [5.0, 2.5]\nheading_deg = 30.0\n[[people]]\n\
     path = [[2.0, 1.4], [8.0, 1.2], [8.4, 3.6], [1.8, 3.8], [3.4, 2.4]]\nspeed_mps = 0.7\n\
     start_s = 0.0\nlook = 11\nextras = [\"green-hat\"]\n";
 
-/// Where the webcams hang, and how far off the guess is: m and degrees.
+/// The poses of the webcams, with an error of the guess: m and degrees.
 fn webcams(off_m: f64, off_deg: f64) -> String {
     let corners = [(0.1, 0.1, 45.0), (9.9, 0.1, 135.0), (9.9, 4.9, 225.0), (0.1, 4.9, 315.0)];
     let one = |(x, y, heading): (f64, f64, f64)| {
@@ -79,7 +79,7 @@ fn webcams_make_the_truth_of_a_log() {
         assert!(off < 0.1, "{stamp}: {place:?} {truth:?}");
     }
 
-    // Who says where the robot stands gets the same as a log that knows it.
+    // With the robot's pose on the command line the result is that of a log with the pose.
     run(
         folder.path(),
         &[

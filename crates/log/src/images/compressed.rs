@@ -13,15 +13,15 @@ use super::{ImageError, Pixels, check_size, metres, metres_of_float, rvl};
 use crate::Limits;
 use crate::msgs::CompressedImage;
 
-/// Scans of a progressive JPEG; an honest one has about ten.
+/// Maximum number of scans of a progressive JPEG; a regular one has about ten.
 const MAX_JPEG_SCANS: usize = 64;
 
-/// Bytes of the `compressedDepth` header: format, quantisation a and b.
+/// Length of the `compressedDepth` header, bytes: format, quantisation a and b.
 const DEPTH_HEADER: usize = 12;
 
-/// Decodes a compressed image. The kind of picture is told by its first bytes,
-/// not by the format string, which drivers fill in as they like. Depth is scaled
-/// as in [`super::decode_raw`].
+/// Decodes a compressed image. Except for `compressedDepth`, the codec follows from the first
+/// bytes, not from the format string, which drivers fill in differently. Depth is scaled as in
+/// [`super::decode_raw`].
 ///
 /// # Errors
 /// [`ImageError`]. A JPEG that ends early is an error, not half a picture.
@@ -40,10 +40,10 @@ pub fn decode_compressed(
     }
 }
 
-/// Returns the columns and rows of a compressed image, of which it reads the header.
+/// Returns the columns and rows of a compressed image, from its header.
 ///
 /// # Errors
-/// [`ImageError`]: a kind that is not known, a damaged header, a size beyond the limits.
+/// [`ImageError`]: an unknown codec, a damaged header, a size beyond the limits.
 pub fn size_of_compressed(
     image: &CompressedImage<'_>,
     limits: &Limits,
@@ -68,6 +68,7 @@ pub fn size_of_compressed(
             Ok((width as usize, height as usize))
         }
         _ if is_depth => {
+            // RVL has its size in a header of its own, which decoding reads and checks.
             let values = compressed_depth(image, None, limits)?;
             Ok((values.width(), values.height()))
         }
@@ -79,9 +80,10 @@ fn codec(error: impl std::fmt::Debug) -> ImageError {
     ImageError::Codec(format!("{error:?}"))
 }
 
-/// True if a JPEG has its end marker behind its last scan. The decoder fills up
-/// the last few blocks of a picture that lacks only a little.
+/// Returns true if a JPEG has its end marker behind its last scan. The decoder would otherwise fill
+/// in the last few blocks of a picture that is slightly truncated.
 fn has_jpeg_end(data: &[u8]) -> bool {
+    // 0xd9 ends the image and 0xda starts a scan: the last of both decides.
     let markers = data.windows(2).rev().filter(|pair| pair[0] == 0xff);
     markers.map(|pair| pair[1]).find(|code| matches!(code, 0xd9 | 0xda)) == Some(0xd9)
 }
@@ -91,6 +93,7 @@ fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
         return Err(ImageError::Codec("a JPEG without its end".into()));
     }
     let side = limits.image_side_px as usize;
+    // Strict, so that a damaged scan is an error and not half a picture.
     let options = DecoderOptions::default()
         .set_strict_mode(true)
         .set_max_width(side)
@@ -101,6 +104,7 @@ fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
     let info = decoder.info().ok_or_else(|| codec("no header"))?;
     let (width, height) = (usize::from(info.width), usize::from(info.height));
     check_size(width as u64, height as u64, 3, limits)?;
+    // Grey stays grey, which takes a third of the memory.
     let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
     let colours = if grey { ColorSpace::Luma } else { ColorSpace::RGB };
     decoder.set_options(options.jpeg_set_out_colorspace(colours));
@@ -127,6 +131,7 @@ fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels
             Pixels::Colour(exact(w, h, pixels.iter().map(|p| [p[0], p[1], p[2]]).collect()))
         }
         (png::ColorType::Grayscale, png::BitDepth::Sixteen) => {
+            // As for `16UC1`: millimetres.
             let unit = depth_unit_m.unwrap_or(0.001) as f32;
             let values = bytes.as_chunks::<2>().0.iter();
             let depth = values.map(|p| metres(u16::from_be_bytes(*p), unit)).collect();
@@ -139,7 +144,7 @@ fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels
     Ok(pixels)
 }
 
-/// A decoded PNG, samples of 16 bits high byte first.
+/// Decoded PNG, samples of 16 bits high byte first.
 struct PngPixels {
     width: usize,
     height: usize,
@@ -172,8 +177,8 @@ impl PngPixels {
     }
 }
 
-/// Depth as `compressed_depth_image_transport` writes it: a header of 12 bytes,
-/// then 16-bit PNG or RVL. `32FC1` is quantised as inverse depth, `a / (v - b)`.
+/// Decodes depth as `compressed_depth_image_transport` writes it: a header of 12 bytes, then 16-bit
+/// PNG or RVL. `32FC1` is quantised as inverse depth, `a / (v - b)`.
 fn compressed_depth(
     image: &CompressedImage<'_>,
     depth_unit_m: Option<f64>,
@@ -212,7 +217,7 @@ fn depth_png(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), I
     Ok((png.width, png.height, values))
 }
 
-/// Columns and rows as 32-bit numbers, then the stream.
+/// Reads columns and rows as 32-bit numbers, then the stream.
 fn depth_rvl(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), ImageError> {
     let (size, stream) =
         body.split_at_checked(8).ok_or_else(|| ImageError::Codec("RVL without a size".into()))?;
@@ -226,8 +231,8 @@ fn depth_rvl(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), I
     Ok((width, height, values))
 }
 
-/// The data of a `16UC1; compressedDepth rvl` message: header, size, stream.
-/// `values` are `width * height` readings in millimetres, 0 = none.
+/// Returns the data of a `16UC1; compressedDepth rvl` message: header, size, stream. `values` are
+/// `width * height` readings in millimetres, 0 = none.
 pub fn encode_rvl(width: u32, height: u32, values: &[u16]) -> Vec<u8> {
     let mut out = vec![0; DEPTH_HEADER];
     out.extend_from_slice(&width.to_le_bytes());

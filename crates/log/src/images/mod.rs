@@ -1,9 +1,8 @@
-//! From image messages to images.
+//! Decoding of image messages.
 //!
-//! Depth becomes metres along the optical axis with NaN for "no reading": 0 and
-//! 65535 of integer depth, and 0, negative, infinite and NaN values of floating
-//! depth (REP 117 and 118 give infinities a meaning of their own, which no
-//! detector here has a use for).
+//! Depth becomes metres along the optical axis, with NaN for "no reading": 0 and 65535 of integer
+//! depth, and 0, negative, infinite and NaN values of floating depth (REP 117 and 118 give
+//! infinities a meaning of their own, which no detector here uses).
 
 mod compressed;
 mod raw;
@@ -15,7 +14,7 @@ use tagalong_core::{DepthImage, GreyImage, RgbImage};
 
 use crate::Limits;
 
-/// A decoded image.
+/// Decoded image.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pixels {
     /// Colour.
@@ -27,7 +26,7 @@ pub enum Pixels {
 }
 
 impl Pixels {
-    /// Columns and rows.
+    /// Returns columns and rows.
     pub fn size(&self) -> (usize, usize) {
         match self {
             Self::Colour(image) => (image.width(), image.height()),
@@ -37,34 +36,34 @@ impl Pixels {
     }
 }
 
-/// Why an image message was not decoded.
+/// Reason for which an image message was not decoded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
-    /// An encoding that is not known, or not as depth.
+    /// The encoding is unknown, or unknown for depth.
     #[error(
         "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, 8UC1, 8UC3, 16UC1, 32FC1 \
          (mono16 only where `depth_unit_m` says that it is depth), jpeg, png, compressedDepth"
     )]
     Encoding(String),
-    /// Larger than the limits allow.
+    /// The image is larger than the limits allow.
     #[error("{width}x{height} pixels exceed the limit")]
     TooLarge {
-        /// Columns claimed.
+        /// Columns in the message.
         width: u64,
-        /// Rows claimed.
+        /// Rows in the message.
         height: u64,
     },
     /// `step` or the length of the data contradict the size.
     #[error("{0}")]
     Layout(String),
-    /// The compressed bytes are damaged or of a kind that is not handled.
+    /// The compressed bytes are damaged or of an unknown kind.
     #[error("{0}")]
     Codec(String),
 }
 
 impl ImageError {
-    /// The name under which such messages are counted.
+    /// Returns the name under which such messages are counted.
     pub fn counter(&self) -> &'static str {
         match self {
             Self::Encoding(_) => "images_of_unknown_encoding",
@@ -75,19 +74,19 @@ impl ImageError {
     }
 }
 
-/// What an encoding or format holds, as far as its name tells.
+/// Content of an encoding or format, as far as its name shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Colour or intensity.
     Picture,
     /// Depth.
     Depth,
-    /// Not known.
+    /// Unknown.
     Unknown,
 }
 
-/// What images of a `sensor_msgs/Image` encoding hold. `depth_unit_m` is the
-/// setting that makes `mono16` depth.
+/// Returns the content of images of a `sensor_msgs/Image` encoding. `depth_unit_m` is the setting
+/// that makes `mono16` depth.
 pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content {
     match encoding {
         "rgb8" | "bgr8" | "rgba8" | "bgra8" | "mono8" | "8UC1" | "8UC3" => Content::Picture,
@@ -97,7 +96,7 @@ pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content
     }
 }
 
-/// What images of a `sensor_msgs/CompressedImage` format hold.
+/// Returns the content of images of a `sensor_msgs/CompressedImage` format.
 pub fn content_of_format(format: &str) -> Content {
     let lower = format.to_ascii_lowercase();
     let depth = lower.contains("compresseddepth") || lower.starts_with("16uc1");
@@ -117,6 +116,7 @@ fn check_size(
 ) -> Result<(), ImageError> {
     let side = u64::from(limits.image_side_px);
     let sides_fit = width <= side && height <= side;
+    // Saturating, because a damaged header may claim any size.
     let bytes = width.saturating_mul(height).saturating_mul(bytes_per_pixel);
     if !sides_fit || bytes > limits.image_bytes {
         return Err(ImageError::TooLarge { width, height });
@@ -127,12 +127,12 @@ fn check_size(
     Ok(())
 }
 
-/// Integer depth to metres.
+/// Converts integer depth to metres.
 fn metres(value: u16, unit_m: f32) -> f32 {
     if value == 0 || value == u16::MAX { f32::NAN } else { f32::from(value) * unit_m }
 }
 
-/// Floating depth to metres.
+/// Converts floating depth to metres.
 fn metres_of_float(value: f32, unit_m: f32) -> f32 {
     if value.is_finite() && value > 0.0 { value * unit_m } else { f32::NAN }
 }

@@ -9,14 +9,14 @@ use crate::msgs::Image;
 /// Returns the columns and rows of an uncompressed image.
 ///
 /// # Errors
-/// [`ImageError`]: a size beyond the limits, or none.
+/// [`ImageError`]: a size of 0 or beyond the limits.
 pub fn size_of_raw(image: &Image<'_>, limits: &Limits) -> Result<(usize, usize), ImageError> {
     check_size(image.width.into(), image.height.into(), 3, limits)?;
     Ok((image.width as usize, image.height as usize))
 }
 
-/// Decodes an uncompressed image. Depth is scaled by `depth_unit_m` (metres per
-/// unit), or by what the encoding stands for: 1 mm for `16UC1`, 1 m for `32FC1`.
+/// Decodes an uncompressed image. Depth is scaled by `depth_unit_m` (metres per unit), or by the
+/// convention of the encoding: 1 mm for `16UC1`, 1 m for `32FC1`.
 ///
 /// # Errors
 /// [`ImageError`]: unknown encoding, size beyond the limits, `step` or data
@@ -57,7 +57,7 @@ pub fn decode_raw(
     Ok(pixels)
 }
 
-/// The rows of an image whose layout was checked.
+/// Rows of an image with a checked layout.
 struct Rows<'a> {
     data: &'a [u8],
     width: usize,
@@ -70,6 +70,7 @@ impl<'a> Rows<'a> {
     fn new(image: &Image<'a>, bytes_per_pixel: usize) -> Result<Self, ImageError> {
         let (width, height) = (image.width as usize, image.height as usize);
         let (step, row_bytes) = (image.step as usize, width * bytes_per_pixel);
+        // In 64 bits, where the product of two 32-bit numbers cannot overflow.
         let expected = u64::from(image.step) * u64::from(image.height);
         if step < row_bytes {
             return Err(ImageError::Layout(format!(
@@ -93,7 +94,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// An image from pixels that are known to be `width * height`.
+/// Makes an image from pixels that are known to be `width * height`.
 #[expect(clippy::expect_used, reason = "the callers have made exactly this many pixels")]
 pub(super) fn exact<P: Copy>(width: usize, height: usize, pixels: Vec<P>) -> Plane<P> {
     Plane::from_pixels(width, height, pixels).expect("width * height pixels")

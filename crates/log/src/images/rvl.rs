@@ -1,12 +1,11 @@
 //! Run-length and variable-length coding of integer depth.
 //!
-//! Source: A. D. Wilson, "Fast lossless depth image compression", ISS 2017: runs
-//! of zeros and of readings alternate; readings are differences to the last one,
-//! zigzag coded; every number is a string of nibbles with three bits each, the
-//! low ones first, the fourth bit saying that more follow. Eight nibbles make a
-//! 32-bit word, first nibble highest, words little endian.
+//! Source: A. D. Wilson, "Fast lossless depth image compression", ISS 2017: runs of zeros and of
+//! readings alternate; readings are differences to the last one, zigzag coded; every number is a
+//! sequence of nibbles with three bits each, the low ones first, and the fourth bit is set if more
+//! follow. Eight nibbles make a 32-bit word, first nibble highest, words little endian.
 
-/// Takes numbers off a stream of nibbles.
+/// Reader of numbers from a stream of nibbles.
 struct Nibbles<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -23,6 +22,7 @@ impl Nibbles<'_> {
 
     fn number(&mut self) -> Option<u32> {
         let mut value = 0;
+        // Eleven nibbles hold 32 bits; a longer number is damage.
         for shift in (0..32).step_by(3) {
             let nibble = self.next()?;
             value |= (nibble & 7) << shift;
@@ -34,13 +34,14 @@ impl Nibbles<'_> {
     }
 }
 
-/// The `count` values of a stream; `None` if it ends early or holds more.
+/// Decodes the `count` values of a stream; `None` if it ends early or holds more.
 pub(super) fn decode(bytes: &[u8], count: usize) -> Option<Vec<u16>> {
     let mut nibbles = Nibbles { bytes, at: 0 };
     let mut out: Vec<u16> = Vec::with_capacity(count);
     let mut last = 0_u16;
     while out.len() < count {
         let zeros = nibbles.number()? as usize;
+        // Tested before the memory is taken: a damaged run may claim any length.
         if zeros > count - out.len() {
             return None;
         }
@@ -51,6 +52,7 @@ pub(super) fn decode(bytes: &[u8], count: usize) -> Option<Vec<u16>> {
         }
         for _ in 0..readings {
             let coded = nibbles.number()?;
+            // Zigzag: the lowest bit is the sign.
             let step = (coded >> 1) as i32 ^ -((coded & 1) as i32);
             last = last.wrapping_add(step as u16);
             out.push(last);
@@ -59,7 +61,7 @@ pub(super) fn decode(bytes: &[u8], count: usize) -> Option<Vec<u16>> {
     Some(out)
 }
 
-/// Puts numbers into a stream of nibbles.
+/// Writer of numbers to a stream of nibbles.
 #[derive(Default)]
 struct Packer {
     bytes: Vec<u8>,
@@ -93,7 +95,7 @@ impl Packer {
     }
 }
 
-/// Codes values; [`decode`] takes them back.
+/// Encodes values; [`decode`] reads them back.
 pub(super) fn encode(values: &[u16]) -> Vec<u8> {
     let mut packer = Packer::default();
     let mut rest = values;

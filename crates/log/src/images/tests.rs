@@ -218,8 +218,8 @@ fn compressed_depth_without_its_header_is_refused() {
     );
 }
 
-/// Worked out by hand from the paper: 2 zeros, 3 readings 5, 5, 4. Differences
-/// 5, 0, -1 are 10, 0, 1 in zigzag. 10 is 1010 binary: nibble 2 with more, then 1.
+/// Calculated by hand from the paper: 2 zeros, 3 readings 5, 5, 4. Differences 5, 0, -1 are 10, 0,
+/// 1 in zigzag. 10 is 1010 binary: nibble 2 with more, then 1.
 #[test]
 fn rvl_is_as_published() {
     let nibbles = [2_u32, 3, 8 | 2, 1, 0, 1];

@@ -6,11 +6,11 @@ use super::record;
 use super::source::Source;
 use crate::Limits;
 
-/// Why a chunk delivers nothing.
+/// Reason for which a chunk delivers no records.
 pub(super) enum ChunkFault {
-    /// The file ends inside it.
+    /// The file ends inside the chunk.
     Truncated,
-    /// It was passed over.
+    /// The chunk was skipped.
     Skipped { counter: &'static str, why: String },
 }
 
@@ -18,7 +18,7 @@ fn skipped(counter: &'static str, why: impl Into<String>) -> ChunkFault {
     ChunkFault::Skipped { counter, why: why.into() }
 }
 
-/// What a chunk says of itself before its data.
+/// Header fields of a chunk.
 struct Head {
     uncompressed_size: u64,
     uncompressed_crc: u32,
@@ -26,9 +26,9 @@ struct Head {
     data_size: u64,
 }
 
-/// Reads a chunk record of `length` bytes and leaves its records in `out`; true
-/// if their checksum was verified, false if there is none. Whatever happens,
-/// the source stands behind the record, unless the file ended.
+/// Reads a chunk record of `length` bytes and writes its records to `out`; returns true if their
+/// checksum was verified, false if there is none. After a fault, too, the source stands behind the
+/// record, unless the file ended.
 pub(super) fn read<R: Read>(
     source: &mut Source<R>,
     length: u64,
@@ -38,6 +38,7 @@ pub(super) fn read<R: Read>(
     out.clear();
     let start = source.position();
     let result = read_parts(source, length, limits, out);
+    // A fault may leave a part of the chunk unread.
     let used = source.position() - start;
     let rest = length.saturating_sub(used);
     if source.skip(rest) < rest {
@@ -72,9 +73,10 @@ fn read_parts<R: Read>(
     Ok(has_crc)
 }
 
-/// Start and end time, uncompressed size and checksum, compression, data size.
+/// Reads start and end time, uncompressed size and checksum, compression, data size.
 fn read_head<R: Read>(source: &mut Source<R>, length: u64) -> Result<Head, ChunkFault> {
     let mut fixed = [0; 32];
+    // The fixed fields and both lengths, without the name of the compression.
     if length < 40 {
         return Err(skipped("damaged_chunks", "a chunk shorter than its own header"));
     }
@@ -121,8 +123,9 @@ fn decompress<R: Read>(
     outcome.map_err(|error| skipped("damaged_chunks", format!("a chunk does not unpack: {error}")))
 }
 
-/// Reads at most one byte more than promised: that is enough to see a lie.
+/// Reads at most one byte more than promised, which is enough to detect a wrong size.
 fn fill_from(mut reader: impl Read, promised: u64, out: &mut Vec<u8>) -> std::io::Result<()> {
+    // At most 4 MiB in advance, because the promised size may be wrong.
     out.reserve((promised as usize).min(1 << 22));
     reader.by_ref().take(promised + 1).read_to_end(out).map(drop)
 }

@@ -1,14 +1,13 @@
-//! Walks through an MCAP file, trusting nothing in it.
+//! Robust reader of an MCAP file, which trusts nothing in it.
 //!
-//! The file is read once from front to back through a small buffer, so a pipe
-//! of any length will do, and a file that shrinks meanwhile is only a truncated
-//! file. Of a chunk nothing is delivered before all of it was decompressed and
-//! its checksum was found right. What cannot be used is counted and the walk
-//! goes on behind it; what cannot be got behind (a record longer than the rest
-//! of the file) ends the walk. Once ended, it stays ended.
+//! The file is read once from front to back through a small buffer, so that a pipe of any length
+//! can be read, and a file that shrinks meanwhile is only a truncated file. The records of a chunk
+//! are delivered only after all of it was decompressed and its checksum verified. A part that
+//! cannot be used is counted and the walk goes on behind it; a part without an end (a record longer
+//! than the rest of the file) ends the walk. Once ended, it stays ended.
 //!
-//! The index at the end of a file is never needed, hence a file without it (its
-//! writer was killed) is read like any other, up to its last complete chunk.
+//! The index at the end of a file is never needed, hence a file without it (because its writer was
+//! killed) is read like any other, up to its last complete chunk.
 //!
 //! Source: the MCAP specification, version 0, sections "Records" and "Chunk".
 
@@ -27,42 +26,42 @@ use source::Source;
 
 use crate::Limits;
 
-/// A stream of messages of one type.
+/// Stream of messages of one type.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Channel {
-    /// Number within the file.
+    /// Id within the file.
     pub id: u16,
     /// Name of the topic.
     pub topic: String,
-    /// Name of the message type, for example `sensor_msgs/msg/Image`; empty if
-    /// the file does not say.
+    /// Name of the message type, for example `sensor_msgs/msg/Image`; empty if the file does not
+    /// give it.
     pub schema_name: String,
     /// Language of the definition, for example `ros2msg`.
     pub schema_encoding: String,
-    /// How messages are encoded, for example `cdr`.
+    /// Encoding of the messages, for example `cdr`.
     pub encoding: String,
 }
 
 /// One message, borrowed from the walker's buffer.
 #[derive(Clone, Copy, Debug)]
 pub struct Message<'a> {
-    /// Where it was published.
+    /// Channel on which it was published.
     pub channel: &'a Arc<Channel>,
-    /// When it was recorded, ns.
+    /// Time of recording, ns.
     pub log_time: u64,
-    /// When it was published, ns.
+    /// Time of publication, ns.
     pub publish_time: u64,
-    /// Number given by the publisher.
+    /// Sequence number given by the publisher.
     pub sequence: u32,
-    /// The encoded message.
+    /// Encoded message.
     pub data: &'a [u8],
 }
 
-/// Names and meanings of the counters of a walk. Those in [`LOSSES`] mean that
-/// something in the file could not be used.
+/// Counters of a walk by name. Those in [`LOSSES`] mean that some part of the file could not be
+/// used.
 pub type Counters = BTreeMap<&'static str, u64>;
 
-/// Counters that mean lost data.
+/// Names of the counters that mean lost data.
 pub const LOSSES: &[&str] = &[
     "conflicting_channels",
     "crc_failed_chunks",
@@ -78,12 +77,12 @@ pub const LOSSES: &[&str] = &[
     "unknown_compression_chunks",
 ];
 
-/// The file is not MCAP at all.
+/// Error for a file that is not MCAP at all.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not an MCAP file: {0}")]
 pub struct NotMcap(pub String);
 
-/// Where the next message lies.
+/// Position of the next message in the buffer.
 struct Located {
     channel: Arc<Channel>,
     log_time: u64,
@@ -92,15 +91,15 @@ struct Located {
     data: Range<usize>,
 }
 
-/// Walks through a file. See the [module](self).
+/// Reader of a file, record by record. See the [module](self).
 pub struct Walker<R> {
     source: Source<R>,
     limits: Limits,
     schemas: BTreeMap<u16, (String, String)>,
     channels: BTreeMap<u16, Arc<Channel>>,
-    /// The records of the current chunk, or one top-level message.
+    /// Records of the current chunk, or one top-level message.
     buffer: Vec<u8>,
-    /// What of the buffer is still to be walked.
+    /// Part of the buffer that is still to be read.
     rest: Range<usize>,
     /// Offset of the current top-level record in the file.
     offset: u64,
@@ -139,16 +138,15 @@ impl<R: Read> Walker<R> {
         })
     }
 
-    /// Gives the walk channels that an earlier walk through the same file has
-    /// met. The index at the end repeats them, which helps where the chunk that
-    /// introduced them is damaged.
+    /// Adds the channels of an earlier walk through the same file. The index at the end repeats
+    /// them, which helps where the chunk with their first record is damaged.
     #[must_use]
     pub fn knowing(mut self, channels: impl IntoIterator<Item = Arc<Channel>>) -> Self {
         self.channels.extend(channels.into_iter().map(|channel| (channel.id, channel)));
         self
     }
 
-    /// The next message in the order of the file; `None` at the end, for ever.
+    /// Returns the next message in the order of the file; `None` at the end, and from then on.
     #[expect(clippy::should_implement_trait, reason = "the message borrows the walker's buffer")]
     pub fn next(&mut self) -> Option<Message<'_>> {
         self.located = None;
@@ -169,33 +167,32 @@ impl<R: Read> Walker<R> {
         })
     }
 
-    /// The channels met so far.
+    /// Returns the channels found so far.
     pub fn channels(&self) -> impl Iterator<Item = &Arc<Channel>> {
         self.channels.values()
     }
 
-    /// What was met, skipped and lost, by name.
+    /// Returns the numbers of records read, skipped and lost, by name.
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// True if anything in the file could not be used.
+    /// Returns true if some part of the file could not be used.
     pub fn data_lost(&self) -> bool {
         self.counters.keys().any(|name| LOSSES.contains(name))
     }
 
-    /// Sentences about what is wrong, each with its offset in the file; at most
-    /// a few of them.
+    /// Returns sentences about the damage, each with its offset in the file; only the first few.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// Bytes of the file consumed so far.
+    /// Returns the number of bytes of the file consumed so far.
     pub fn position(&self) -> u64 {
         self.source.position()
     }
 
-    /// Reads the rest of the file without walking it and returns the reader.
+    /// Returns the reader, behind the buffered part of the file.
     pub fn into_reader(self) -> R {
         self.source.into_inner()
     }
@@ -218,13 +215,15 @@ impl<R: Read> Walker<R> {
         self.ended = true;
     }
 
-    /// Takes one record from the file.
+    /// Reads one record from the file.
     fn step_in_file(&mut self) {
         self.offset = self.source.position();
+        // The checksum of the data section covers the bytes before its closing record.
         let before = self.source.crc();
         let mut head = [0; 9];
         match self.source.fill(&mut head) {
             9 => {}
+            // The closing magic in place of a record: there is no footer.
             8 if head[..8] == record::MAGIC => {
                 return self.end_truncated("before its index is complete");
             }
@@ -255,7 +254,7 @@ impl<R: Read> Walker<R> {
         }
     }
 
-    /// Reads a record that is to be looked at into the buffer.
+    /// Reads a record into the buffer; returns false if it is too long or truncated.
     fn read_record(&mut self, length: u64) -> bool {
         if length > self.limits.record_bytes {
             let limit = self.limits.record_bytes;
@@ -294,7 +293,7 @@ impl<R: Read> Walker<R> {
         }
     }
 
-    /// The checksum over everything before the record, where the file has one.
+    /// Verifies the checksum over everything before the record, if the file has one.
     fn take_data_end(&mut self, length: u64, crc: u32) {
         if !self.read_record(length) {
             return;
@@ -330,7 +329,7 @@ impl<R: Read> Walker<R> {
         self.ended = true;
     }
 
-    /// Takes one record from the chunk in the buffer.
+    /// Reads one record from the chunk in the buffer.
     fn step_in_buffer(&mut self) {
         let Range { start, end } = self.rest.clone();
         let whole = self.buffer[start..end]
@@ -355,7 +354,7 @@ impl<R: Read> Walker<R> {
         }
     }
 
-    /// Understands a schema, channel or message record in the buffer.
+    /// Interprets a schema, channel or message record in the buffer.
     fn interpret(&mut self, opcode: u8, body: Range<usize>) {
         let done = match Opcode::from(opcode) {
             Opcode::Schema => self.learn_schema(body),
@@ -373,6 +372,7 @@ impl<R: Read> Walker<R> {
         if too_long {
             return None;
         }
+        // The first definition is kept; later ones repeat it.
         self.schemas.entry(schema.id).or_insert((schema.name, schema.encoding));
         Some(())
     }
@@ -392,6 +392,7 @@ impl<R: Read> Walker<R> {
             encoding: read.encoding,
         };
         let known = self.channels.entry(channel.id).or_insert_with(|| Arc::new(channel.clone()));
+        // The first one is kept; messages of the other cannot be told apart from its own.
         if known.topic != channel.topic || known.encoding != channel.encoding {
             let topic = known.topic.clone();
             self.fault("conflicting_channels", || {
@@ -420,7 +421,7 @@ impl<R: Read> Walker<R> {
     }
 }
 
-/// Sentences kept about one file.
+/// Maximum number of sentences kept about one file.
 const MAX_NOTES: usize = 12;
 
 fn describe_start(start: &[u8]) -> String {

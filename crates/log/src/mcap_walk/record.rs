@@ -1,8 +1,8 @@
-//! The records of MCAP that matter here, read with every length checked.
+//! Records of MCAP that are needed here, read with every length checked.
 
 pub(super) const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
-/// Bytes of a message record before its payload.
+/// Length of a message record before its payload, bytes.
 pub(super) const MESSAGE_HEAD: usize = 22;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(super) enum Opcode {
     Attachment,
     Statistics,
     DataEnd,
-    /// The header, indexes, metadata: nothing that is needed here.
+    /// The header, indexes and metadata, which are not needed here.
     Harmless,
     Unknown,
 }
@@ -37,22 +37,22 @@ impl From<u8> for Opcode {
     }
 }
 
-/// Little-endian number at a place that the caller has checked to be there.
+/// Returns the little-endian number at a position that the caller has checked.
 pub(super) fn u16_at(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
 }
 
-/// See [`u16_at`].
+/// Returns the 32-bit number; see [`u16_at`].
 pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
     u32::from(u16_at(bytes, at)) | u32::from(u16_at(bytes, at + 2)) << 16
 }
 
-/// See [`u16_at`].
+/// Returns the 64-bit number; see [`u16_at`].
 pub(super) fn u64_at(bytes: &[u8], at: usize) -> u64 {
     u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
 }
 
-/// Takes values off the front of a record.
+/// Reader of values from the front of a record.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {

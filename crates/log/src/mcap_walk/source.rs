@@ -1,9 +1,9 @@
-//! The file, read front to back, with its position and running checksum.
+//! File, read front to back, with its position and running checksum.
 
 use std::io::{BufReader, Read};
 
-/// Memory is taken in steps of this size, so that a length that lies costs
-/// nothing but what is really there.
+/// Step in which memory is taken, so that a wrong length costs no more than the bytes that are
+/// really there.
 const STEP: usize = 1 << 20;
 
 pub(super) struct Source<R> {
@@ -35,7 +35,7 @@ impl<R: Read> Source<R> {
         self.reader.into_inner()
     }
 
-    /// Fills `out` as far as the file goes; returns how far that was.
+    /// Fills `out` as far as the file goes; returns the number of bytes.
     pub(super) fn fill(&mut self, out: &mut [u8]) -> usize {
         let mut got = 0;
         while got < out.len() {
@@ -47,11 +47,12 @@ impl<R: Read> Source<R> {
         got
     }
 
-    /// Replaces the contents of `out` by the next `length` bytes, or what is there.
+    /// Replaces the contents of `out` by the next `length` bytes, or as many as there are.
     pub(super) fn read_into(&mut self, out: &mut Vec<u8>, length: u64) -> u64 {
         out.clear();
         while (out.len() as u64) < length {
             let from = out.len();
+            // Steps that double the length: few for a long record, and none far beyond the data.
             let step = STEP.max(from).min((length - from as u64).min(usize::MAX as u64) as usize);
             out.resize(from + step, 0);
             let got = self.fill(&mut out[from..]);
@@ -63,8 +64,9 @@ impl<R: Read> Source<R> {
         out.len() as u64
     }
 
-    /// Passes over `length` bytes; returns how many there were.
+    /// Skips `length` bytes; returns the number of bytes that there were.
     pub(super) fn skip(&mut self, length: u64) -> u64 {
+        // Read and not sought, because the checksum covers skipped records, too.
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.resize(1 << 16, 0);
         let mut done = 0;
@@ -82,8 +84,8 @@ impl<R: Read> Source<R> {
 }
 
 impl<R: Read> Read for Source<R> {
-    /// An interrupted read is tried again; another error ends the file like
-    /// its end would, and whoever asked notices what is missing.
+    /// Reads bytes. An interrupted read is repeated; another error ends the file as its end would,
+    /// and the caller detects the missing bytes.
     fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
         let count = loop {
             match self.reader.read(out) {

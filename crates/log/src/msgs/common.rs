@@ -13,7 +13,7 @@ pub struct Time {
 }
 
 impl From<Stamp> for Time {
-    /// Saturates in the year 2038, where ROS time ends.
+    /// Converts a stamp; saturates in the year 2038, where ROS time ends.
     fn from(stamp: Stamp) -> Self {
         let sec = i32::try_from(stamp.nanos() / 1_000_000_000).unwrap_or(i32::MAX);
         Self { sec, nanosec: (stamp.nanos() % 1_000_000_000) as u32 }
@@ -21,7 +21,7 @@ impl From<Stamp> for Time {
 }
 
 impl From<Time> for Stamp {
-    /// Times before the epoch become the epoch.
+    /// Converts a time; times before the epoch become the epoch.
     fn from(time: Time) -> Self {
         let nanos = i64::from(time.sec) * 1_000_000_000 + i64::from(time.nanosec);
         Self::from_nanos(u64::try_from(nanos).unwrap_or(0))
@@ -31,19 +31,19 @@ impl From<Time> for Stamp {
 /// `std_msgs/Header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
-    /// When the thing was measured.
+    /// Time of the measurement.
     pub stamp: Time,
-    /// The frame of its coordinates.
+    /// Frame of the coordinates.
     pub frame_id: String,
 }
 
 impl Header {
-    /// A header.
+    /// Creates a header.
     pub fn new(stamp: Stamp, frame_id: impl Into<String>) -> Self {
         Self { stamp: stamp.into(), frame_id: frame_id.into() }
     }
 
-    /// The stamp in Tagalong's words.
+    /// Returns the stamp as a [`Stamp`].
     pub fn stamp(&self) -> Stamp {
         self.stamp.into()
     }

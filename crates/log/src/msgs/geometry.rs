@@ -45,7 +45,7 @@ pub struct Pose {
     pub orientation: Quaternion,
 }
 
-/// `geometry_msgs/Transform`; it lies in CDR like a [`Pose`].
+/// `geometry_msgs/Transform`, with the CDR layout of a [`Pose`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transform {
     /// Origin of the child in the parent, m.
@@ -54,12 +54,13 @@ pub struct Transform {
     pub rotation: Quaternion,
 }
 
-/// The isometry of a position and a rotation; `None` if a number is not finite
-/// or the quaternion is further than 0.1 from length 1.
+/// Returns the isometry of a position and a rotation; `None` if a number is not finite or the
+/// length of the quaternion differs from 1 by 0.1 or more.
 fn isometry(position: Point, rotation: Quaternion) -> Option<Isometry3<f64>> {
     let q = nalgebra::Quaternion::new(rotation.w, rotation.x, rotation.y, rotation.z);
     let at = nalgebra::Vector3::new(position.x, position.y, position.z);
     let sane = at.iter().all(|v| v.is_finite()) && (q.norm() - 1.0).abs() < 0.1;
+    // Normalises the quaternion, which publishers round.
     sane.then(|| Isometry3::from_parts(at.into(), UnitQuaternion::from_quaternion(q)))
 }
 
@@ -70,7 +71,7 @@ fn parts(isometry: &Isometry3<f64>) -> (Point, Quaternion) {
 }
 
 impl Pose {
-    /// The pose as an isometry; `None` if it is none.
+    /// Returns the pose as an isometry; `None` if it is invalid.
     pub fn isometry(&self) -> Option<Isometry3<f64>> {
         isometry(self.position, self.orientation)
     }
@@ -84,7 +85,7 @@ impl From<&Isometry3<f64>> for Pose {
 }
 
 impl Transform {
-    /// `parent_from_child`; `None` if it is none.
+    /// Returns `parent_from_child`; `None` if it is invalid.
     pub fn isometry(&self) -> Option<Isometry3<f64>> {
         isometry(self.translation, self.rotation)
     }
@@ -100,9 +101,9 @@ impl From<&Isometry3<f64>> for Transform {
 /// `geometry_msgs/TransformStamped`: `header.frame_id` is the parent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformStamped {
-    /// When, and the parent frame.
+    /// Time and parent frame.
     pub header: Header,
-    /// The child frame.
+    /// Child frame.
     pub child_frame_id: String,
     /// `parent_from_child`.
     pub transform: Transform,
@@ -111,7 +112,7 @@ pub struct TransformStamped {
 /// `tf2_msgs/TFMessage`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TFMessage {
-    /// The transforms.
+    /// Transforms.
     pub transforms: Vec<TransformStamped>,
 }
 
@@ -120,9 +121,9 @@ message!(TFMessage, "tf2_msgs/msg/TFMessage", "TFMessage.msg");
 /// `geometry_msgs/PoseStamped`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseStamped {
-    /// When and in which frame.
+    /// Time and frame.
     pub header: Header,
-    /// The pose.
+    /// Pose.
     pub pose: Pose,
 }
 
@@ -131,7 +132,7 @@ message!(PoseStamped, "geometry_msgs/msg/PoseStamped", "PoseStamped.msg");
 /// `geometry_msgs/PoseWithCovariance`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseWithCovariance {
-    /// The pose.
+    /// Pose.
     pub pose: Pose,
     /// Covariance of (x, y, z, rotation about X, Y, Z), row by row.
     pub covariance: [[f64; 6]; 6],
@@ -140,18 +141,18 @@ pub struct PoseWithCovariance {
 /// `geometry_msgs/Twist`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
-    /// m/s.
+    /// Linear velocity, m/s.
     pub linear: Vector3,
-    /// rad/s.
+    /// Angular velocity, rad/s.
     pub angular: Vector3,
 }
 
 /// `geometry_msgs/TwistStamped`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwistStamped {
-    /// When and in which frame.
+    /// Time and frame.
     pub header: Header,
-    /// The speeds.
+    /// Velocities.
     pub twist: Twist,
 }
 
@@ -160,22 +161,22 @@ message!(TwistStamped, "geometry_msgs/msg/TwistStamped", "TwistStamped.msg");
 /// `geometry_msgs/TwistWithCovariance`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwistWithCovariance {
-    /// The speeds.
+    /// Velocities.
     pub twist: Twist,
-    /// Their covariance, row by row.
+    /// Covariance of the velocities, row by row.
     pub covariance: [[f64; 6]; 6],
 }
 
 /// `nav_msgs/Odometry`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Odometry {
-    /// When, and the odometry frame.
+    /// Time and odometry frame.
     pub header: Header,
-    /// The frame of the robot.
+    /// Robot frame.
     pub child_frame_id: String,
     /// `odom_from_robot`.
     pub pose: PoseWithCovariance,
-    /// Speeds in the robot's frame.
+    /// Velocities in the robot frame.
     pub twist: TwistWithCovariance,
 }
 

@@ -1,11 +1,11 @@
-//! The ROS 2 messages that Tagalong reads and writes, as they lie in CDR.
+//! ROS 2 messages that Tagalong reads and writes, in their CDR layout.
 //!
-//! The structs have the fields of the ROS definitions, in their order. CDR has
-//! no names: the order *is* the format. [`decode`] looks at the encapsulation
-//! header and reads either byte order; [`encode`] writes little endian.
+//! The structs have the fields of the ROS definitions, in their order. CDR has no names: the order
+//! *is* the format. [`decode`] reads the encapsulation header and either byte order; [`encode`]
+//! writes little endian.
 //!
-//! Image payloads are borrowed from the message, so that decoding an image
-//! message costs nothing but its header.
+//! Image payloads are borrowed from the message, so that decoding an image message costs no more
+//! than its header.
 
 mod common;
 mod geometry;
@@ -25,11 +25,11 @@ pub use vision::{
     ObjectHypothesis, ObjectHypothesisWithPose, Point2D, Pose2D,
 };
 
-/// A message type that can be a channel of a log.
+/// Message type that can be a channel of a log.
 pub trait Message {
-    /// The ROS name, for example `sensor_msgs/msg/Image`.
+    /// ROS name, for example `sensor_msgs/msg/Image`.
     const TYPE: &'static str;
-    /// The definition with all it contains, in the concatenated `ros2msg` form.
+    /// Definition with all it contains, in the concatenated `ros2msg` form.
     const DEFINITION: &'static str;
 }
 
@@ -43,11 +43,11 @@ macro_rules! message {
 }
 use message;
 
-/// Why a message could not be read.
+/// Reason for which a message could not be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CdrError {
-    /// No encapsulation header, or one of another representation than plain CDR.
+    /// The encapsulation header is missing, or of another representation than plain CDR.
     #[error("not a CDR message: it starts with {0:02x?}; expected 00 00 or 00 01")]
     Encapsulation(Vec<u8>),
     /// The bytes end early or do not fit the type.
@@ -58,7 +58,7 @@ pub enum CdrError {
 /// Reads a message with its four-byte encapsulation header.
 ///
 /// # Errors
-/// [`CdrError`]. Bytes after the message are allowed: some writers pad.
+/// [`CdrError`]. Bytes after the message are allowed, because some writers pad.
 ///
 /// ```
 /// use tagalong_log::msgs::{StringMsg, decode, encode};

@@ -29,8 +29,8 @@ fn an_image_lies_in_cdr_as_ros_writes_it() {
         step: 2,
         data: &[9, 10],
     };
-    // Written out by hand from the rules of CDR: alignment to the size of the
-    // value counted after the encapsulation header, strings with their zero.
+    // Written by hand from the rules of CDR: alignment to the size of the value counted after the
+    // encapsulation header, strings with their zero.
     let expected = [
         &[0, 1, 0, 0][..],                                    // little endian
         &[7, 0, 0, 0, 8, 0, 0, 0],                            // stamp

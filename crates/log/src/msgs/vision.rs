@@ -5,49 +5,49 @@ use super::{Header, Pose, PoseWithCovariance, Vector3, message};
 /// `vision_msgs/ObjectHypothesis`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectHypothesis {
-    /// What it is.
+    /// Class of the object.
     pub class_id: String,
-    /// How sure.
+    /// Confidence.
     pub score: f64,
 }
 
 /// `vision_msgs/ObjectHypothesisWithPose`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectHypothesisWithPose {
-    /// What it is.
+    /// Class with its confidence.
     pub hypothesis: ObjectHypothesis,
-    /// Where it is.
+    /// Pose of the object.
     pub pose: PoseWithCovariance,
 }
 
 /// `vision_msgs/BoundingBox3D`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BoundingBox3D {
-    /// Middle of the box.
+    /// Centre of the box.
     pub center: Pose,
-    /// Its size along its axes, m.
+    /// Size along its axes, m.
     pub size: Vector3,
 }
 
 /// `vision_msgs/Detection3D`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection3D {
-    /// When and in which frame.
+    /// Time and frame.
     pub header: Header,
-    /// What it may be.
+    /// Hypotheses about its class.
     pub results: Vec<ObjectHypothesisWithPose>,
-    /// The space it takes.
+    /// Bounding box.
     pub bbox: BoundingBox3D,
-    /// Its identity over time.
+    /// Identity over time.
     pub id: String,
 }
 
 /// `vision_msgs/Detection3DArray`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection3DArray {
-    /// When and in which frame.
+    /// Time and frame.
     pub header: Header,
-    /// All detections of the moment.
+    /// All detections of one time.
     pub detections: Vec<Detection3D>,
 }
 
@@ -63,42 +63,42 @@ pub struct Point2D {
 /// `vision_msgs/Pose2D`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2D {
-    /// Where.
+    /// Position.
     pub position: Point2D,
-    /// Turned by, rad.
+    /// Rotation, rad.
     pub theta: f64,
 }
 
 /// `vision_msgs/BoundingBox2D`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BoundingBox2D {
-    /// Middle of the box, pixels.
+    /// Centre of the box, pixels.
     pub center: Pose2D,
-    /// Its width, pixels.
+    /// Width, pixels.
     pub size_x: f64,
-    /// Its height, pixels.
+    /// Height, pixels.
     pub size_y: f64,
 }
 
 /// `vision_msgs/Detection2D`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection2D {
-    /// When and in which image.
+    /// Time and image.
     pub header: Header,
-    /// What it may be.
+    /// Hypotheses about its class.
     pub results: Vec<ObjectHypothesisWithPose>,
-    /// The part of the image it takes.
+    /// Bounding box in the image.
     pub bbox: BoundingBox2D,
-    /// Its identity over time.
+    /// Identity over time.
     pub id: String,
 }
 
 /// `vision_msgs/Detection2DArray`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection2DArray {
-    /// When and in which image.
+    /// Time and image.
     pub header: Header,
-    /// All detections of the moment.
+    /// All detections of one time.
     pub detections: Vec<Detection2D>,
 }
 

@@ -1,4 +1,4 @@
-//! Makes frames of the images that belong together.
+//! Assembly of frames from the images that belong together.
 
 use std::sync::Arc;
 
@@ -26,14 +26,14 @@ use crate::odometry::{PoseAt, unknown_motion};
 use crate::register::Registration;
 use crate::scan::Type;
 
-/// What is carried from frame to frame.
+/// State that is carried from frame to frame.
 pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
     registration: Option<Registration>,
     unwrapping: Unwrapping,
     previous: Option<(Stamp, PoseAt)>,
-    /// The first calibration that did not fit its images.
+    /// First calibration that did not fit its images.
     pub(super) misfit: Option<CalibrationError>,
 }
 
@@ -49,13 +49,13 @@ impl Assembler {
         }
     }
 
-    /// The camera of the last frame.
+    /// Returns the camera of the last frame.
     pub(super) fn camera(&self) -> Option<&Arc<Camera>> {
         self.camera.as_ref()
     }
 
-    /// Makes a frame of an image and its partners; `None` if something that is
-    /// needed is missing or damaged, which is counted.
+    /// Makes a frame of an image and its partners; `None` if a required part is missing or damaged,
+    /// which is counted.
     pub(super) fn assemble(
         &mut self,
         plan: &Plan,
@@ -64,6 +64,7 @@ impl Assembler {
         intake: &mut Intake,
         tally: &mut Tally,
     ) -> Option<LogFrame> {
+        // Counted before anything can fail, so that the index does not depend on the inputs.
         self.index += 1;
         if plan.is_of_scans() {
             return self.assemble_scan(plan, image, intake, tally);
@@ -79,6 +80,7 @@ impl Assembler {
             tally.count("left_without_right");
         }
         let requires = |input| plan.inputs.requires(input);
+        // Tested before decoding, which is the costly part.
         let lacks_depth = requires(Input::Depth) && plan.has_second_depth() && depth.is_none();
         if lacks_depth || requires(Input::Right) && right.is_none() {
             return None;
@@ -103,8 +105,8 @@ impl Assembler {
         Some(item)
     }
 
-    /// Makes a frame of a laser scan alone; `None` if it is damaged or its pose is not known,
-    /// which is counted.
+    /// Makes a frame of a laser scan alone; `None` if it is damaged or its pose is unknown, which
+    /// is counted.
     fn assemble_scan(
         &mut self,
         plan: &Plan,
@@ -131,7 +133,8 @@ impl Assembler {
         Some(item)
     }
 
-    /// The image that makes the frame, as far as it is used, and the size of the frame.
+    /// Decodes the image that makes the frame, as far as it is used; returns it with the size of
+    /// the frame.
     fn primary(
         &mut self,
         plan: &Plan,
@@ -155,7 +158,7 @@ impl Assembler {
         }
     }
 
-    /// `None`, counted, for an image of another size than the calibration is for.
+    /// Checks that the image has the size of the calibration; `None`, counted, if not.
     fn check_calibration(
         &mut self,
         plan: &Plan,
@@ -170,7 +173,7 @@ impl Assembler {
         Some(())
     }
 
-    /// The circular image of a mirror as a panorama, if there is one, and its size.
+    /// Unwraps the circular image of a mirror, if there is one; returns the panorama and its size.
     fn unwrap(
         &mut self,
         plan: &Plan,
@@ -189,7 +192,7 @@ impl Assembler {
         Some((unwrapped.ok()?, (columns, rows)))
     }
 
-    /// The camera at the moment of an image; the last one while it stays.
+    /// Returns the camera at the time of an image; the last one if it is unchanged.
     fn camera_at(
         &mut self,
         plan: &Plan,
@@ -199,6 +202,7 @@ impl Assembler {
         tally: &mut Tally,
     ) -> Option<Arc<Camera>> {
         let found = plan.mount.at(&intake.tf, image.stamp);
+        // The last known pose bridges a gap in tf.
         let known = found.or_else(|| self.camera.as_ref().map(|last| last.robot_from_camera));
         if found.is_none() {
             tally.count("frames_without_camera_pose");
@@ -214,13 +218,14 @@ impl Assembler {
             |known| lens_of(&known, width, height),
         );
         let camera = Camera { lens, width, height, robot_from_camera };
+        // A new object only after a change, so that frames share one.
         if self.camera.as_deref() != Some(&camera) {
             self.camera = Some(Arc::new(camera));
         }
         self.camera.clone()
     }
 
-    /// A depth image in the view of the colour camera.
+    /// Returns a depth image in the view of the colour camera.
     fn depth(
         &mut self,
         plan: &Plan,
@@ -236,6 +241,7 @@ impl Assembler {
         };
         let seen = shifted(seen, plan.input.depth_offset_px);
         let same_size = (seen.width(), seen.height()) == (camera.width, camera.height);
+        // Registered by the driver: same size, frame and lens.
         if same_size && image.frame_id == depth.frame_id && plan.same_lens() {
             return Some(Arc::new(seen));
         }
@@ -274,13 +280,14 @@ impl Assembler {
     ) -> Option<Arc<DepthImage>> {
         tally.count("depth_registered");
         tally.note("depth is registered to the colour camera through tf and both calibrations");
+        // Made anew only after a change of the transform, because its rays are costly.
         if !self.registration.as_ref().is_some_and(|known| known.is_for(&colour_from_depth)) {
             self.registration = Some(Registration::new(from, camera, colour_from_depth));
         }
         self.registration.as_ref()?.apply(seen).map(Arc::new)
     }
 
-    /// What the laser scanner met, in the robot frame at the time of the image.
+    /// Returns the points of the laser scan in the robot frame at the time of the image.
     fn laser(&self, plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) -> Option<Scan> {
         plan.chosen.laser.as_ref()?;
         let Some(scan) = intake.laser.near(stamp) else {
@@ -329,11 +336,12 @@ impl Assembler {
                 .lookup(odom, robot, stamp)
                 .map(|pose| PoseAt { pose: planar_pose(&pose), stale: false }),
         };
+        // Without odometry the robot stays at its last pose, which is marked as stale.
         let last = self.previous.map_or_else(Isometry2::identity, |(_, last)| last.pose);
         found.unwrap_or(PoseAt { pose: last, stale: true })
     }
 
-    /// True if odometry jumps between the previous frame and this one.
+    /// Returns true if odometry jumps between the previous frame and this one.
     fn has_jumped(&self, plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) -> bool {
         let from_topic = matches!(plan.odom_frames, Some(None));
         let jumped = from_topic
@@ -345,7 +353,7 @@ impl Assembler {
         jumped
     }
 
-    /// The motion since the previous frame, and whether it is known.
+    /// Returns the motion since the previous frame, and true if it is known.
     fn motion(
         &self,
         plan: &Plan,
@@ -358,6 +366,7 @@ impl Assembler {
             tally.count("odometry_gap_frames");
             tally.note("odometry is silent for more than half a second at some frames");
         }
+        // After a jump of the clock there is no previous frame to measure from.
         let Some((then, before)) = self.previous.filter(|(then, _)| *then < stamp) else {
             return (Motion::at_rest(0.0), true);
         };
@@ -369,7 +378,7 @@ impl Assembler {
     }
 }
 
-/// The image moved by columns and rows; nothing is known of what comes in.
+/// Shifts the image by columns and rows; the pixels that come in are unknown.
 fn shifted(depth: DepthImage, offset: [i32; 2]) -> DepthImage {
     let [right, down] = offset.map(i64::from);
     if (right, down) == (0, 0) {
@@ -409,7 +418,7 @@ fn right_image(
     Some(RightImage { image, baseline_m: plan.baseline_m? })
 }
 
-/// The lens of the frames, whose images are unwrapped.
+/// Returns the lens of the frames after unwrapping.
 fn lens_of(known: &Intrinsics, width: usize, height: usize) -> Lens {
     let sized = |mirror| Panorama { mirror, columns: width, rows: height };
     match known.mirror {
@@ -429,7 +438,7 @@ fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Optio
     read(plan, topic, image, tally, of)
 }
 
-/// The size of an image that makes a frame, by its header; a failure is counted as lost.
+/// Returns the size of an image that makes a frame, from its header; a failure is counted as lost.
 fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<(usize, usize)> {
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
@@ -438,7 +447,7 @@ fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Optio
     read(plan, plan.primary(), image, tally, of)
 }
 
-/// An image message of one of the two types.
+/// Image message of one of the two types.
 enum AnyImage<'a> {
     Raw(Image<'a>),
     Compressed(CompressedImage<'a>),
@@ -466,11 +475,12 @@ fn read<T>(
         .ok()
 }
 
-/// A lens with a horizontal view of 53 degrees, for logs that tell nothing.
+/// Returns a lens with a horizontal field of view of 53 degrees, for logs without a calibration.
 fn assumed_lens(width: usize, height: usize) -> Pinhole {
     Pinhole {
         fx: width as f64,
         fy: width as f64,
+        // Pixel centres have whole coordinates.
         cx: 0.5 * (width as f64 - 1.0),
         cy: 0.5 * (height as f64 - 1.0),
         distortion: Distortion::None,

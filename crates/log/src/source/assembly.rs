@@ -1,4 +1,4 @@
-//! Frames from messages, wherever these come from.
+//! Frames from messages of any source.
 
 use tagalong_core::Camera;
 
@@ -12,13 +12,13 @@ use crate::camera_info::CalibrationError;
 use crate::mcap_walk::{Channel, Message};
 use crate::scan::Type;
 
-/// Messages one after the other.
+/// Sequence of messages.
 pub(super) trait Messages {
-    /// The next one; `None` at the end.
+    /// Returns the next message; `None` at the end.
     fn next_message(&mut self) -> Option<Message<'_>>;
 }
 
-/// Takes in messages and gives out frames.
+/// Converter from messages to frames.
 pub(super) struct Assembly {
     pub(super) plan: Plan,
     pub(super) tally: Tally,
@@ -33,7 +33,7 @@ impl Assembly {
         Self { intake, assembler: Assembler::new(), plan, tally, ended: false }
     }
 
-    /// True for topics whose messages are not ignored.
+    /// Returns true for topics with messages that are used.
     pub(super) fn reads(&self, channel: &Channel) -> bool {
         Type::of(&channel.schema_name) == Type::Tf || self.plan.chosen.has(&channel.topic)
     }
@@ -42,7 +42,7 @@ impl Assembly {
         self.intake.take(message, &mut self.tally);
     }
 
-    /// Reads on to the next frame; `None` when the messages have ended.
+    /// Reads on to the next frame; `None` at the end of the messages.
     pub(super) fn read(&mut self, messages: &mut dyn Messages) -> Option<LogFrame> {
         loop {
             let frame = self.next_frame();
@@ -56,7 +56,7 @@ impl Assembly {
         }
     }
 
-    /// The next frame that no message to come can change any more.
+    /// Returns the next frame that no later message can change.
     fn next_frame(&mut self) -> Option<LogFrame> {
         while let Some((image, next)) = self.intake.frames.pop(self.ended) {
             let (plan, intake) = (&self.plan, &mut self.intake);
@@ -66,6 +66,7 @@ impl Assembly {
                 return frame;
             }
         }
+        // Partners that still wait at the end have none.
         if self.ended {
             self.tally.add("depth_without_colour", self.intake.depth.leave());
             self.tally.add("right_without_left", self.intake.right.leave());
@@ -73,8 +74,7 @@ impl Assembly {
         None
     }
 
-    /// The newest frame whose images are all there; older ones are skipped and
-    /// counted.
+    /// Returns the newest frame with all its images; older ones are skipped and counted.
     pub(super) fn newest_frame(&mut self) -> Option<LogFrame> {
         loop {
             let (plan, intake) = (&self.plan, &mut self.intake);
@@ -96,17 +96,17 @@ impl Assembly {
         }
     }
 
-    /// True if there are no more messages.
+    /// Returns true if there are no more messages.
     pub(super) fn has_ended(&self) -> bool {
         self.ended
     }
 
-    /// The first calibration that did not fit its images.
+    /// Returns the first calibration that did not fit its images.
     pub(super) fn misfit(&self) -> Option<&CalibrationError> {
         self.assembler.misfit.as_ref()
     }
 
-    /// What is known of the source once it has given a frame.
+    /// Returns the facts about the source, complete after the first frame.
     pub(super) fn facts(&self) -> LogFacts {
         let (scan, chosen) = (&self.plan.scan, &self.plan.chosen);
         let camera = self.assembler.camera();

@@ -1,4 +1,4 @@
-//! Sorts the messages of a log into what the frames are made of.
+//! Distribution of the messages of a log to the parts of a frame.
 
 use tagalong_core::planar_pose;
 
@@ -16,10 +16,10 @@ use crate::scan::{Scan, Type, is_static};
 use crate::tf::TfBuffer;
 use crate::topics::Chosen;
 
-/// Everything that has been read and not yet become a frame.
+/// Messages that have been read and not yet become a frame.
 pub(super) struct Intake {
     chosen: Chosen,
-    /// The topic that makes the frames: colour, or depth where there is none, or laser scans.
+    /// Topic that makes the frames: colour, or depth without it, or laser scans.
     primary: String,
     info: Option<CameraInfo>,
     pub(super) frames: Reorder,
@@ -34,6 +34,7 @@ pub(super) struct Intake {
 impl Intake {
     pub(super) fn new(scan: &Scan, chosen: &Chosen, primary: &str, input: &InputSettings) -> Self {
         let mut tf = scan.tf.clone();
+        // The first pass left one sample of each moving transform, to know the links only.
         tf.clear_moving();
         let info = chosen.colour_info.as_ref().and_then(|topic| scan.infos.get(topic));
         Self {
@@ -50,7 +51,7 @@ impl Intake {
         }
     }
 
-    /// Takes in a message. One that does not decode is counted as lost.
+    /// Takes in a message. One that cannot be decoded is counted as lost.
     pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
         let topic = Some(&message.channel.topic);
         let outcome = if *message.channel.topic == self.primary {
@@ -85,6 +86,7 @@ impl Intake {
             Arrival::LateBefore => tally.count("late_frames"),
             Arrival::Jumped => {
                 tally.count("time_jumps_back");
+                // Partners with older stamps than the newest image belong to the new time already.
                 if let Some(newest) = newest {
                     self.depth.set_aside(newest);
                     self.right.set_aside(newest);
@@ -123,6 +125,7 @@ impl Intake {
     }
 
     fn watch_info(&mut self, info: &CameraInfo, tally: &mut Tally) {
+        // Field by field, because the header differs in each message.
         let changed = self.info.as_ref().is_some_and(|first| {
             first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
         });
@@ -132,8 +135,8 @@ impl Intake {
         }
     }
 
-    /// The newest image that has all its partners, and how many older ones were
-    /// skipped for it.
+    /// Returns the newest image with all its partners, and the number of older ones that were
+    /// skipped.
     pub(super) fn pop_newest(&mut self, plan: &Plan) -> (Option<Popped>, u64) {
         let near = plan.input.pair_tolerance_s;
         let Self { frames, depth, right, detections, chosen, .. } = self;
@@ -144,7 +147,8 @@ impl Intake {
         })
     }
 
-    /// At the end of the log and after a jump of the clock.
+    /// Returns to the partners of the new time once all images from before a jump of the clock are
+    /// delivered.
     pub(super) fn settle(&mut self) {
         if self.frames.is_flushed() {
             self.depth.restore();
@@ -154,13 +158,13 @@ impl Intake {
     }
 }
 
-/// A message that begins with a header.
+/// Reads the header of a message that begins with one.
 fn headed(message: &Message<'_>) -> Result<Payload, CdrError> {
     let header: Header = decode(message.data)?;
     Ok(Payload { stamp: header.stamp(), frame_id: header.frame_id, data: message.data.to_vec() })
 }
 
-/// The stamp and frame of an image or a scan, and its bytes.
+/// Returns the stamp, the frame and the bytes of an image or a scan.
 fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
     if Type::of(&message.channel.schema_name) == Type::LaserScan {
         return headed(message);

@@ -1,4 +1,4 @@
-//! Laser scans: nearest to an image in time, or frames of their own.
+//! Laser scans: the nearest one to an image in time, or frames of their own.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -8,21 +8,21 @@ use tagalong_core::{LaserScan as Scan, Stamp};
 
 use crate::msgs::LaserScan;
 
-/// A scan this far from an image in time says nothing about it, s.
+/// Maximum time between a scan and an image, s.
 const NEAR_S: f64 = 0.25;
-/// Scans that are kept: those of the frames that wait for their turn.
+/// Maximum number of scans kept: those of the frames that wait for their turn.
 const KEPT: usize = 64;
-/// Rays of a scan at most.
+/// Maximum number of rays of a scan.
 const MAX_RAYS: usize = 65_536;
 
-/// The scans of the last seconds, as they came.
+/// Scans of the last seconds, in the order of arrival.
 #[derive(Default)]
 pub(super) struct Scans {
     scans: VecDeque<LaserScan>,
 }
 
 impl Scans {
-    /// Takes in a scan; false if its angles or ranges are none.
+    /// Adds a scan; returns false if its angles or ranges are invalid.
     pub(super) fn push(&mut self, scan: LaserScan) -> bool {
         if !is_sane(&scan) {
             return false;
@@ -34,7 +34,7 @@ impl Scans {
         true
     }
 
-    /// The scan nearest to an image in time, if one is near.
+    /// Returns the scan nearest to an image in time, if it is near enough.
     pub(super) fn near(&self, image: Stamp) -> Option<&LaserScan> {
         let off_s = |scan: &&LaserScan| scan.header.stamp().seconds_since(image).abs();
         let nearest = self.scans.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
@@ -54,6 +54,7 @@ pub(super) fn seen_from(
     let moved = Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn);
     let moved_point = |point: Point3<f64>| {
         let then = robot_from_laser * point;
+        // The robot moves on a floor: heights stay.
         let now = robot_from_then * then.xy();
         Point3::new(now.x, now.y, then.z)
     };
@@ -67,20 +68,20 @@ pub(super) fn seen_from(
     }
 }
 
-/// Returns false for a scan whose angles or ranges are none.
+/// Returns false for a scan with invalid angles or ranges.
 pub(super) fn is_sane(scan: &LaserScan) -> bool {
     let angles = [scan.angle_min, scan.angle_increment];
     let is_known = angles.into_iter().all(f32::is_finite) && !limits(scan).is_empty();
     is_known && scan.ranges.len() <= MAX_RAYS
 }
 
-/// What the scanner measures, m.
+/// Returns the valid ranges of the scanner, m.
 fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
     scan.range_min.max(0.0)..=scan.range_max
 }
 
-/// Where the rays met something, in the frame of the scanner, m, with the number of the ray.
-/// Ranges beyond the scanner's own limits, infinite and NaN ones are rays that met nothing.
+/// Yields the reflections in the frame of the scanner, m, with the index of the ray. Ranges beyond
+/// the scanner's own limits, infinite and NaN ones are rays without a reflection.
 fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
     let (first, step) = (f64::from(scan.angle_min), f64::from(scan.angle_increment));
     let limits = limits(scan);

@@ -1,9 +1,8 @@
-//! Frames from messages that arrive now.
+//! Frames from messages that arrive live.
 //!
-//! What takes two readings of a file takes two phases here: [`Listening`] gathers
-//! until everything is there that the pipeline needs, [`LiveSource`] makes frames.
-//! Who comes too late for a frame is not waited for: see
-//! [`LiveSource::newest_frame`].
+//! The two passes over a file are two phases here: [`Listening`] gathers until all inputs of the
+//! pipeline are there, [`LiveSource`] makes frames. An image that comes too late for a frame is not
+//! waited for: see [`LiveSource::newest_frame`].
 
 use std::collections::BTreeMap;
 use std::slice::Iter;
@@ -16,13 +15,13 @@ use crate::mcap_walk::{Channel, Message};
 use crate::scan::{Gathering, Type};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
-/// Messages that are kept of each topic, to find the floor in.
+/// Number of messages kept of each topic, to fit the floor to.
 const KEPT: u64 = 16;
 
-/// A topic and one of its messages.
+/// Channel with one of its messages.
 type Held = (Arc<Channel>, Vec<u8>);
 
-/// The first phase: which topics are there, and what are they?
+/// First phase: discovery of the topics and their types.
 pub struct Listening {
     name: String,
     input: InputSettings,
@@ -40,10 +39,10 @@ impl Messages for Iter<'_, Held> {
 }
 
 impl Listening {
-    /// Knows of no topic yet. `name` stands in errors where a log has its path.
+    /// Starts without any topic. `name` is used in errors in place of the path of a log.
     ///
     /// # Errors
-    /// [`LogError::Settings`] for numbers that cannot work.
+    /// [`LogError::Settings`] for invalid values.
     pub fn new(
         name: &str,
         input: &InputSettings,
@@ -62,7 +61,7 @@ impl Listening {
         })
     }
 
-    /// Takes note of a topic; false if it was known.
+    /// Adds a topic; returns false if it was known.
     pub fn announce(&mut self, topic: &str, message_type: &str) -> bool {
         if self.channels.contains_key(topic) {
             return false;
@@ -79,9 +78,8 @@ impl Listening {
         true
     }
 
-    /// True for a topic that was announced and of whose messages frames can be made.
-    /// Detections of others are wanted only where the settings name them, since our
-    /// own have the same type.
+    /// Returns true for an announced topic with messages that frames can be made of. Detections are
+    /// used only if the settings name their topic, because Tagalong's own output has the same type.
     pub fn wants(&self, topic: &str) -> bool {
         let kind = self.channels.get(topic).map(|channel| Type::of(&channel.schema_name));
         match kind {
@@ -93,27 +91,28 @@ impl Listening {
         }
     }
 
-    /// True once an image has come.
+    /// Returns true once an image has arrived.
     pub fn has_image(&self) -> bool {
         self.gathering.has_image()
     }
 
-    /// Takes in a message, in CDR with its encapsulation header. Those of topics
-    /// that were not announced are ignored.
+    /// Takes in a message, in CDR with its encapsulation header. Messages of topics that were not
+    /// announced are ignored.
     pub fn take(&mut self, topic: &str, data: &[u8]) {
         let Some(channel) = self.channels.get(topic) else { return };
         self.gathering.take(&message(channel, data));
+        // Only the first messages are kept, because listening may last for ever.
         if self.gathering.topic(topic, "", "cdr").count <= KEPT {
             self.held.push((Arc::clone(channel), data.to_vec()));
         }
     }
 
-    /// Begins to make frames, if everything that is needed has been seen. To be
-    /// asked again after an error, which may pass as messages arrive.
+    /// Starts to make frames, if all inputs have been seen. To be called again after an error,
+    /// which may be resolved by further messages.
     ///
     /// # Errors
-    /// [`LogError`]: something that the inputs or the settings name is not there
-    /// (yet), or a calibration cannot be used.
+    /// [`LogError`]: a topic that the inputs or the settings name is not there (yet), or a
+    /// calibration cannot be used.
     pub fn start(&self) -> Result<LiveSource, LogError> {
         let scan = Arc::new(self.gathering.scan(&self.name));
         let mut tally = tally_of(&scan);
@@ -126,52 +125,51 @@ impl Listening {
     }
 }
 
-/// The second phase: frames, as images arrive.
+/// Second phase: frames, as images arrive.
 pub struct LiveSource {
     assembly: Assembly,
     channels: BTreeMap<String, Arc<Channel>>,
 }
 
 impl LiveSource {
-    /// The topics that are read; messages of others are ignored.
+    /// Returns the topics that are read; messages of others are ignored.
     pub fn topics(&self) -> impl Iterator<Item = &str> {
         self.channels.keys().map(String::as_str)
     }
 
-    /// Takes in a message, in CDR with its encapsulation header. One that does not
-    /// decode is counted.
+    /// Takes in a message, in CDR with its encapsulation header. One that cannot be decoded is
+    /// counted.
     pub fn take(&mut self, topic: &str, data: &[u8]) {
         if let Some(channel) = self.channels.get(topic) {
             self.assembly.take(&message(channel, data));
         }
     }
 
-    /// The newest frame whose images have all arrived, if there is a new one.
+    /// Returns the newest frame with all its images, if there is a new one.
     ///
-    /// A log can be waited for, a robot cannot: an image whose partners are there
-    /// becomes a frame at once, and what is older is skipped and counted as
-    /// `frames_skipped`. An image whose partners do not come is given up once
-    /// [`InputSettings::reorder_frames`] newer ones wait.
+    /// A robot does not wait, unlike a log: an image with all its partners becomes a frame at once,
+    /// and older ones are skipped and counted as `frames_skipped`. An image with missing partners
+    /// is given up once [`InputSettings::reorder_frames`] newer ones wait.
     pub fn newest_frame(&mut self) -> Option<LogFrame> {
         self.assembly.newest_frame()
     }
 
-    /// Why no frame can be made of the images that came, if that is so.
+    /// Returns the reason for which no frame can be made of the images, if so.
     pub fn misfit(&self) -> Option<LogError> {
         self.assembly.misfit().map(|misfit| self.assembly.plan.misfit(misfit.clone()))
     }
 
-    /// What was counted so far: images skipped and lost, and why.
+    /// Returns the numbers of images skipped and lost so far, by reason.
     pub fn counters(&self) -> &BTreeMap<&'static str, u64> {
         &self.assembly.tally.counters
     }
 
-    /// What is to be said about the messages, each thing once.
+    /// Returns the remarks about the messages, each one once.
     pub fn notes(&self) -> &[String] {
         &self.assembly.tally.notes
     }
 
-    /// What was found out; the camera once there was a frame.
+    /// Returns the facts about the source; about the camera only after a frame.
     pub fn facts(&self) -> LogFacts {
         self.assembly.facts()
     }

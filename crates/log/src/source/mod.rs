@@ -1,4 +1,4 @@
-//! The second reading of a log: frames.
+//! Second pass over a log: frames.
 
 mod assemble;
 mod assembly;
@@ -27,25 +27,25 @@ use crate::mcap_walk::{Message, Walker};
 use crate::scan::{Scan, open_file};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
-/// A frame, and where the robot was.
+/// Frame with the pose of the robot.
 pub struct LogFrame {
-    /// The frame. Its index counts the colour images of the log in the order of
-    /// their stamps from 1, skipped ones included.
+    /// The frame. Its index counts the images (or scans) that make the frames, in the order of
+    /// their stamps from 1, unusable ones included.
     pub frame: Frame,
-    /// The robot's pose in the odometry frame; the identity without odometry.
+    /// Pose of the robot in the odometry frame; the identity without odometry.
     pub odom_from_robot: Isometry2<f64>,
-    /// The pose is a guess: odometry was silent for long, or has jumped.
+    /// True if the pose is a guess: there was a long gap in the odometry, or a jump.
     pub odom_stale: bool,
-    /// Odometry has jumped since the frame before.
+    /// True if odometry has jumped since the previous frame.
     pub odom_jumped: bool,
 }
 
-/// What was found out about a log.
+/// Facts about a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogFacts {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its size.
+    /// Size of the file, bytes.
     pub bytes: u64,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
@@ -61,9 +61,9 @@ pub struct LogFacts {
     pub laser_topic: Option<String>,
     /// Frame id of the images.
     pub camera_frame: Option<String>,
-    /// Topic of the calibration that the frames have.
+    /// Topic of the calibration of the frames.
     pub calibration_topic: Option<String>,
-    /// The robot's frame in tf.
+    /// Robot frame in tf.
     pub robot_frame: String,
     /// Columns of the images.
     pub width: usize,
@@ -75,15 +75,15 @@ pub struct LogFacts {
     pub baseline_m: Option<f64>,
     /// Height of the camera above the floor at the first frame, m.
     pub camera_height_m: f64,
-    /// How far it looks down, degrees.
+    /// Angle of the optical axis below the horizon, degrees.
     pub camera_pitch_down_deg: f64,
-    /// How far its right side is raised, degrees.
+    /// Roll of the camera, degrees; positive if its right side is raised.
     pub camera_roll_deg: f64,
-    /// Where these three come from.
+    /// Source of these three.
     pub camera_source: String,
 }
 
-/// The frames of a log, one after the other.
+/// Frames of a log, one after the other.
 pub struct FrameSource {
     walker: Walker<File>,
     assembly: Assembly,
@@ -98,12 +98,12 @@ impl Messages for Walker<File> {
 }
 
 impl FrameSource {
-    /// Opens a log: reads it once without decoding images, chooses topics and
-    /// settles where the camera is.
+    /// Opens a log: reads it once without decoding images, chooses topics and determines the pose
+    /// of the camera.
     ///
     /// # Errors
-    /// [`LogError`]: the file cannot be read, a calibration cannot be used, or
-    /// the log lacks something that `inputs` or `input` name.
+    /// [`LogError`]: the file cannot be read, a calibration cannot be used, or the log lacks an
+    /// input or topic that `inputs` or `input` name.
     pub fn open(
         path: &Path,
         input: &InputSettings,
@@ -115,7 +115,7 @@ impl FrameSource {
         Self::of_scan(scan, input, limits, inputs)
     }
 
-    /// Like [`FrameSource::open`], of a log that was scanned already.
+    /// Opens a log as [`FrameSource::open`] does, after its first pass.
     pub(crate) fn of_scan(
         scan: Arc<Scan>,
         input: &InputSettings,
@@ -131,6 +131,7 @@ impl FrameSource {
             facts: LogFacts::default(),
             first: None,
         };
+        // Read in advance, because the facts about the camera are known after a frame only.
         source.first = source.advance();
         if let (None, Some(misfit)) = (&source.first, source.assembly.misfit()) {
             return Err(source.assembly.plan.misfit(misfit.clone()));
@@ -139,7 +140,7 @@ impl FrameSource {
         Ok(source)
     }
 
-    /// The next frame in the order of stamps; `None` at the end.
+    /// Returns the next frame in the order of stamps; `None` at the end.
     pub fn next_frame(&mut self) -> Option<LogFrame> {
         self.first.take().or_else(|| self.advance())
     }
@@ -153,7 +154,7 @@ impl FrameSource {
         frame
     }
 
-    /// At the end: is the file what it was when it was opened?
+    /// Checks at the end that the file is still as it was when it was opened.
     fn check_whole(&mut self) {
         let Assembly { plan, tally, .. } = &mut self.assembly;
         if self.walker.data_lost() && !plan.scan.data_lost {
@@ -164,7 +165,7 @@ impl FrameSource {
         }
     }
 
-    /// How much of the file has been read, 0 to 1.
+    /// Returns the fraction of the file that has been read, 0 to 1.
     pub fn progress(&self) -> f64 {
         let bytes = self.assembly.plan.scan.bytes.max(1);
         match self.assembly.has_ended() {
@@ -173,28 +174,28 @@ impl FrameSource {
         }
     }
 
-    /// What was counted so far: damage of the file, images skipped and why.
+    /// Returns the counters so far: damage of the file, images skipped and the reasons.
     pub fn counters(&self) -> &BTreeMap<&'static str, u64> {
         &self.assembly.tally.counters
     }
 
-    /// What is to be said about the log, each thing once.
+    /// Returns the remarks about the log, each one once.
     pub fn notes(&self) -> &[String] {
         &self.assembly.tally.notes
     }
 
-    /// True if anything in the log could not be used because it is damaged.
+    /// Returns true if some part of the log could not be used because it is damaged.
     pub fn data_lost(&self) -> bool {
         self.assembly.tally.lost
     }
 
-    /// What was found out about the log.
+    /// Returns the facts about the log.
     pub fn facts(&self) -> &LogFacts {
         &self.facts
     }
 }
 
-/// Begins to read a log that was scanned.
+/// Starts the second pass over a log.
 fn walk(scan: &Scan, limits: &Limits) -> Result<Walker<File>, LogError> {
     let path = &scan.path;
     let walker = Walker::new(open_file(path)?, limits)

@@ -1,4 +1,4 @@
-//! Where the camera sits on the robot.
+//! Pose of the camera on the robot.
 
 use nalgebra::Isometry3;
 use tagalong_core::{Camera, ConicalMirror, Pinhole, Stamp};
@@ -7,21 +7,21 @@ use crate::scan::Scan;
 use crate::tf::TfBuffer;
 use crate::{InputSettings, MountSettings};
 
-/// Where the pose of the camera comes from.
+/// Source of the camera's pose.
 #[derive(Clone, Debug)]
 pub(super) enum Mount {
-    /// Looked up for each image.
+    /// Looked up in tf for each image.
     Tf { base: String, camera: String },
-    /// The same for all images.
+    /// Constant for all images.
     Fixed { pose: Isometry3<f64>, source: String },
 }
 
-/// The height that is assumed where nothing tells it and nothing depends on it, m.
+/// Assumed height of the camera if nothing gives it and nothing depends on it, m.
 const ASSUMED_HEIGHT_M: f64 = 1.2;
 
 impl Mount {
-    /// From the settings, else from tf; `None` if neither tells. A camera that
-    /// looks into a mirror stands upright.
+    /// Returns the mount from the settings, else from tf; `None` with neither. A camera that looks
+    /// into a mirror is upright.
     pub(super) fn find(
         scan: &Scan,
         camera: Option<&str>,
@@ -49,14 +49,14 @@ impl Mount {
         Self::fixed(&mount, "an assumption (neither tf, nor [input.camera], nor depth)".into())
     }
 
-    /// Of a laser scanner that tf does not know.
+    /// Returns the mount of a laser scanner that is not in tf.
     pub(super) fn scanner_at_origin() -> Self {
         let source = "an assumption (no tf): the scanner sits at the robot's origin, level, and \
                       looks ahead";
         Self::Fixed { pose: Isometry3::identity(), source: source.into() }
     }
 
-    /// What to tell about it.
+    /// Returns a description of the source for people.
     pub(super) fn source(&self) -> String {
         match self {
             Self::Tf { base, camera } => format!("tf ({base} to {camera})"),
@@ -64,7 +64,7 @@ impl Mount {
         }
     }
 
-    /// The pose of the camera in the robot at a moment, if it is known.
+    /// Returns the pose of the camera in the robot frame at a given time, if it is known.
     pub(super) fn at(&self, tf: &TfBuffer, stamp: Stamp) -> Option<Isometry3<f64>> {
         match self {
             Self::Tf { base, camera } => tf.lookup(base, camera, stamp),
@@ -73,8 +73,8 @@ impl Mount {
     }
 }
 
-/// The frame on the floor: `base_footprint` where a robot has one and the
-/// settings do not say otherwise.
+/// Returns the robot frame on the floor: `base_footprint` if tf has it and the settings do not name
+/// another frame.
 pub(super) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str {
     if input.base_frame == "base_link" && scan.tf.knows("base_footprint") {
         return "base_footprint";
@@ -84,6 +84,7 @@ pub(super) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str 
 
 fn pose_of(mount: &MountSettings) -> Isometry3<f64> {
     let (pitch, roll) = (mount.pitch_down_deg.to_radians(), mount.roll_deg.to_radians());
+    // Any lens will do, because only the pose of the camera is used.
     let any = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Default::default() };
     Camera::mounted(any, 1, 1, mount.height_m, pitch, roll).robot_from_camera
 }

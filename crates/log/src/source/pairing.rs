@@ -1,10 +1,10 @@
-//! Puts images in the order of their stamps and finds those that belong together.
+//! Ordering of images by stamp, and pairing of those that belong together.
 
 use std::collections::VecDeque;
 
 use tagalong_core::Stamp;
 
-/// The undecoded message of an image.
+/// Undecoded message of an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Payload {
     pub(super) stamp: Stamp,
@@ -12,11 +12,11 @@ pub(super) struct Payload {
     pub(super) data: Vec<u8>,
 }
 
-/// Images kept of a second stream; more are not near any image to come.
+/// Maximum number of images kept of a second stream; older ones are not near any image to come.
 const MAX_WAITING: usize = 64;
-/// Bytes kept of a second stream, unless a few images alone are larger.
+/// Maximum number of bytes kept of a second stream, unless a few images alone are larger.
 const MAX_WAITING_BYTES: usize = 40 << 20;
-/// So many images are kept whatever their size.
+/// Number of images that are kept regardless of their size.
 const MIN_WAITING: usize = 4;
 
 /// Images of a second stream (depth, right) that wait for their partner.
@@ -24,7 +24,7 @@ const MIN_WAITING: usize = 4;
 pub(super) struct Waiting {
     images: VecDeque<Payload>,
     aside: VecDeque<Payload>,
-    /// Images that left without a partner.
+    /// Number of images dropped without a partner.
     unpaired: u64,
 }
 
@@ -44,8 +44,8 @@ impl Waiting {
         count > MAX_WAITING || count > MIN_WAITING && bytes > MAX_WAITING_BYTES
     }
 
-    /// Takes the image nearest to `stamp` if it is within the tolerance and not
-    /// nearer to the image that comes next. Older images are dropped.
+    /// Takes the image nearest to `stamp` if it is within the tolerance and not nearer to the next
+    /// image of the other stream. Images older than the tolerance are dropped.
     pub(super) fn take(
         &mut self,
         stamp: Stamp,
@@ -65,8 +65,8 @@ impl Waiting {
         taken
     }
 
-    /// True if an image is there that [`Waiting::take`] would find for the newest
-    /// image of the other stream.
+    /// Returns true if [`Waiting::take`] would find an image for the newest image of the other
+    /// stream.
     pub(super) fn has(&self, stamp: Stamp, tolerance_s: f64) -> bool {
         self.images.iter().any(|image| image.stamp.seconds_since(stamp).abs() <= tolerance_s)
     }
@@ -78,15 +78,15 @@ impl Waiting {
         }
     }
 
-    /// After a jump of the clock: keeps what is older than `stamp`, and hence of
-    /// the new time, for [`Waiting::restore`].
+    /// Keeps, after a jump of the clock, the images older than `stamp`, which are hence of the new
+    /// time, for [`Waiting::restore`].
     pub(super) fn set_aside(&mut self, stamp: Stamp) {
         let first_old = self.images.partition_point(|image| image.stamp < stamp);
         let old = self.images.split_off(first_old);
         self.aside = std::mem::replace(&mut self.images, old);
     }
 
-    /// The old time is over: drops what is left of it.
+    /// Drops the rest of the old time and continues with the images that were set aside.
     pub(super) fn restore(&mut self) {
         if !self.aside.is_empty() {
             self.unpaired += self.images.len() as u64;
@@ -94,7 +94,7 @@ impl Waiting {
         }
     }
 
-    /// At the end: how many images found no partner since this was last asked.
+    /// Removes all images at the end; returns the number without a partner since the last call.
     pub(super) fn leave(&mut self) -> u64 {
         let left = self.images.len() + self.aside.len();
         self.images.clear();
@@ -103,27 +103,27 @@ impl Waiting {
     }
 }
 
-/// An image, and the stamp of the one after it.
+/// Image with the stamp of the next one.
 pub(super) type Popped = (Payload, Option<Stamp>);
 
-/// What became of an image that arrived.
+/// Result of the arrival of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arrival {
-    /// It waits for its turn.
+    /// The image waits for its turn.
     Queued,
-    /// Its stamp is that of another image.
+    /// The stamp is that of another image.
     Duplicate,
-    /// It is older than what was delivered; whether it is late or the clock has
-    /// jumped will show with the next image.
+    /// The image is older than the last one delivered; the next image will show if it is late or if
+    /// the clock has jumped.
     Suspect,
-    /// The image before was late and is dropped; this one waits.
+    /// The previous image was late and is dropped; this one waits.
     LateBefore,
-    /// The clock has jumped back: all images of the old time are ready now, and
-    /// the queue goes on with the new one.
+    /// The clock has jumped back: all images of the old time are ready now, and the queue goes on
+    /// with the new one.
     Jumped,
 }
 
-/// Orders a stream of images by stamp.
+/// Queue that orders a stream of images by stamp.
 #[derive(Debug)]
 pub(super) struct Reorder {
     window: usize,
@@ -162,6 +162,7 @@ impl Reorder {
                 Arrival::LateBefore
             }
             (Some(first), true) => {
+                // Two old images in a row are no late ones: the clock has jumped.
                 self.ready.append(&mut self.queue);
                 self.last = None;
                 self.enqueue(first);
@@ -176,8 +177,8 @@ impl Reorder {
         self.queue.insert(place, payload);
     }
 
-    /// The next image in order, if no earlier one can come any more (or the log
-    /// has ended), with the stamp of the one after it.
+    /// Returns the next image in order, if no earlier one can follow (or the log has ended), with
+    /// the stamp of the next one.
     pub(super) fn pop(&mut self, ended: bool) -> Option<Popped> {
         if let Some(payload) = self.ready.pop_front() {
             return Some((payload, self.ready.front().map(|next| next.stamp)));
@@ -190,9 +191,9 @@ impl Reorder {
         Some((payload, self.queue.front().map(|next| next.stamp)))
     }
 
-    /// The newest image that is complete, without waiting for those it might have
-    /// overtaken; where none is, the one that has waited longest, once more than
-    /// the window wait. Also says how many older images were dropped.
+    /// Returns the newest complete image, without waiting for earlier ones; without a complete one,
+    /// the image that has waited longest, once more than the window wait. Also returns the number
+    /// of older images that were dropped.
     pub(super) fn pop_newest(
         &mut self,
         is_complete: impl Fn(Stamp) -> bool,
@@ -203,17 +204,17 @@ impl Reorder {
         (self.pop(newest.is_some()), (outdated + older) as u64)
     }
 
-    /// True if no images of the time before a jump are left.
+    /// Returns true if no images from before a jump are left.
     pub(super) fn is_flushed(&self) -> bool {
         self.ready.is_empty()
     }
 
-    /// The newest stamp that was handed out.
+    /// Returns the newest stamp that was delivered.
     pub(super) fn last(&self) -> Option<Stamp> {
         self.last
     }
 
-    /// At the end of the log: an image that was held back as suspect is late.
+    /// Drops an image held back as suspect, at the end of the log; returns true if there was one.
     pub(super) fn drop_suspect(&mut self) -> bool {
         self.suspect.take().is_some()
     }
@@ -233,7 +234,7 @@ mod tests {
         stamp.nanos() / 1_000_000
     }
 
-    /// Everything that comes out, and what happened to each arrival.
+    /// Runs the queue; returns all images delivered and the result of each arrival.
     fn run(window: usize, arrivals: &[u64]) -> (Vec<u64>, Vec<Arrival>) {
         let mut reorder = Reorder::new(window);
         let (mut out, mut what) = (Vec::new(), Vec::new());
@@ -322,7 +323,7 @@ mod tests {
         fn small_disorder_is_undone(seed in any::<u64>(), window in 1..4_usize) {
             let sorted: Vec<u64> = (1..40).map(|i| i * 33).collect();
             let mut shuffled = sorted.clone();
-            // Swapping neighbours within blocks delays nothing by more than the window.
+            // Swapping neighbours within blocks delays no image by more than the window.
             for (i, block) in shuffled.chunks_mut(window + 1).enumerate() {
                 let turn = (seed >> (i % 60)) as usize % block.len();
                 block.rotate_left(turn);

@@ -1,4 +1,4 @@
-//! What is settled before the first frame.
+//! Decisions before the first frame.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use crate::scan::Scan;
 use crate::topics::{Chosen, choose, missing};
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
-/// Begins to read the same messages once more.
+/// Function that starts another pass over the same messages.
 pub(super) type Reread<'a> = &'a dyn Fn() -> Result<Box<dyn Messages + 'a>, LogError>;
 
-/// Everything about a log that is settled before its first frame.
+/// All decisions about a log that are made before its first frame.
 pub(super) struct Plan {
     pub(super) scan: Arc<Scan>,
     pub(super) chosen: Chosen,
@@ -27,41 +27,42 @@ pub(super) struct Plan {
     pub(super) lens: Option<Intrinsics>,
     depth_lens: Option<Intrinsics>,
     pub(super) baseline_m: Option<f64>,
-    /// `None`: no odometry. `Some(None)`: from its topic. Else the two frames of tf.
+    /// Source of the odometry. `None`: no odometry. `Some(None)`: its topic. Else the two frames of
+    /// tf.
     pub(super) odom_frames: Option<Option<(String, String)>>,
 }
 
 impl Plan {
-    /// The topic whose images make the frames.
+    /// Returns the topic of the images that make the frames.
     pub(super) fn primary(&self) -> &str {
         primary(&self.chosen)
     }
 
-    /// The error of a calibration that does not fit the images.
+    /// Returns the error for a calibration that does not fit the images.
     pub(super) fn misfit(&self, source: CalibrationError) -> LogError {
         let topic = self.chosen.colour_info.clone().unwrap_or_default();
         LogError::Calibration { path: self.scan.path.clone(), topic, source }
     }
 
-    /// The topic of the calibration that the frames have.
+    /// Returns the topic of the calibration of the frames.
     pub(super) fn calibration_topic(&self) -> Option<&String> {
         self.lens?;
         let own = if self.chosen.colour.is_some() { &self.chosen.colour_info } else { &None };
         own.as_ref().or(self.chosen.depth_info.as_ref())
     }
 
-    /// True if depth comes beside another image.
+    /// Returns true if depth comes beside another image.
     pub(super) fn has_second_depth(&self) -> bool {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
     }
 
-    /// True if the pixels of the images that make the frames are used, and not only
-    /// their stamps and their size.
+    /// Returns true if the pixels of the images that make the frames are used, and not only their
+    /// stamps and their size.
     pub(super) fn reads_primary(&self) -> bool {
         self.inputs.uses(self.primary_input())
     }
 
-    /// True if a frame is of no use whose image cannot be decoded.
+    /// Returns true if a frame is useless unless its image can be decoded.
     pub(super) fn requires_primary(&self) -> bool {
         self.inputs.requires(self.primary_input())
     }
@@ -74,12 +75,12 @@ impl Plan {
         }
     }
 
-    /// True if laser scans make the frames, because the log has no images.
+    /// Returns true if laser scans make the frames, because the log has no images.
     pub(super) fn is_of_scans(&self) -> bool {
         self.primary_input() == Input::Laser
     }
 
-    /// The mirror whose images are still circular.
+    /// Returns the mirror if its images are still circular.
     pub(super) fn raw_mirror(&self) -> Option<ConicalMirror> {
         match self.lens?.mirror? {
             Mirrored::Raw(mirror) => Some(mirror),
@@ -87,19 +88,21 @@ impl Plan {
         }
     }
 
-    /// True unless both calibrations are known and differ.
+    /// Returns true unless both calibrations are known and differ.
     pub(super) fn same_lens(&self) -> bool {
         let (Some(colour), Some(depth)) = (self.lens, self.depth_lens) else { return true };
         let (a, b) = (colour.lens, depth.lens);
         let close = |a: f64, b: f64, off: f64| (a - b).abs() <= off;
+        // Calibrations of one camera may differ slightly: by 1 % in focal length, 2 px in the
+        // centre.
         close(a.fx, b.fx, 0.01 * a.fx)
             && close(a.fy, b.fy, 0.01 * a.fy)
             && close(a.cx, b.cx, 2.0)
             && close(a.cy, b.cy, 2.0)
     }
 
-    /// The camera that took a depth image, without its pose; `None` without a
-    /// calibration for images of that size.
+    /// Returns the camera that took a depth image, without its pose; `None` without a calibration
+    /// for images of that size.
     pub(super) fn depth_camera(&self, depth: &DepthImage) -> Option<Camera> {
         let known = self.depth_lens?;
         check_size(&known, depth.width(), depth.height()).ok()?;
@@ -117,7 +120,7 @@ fn primary(chosen: &Chosen) -> &str {
     images.or(chosen.laser.as_ref()).map_or("", String::as_str)
 }
 
-/// What the scan has to say, before anything else.
+/// Returns the counters and remarks of the first pass.
 pub(super) fn tally_of(scan: &Scan) -> Tally {
     let mut tally =
         Tally { counters: scan.counters.clone(), lost: scan.data_lost, ..Tally::default() };
@@ -128,10 +131,10 @@ pub(super) fn tally_of(scan: &Scan) -> Tally {
     tally
 }
 
-/// Chooses topics, and settles calibration and the pose of the camera.
+/// Chooses topics, calibration and the source of the camera's pose.
 ///
 /// # Errors
-/// A calibration that cannot be used, and what `inputs` or `input` name and the
+/// A calibration that cannot be used, and an input or topic that `inputs` or `input` name and the
 /// scan lacks.
 pub(super) fn plan(
     scan: Arc<Scan>,
@@ -174,7 +177,7 @@ fn same_frame(scan: &Scan, chosen: &Chosen) -> bool {
     frame(&chosen.colour).is_some() && frame(&chosen.colour) == frame(&chosen.depth)
 }
 
-/// The calibration of an image topic, if there is one.
+/// Returns the calibration of an image topic, if there is one.
 fn lens_of(
     scan: &Scan,
     image: Option<&str>,
@@ -182,6 +185,7 @@ fn lens_of(
 ) -> Result<Option<Intrinsics>, LogError> {
     let (Some(image), Some(topic)) = (image, info) else { return Ok(None) };
     let Some(info) = scan.infos.get(topic) else { return Ok(None) };
+    // The name of the topic is the only sign that images are rectified.
     intrinsics(info, image.contains("rect")).map(Some).map_err(|source| LogError::Calibration {
         path: scan.path.clone(),
         topic: topic.to_owned(),
@@ -189,7 +193,8 @@ fn lens_of(
     })
 }
 
-/// Positions in metres need a calibration; a mono pipeline may do without.
+/// Checks that there is a calibration if positions in metres need it; a monocular pipeline works
+/// without.
 fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     let metric = plan.inputs.requires(Input::Depth) || plan.inputs.requires(Input::Right);
     if plan.inputs.requires(Input::Right) && plan.baseline_m.is_none_or(|baseline| baseline <= 0.0)
@@ -209,7 +214,7 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     Ok(())
 }
 
-/// From the odometry topic, else from tf if it connects the two frames.
+/// Returns the odometry topic, else the tf frames if they are connected.
 fn odom_frames(
     scan: &Scan,
     chosen: &Chosen,
@@ -223,7 +228,7 @@ fn odom_frames(
     connected.then(|| Some((input.odom_frame.clone(), robot.to_owned())))
 }
 
-/// From tf, the settings, or the floor in the first depth images.
+/// Returns the mount from tf, the settings, or the floor in the first depth images.
 fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     let camera = plan.scan.frame_of(plan.primary());
     let mirror = plan.lens.is_some_and(|lens| lens.mirror.is_some());
@@ -245,10 +250,10 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     }
 }
 
-/// Depth images that are tried for a floor.
+/// Number of depth images to which the floor is fitted.
 const FLOOR_FRAMES: usize = 9;
 
-/// The pose of the camera above the floor: the median of the first images.
+/// Returns the pose of the camera above the floor: the median over the first images.
 fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
     if plan.chosen.depth.is_none() || plan.lens.is_none() {
         return Ok(None);
@@ -258,6 +263,7 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
         chosen: plan.chosen.clone(),
         input: plan.input.clone(),
         limits: plan.limits.clone(),
+        // No other input than depth, so that nothing else is decoded.
         inputs: Inputs::NONE.require(Input::Depth),
         mount: Mount::assumed(),
         odom_frames: None,

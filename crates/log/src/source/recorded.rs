@@ -1,4 +1,4 @@
-//! What other detectors recorded in a log.
+//! Detections by other programs that were recorded in a log.
 
 use nalgebra::{Isometry3, Point3};
 use tagalong_core::{Recorded, Rect};
@@ -11,11 +11,11 @@ use super::tally::Tally;
 use crate::msgs::{Detection2DArray, Detection3DArray, ObjectHypothesisWithPose, decode};
 use crate::scan::Type;
 
-/// The crown lies this far above the centre of the head, m.
+/// Height of the crown above the centre of the head, m.
 const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
-/// The detections of a message that was paired with a frame; none without one,
-/// which is counted.
+/// Returns the detections of a message that was paired with a frame; none without a message, which
+/// is counted.
 pub(super) fn recorded(
     plan: &Plan,
     message: Option<Payload>,
@@ -66,6 +66,7 @@ fn space(
     let head = |detection: &crate::msgs::Detection3D| {
         let pose = robot_from_message * detection.bbox.center.isometry()?;
         let size = detection.bbox.size;
+        // Vertical extent of the rotated box.
         let up = pose.rotation.to_rotation_matrix().matrix().row(2).abs();
         let height = up[0] * size.x + up[1] * size.y + up[2] * size.z;
         let at = pose.translation.vector;
@@ -79,7 +80,7 @@ fn space(
     Some(all.collect())
 }
 
-/// The best hypothesis; a detection without one is taken for granted.
+/// Returns the best score; 1 for a detection without a hypothesis.
 fn score(results: &[ObjectHypothesisWithPose]) -> f64 {
     let best = results.iter().map(|result| result.hypothesis.score).max_by(f64::total_cmp);
     best.filter(|score| score.is_finite()).unwrap_or(1.0)

@@ -2,18 +2,17 @@ use std::io::{self, Write};
 
 use super::record::{FrameRecord, probability};
 
-/// The header line of `tracks-metres.csv`.
+/// Header line of `tracks-metres.csv`.
 pub const METRES_HEADER: &str = "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,\
 y_odom_m,z_odom_m,vx_robot_mps,vy_robot_mps,var_xx_m2,cov_xy_m2,cov_xz_m2,var_yy_m2,cov_yz_m2,\
 var_zz_m2,seen";
 
-/// Writes the lines of `tracks.csv` for one frame: the ten columns of the
-/// MOTChallenge, `frame,id,x,y,w,h,score,-1,-1,-1`.
+/// Writes the lines of `tracks.csv` for one frame: the ten columns of the MOTChallenge,
+/// `frame,id,x,y,w,h,score,-1,-1,-1`.
 ///
-/// `frame` is the 1-based index of the colour image; the box is the upper-body
-/// square clipped to the image, in pixels with (0, 0) at the upper left corner;
-/// `score` is a probability. Confirmed tracks, unless unseen for longer than
-/// `report_unseen_s`.
+/// `frame` is the 1-based index of the frame; the box is the upper-body square clipped to the
+/// image, in pixels with (0, 0) at the upper left corner; `score` is a probability. Only confirmed
+/// tracks are written, unless unseen for longer than `report_unseen_s`.
 pub(super) fn boxes(
     out: &mut impl Write,
     record: &FrameRecord<'_>,
@@ -55,11 +54,12 @@ pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Resu
     Ok(())
 }
 
-/// A number with fixed decimals that never prints a negative zero.
+/// Number with fixed decimals that never prints a negative zero.
 struct Decimal(f64, usize);
 
 impl std::fmt::Display for Decimal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Smaller values are printed as zero, negative ones with a sign.
         let half = 0.5 * 10f64.powi(-(self.1 as i32));
         let value = if self.0.abs() < half { 0.0 } else { self.0 };
         write!(f, "{value:.*}", self.1)

@@ -1,22 +1,22 @@
 use std::path::{Path, PathBuf};
 
-/// What can go wrong while results are written.
+/// Error of writing results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The output directory holds something already.
+    /// The output directory is not empty.
     #[error("{} exists and is not empty; give another directory or --overwrite", path.display())]
     Exists {
-        /// The output directory.
+        /// Output directory.
         path: PathBuf,
     },
-    /// The output path is taken by something that is no directory.
+    /// The output path exists and is not a directory.
     #[error("{} is not a directory; results need one of their own", path.display())]
     NotADirectory {
         /// The path.
         path: PathBuf,
     },
-    /// Writing would endanger the log that is read.
+    /// The log that is read lies in the output directory.
     #[error(
         "the log {} lies in the output directory {}; give another directory, so that the log \
          cannot be overwritten",
@@ -24,32 +24,31 @@ pub enum WriteError {
         output.display()
     )]
     InputInside {
-        /// The log.
+        /// Path of the log.
         input: PathBuf,
-        /// The output directory.
+        /// Output directory.
         output: PathBuf,
     },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// The MCAP writer failed.
     #[error("cannot write {}: {source}", path.display())]
     Mcap {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: Box<mcap::McapError>,
     },
 }
 
 impl WriteError {
-    /// True if the caller asked for something that is not allowed, as opposed
-    /// to a disk that failed.
+    /// Returns true if the request is not allowed, as opposed to a disk that failed.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Self::Exists { .. } | Self::NotADirectory { .. } | Self::InputInside { .. })
     }

@@ -10,20 +10,20 @@ use super::messages;
 use super::record::FrameRecord;
 use crate::msgs::{Detection3DArray, Message, PoseStamped, StringMsg, TFMessage, encode};
 
-/// More pose topics than this are not opened: a file has 65,535 channels, and
-/// nobody looks at so many. Further people are still in the other topics.
+/// Maximum number of pose topics: a file has 65,535 channels, and more would not be viewed. Further
+/// people are still in the other topics.
 const MAX_POSE_TOPICS: usize = 10_000;
 
 /// Names of the frames that the messages use.
 #[derive(Clone, Debug)]
 pub struct FrameNames {
-    /// The robot frame, for example `base_link`.
+    /// Robot frame, for example `base_link`.
     pub base: String,
-    /// The odometry frame, for example `odom`.
+    /// Odometry frame, for example `odom`.
     pub odom: String,
 }
 
-/// The writer of `tracks.mcap`.
+/// Writer of `tracks.mcap`.
 pub(super) struct McapTracks<W: Write + Seek> {
     writer: Writer<W>,
     frames: FrameNames,
@@ -34,18 +34,17 @@ pub(super) struct McapTracks<W: Write + Seek> {
     people: BTreeMap<TrackId, Channel>,
 }
 
-/// A topic, and how many messages it has.
+/// Topic with its number of messages.
 struct Channel {
     id: u16,
     sequence: u32,
 }
 
 impl<W: Write + Seek> McapTracks<W> {
-    /// Starts the file; the resolved config becomes the attachment
-    /// `config.toml`.
+    /// Starts the file; the resolved config becomes the attachment `config.toml`.
     pub fn new(out: W, frames: FrameNames, config: &str) -> McapResult<Self> {
-        // One compression thread: with none the files differ from those with
-        // any number, and more bring nothing for so little data.
+        // One compression thread: with none the files differ from those with any number, and more
+        // are of no use for so little data.
         let mut writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("tagalong ", env!("CARGO_PKG_VERSION")))
@@ -59,6 +58,7 @@ impl<W: Write + Seek> McapTracks<W> {
             media_type: "application/toml".into(),
             data: Cow::Borrowed(config.as_bytes()),
         })?;
+        // These topics are opened at once, so that they exist even in a run without tracks.
         let tracks = open::<Detection3DArray, W>(&mut writer, "/people/tracks")?;
         let json = open::<StringMsg, W>(&mut writer, "/people/tracks_json")?;
         let tf = open::<TFMessage, W>(&mut writer, "/tf")?;
@@ -97,7 +97,7 @@ impl<W: Write + Seek> McapTracks<W> {
         Ok(())
     }
 
-    /// The pose topic of a person, opened on first use.
+    /// Returns the pose topic of a person, opened on first use.
     fn person(&mut self, id: TrackId) -> McapResult<Option<&mut Channel>> {
         if !self.people.contains_key(&id) && self.people.len() < MAX_POSE_TOPICS {
             let topic = format!("/people/person_{id}");

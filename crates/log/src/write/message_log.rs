@@ -12,8 +12,8 @@ use super::WriteError;
 use crate::msgs::{Message, StringMsg, encode};
 use crate::{TRUTH_TOPIC, TruthFrame};
 
-/// Writes any ROS 2 messages to an MCAP file, as a robot's recorder would. The
-/// file has a partial name until [`MessageLog::finish`].
+/// Writer of any ROS 2 messages to an MCAP file, as a robot's recorder would do it. The file has a
+/// partial name until [`MessageLog::finish`].
 pub struct MessageLog {
     writer: Writer<BufWriter<File>>,
     channels: BTreeMap<String, u16>,
@@ -22,7 +22,7 @@ pub struct MessageLog {
 }
 
 impl MessageLog {
-    /// Starts a file, and the folder it lies in.
+    /// Starts a file, and creates its folder.
     ///
     /// # Errors
     /// [`WriteError::Io`], [`WriteError::Mcap`].
@@ -36,6 +36,7 @@ impl MessageLog {
             .profile("ros2")
             .library(concat!("tagalong ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
+            // As for `tracks.mcap`: one thread gives the same bytes on every machine.
             .compression_threads(1)
             .create(BufWriter::new(file))
             .map_err(failed(&partial))?;
@@ -59,8 +60,8 @@ impl MessageLog {
         self.put(channel_id, captured, &encode(message))
     }
 
-    /// Writes the truth of an image to [`TRUTH_TOPIC`]; `recorded` is its
-    /// publish time and its log time.
+    /// Writes the truth of an image to [`TRUTH_TOPIC`]; `recorded` is its publish time and its log
+    /// time.
     ///
     /// # Errors
     /// [`WriteError::Mcap`].

@@ -1,4 +1,4 @@
-//! One frame's tracks as ROS 2 messages.
+//! Tracks of one frame as ROS 2 messages.
 
 use nalgebra::{Isometry3, Point3, SMatrix, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -12,24 +12,24 @@ use crate::msgs::{
     TransformStamped,
 };
 
-/// What is not known has a variance above 99,999, by the convention of
-/// `spencer_tracking_msgs`.
+/// Variance of unknown quantities: above 99,999, by the convention of `spencer_tracking_msgs`.
 const UNKNOWN_VARIANCE: f64 = 1e6;
 
-/// Below this speed over ground a person has no heading, m/s.
+/// Speed over ground below which a person has no heading, m/s.
 const MIN_HEADING_SPEED_MPS: f64 = 0.2;
 
 /// Width and depth of the box around a person, m.
 const PERSON_WIDTH_M: f64 = 0.6;
 
-/// The crown lies this far above the centre of the head, m.
+/// Height of the crown above the centre of the head, m.
 const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
-/// Confirmed tracks in the robot frame, most certain first, as
+/// Returns the confirmed tracks in the robot frame, most certain first, as
 /// `vision_msgs/Detection3DArray` asks.
 pub fn detections(record: &FrameRecord<'_>, base_frame: &str) -> Detection3DArray {
     let header = Header::new(record.stamp, base_frame);
     let mut tracks: Vec<&Track> = record.confirmed().collect();
+    // Of equal scores by id, so that the order is always the same.
     tracks.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.id.cmp(&b.id)));
     let detections = tracks.into_iter().map(|track| detection(track, &header)).collect();
     Detection3DArray { header, detections }
@@ -51,8 +51,9 @@ fn detection(track: &Track, header: &Header) -> Detection3D {
     }
 }
 
-/// The box from the floor to the crown.
+/// Returns the box from the floor to the crown.
 fn standing_box(head: &Point3<f64>) -> BoundingBox3D {
+    // A head far too low must not give a box of negative height.
     let height = (head.z + CROWN_ABOVE_HEAD_M).max(0.1);
     let centre = Point3::new(head.x, head.y, 0.5 * height);
     BoundingBox3D {
@@ -61,7 +62,7 @@ fn standing_box(head: &Point3<f64>) -> BoundingBox3D {
     }
 }
 
-/// Position variances where they are known; the rotation is not.
+/// Returns the position covariance; the rotation is unknown.
 fn pose_covariance(state: &SMatrix<f64, 5, 5>) -> [[f64; 6]; 6] {
     let mut covariance = [[0.0; 6]; 6];
     for (row, line) in covariance.iter_mut().enumerate() {
@@ -76,7 +77,7 @@ fn pose_covariance(state: &SMatrix<f64, 5, 5>) -> [[f64; 6]; 6] {
     covariance
 }
 
-/// A person in the odometry frame, facing where they walk.
+/// Returns the pose of a person in the odometry frame, facing the direction of walking.
 pub fn pose(record: &FrameRecord<'_>, track: &Track, odom_frame: &str) -> PoseStamped {
     PoseStamped {
         header: Header::new(record.stamp, odom_frame),
@@ -87,13 +88,14 @@ pub fn pose(record: &FrameRecord<'_>, track: &Track, odom_frame: &str) -> PoseSt
 fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isometry3<f64> {
     let velocity = track.estimate.person.velocity;
     let walks = velocity.norm() >= MIN_HEADING_SPEED_MPS;
+    // A person at rest is given the heading of the robot.
     let heading = if walks { velocity.y.atan2(velocity.x) } else { 0.0 };
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
     let head = track.estimate.person.position.coords;
     record.odom_from_robot() * Isometry3::from_parts(head.into(), turn)
 }
 
-/// The robot and all confirmed people in the odometry frame.
+/// Returns the transforms of the robot and all confirmed people in the odometry frame.
 pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMessage {
     let stamped = |child: String, pose: &Isometry3<f64>| TransformStamped {
         header: Header::new(record.stamp, frames.odom.as_str()),
@@ -109,7 +111,7 @@ pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMes
     TFMessage { transforms }
 }
 
-/// What the standard messages have no place for, one object a frame.
+/// Data without a field in the standard messages, one object per frame.
 #[derive(Serialize)]
 struct FrameJson {
     stamp_ns: u64,
@@ -134,7 +136,7 @@ struct TrackJson {
     upper_body_px: [f64; 4],
 }
 
-/// All tracks of a frame, tentative ones too, with velocity, age and occlusion.
+/// Returns all tracks of a frame as JSON, tentative ones too, with velocity, age and occlusion.
 pub(super) fn json(record: &FrameRecord<'_>) -> String {
     let frame = FrameJson {
         stamp_ns: record.stamp.nanos(),
@@ -164,7 +166,8 @@ fn track_json(record: &FrameRecord<'_>, track: &Track) -> TrackJson {
     }
 }
 
-/// Six decimals: a micrometre, and short enough to read.
+/// Rounds to six decimals: a micrometre, and short enough to read.
 fn rounded(value: f64) -> f64 {
+    // Adding 0 turns a negative zero into a positive one.
     (value * 1e6).round() / 1e6 + 0.0
 }

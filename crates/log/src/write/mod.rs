@@ -1,11 +1,10 @@
-//! The files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`,
-//! `report.json` and `timings.json`.
+//! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json` and
+//! `timings.json`.
 //!
-//! All are written under partial names and get their final names together when
-//! the run ends; what a crash leaves behind is never mistaken for a result.
-//! At least once per second of log time everything written so far is handed to
-//! the operating system, so that a killed run loses no more than that.
-//! Nothing here depends on the time of day: the same frames give the same bytes.
+//! All are written under partial names and get their final names together at the end of the run, so
+//! that the files of a crash are never mistaken for a result. At least once per second of log time
+//! everything written so far is handed to the operating system, so that a killed run loses no more
+//! than that. The contents do not depend on the time of day: the same frames give the same bytes.
 
 mod csv;
 mod error;
@@ -37,7 +36,7 @@ use tagalong_core::Stamp;
 /// Log time after which everything written is flushed, s.
 const FLUSH_EVERY_S: f64 = 1.0;
 
-/// Writes the tracks of a run, frame by frame.
+/// Writer of the tracks of a run, frame by frame.
 pub struct TrackLog {
     dir: RunDir,
     output: OutputSettings,
@@ -66,7 +65,7 @@ impl TrackLog {
         Ok(Self { dir, output, mcap, boxes, metres, flushed: None })
     }
 
-    /// The directory of the run.
+    /// Returns the directory of the run.
     pub fn dir(&self) -> &RunDir {
         &self.dir
     }
@@ -82,6 +81,7 @@ impl TrackLog {
         csv::metres(&mut self.metres, record)
             .map_err(WriteError::io(&self.file("tracks-metres.csv")))?;
         let due =
+            // The absolute value, because the stamps of a log may jump back.
             self.flushed.is_none_or(|last| record.stamp.seconds_since(last).abs() >= FLUSH_EVERY_S);
         if due { self.flush(record.stamp) } else { Ok(()) }
     }
@@ -97,8 +97,8 @@ impl TrackLog {
         self.metres.flush().map_err(WriteError::io(&self.file("tracks-metres.csv")))
     }
 
-    /// Ends the files, adds the report, the timings and `about` (as metadata
-    /// of the log), and gives everything its final name. Returns the directory.
+    /// Ends the files, adds the report, the timings and `about` (as metadata of the log), and gives
+    /// all files their final names. Returns the directory.
     ///
     /// # Errors
     /// [`WriteError`]; the partial files stay.
@@ -118,8 +118,8 @@ impl TrackLog {
         Ok(path)
     }
 
-    /// Removes what was written, and the directory if nothing else is in it:
-    /// for a run that failed before its first frame.
+    /// Removes the files written, and the directory if it is empty then: for a run that failed
+    /// before its first frame.
     ///
     /// # Errors
     /// [`WriteError::Io`].

@@ -4,34 +4,34 @@ use std::path::{Path, PathBuf};
 
 use super::WriteError;
 
-/// The directory of one run.
+/// Directory of one run.
 ///
-/// Files are written under `NAME.partial` and get their names together, when
-/// the run ends: a file that has its final name is whole.
+/// Files are written under `NAME.partial` and get their names together at the end of the run: a
+/// file with its final name is complete.
 #[derive(Debug)]
 pub struct RunDir {
     path: PathBuf,
     pending: Vec<String>,
 }
 
-/// The names that a run gives to its files; only these are ever removed.
+/// Names of the files of a run; only these are ever removed.
 const OWN_FILES: [&str; 5] =
     ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json", "timings.json"];
 
-/// The folder of overlay pictures.
+/// Folder of overlay pictures.
 const OVERLAY: &str = "overlay";
 
 impl RunDir {
-    /// Refuses what [`RunDir::create`] would refuse, and touches nothing.
+    /// Checks a path as [`RunDir::create`] would, and changes nothing.
     ///
     /// # Errors
-    /// [`WriteError::Exists`] if the directory is not empty and `overwrite` is
-    /// not set, [`WriteError::InputInside`] if `input` lies in it,
-    /// [`WriteError::NotADirectory`].
+    /// [`WriteError::Exists`] if the directory is not empty and `overwrite` is not set,
+    /// [`WriteError::InputInside`] if `input` lies in it, [`WriteError::NotADirectory`].
     pub fn check(path: &Path, overwrite: bool, input: &Path) -> Result<(), WriteError> {
         if path.exists() && !path.is_dir() {
             return Err(WriteError::NotADirectory { path: path.to_owned() });
         }
+        // Canonical paths, because links and `..` could hide that the log lies inside.
         if let (Ok(output), Ok(log)) = (path.canonicalize(), input.canonicalize())
             && log.starts_with(&output)
         {
@@ -48,8 +48,7 @@ impl RunDir {
         Err(WriteError::Exists { path: path.to_owned() })
     }
 
-    /// Makes the directory, or clears it of the files of an earlier run;
-    /// foreign files stay.
+    /// Creates the directory, or removes the files of an earlier run from it; foreign files stay.
     ///
     /// # Errors
     /// As [`RunDir::check`], and [`WriteError::Io`].
@@ -64,12 +63,12 @@ impl RunDir {
         Ok(Self { path: path.to_owned(), pending: Vec::new() })
     }
 
-    /// The directory.
+    /// Returns the directory.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The folder for overlay pictures, made when first asked for.
+    /// Returns the folder for overlay pictures, created at the first call.
     ///
     /// # Errors
     /// [`WriteError::Io`].

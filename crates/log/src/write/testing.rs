@@ -8,7 +8,7 @@ pub(super) fn camera() -> Camera {
     Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
 }
 
-/// A confirmed person three metres ahead and half a metre to the left.
+/// Returns a confirmed person three metres ahead and half a metre to the left.
 pub(super) fn track(id: u32) -> Track {
     let person =
         Person { position: Point3::new(3.0, 0.5, 1.6), velocity: Vector2::new(0.5, -0.25) };

@@ -13,7 +13,7 @@ fn names() -> FrameNames {
     FrameNames { base: "base_link".into(), odom: "odom".into() }
 }
 
-/// Hands a record of frame `index` (ten a second) to `use_it`.
+/// Passes a record of frame `index` (ten a second) to `use_it`.
 fn with_record<T>(index: u64, tracks: &[Track], use_it: impl FnOnce(&FrameRecord<'_>) -> T) -> T {
     use_it(&FrameRecord {
         index,
@@ -118,7 +118,7 @@ fn a_clock_that_jumps_back_still_flushes() {
     assert_eq!(csv.lines().count(), 2);
 }
 
-/// A disk that is full after `room` bytes.
+/// Disk that is full after `room` bytes.
 struct SmallDisk {
     room: usize,
     file: Cursor<Vec<u8>>,
@@ -143,7 +143,7 @@ impl Seek for SmallDisk {
     }
 }
 
-/// The length of the file, or the error that a full disk causes.
+/// Returns the length of the file, or the error of a full disk.
 fn write_to_disk(room: usize) -> mcap::McapResult<usize> {
     let disk = SmallDisk { room, file: Cursor::default() };
     let mut log = McapTracks::new(disk, names(), "seed = 1\n")?;

@@ -19,7 +19,7 @@ pub fn at(seconds: f64) -> Stamp {
     Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(seconds)
 }
 
-/// Writes messages of our types into an MCAP file in memory.
+/// Writer of messages to an MCAP file in memory.
 pub struct LogWriter {
     writer: Writer<Cursor<Vec<u8>>>,
     channels: BTreeMap<String, u16>,
@@ -77,7 +77,7 @@ impl LogWriter {
         self.message("/camera/color/image_raw", stamp, &message);
     }
 
-    /// A depth image of one distance.
+    /// Writes a depth image of one distance.
     pub fn depth(&mut self, stamp: Stamp, frame: &str, metres: f32) {
         let values = vec![metres; 16 * 12];
         self.depth_of(stamp, frame, 16, 12, &values);
@@ -157,7 +157,7 @@ pub fn info_of(frame: &str, camera: &Camera) -> CameraInfo {
     CameraInfo::of_lens(&Header::new(at(0.0), frame), lens, size, 0.0)
 }
 
-/// A level camera 1.2 m high.
+/// Returns a level camera at a height of 1.2 m.
 pub fn camera(width: usize, height: usize, focal: f64) -> Camera {
     let lens = Pinhole {
         fx: focal,
@@ -177,7 +177,7 @@ pub fn level_pose() -> Isometry3<f64> {
     )
 }
 
-/// A log in a folder of its own, which goes with it.
+/// Log in a temporary folder of its own, which is removed with it.
 pub struct SavedLog {
     _folder: tempfile::TempDir,
     pub path: PathBuf,
@@ -192,7 +192,7 @@ impl SavedLog {
     }
 }
 
-/// Chunks of a few messages in each way of compression.
+/// Returns each kind of compression of the chunks, with its name.
 pub fn compressions() -> [(&'static str, Option<Compression>); 3] {
     [("none", None), ("lz4", Some(Compression::Lz4)), ("zstd", Some(Compression::Zstd))]
 }

@@ -1,4 +1,4 @@
-//! The inputs that a pipeline declares: those of its plugins and its own.
+//! Inputs that a pipeline declares: those of its plugins and its own.
 
 use std::ops::Range;
 
@@ -6,22 +6,22 @@ use tagalong_core::{ConfigError, Input, Inputs};
 
 use super::PipelineSettings;
 
-/// The inputs of the target lock and the governor, which every controller has.
+/// Inputs of the target lock and the governor, which every controller has.
 const STEERING: Inputs =
     Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
-/// The inputs of `[odometry]`.
+/// Inputs of `[odometry]`.
 const ODOMETRY: Inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
-/// The inputs of `[stereo]`, which leaves a frame alone that has depth.
+/// Inputs of `[stereo]`, which leaves a frame with depth unchanged.
 const STEREO: Inputs =
     Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
 
-/// A plugin or a stage by its name, and its inputs.
+/// Name of a plugin or a stage, and its inputs.
 pub(super) type Declared<'a> = (&'a str, Inputs);
 
-/// Adds up what the plugins and the stages declare.
+/// Returns the union of the inputs that the plugins and the stages declare.
 ///
 /// # Errors
-/// If something requires an input that the setting `without` leaves out.
+/// If a plugin or a stage requires an input that the setting `without` leaves out.
 pub(super) fn declared_inputs(
     settings: &PipelineSettings,
     plugins: &[Declared<'_>],
@@ -32,7 +32,7 @@ pub(super) fn declared_inputs(
     let steering = has_controller.then_some(("[governor]", STEERING));
     let users: Vec<Declared<'_>> =
         plugins.iter().copied().chain(odometry).chain(steering).collect();
-    // Depth from the pair is the pipeline's own; that of the log is used where it is there.
+    // The pipeline computes depth from the pair; that of the log is used where it is there.
     let has_stereo = settings.stereo.is_some();
     let of_log = |inputs: Inputs| if has_stereo { inputs.relax(Input::Depth) } else { inputs };
     let stereo = has_stereo.then_some(("[stereo]", STEREO));

@@ -6,8 +6,8 @@ use tagalong_tracking::DetectorSettings;
 use super::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER};
 use crate::settings::PipelineSettings;
 
-/// Returns the config with every default filled in, of the plugins too. What may be tuned
-/// is no part of it.
+/// Returns the config with every default filled in, also those of the plugins. `[tune]` is left
+/// out.
 pub(super) fn resolve(
     mut root: Table,
     settings: &PipelineSettings,
@@ -50,7 +50,7 @@ fn fill_config(section: &mut Value, registry: &Registry) -> Result<(), ConfigErr
     Ok(())
 }
 
-/// Adds what is missing, table by table.
+/// Adds the missing keys, table by table.
 fn fill(value: &mut Value, defaults: Table) {
     let Value::Table(table) = value else { return };
     for (key, default) in defaults {

@@ -188,7 +188,7 @@ fn a_pipeline_built_from_text_tracks() {
     assert_eq!(report.tracks.len(), 1);
 }
 
-/// A line for each number of a table that makes it no number.
+/// Returns a copy of the table, as lines, for each number that is replaced by NaN.
 fn without_a_number(table: &toml::Table, path: &str) -> Vec<String> {
     let mut lines = Vec::new();
     for (key, value) in table {
@@ -205,7 +205,7 @@ fn without_a_number(table: &toml::Table, path: &str) -> Vec<String> {
     lines
 }
 
-/// What compares with a number that is none is never true: a robot would drive on.
+/// A comparison with NaN is never true: the robot would drive on.
 #[test]
 fn no_setting_may_be_no_number() {
     let defaults = toml::Table::try_from(PipelineSettings::default()).unwrap();
@@ -266,7 +266,7 @@ fn a_robot_that_cannot_stop_before_the_person_is_refused() {
     }
 }
 
-/// Seeds of plugins, by their place in a config.
+/// Returns the seeds of the plugins, by their place in a config.
 fn seeds(run: u64) -> Vec<u64> {
     let seen = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     let mut registry = World::default().registry();

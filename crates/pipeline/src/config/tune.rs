@@ -1,4 +1,4 @@
-//! `[tune]`: which settings of a config may be fitted, and what is tried for each.
+//! `[tune]`: the settings of a config that may be fitted, and the values to try for each.
 
 use std::ops::Range;
 use std::path::Path;
@@ -10,22 +10,22 @@ use toml::de::{DeArray, DeValue};
 use super::{OWN, Options, PLUGINS};
 use crate::Pipeline;
 
-/// The table of a config that this is about.
+/// Name of the table.
 pub(super) const TABLE: &str = "tune";
 
 /// Most values of one setting.
 const MAX_VALUES: usize = 64;
 
-/// A setting that may be fitted, and the values that may be tried for it.
+/// Setting that may be fitted, with the values to try.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tunable {
-    /// Its place in the config: `manager.config.confirm_hits`, `detectors.0.config.min_cells`.
+    /// Dotted path in the config: `manager.config.confirm_hits`, `detectors.0.config.min_cells`.
     pub key: String,
-    /// The value that the config has.
+    /// Value in the config.
     pub now: toml::Value,
-    /// The values to try, in the order of the config.
+    /// Values to try, in the order of the config.
     pub values: Vec<toml::Value>,
-    /// Where each of them stands in the text.
+    /// Span of each value in the text.
     pub places: Vec<Range<usize>>,
 }
 
@@ -37,7 +37,7 @@ struct Spread {
     steps: usize,
 }
 
-/// A setting as the config has it, by its place.
+/// Setting of the config, by its dotted path.
 type Leaf<'a> = (String, &'a toml::Value);
 
 /// Reads `[tune]`. `resolved` is the config with every default.
@@ -53,7 +53,7 @@ pub(super) fn read(
     named.into_iter().map(read_one).collect()
 }
 
-/// Builds the pipeline with each value of each setting in turn, the others as they are.
+/// Builds the pipeline with each value of each setting in turn, the others unchanged.
 ///
 /// # Errors
 /// A value that the setting does not allow, with its place in the text.
@@ -76,8 +76,8 @@ pub fn check_tuning(
     Ok(())
 }
 
-/// Returns a config in which settings have other values. `resolved` is what
-/// [`Pipeline::resolved`] says, so that each setting stands somewhere.
+/// Returns the config with other values for some settings. `resolved` is the text of
+/// [`Pipeline::resolved`], which contains every setting.
 ///
 /// # Errors
 /// A setting that the config does not have.
@@ -94,16 +94,18 @@ pub fn with_values(resolved: &str, values: &[(&str, &toml::Value)]) -> Result<St
     toml::to_string(&root).map_err(|error| ConfigError::new(error.to_string()))
 }
 
-/// A dotted key and where it stands.
+/// Dotted key and its span.
 struct Named {
     key: String,
     place: Range<usize>,
 }
 
-/// Tables within the table are dotted keys, too: quotes around a key change nothing.
+/// Collects the dotted keys. A table within the table is a dotted key, too: quotes around a key
+/// change nothing.
 fn flatten<'a>(path: String, value: Value<'a>, out: &mut Vec<(Named, Value<'a>)>) {
     let span = value.span();
     match value.into_inner() {
+        // A table with `between` is a value, not a level of keys.
         DeValue::Table(table) if !table.contains_key("between") => {
             for (name, inner) in table {
                 let place = name.span();
@@ -121,11 +123,12 @@ fn flatten<'a>(path: String, value: Value<'a>, out: &mut Vec<(Named, Value<'a>)>
     }
 }
 
-/// What may be tuned: single settings of the pipeline and of its plugins.
+/// Returns the settings that may be tuned: single settings of the pipeline and of its plugins.
 fn leaves_of(resolved: &toml::Table) -> Vec<Leaf<'_>> {
     let mut leaves = Vec::new();
     for (name, value) in resolved {
         let is_setting = OWN.contains(&name.as_str()) || PLUGINS.contains(&name.as_str());
+        // The seed is no quantity to fit, and a plugin's name is no value.
         if is_setting && name != "seed" {
             add_leaves(name.clone(), value, &mut leaves);
         }
@@ -136,6 +139,7 @@ fn leaves_of(resolved: &toml::Table) -> Vec<Leaf<'_>> {
 fn add_leaves<'a>(path: String, value: &'a toml::Value, out: &mut Vec<Leaf<'a>>) {
     match value {
         toml::Value::Table(table) => {
+            // Another plugin has other keys, so its name cannot be tuned alone.
             let inner = table.iter().filter(|(name, _)| *name != "plugin");
             inner.for_each(|(name, value)| add_leaves(format!("{path}.{name}"), value, out));
         }
@@ -212,6 +216,7 @@ fn spread(
             toml::Value::Integer(_) => toml::Value::Integer(value.round() as i64),
             _ => as_now(key, toml::Value::Float(value), now).map_err(|e| at(e.message))?,
         };
+        // Rounding to whole numbers can make neighbours equal.
         if !values.contains(&value) {
             values.push(value);
         }
@@ -220,7 +225,7 @@ fn spread(
     Ok((values, places))
 }
 
-/// The value as the setting's own type; whole numbers are numbers, too.
+/// Converts a value to the setting's own type; a whole number is accepted for a float.
 fn as_now(key: &str, value: toml::Value, now: &toml::Value) -> Result<toml::Value, ConfigError> {
     match (&value, now) {
         (toml::Value::Integer(whole), toml::Value::Float(_)) => {

@@ -2,39 +2,38 @@ use nalgebra::{Point2, Point3};
 
 use super::CorridorSettings;
 
-/// Obstacles are told apart to this, m.
+/// Resolution of obstacle distances, m.
 const BIN_M: f64 = 0.05;
-/// The floor's roughness grows by this, m for each metre.
+/// Growth of the floor's height limit with the distance, m per m.
 const FLOOR_SLOPE: f64 = 0.03;
-/// Weaker curvatures are straight, 1/m.
+/// Curvature below which a path is straight, 1/m.
 const STRAIGHT: f64 = 1e-4;
 
-/// What is ahead.
+/// Result of a look along the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Ahead {
-    /// The depth image shows next to nothing.
+    /// The depth image has nearly no valid pixel.
     Blind,
-    /// Nothing within the range.
+    /// No obstacle within the range.
     Free,
-    /// Something, at this distance from the robot's front along its path, m.
+    /// Obstacle at this distance from the robot's front along its path, m.
     Something(f64),
 }
 
-/// Something that is seen or remembered.
+/// Evidence of an obstacle, seen or remembered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sign {
-    /// Robot frame, m.
+    /// Position in the robot frame, m.
     pub(super) at: Point2<f64>,
-    /// As many points of the image count like it.
+    /// Weight, in points of the image.
     pub(super) points: u32,
-    /// It may come nearer to the middle of the corridor by this until the robot is
+    /// Distance by which it may come nearer to the middle of the corridor before the robot is
     /// there, m.
     pub(super) steps_in_m: f64,
 }
 
-/// The nearest thing in the corridor that the robot sweeps on an arc of this
-/// curvature, 1/m, to the left positive; signs around `target` are the person who is
-/// followed.
+/// Returns the nearest obstacle in the corridor that the robot sweeps on an arc of this curvature,
+/// 1/m, positive to the left; signs around `target` belong to the followed person.
 pub(super) fn ahead(
     settings: &CorridorSettings,
     signs: impl Iterator<Item = Sign>,
@@ -50,15 +49,18 @@ pub(super) fn ahead(
     nearest(settings, &bins)
 }
 
-/// True for what stands on the floor, or hangs so low that the robot would hit it.
+/// Returns true for a point of an obstacle: above the floor, and low enough for the robot to hit
+/// it.
 pub(super) fn is_thing(settings: &CorridorSettings, point: &Point3<f64>) -> bool {
+    // Depth noise and errors of the mount's pitch lift far floor points.
     let floor = settings.floor_m + FLOOR_SLOPE * point.xy().coords.norm();
     floor < point.z && point.z < settings.top_m
 }
 
-/// The first bin with which enough points are nearer.
+/// Returns the first bin up to which enough points lie.
 fn nearest(settings: &CorridorSettings, bins: &[u32]) -> Ahead {
     let mut points = 0_u32;
+    // Points accumulate over the bins: few of them per bin may still be one slanted obstacle.
     let first = bins.iter().position(|bin| {
         points = points.saturating_add(*bin);
         points >= settings.min_points.max(1)
@@ -66,7 +68,7 @@ fn nearest(settings: &CorridorSettings, bins: &[u32]) -> Ahead {
     first.map_or(Ahead::Free, |bin| Ahead::Something(bin as f64 * BIN_M))
 }
 
-/// Distance from the front along the path, m, of what the robot would hit.
+/// Returns the distance from the front along the path, m, of a point that the robot would hit.
 fn in_the_way(
     settings: &CorridorSettings,
     sign: &Sign,
@@ -82,12 +84,14 @@ fn in_the_way(
     let from_front = along - settings.front_m;
     let half_width_m = settings.half_width_m + sign.steps_in_m;
     let inside = aside.abs() < half_width_m && along > 0.0 && from_front < settings.range_m;
+    // A point beside the front has a negative distance, and is reached at once.
     inside.then_some(from_front.max(0.0))
 }
 
-/// Distance along an arc that leaves the origin along x, and distance aside of
-/// it, m.
+/// Returns the distance along an arc that leaves the origin along x, and the distance aside of it,
+/// m.
 fn on_arc(point: Point2<f64>, curvature: f64) -> (f64, f64) {
+    // The radius of a nearly straight arc would be infinite.
     if curvature.abs() < STRAIGHT {
         return (point.x, point.y);
     }
@@ -201,7 +205,7 @@ mod tests {
         }
     }
 
-    /// In a bend to the left, one metre to the left of it and one to the right.
+    /// A bend to the left, with one point a metre to the left of it and one a metre to the right.
     #[test]
     fn what_is_aside_of_a_bend_is_as_far_aside_as_it_is_from_the_path() {
         for (point, aside) in [(Point2::new(0.0, 1.0), 1.0), (Point2::new(3.0, 2.0), -1.0)] {

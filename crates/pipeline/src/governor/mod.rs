@@ -1,9 +1,9 @@
-//! The governor: between the controller's wish and the wheels, always.
+//! Governor of the commands: every command of the controller passes it on the way to the wheels.
 //!
-//! It knows nothing of how the wish arose. It lets the robot move only while
-//! frames come, somebody is followed and nothing is in the way; it limits speed,
-//! acceleration and turn rate and keeps the curvature; and it says of every
-//! command why it is what it is and until when it may be obeyed.
+//! It does not depend on the source of the wish. It lets the robot move only while frames arrive, a
+//! target is followed or searched for and the path is free; it limits speed, acceleration and turn
+//! rate and keeps the curvature; each command carries its reason and the time until which it is
+//! valid.
 
 mod corridor;
 mod settings;
@@ -15,42 +15,42 @@ pub(crate) use surroundings::Surroundings;
 
 use tagalong_core::{Command, Motion, Reason, Stamp, WheelSpeeds, Wheels};
 
-/// Longest time over which the robot may have changed its speed, s. A pause of
-/// frames gives no licence for a leap.
+/// Longest time over which the robot may have changed its speed, s. A pause of frames must not
+/// allow a large step of the speed.
 const LONGEST_STEP_S: f64 = 0.2;
 /// Speeds below this are standing still, m/s.
 const STILL_MPS: f64 = 1e-6;
 
-/// What a controller wishes, and what the governor has to know of the frame.
+/// Wish of a controller, with the facts that the governor needs about the frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Wish {
-    /// The controller's wheel speeds, which may be anything.
+    /// Wheel speeds of the controller; any numbers, also NaN and infinite ones.
     pub(crate) wheels: WheelSpeeds,
     /// Stamp of the frame.
     pub(crate) stamp: Stamp,
-    /// What the robot moves for.
+    /// Purpose of the motion.
     pub(crate) aim: Aim,
-    /// Enough frames since the start or a jump.
+    /// True if enough frames came since the start or a jump.
     pub(crate) settled: bool,
-    /// Time since the frame before, s.
+    /// Time since the previous frame, s.
     pub(crate) pause_s: f64,
 }
 
-/// What the robot moves for.
+/// Purpose of the robot's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aim {
-    /// Nothing: it stands.
+    /// No purpose: the robot stands.
     Nobody,
-    /// A person who is followed.
+    /// Follow the target.
     Person,
-    /// Somebody who may not be the person: at half speed.
+    /// Follow a track that may not be the person: at half speed.
     Perhaps,
-    /// To find the person again, at half speed.
+    /// Find the person again, at half speed.
     Search,
 }
 
 impl Aim {
-    /// The reason for an ordinary command.
+    /// Returns the reason for an ordinary command.
     fn reason(self) -> Reason {
         match self {
             Self::Nobody => Reason::NoTarget,
@@ -61,11 +61,11 @@ impl Aim {
     }
 }
 
-/// What the wheels may do until the next frame: the last command until it expires,
-/// zero after that, after a fault and before the first frame.
+/// Command that is in force until the next frame: the last one until it expires, zero after that,
+/// after a fault and before the first frame.
 ///
-/// A copy, so that a thread which drives the wheels need not wait for one that is
-/// still at work on a frame, and stops them if that one never ends.
+/// It is a copy, so that the thread that drives the wheels need not wait for one that still
+/// processes a frame, and stops the wheels if that one never ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orders {
     last: Option<Command>,
@@ -74,8 +74,8 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// What the wheels may do at a time, by the clock of the frames' stamps. A command
-    /// from further ahead than commands last is none: clocks that disagree must not
+    /// Returns the command in force at a time, by the clock of the frames' stamps. A command with a
+    /// stamp further ahead than the validity of a command is ignored: clocks that disagree must not
     /// make it last longer.
     pub fn at(&self, now: Stamp) -> Command {
         let stop = |reason| Command {
@@ -97,7 +97,7 @@ impl Orders {
     }
 }
 
-/// See the [module](self).
+/// Governor of the commands; see the [module](self).
 pub(crate) struct Governor {
     settings: GovernorSettings,
     wheels: Wheels,
@@ -106,7 +106,7 @@ pub(crate) struct Governor {
     fault: Option<&'static str>,
 }
 
-/// Forward speed, m/s, and turn rate, rad/s, to the left positive.
+/// Forward speed, m/s, and turn rate, rad/s, positive to the left.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Twist {
     forward: f64,
@@ -129,7 +129,7 @@ impl Twist {
         Self { forward: self.forward * by, turn: self.turn * by }
     }
 
-    /// 1/m; a turn in place has none to speak of.
+    /// Returns the curvature, 1/m; 0 for a turn in place.
     fn curvature(self) -> f64 {
         if self.forward.abs() > STILL_MPS { self.turn / self.forward } else { 0.0 }
     }
@@ -140,9 +140,9 @@ impl Governor {
         Self { settings, wheels, max_speed_mps, last: None, fault: None }
     }
 
-    /// The command for a frame; `look` says what is ahead in the corridor along
-    /// an arc of a curvature, and is asked only where the robot may move. `None`
-    /// of it is a robot without depth.
+    /// Returns the command for a frame. `look` returns the nearest obstacle in the corridor along
+    /// an arc of a given curvature, and is called only where the robot may move; it returns `None`
+    /// for a robot with neither depth nor laser.
     pub(crate) fn govern(
         &mut self,
         wish: &Wish,
@@ -154,39 +154,42 @@ impl Governor {
         };
         let valid_until = wish.stamp.plus_seconds(self.settings.valid_s);
         let command = Command { wheels, stamp: wish.stamp, valid_until, reason };
+        // Stops are remembered, too: the ramp of the next command starts from this one.
         self.last = Some(command);
         command
     }
 
-    /// What holds until the next frame.
+    /// Returns the command state that holds until the next frame.
     pub(crate) fn orders(&self) -> Orders {
         Orders { last: self.last, fault: self.fault, valid_s: self.settings.valid_s }
     }
 
-    /// Odometry cannot have moved like this: nothing more until armed again.
+    /// Latches a fault if the odometry moved faster than the robot can.
     pub(crate) fn check_odometry(&mut self, motion: &Motion) {
         let travel = motion.forward.hypot(motion.left);
+        // At least 50 ms: over a shorter time, small odometry errors would look like high speeds.
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
             self.latch("odometry jumped");
         }
     }
 
-    /// What counts as something in the way.
+    /// Returns the settings of the obstacle corridor.
     pub(crate) fn corridor(&self) -> &CorridorSettings {
         &self.settings.corridor
     }
 
-    /// Stops until armed again.
+    /// Stops the robot until it is armed again.
     pub(crate) fn latch(&mut self, why: &'static str) {
+        // The first cause is kept: later faults usually follow from it.
         self.fault.get_or_insert(why);
     }
 
-    /// Why nothing moves, if it lasts.
+    /// Returns the cause of a latched fault.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         self.fault
     }
 
-    /// A person has looked and lets the robot move again.
+    /// Clears the fault, after a person has checked the robot.
     pub(crate) fn arm(&mut self) {
         self.fault = None;
         self.last = None;
@@ -195,6 +198,7 @@ impl Governor {
     fn must_stop(&self, wish: &Wish) -> Option<Reason> {
         let Wish { wheels, aim, settled, pause_s, .. } = wish;
         let in_time = *pause_s <= self.settings.stop_after_s;
+        // The order is that of severity: a fault outranks every passing state.
         if self.fault.is_some() {
             Some(Reason::Fault)
         } else if !settled {
@@ -223,6 +227,7 @@ impl Governor {
         if wish.pause_s > self.settings.slow_after_s {
             (cap, why) = (0.5 * self.max_speed_mps, Reason::Slow);
         }
+        // A turn in place stays in place, and the corridor shows nothing behind the robot.
         if wanted.forward > STILL_MPS {
             match look(&self.settings.corridor, wanted.curvature()) {
                 Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
@@ -232,12 +237,14 @@ impl Governor {
                 _ => {}
             }
         }
+        // Turning stays allowed: it may free the path.
         if cap <= STILL_MPS {
             return (Twist { forward: 0.0, ..wanted }.wheels(&self.wheels), Reason::Blocked);
         }
         let ramped = self.ramped(wanted, wish.stamp);
         let as_wished = as_wished && ramped == wanted;
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
+        // The cap comes after the ramp, so it may brake harder than `max_decel_mps2`.
         if ramped.forward.abs() > cap {
             let slower = ramped.scaled(cap / ramped.forward.abs());
             return (self.in_reach(slower.wheels(&self.wheels)), why);
@@ -245,8 +252,8 @@ impl Governor {
         (self.in_reach(ramped.wheels(&self.wheels)), reason)
     }
 
-    /// As fast as the drive can and the turn rate may, on the same arc, and
-    /// whether that is as wished.
+    /// Limits the wheel speeds to the drive and the turn rate, on the same arc, and returns whether
+    /// they are as wished.
     fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
         let twist = Twist::of(self.in_reach(wheels), &self.wheels);
         let twist = match self.settings.reverse {
@@ -254,26 +261,28 @@ impl Governor {
             _ => twist,
         };
         let limit = self.settings.max_turn_radps;
+        // Forward speed and turn rate shrink by the same factor, which keeps the curvature.
         let slower = twist.scaled(limit / twist.turn.abs().max(limit));
         let WheelSpeeds { left, right } = slower.wheels(&self.wheels);
         let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
         (slower, as_wished)
     }
 
-    /// The speed from which the robot still stops in time, m/s.
+    /// Returns the speed from which the robot still stops in time, m/s.
     fn speed_before(&self, at_m: f64) -> f64 {
         let left = at_m - self.settings.corridor.stop_m;
+        // From v² = 2 a s, with the distance that is left before `stop_m`.
         (2.0 * self.settings.max_decel_mps2 * left.max(0.0)).sqrt()
     }
 
-    /// As near to the wish as the acceleration allows, on the arc that is wished
-    /// for.
+    /// Moves the speed towards the wish as far as the acceleration allows, on the wished arc.
     fn ramped(&self, wanted: Twist, now: Stamp) -> Twist {
         let before = self.last.map_or(Twist::default(), |c| Twist::of(c.wheels, &self.wheels));
         let dt = self.last.map_or(LONGEST_STEP_S, |c| now.seconds_since(c.stamp));
+        // Stamps may stand still or step back; both allow no change of speed.
         let dt = dt.clamp(0.0, LONGEST_STEP_S);
         let GovernorSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
-        // Away from standing still is faster, towards it is slower.
+        // Away from standstill is acceleration, towards it is deceleration.
         let up = if before.forward < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
         let down = if before.forward > 0.0 { max_decel_mps2 } else { max_accel_mps2 };
         let forward = wanted.forward.clamp(before.forward - down * dt, before.forward + up * dt);
@@ -287,10 +296,11 @@ impl Governor {
         Twist { forward, turn }
     }
 
-    /// As fast as the faster wheel can, on the same arc.
+    /// Scales the wheel speeds to the limit of the faster wheel, on the same arc.
     fn in_reach(&self, WheelSpeeds { left, right }: WheelSpeeds) -> WheelSpeeds {
         let most = self.max_speed_mps;
         let scale = most / left.abs().max(right.abs()).max(most);
+        // The clamp removes the rounding error of the scale.
         let limit = |speed: f64| (speed * scale).clamp(-most, most);
         WheelSpeeds { left: limit(left), right: limit(right) }
     }

@@ -1,16 +1,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the robot may do, whatever the controller wishes. The figures are those
-/// that makers and users of mobile robots work with; this is no safety function
-/// in the sense of the standards.
+/// Limits on the robot's motion, for any wish of the controller. The figures are those that makers
+/// and users of mobile robots work with; this is no safety function in the sense of the standards.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GovernorSettings {
     /// Largest acceleration, m/s².
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_mps2: f64,
-    /// Largest deceleration while somebody is followed, m/s²; a stop is at once.
+    /// Largest deceleration while a target is followed, m/s²; a stop is at once.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_decel_mps2: f64,
     /// Largest turn rate, rad/s.
@@ -18,27 +17,26 @@ pub struct GovernorSettings {
     pub max_turn_radps: f64,
     /// The robot may drive backwards.
     pub reverse: bool,
-    /// From an image to wheels that move accordingly, s; for the distance in
-    /// which the robot stops.
+    /// Delay from an image to wheels that move accordingly, s; part of the stopping distance.
     #[schemars(range(min = 0.0))]
     pub reaction_s: f64,
     /// Distance that is left when the robot has stopped, m.
     #[schemars(range(min = 0.0))]
     pub margin_m: f64,
-    /// A command is good for this long, s.
+    /// Validity of a command, s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub valid_s: f64,
-    /// Half speed after a longer pause between frames, s.
+    /// Pause between frames after which the speed is halved, s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub slow_after_s: f64,
-    /// Stop after a longer pause between frames, s.
+    /// Pause between frames after which the robot stops, s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub stop_after_s: f64,
-    /// Odometry that moves faster has jumped, m/s: a fault until the pipeline is
-    /// armed again.
+    /// Largest believable speed of the odometry, m/s; more is a fault until the pipeline is armed
+    /// again.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_odometry_mps: f64,
-    /// What is looked at in the depth image.
+    /// Corridor in which obstacles are looked for.
     pub corridor: CorridorSettings,
 }
 
@@ -61,52 +59,50 @@ impl Default for GovernorSettings {
 }
 
 impl GovernorSettings {
-    /// The distance in which a robot of this speed stops, m: reaction, braking
-    /// and margin.
+    /// Returns the distance in which a robot of this speed stops, m: reaction, braking and margin.
     pub fn stopping_m(&self, speed_mps: f64) -> f64 {
         let braking = speed_mps * speed_mps / (2.0 * self.max_decel_mps2);
         speed_mps * self.reaction_s + braking + self.margin_m
     }
 }
 
-/// Where something is in the way.
+/// Corridor before the robot in which a point counts as an obstacle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CorridorSettings {
-    /// Half the width of what the robot sweeps, m.
+    /// Half the width of the area that the robot sweeps, m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub half_width_m: f64,
-    /// The robot's foremost point, ahead of the point between its wheels, m.
+    /// Foremost point of the robot, ahead of the point between its wheels, m.
     #[schemars(range(min = 0.0))]
     pub front_m: f64,
-    /// What has not stood in its place for a second may step in: for it the robot
-    /// sweeps so much more on both sides, m.
+    /// Extra half width for points that have not been static for a second and may step in, m.
     #[schemars(range(min = 0.0))]
     pub steps_in_m: f64,
-    /// No movement towards what is nearer to the front than this, m.
+    /// Clearance to an obstacle below which the robot does not move towards it, m.
     #[schemars(range(min = 0.0))]
     pub stop_m: f64,
-    /// What is farther away does not matter, m.
+    /// Distance beyond which obstacles are ignored, m.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 100))]
     pub range_m: f64,
-    /// What is lower is floor, m; at `range_m` three centimetres for each metre
-    /// more.
+    /// Height up to which points belong to the floor, m; it grows by 3 cm for each metre of
+    /// distance.
     #[schemars(range(min = 0.0))]
     pub floor_m: f64,
-    /// What is higher the robot passes below, m.
+    /// Height above which points are ignored because the robot passes below, m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub top_m: f64,
-    /// Points this near to the person who is followed are that person, m.
+    /// Radius around the target within which points belong to it, m.
     #[schemars(range(min = 0.0))]
     pub target_radius_m: f64,
-    /// So many points are something, in a grid of 160 columns over the image.
+    /// Number of points that make an obstacle, in a grid of 160 columns over the image.
     #[schemars(range(min = 1))]
     pub min_points: u32,
-    /// Less than this part of the image with depth is a blind camera.
+    /// Part of the image with depth below which the camera counts as blind.
     #[schemars(range(min = 0.0))]
     pub min_seen: f64,
-    /// What was seen and is out of view now, beside the robot or below the image,
-    /// is believed to be there for this long, s.
+    /// Time for which an obstacle is remembered that left the view beside the robot or below the
+    /// image, s.
     #[schemars(range(min = 0.0))]
     pub memory_s: f64,
 }
@@ -130,8 +126,8 @@ impl Default for CorridorSettings {
 }
 
 impl CorridorSettings {
-    /// So many points of the image a ray of a laser scanner counts for: two rays are
-    /// something, one may be dust.
+    /// Returns the number of image points that one ray of a laser scanner counts for: two rays make
+    /// an obstacle, one may be dust.
     pub(super) fn ray_points(&self) -> u32 {
         self.min_points.div_ceil(2)
     }

@@ -4,84 +4,83 @@ use tagalong_core::{Camera, DepthImage, Motion, Person, Track, TrackId};
 use super::CorridorSettings;
 use super::corridor::{Ahead, Sign, ahead, is_thing};
 
-/// Columns of the image that are looked at.
+/// Sampled columns of the image.
 const COLUMNS: usize = 160;
-/// Things are remembered to this, m.
+/// Resolution of the remembered positions, m.
 const CELL_M: f64 = 0.05;
-/// So many points in a cell are no noise.
+/// Points in a cell that are no noise.
 const ENOUGH: u16 = 3;
-/// What stands in its place for so long is a thing; somebody who walks by is not.
+/// Time after which a static point is an obstacle to remember, s; a person walking by is not.
 const STANDS_S: f64 = 1.0;
-/// What was so close before the robot that it could not drive on, m, and left the
-/// image for its edge or below, is believed to be there for so long, s.
+/// Distance ahead of the robot, m, within which an obstacle that left the image at its edge or
+/// below is believed to be there for `STEPPED_IN_S`, s, however short it was seen.
 const CLOSE_M: f64 = 0.6;
 const STEPPED_IN_S: f64 = 5.0;
-/// From the torso of a person to the head, m.
+/// Offset from the torso of a person to the head, m.
 const TORSO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.35);
-/// What people carry, draw along or push is this near to them, m, ...
+/// Distance from a person within which a point may be an object that the person carries, pulls or
+/// pushes, m, ...
 const CARRIED_M: f64 = 0.8;
-/// ... and stays where it is while they are slower than this, m/s.
+/// ... while the person is slower than this, m/s.
 const STAYS_MPS: f64 = 0.25;
-/// What the image shows this far before a place hides the place, m.
+/// Distance before a place from which on a nearer surface hides it, m.
 const BEFORE_M: f64 = 0.2;
-/// Heights are told apart to this, m.
+/// Resolution of the heights, m.
 const BAND_M: f64 = 0.1;
-/// A column of the image with readings in less than this part of it shows nothing.
+/// Part of valid readings below which an image column is dark.
 const DARK: f64 = 0.05;
-/// What hides a column is at this depth, m.
+/// Depth that is assumed for an object that hides a column, m.
 const HIDES_M: f64 = 0.4;
 
-/// What is around the robot: what the depth image shows, and what it showed lately
-/// and cannot show now, because it is beside the robot, below the image, too near
-/// for the camera, or hidden.
+/// Memory of the obstacles around the robot: those in the depth image, and those seen lately that
+/// are now beside the robot, below the image, too near for the camera, or hidden.
 #[derive(Default)]
 pub(crate) struct Surroundings {
     seen: Vec<Point3<f64>>,
-    /// What the rays of a laser scanner meet; `None` without one.
+    /// Hits of the laser scanner; `None` without one.
     felt: Option<Vec<Point2<f64>>>,
     /// Part of the image that has depth; `None` without a depth image.
     with_depth: Option<f64>,
-    /// Columns of the image that are looked at.
+    /// Sampled columns of the image.
     columns: Vec<Column>,
     things: Vec<Thing>,
     grid: Grid,
 }
 
-/// Heights above the floor, a bit for each decimetre.
+/// Set of heights above the floor, one bit per decimetre.
 #[derive(Clone, Copy, Default)]
 struct Heights(u16);
 
-/// A column of the image.
+/// Column of the image.
 #[derive(Clone)]
 struct Column {
-    /// Where somebody stands who hides it, robot frame, m.
+    /// Assumed position of an object that hides it, robot frame, m.
     at: Point2<f64>,
-    /// Readings in it.
+    /// Valid readings in it.
     read: u32,
-    /// For how long there are next to none, s; for ever where there never was one: the
-    /// images of some cameras have an empty border.
+    /// Time for which it has been dark, s; infinite if it always was: the images of some cameras
+    /// have an empty border.
     dark_s: f64,
 }
 
-/// Something that does not move.
+/// Static obstacle.
 struct Thing {
-    /// Robot frame, m.
+    /// Position in the robot frame, m.
     at: Point2<f64>,
-    /// Where it was seen above that.
+    /// Heights at which it was seen above that.
     heights: Heights,
-    /// How long it has been seen, s; the time does not count in which it may have
-    /// stood there because of the person who is followed and stood beside it.
+    /// Time for which it has been seen, s, without the time in which the followed person stood
+    /// beside it and may have carried it.
     seen_s: f64,
-    /// How long it has not been seen, s.
+    /// Time for which it has not been seen, s.
     unseen_s: f64,
-    /// Whom it was, if it is somebody: where a track was seen last.
+    /// Track of the person that it was, if it is one.
     who: Option<TrackId>,
 }
 
 impl Surroundings {
-    /// Takes in an image; the robot moved by `motion` since the last one. What is
-    /// near the person who is followed is not remembered, nor is what does not stay
-    /// where it is.
+    /// Takes in an image; the robot moved by `motion` since the last one. Points near the followed
+    /// person are not remembered, nor are moving ones.
     pub(crate) fn look(
         &mut self,
         settings: &CorridorSettings,
@@ -91,13 +90,15 @@ impl Surroundings {
         target: Option<&Person>,
     ) {
         self.see(settings, camera, depth, motion.dt);
+        // The order matters: old obstacles are matched with the new points before the rest of these
+        // become new obstacles.
         self.grid.count(settings, &self.seen);
         self.meet_again(settings, camera, depth, motion, target);
         self.remember(settings, target);
     }
 
-    /// Takes in what a laser scanner met. That needs no memory: it looks to the sides,
-    /// and down to the robot itself.
+    /// Takes in a laser scan. It needs no memory: a scanner also sees to the sides and close to the
+    /// robot.
     pub(crate) fn feel(&mut self, settings: &CorridorSettings, laser: Option<&[Point3<f64>]>) {
         let heights = settings.floor_m..settings.top_m;
         self.felt = laser.map(|points| {
@@ -106,27 +107,29 @@ impl Surroundings {
         });
     }
 
-    /// Other people who were seen are in the way where that was, until the camera
-    /// sees past them or them elsewhere: somebody who steps before the robot is soon
-    /// too near to be seen.
+    /// Remembers other people where they were seen last, until the camera sees past that place or
+    /// sees them elsewhere: a person in the robot's way is soon too near to be seen.
     pub(crate) fn meet(&mut self, tracks: &[Track], followed: Option<TrackId>) {
         for track in tracks.iter().filter(|track| track.seen) {
+            // An older place of the same person is outdated, also that of the target.
             self.things.retain(|thing| thing.who != Some(track.id));
             if Some(track.id) != followed {
                 let Point3 { coords: torso } = track.estimate.person.position - TORSO;
                 let (at, heights) = (torso.xy().into(), Heights::of(torso.z));
                 let who = Some(track.id);
+                // `STANDS_S` at once: the tracker vouches for a person, so no second of standing is
+                // needed.
                 self.things.push(Thing { at, heights, seen_s: STANDS_S, unseen_s: 0.0, who });
             }
         }
     }
 
-    /// Everything was elsewhere.
+    /// Forgets everything, after a jump of the clock.
     pub(crate) fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// What is ahead on an arc, as [`ahead`]; `None` with neither depth nor laser.
+    /// Returns the nearest obstacle on an arc, as [`ahead`]; `None` with neither depth nor laser.
     pub(crate) fn ahead(
         &self,
         settings: &CorridorSettings,
@@ -140,11 +143,13 @@ impl Surroundings {
             return Some(Ahead::Blind);
         }
         let stays = |at: Point2<f64>, points| Sign { at, points, steps_in_m: 0.0 };
+        // Points that may move get a wider corridor.
         let seen = self.seen.iter().map(|point| match self.grid.stands(&point.xy()) {
             true => stays(point.xy(), 1),
             false => Sign { steps_in_m: settings.steps_in_m, ..stays(point.xy(), 1) },
         });
         let unseen = self.things.iter().filter(|thing| thing.unseen_s > 0.0);
+        // A remembered obstacle was confirmed by many points, so alone it is enough to stop.
         let unseen = unseen.map(|thing| stays(thing.at, settings.min_points));
         let hidden = self.columns.iter().filter(|column| column.is_hidden(settings));
         let hidden = hidden.map(|column| stays(column.at, 1));
@@ -152,9 +157,8 @@ impl Surroundings {
         Some(ahead(settings, seen.chain(unseen).chain(hidden).chain(felt), curvature, target))
     }
 
-    /// Moves the things into the robot's new frame, and forgets where the camera
-    /// sees past, what did not stand there for long, and what is out of view for
-    /// too long.
+    /// Moves the obstacles into the robot's new frame. Forgets those that the camera sees past,
+    /// those that were seen too briefly, and those out of view for too long.
     fn meet_again(
         &mut self,
         settings: &CorridorSettings,
@@ -178,6 +182,8 @@ impl Surroundings {
             }
             *unseen_s += motion.dt;
             let is_gone = depth.is_some_and(|depth| shows_past(camera, depth, at, *heights));
+            // An obstacle that stood for a second is kept for `memory_s`, a brief one only if it
+            // was close.
             let kept_s = match () {
                 () if *seen_s >= STANDS_S => settings.memory_s,
                 () if is_close(settings, at) => STEPPED_IN_S,
@@ -196,6 +202,7 @@ impl Surroundings {
     ) {
         self.seen.clear();
         self.with_depth = depth.map(|depth| {
+            // Large images are sampled, so that `min_points` does not depend on their resolution.
             let step = depth.width().div_ceil(COLUMNS).max(1);
             let rows = depth.height().div_ceil(step);
             self.columns.resize(depth.width().div_ceil(step), Column::NEVER_SEEN);
@@ -227,6 +234,7 @@ impl Surroundings {
 
     fn remember(&mut self, settings: &CorridorSettings, target: Option<&Person>) {
         for thing in &self.things {
+            // Points of a known obstacle must not become a second one below.
             self.grid.clear_around(&thing.at);
             if thing.seen_s >= STANDS_S {
                 self.grid.mark_standing(&thing.at);
@@ -245,12 +253,12 @@ impl Surroundings {
 }
 
 impl Heights {
-    /// Of what is nearest to a height, m.
+    /// Returns the set of the one height nearest to `height_m`.
     fn of(height_m: f64) -> Self {
         Self(1 << (height_m / BAND_M).clamp(0.0, 15.0) as u16)
     }
 
-    /// Each of them, m.
+    /// Returns the middle of each height, m.
     fn metres(self) -> impl Iterator<Item = f64> {
         let is_set = move |bit: &u16| self.0 & (1 << bit) != 0;
         (0..16).filter(is_set).map(|bit| (f64::from(bit) + 0.5) * BAND_M)
@@ -260,13 +268,13 @@ impl Heights {
 impl Column {
     const NEVER_SEEN: Self = Self { at: Point2::new(0.0, 0.0), read: 0, dark_s: f64::INFINITY };
 
-    /// Somebody stands before the camera, nearer than it measures: what it saw a while
-    /// ago it sees no more, from the floor to the top of the image.
+    /// Returns true if an object nearer than the camera measures hides the column: it had readings
+    /// a while ago and has none now, from the floor to the top of the image.
     fn is_hidden(&self, settings: &CorridorSettings) -> bool {
         0.0 < self.dark_s && self.dark_s <= settings.memory_s
     }
 
-    /// All readings of an image of so many rows were counted.
+    /// Ends an image of so many rows, after all its readings were counted.
     fn end(&mut self, rows: usize, dt_s: f64) {
         let is_dark = f64::from(self.read) < DARK * rows as f64;
         self.dark_s = if is_dark { self.dark_s + dt_s } else { 0.0 };
@@ -274,19 +282,20 @@ impl Column {
     }
 }
 
-/// Points in each cell of a grid around the robot, and a border of one cell.
+/// Number of points in each cell of a grid around the robot, with a border of one cell.
 #[derive(Default)]
 struct Grid {
     points: Vec<u16>,
-    /// Where they are above each cell.
+    /// Heights of the points above each cell.
     heights: Vec<Heights>,
-    /// Something has stood here for long enough.
+    /// True for cells around an obstacle that stood for long enough.
     standing: Vec<bool>,
     side: usize,
 }
 
 impl Grid {
     fn count(&mut self, settings: &CorridorSettings, seen: &[Point3<f64>]) {
+        // One cell for the middle and one of border on each side, so that neighbours always exist.
         self.side = 2 * (reach_m(settings) / CELL_M).ceil() as usize + 3;
         self.points.clear();
         self.points.resize(self.side * self.side, 0);
@@ -301,7 +310,7 @@ impl Grid {
         }
     }
 
-    /// The cell of a place within reach.
+    /// Returns the cell of a place within reach.
     fn cell(&self, at: &Point2<f64>) -> usize {
         let of = |metres: f64| {
             let cell = (metres / CELL_M + self.side as f64 / 2.0) as usize;
@@ -319,17 +328,17 @@ impl Grid {
         self.points[self.cell(at)] >= ENOUGH
     }
 
-    /// Here, or one cell away.
+    /// Returns the heights here and one cell away.
     fn heights_around(&self, at: &Point2<f64>) -> Heights {
         Heights(self.around(at).iter().fold(0, |all, cell| all | self.heights[*cell].0))
     }
 
-    /// True if there is something here, or one cell away.
+    /// Returns true if an obstacle is here, or one cell away.
     fn is_something(&self, at: &Point2<f64>) -> bool {
         self.around(at).iter().any(|cell| self.points[*cell] >= ENOUGH)
     }
 
-    /// True if what is here has stood here, or one cell away.
+    /// Returns true if a static obstacle is here, or one cell away.
     fn stands(&self, at: &Point2<f64>) -> bool {
         self.standing[self.cell(at)]
     }
@@ -343,8 +352,8 @@ impl Grid {
     }
 }
 
-/// True if the image shows what is behind a place at one of the heights, and not
-/// something before it. Out of the image and where there is no depth it shows nothing.
+/// Returns true if the image shows a surface behind a place at one of the heights. Out of the image
+/// and at pixels without depth it shows nothing.
 fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: Heights) -> bool {
     heights.metres().any(|height_m| {
         let place = Point3::new(at.x, at.y, height_m);
@@ -356,7 +365,7 @@ fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: He
     })
 }
 
-/// Close before the robot, in its way straight ahead.
+/// Returns true for a place close before the robot, straight ahead.
 fn is_close(settings: &CorridorSettings, at: &Point2<f64>) -> bool {
     let before_m = at.x - settings.front_m;
     at.y.abs() < settings.half_width_m && 0.0 < before_m && before_m < CLOSE_M
@@ -386,13 +395,13 @@ mod tests {
 
     use super::*;
 
-    /// A camera 1 m high that sees 90 degrees across and 67 degrees up and down.
+    /// A camera 1 m high with a field of view of 90 by 67 degrees.
     fn camera() -> Camera {
         let lens = Pinhole { fx: 40.0, fy: 40.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
         Camera::mounted(lens, 80, 60, 1.0, 0.0, 0.0)
     }
 
-    /// So many frames are enough to know that something stands, at 10 a second.
+    /// Frames after which an obstacle is static, at 10 a second.
     const WAIT: usize = 12;
 
     /// A wall at 6 m and a box 0.4 m wide and 0.6 m high, its front at (x, y).
@@ -411,8 +420,7 @@ mod tests {
         Person { position: Point3::new(x, y, 1.6), velocity: Vector2::new(forward_mps, 0.0) }
     }
 
-    /// Waits before a box at `from_m`, then drives straight towards it, until it is
-    /// `to_m` away.
+    /// Waits before a box at `from_m`, then drives straight towards it, until it is `to_m` away.
     fn approach(y: f64, from_m: f64, to_m: f64, memory_s: f64, someone: bool) -> Option<Ahead> {
         let settings = CorridorSettings { memory_s, ..CorridorSettings::default() };
         let mut surroundings = Surroundings::default();
@@ -470,8 +478,8 @@ mod tests {
         assert_eq!(look(9.0), Some(Ahead::Free));
     }
 
-    /// Somebody whose head is above the image walks through the way, half a metre
-    /// before the robot: only the legs were seen, and they are no thing.
+    /// A person with the head above the image crosses the path a metre before the robot: only the
+    /// legs were seen, and they are not remembered.
     #[test]
     fn who_walks_by_is_not_remembered() {
         let settings = CorridorSettings::default();
@@ -490,7 +498,7 @@ mod tests {
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
     }
 
-    /// Half a metre beside the way somebody comes along, a box stands.
+    /// A box half a metre beside the path stands, or moves towards it.
     #[test]
     fn what_moves_has_a_wider_way_than_what_stands() {
         let settings = CorridorSettings::default();
@@ -506,7 +514,7 @@ mod tests {
         }
     }
 
-    /// Somebody stepped close before the robot, and was out of the image at once.
+    /// A person steps close before the robot, and is out of the image at once.
     #[test]
     fn who_left_the_image_close_before_the_robot_is_believed_there_for_a_while() {
         let settings = CorridorSettings::default();
@@ -523,8 +531,8 @@ mod tests {
         assert!(then[55..].iter().all(|there| !there), "{then:?}");
     }
 
-    /// A suitcase stands behind somebody, and is gone with them when the robot is so
-    /// near that it would be below the image; a box that they walk past is not.
+    /// A suitcase stands behind a person, and is gone with them when the robot is so near that it
+    /// would be below the image; a box that a person walks past is not.
     #[test]
     fn what_stands_beside_whoever_stands_may_be_carried_away() {
         let settings = CorridorSettings::default();
@@ -546,8 +554,8 @@ mod tests {
         }
     }
 
-    /// A standing person's legs are below the image when the robot is near; that the
-    /// trunk is gone says that the legs are gone too. A low box may still be there.
+    /// A standing person's legs are below the image when the robot is near; a missing trunk shows
+    /// that the legs are gone too. A low box may still be there.
     #[test]
     fn who_stood_and_left_is_gone_down_to_the_feet() {
         let settings = CorridorSettings::default();
@@ -597,7 +605,7 @@ mod tests {
         assert_eq!(look(0.0, Some(there(0.3, 0.1)), Some(TrackId(1))), Some(Ahead::Free));
     }
 
-    /// Somebody stepped in from the side, nearer than the camera measures.
+    /// A person steps in from the side, nearer than the camera measures.
     #[test]
     fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
         let settings = CorridorSettings::default();
@@ -617,9 +625,9 @@ mod tests {
         assert_eq!(look(0..23), Some(Ahead::Free), "too narrow");
     }
 
-    /// A laser scanner meets somebody beside the robot, with and without a depth image:
-    /// in the way of a bend as long as they are there. What is high above is no
-    /// obstacle, nor is the person who is followed; one ray may be dust.
+    /// A laser scanner hits a person beside the robot, with and without a depth image: an obstacle
+    /// in a bend as long as the hits last. Hits high above are no obstacle, nor is the followed
+    /// person; one ray may be dust.
     #[test]
     fn what_a_laser_met_is_in_the_way_for_as_long_as_it_meets_it() {
         let settings = CorridorSettings::default();

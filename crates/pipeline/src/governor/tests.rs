@@ -24,7 +24,7 @@ fn free(_: &CorridorSettings, _: f64) -> Option<Ahead> {
     Some(Ahead::Free)
 }
 
-/// After enough frames to be as fast as wished.
+/// A governor after enough frames to reach the wished speed.
 fn at_speed(left: f64, right: f64) -> (Governor, Command) {
     let mut governor = governor();
     let commands: Vec<Command> =
@@ -299,7 +299,7 @@ fn stopping_takes_reaction_braking_and_a_margin() {
     assert!((settings.stopping_m(2.0) - (0.8 + 1.0 + 0.25)).abs() < 1e-12);
 }
 
-/// Any number at all, the strange ones often.
+/// Any number, with NaN, infinite and tiny ones often.
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![
         -3.0..3.0_f64,
@@ -337,7 +337,7 @@ fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 20_000, ..ProptestConfig::default() })]
 
-    /// With fifty wishes a case this is a million states.
+    /// With fifty wishes per case this is a million states.
     #[test]
     fn commands_are_finite_limited_and_gentle(
         wishes in prop::collection::vec(any_wish(), 50)

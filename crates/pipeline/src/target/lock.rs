@@ -7,46 +7,45 @@ use super::looks::Looks;
 use super::memory::{Differences, Memory};
 use super::settings::TargetSettings;
 
-/// Log-odds are bounded by this: no single look is certain.
+/// Bound of the log-odds: no single look is certain.
 const CERTAIN: f64 = 6.0;
-/// A track that is out of sight for longer may come back as somebody else, s.
+/// Time out of sight after which a track may return as another person, s.
 const UNSEEN_S: f64 = 0.25;
-/// Of the evidence for somebody who may be the person, so much is left in the next
-/// frame, and so much of what that says comes on top: two seconds of evidence count
-/// five times that of a frame.
+/// Decay of a candidate's log-odds per frame, and weight of a new frame: in the long run evidence
+/// counts five times that of a frame.
 const KEPT: f64 = 0.9;
 const NEW: f64 = 0.5;
-/// Who is slower stands, m/s.
+/// Speed below which a person stands, m/s.
 const STANDS_MPS: f64 = 0.3;
-/// Who is this near to where somebody stood is the same one, m, ...
+/// Distance from the place of a standing person within which a detection is of the same one, m, ...
 const SAME_PLACE_M: f64 = 0.4;
-/// ... for so long, s.
+/// ... for this time, s.
 const STANDING_S: f64 = 60.0;
-/// Whom it believes at least this much to be the person, nobody else is.
+/// Probability of the lock from which on every other track is another person.
 const SURE: f64 = 0.95;
-/// Somebody may have moved by this much more than their speed says, m.
+/// Distance beyond the largest speed that a person may have moved, m.
 const REACH_M: f64 = 0.6;
 
-/// How sure it is who is followed.
+/// State of the target lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum LockState {
-    /// Nobody was chosen yet.
+    /// No target was chosen yet.
     Initial,
-    /// The person is followed, and what they look like is learned.
+    /// The target is followed, and its appearance is learned.
     Training,
-    /// The person is followed.
+    /// The target is followed.
     Locked,
-    /// Somebody is followed slowly, perhaps not the person.
+    /// A track is followed slowly that may not be the person.
     Suspect,
-    /// Nobody is followed; the person is looked for.
+    /// No track is followed; the person is searched for.
     Lost,
-    /// Somebody who seems to be the person is followed slowly.
+    /// A track that seems to be the person is followed slowly.
     Refound,
 }
 
 impl LockState {
-    /// The word for it in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Initial => "initial",
@@ -58,56 +57,55 @@ impl LockState {
         }
     }
 
-    /// True if somebody is followed.
+    /// Returns true if a track is followed.
     pub fn follows(self) -> bool {
         matches!(self, Self::Training | Self::Locked | Self::Suspect | Self::Refound)
     }
 
-    /// True if whoever is followed may be somebody else.
+    /// Returns true if the followed track may be another person.
     pub fn doubts(self) -> bool {
         matches!(self, Self::Suspect | Self::Refound)
     }
 }
 
-/// Who is followed, and how sure that is.
+/// Report of the target lock for one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LockReport {
-    /// How sure.
+    /// State of the lock.
     pub state: LockState,
-    /// What led to the state.
+    /// Cause of the last change of state.
     pub why: &'static str,
-    /// For how long it is so, s.
+    /// Time since that change, s.
     pub since_s: f64,
-    /// Probability that the followed track is the person, all sightings
-    /// considered.
+    /// Probability that the followed track is the person, by all detections.
     pub belief: Option<f64>,
-    /// How much each track that is seen looks like the person.
+    /// Similarity of each seen track to the person.
     pub likeness: Vec<Likeness>,
 }
 
-/// How much a track looks like the person in one frame.
+/// Similarity of a track to the person in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Likeness {
     /// The track.
     pub track: TrackId,
-    /// Probability that it is the person, by its looks in this frame alone.
+    /// Probability that it is the person, by its appearance in this frame alone.
     pub probability: f64,
-    /// Why: the differences from what is remembered.
+    /// Differences from the remembered appearance that led to it.
     pub differences: Differences,
 }
 
-/// The person when seen last, moved along with the robot frame.
+/// Last seen state of the person, moved along with the robot frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LastSeen {
-    /// Robot frame, m.
+    /// Position in the robot frame, m.
     pub(crate) place: Point2<f64>,
-    /// Over ground, in robot axes, m/s.
+    /// Velocity over ground, in robot axes, m/s.
     pub(crate) velocity: Vector2<f64>,
-    /// How long ago, s.
+    /// Time since then, s.
     pub(crate) ago_s: f64,
 }
 
-/// See the [module](super).
+/// Target lock; see the [module](super).
 pub(crate) struct Lock {
     settings: TargetSettings,
     state: LockState,
@@ -117,18 +115,18 @@ pub(crate) struct Lock {
     memory: Memory,
     /// Log-odds that the followed track is the person.
     belief: f64,
-    /// How long there has been somebody to choose, s.
+    /// Time for which there has been a track to choose, s.
     waited_s: f64,
-    /// Somebody came near or the track was out of sight: it may have changed over.
+    /// True after another track came near or the track was out of sight: it may have changed over.
     doubtful: bool,
     sightings: u32,
     last: Option<LastSeen>,
-    /// Log-odds of others while the person is lost, their sightings added up, and
-    /// how often in a row that was enough.
+    /// Candidates while the person is lost: accumulated log-odds, and number of frames in a row in
+    /// which they sufficed.
     candidates: BTreeMap<TrackId, (f64, u32)>,
     /// Tracks that are not the person: both were seen at once.
     others: BTreeSet<TrackId>,
-    /// Where those of them were who stood, robot frame, m, and how long ago, s.
+    /// Places of the standing ones among those, robot frame, m, and their age, s.
     standing: Vec<(Point2<f64>, f64)>,
 }
 
@@ -152,14 +150,14 @@ impl Lock {
         }
     }
 
-    /// Chooses this track anew, and forgets whom it followed before.
+    /// Chooses this track anew, and forgets the previous target.
     pub(crate) fn choose(&mut self, track: TrackId) {
         let settings = TargetSettings { track: Some(track.0), ..self.settings.clone() };
         *self = Self::new(settings);
     }
 
-    /// After a jump of the clock nobody knows where anybody is: who is remembered
-    /// is lost, who is not is chosen anew.
+    /// Discards all positions after a jump of the clock: a remembered person is lost, otherwise a
+    /// target is chosen anew.
     pub(crate) fn reset(&mut self) {
         if !self.settings.remember {
             *self = Self::new(self.settings.clone());
@@ -176,17 +174,17 @@ impl Lock {
         self.state
     }
 
-    /// For how long it is so, s.
+    /// Returns the time since the last change of state, s.
     pub(crate) fn since_s(&self) -> f64 {
         self.since_s
     }
 
-    /// Where the person was seen last.
+    /// Returns the last seen state of the person.
     pub(crate) fn last_seen(&self) -> Option<&LastSeen> {
         self.last.as_ref()
     }
 
-    /// Somebody who may turn out to be the person who is lost, robot frame, m.
+    /// Returns the position of the best candidate for the lost person, robot frame, m.
     pub(crate) fn candidate(&self, tracks: &[Track]) -> Option<Point2<f64>> {
         let hopeful = self.candidates.iter().filter(|(_, (belief, _))| *belief > 0.0);
         let (id, _) = hopeful.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
@@ -194,13 +192,12 @@ impl Lock {
         Some(track.estimate.person.position.xy())
     }
 
-    /// The track that is followed now.
+    /// Returns the track that is followed now.
     pub(crate) fn followed(&self) -> Option<TrackId> {
         self.track.filter(|_| self.state.follows())
     }
 
-    /// Takes in a frame; `tracks` are near to far, `may_choose` says whether
-    /// somebody may be chosen yet.
+    /// Takes in a frame; `tracks` are near to far, `may_choose` allows the choice of a target.
     pub(crate) fn update(
         &mut self,
         frame: &Frame,
@@ -218,6 +215,7 @@ impl Lock {
             LockState::Lost => self.look_for(tracks, &log_odds),
             _ => self.hold(tracks, &log_odds),
         }
+        // Others are noted before the appearance is learned, with the state of this frame.
         self.tell_apart(tracks);
         self.learn(tracks, looks);
         LockReport {
@@ -243,17 +241,18 @@ impl Lock {
         self.standing.retain(|(_, ago_s)| *ago_s < STANDING_S);
     }
 
-    /// What everybody looks like who is seen whole.
+    /// Returns the appearance of all tracks that are seen whole.
     fn looks(&self, frame: &Frame, tracks: &[Track]) -> BTreeMap<TrackId, Looks> {
         let whole = |track: &&Track| track.confirmed && track.seen && !track.occluded;
         let all = tracks.iter().filter(|track| self.settings.remember && whole(track));
         all.map(|track| (track.id, Looks::of(track, frame))).collect()
     }
 
-    /// How much everybody looks like the person, with the log-odds.
+    /// Returns the similarity of all tracks to the person, with the log-odds.
     fn likeness(&self, looks: &BTreeMap<TrackId, Looks>) -> Vec<(Likeness, f64)> {
         let of = |(track, looks): (&TrackId, &Looks)| {
             let differences = self.memory.differences(looks)?;
+            // The clamp keeps one frame of unusual light from outweighing all others.
             let odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
             let probability = probability(odds);
             Some((Likeness { track: *track, probability, differences }, odds))
@@ -261,7 +260,7 @@ impl Lock {
         looks.iter().filter_map(of).collect()
     }
 
-    /// Chooses somebody.
+    /// Chooses the nearest track in front, or the one of the settings.
     fn start(&mut self, tracks: &[Track], dt_s: f64) {
         let far_m = |track: &Track| track.estimate.person.position.xy().coords.norm();
         let fits = |track: &&Track| {
@@ -278,6 +277,7 @@ impl Lock {
             return;
         }
         self.track = Some(track.id);
+        // The chosen track is the person by definition.
         self.belief = CERTAIN;
         self.see(track);
         match self.settings.remember {
@@ -299,8 +299,8 @@ impl Lock {
         self.judge();
     }
 
-    /// A track that nobody came near and that was always in sight is the same
-    /// person, whatever they look like from this side. Otherwise looks decide.
+    /// Updates the belief. A track that no other came near and that was always in sight is the same
+    /// person, whatever it looks like from this side. Otherwise its appearance decides.
     fn weigh(&mut self, odds: Option<f64>, alone: bool) {
         self.doubtful |= !alone;
         let evidence = if self.doubtful { odds } else { Some(CERTAIN) };
@@ -311,18 +311,18 @@ impl Lock {
         self.doubtful &= !(alone && sure && !self.state.doubts());
     }
 
-    /// Nobody else is near a track.
+    /// Returns true if no other track is near a track.
     fn is_alone(&self, track: &Track, tracks: &[Track]) -> bool {
         tracks.iter().all(|other| other.id == track.id || self.are_apart(other, track))
     }
 
-    /// So far apart that neither is taken for the other.
+    /// Returns true for tracks so far apart that neither is taken for the other.
     fn are_apart(&self, a: &Track, b: &Track) -> bool {
         let [a, b] = [a, b].map(|track| track.estimate.person.position.xy());
         nalgebra::distance(&a, &b) >= self.settings.alone_m
     }
 
-    /// The track is not seen.
+    /// Handles a frame in which the track is not seen.
     fn miss(&mut self) {
         let ago_s = self.last.map_or(f64::INFINITY, |last| last.ago_s);
         if !self.settings.remember {
@@ -333,19 +333,20 @@ impl Lock {
         if ago_s > self.settings.lose_after_s {
             self.lose("out of sight");
         } else if ago_s > self.settings.doubt_after_s && self.state != LockState::Suspect {
-            // Whoever comes back has to look like the person first.
+            // A track that returns has to look like the person first.
             self.belief = self.belief.min(logit(self.settings.doubt_below));
             self.go(LockState::Suspect, "out of sight");
         }
     }
 
-    /// What the belief says about somebody who is seen.
+    /// Changes the state by the belief about a seen track.
     fn judge(&mut self) {
         let TargetSettings { refuse_below, doubt_below, training_sightings, .. } = self.settings;
         let sure = self.sightings >= self.settings.again_sightings;
         match self.state {
             _ if self.belief < logit(refuse_below) => self.lose("looks like somebody else"),
             LockState::Refound if self.belief < 0.0 => self.lose("was somebody else after all"),
+            // Two seconds: a track that was found again is followed slowly until it proved itself.
             LockState::Refound if self.since_s > 2.0 && sure => {
                 self.go(LockState::Locked, "looks right for long enough");
             }
@@ -362,7 +363,7 @@ impl Lock {
         }
     }
 
-    /// Looks for the person among those who are seen.
+    /// Searches for the person among the seen tracks.
     fn look_for(&mut self, tracks: &[Track], log_odds: &BTreeMap<TrackId, f64>) {
         if !self.settings.remember {
             return;
@@ -373,7 +374,7 @@ impl Lock {
         for track in tracks.iter().filter(may_be) {
             let Some(odds) = log_odds.get(&track.id) else { continue };
             let (before, times) = self.candidates.get(&track.id).copied().unwrap_or_default();
-            // Evidence adds up, but looks of one moment to the next are much the same.
+            // Evidence adds up, but consecutive frames are correlated.
             let belief = (KEPT * before + NEW * odds).clamp(-CERTAIN, CERTAIN);
             seen.insert(track.id, (belief, if belief >= enough { times + 1 } else { 0 }));
         }
@@ -386,6 +387,7 @@ impl Lock {
         if times >= self.settings.again_sightings {
             self.track = Some(id);
             self.belief = belief;
+            // A found track counts as doubtful, so that its appearance goes on being compared.
             self.doubtful = true;
             self.sightings = 0;
             self.candidates.clear();
@@ -394,7 +396,7 @@ impl Lock {
         }
     }
 
-    /// Whether the person can have got to where a track is.
+    /// Returns true if the person can have got to where a track is.
     fn is_in_reach(&self, track: &Track) -> bool {
         let Some(last) = &self.last else { return true };
         let covariance = &track.estimate.covariance;
@@ -403,7 +405,7 @@ impl Lock {
         nalgebra::distance(&track.estimate.person.position.xy(), &last.place) <= reach_m
     }
 
-    /// The person was seen there.
+    /// Records that the person was seen here.
     fn see(&mut self, track: &Track) {
         let person = &track.estimate.person;
         let place = person.position.xy();
@@ -411,9 +413,9 @@ impl Lock {
         self.sightings = self.sightings.saturating_add(1);
     }
 
-    /// A track is not the person. Neither is who is seen later where it stood: a thing
-    /// that was taken for somebody stays where it is, but its track does not live on
-    /// while the robot looks elsewhere.
+    /// Records that a track is not the person, nor a track seen later where it stood: a static
+    /// object that was taken for a person stays where it is, but its track does not live on while
+    /// the robot looks elsewhere.
     fn note_other(&mut self, track: &Track) {
         let Person { position, velocity, .. } = &track.estimate.person;
         self.others.insert(track.id);
@@ -439,13 +441,14 @@ impl Lock {
         self.state = state;
         self.why = why;
         self.since_s = 0.0;
+        // The count starts anew: a suspect has to convince by later detections alone.
         if state == LockState::Suspect {
             self.sightings = 0;
         }
     }
 
-    /// Whoever is seen beside the person is not the person, until that track is out of
-    /// sight, or comes so near to the person's or to a new one that it may change over.
+    /// Notes each track seen beside the person as another person, until that track is out of sight,
+    /// or comes so near to the person's or to a new one that it may change over.
     fn tell_apart(&mut self, tracks: &[Track]) {
         let is_own = |track: &Track| Some(track.id) == self.track;
         let is_sure = self.state.follows() && !self.state.doubts() && self.belief >= logit(SURE);
@@ -460,12 +463,13 @@ impl Lock {
         let stays =
             |track: &&Track| is_known(track) && track.unseen_s <= UNSEEN_S && !may_be_taken(track);
         let stay = tracks.iter().filter(stays).map(|track| track.id).collect();
+        // Collected before `self.others` changes, because `is_known` reads it.
         let beside: Vec<&Track> = tracks.iter().filter(|t| !is_own(t) && is_beside(t)).collect();
         self.others = stay;
         beside.into_iter().for_each(|track| self.note_other(track));
     }
 
-    /// Learns what the person looks like, and others, while that is certain.
+    /// Learns the appearance of the person, and of others, while that is certain.
     fn learn(&mut self, tracks: &[Track], mut looks: BTreeMap<TrackId, Looks>) {
         let certain = matches!(self.state, LockState::Training | LockState::Locked);
         if !certain || self.doubtful {
@@ -499,7 +503,7 @@ mod tests {
     use super::*;
     use crate::tests::doubles::frame;
 
-    /// There are no images: people are told apart by their height.
+    /// There are no images: people are distinguished by their height.
     fn settings() -> TargetSettings {
         let looks = LooksSettings { height: [0.06, 60.0], ..LooksSettings::default() };
         TargetSettings { looks, ..TargetSettings::default() }
@@ -525,7 +529,7 @@ mod tests {
         (0..count).map(|_| step(lock, std::slice::from_ref(track)).state).collect()
     }
 
-    /// Somebody 1.6 m tall who was seen in twenty frames, and missed in so many after that.
+    /// A person 1.6 m tall, seen in twenty frames and missed in `frames` after that.
     fn missed(frames: usize) -> (Lock, Vec<LockState>) {
         let mut lock = Lock::new(settings());
         steps(&mut lock, 20, &tall(1.6));
@@ -561,7 +565,7 @@ mod tests {
         assert_eq!(lock.why, "looks like somebody else");
     }
 
-    /// A quarter of a second is no reason to doubt whoever is there again.
+    /// A quarter of a second out of sight is no reason to doubt a track.
     #[test]
     fn a_blink_is_no_reason_for_doubt() {
         let (mut lock, _) = missed(2);

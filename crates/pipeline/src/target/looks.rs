@@ -1,32 +1,31 @@
 use tagalong_core::{Frame, HEAD_BELOW_TOP_M, Rect, Track, UPPER_BODY_SIDE_M};
 
-/// Hues that are told apart.
+/// Bins of hues.
 const HUES: usize = 12;
-/// Greys that are told apart.
+/// Bins of greys.
 const GREYS: usize = 4;
-/// Colours: each hue dark and bright, and the greys.
+/// Bins of colours: each hue dark and bright, and the greys.
 const COLOURS: usize = 2 * HUES + GREYS;
-/// Directions of edges that are told apart, and one bin for no edge.
+/// Bins of edge directions, and one for no edge.
 const EDGES: usize = 9;
-/// Pixels of a patch in each direction that are looked at.
+/// Sampled pixels of a patch in each direction.
 const SAMPLES: usize = 24;
-/// Fewer pixels say nothing.
+/// Least number of pixels in a histogram.
 const LEAST_PIXELS: usize = 24;
-/// Pixels this far from the person's depth are not the person, m.
+/// Distance from the person's depth from which on a pixel is not the person, m.
 const BODY_DEPTH_M: f64 = 0.35;
-/// From this saturation on a colour is a hue, and up to that a grey.
+/// Saturations between which a colour changes from a grey to a hue.
 const SATURATION: [f64; 2] = [0.08, 0.3];
-/// Weaker slopes of the intensity are no edge, grey values a pixel.
+/// Slope of the intensity below which there is no edge, grey values per pixel.
 const EDGE: f64 = 6.0;
-/// Upper body and legs: from and to below the centre of the head, and half the
-/// width, m.
+/// Upper body and legs: from and to below the centre of the head, and half the width, m.
 const TORSO: [f64; 3] = [0.25, 0.65, 0.17];
 const LEGS: [f64; 3] = [0.9, 1.3, 0.15];
 
 /// Relative frequencies.
 type Histogram<const N: usize> = [f64; N];
 
-/// What somebody looks like in one frame; what the images do not show is missing.
+/// Appearance of a person in one frame; parts that the images do not show are missing.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Looks {
     /// Height of the centre of the head, m.
@@ -36,7 +35,7 @@ pub(crate) struct Looks {
     texture: Option<Histogram<EDGES>>,
 }
 
-/// How two looks differ; Hellinger distances, 0 to 1.
+/// Hellinger distances between two appearances, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Difference {
     pub(crate) torso: Option<f64>,
@@ -45,7 +44,7 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    /// The mean of what is known; `None` if nothing is.
+    /// Returns the mean of the known parts; `None` if there are none.
     pub(crate) fn mean(&self) -> Option<f64> {
         let known = [self.torso, self.legs, self.texture];
         let (sum, count) =
@@ -55,7 +54,7 @@ impl Difference {
 }
 
 impl Looks {
-    /// What the person of a track looks like.
+    /// Returns the appearance of the person of a track.
     pub(crate) fn of(track: &Track, frame: &Frame) -> Self {
         let height_m = track.estimate.person.position.z;
         let torso = Patch::of(track, frame, TORSO);
@@ -67,7 +66,7 @@ impl Looks {
         }
     }
 
-    /// Of somebody whose upper body is of one colour of the histogram's.
+    /// Returns the appearance of a person whose upper body has one colour of the histogram's.
     #[cfg(test)]
     pub(crate) fn in_one_colour(height_m: f64, colour: Option<usize>) -> Self {
         let torso = colour.map(|bin| std::array::from_fn(|i| f64::from(i == bin)));
@@ -87,13 +86,14 @@ fn both<const N: usize>(a: &Option<Histogram<N>>, b: &Option<Histogram<N>>) -> O
     Some(hellinger(a.as_ref()?, b.as_ref()?))
 }
 
-/// The Hellinger distance of two distributions, 0 to 1.
+/// Returns the Hellinger distance of two distributions, 0 to 1.
 fn hellinger<const N: usize>(a: &Histogram<N>, b: &Histogram<N>) -> f64 {
     let overlap: f64 = a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum();
+    // Rounding can make the overlap of equal distributions exceed 1.
     (1.0 - overlap).max(0.0).sqrt()
 }
 
-/// The pixels of a part of a person.
+/// Pixels of a part of a person.
 struct Patch<'f> {
     frame: &'f Frame,
     area: Rect,
@@ -113,6 +113,7 @@ impl<'f> Patch<'f> {
         );
         let camera = &frame.camera;
         let area = whole.clipped(camera.width, camera.height);
+        // A part that is mostly outside of the image is not representative.
         let is_most = area.area() > 0.5 * whole.area();
         Self {
             frame,
@@ -121,7 +122,7 @@ impl<'f> Patch<'f> {
         }
     }
 
-    /// The pixels that are the person's.
+    /// Returns the pixels that belong to the person.
     fn pixels(&self) -> impl Iterator<Item = (i64, i64)> {
         let step = |size: f64| (size / SAMPLES as f64).max(1.0);
         let (across, down) = (step(self.area.width), step(self.area.height));
@@ -168,13 +169,14 @@ impl<'f> Patch<'f> {
     }
 }
 
-/// A share of each of the two nearest hues and of the nearest greys.
+/// Adds a colour to the two nearest hues and the two nearest greys, each by its share.
 fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
     let (most, least) = (r.max(g).max(b), r.min(g).min(b));
     let saturation = if most > 0.0 { (most - least) / most } else { 0.0 };
     let [grey_below, hue_from] = SATURATION;
     let coloured = ((saturation - grey_below) / (hue_from - grey_below)).clamp(0.0, 1.0);
     let bright = ((most - 0.2) / 0.4).clamp(0.0, 1.0);
+    // Soft shares: a small change of light must not move a pixel to another bin at once.
     let hue = hue(r, g, b, most, most - least) * HUES as f64;
     let (first, share) = (hue.floor(), hue - hue.floor());
     for (bin, share) in [(first as usize % HUES, 1.0 - share), ((first as usize + 1) % HUES, share)]
@@ -182,6 +184,7 @@ fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
         histogram[bin] += coloured * share * (1.0 - bright);
         histogram[HUES + bin] += coloured * share * bright;
     }
+    // Square root: dark greys are spread over more bins than on a linear scale.
     let level = most.sqrt() * (GREYS - 1) as f64;
     let (first, share) = (level.floor(), level - level.floor());
     let first = (first as usize).min(GREYS - 1);
@@ -189,8 +192,8 @@ fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
     histogram[2 * HUES + (first + 1).min(GREYS - 1)] += (1.0 - coloured) * share;
 }
 
-/// The hue, 0 to 1, of a colour whose largest component is `most` and whose
-/// components span `range`.
+/// Returns the hue, 0 to 1, of a colour whose largest component is `most` and whose components span
+/// `range`.
 fn hue(r: f64, g: f64, b: f64, most: f64, range: f64) -> f64 {
     if range <= 0.0 {
         return 0.0;
@@ -205,7 +208,7 @@ fn hue(r: f64, g: f64, b: f64, most: f64, range: f64) -> f64 {
     (sixths / 6.0).rem_euclid(1.0)
 }
 
-/// The bin of a slope: its direction, of which the sign does not count.
+/// Returns the bin of a slope: its direction without the sign.
 fn edge(across: f64, down: f64) -> usize {
     if across.hypot(down) < EDGE {
         return EDGES - 1;
@@ -259,7 +262,7 @@ mod tests {
 
     const SURE: f64 = 1e-9;
 
-    /// Where the votes of a colour go: bins and their shares.
+    /// Returns the bins of a colour and their shares.
     fn votes(colour: [f64; 3]) -> Vec<(usize, f64)> {
         let mut histogram = [0.0; COLOURS];
         vote(&mut histogram, colour);
@@ -347,8 +350,8 @@ mod tests {
             Camera::mounted(lens, 320, 240, 1.6, 0.0, 0.0)
         }
 
-        /// Somebody whose face is 2 m away, where a metre is 100 pixels: a head at row 60,
-        /// a shirt from row 85 to 125, trousers from row 150 to 190.
+        /// A person whose face is 2 m away, where a metre is 100 pixels: a head at row 60, a shirt
+        /// from row 85 to 125, trousers from row 150 to 190.
         fn somebody(y_m: f64) -> Track {
             let mut track = target(2.08, y_m, Vector2::zeros());
             track.estimate.person.position = Point3::new(2.08, y_m, 1.6);
@@ -374,7 +377,7 @@ mod tests {
             }
         }
 
-        /// The share of a bright hue.
+        /// Returns the share of a bright hue.
         fn share(histogram: &Option<Histogram<COLOURS>>, hue: usize) -> f64 {
             histogram.unwrap()[HUES + hue]
         }

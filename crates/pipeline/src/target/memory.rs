@@ -3,14 +3,14 @@ use std::collections::VecDeque;
 use super::looks::{Difference, Looks};
 use super::settings::LooksSettings;
 
-/// So many looks are remembered of the person, and as many of others.
+/// Most remembered appearances of the person, and of others.
 const MOST: usize = 24;
-/// The first ones are never forgotten: they are certain.
+/// Number of first appearances that are never forgotten: they are certain.
 const KEPT: usize = 8;
-/// Looks that differ less from what is known add nothing, on the mean.
+/// Mean difference from the known appearances below which a new one is not stored.
 const NEWS: f64 = 0.06;
 
-/// What the person looks like, and what others look like.
+/// Memory of the appearance of the person, and of others.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     own: VecDeque<Looks>,
@@ -20,18 +20,18 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// The person was seen.
+    /// Learns an appearance of the person.
     pub(crate) fn learn(&mut self, looks: Looks) {
         self.heights = (self.heights.0 + looks.height_m, self.heights.1 + 1.0);
         remember(&mut self.own, looks, KEPT);
     }
 
-    /// Somebody else was seen.
+    /// Learns an appearance of another person.
     pub(crate) fn learn_other(&mut self, looks: Looks) {
         remember(&mut self.others, looks, 0);
     }
 
-    /// How these looks differ from the person's; `None` without a memory.
+    /// Returns the differences of an appearance from the person's; `None` without a memory.
     pub(crate) fn differences(&self, looks: &Looks) -> Option<Differences> {
         let own = nearest(&self.own, looks)?;
         let other = nearest(&self.others, looks);
@@ -46,8 +46,8 @@ impl Memory {
     }
 }
 
-/// How somebody's looks differ from what is remembered of a person: Hellinger
-/// distances, 0 to 1, of what the images show, and the height of the head.
+/// Differences of an appearance from the remembered person: Hellinger distances, 0 to 1, of the
+/// visible parts, and the height of the head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Differences {
     /// Colours of the upper body.
@@ -58,13 +58,12 @@ pub struct Differences {
     pub texture: Option<f64>,
     /// Height of the head, m.
     pub height_m: f64,
-    /// How much farther the looks are from those of others than from the
-    /// person's.
+    /// Excess of the distance to the others' appearance over that to the person's.
     pub rivals: Option<f64>,
 }
 
 impl Differences {
-    /// Log-odds that it is the person; what is not known says nothing.
+    /// Returns the log-odds that it is the person; an unknown difference adds nothing.
     pub(crate) fn log_odds(&self, settings: &LooksSettings) -> f64 {
         let say = |difference: Option<f64>, [even, weight]: [f64; 2]| {
             difference.map_or(0.0, |difference| weight * (even - difference))
@@ -77,7 +76,7 @@ impl Differences {
     }
 }
 
-/// Adds looks that are new; the oldest that is not among the first `kept` goes.
+/// Adds an appearance that is new; the oldest that is not among the first `kept` goes.
 fn remember(all: &mut VecDeque<Looks>, looks: Looks, kept: usize) {
     let differs = |known: &Looks| looks.difference(known).mean().is_some_and(|d| d > NEWS);
     if !all.is_empty() && !all.iter().all(differs) {
@@ -89,7 +88,7 @@ fn remember(all: &mut VecDeque<Looks>, looks: Looks, kept: usize) {
     all.push_back(looks);
 }
 
-/// The difference from the most like of several looks.
+/// Returns the difference from the most similar of several appearances.
 fn nearest(all: &VecDeque<Looks>, looks: &Looks) -> Option<Difference> {
     let differences = all.iter().map(|known| looks.difference(known));
     let mean = |d: &Difference| d.mean().unwrap_or(0.0);
@@ -100,7 +99,7 @@ fn nearest(all: &VecDeque<Looks>, looks: &Looks) -> Option<Difference> {
 mod tests {
     use super::*;
 
-    /// Looks of a height, and of a shirt of this colour.
+    /// An appearance with a height, and a shirt of this colour.
     fn looks(height_m: f64, colour: Option<usize>) -> Looks {
         Looks::in_one_colour(height_m, colour)
     }

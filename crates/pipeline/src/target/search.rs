@@ -4,28 +4,27 @@ use tagalong_core::{WheelSpeeds, Wheels};
 use super::lock::LastSeen;
 use super::settings::SearchSettings;
 
-/// Turning for each radian of bearing, 1/s.
+/// Gain from bearing to turn rate, 1/s.
 const TURN_GAIN: f64 = 1.5;
-/// Drives ahead only within this bearing, rad.
+/// Bearing within which the robot drives ahead, rad.
 const AHEAD_RAD: f64 = 0.35;
-/// Somebody goes on the way they went for this long, s.
+/// Time for which a lost person is assumed to keep their velocity, s.
 const GOES_ON_S: f64 = 1.5;
-/// Something blocks the way if the robot cannot move for this long, s.
+/// Time without motion after which the way counts as blocked, s.
 const BLOCKED_S: f64 = 1.0;
 
-/// Looks for a person who is lost: waits, drives to where they were last, turns
-/// to where they went, and on round; whoever may be the person is looked at; at last
-/// it gives up.
+/// Search for a lost person: waits, drives to the last seen position, turns to where the person
+/// went, and on round; turns towards a candidate; at last it gives up.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Search {
     arrived: bool,
     blocked_s: f64,
-    /// Which way it looks round, 1 to the left.
+    /// Direction of the turn, 1 to the left.
     way: Option<f64>,
 }
 
 impl Search {
-    /// The wheel speeds to wish for; `lost_s` after the person was lost.
+    /// Returns the wheel speeds to wish for, `lost_s` after the person was lost.
     pub(crate) fn wish(
         &mut self,
         settings: &SearchSettings,
@@ -37,6 +36,7 @@ impl Search {
         if !settings.enabled || lost_s < settings.wait_s || lost_s > settings.give_up_s {
             return None;
         }
+        // A blocked way or a long drive counts as arrival, so that the search goes on by turning.
         self.arrived |= last.place.coords.norm() < settings.arrive_m
             || self.blocked_s > BLOCKED_S
             || lost_s > settings.wait_s + settings.drive_s;
@@ -49,7 +49,7 @@ impl Search {
         Some(WheelSpeeds { left: speed_mps - rim, right: speed_mps + rim })
     }
 
-    /// Hears what became of the wish.
+    /// Records whether the governor blocked the wish.
     pub(crate) fn hear(&mut self, blocked: bool, dt_s: f64) {
         self.blocked_s = if blocked { self.blocked_s + dt_s } else { 0.0 };
     }
@@ -57,18 +57,19 @@ impl Search {
     /// Turns to the side on which the person went, and on.
     fn look_round(&mut self, settings: &SearchSettings, last: &LastSeen) -> f64 {
         let went = last.place + GOES_ON_S * last.velocity;
+        // The first choice is kept: a sign that flips would make the robot swing to and fro.
         let way = *self.way.get_or_insert_with(|| went.y.atan2(went.x).signum());
         way * settings.turn_radps
     }
 }
 
-/// Forward speed, m/s, and turn rate, rad/s, to a place.
+/// Returns the forward speed, m/s, and turn rate, rad/s, towards a place.
 fn drive_to(settings: &SearchSettings, place: &Point2<f64>) -> (f64, f64) {
     let ahead = place.y.atan2(place.x).abs() < AHEAD_RAD;
     (if ahead { settings.speed_mps } else { 0.0 }, turn_to(settings, place))
 }
 
-/// Turn rate, rad/s, to a place.
+/// Returns the turn rate, rad/s, towards a place.
 fn turn_to(settings: &SearchSettings, place: &Point2<f64>) -> f64 {
     let turn = TURN_GAIN * place.y.atan2(place.x);
     turn.clamp(-settings.turn_radps, settings.turn_radps)

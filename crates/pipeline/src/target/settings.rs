@@ -1,61 +1,59 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Who is followed, when it is doubted that it is still the same person, and what
-/// is done when the person is lost.
+/// Choice of the target, doubts about its identity, and the search for a lost person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TargetSettings {
-    /// Follow the track with this number; the nearest one in front if left out.
+    /// Number of the track to follow; the nearest one in front if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u32>,
-    /// In front is up to this bearing to either side, degrees ...
+    /// Largest bearing to either side of a track that may be chosen, degrees.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub choose_within_deg: f64,
-    /// ... and up to this distance, m, ...
+    /// Largest distance of a track that may be chosen, m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub choose_within_m: f64,
-    /// ... once there has been somebody for this long, s: who is nearest is not
-    /// always seen first.
+    /// Time for which there has been such a track before one is chosen, s: the nearest person is
+    /// not always seen first.
     #[schemars(range(min = 0.0))]
     pub choose_after_s: f64,
-    /// Remember what the person looks like, doubt a track that looks like
-    /// somebody else, and know the person again. Without it a track is followed
-    /// while it lives, and nobody after that.
+    /// Remember the person's appearance, doubt a track that looks different, and recognise the
+    /// person again. Without it a track is followed while it lives, and no other after that.
     pub remember: bool,
-    /// The person is known well after so many sightings.
+    /// Number of detections after which the person is known well.
     #[schemars(range(min = 1))]
     pub training_sightings: u32,
-    /// Weight of a sighting in the belief that it is the same person, 0 to 1.
+    /// Weight of one detection in the belief that it is the same person, 0 to 1.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub belief_weight: f64,
-    /// Below this probability it is doubted that it is the same person: slower.
+    /// Probability of being the same person below which the track is followed slowly.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub doubt_below: f64,
-    /// Below this probability it is somebody else: lost.
+    /// Probability of being the same person below which the target is lost.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub refuse_below: f64,
-    /// Out of sight for longer than this, s, it is doubted who comes back.
+    /// Time out of sight after which the identity is doubted, s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub doubt_after_s: f64,
-    /// Out of sight for longer than this, s, the person is lost.
+    /// Time out of sight after which the target is lost, s.
     pub lose_after_s: f64,
-    /// Somebody is known again from this probability on, sightings added up, ...
+    /// Accumulated probability from which on a track is recognised as the person, ...
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub again_from: f64,
-    /// ... in so many sightings in a row.
+    /// ... in this many detections in a row.
     #[schemars(range(min = 1))]
     pub again_sightings: u32,
-    /// Nobody gets farther than at this speed from where they were seen last, m/s.
+    /// Largest speed at which the person can have moved from the last seen position, m/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach_mps: f64,
-    /// Somebody nearer to the person than this may be taken for them, m: looks are
-    /// compared, and nothing is learned.
+    /// Distance from the person below which another track may be confused with it, m: appearances
+    /// are compared, and nothing is learned.
     #[schemars(range(min = 0.0))]
     pub alone_m: f64,
-    /// What differences in looks say.
+    /// Evidence from differences in appearance.
     pub looks: LooksSettings,
-    /// Looking for a person who is lost.
+    /// Search for a lost person.
     pub search: SearchSettings,
 }
 
@@ -83,27 +81,23 @@ impl Default for TargetSettings {
     }
 }
 
-/// The log-odds that two sightings are of one person: for each kind of
-/// difference its weight times how far it is below what is even, summed up.
-/// Hellinger distances lie between 0, the same, and 1. The numbers are what
-/// `tagalong follow configs/follow-best.toml --split train --seeds 4 --fit` prints, a
-/// logistic regression over 60 rides; every `tagalong follow` prints how far the
-/// probabilities can be believed.
+/// Log-odds that two detections are of one person: the sum, over the kinds of difference, of a
+/// weight times the amount by which the difference is below its neutral value. Hellinger distances
+/// lie between 0, the same, and 1. The numbers are those that `tagalong follow
+/// configs/follow-best.toml --split train --seeds 4 --fit` prints, a logistic regression over 60
+/// rides; every `tagalong follow` prints the calibration of the probabilities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooksSettings {
-    /// Colours of the upper body: the Hellinger distance that says nothing, and
-    /// the weight of one below it.
+    /// Colours of the upper body: the neutral Hellinger distance, and the weight of one below it.
     pub torso: [f64; 2],
     /// Colours of the legs, likewise.
     pub legs: [f64; 2],
     /// Directions of edges on the upper body, likewise.
     pub texture: [f64; 2],
-    /// Height of the head: the difference that says nothing, m, and the weight of
-    /// one metre.
+    /// Height of the head: the neutral difference, m, and the weight of one metre below it.
     pub height: [f64; 2],
-    /// Weight of being nearer to the person's looks than to those of others who
-    /// were seen beside them.
+    /// Weight of being nearer to the person's appearance than to those of others seen beside them.
     #[schemars(range(min = 0.0))]
     pub rivals: f64,
 }
@@ -120,29 +114,29 @@ impl Default for LooksSettings {
     }
 }
 
-/// What the robot does to find a person again. It asks for room all the time;
-/// without it the robot stands still when the person is lost.
+/// Search for a lost person. It needs free space around the robot; without it the robot stands
+/// still when the person is lost.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SearchSettings {
-    /// Turn towards where the person went, and drive to where they were last.
+    /// Turn towards where the person went, and drive to the last seen position.
     pub enabled: bool,
-    /// Waits for this long first: most people come back by themselves, s.
+    /// Time to wait first, s: most people come back by themselves.
     #[schemars(range(min = 0.0))]
     pub wait_s: f64,
-    /// Turns at most this fast, rad/s.
+    /// Largest turn rate, rad/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub turn_radps: f64,
-    /// Drives at most this fast, m/s.
+    /// Largest speed, m/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_mps: f64,
-    /// As near as this to where the person was last is there, m.
+    /// Distance to the last seen position that counts as arrived, m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub arrive_m: f64,
-    /// Gives up driving there after this time, s.
+    /// Time after which the drive there is given up, s.
     #[schemars(range(min = 0.0))]
     pub drive_s: f64,
-    /// Gives up, stands still and watches after this time, s.
+    /// Time after which the search is given up and the robot stands still, s.
     #[schemars(range(min = 0.0))]
     pub give_up_s: f64,
 }

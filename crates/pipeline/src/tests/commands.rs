@@ -1,5 +1,5 @@
-//! Faults on the way to the wheels: each leads to zero within the frame in which
-//! it is seen, or, where no frame comes, within a command's validity.
+//! Faults on the way to the wheels: each leads to zero within the frame in which it is seen or,
+//! without a frame, within the validity of a command.
 
 use nalgebra::Point3;
 use tagalong_core::{Command, Frame, Images, Motion, Reason, Stamp, WheelSpeeds};
@@ -7,7 +7,7 @@ use tagalong_core::{Command, Frame, Images, Motion, Reason, Stamp, WheelSpeeds};
 use super::doubles::{PLAIN, World, camera, frame, person, scored};
 use crate::{LockState, Pipeline};
 
-/// A pipeline that has driven after somebody for two seconds.
+/// A pipeline that has followed a person for two seconds.
 fn driving(how: &str) -> (World, Pipeline) {
     let world = World::of((0..60).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
     let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\nconfig = {{ how = '{how}' }}\n");
@@ -49,7 +49,7 @@ fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
     assert!(!is_moving(&paused(1.0).1));
 }
 
-/// Somebody steps in from beside the camera, and is in no image.
+/// A person steps in from beside the camera, and is in no image.
 #[test]
 fn who_is_in_the_laser_scan_alone_is_not_driven_into() {
     let (_, mut pipeline) = driving("");

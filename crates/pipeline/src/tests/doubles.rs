@@ -1,4 +1,4 @@
-//! Scripted plugins: what they say is written in the test.
+//! Scripted plugins: the test gives their answers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -20,9 +20,9 @@ use crate::{FrameReport, Pipeline};
 #[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Which script it reads.
+    /// Number of the script.
     pub script: usize,
-    /// What it does.
+    /// Name of the behaviour.
     pub how: String,
 }
 
@@ -37,7 +37,7 @@ pub fn frame(index: u64, t_s: f64) -> Frame {
     Frame::new(index, stamp, Arc::new(camera()), motion, Images::default())
 }
 
-/// Somebody 1.6 m tall (to the head's centre) at a place on the floor.
+/// A person 1.6 m tall (to the head's centre) at a place on the floor.
 pub fn person(x: f64, y: f64) -> Detection {
     let position = Point3::new(x, y, 1.6);
     Detection {
@@ -56,7 +56,7 @@ pub fn scored(score: f64, detection: Detection) -> Detection {
 type Seen = BTreeMap<(usize, u64), Vec<Detection>>;
 type Question = (usize, u64, Option<TrackId>);
 
-/// What the detectors see, by script and frame, and what was asked of them.
+/// Detections by script and frame, and a record of the calls.
 #[derive(Clone, Default)]
 pub struct World {
     seen: Arc<Mutex<Seen>>,
@@ -180,7 +180,7 @@ impl Likelihood for Script {
     }
 }
 
-/// Says no to everybody left of the middle.
+/// Verifier that rejects every candidate left of the middle.
 struct Choosy(Config);
 
 impl Verifier for Choosy {
@@ -200,7 +200,7 @@ impl Verifier for Choosy {
     }
 }
 
-/// Constant velocity, learned from the last two sightings.
+/// Constant velocity, learned from the last two detections.
 struct Steady(World);
 
 #[derive(Clone)]
@@ -285,7 +285,7 @@ impl Filter for Odd {
     }
 }
 
-/// Gives each track the first detection, with a weight; or pairs that cannot be.
+/// Gives each track the first detection, with a weight; or impossible pairs.
 struct Weighs(Config);
 
 impl Associator for Weighs {

@@ -28,7 +28,7 @@ fn tracks(config: &str, frame: impl Fn(u64) -> Frame) -> String {
     format!("{:?}", reports.iter().map(|report| &report.tracks).collect::<Vec<_>>())
 }
 
-/// A detector that finds somebody only where there is no depth shows that there is none.
+/// A detector that fires only without depth shows that there is none.
 #[test]
 fn what_a_config_does_without_is_not_there() {
     let plain = |index: u64| frame(index, index as f64 * 0.1);
@@ -67,7 +67,7 @@ fn a_pipeline_declares_what_its_parts_declare() {
     assert_eq!(inputs(&format!("odometry = {{}}\n{PLAIN}")), images);
 }
 
-/// Depth is the pair's, but that of a log is taken where it is there.
+/// Depth comes from the pair, but that of a log is used where it is there.
 #[test]
 fn stereo_stands_in_for_depth() {
     let pair = Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
@@ -78,7 +78,7 @@ fn stereo_stands_in_for_depth() {
     assert_eq!(inputs(&without), pair.without(Input::Depth));
 }
 
-/// The detector refuses a frame without depth: what it gets is the pair's, not the log's.
+/// The detector refuses a frame without depth: it receives the pair's, not the log's.
 #[test]
 fn stereo_replaces_depth_that_the_config_does_without() {
     let stereo = "without = ['depth']\nstereo = { method = 'block', speckle_pixels = 0 }\n";

@@ -1,11 +1,11 @@
-//! Pipelines that share what they find say the same as those that do not.
+//! Pipelines that share their findings give the same reports as those that do not.
 
 use tagalong_core::Frame;
 
 use super::doubles::{World, frame, person};
 use crate::{FrameReport, Pipeline};
 
-/// Of two scripts the first forgets; verifiers and thresholds differ.
+/// Of two scripts the first has no memory; verifiers and thresholds differ.
 const CONFIGS: [&str; 4] = [
     "",
     "manager.config.drop_after_s = 0.3\nmanager.config.drop_after_misses = 1",
@@ -34,7 +34,7 @@ fn untimed(report: FrameReport) -> String {
     format!("{:?}", FrameReport { timings: Vec::new(), plugin_timings: Vec::new(), ..report })
 }
 
-/// What pipelines say of the same frames, step by step side by side.
+/// Reports of several pipelines for the same frames, step by step side by side.
 fn together(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
     let frames: Vec<Frame> = (1..=20).map(|i| frame(i, i as f64 * 0.1)).collect();
     let of = |frame| -> Vec<String> {

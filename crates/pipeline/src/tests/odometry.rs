@@ -1,4 +1,4 @@
-//! Odometry, corrected by what stands still.
+//! Odometry, corrected by static structure.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ const BY_WHEELS: &str = "
     plugin = 'script'
 ";
 
-/// What a robot sees that stands before a wall.
+/// A frame of a robot that stands before a wall.
 fn wall(index: u64, motion: Motion) -> Frame {
     let plain = frame(index, 0.1 * index as f64);
     let waves = |x: usize, y: usize| {
@@ -27,7 +27,7 @@ fn wall(index: u64, motion: Motion) -> Frame {
     Frame::new(plain.index, plain.stamp, plain.camera, motion, images)
 }
 
-/// What is believed of a turn by the wheels while the robot stands, rad.
+/// Estimated turn when the wheels report one while the robot stands, rad.
 fn believed(config: &str) -> f64 {
     let mut pipeline = World::default().pipeline(config);
     pipeline.step(&wall(1, Motion::at_rest(0.0))).unwrap();

@@ -3,14 +3,14 @@ use tagalong_core::{Detection, Reason, TrackId};
 use super::doubles::{PLAIN, World, person, scored};
 use crate::{FrameReport, LockState};
 
-/// Somebody who is confirmed at once, with the head at this height, m.
+/// A person with the head at this height, m, confirmed at once.
 fn tall(height_m: f64, x: f64, y: f64) -> Detection {
     let mut somebody = scored(5.0, person(x, y));
     somebody.position.z = height_m;
     somebody
 }
 
-/// There are no images: people are told apart by their height.
+/// There are no images: people are distinguished by their height.
 fn config(target: &str) -> String {
     format!(
         "{PLAIN}\n[controller]\nplugin = 'drive'\n[target]\n{target}\n\
@@ -114,7 +114,7 @@ fn what_stood_beside_the_person_is_never_taken_for_them() {
     }
 }
 
-/// Others walk beside the person, and go on alone.
+/// Another person walks beside the target, and goes on alone.
 #[test]
 fn who_walked_beside_the_person_is_not_taken_for_them_while_in_sight() {
     let people = |i| {
@@ -142,7 +142,7 @@ fn nobody_comes_back_from_farther_than_they_can_have_got() {
 
 #[test]
 fn a_track_that_changes_over_to_somebody_else_is_doubted_and_left() {
-    // The other one comes near, and the person is gone.
+    // The other person comes near, and the target is gone.
     let people = |i| match i {
         0..20 => vec![tall(1.6, 3.0, 0.0)],
         20..24 => vec![tall(1.6, 3.0, 0.0), tall(1.9, 3.0, 0.5)],

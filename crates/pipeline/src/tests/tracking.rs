@@ -57,7 +57,7 @@ fn two_people_who_cross_keep_their_numbers() {
     }
 }
 
-/// One stands 2 m ahead; the other walks behind and is not seen there.
+/// One person stands 2 m ahead; the other walks behind and is not seen there.
 fn behind_somebody(somebody: bool) -> Vec<FrameReport> {
     let walk = |i: i32| {
         let y = 1.3 - 0.05 * f64::from(i);
@@ -80,8 +80,8 @@ fn a_person_hidden_behind_another_coasts_and_keeps_the_number() {
     assert!(reports.iter().all(|r| r.tracks.iter().all(|t| !(t.occluded && t.seen))));
 }
 
-/// Standard deviations, along and across, with which somebody 4 m ahead was believed to
-/// be seen in the last of some frames.
+/// Standard deviations, along and across, of the measurement of a person 4 m ahead in the last of
+/// some frames.
 fn spread_of_second(how: &str, frames: Vec<Vec<Detection>>) -> (f64, f64) {
     let many = frames.len() as u64;
     let reports = World::of(frames).run(&format!("{how}\n{PLAIN}"), many, 0.1);
@@ -230,7 +230,7 @@ fn a_followed_person_who_is_discovered_again_stays_one() {
     assert_eq!(reports[3].funnel.count("same person"), 1);
 }
 
-/// One script discovers, another one follows.
+/// One script discovers, another one tracks.
 const TWO_SCRIPTS: &str = "
     [[detectors]]
     plugin = 'script'
@@ -256,8 +256,8 @@ fn the_better_sighting_of_a_followed_person_is_kept() {
 
 #[test]
 fn a_search_for_one_person_does_not_steal_anothers_sighting() {
-    // Two people side by side; then one is gone, and the searches for both
-    // tracks find the other one. Track 1 is the nearer one and searches first.
+    // Two people side by side; then one is gone, and the searches for both tracks find the other
+    // one. Track 1 is the nearer one and searches first.
     let both = || vec![person(2.9, 0.2), person(3.0, -0.2)];
     let one = || vec![person(3.0, -0.2)];
     let world = World::of((0..10).map(|i| if i < 5 { both() } else { one() }));
@@ -429,7 +429,7 @@ fn who_comes_to_a_doubted_place_is_believed_a_little_later() {
     assert_eq!(reports[10].funnel.count("doubt"), 1);
 }
 
-/// An associator by name, and what it gives.
+/// Reports with an associator chosen by its name.
 fn associated(how: &str, frames: u64) -> Vec<FrameReport> {
     let associator =
         format!("[associator]\nplugin = 'weighing'\nconfig = {{ how = '{how}' }}\n{PLAIN}");

@@ -1,12 +1,12 @@
-/// How values become places.
+/// Mapping of values to positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Scale {
     Linear,
-    /// For values above zero; what is not is drawn at the low end.
+    /// Logarithmic scale for values above zero; others are drawn at the low end.
     Log,
 }
 
-/// A range of values and the places of its ends.
+/// Range of values and the positions of its ends.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Axis {
     low: f64,
@@ -17,8 +17,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// An axis from `low` at the place `from` to `high` at `to`. A range that
-    /// is empty or not finite is widened to one that can be drawn.
+    /// Creates an axis from `low` at the position `from` to `high` at `to`. A range that is empty
+    /// or not finite is widened to one that can be drawn.
     pub fn new(scale: Scale, [low, high]: [f64; 2], [from, to]: [f64; 2]) -> Self {
         let [low, high] = match scale {
             Scale::Linear => drawable([low, high]),
@@ -27,8 +27,8 @@ impl Axis {
         Self { low, high, from, to, scale }
     }
 
-    /// An axis around the finite values, from zero (linear) or from the round
-    /// value below them (log), to a round value above.
+    /// Creates an axis around the finite values, from zero (linear) or from the round value below
+    /// them (log), to a round value above.
     pub fn around(scale: Scale, values: impl IntoIterator<Item = f64>, places: [f64; 2]) -> Self {
         let finite = values.into_iter().filter(|v| v.is_finite());
         match scale {
@@ -38,6 +38,7 @@ impl Axis {
                 Self::new(scale, [(low / step).floor() * step, (high / step).ceil() * step], places)
             }
             Scale::Log => {
+                // A value without a logarithm has no influence on the range.
                 let positive: Vec<f64> = finite.filter(|v| *v > 0.0).collect();
                 let low = positive.iter().copied().fold(f64::INFINITY, f64::min);
                 let high = positive.iter().copied().fold(0.0, f64::max);
@@ -46,7 +47,7 @@ impl Axis {
         }
     }
 
-    /// Where a value lies, within the ends of the axis; nothing if it is no number.
+    /// Returns the position of a value, within the ends of the axis; `None` if it is NaN.
     pub fn at(&self, value: f64) -> Option<f64> {
         if value.is_nan() {
             return None;
@@ -59,7 +60,7 @@ impl Axis {
         Some(self.from + part.clamp(0.0, 1.0) * (self.to - self.from))
     }
 
-    /// Round values within the axis, as text, and where they lie.
+    /// Returns round values within the axis, as text, and their positions.
     pub fn ticks(&self) -> Vec<(String, f64)> {
         let values = match self.scale {
             Scale::Linear => self.linear_ticks(),
@@ -72,26 +73,28 @@ impl Axis {
         let step = step_of(self.high - self.low, 5.0);
         let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
         let first = (self.low / step).ceil();
+        // The addend keeps a tick at the high end in spite of rounding.
         let last = (self.high / step + 1e-9).floor();
+        // A bound, so that a step lost to rounding cannot fill the chart with ticks.
         let count = (last - first).clamp(0.0, 20.0) as u32;
         let value = |i: u32| (first + f64::from(i)) * step;
         (0..=count).map(|i| (minus(&format!("{:.decimals$}", value(i))), value(i))).collect()
     }
 
-    /// Powers of ten; within less than two of them also 2 and 5 times those.
+    /// Returns the powers of ten; within less than two decades also 2 and 5 times those.
     fn log_ticks(&self) -> Vec<(String, f64)> {
         let first = self.low.log10().floor() as i32;
         let last = (self.high.log10() + 1e-9).floor() as i32;
         let times: &[f64] = if self.high / self.low <= 100.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let all = (first..=last.min(first + 20))
             .flat_map(|exponent| times.iter().map(move |t| (exponent, t * 10_f64.powi(exponent))));
+        // A margin, so that ticks at the ends are not lost to rounding.
         let inside = |v: f64| self.low * 0.999 <= v && v <= self.high * 1.001;
         all.filter(|(_, v)| inside(*v)).map(|(e, v)| (rounded(e, v), v)).collect()
     }
 }
 
-/// A round step that divides a range into about `parts`: 1, 2 or 5 times a
-/// power of ten.
+/// Returns a round step that divides a range into about `parts`: 1, 2 or 5 times a power of ten.
 fn step_of(range: f64, parts: f64) -> f64 {
     if !(range.is_finite() && range > 0.0) {
         return 1.0;
@@ -102,12 +105,13 @@ fn step_of(range: f64, parts: f64) -> f64 {
     times * unit
 }
 
-/// The widest ends that are drawn, so that differences stay finite.
+/// Largest value that is drawn, so that differences stay finite.
 const FARTHEST: f64 = 1e12;
 
 fn drawable([low, high]: [f64; 2]) -> [f64; 2] {
     let low = if low.is_nan() { 0.0 } else { low.clamp(-FARTHEST, FARTHEST) };
     let high = if high.is_nan() { low } else { high.clamp(-FARTHEST, FARTHEST) };
+    // Ends closer than this are the same to the precision of the positions.
     let least = (low.abs() * 1e-6).max(1e-9);
     if high - low >= least { [low, high] } else { [low, low + least.max(1.0)] }
 }
@@ -118,13 +122,13 @@ fn drawable_log([low, high]: [f64; 2]) -> [f64; 2] {
     if high >= low * 1.1 { [low, high] } else { [low, low * 10.0] }
 }
 
-/// The greatest of 1, 2 and 5 times a power of ten that is not above the value.
+/// Returns the greatest of 1, 2 and 5 times a power of ten that is not above the value.
 fn round_below(value: f64) -> f64 {
     let unit = 10_f64.powf(value.log10().floor());
     [5.0, 2.0].into_iter().map(|t| t * unit).find(|v| *v <= value).unwrap_or(unit)
 }
 
-/// The least of 1, 2 and 5 times a power of ten that is not below the value.
+/// Returns the least of 1, 2 and 5 times a power of ten that is not below the value.
 fn round_above(value: f64) -> f64 {
     let unit = 10_f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|t| t * unit).find(|v| *v >= value).unwrap_or(10.0 * unit)
@@ -139,8 +143,9 @@ fn rounded(exponent: i32, value: f64) -> String {
     }
 }
 
-/// With a true minus sign, which screen readers read and which is as wide as a plus.
+/// Replaces hyphens by true minus signs, which screen readers read and which are as wide as a plus.
 pub fn minus(text: &str) -> String {
+    // A negative number that rounds to zero loses its sign.
     let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
     text.replace('-', if zero { "" } else { "\u{2212}" })
 }

@@ -5,25 +5,26 @@ use super::{
     Axis, Plot, Scale, Words, axes, dashes, hint, mark, picture, points, px, series_class,
 };
 
-/// The miss-rate curve of a pipeline.
+/// Miss-rate curve of a pipeline.
 #[derive(Clone, Debug)]
 pub struct Curve<'a> {
-    /// The pipeline.
+    /// Name of the pipeline.
     pub name: &'a str,
-    /// Its number among the pipelines.
+    /// Index among the pipelines.
     pub series: usize,
-    /// The curve, in any order.
+    /// Points of the curve, in any order.
     pub points: &'a [CurvePoint],
 }
 
 const SIZE: (f64, f64) = (480.0, 300.0);
 const PLOT: Plot = Plot { left: 58.0, right: 468.0, top: 12.0, bottom: 250.0 };
 
-/// Below this a curve is drawn at the edge: few logs are long enough to tell.
+/// False positives per image below which a curve is drawn at the edge: few logs are long enough to
+/// measure less.
 const LEAST_FPPI: f64 = 1e-3;
 
-/// Miss rate over false positives per image, one line per pipeline. The band is
-/// where the log-average miss rate reads the curve.
+/// Renders miss rate over false positives per image, one line per pipeline. The band is the range
+/// in which the log-average miss rate reads the curve.
 pub fn miss_rate(curves: &[Curve<'_>], words: &Words<'_>) -> Markup {
     let reference = [REFERENCE_FPPI[0], REFERENCE_FPPI[8]];
     let most = curves.iter().flat_map(|c| c.points).map(|p| p.fppi).filter(|v| v.is_finite());
@@ -53,8 +54,8 @@ fn line(curve: &Curve<'_>, x: &Axis, y: &Axis) -> Markup {
     }
 }
 
-/// The miss rate stays until a lower score brings the next false positive.
-/// Steps below the size of a dot are left out.
+/// Returns the steps of a curve: the miss rate stays until a lower score adds the next false
+/// positive. Steps below the size of a dot are left out.
 fn steps(curve: &[CurvePoint], x: &Axis, y: &Axis) -> Vec<(f64, f64)> {
     let mut sorted: Vec<&CurvePoint> = curve.iter().collect();
     sorted.sort_by(|a, b| a.fppi.total_cmp(&b.fppi).then(b.miss_rate.total_cmp(&a.miss_rate)));
@@ -66,6 +67,7 @@ fn steps(curve: &[CurvePoint], x: &Axis, y: &Axis) -> Vec<(f64, f64)> {
             line.push(at);
             continue;
         };
+        // The last point is never left out, because the mark of the series is drawn there.
         let last = index + 1 == places.len();
         if last || (at.0 - before.0).hypot(at.1 - before.1) >= 1.0 {
             line.push((at.0, before.1));

@@ -4,8 +4,8 @@ use super::{Axis, Scale, px};
 
 const WIDTH: f64 = 120.0;
 
-/// A bar from zero in a cell of a table; `whisker` is a second, greater value.
-/// The numbers stand beside it, so it is hidden from screen readers.
+/// Renders a bar from zero for a cell of a table; `whisker` is a second, greater value. The numbers
+/// stand beside it, so it is hidden from screen readers.
 pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
     let axis = Axis::new(Scale::Linear, [0.0, most], [1.0, WIDTH - 1.0]);
     let Some(end) = axis.at(value) else { return html! {} };
@@ -14,6 +14,7 @@ pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
         svg class="inline" viewBox="0 0 120 14" width="120" height="14" aria-hidden="true" {
             rect class="bar" x="1" y="2" height="10" width=(px((end - 1.0).max(0.0))) {}
             @if let Some(far) = far {
+                // A whisker below the bar's end would otherwise have a negative length.
                 line class="whisker" x1=(px(end.min(far))) x2=(px(far)) y1="7" y2="7" {}
                 line class="whisker" x1=(px(far)) x2=(px(far)) y1="2" y2="12" {}
             }
@@ -21,7 +22,7 @@ pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
     }
 }
 
-/// An estimate and its interval in a cell of a table, within the range of all.
+/// Renders an estimate and its interval for a cell of a table, within the range of all.
 pub fn interval(estimate: f64, ends: Option<[f64; 2]>, range: [f64; 2]) -> Markup {
     let axis = Axis::new(Scale::Linear, range, [6.0, WIDTH - 6.0]);
     let Some(at) = axis.at(estimate) else { return html! {} };

@@ -1,8 +1,8 @@
 //! Charts as SVG: scales, marks and the frame around them.
 //!
-//! Every chart is a function from numbers to markup. Colours are classes, so
-//! that the style sheet decides what light, dark and paper look like. Series
-//! differ by the shape of their marks and by dashes too, never by colour alone.
+//! Every chart is a function from numbers to markup. Colours are classes, so that the style sheet
+//! defines them for light, dark and paper. Series differ by the shape of their marks and by dashes
+//! too, never by colour alone.
 
 mod axis;
 mod curves;
@@ -18,27 +18,27 @@ pub use inline::{bar, interval};
 pub use plan::{Extent, plan};
 pub use scatter::{Mark, front};
 
-/// How many series look different.
+/// Number of series that look different.
 pub const SERIES: usize = 8;
 
-/// Class that colours a series.
+/// Returns the class that colours a series.
 pub fn series_class(index: usize) -> String {
     format!("s{}", index % SERIES)
 }
 
-/// Dashes of a series; a second round of colours gets other dashes.
+/// Returns the dashes of a series; a second round of colours gets other dashes.
 pub fn dashes(index: usize) -> &'static str {
     ["none", "7 3", "2 3", "9 3 2 3"][(index + index / SERIES) % 4]
 }
 
-/// A length or a place in a chart, in its own units, as short as possible.
+/// Formats a length or a position in the units of a chart, as short as possible.
 pub fn px(value: f64) -> String {
     let text = format!("{value:.1}");
     let text = text.strip_suffix(".0").unwrap_or(&text);
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Corners of the mark of a series, for a radius of one.
+/// Corners of the marks of the series, for a radius of one.
 const SHAPES: [&[(f64, f64)]; 6] = [
     &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)],
     &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)],
@@ -48,8 +48,9 @@ const SHAPES: [&[(f64, f64)]; 6] = [
     &[(-1.2, -0.5), (1.2, -0.5), (1.2, 0.5), (-1.2, 0.5)],
 ];
 
-/// The mark of a series at a place, with a radius.
+/// Renders the mark of a series at a position, with a radius.
 pub fn mark(index: usize, (x, y): (f64, f64), radius: f64) -> Markup {
+    // The first shape is a circle; `SHAPES` holds the others.
     let shape = index % (SHAPES.len() + 1);
     let Some(corners) = shape.checked_sub(1).map(|at| SHAPES[at]) else {
         return html! { circle class="mark" cx=(px(x)) cy=(px(y)) r=(px(radius)) {} };
@@ -58,14 +59,14 @@ pub fn mark(index: usize, (x, y): (f64, f64), radius: f64) -> Markup {
     html! { polygon class="mark" points=(points(corners)) {} }
 }
 
-/// Places as the `points` of a polygon or a line.
+/// Formats positions as the `points` of a polygon or a line.
 pub fn points(places: impl IntoIterator<Item = (f64, f64)>) -> String {
     let texts: Vec<String> =
         places.into_iter().map(|(x, y)| format!("{},{}", px(x), px(y))).collect();
     texts.join(" ")
 }
 
-/// A series in a legend: its line, its mark and its name.
+/// Renders a series in a legend: its line, its mark and its name.
 pub fn key(index: usize, name: &str) -> Markup {
     html! {
         span.key.(series_class(index)) data-series=(index) {
@@ -78,15 +79,15 @@ pub fn key(index: usize, name: &str) -> Markup {
     }
 }
 
-/// What a chart shows, for those who do not see it.
+/// Texts of a chart for screen readers.
 pub struct Words<'a> {
-    /// Its name.
+    /// Name of the chart.
     pub title: &'a str,
-    /// What it says, in a sentence.
+    /// Content of the chart, in a sentence.
     pub says: &'a str,
 }
 
-/// An image of `width` times `height` units; the page scales it.
+/// Renders an image of `width` times `height` units; the page scales it.
 pub fn picture(words: &Words<'_>, (width, height): (f64, f64), body: &Markup) -> Markup {
     let label = format!("{}. {}", words.title, words.says);
     html! {
@@ -95,7 +96,7 @@ pub fn picture(words: &Words<'_>, (width, height): (f64, f64), body: &Markup) ->
     }
 }
 
-/// Where a chart draws, within its margins for the words of the axes.
+/// Area of a chart for the data, within margins for the labels of the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plot {
     pub left: f64,
@@ -104,7 +105,7 @@ pub struct Plot {
     pub bottom: f64,
 }
 
-/// Grid, ticks and names of two axes; `x` runs right and `y` runs up.
+/// Renders grid, ticks and names of two axes; `x` runs right and `y` runs up.
 pub fn axes(plot: Plot, x: &Axis, y: &Axis, [x_name, y_name]: [&str; 2]) -> Markup {
     let middle = 0.5 * (plot.top + plot.bottom);
     html! {
@@ -124,7 +125,7 @@ pub fn axes(plot: Plot, x: &Axis, y: &Axis, [x_name, y_name]: [&str; 2]) -> Mark
     }
 }
 
-/// A hint that appears over a mark.
+/// Renders a hint that appears over a mark.
 pub fn hint(text: &str) -> Markup {
     html! { title { (text) } }
 }

@@ -5,7 +5,7 @@ use super::{
 };
 use crate::model::Trajectory;
 
-/// The part of the floor that is drawn: a square, in metres.
+/// Part of the floor that is drawn: a square, in metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Extent {
     x_m: [f64; 2],
@@ -15,14 +15,14 @@ pub struct Extent {
 const SIZE: (f64, f64) = (380.0, 390.0);
 const PLOT: Plot = Plot { left: 56.0, right: 370.0, top: 16.0, bottom: 330.0 };
 
-/// A pause after which a line does not go on, in seconds.
+/// Duration of a gap after which a line is interrupted, in seconds.
 const PAUSE_S: f64 = 1.0;
 
-/// Places closer than this on the picture are drawn once.
+/// Distance on the picture below which positions are drawn once.
 const NEAR: f64 = 1.5;
 
 impl Extent {
-    /// The smallest square with some room around everything; nothing without a place.
+    /// Returns the smallest square with a margin around all positions; `None` without any.
     pub fn around<'a>(all: impl IntoIterator<Item = &'a Trajectory>) -> Option<Self> {
         let mut places = all.into_iter().flat_map(|t| &t.points).filter(|p| drawable(p));
         let &[_, x, y] = places.next()?;
@@ -31,6 +31,7 @@ impl Extent {
             low = [low[0].min(x), low[1].min(y)];
             high = [high[0].max(x), high[1].max(y)];
         }
+        // Ten percent of margin; at least a metre, so that a person standing still has a scale.
         let half = 0.55 * (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
         let around = |i: usize| {
             let centre = 0.5 * (low[i] + high[i]);
@@ -40,13 +41,14 @@ impl Extent {
     }
 }
 
-/// Far beyond any floor; such a place would hide all others.
+/// Returns false for positions that are not finite or far beyond any floor; they would hide all
+/// others.
 fn drawable(point: &[f64; 3]) -> bool {
     point.iter().all(|v| v.is_finite()) && point[1].abs().max(point[2].abs()) < 1e5
 }
 
-/// A plan view: x (ahead) runs up, y (left) runs left, both at one scale.
-/// People are wide pale lines, tracks are thin ones with their number at the end.
+/// Renders a plan view: x (ahead) runs up, y (left) runs left, both at one scale. People are wide
+/// pale lines, tracks are thin ones with their number at the end.
 pub fn plan(
     truth: &[Trajectory],
     tracks: &[Trajectory],
@@ -64,6 +66,7 @@ pub fn plan(
                 (hint(&format!("person {}", person.id)))
             }
         }
+        // After the people, so that the thin lines lie on the wide ones.
         @for (index, track) in tracks.iter().enumerate() { (track_lines(index, track, &lines(track))) }
     };
     picture(words, SIZE, &body)
@@ -78,6 +81,7 @@ fn truth_line(line: &[(f64, f64)]) -> Markup {
 
 fn track_lines(index: usize, track: &Trajectory, lines: &[Vec<(f64, f64)>]) -> Markup {
     let Some(&end) = lines.last().and_then(|line| line.last()) else { return html! {} };
+    // Near the right border the number goes to the left of the line's end.
     let end_anchored = end.0 > PLOT.right - 24.0;
     let (dx, anchor) = if end_anchored { (-7.0, "end") } else { (7.0, "start") };
     html! {
@@ -95,7 +99,7 @@ fn track_lines(index: usize, track: &Trajectory, lines: &[Vec<(f64, f64)>]) -> M
     }
 }
 
-/// The lines of a trajectory between its pauses, as places on the picture.
+/// Returns the lines of a trajectory between its gaps, as positions on the picture.
 fn lines(trajectory: &Trajectory, left: &Axis, ahead: &Axis) -> Vec<Vec<(f64, f64)>> {
     let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut before_s = f64::NEG_INFINITY;

@@ -2,14 +2,14 @@ use maud::{Markup, html};
 
 use super::{Axis, Plot, Scale, Words, axes, hint, mark, picture, points, px, series_class};
 
-/// A pipeline in the plane of accuracy and time.
+/// Pipeline in the plane of accuracy and time.
 #[derive(Clone, Debug)]
 pub struct Mark<'a> {
-    /// Its name.
+    /// Name of the pipeline.
     pub name: &'a str,
-    /// Its number among the pipelines, for colour and shape.
+    /// Index among the pipelines, for colour and shape.
     pub series: usize,
-    /// Milliseconds per frame; less is better.
+    /// Time per frame, ms; less is better.
     pub ms: f64,
     /// Accuracy; more is better.
     pub accuracy: f64,
@@ -18,7 +18,7 @@ pub struct Mark<'a> {
 const SIZE: (f64, f64) = (760.0, 360.0);
 const PLOT: Plot = Plot { left: 62.0, right: 740.0, top: 14.0, bottom: 308.0 };
 
-/// Accuracy over time, and the line of those that no other beats in both.
+/// Renders accuracy over time, and the line of the pipelines that no other beats in both.
 pub fn front(marks: &[Mark<'_>], accuracy_name: &str, words: &Words<'_>) -> Markup {
     let x = Axis::around(Scale::Log, marks.iter().map(|m| m.ms), [PLOT.left, PLOT.right]);
     let accuracies = marks.iter().map(|m| m.accuracy);
@@ -41,16 +41,17 @@ pub fn front(marks: &[Mark<'_>], accuracy_name: &str, words: &Words<'_>) -> Mark
     picture(words, SIZE, &body)
 }
 
-/// A rectangle: left, top, right, bottom.
+/// Rectangle: left, top, right, bottom.
 type Box4 = [f64; 4];
 
-/// Where the name of each mark goes: beside, above or below it, where it covers
-/// no mark and no earlier name; where there is room if there is no such place.
+/// Returns the position of each name: beside, above or below its mark, where it covers no mark and
+/// no earlier name; if there is no such position, beside the mark, towards the middle.
 fn labels(marks: &[(&str, (f64, f64))]) -> Vec<(f64, f64, &'static str)> {
     let mut taken: Vec<Box4> =
         marks.iter().map(|&(_, (x, y))| [x - 7.0, y - 7.0, x + 7.0, y + 7.0]).collect();
     let mut placed = Vec::new();
     for &(name, (x, y)) in marks {
+        // In the order of preference: beside a mark a name is read with it at once.
         let sides = [
             (x + 11.0, y + 4.0, "start"),
             (x - 11.0, y + 4.0, "end"),
@@ -72,8 +73,9 @@ fn labels(marks: &[(&str, (f64, f64))]) -> Vec<(f64, f64, &'static str)> {
     placed
 }
 
-/// About the room that a name takes.
+/// Returns the approximate rectangle of a name.
 fn label_box(name: &str, (x, y, anchor): (f64, f64, &str)) -> Box4 {
+    // About seven units a character, because the width is known to the browser only.
     let width = 7.0 * name.chars().count() as f64;
     let left = match anchor {
         "end" => x - width,
@@ -87,10 +89,11 @@ fn overlap(a: &Box4, b: &Box4) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Those that no other beats in both, fastest first.
+/// Returns the marks that no other beats in both, fastest first.
 fn unbeaten<'a, 'b>(marks: &'b [Mark<'a>]) -> Vec<&'b Mark<'a>> {
     let mut sorted: Vec<&Mark<'_>> =
         marks.iter().filter(|m| m.ms.is_finite() && m.accuracy.is_finite()).collect();
+    // Of equal times the most accurate first, so that the others do not pass the test.
     sorted.sort_by(|a, b| a.ms.total_cmp(&b.ms).then(b.accuracy.total_cmp(&a.accuracy)));
     let mut best = f64::NEG_INFINITY;
     sorted.retain(|m| {
@@ -102,7 +105,7 @@ fn unbeaten<'a, 'b>(marks: &'b [Mark<'a>]) -> Vec<&'b Mark<'a>> {
     sorted
 }
 
-/// What can be had at each time: it stays level until the next one is in reach.
+/// Returns the best accuracy for each time as steps: it stays level until the next mark.
 fn stairs(front: &[&Mark<'_>], place: impl Fn(&Mark<'_>) -> Option<(f64, f64)>) -> Vec<(f64, f64)> {
     let mut line: Vec<(f64, f64)> = Vec::new();
     for at in front.iter().filter_map(|m| place(m)) {

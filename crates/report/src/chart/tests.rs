@@ -4,18 +4,18 @@ use tagalong_eval::CurvePoint;
 use super::*;
 use crate::model::Trajectory;
 
-/// Any number, ordinary ones more often.
+/// Generates any number, ordinary ones more often.
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![4 => -1e3..1e3, 1 => any::<f64>(), 1 => Just(f64::NAN), 1 => Just(f64::INFINITY), 1 => Just(0.0)]
 }
 
-/// The values of an attribute in all elements.
+/// Returns the values of an attribute in all elements.
 fn attributes<'a>(svg: &'a str, name: &str) -> Vec<&'a str> {
     let start = format!(" {name}=\"");
     svg.split(&start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// Every place that is drawn: x and y by the attributes that hold them.
+/// Returns all positions that are drawn: x and y by the attributes that hold them.
 fn places(svg: &str) -> (Vec<f64>, Vec<f64>) {
     let of = |names: &[&str]| -> Vec<f64> {
         let texts = names.iter().flat_map(|n| attributes(svg, n));

@@ -43,7 +43,7 @@ impl Page<'_> {
         })
     }
 
-    /// The tasks of a log that stand for their pipelines.
+    /// Returns the tasks of a log that stand for their pipelines.
     fn drawn(&self, log: &str) -> impl Iterator<Item = &TaskResult> {
         self.view.pipelines.iter().filter_map(move |p| self.view.drawn(p, log))
     }
@@ -62,6 +62,7 @@ impl Page<'_> {
 
     fn plans_of(&self, log: &str) -> Option<Markup> {
         let tasks: Vec<&TaskResult> = self.drawn(log).collect();
+        // One extent for all pipelines, so that their plans can be compared at sight.
         let extent = Extent::around(tasks.iter().flat_map(|t| t.truth.iter().chain(&t.tracks)))?;
         Some(html! {
             details class="print" open {
@@ -81,6 +82,7 @@ impl Page<'_> {
     }
 
     fn funnel(&self, pipeline: &str) -> Option<Markup> {
+        // The order of the first occurrence is that of the stages; the map sorts by name.
         let mut order: Vec<&str> = Vec::new();
         let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
         for dropped in self.view.done(pipeline).flat_map(|t| &t.funnel) {
@@ -90,6 +92,7 @@ impl Page<'_> {
             *counts.entry(&dropped.test).or_default() += dropped.count;
         }
         let most = *counts.values().max()? as f64;
+        // At least 1, because no candidate may have been dropped.
         let all = counts.values().sum::<u64>().max(1) as f64;
         let head = html! { (column("Test", None)) (column("Dropped", None)) (column("Share", None)) th scope="col" class="picture" { "Dropped, as a bar" } };
         let row = |test: &str| {
@@ -127,7 +130,7 @@ fn plan_of(task: &TaskResult, extent: Extent, series: usize) -> Markup {
     }
 }
 
-/// Digits in groups of three, by thin spaces.
+/// Formats digits in groups of three, separated by thin spaces.
 fn thousands(count: u64) -> String {
     let digits = count.to_string();
     let mut out = String::new();

@@ -10,6 +10,7 @@ impl Page<'_> {
     pub(super) fn events(&self) -> Option<Markup> {
         let tasks: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| !t.events.is_empty()).collect();
+        // Numbered among all tasks, as the links from the pairs are.
         let numbered = self.view.tasks.iter().enumerate().filter(|(_, t)| !t.events.is_empty());
         (!tasks.is_empty()).then(|| {
             html! {
@@ -20,7 +21,7 @@ impl Page<'_> {
         })
     }
 
-    /// How often each kind happened to each pipeline.
+    /// Renders the number of events of each kind and pipeline.
     fn event_counts(&self, tasks: &[&TaskResult]) -> Markup {
         let mut counts: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
         for task in tasks {
@@ -69,7 +70,7 @@ impl Page<'_> {
     }
 }
 
-/// The anchor of an event, by the places of its task and of itself.
+/// Returns the anchor of an event, by the indices of its task and of itself.
 pub(super) fn event_id(task: usize, event: usize) -> String {
     format!("event-{task}-{event}")
 }
@@ -87,7 +88,7 @@ fn row(event: &EventRow, id: &str) -> Markup {
     }
 }
 
-/// A kind of event with a sign of its own, since colour alone does not tell.
+/// Renders a kind of event with a sign of its own, because colour alone is not enough.
 pub(super) fn kind(kind: &str) -> Markup {
     let (sign, name) = match kind {
         "miss" => ("○", "miss"),
@@ -101,8 +102,9 @@ pub(super) fn kind(kind: &str) -> Markup {
     html! { span class=(class) { span aria-hidden="true" { (sign) " " } (name) } }
 }
 
-/// The picture of an event, if it is one: anything else than base64 stays out.
+/// Renders the picture of an event; text other than base64 is left out.
 pub(super) fn picture(event: &EventRow) -> Markup {
+    // Other text is no picture, and the page would show a broken one.
     let data = event.picture_png_base64.as_deref().filter(|data| is_base64(data));
     html! {
         @if let Some(data) = data {

@@ -37,6 +37,7 @@ fn figures() -> Markup {
     let all = Place::ALL
         .into_iter()
         .flat_map(Figure::at)
+        // Figures of both spaces are explained once.
         .filter(|f| known.insert(f.name))
         .collect::<Vec<_>>();
     html! {

@@ -27,7 +27,7 @@ impl Page<'_> {
         self.view.tasks.iter().any(|task| place.scores(task).is_some())
     }
 
-    /// Who is ahead by the main figure, and whether that is more than chance.
+    /// Names the pipeline with the best main figure, and says if the difference is significant.
     fn verdict(&self) -> Option<Markup> {
         let place = Place::ALL.into_iter().find(|p| self.ranked(*p).len() > 1)?;
         let ranked = self.ranked(place);
@@ -58,12 +58,13 @@ impl Page<'_> {
         })
     }
 
-    /// Pipelines with the most logs, best first.
+    /// Returns the pipelines with the most logs, best first.
     fn ranked(&self, place: Place) -> Vec<(&PipelineSummary, Estimate)> {
         let key = MAIN.key(place);
         let pipelines = self.summary.pipelines.iter();
         let mut all: Vec<(&PipelineSummary, Estimate)> =
             pipelines.filter_map(|p| Some((p, *p.figures.get(&key)?))).collect();
+        // A mean over fewer logs, which may be the easier ones, is not comparable.
         let most = all.iter().map(|(_, e)| e.logs).max().unwrap_or(0);
         all.retain(|(_, e)| e.logs == most);
         all.sort_by(|a, b| b.1.mean.total_cmp(&a.1.mean));
@@ -107,6 +108,7 @@ impl Page<'_> {
         let all: Vec<&Estimate> =
             self.summary.pipelines.iter().filter_map(|p| p.figures.get(&key)).collect();
         let most = all.iter().map(|e| e.logs).max().unwrap_or(0);
+        // One picture per row is enough: that of the ranking figure.
         let picture = (figure.name == MAIN.name)
             .then(|| interval(estimate.mean, estimate.interval, range(&all)));
         cell(
@@ -123,7 +125,7 @@ impl Page<'_> {
         )
     }
 
-    /// The main figure of each pipeline on each log.
+    /// Renders the main figure of each pipeline on each log.
     fn log_table(&self, place: Place) -> Markup {
         let columns: Vec<_> =
             self.view.pipelines.iter().map(|p| (*p, per_log(&self.view, p, MAIN, place))).collect();
@@ -159,6 +161,7 @@ impl Page<'_> {
 
 fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
     let Some(value) = value else { return no_cell() };
+    // A single column has no best one.
     let best = columns > 1 && value >= best;
     cell(
         value,
@@ -181,12 +184,12 @@ fn figure_head(figure: &Figure) -> Markup {
     }
 }
 
-/// The first sentence, since hints should be short.
+/// Returns the first clause, because hints should be short.
 fn short_title(meaning: &str) -> &str {
     meaning.split(['.', ';', ',']).next().unwrap_or(meaning)
 }
 
-/// As a heading: short, with its unit.
+/// Returns the heading of a figure: short, with its unit.
 pub(super) fn figure_name(figure: &Figure) -> String {
     let name = match figure.name {
         "fp_per_frame" => "False / frame",
@@ -206,6 +209,7 @@ fn done_cell(summary: &PipelineSummary, most: u64) -> Markup {
 
 fn people_cell(summary: &PipelineSummary) -> Markup {
     let Some(found) = summary.people_found else { return no_cell() };
+    // The summary keeps the share; the count is recovered from it.
     let count = (found.estimate * summary.people as f64).round() as u64;
     cell(
         found.estimate,
@@ -220,7 +224,7 @@ pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
     html! { span class="ends" { (span_of([low, high], decimals)) } }
 }
 
-/// Two ends as one text; a dash would look like a sign where one is negative.
+/// Formats two ends as one text; with a negative one a dash would look like a sign.
 pub(super) fn span_of([low, high]: [f64; 2], decimals: usize) -> String {
     let between = if low < 0.0 || high < 0.0 { " to " } else { "–" };
     format!("{}{between}{}", number(low, decimals), number(high, decimals))
@@ -231,7 +235,7 @@ fn p_equals(p: f64) -> String {
     if text.starts_with('<') { text } else { format!("= {text}") }
 }
 
-/// From the lowest to the highest end of all.
+/// Returns the range from the lowest to the highest end of all, including zero.
 fn range(all: &[&Estimate]) -> [f64; 2] {
     let ends =
         all.iter().flat_map(|e| e.interval.unwrap_or([e.mean, e.mean]).into_iter().chain([e.mean]));

@@ -1,4 +1,4 @@
-//! The page.
+//! HTML page of the report.
 
 mod charts;
 mod events;
@@ -15,24 +15,24 @@ use crate::model::{Benchmark, Outcome, Timings};
 use crate::summary::Summary;
 use crate::view::View;
 
+// Inlined, so that the page is one file.
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// Everything that the sections are made from.
+/// Data that the sections are made from.
 struct Page<'a> {
     view: View<'a>,
     summary: Summary,
-    /// Only if they mean something.
+    /// Times, if the machine was otherwise idle.
     timings: Option<&'a Timings>,
-    /// There are some, but the machine was busy.
+    /// True if there are times but the machine was busy.
     timings_left_out: bool,
 }
 
-/// The report as one HTML page without any reference to another file.
+/// Returns the report as one HTML page without any reference to another file.
 ///
-/// Times are shown only if [`Timings::exclusive`] says that they mean something;
-/// without them the page depends on nothing but the benchmark, and not on the
-/// order of its tasks.
+/// Times are shown only if [`Timings::exclusive`] is set; without them the page depends on the
+/// benchmark only, and not on the order of its tasks.
 pub fn html(benchmark: &Benchmark, timings: Option<&Timings>) -> String {
     let page = Page {
         view: View::new(benchmark),
@@ -43,7 +43,7 @@ pub fn html(benchmark: &Benchmark, timings: Option<&Timings>) -> String {
     page.whole().into_string()
 }
 
-/// A section: its anchor, its heading and what it holds.
+/// Section with its anchor, heading and body.
 struct Section {
     anchor: &'static str,
     heading: &'static str,
@@ -130,7 +130,7 @@ impl Page<'_> {
         }
     }
 
-    /// The number of a pipeline, for colour, shape and dashes.
+    /// Returns the index of a pipeline, for colour, shape and dashes.
     fn series(&self, pipeline: &str) -> usize {
         self.view.pipelines.iter().position(|p| *p == pipeline).unwrap_or(0)
     }
@@ -140,14 +140,15 @@ fn amount(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A number for people; nothing but a dash if it is none.
+/// Formats a number; a dash if it is not finite.
 fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() { minus(&format!("{value:.decimals$}")) } else { "–".to_owned() }
 }
 
-/// A difference, always with its sign.
+/// Formats a difference, always with its sign.
 fn signed(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
+    // A difference that rounds to zero has no sign.
     if value > 0.0 && text.chars().any(|c| ('1'..='9').contains(&c)) {
         format!("+{text}")
     } else {
@@ -155,12 +156,12 @@ fn signed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A heading cell by which the table can be sorted.
+/// Renders a heading cell by which the table can be sorted.
 fn column(name: &str, hint: Option<&str>) -> Markup {
     html! { th scope="col" title=[hint] { (name) } }
 }
 
-/// A table that scrolls by itself if it is wider than the page.
+/// Renders a table that scrolls by itself if it is wider than the page.
 fn table(name: &str, caption: &Markup, head: &Markup, body: &Markup) -> Markup {
     html! {
         section class="scroll" tabindex="0" aria-label=(name) {
@@ -173,12 +174,12 @@ fn table(name: &str, caption: &Markup, head: &Markup, body: &Markup) -> Markup {
     }
 }
 
-/// A cell with a number, and the number itself for sorting.
+/// Renders a cell with a number, and the number itself for sorting.
 fn cell(value: f64, shown: &Markup) -> Markup {
     html! { td class="number" data-value=[value.is_finite().then_some(value)] { (shown) } }
 }
 
-/// A cell with nothing in it.
+/// Renders an empty cell.
 fn no_cell() -> Markup {
     html! { td class="number none" { "–" } }
 }

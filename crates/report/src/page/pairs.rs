@@ -8,10 +8,10 @@ use crate::compare::{Difference, SAME_EVENT_S, compare_in};
 use crate::figures::{Figure, Place};
 use crate::summary::PairSummary;
 
-/// Differences listed per pair; the rest is counted.
+/// Maximum number of differences listed per pair; the rest is counted.
 const MOST_LISTED: usize = 200;
 
-/// Pairs whose differences are listed.
+/// Maximum number of pairs with listed differences.
 const MOST_PAIRS: usize = 45;
 
 impl Page<'_> {
@@ -94,9 +94,10 @@ impl Page<'_> {
         table(&name, &caption, &head, &body)
     }
 
-    /// The frame of an event, as a link to its row and picture.
+    /// Renders the frame of an event, as a link to its row and picture.
     fn link(&self, d: &Difference<'_>) -> Markup {
         let found = self.view.tasks.iter().enumerate().find_map(|(task, of)| {
+            // Events have no id of their own, but the difference refers to the event itself.
             let index = of.events.iter().position(|event| std::ptr::eq(event, d.event))?;
             Some(event_id(task, index))
         });
@@ -132,6 +133,7 @@ fn gain_table(a: &str, b: &str, rows: &[&PairSummary]) -> Markup {
 }
 
 fn gain_row(row: &PairSummary, figure: &Figure, place: Place) -> Markup {
+    // The difference is that of `b` from `a`, so a better one than 0 speaks for `b`.
     let winner = if figure.better(row.difference, 0.0) { &row.b } else { &row.a };
     let better = match (row.difference == 0.0, row.is_clear()) {
         (true, _) => html! { "equal" },

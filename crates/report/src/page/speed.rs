@@ -26,7 +26,7 @@ impl Page<'_> {
         }
     }
 
-    /// Times of the finished tasks of a pipeline.
+    /// Returns the times of the finished tasks of a pipeline.
     fn times<'t>(&self, timings: &'t Timings, pipeline: &str) -> Vec<&'t TaskTiming> {
         self.view.done(pipeline).filter_map(|task| timings.tasks.get(&task.hash)).collect()
     }
@@ -111,12 +111,13 @@ impl StageRow {
     }
 }
 
-/// The whole frame, then the stages in their order.
+/// Returns the row of the whole frame, then those of the stages in their order.
 fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
     let Some(p50_ms) = mean(times.iter().map(|t| t.frame_ms_p50)) else { return Vec::new() };
     let p95_ms = mean(times.iter().map(|t| t.frame_ms_p95)).unwrap_or(f64::NAN);
     let mut rows = vec![StageRow { stage: "whole frame".into(), p50_ms, p95_ms, is_total: true }];
     let mut by_stage: BTreeMap<&str, Vec<[f64; 2]>> = BTreeMap::new();
+    // The map sorts by name; the rows keep the order of the pipeline.
     let mut order: Vec<&str> = Vec::new();
     for stage in times.iter().flat_map(|t| &t.stages) {
         if !order.contains(&stage.stage.as_str()) {
@@ -133,7 +134,7 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
     rows
 }
 
-/// The mean of what is a number.
+/// Returns the mean of the finite values.
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)

@@ -38,7 +38,7 @@ impl Page<'_> {
         })
     }
 
-    /// Says which LAMR is none.
+    /// Names the tasks with a meaningless LAMR because all scores are equal.
     pub(super) fn constant_scores(&self) -> Option<Markup> {
         let constant: Vec<&TaskResult> = self
             .view
@@ -122,7 +122,7 @@ impl Page<'_> {
     }
 }
 
-/// How and why a task did not end.
+/// Returns the outcome and the reason of a task that did not finish.
 fn reason(outcome: &Outcome) -> Option<(&'static str, &str)> {
     match outcome {
         Outcome::Done => None,

@@ -1,4 +1,4 @@
-//! Made-up results, shaped like real ones. None of them was measured.
+//! Invented results, shaped like real ones. None of them was measured.
 
 use std::collections::BTreeMap;
 
@@ -7,14 +7,14 @@ use tagalong_report::{
     Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
 };
 
-/// A drawing of a person in a frame, 48 x 64 pixels: PNG in base64.
+/// Picture of a person in a frame, 48 x 64 pixels: PNG in base64.
 const PICTURE: &str = "iVBORw0KGgoAAAANSUhEUgAAADAAAABACAAAAAB5S6uaAAAA3UlEQVR42s3LYQqDMAyGYQ/Wk/SIQ0SKiIiIiMhu\
 lWUppK3a0DGRvD+T76neP1YpBDsGhX23HuxFPQU2DLaiaHYNrK8U2FARsDYjPFgxWOMSED9odgbW5sRTYMFgiTqA\
 6EMzjWDGYI5L9vGDZneAObPPAyaHqwcTBlNRNLsFmFAJMGknMGIwcuYc/2iWAnNdDph8/4ABg4ESwMAzjaDHoKcE\
 0PNMI+gw6CgBdDzTCBwGjhKA45lG0GLQUgJoeaYRNBg0lAAanmkENQY1JYCaZ08BnwD8gMArJIAwUgg+zIHCZKlW\
 pIkAAAAASUVORK5CYII=";
 
-/// Numbers between 0 and 1 that look random and are always the same.
+/// Generator of reproducible numbers between 0 and 1 that look random.
 struct Wobble(u64);
 
 impl Wobble {
@@ -29,7 +29,7 @@ impl Wobble {
     }
 }
 
-/// Results of invented pipelines on invented logs.
+/// Returns results of invented pipelines on invented logs.
 pub fn benchmark(pipelines: &[&str], logs: &[&str]) -> Benchmark {
     let mut tasks = Vec::new();
     for (p, pipeline) in pipelines.iter().enumerate() {
@@ -167,7 +167,7 @@ fn events(wobble: &mut Wobble) -> Vec<EventRow> {
     told.into_iter().enumerate().map(event).collect()
 }
 
-/// Spoils one task, so that the page has something to complain about.
+/// Replaces the result of one task by another outcome, so that the page has a task to report.
 pub fn spoil(benchmark: &mut Benchmark, outcome: Outcome) {
     if let Some(task) = benchmark.tasks.last_mut() {
         let (pipeline, log, hash) = (task.pipeline.clone(), task.log.clone(), task.hash.clone());
@@ -175,7 +175,7 @@ pub fn spoil(benchmark: &mut Benchmark, outcome: Outcome) {
     }
 }
 
-/// Invented times for all tasks.
+/// Returns invented times for all tasks.
 pub fn timings(benchmark: &Benchmark) -> Timings {
     let mut wobble = Wobble(7);
     let mut tasks = BTreeMap::new();

@@ -12,19 +12,19 @@ use super::{FRESH, difference, in_turn, mean, means, over_draws};
 use crate::lab::read;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// Rooms, with two people each.
+/// Number of rooms, with two people each.
 const ROOMS: u64 = 8;
-/// How long each of them is seen, s: more rooms tell more than more images of one.
+/// Duration per person, s: more rooms are more informative than more images of one.
 const EACH_S: f64 = 24.0;
-/// Fewer samples fit no head.
+/// Least number of samples to fit a head.
 const LEAST_SAMPLES: usize = 10;
-/// Times that each room is divided into training and test.
+/// Number of divisions of each room into training and test.
 const REPEATS: u64 = 4;
 
-/// A way to the distance: its name, the detector that measures, and the form.
+/// A method for the distance: its name, the detector that measures the features, and the form.
 type Way = (&'static str, Eye, Distance);
 
-/// The detector of a shipped config.
+/// Detector of a shipped config.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Eye {
     Printed,
@@ -44,10 +44,10 @@ const WAYS: [Way; 7] = [
     ("network of all features", Eye::Ours, Distance::Rich),
 ];
 
-/// The columns that are fitted within a room.
+/// Columns that are fitted within a room.
 const SPLITS: [Split; 3] = [Split::Random, Split::Place, Split::PlaceAndPerson];
 
-/// The people of one room as each of [`EYES`] measures them.
+/// Samples of the people of one room, measured by each of [`EYES`].
 struct Room {
     samples: [Vec<Sample>; EYES.len()],
 }
@@ -58,8 +58,8 @@ impl Room {
     }
 }
 
-/// A shipped detector: its settings and the general head of its model, which was
-/// fitted to rooms of the training split.
+/// A shipped detector: its settings and the general head of its model, which was fitted to rooms of
+/// the training split.
 struct Shipped {
     config: Config,
     head: Head,
@@ -74,6 +74,7 @@ impl Shipped {
         let text = read(&lab.configs.join(format!("{name}.toml")))?;
         let config = settings(&text).map_err(failed)?;
         let model = match config.model.as_str() {
+            // An empty name selects the built-in model, of which this is the source.
             "" => "models/omni-distance.toml",
             model => model,
         };
@@ -89,7 +90,7 @@ fn settings(text: &str) -> Result<Config, toml::de::Error> {
     detector.map_or_else(|| Ok(Config::default()), toml::Value::try_into)
 }
 
-/// Draws a scene and collects what both detectors measure in it.
+/// Simulates a scene and collects the samples of both detectors in it.
 fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, ReproduceError> {
     let collector = |shipped: &Shipped| Collector::new(shipped.config.clone()).map_err(failed);
     let mut collectors = [collector(&shipped[0])?, collector(&shipped[1])?];
@@ -125,7 +126,7 @@ pub(super) fn appearance(lab: &Lab) -> Result<Findings, ReproduceError> {
     Ok(Findings { tables, pictures: Vec::new() })
 }
 
-/// Returns a head of these samples; `None` if they are too few to fit one.
+/// Fits a head to these samples; returns `None` if they are too few.
 fn fitted(samples: &[Sample], seed: u64) -> Result<Option<Head>, ReproduceError> {
     if samples.len() < LEAST_SAMPLES {
         return Ok(None);
@@ -137,14 +138,14 @@ fn errors(samples: &[Sample], head: &Head, how: Distance) -> Vec<f64> {
     samples.iter().map(|s| (s.distance(head, how) - s.distance_m).abs()).collect()
 }
 
-/// Returns the errors of all ways in one room, by a head for each of [`EYES`].
+/// Returns the errors of all methods in one room, by a head for each of [`EYES`].
 fn of_ways(parts: [&[Sample]; EYES.len()], heads: [&Head; EYES.len()]) -> Vec<Vec<f64>> {
     let way = |(_, eye, how): &Way| errors(parts[*eye as usize], heads[*eye as usize], *how);
     WAYS.iter().map(way).collect()
 }
 
-/// Returns the errors of all ways in one room, fitted to samples of that room, and
-/// counts the divisions that leave too few of them.
+/// Returns the errors of all methods in one room, fitted to samples of that room, and counts the
+/// divisions that leave too few of them.
 fn within(room: &Room, split: Split, too_few: &mut u64) -> Result<Vec<Vec<f64>>, ReproduceError> {
     let mut all = vec![Vec::new(); WAYS.len()];
     for seed in 0..REPEATS {
@@ -161,7 +162,7 @@ fn within(room: &Room, split: Split, too_few: &mut u64) -> Result<Vec<Vec<f64>>,
     Ok(all)
 }
 
-/// Section 6.1, the first table.
+/// Builds the first table of section 6.1.
 fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceError> {
     let mut columns: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
     let mut too_few = 0;
@@ -219,7 +220,7 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
     })
 }
 
-/// Fig. 5, whose values are lost.
+/// Builds the table for Fig. 5, of which the values are lost.
 fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
     let mut parts = Vec::new();
     for room in rooms {
@@ -234,6 +235,7 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
             plain.push(vec![pearson(&values, &truth)]);
             ranked.push(vec![pearson(&ranks(&values), &ranks(&truth))]);
         }
+        // The deviation over rooms is not that of samples, which the other tables show.
         let cell = |draws: &[Vec<f64>]| Cell { deviation: None, ..over_draws(draws, 3) };
         Row::ours(name, vec![cell(&plain), cell(&ranked)])
     };
@@ -262,7 +264,7 @@ fn pearson(a: &[f64], b: &[f64]) -> f64 {
     product(a, ma, b, mb) / (product(a, ma, a, ma) * product(b, mb, b, mb)).sqrt()
 }
 
-/// Ranks; what is equal shares the mean of its ranks.
+/// Returns ranks; equal values share the mean of their ranks.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -301,7 +303,7 @@ fn bearings(rooms: &[Room]) -> Table {
     }
 }
 
-/// Section 6.1, the second table.
+/// Builds the second table of section 6.1.
 fn of_persons(rooms: &[Room], strangers: &Head) -> Result<Table, ReproduceError> {
     let mut models = [const { Vec::new() }; 4];
     for room in rooms {
@@ -313,6 +315,7 @@ fn of_persons(rooms: &[Room], strangers: &Head) -> Result<Table, ReproduceError>
         let Some(both) = fitted(&training, 0)? else { continue };
         let mut errors_of = [const { Vec::new() }; 4];
         for who in people {
+            // A person counts only with all models, which are compared on the same samples.
             let of_others = fitted(&of(&training, who, false), 0)?;
             let (Some(own), Some(other)) = (fitted(&of(&training, who, true), 0)?, of_others)
             else {
@@ -366,7 +369,7 @@ mod tests {
         assert_eq!(ranks(&[5.0, 1.0, 5.0, 0.0]), [2.5, 1.0, 2.5, 0.0]);
     }
 
-    /// The model of the printed method is fitted to what the printed method measures.
+    /// The model of the printed method is fitted to the features of the printed method.
     #[test]
     fn the_printed_method_is_trained_with_the_settings_it_is_used_with() {
         let printed = include_str!("../../../../configs/omni-appearance-as-printed.toml");

@@ -1,4 +1,4 @@
-//! Section 3: four webcams that see a hat, calibrated by known places.
+//! Section 3: four webcams that observe a hat, calibrated by known positions.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +10,14 @@ use tagalong_triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate,
 use super::over_draws;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// Rooms, each with its own webcams.
+/// Number of rooms, each with its own webcams.
 const ROOMS: u64 = 6;
-/// For how long the hat is seen, s.
+/// Duration of the observation, s.
 const SEEN_S: &str = "30.0";
-/// How far off the first guess of a webcam is: m, rad, and part of the focal length.
+/// Errors of the first guess of a webcam: m, rad, and part of the focal length.
 const GUESS: (f64, f64, f64) = (0.3, 0.08, 0.1);
 
-/// Places of a hat that are known, and what the webcams saw.
+/// Returns the webcams, and the known positions of the hat with the observations of the webcams.
 fn hats(lab: &Lab, scene: &Scene) -> (Vec<Station>, Vec<Known>) {
     let mut simulation = Simulation::new(scene, lab.jobs);
     let stations: Vec<Station> = simulation.webcams().filter_map(station).collect();
@@ -33,6 +33,7 @@ fn hats(lab: &Lab, scene: &Scene) -> (Vec<Station>, Vec<Known>) {
                 }
             }
             Event::Webcam(shot) => {
+                // The centre of a hat that the border of the image cuts would be off.
                 let hat = find_hat(&shot.image, &HatColour::default()).filter(|hat| !hat.cut);
                 let sight = hat.map(|hat| Sight { station: shot.webcam, pixel: hat.centre });
                 sights.entry(shot.captured_ns).or_default().extend(sight);
@@ -40,6 +41,7 @@ fn hats(lab: &Lab, scene: &Scene) -> (Vec<Station>, Vec<Known>) {
             Event::Odometry(_) => {}
         }
     }
+    // The position is known only at the capture times of the robot's camera.
     for (at, sights) in sights {
         known.extend(places.get(&at).map(|place| Known { place: *place, sights }));
     }
@@ -58,9 +60,10 @@ fn station(camera: &Camera) -> Option<Station> {
     })
 }
 
-/// A guess that is off, each webcam otherwise.
+/// Returns a guess with other errors for each webcam.
 fn guessed(truth: &[Station]) -> Vec<Station> {
     let (metres, radians, part) = GUESS;
+    // The bits of the number give each of the four webcams other signs.
     let sign = |number: usize, bit: usize| if (number >> bit) & 1 == 0 { 1.0 } else { -1.0 };
     let off = |(number, station): (usize, &Station)| Station {
         at: station.at + Vector2::new(sign(number, 0), sign(number, 1)) * metres,
@@ -72,20 +75,21 @@ fn guessed(truth: &[Station]) -> Vec<Station> {
     truth.iter().enumerate().map(off).collect()
 }
 
-/// Distances of measured from known places, cm.
+/// Returns the distances between measured and known positions, cm.
 fn distances_to(stations: &[Station], known: &[Known]) -> Vec<f64> {
     let cameras = Cameras::new(stations.to_vec());
     cameras.distances_m(known).iter().map(|m| 100.0 * m).collect()
 }
 
-/// Returns the distances of one room: by the cameras as guessed, as calibrated, and as
-/// they are; to places that were used, and to those held out.
+/// Returns the distances of one room: by the cameras as guessed, as calibrated, and as they are; at
+/// positions used for the calibration, and at those held out.
 fn of_room(lab: &Lab, scene: &Scene) -> [[Vec<f64>; 2]; 3] {
     let mut scene = scene.clone();
-    // The robot's own camera is of no importance here.
+    // The robot's own camera is not used here, so a small image saves time.
     (scene.camera.width, scene.camera.height) = (16, 16);
     let (truth, known) = hats(lab, &scene);
     lab.progress.step();
+    // Every second position, so that both halves cover the whole walk.
     let every =
         |part: usize| -> Vec<Known> { known.iter().skip(part).step_by(2).cloned().collect() };
     let (used, held) = (every(0), every(1));
@@ -94,7 +98,7 @@ fn of_room(lab: &Lab, scene: &Scene) -> [[Vec<f64>; 2]; 3] {
     [guess, found, truth].map(|stations| [&used, &held].map(|known| distances_to(&stations, known)))
 }
 
-/// Section 3.
+/// Builds the table of section 3.
 pub(super) fn calibration(lab: &Lab) -> Result<Findings, ReproduceError> {
     let scenes = lab.scenes("omni-hat", &[("duration_s", SEEN_S)], lab.seeds(ROOMS))?;
     lab.progress.begin(scenes.len(), "looking at a hat");

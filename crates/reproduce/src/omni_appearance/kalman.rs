@@ -1,19 +1,18 @@
-//! Section 6.2: the filter against the appearance model alone, and the printed method
-//! step by step.
+//! Section 6.2: the filter against the appearance model alone, and the printed method step by step.
 
 use tagalong_trials::{Contender, Run, Trial, TrialError};
 
 use super::{FRESH, difference, in_turn, means, over_draws};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// Rooms, with two people each.
+/// Number of rooms, with two people each.
 const ROOMS: u64 = 10;
-/// How long each of them is seen, s.
+/// Duration per person, s.
 const EACH_S: f64 = 12.0;
 /// Largest error of a position that counts as found, m.
 const FOUND_M: f64 = 0.5;
 
-/// The filters of section 6.2, and what `u` may be.
+/// Filters of section 6.2, with the possible meanings of `u`.
 const FILTERS: [(&str, &str); 6] = [
     ("appearance model alone", "plugin = \"last-seen\""),
     ("printed Q and R, u = 0", PRINTED_U),
@@ -31,12 +30,11 @@ const PRINTED_U: &str =
 const LAST_U: &str =
     "plugin = \"floor-kalman\"\nconfig = { form = \"last-difference\", measurement = \"fixed\" }";
 
-/// The distances that are filtered, with what they are called.
+/// Distance estimates that are filtered, with their names.
 const DISTANCES: [(&str, &str); 2] =
     [("network 3-4-1", "network"), ("network of all features", "rich")];
 
-/// Steps away from the printed method: the change against the row above, its detector,
-/// and its filter.
+/// Steps from the printed method: the change against the row above, its detector, and its filter.
 const STEPS: [(&str, &str, &str); 6] = [
     ("misprint: the panorama has no seam", SEAMLESS, PRINTED_U),
     ("misprint: u is the last difference, with its noise", SEAMLESS, LAST_U),
@@ -58,17 +56,17 @@ const SEAMLESS: &str = "model = \"models/omni-distance-as-printed.toml\"\ndistan
     background_frames = 5\nadapt_s = 0.0\nabsorb_s = 0.0\nshadow_min = 1.0\nvalley = 0.0\n\
     max_people = 1";
 const OURS: &str = "plugin = \"floor-kalman\"";
-/// The config above these rows, and those below them.
+/// Config before the first step, and those after the last.
 const PRINTED: &str = "omni-appearance-as-printed";
 const BEYOND: [&str; 2] = ["omni-appearance", "omni-best"];
 
 /// Errors of the runs of one room.
 struct Walk {
-    /// In the images in which all filters have an answer, for each filter.
+    /// Errors of each filter, in the images in which all filters have an estimate.
     of_filters: Vec<Vec<f64>>,
-    /// In the images in which it has an answer, for each step from the printed method.
+    /// Errors of each step from the printed method, in the images in which it has an estimate.
     of_steps: Vec<Vec<f64>>,
-    /// Images with a person in view.
+    /// Number of images with a person in view.
     images: usize,
 }
 
@@ -111,6 +109,7 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
         images: 0,
     };
     for (at, moment) in trial.moments.iter().enumerate() {
+        // The people are in the room one after the other, so there is one at a time.
         let Some(truth) = moment.truth.first().filter(|truth| !truth.ignore) else { continue };
         let error = |run: &Run| {
             let seen = run.reports[at].tracks.iter().filter(|track| track.seen);
@@ -120,6 +119,7 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
             seen.map(off).min_by(f64::total_cmp)
         };
         let (of_filters, of_steps) = trial.runs.split_at(filters);
+        // Filters are compared on the images in which all of them have an estimate.
         let all: Option<Vec<f64>> = of_filters.iter().map(error).collect();
         for (errors, error) in walk.of_filters.iter_mut().zip(all.into_iter().flatten()) {
             errors.push(error);
@@ -132,8 +132,8 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
     Ok(walk)
 }
 
-/// Section 6.2, with the gain over the first row; `first` is the number of the first
-/// filter among the contenders.
+/// Builds the table of section 6.2, with the gain over the first row; `first` is the number of the
+/// first filter among the contenders.
 fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
     let published = |mean, deviation| Cell { deviation: Some(deviation), ..Cell::number(mean, 3) };
     let mut rows = vec![
@@ -165,7 +165,7 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
     }
 }
 
-/// Compares the printed method with one that is put right, step by step.
+/// Builds the table from the printed method to the corrected one, step by step.
 fn steps(walks: &[Walk]) -> Table {
     let names = std::iter::once("as printed").chain(STEPS.map(|(name, ..)| name)).chain(BEYOND);
     let draws = |at: usize| -> Vec<Vec<f64>> {

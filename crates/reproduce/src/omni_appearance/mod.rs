@@ -1,5 +1,5 @@
-//! P5: a person in the panorama of a conical mirror, the distance learned, and a
-//! Kalman filter on the floor plan.
+//! P5: a person in the panorama of a conical mirror, a learned distance, and a Kalman filter on the
+//! floor plan.
 
 mod appearance;
 mod calibration;
@@ -12,7 +12,7 @@ use tagalong_sim::Scene;
 
 use crate::{Cell, Experiment, Lab, ReproduceError, System};
 
-/// The system.
+/// The system of P5.
 pub const SYSTEM: System = System {
     name: "omni-appearance",
     about: "P5: a person in a conical mirror, the distance by a network, a Kalman filter",
@@ -41,7 +41,7 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// A note on the draws.
+/// Note on the draws.
 const FRESH: &str = "Each draw is another room with other furniture, light, people and ways, and \
     another mirror, which differs from what the log says of it by chance.";
 
@@ -52,7 +52,7 @@ fn in_turn(lab: &Lab, seeds: u64, each_s: f64) -> Result<Vec<Scene>, ReproduceEr
     Ok(scenes.into_iter().map(alone).collect())
 }
 
-/// The mean; 0 of nothing.
+/// Returns the mean; 0 of no values.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
@@ -62,10 +62,11 @@ fn means<'a>(draws: impl IntoIterator<Item = &'a Vec<f64>>) -> Vec<f64> {
     draws.into_iter().filter(|values| !values.is_empty()).map(|values| mean(values)).collect()
 }
 
-/// Returns the mean of the means of draws, its interval over draws, and the deviation
-/// of all values.
+/// Returns the mean of the means of draws, its interval over draws, and the deviation of all
+/// values.
 fn over_draws(draws: &[Vec<f64>], digits: usize) -> Cell {
     let all = Cell::mean(&draws.concat(), digits);
+    // Values of one draw depend on each other, so the interval is that of the means of draws.
     let means = means(draws);
     match mean_interval(&means) {
         Some(interval) => {
@@ -75,8 +76,7 @@ fn over_draws(draws: &[Vec<f64>], digits: usize) -> Cell {
     }
 }
 
-/// Returns the mean difference of draws to those of a rival, with its interval over
-/// draws.
+/// Returns the mean difference of draws to those of a rival, with its interval over draws.
 fn difference(rival: &[Vec<f64>], draws: &[Vec<f64>], digits: usize) -> Cell {
     let both = rival.iter().zip(draws).filter(|(a, b)| !a.is_empty() && !b.is_empty());
     let (a, b): (Vec<f64>, Vec<f64>) = both.map(|(a, b)| (mean(a), mean(b))).unzip();

@@ -1,4 +1,4 @@
-//! What the paper leaves to others: several people, and a robot that drives.
+//! Beyond the paper: several people, and a robot that drives.
 
 use tagalong_eval::{Scores, Tally, draws_interval};
 use tagalong_sim::Scene;
@@ -7,22 +7,22 @@ use tagalong_trials::{Judge, Trial, TrialError};
 use super::{FRESH, over_draws};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// The printed method, ours, its detector with the filter of P1, and our best.
+/// The printed method, the corrected one, its detector with the filter of P1, and the best.
 const PIPELINES: [&str; 4] =
     ["omni-appearance-as-printed", "omni-appearance", "omni-ekf", "omni-best"];
-/// Draws of each scene.
+/// Number of draws of each scene.
 const SEEDS: u64 = 6;
-/// How long they are, s: more draws tell more than longer ones.
+/// Duration, s: more draws are more informative than longer ones.
 const LONG_S: f64 = 29.0;
 
-/// A name, a scene, and how many of its people walk in it.
+/// Title, scene, and number of people that walk in it.
 const WORLDS: [(&str, &str, usize); 3] = [
     ("two people", "omni-people", 2),
     ("three people", "omni-people", 3),
     ("two people, the robot drives", "omni-moving", 2),
 ];
 
-/// How one pipeline did.
+/// Results of one pipeline.
 struct Done {
     tally: Tally,
     errors_m: Vec<f64>,

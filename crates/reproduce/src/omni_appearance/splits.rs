@@ -6,19 +6,19 @@ use std::f64::consts::{PI, TAU};
 use tagalong_learn::mix;
 use tagalong_omni_appearance::train::Sample;
 
-/// Part of the samples, or of the places, that is used for training (P5, section 4.4).
+/// Part of the samples, or of the sectors, that is used for training (P5, section 4.4).
 const TRAINING_PART: f64 = 0.3;
-/// Number of places: sectors around the robot. Each has near and far ones, so that a
-/// place is held out and no range of distances.
+/// Number of sectors around the robot. Each has near and far samples, so that the split holds out
+/// sectors and no range of distances.
 const SECTORS: u64 = 12;
 
-/// A way to divide the samples of one room.
+/// Method of dividing the samples of one room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Split {
-    /// At random, as in the paper: most images of the test have a neighbour in the
-    /// training, a third of a second away.
+    /// At random, as in the paper: most images of the test have a neighbour in the training, a
+    /// third of a second away.
     Random,
-    /// By the sector in which the person is.
+    /// By the sector of the person.
     Place,
     /// By sector and person.
     PlaceAndPerson,
@@ -30,7 +30,8 @@ impl Split {
         let places = match self {
             Self::Random => BTreeSet::new(),
             Self::Place => chosen(0..SECTORS, TRAINING_PART, seed),
-            // Of one person of two, about as many samples as otherwise.
+            // With one person of two, half of the sectors give about as many samples as the other
+            // splits.
             Self::PlaceAndPerson => chosen(0..SECTORS, 0.5, seed),
         };
         let numbers = chosen(0..samples.len() as u64, TRAINING_PART, seed);
@@ -57,15 +58,18 @@ impl Split {
     }
 }
 
-/// Returns the sector in which the person of a sample is.
+/// Returns the sector of the person in a sample.
 fn sector(sample: &Sample) -> u64 {
     let turn = (sample.true_bearing_rad + PI) / TAU;
+    // A bearing of exactly pi would give one sector too many.
     ((turn * SECTORS as f64) as u64).min(SECTORS - 1)
 }
 
-/// Returns a part of some keys, by chance.
+/// Returns a random part of some keys.
 fn chosen(keys: std::ops::Range<u64>, part: f64, seed: u64) -> BTreeSet<u64> {
     let count = (part * (keys.end - keys.start) as f64).round() as usize;
+    // The keys are small, so that the shifted seed does not overlap them.
+    // A shuffle by seed: the keys are sorted by a hash of key and seed.
     let mut order: Vec<(u64, u64)> = keys.map(|key| (mix(key ^ (seed << 40)), key)).collect();
     order.sort_unstable();
     order.into_iter().take(count).map(|(_, key)| key).collect()
@@ -77,7 +81,7 @@ mod tests {
 
     use super::*;
 
-    /// Two people who go round the robot, one after the other.
+    /// Samples of two people that go round the robot, one after the other.
     fn samples() -> Vec<Sample> {
         let sample = |frame: u64| Sample {
             features: Features {

@@ -1,5 +1,5 @@
-//! What the papers leave free, fitted for their printed forms: a form that is compared
-//! with untuned numbers is a straw man. Everything is drawn with seeds of `validation`.
+//! Fits the parameters that the papers do not print, for their printed forms: a comparison with
+//! untuned parameters would be unfair to them. All scenes have seeds of `validation`.
 
 use tagalong_core::{Camera, Frame, Funnel};
 use tagalong_eval::Tally;
@@ -13,32 +13,31 @@ use super::variants::{self, Variant};
 use super::walk::{FOLLOWED, only_the_walker_counts};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// A frame without a place counts like a place that is this far off, m: the judge matches
-/// none that is farther.
+/// Error of a frame without an estimate, m: the judge matches no estimate that is farther away.
 const WITHOUT_M: f64 = 0.5;
 
-/// What is tried for the threshold of the printed dissimilarity, m². The other costs keep
-/// the proportions that they have in the corrected config.
+/// Thresholds to try for the printed dissimilarity, m². The other costs keep the proportions of the
+/// corrected config.
 const THRESHOLDS: [f64; 5] = [2000.0, 4000.0, 8000.0, 16_000.0, 32_000.0];
-/// What is tried for the noise of the process, m/s², ...
+/// Values to try for the process noise, m/s², ...
 const SIGMAS_W: [f64; 5] = [1.0, 2.5, 5.0, 10.0, 20.0];
-/// ... and of the measurement, m, each with each; ...
+/// ... and for the measurement noise, m, in all combinations; ...
 const SIGMAS_V: [f64; 3] = [0.03, 0.1, 0.2];
-/// ... for the variance of a newcomer's velocity, m²/s², ...
+/// ... for the variance of a new track's velocity, m²/s², ...
 const INITIAL: [f64; 3] = [0.5, 2.0, 8.0];
-/// ... and for the gate, each with each.
+/// ... and for the gate, in all combinations.
 const GATES: [f64; 3] = [11.34, 20.0, 40.0];
 
-/// What a value is chosen for.
+/// Criterion for the choice of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Goal {
-    /// The error of the place of the one who is followed, predicted places included.
+    /// Position error of the followed person, predicted positions included.
     Place,
     /// Misses and false alarms, MOTA.
     Sightings,
 }
 
-/// Numbers of a config that are chosen together.
+/// Parameters of a config that are chosen together.
 struct Step {
     goal: Goal,
     tried: Vec<Vec<(&'static str, f64)>>,
@@ -75,7 +74,7 @@ fn each_with_each(
     a.iter().flat_map(|a| b.iter().map(move |b| vec![(first, *a), (second, *b)])).collect()
 }
 
-/// How one contender did on one walk.
+/// Results of one contender on one walk.
 #[derive(Clone, Debug, Default)]
 struct Score {
     errors_m: Vec<f64>,
@@ -83,14 +82,14 @@ struct Score {
     tally: Tally,
 }
 
-/// A walk that is drawn, and matched, once and looked at many times.
+/// A walk that is simulated, and matched, once and used many times.
 struct Walk {
     seed: u64,
     camera: Camera,
     shots: Vec<(Frame, Moment)>,
 }
 
-/// P1's filter, and the same with its velocity corrected, in stereo and in depth images.
+/// Fits P1's filter, and the same with its velocity corrected, in stereo and in depth images.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -103,7 +102,7 @@ pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
     Ok(findings)
 }
 
-/// P4's threshold and filter, and the same with its velocity corrected.
+/// Fits P4's threshold and filter, and the same with its velocity corrected.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -111,7 +110,7 @@ pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
     of_walks(lab, &FOLLOWED, &variants::OF_P4, &[threshold()])
 }
 
-/// Fits the printed forms among some, on walks in a room full of things.
+/// Fits the printed forms among some variants, on walks in a cluttered room.
 fn of_walks(
     lab: &Lab,
     set: &[(&str, &str)],
@@ -127,7 +126,7 @@ fn of_walks(
     let mut findings = Findings::default();
     for variant in all.iter().filter(|variant| variant.is_printed()) {
         let rest = [noise(), start_and_gate()];
-        // What one form has in common with the one before it is chosen once.
+        // The parameters that a form shares with the one before it are chosen once.
         let steps: Vec<&Step> = match variant.set {
             [] => first.iter().chain(&rest).collect(),
             _ => vec![&rest[0]],
@@ -137,7 +136,7 @@ fn of_walks(
     Ok(findings)
 }
 
-/// Takes one step after the other, each with what was chosen before it.
+/// Fits one step after the other, each with the values chosen before it.
 fn fitted(
     lab: &Lab,
     variant: &Variant,
@@ -177,7 +176,7 @@ fn fitted(
     })
 }
 
-/// The last words of two keys at most; what is left follows from them.
+/// Formats the first key, or both if there are two; the rest follow from the first.
 fn named(keys: &[(&str, f64)]) -> String {
     let word =
         |(key, value): &(&str, f64)| format!("{} = {value}", key.rsplit('.').next().unwrap_or(key));
@@ -192,6 +191,7 @@ impl Walk {
         let mut stereo = StereoDepth::new(stereo.clone()).map_err(failed)?;
         let (camera, mut shots) = (draw.camera().clone(), Vec::new());
         while let Some(drawn) = draw.next_frame() {
+            // The images of a depth camera need no stereo matching.
             let frame = match drawn.frame.depth() {
                 Ok(_) => drawn.frame,
                 Err(_) => {
@@ -217,7 +217,7 @@ impl Walk {
             |one: &Contender| Run { pipeline: one.name.clone(), reports: vec![], worked_ms: 0.0 };
         let mut runs: Vec<Run> = contenders.iter().map(run).collect();
         for (frame, _) in &self.shots {
-            // What is derived from this frame is shared by the contenders, and then given up.
+            // A new frame for each trial, so that the data derived from it are freed afterwards.
             let images = frame.images().clone();
             let (camera, motion) = (frame.camera.clone(), frame.motion);
             let frame = Frame::new(frame.index, frame.stamp, camera, motion, images);
@@ -240,6 +240,7 @@ impl Walk {
 fn best(scores: &[Score], goal: Goal) -> usize {
     let mota = |at: usize| scores[at].tally.clear.mota();
     let loss = |at: usize| match goal {
+        // Errors that agree to the millimetre count as equal, and MOTA decides.
         Goal::Place => (1e3 * scores[at].error_m()).round(),
         Goal::Sightings => -mota(at),
     };
@@ -250,13 +251,15 @@ fn best(scores: &[Score], goal: Goal) -> usize {
     known.min_by(order).unwrap_or(0)
 }
 
-/// Places of the one who is followed, predicted ones included, and sightings of all.
+/// Scores the positions of the followed person, predicted ones included, and the detections of all
+/// people.
 fn scores(mut trial: Trial) -> Result<Vec<Score>, TrialError> {
     let sightings = trial
         .runs
         .iter()
         .map(|run| Ok(Judge::default().judge(&trial, run)?.tally))
         .collect::<Result<Vec<Tally>, TrialError>>()?;
+    // The tallies above cover all people; the position error is that of the walker alone.
     only_the_walker_counts(&mut trial);
     let judge = Judge { coasting: true, ..Judge::default() };
     let both = trial.runs.iter().zip(sightings);

@@ -1,4 +1,4 @@
-//! Printed, corrected and best on the same scenes.
+//! Comparison of the printed, the corrected and the best pipeline on the same scenes.
 
 use tagalong_eval::{mean_interval, paired_gain};
 use tagalong_trials::{Judge, Judged, Trial, TrialError};
@@ -6,14 +6,14 @@ use tagalong_trials::{Judge, Judged, Trial, TrialError};
 use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// The suites of P1 and P4, a crowd, and crossings.
+/// Suites of P1 and P4, a crowd, and crossings.
 const SUITES: [&str; 5] =
     ["following", "square-walk", "full-occlusion", "crowd", "crossing-oblique"];
 
-/// A figure of one contender on one draw.
+/// A score of one contender on one draw.
 type Figure = fn(&Judged) -> f64;
 
-/// How the three do, and what each step gains.
+/// Compares the three pipelines, with the gain of each step.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -63,10 +63,11 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure)
     }
 }
 
-/// The three, and the two steps between them on the same draws.
+/// Returns the cells of the three pipelines, and of the two steps between them on the same draws.
 fn cells(draws: &[Vec<Judged>], digits: usize, figure: Figure) -> Vec<Cell> {
     let scores: Vec<Vec<f64>> =
         draws.iter().map(|draw| draw.iter().map(figure).collect()).collect();
+    // A draw without a score of one pipeline cannot be paired.
     let known: Vec<&Vec<f64>> =
         scores.iter().filter(|draw| draw.iter().all(|v| v.is_finite())).collect();
     let of = |at: usize| known.iter().map(|draw| draw[at]).collect::<Vec<f64>>();

@@ -1,7 +1,6 @@
-//! What verifiers do to things of a kind that they were not trained on. A verifier is
-//! fitted again without each kind in turn, and shown rooms in which it stands: the
-//! figures of models that have seen everything say little of a room that has not been
-//! drawn.
+//! Behaviour of verifiers on furniture of a kind that they were not trained on. A verifier is
+//! fitted again without each kind in turn, and tested in rooms with that kind: the scores of models
+//! that were trained on all kinds say little about a new room.
 
 use std::fs;
 
@@ -19,7 +18,7 @@ use super::verifier::{Whose, share, what_stands_at, whose};
 use super::{STEREO, variants};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table as Page};
 
-/// What is left out in turn.
+/// Kinds that are left out in turn.
 const KINDS: [FurnitureKind; 6] = [
     FurnitureKind::CoatStand,
     FurnitureKind::CardboardFigure,
@@ -28,15 +27,15 @@ const KINDS: [FurnitureKind; 6] = [
     FurnitureKind::Plant,
     FurnitureKind::Poster,
 ];
-/// A verifier, how its model is fitted (with the numbers that cross-validation chose for
-/// the shipped one, to save an hour of it), and how it is asked.
+/// Verifiers, with the settings of their training (with the numbers that cross-validation chose for
+/// the shipped one, which saves an hour), and with their settings in use.
 const VERIFIERS: [(&str, &str, &str); 2] = [
     ("svm-patch", "training = { gammas = [2.0], penalties = [3.0] }", ""),
     ("color-texture", "training = { trees = [200] }", "weight = 2.0\nbias = -4.0"),
 ];
-/// What detects, without its verifiers.
+/// Config of the detector, used without its verifiers.
 const DETECTS: &str = "stereo-best";
-/// In training much is proposed (as by `tagalong train`).
+/// Lowered thresholds, so that training gets many candidates (as by `tagalong train`).
 const LOWERED: [(&str, f64); 9] = [
     ("detectors.0.config.boundary_margin_m", 0.2),
     ("detectors.0.config.min_head_height_m", 1.0),
@@ -48,7 +47,8 @@ const LOWERED: [(&str, f64); 9] = [
     ("manager.config.start_score", -4.0),
     ("manager.config.drop_score", -8.0),
 ];
-/// Whom the rooms show, many moments of few scenes being worth less than few of many.
+/// Scenes, with few frames of many draws instead of many frames of few, because frames of one scene
+/// resemble each other.
 const ROOMS: [(&str, &[(&str, &str)]); 3] = [
     (
         "empty-clutter",
@@ -61,15 +61,15 @@ const ROOMS: [(&str, &[(&str, &str)]); 3] = [
     ),
 ];
 
-/// Sightings that were judged, and of these rejected: by the model that has seen
-/// everything, and by the one that has not seen this.
+/// Judged detections, and rejected ones: by the model that was trained on all kinds, and by the one
+/// without this kind.
 #[derive(Clone, Copy, Debug, Default)]
 struct Judged {
     with: [u64; 2],
     without: [u64; 2],
 }
 
-/// The table.
+/// Runs the experiment.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -80,13 +80,14 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
         let each = (0..=KINDS.len()).map(|_| trainer(lab, plugin, training));
         trainers.push(each.collect::<Result<Vec<_>, _>>()?);
     }
-    // Each draw of a room is worth two, of training and of testing.
+    // Training has two draws for each draw of the test.
     let seeds = lab.seeds(40);
     let lowered = variants::with(&detects, &LOWERED)?;
     let mut counts = [0u64; 2];
     visit(lab, Split::Train, 2 * seeds, &lowered, &mut |frame, sighting| {
         counts[usize::from(sighting.is_person)] += 1;
         for trainer in trainers.iter_mut().flatten().enumerate() {
+            // The last trainer of each verifier leaves no kind out.
             let left_out = KINDS.get(trainer.0 % (KINDS.len() + 1));
             if left_out.is_some_and(|kind| sighting.thing == Some(kind.name())) {
                 continue;
@@ -104,6 +105,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
     let mut things = [[Judged::default(); KINDS.len()]; VERIFIERS.len()];
     let mut people = [Judged::default(); VERIFIERS.len()];
     visit(lab, Split::Test, seeds, &detects, &mut |frame, sighting| {
+        // Candidates that the detector drops itself never matter to a verifier.
         if !sighting.is_believed {
             return Ok(());
         }
@@ -149,7 +151,7 @@ fn table(
     let mut rows = vec![Row::ours("all kinds", cells(std::array::from_fn(|v| sum(things[v]))))];
     let kinds = KINDS.iter().enumerate();
     rows.extend(kinds.map(|(at, kind)| Row::ours(kind.name(), cells(of_kind(at)))));
-    // Every model is asked about every person.
+    // Each model is tested on each person, so that the sums count people once per kind.
     let times = KINDS.len() as u64;
     let mut of_people: Vec<Cell> = cells(*people);
     of_people[0] = Cell::number((people[0].with[0] / times) as f64, 0);
@@ -181,20 +183,20 @@ fn table(
     }
 }
 
-/// A candidate of the detector that the truth can label.
+/// A labelled candidate of the detector.
 struct Sighting<'a> {
     detection: &'a Detection,
     is_person: bool,
-    /// What stands where nobody is.
+    /// Furniture at the position of a candidate that is not a person.
     thing: Option<&'static str>,
     is_believed: bool,
     group: u64,
 }
 
-/// Hears of each.
+/// Callback for each candidate.
 type See<'a> = &'a mut dyn FnMut(&Frame, &Sighting<'_>) -> Result<(), ReproduceError>;
 
-/// Goes through so many draws of each room of a split.
+/// Runs the detector on `seeds` draws of each room of a split.
 fn visit(
     lab: &Lab,
     split: Split,
@@ -232,6 +234,7 @@ fn in_scene(
             let at = drawn.world_from_robot * detection.position.xy();
             let thing = (!is_person).then(|| what_stands_at(at, &furniture));
             let is_believed = !matches!(candidate.fate, Fate::Dropped(_));
+            // Candidates of one scene share a group, which cross-validation does not split.
             see(&frame, &Sighting { detection, is_person, thing, is_believed, group: scene.seed })?;
         }
     }
@@ -256,7 +259,7 @@ fn trainer(lab: &Lab, plugin: &str, settings: &str) -> Result<Box<dyn Trainer>, 
     build(settings, |value, context| lab.registry.build_trainer(plugin, Some(value), context))
 }
 
-/// The models that were fitted, as the plugin reads them.
+/// Fits the models, and builds the verifiers with them.
 fn judges_of(
     lab: &Lab,
     plugin: &str,
@@ -267,6 +270,7 @@ fn judges_of(
     let mut judges = Vec::new();
     for (at, mut trainer) in trainers.into_iter().enumerate() {
         let fitted = trainer.fit(&mut |_| ()).map_err(other)?;
+        // A verifier reads its model from a file.
         let path = folder.path().join(format!("{at}.toml"));
         fs::write(&path, fitted.model).map_err(other)?;
         let settings = format!("{settings}\nmodel = '{}'", path.display());

@@ -1,4 +1,4 @@
-//! The stereo systems of Satake and Miura: P1 without and P4 with a verifier.
+//! Stereo systems of Satake and Miura: P1 without and P4 with a verifier.
 
 mod fit;
 mod ladder;
@@ -13,7 +13,7 @@ mod walk;
 
 use crate::{Experiment, System};
 
-/// P1.
+/// The system of P1.
 pub const STEREO_EKF: System = System {
     name: "stereo-ekf",
     about: "P1: templates in stereo depth and an extended Kalman filter",
@@ -46,7 +46,7 @@ pub const STEREO_EKF: System = System {
     ],
 };
 
-/// P4.
+/// The system of P4.
 pub const STEREO_SVM_EKF: System = System {
     name: "stereo-svm-ekf",
     about: "P4: templates in stereo depth, an SVM that verifies, an extended Kalman filter",
@@ -99,8 +99,8 @@ pub const STEREO_SVM_EKF: System = System {
     ],
 };
 
-/// Every suite can be seen by a stereo camera.
+/// Setting that renders a scene with a stereo camera.
 const STEREO: (&str, &str) = ("camera.kind", "stereo");
 
-/// As printed, corrected, and the best.
+/// Configs as printed, corrected, and the best.
 const PIPELINES: [&str; 3] = ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-best"];

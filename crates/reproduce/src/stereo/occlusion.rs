@@ -1,23 +1,23 @@
-//! P4, Fig. 7: who is fully hidden is known again.
+//! P4, Fig. 7: identities after full occlusions.
 
 use tagalong_trials::{Occlusion, Outcome, Trial, TrialError, occlusions, outcome};
 
 use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// Ends of the bins of time hidden, s.
+/// Edges of the bins of the duration, s.
 const HIDDEN_S: [f64; 4] = [0.0, 1.0, 2.0, 4.0];
-/// Ends of the bins of the gap between the two people, m.
+/// Edges of the bins of the gap between the two people, m.
 const GAP_M: [f64; 3] = [0.0, 1.1, 2.0];
 
-/// One occlusion, and how each contender came through.
+/// One occlusion, with the outcome for each contender.
 struct Case {
     hidden_s: f64,
     gap_m: f64,
     outcomes: Vec<Outcome>,
 }
 
-/// Kept identities by gap and duration.
+/// Counts kept identities by gap and duration.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -63,7 +63,7 @@ fn table(cases: &[Case], draws: usize) -> Table {
     }
 }
 
-/// Share of kept identities, for each pipeline.
+/// Returns the share of kept identities for each pipeline.
 fn row(cases: &[&Case]) -> Vec<Cell> {
     let share = |at: usize| {
         let tracked = || cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);

@@ -1,5 +1,5 @@
-//! Annotated logs of real rooms as trials: the same frames for every verifier, with the
-//! depth of the log.
+//! Annotated logs of real rooms as trials: the same frames for every verifier, with the depth of
+//! the log.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +15,12 @@ use super::variants::table;
 use crate::lab::read;
 use crate::{Lab, ReproduceError};
 
-/// What detects in depth images of real rooms.
+/// Config of the detector for depth images of real rooms.
 const DETECTS: &str = "depth-ekf";
-/// What a config says of verifiers, and of what becomes of those whom they reject.
+/// Keys of a config for the verifiers and the track manager, which depends on them.
 const OF_VERIFIERS: [&str; 2] = ["verifiers", "manager"];
 
-/// The detector of `depth-ekf` with the verifiers of another config, or without any.
+/// Returns the detector of `depth-ekf` with the verifiers of another config, or without any.
 ///
 /// # Errors
 /// A config that cannot be read.
@@ -36,7 +36,7 @@ pub fn contender(
     Ok(Contender { name: name.into(), config: config.to_string(), ..plain })
 }
 
-/// The contenders on an annotated log; nothing where there is no such log.
+/// Runs the contenders on an annotated log; returns `None` if there is no such log.
 ///
 /// # Errors
 /// A log or annotations that cannot be used, and a plugin that fails.
@@ -74,10 +74,11 @@ pub fn trial(
         camera = Some((*item.frame.camera).clone());
     }
     let whole = |camera| Trial { seed: 0, camera, furniture: Vec::new(), moments, runs };
+    // An empty log has no camera, and is no trial.
     Ok(camera.map(whole))
 }
 
-/// Who is annotated in a frame. Nothing here asks where the robot is.
+/// Returns the annotations of a frame. The poses of the robot are not used.
 fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
     let pose = &frame.camera.robot_from_camera;
     Moment {
@@ -88,7 +89,7 @@ fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
     }
 }
 
-/// Heads are annotated at their surface.
+/// Converts an annotation; heads are annotated at their surface.
 fn somebody(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Truth {
     let surface = Point3::from(row.head_in_camera_m);
     let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();

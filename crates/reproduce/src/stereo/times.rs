@@ -1,4 +1,4 @@
-//! P4, Table II: where the time of a frame goes.
+//! P4, Table II: time of a frame by stage.
 
 use tagalong_eval::percentile;
 use tagalong_pipeline::FrameReport;
@@ -7,7 +7,7 @@ use tagalong_trials::{Contender, Moment, Trial};
 use super::STEREO;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// Rows of the paper's table, and our preprocessors and stages that do the same.
+/// Rows of the paper's table, with the corresponding preprocessors and stages.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("stereo processing", &["stereo"]),
     (
@@ -21,12 +21,12 @@ const GROUPS: [(&str, &[&str]); 4] = [
 /// Parts of the stage `preprocess`.
 const PREPROCESSORS: [&str; 2] = ["stereo", "odometry"];
 
-/// Milliseconds of the paper's rows.
+/// Published milliseconds of the rows.
 const PUBLISHED_MS: [f64; 4] = [40.0, 20.0, 10.0, 20.0];
-/// Milliseconds a frame of P1.
+/// Published milliseconds per frame of P1.
 const P1_MS: f64 = 70.0;
 
-/// The breakdown of P4.
+/// Measures the breakdown of P4.
 ///
 /// # Errors
 /// As [`Lab::contenders`], and a pipeline that fails.
@@ -36,7 +36,7 @@ pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
     times(lab, &names, &published, PUBLISHED_MS.iter().sum(), "P4, Table II")
 }
 
-/// The time of P1.
+/// Measures the time of P1.
 ///
 /// # Errors
 /// As [`of_p4`].
@@ -76,8 +76,8 @@ fn times(
     .into())
 }
 
-/// For each contender the milliseconds of each group, frame by frame. One trial
-/// at a time: others would take the processor away.
+/// Returns for each contender the milliseconds of each group, frame by frame. One trial runs at a
+/// time: others would compete for the processor.
 fn frames(lab: &Lab, contenders: &[Contender]) -> Result<Vec<Vec<[f64; 4]>>, ReproduceError> {
     let scenes = lab.scenes("square-walk", &[STEREO], lab.seeds(4).min(4))?;
     let mut frames = vec![Vec::new(); contenders.len()];
@@ -86,6 +86,7 @@ fn frames(lab: &Lab, contenders: &[Contender]) -> Result<Vec<Vec<[f64; 4]>>, Rep
         let trial = Trial::new(scene, contenders, lab.registry, 1)?;
         for (run, out) in trial.runs.iter().zip(&mut frames) {
             let both = trial.moments.iter().zip(&run.reports);
+            // The paper's times are those of two people.
             let of_two = both.filter(|(moment, _)| in_view(moment) == 2);
             out.extend(of_two.map(|(_, report)| groups(report)));
         }
@@ -98,8 +99,8 @@ fn in_view(moment: &Moment) -> usize {
     moment.truth.iter().filter(|truth| !truth.ignore && truth.upper_body.is_some()).count()
 }
 
-/// Sums the times of each group. The stage `preprocess` counts by its parts, as the paper
-/// counts stereo and odometry apart.
+/// Sums the times of each group. The stage `preprocess` counts by its parts, because the paper
+/// counts stereo and odometry separately.
 fn groups(report: &FrameReport) -> [f64; 4] {
     let stages = report.timings.iter().map(|(name, ms)| (*name, *ms));
     let plugins = report.plugin_timings.iter().map(|(name, ms)| (name.as_str(), *ms));
@@ -121,7 +122,7 @@ fn cells(frames: &[[f64; 4]], part: f64) -> Vec<Cell> {
 mod tests {
     use super::*;
 
-    /// The groups name what a pipeline with stereo and odometry reports, each once.
+    /// The groups name the stages of a pipeline with stereo and odometry, each once.
     #[test]
     fn every_stage_is_in_one_group() {
         let stages = tagalong_tracking::STAGES.iter().filter(|stage| **stage != "preprocess");

@@ -1,5 +1,5 @@
-//! P1, Fig. 4 and P4, Fig. 3: a body that turns is found in all directions; and
-//! how well its depth is known.
+//! P1, Fig. 4 and P4, Fig. 3: detection of a turning body in all directions, and the accuracy of
+//! its depth.
 
 use tagalong_core::{Camera, Detection};
 use tagalong_pipeline::{Candidate, Fate};
@@ -8,27 +8,28 @@ use tagalong_trials::{Contender, Moment, Trial, TrialError};
 use super::STEREO;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// Templates that a detector has: a frontal silhouette equals one from behind.
+/// Templates of a detector: a frontal silhouette equals one from behind.
 const SUBSETS: [&[&str]; 3] = [&["along"], &["along", "left"], &["along", "left", "right"]];
 /// Distances of the turntable, m.
 const DISTANCES_M: [f64; 5] = [1.5, 2.0, 3.0, 4.0, 5.0];
-/// One image each 15 degrees, a whole turn.
+/// One image per 15 degrees, a whole turn.
 const ONE_TURN: [(&str, &str); 3] = [STEREO, ("camera.rate_hz", "1"), ("duration_s", "24")];
-/// A detection this near to the person is theirs, m.
+/// Largest distance between a detection and its person, m.
 const NEAR_M: f64 = 0.4;
 
-/// One image of the person who turns.
+/// One image of the turning person.
 #[derive(Clone)]
 struct Look {
     /// Index into the distances.
     distance: usize,
     /// Distance from the camera, m.
     range_m: f64,
-    /// For each subset: how much too far the head was seen, if it was.
+    /// For each subset: error of the range of the head, positive if too far; none without a
+    /// detection.
     errors_m: Vec<Option<f64>>,
 }
 
-/// Shares of directions in which the person is found.
+/// Measures the share of directions in which the person is found.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -63,11 +64,12 @@ pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
     .into())
 }
 
-/// Bias and spread of the depth of the head.
+/// Measures bias and spread of the depth of the head.
 ///
 /// # Errors
 /// As [`Lab::trials`].
 pub fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
+    // The last subset has all templates.
     let looks = turns(lab, &SUBSETS[2..])?.concat();
     let of_distance = |distance: usize| {
         let at = looks.iter().filter(move |look| look.distance == distance);
@@ -102,9 +104,9 @@ fn columns() -> Vec<String> {
     DISTANCES_M.iter().map(|distance| format!("{distance} m")).collect()
 }
 
-/// The images of each turn.
+/// Returns the images of each turn.
 fn turns(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Vec<Look>>, ReproduceError> {
-    // Distances take turns: fewer scenes would leave some out.
+    // The distances alternate from seed to seed: fewer scenes would leave some out.
     let seeds = lab.seeds(60).max(DISTANCES_M.len() as u64);
     let scenes = lab.scenes("turntable", &ONE_TURN, seeds)?;
     let contenders: Vec<Contender> =
@@ -112,8 +114,8 @@ fn turns(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Vec<Look>>, ReproduceErro
     lab.trials("turns on the spot", &scenes, &contenders, of_trial)
 }
 
-/// `stereo-ekf` with some of its templates; at one image a second it looks at
-/// every image anew.
+/// Returns `stereo-ekf` with some of its templates; at one image per second it searches every image
+/// anew.
 fn detector(lab: &Lab, directions: &[&str]) -> Result<Contender, ReproduceError> {
     let whole = lab.contender("stereo-ekf")?;
     let table = "[detectors.config]\n";
@@ -144,7 +146,7 @@ fn range_m(place: &nalgebra::Point3<f64>, camera: &Camera) -> f64 {
     (place.coords - camera.robot_from_camera.translation.vector).norm()
 }
 
-/// The believed detection of the person, if there is one.
+/// Returns the accepted detection of the person, if there is one.
 fn sighting<'a>(candidates: &'a [Candidate], moment: &Moment) -> Option<&'a Detection> {
     let head = moment.truth.first()?.head_in_robot;
     let off = |c: &Candidate| (c.detection.position - head).xy().norm();

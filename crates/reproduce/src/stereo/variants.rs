@@ -1,6 +1,5 @@
-//! The forms of a system that stand beside each other in tables: a shipped config each,
-//! some with single settings replaced, so that what one misprint costs can be told from
-//! what the rest of the method lacks.
+//! Forms of a system that are compared in tables: a shipped config each, some with single settings
+//! replaced, which separates the cost of one misprint from that of the rest of the method.
 
 use tagalong_stereo::StereoSettings;
 use tagalong_trials::Contender;
@@ -8,18 +7,18 @@ use toml::{Table, Value};
 
 use crate::{Lab, ReproduceError};
 
-/// One of them.
+/// A form of a system.
 #[derive(Clone, Copy, Debug)]
 pub struct Variant {
-    /// Its name in tables.
+    /// Name in tables.
     pub name: &'static str,
-    /// The config.
+    /// Name of the config.
     pub of: &'static str,
     /// Numbers and switches that are replaced in it, by dotted keys.
     pub set: &'static [(&'static str, Setting)],
 }
 
-/// What a key is set to.
+/// Value of a setting.
 #[derive(Clone, Copy, Debug)]
 pub enum Setting {
     /// A switch.
@@ -35,7 +34,7 @@ const NO_NOISE: (&str, Setting) = ("filter.config.compat_printed_noise", Is(fals
 const NO_UPDATE: (&str, Setting) = ("filter.config.compat_printed_update", Is(false));
 const NO_MEASUREMENT: (&str, Setting) = ("filter.config.compat_printed_measurement", Is(false));
 
-/// P1, from what is printed to the best. What is free is fitted in each printed form
+/// P1, from the printed form to the best. Free parameters are fitted in each printed form
 /// (`tagalong reproduce stereo-ekf --only fit-printed`).
 pub const OF_P1: [Variant; 4] = [
     Variant { name: "stereo-ekf-as-printed", of: "stereo-ekf-as-printed", set: &[] },
@@ -52,8 +51,8 @@ pub const OF_P1: [Variant; 4] = [
     Variant { name: "stereo-best", of: "stereo-best", set: &[] },
 ];
 
-/// P4, likewise. With the whole filter corrected, what is left to `stereo-svm-ekf` is
-/// what the printed dissimilarity and the pixels of the verifier cost.
+/// P4, likewise. With the whole filter corrected, the remaining difference to `stereo-svm-ekf` is
+/// the cost of the printed dissimilarity and of the verifier's pixels.
 pub const OF_P4: [Variant; 5] = [
     Variant { name: "stereo-svm-ekf-as-printed", of: "stereo-svm-ekf-as-printed", set: &[] },
     Variant {
@@ -75,12 +74,12 @@ pub const OF_P4: [Variant; 5] = [
 ];
 
 impl Variant {
-    /// True if something of it is as the paper prints it and was fitted.
+    /// Returns true if a part of the form is as printed and was fitted.
     pub fn is_printed(&self) -> bool {
         self.of.ends_with("as-printed") && !self.set.iter().any(|(key, _)| *key == NO_NOISE.0)
     }
 
-    /// The pipeline.
+    /// Returns the pipeline.
     ///
     /// # Errors
     /// A config that cannot be read or has no such key.
@@ -93,26 +92,26 @@ impl Variant {
     }
 }
 
-/// What a contender's config says.
+/// Parses the config of a contender.
 ///
 /// # Errors
-/// A config that is no TOML.
+/// A config that is not TOML.
 pub fn table(contender: &Contender) -> Result<Table, ReproduceError> {
     let wrong = |e: toml::de::Error| ReproduceError::Other(format!("{}: {e}", contender.name));
     contender.config.parse().map_err(wrong)
 }
 
-/// How a config makes depth of a pair.
+/// Returns the settings of the stereo matching of a config.
 ///
 /// # Errors
-/// A config that is none.
+/// A config that is not TOML, or has invalid settings.
 pub fn stereo_settings(contender: &Contender) -> Result<StereoSettings, ReproduceError> {
     let settings = table(contender)?.remove("stereo").unwrap_or_else(|| Table::new().into());
     let wrong = |e: toml::de::Error| ReproduceError::Other(format!("{}: {e}", contender.name));
     settings.try_into().map_err(wrong)
 }
 
-/// The contender with numbers replaced.
+/// Returns the contender with numbers replaced.
 ///
 /// # Errors
 /// As [`Variant::contender`].
@@ -134,7 +133,7 @@ fn replaced<'a>(
     Ok(Contender { config: config.to_string(), ..contender.clone() })
 }
 
-/// The place of a dotted key; tables are made where there are none, lists are not.
+/// Returns the value at a dotted key; missing tables are created, lists are not.
 fn find<'a>(config: &'a mut Table, key: &str) -> Option<&'a mut Value> {
     let mut names = key.split('.');
     let first = config.entry(names.next()?).or_insert_with(|| Table::new().into());

@@ -1,4 +1,5 @@
-//! P4, Table I and P1, Fig. 5: what a verifier removes, and whom it costs.
+//! P4, Table I and P1, Fig. 5: false detections that a verifier removes, and people that it
+//! rejects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,24 +12,24 @@ use tagalong_trials::{Moment, Trial, TrialError};
 use super::{STEREO, real};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
-/// A name for people, a scene, and what is set in it.
+/// A title, a scene, and its settings.
 type Sequence = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
 
-/// Sequences with nobody, one and two people among things that look like some.
+/// Sequences with no, one and two people among objects that resemble people.
 const SEQUENCES: [Sequence; 3] = [
     ("nobody", "empty-clutter", &[STEREO, ("duration_s", "8")]),
     ("one person", "turntable", &[STEREO, ("duration_s", "8"), ("room.clutter", "9")]),
     ("two people", "square-walk", &[STEREO, ("duration_s", "10"), ("room.clutter", "9")]),
 ];
-/// Without a verifier, with P4's, and with the better one.
+/// Pipelines without a verifier, with P4's, and with the better one.
 const PIPELINES: [&str; 3] = ["stereo-ekf", "stereo-svm-ekf", "stereo-best"];
 
-/// Logs of real rooms, those first in which no shipped verifier was trained.
+/// Logs of real rooms, first those in which no shipped verifier was trained.
 const REAL: [(&str, &[&str]); 2] = [
     ("real rooms not trained on", &["corredor1-camera1", "lab2-camera1", "lab2-camera2"]),
     ("real rooms trained on", &["filinha", "um"]),
 ];
-/// The detector of `depth-ekf`, and verifiers by the config that has them.
+/// The detector of `depth-ekf`, with verifiers by the config that has them.
 const REAL_VERIFIERS: [(&str, Option<&str>); 5] = [
     ("depth-ekf", None),
     ("with the verifier of stereo-svm-ekf-as-printed", Some("stereo-svm-ekf-as-printed")),
@@ -37,22 +38,21 @@ const REAL_VERIFIERS: [(&str, Option<&str>); 5] = [
     ("with the verifiers of stereo-best", Some("stereo-best")),
 ];
 
-/// What has to be known of the rows of real rooms.
+/// Note on the rows of real rooms.
 const REAL_ROOMS: &str = "Real rooms: annotated logs of colour and depth images, left out \
     where they are not there. `svm-patch`, `color-texture` and `body-net` were trained in drawn \
     rooms and in the logs `filinha` and `um`, the verifier as printed in drawn rooms alone.";
 
-/// Something is a person's if it is this near on the floor, m, ...
+/// Largest distance on the floor at which a detection belongs to a person, m, ...
 const SAME_M: f64 = 0.5;
-/// ... and a sighting is of head and shoulders, and not of an arm, if it overlaps them by
-/// this much (IoU); ...
+/// ... least overlap (IoU) with head and shoulders, which excludes an arm; ...
 const SAME_OVERLAP: f64 = 0.4;
-/// ... and nobody's if everybody is farther than this, m.
+/// ... and least distance to every person of a false detection, m.
 const NOBODY_M: f64 = 0.9;
-/// What is seen is a piece of furniture if that is this near on the floor, m.
+/// Largest distance on the floor at which a detection belongs to a piece of furniture, m.
 const FURNITURE_M: f64 = 0.6;
 
-/// What is drawn with the silhouette of a person.
+/// Furniture that is simulated with the silhouette of a person.
 const LOOK_ALIKES: [FurnitureKind; 6] = [
     FurnitureKind::BinOnTable,
     FurnitureKind::CardboardFigure,
@@ -62,27 +62,27 @@ const LOOK_ALIKES: [FurnitureKind; 6] = [
     FurnitureKind::Plant,
 ];
 
-/// What one pipeline did to one scene, or to many.
+/// Results of one pipeline on one scene, or on many.
 #[derive(Clone, Debug, Default)]
 struct Tally {
     frames: u64,
-    /// Sightings of nobody that the detector believes, and of these rejected.
+    /// False detections that the detector accepts, and of these rejected.
     nobody: [u64; 2],
-    /// The same by what stands there.
+    /// The same by the object at the position.
     things: BTreeMap<&'static str, [u64; 2]>,
-    /// The same of people.
+    /// The same of detections of people.
     people: [u64; 2],
     false_tracks: u64,
     false_track_frames: u64,
-    /// People times frames with a confirmed track without the verifier, and of
-    /// these without one now.
+    /// People times frames with a confirmed track without the verifier, and of these without one
+    /// with it.
     covered: [u64; 2],
-    /// People who have a confirmed track at any time without the verifier, and
-    /// of these who never have one now.
+    /// People with a confirmed track at any time without the verifier, and of these without one at
+    /// any time with it.
     tracked: [u64; 2],
 }
 
-/// Sightings and tracks, without a verifier and with one.
+/// Compares detections and tracks without a verifier and with one.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -117,7 +117,7 @@ pub fn verifier(lab: &Lab) -> Result<Findings, ReproduceError> {
     Ok(Findings { tables, pictures: Vec::new() })
 }
 
-/// Rows of sightings and of tracks in real rooms.
+/// Returns the rows of detections and of tracks in real rooms.
 fn real_rooms(lab: &Lab) -> Result<(Vec<Row>, Vec<Row>), ReproduceError> {
     let names = REAL_VERIFIERS.map(|(name, _)| name);
     let contenders = REAL_VERIFIERS
@@ -169,7 +169,7 @@ fn sightings_table(rows: Vec<Row>, drawn: &str) -> Table {
     }
 }
 
-/// What the false sightings are of.
+/// Builds the table of false detections by object.
 fn things_table(tallies: &[Tally]) -> Table {
     let kinds: BTreeSet<&str> =
         tallies.iter().flat_map(|tally| tally.things.keys().copied()).collect();
@@ -241,6 +241,8 @@ impl Tally {
         self.frames += 1;
         for candidate in &report.candidates {
             let rejected = match candidate.fate {
+                // The manager drops by `doubt` at positions where verifiers have rejected
+                // candidates before.
                 Fate::Dropped("verifier" | "doubt") => true,
                 Fate::Dropped(_) => continue,
                 Fate::Matched(_) | Fate::Started(_) => false,
@@ -312,22 +314,22 @@ fn add(sum: &mut [u64; 2], one: [u64; 2]) {
     sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
 }
 
-/// The second number as a share of the first.
+/// Returns the second number as a share of the first.
 pub fn share([of, count]: [u64; 2]) -> Cell {
     Cell::share(count, of, 1)
 }
 
-/// Whom a sighting shows.
+/// Label of a detection.
 pub enum Whose {
-    /// Head and shoulders of somebody who counts.
+    /// Head and shoulders of a person that counts.
     Somebody,
-    /// Nobody is near.
+    /// No person is near.
     Nobody,
-    /// Too near to somebody to be called one or the other.
+    /// Too near to a person to be false, and too far off to be true.
     Unclear,
 }
 
-/// Whom a sighting shows, by the truth.
+/// Labels a detection by the truth.
 pub fn whose(detection: &Detection, people: &[Truth]) -> Whose {
     let off = |truth: &Truth| (detection.position - truth.head_in_robot).xy().norm();
     let nearest = people.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -339,13 +341,13 @@ pub fn whose(detection: &Detection, people: &[Truth]) -> Whose {
     }
 }
 
-/// True for somebody who counts, seen where head and shoulders are.
+/// Returns true if the person counts and the detection overlaps head and shoulders.
 fn overlaps(detection: &Detection, truth: &Truth) -> bool {
     let overlap = truth.upper_body.map_or(0.0, |region| region.iou(&detection.region));
     !truth.ignore && overlap >= SAME_OVERLAP
 }
 
-/// The name of what stands at a place of the world.
+/// Returns the name of the furniture at a position in the world.
 pub fn what_stands_at(at: Point2<f64>, furniture: &[Furniture]) -> &'static str {
     let off = |piece: &Furniture| (at - Point2::from(piece.at)).norm();
     let nearest = furniture.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -356,7 +358,7 @@ fn off_m(track: &Track, truth: &Truth) -> f64 {
     (track.estimate.person.position - truth.head_in_robot).xy().norm()
 }
 
-/// The people who count and have a confirmed track on them.
+/// Returns the people that count and have a confirmed track.
 fn covered(moment: &Moment, report: &FrameReport) -> BTreeSet<u16> {
     let tracks = || report.tracks.iter().filter(|track| track.confirmed);
     let has_one = |truth: &&Truth| tracks().any(|track| off_m(track, truth) <= SAME_M);

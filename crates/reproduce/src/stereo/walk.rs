@@ -1,4 +1,4 @@
-//! P4, Fig. 11: where is a person who walks along two edges of a square?
+//! P4, Fig. 11: position error of a person that walks along two edges of a square.
 
 use nalgebra::{Point2, Vector2};
 use tagalong_eval::{PositionError, draws_interval, percentile};
@@ -11,42 +11,43 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 /// Errors of one contender on one walk, m.
 #[derive(Clone, Debug, Default)]
 struct Errors {
-    /// In the frame of the robot as it is.
+    /// In the true frame of the robot.
     in_robot: Vec<f64>,
-    /// In the frame of the robot at the start, drift included: by the motions that the
-    /// pipeline believed, those of the wheels or corrected ones.
+    /// In the frame of the robot at the start, drift included: by the motions that the pipeline
+    /// used, those of the wheels or corrected ones.
     in_start: Vec<f64>,
-    /// Frames in which the person is in view, and those of them without a place: no track
-    /// is within the half metre of the judge.
+    /// Frames with the person in view, and those of them without an estimate: no track is within
+    /// the half metre of the judge.
     frames: u64,
     without: u64,
 }
 
-/// One walk.
+/// Results of one walk.
 struct Walk {
-    /// Of each contender.
+    /// Errors of each contender.
     errors: Vec<Errors>,
-    /// How far the true place is from itself, seen from where the odometry believes the
-    /// robot to be, m: no tracker is better in the frame of the start.
+    /// Distance between the true position and the same by the odometry's pose, m: a lower bound for
+    /// trackers in the frame of the start.
     drift: Vec<f64>,
-    /// How far the true place is from where somebody expects it who knows every place
-    /// exactly while half of the person shows, and keeps the pace after that, m.
+    /// Error of a predictor that knows every position exactly while half of the person is visible,
+    /// and keeps the velocity after that, m.
     pace: Vec<f64>,
 }
 
-/// From this part of the upper body on a place is known exactly, in [`Walk::pace`], ...
+/// Least visible part of the upper body for an exact position, in [`Walk::pace`], ...
 const HALF: f64 = 0.5;
-/// ... and the pace is that of so many seconds before.
+/// ... and duration over which the velocity is fitted, s.
 const PACE_S: f64 = 1.0;
 
 /// Errors of some walks.
 type Walks<'a> = Vec<&'a [f64]>;
 
-/// The robot keeps behind whom it follows, as the paper's does, and so in view.
+/// Settings of a robot that follows behind the walker, as the paper's does, and so keeps the walker
+/// in view.
 pub const FOLLOWED: [(&str, &str); 3] =
     [STEREO, ("robot.behind_m", "2.0"), ("robot.speed_mps", "0.7")];
 
-/// The error of the one who walks ahead, by the forms of P1's filter.
+/// Measures the error of the walker's position, by the forms of P1's filter.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -54,7 +55,7 @@ pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
     walk(lab, &OF_P1)
 }
 
-/// The error of the one who walks ahead, by the forms of P4.
+/// Measures the error of the walker's position, by the forms of P4.
 ///
 /// # Errors
 /// As [`Lab::trials`].
@@ -70,12 +71,12 @@ fn walk(lab: &Lab, variants: &[Variant]) -> Result<Findings, ReproduceError> {
     Ok(table(&walks, variants).into())
 }
 
-/// The one who walks ahead.
+/// Returns the id of the walker, the first person of the scene.
 fn walker(trial: &Trial) -> Option<u16> {
     trial.moments.iter().flat_map(|m| &m.truth).map(|truth| truth.id).min()
 }
 
-/// The other person is nobody's miss and nobody's false alarm from now on.
+/// Marks all people except the walker as ignored.
 pub fn only_the_walker_counts(trial: &mut Trial) {
     let walker = walker(trial);
     let everybody = trial.moments.iter_mut().flat_map(|moment| &mut moment.truth);
@@ -102,7 +103,7 @@ fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
     Ok(Walk { errors, drift, pace })
 }
 
-/// What the odometry alone does to the places of the one who walks ahead.
+/// Returns the position errors of the walker by the odometry alone.
 fn drift(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
     let Some(first) = moments.first() else { return Vec::new() };
     let off = |moment: &Moment| {
@@ -115,7 +116,7 @@ fn drift(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
     moments.iter().filter_map(off).collect()
 }
 
-/// What no filter that keeps the pace knows of the one who walks ahead.
+/// Returns the position errors of the walker for a predictor of constant velocity.
 fn kept_pace(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
     let mut known: Vec<(f64, Point2<f64>)> = Vec::new();
     let mut errors = Vec::new();
@@ -135,11 +136,12 @@ fn kept_pace(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
     errors
 }
 
-/// Where somebody is at a time who was at these places and goes straight on at the same
-/// pace (least squares); at the last place if that is of now.
+/// Extrapolates known positions with constant velocity (least squares) to a time; returns the last
+/// position if it is of that time.
 fn straight_on(known: &[(f64, Point2<f64>)], now_s: f64) -> Option<Point2<f64>> {
     let (last_s, last) = *known.last()?;
     let of: Vec<_> = known.iter().filter(|(at_s, _)| *at_s > last_s - PACE_S).collect();
+    // A single position has no velocity.
     if last_s >= now_s || of.len() < 2 {
         return Some(last);
     }
@@ -217,6 +219,7 @@ fn cells(walks: &Walks<'_>) -> Vec<Cell> {
     let error = PositionError::of(&all).unwrap_or_default();
     let millimetres = |metres: Option<f64>| Cell::number(1e3 * metres.unwrap_or(f64::NAN), 0);
     let mean = draws_interval(walks.len(), |drawn| 1e3 * mean(drawn));
+    // A mean of distances is not negative, but the interval may reach below zero.
     let mean = mean.map(|mean| mean.within(0.0, f64::INFINITY));
     vec![
         Cell::estimate(mean, 0),
@@ -258,7 +261,7 @@ mod tests {
         let moments = [moment(0.0, &[1, 2]), moment(1.0, &[2, 1]), moment(2.0, &[2])];
         let found = drift(&moments, Some(1));
         assert_eq!(found.len(), 2, "who is not there has no place");
-        // A turn by 0.1 rad that was none moves what is 2 m away along a chord.
+        // A wrong turn by 0.1 rad moves a point 2 m away along a chord.
         assert!(found[0] < 1e-12 && (found[1] - 4.0 * 0.05f64.sin()).abs() < 1e-12, "{found:?}");
     }
 

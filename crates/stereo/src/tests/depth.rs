@@ -1,4 +1,4 @@
-//! Depth of frames, and what is said of bad ones.
+//! Depth of frames, and the reasons that are reported for bad ones.
 
 use std::sync::Arc;
 
@@ -85,8 +85,8 @@ fn bad_pairs_have_no_depth_and_the_reason_is_counted() {
     assert!(funnel.entries().iter().all(|e| !e.test.starts_with("stereo:")), "{funnel:?}");
 }
 
-/// Two cameras seldom agree about exposure. Census strings do not mind at all;
-/// differences of brightness mind much of it, which is told.
+/// Two cameras seldom have the same exposure. Census strings are not affected; differences of
+/// brightness are, which is reported.
 #[test]
 fn cameras_of_unequal_gain_see_the_same_depth() {
     let (left, right) = noise_pair(160, 120, 10);

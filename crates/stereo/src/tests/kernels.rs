@@ -15,7 +15,7 @@ use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window};
 
 const D: usize = 16;
 
-/// Images with many equal neighbours, or few.
+/// Generates images with many equal neighbours, or few.
 fn images(count: usize) -> impl Strategy<Value = Vec<GreyImage>> {
     (1..40usize, 1..12usize, 1..=255u8).prop_flat_map(move |(width, height, most)| {
         let pixels = prop::collection::vec(0..=most, width * height);
@@ -259,7 +259,7 @@ proptest! {
     }
 }
 
-/// A left image of smooth noise, and the right one that shows it shifted.
+/// Generates a left image of smooth noise, and the right one that shows it shifted.
 pub fn noise_pair(width: usize, height: usize, disparity: usize) -> (GreyImage, GreyImage) {
     let hash = |x: usize, y: usize| {
         let h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
@@ -295,8 +295,8 @@ fn a_shift_is_found() {
         let found = matcher.disparities(&left, &right, 31).unwrap();
         let right = found.values.iter().filter(|d| (**d - 9.0).abs() < 0.3).count();
         assert!(right > 100 * 60, "{method:?}: {right}");
-        // What is further left is not in the right image, and of the last two columns
-        // the census sees neighbours that are none.
+        // Pixels further left are not in the right image, and the census of the last two columns
+        // reads neighbours outside of it.
         let wrong: Vec<(usize, f32)> = found
             .values
             .iter()
@@ -320,7 +320,7 @@ fn what_cannot_be_matched_is_an_error() {
     assert!(Matcher::new(bad).unwrap_err().to_string().contains("`window` must be"));
 }
 
-/// Noise about `sigma` grey levels strong, another one for each `salt`.
+/// Returns noise with a deviation of about `sigma` grey levels, another one for each `salt`.
 fn grain(salt: u32, at: usize, sigma: f32) -> f32 {
     let uniform = |i: u32| {
         let h = (at as u32 ^ salt.rotate_left(16)).wrapping_mul(0x9E37_79B1).wrapping_add(i);

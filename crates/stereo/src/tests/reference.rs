@@ -1,4 +1,4 @@
-//! What the kernels compute, pixel by pixel and in wide numbers.
+//! References of the kernels, pixel by pixel and in wide integers.
 
 use tagalong_core::GreyImage;
 
@@ -19,8 +19,8 @@ pub fn census(image: &GreyImage, noise: u8, x: i64, y: i64) -> Vec<bool> {
     NEIGHBOURS.iter().map(darker).collect()
 }
 
-/// In how many bits disparity `d` differs at the left image's pixel; outside of
-/// the right image its border goes on.
+/// Counts the bits in which disparity `d` differs at the left image's pixel; the border of the
+/// right image is continued.
 pub fn bits(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
     let left = census(&pair[0], noise, x, y);
     let right = census(&pair[1], noise, (x - d).max(0), y);
@@ -45,7 +45,7 @@ fn slope(image: &GreyImage, x: i64, y: i64) -> i64 {
     (128 + sum.div_euclid(2)).clamp(0, 255)
 }
 
-/// Equations 1 to 3 of Birchfield and Tomasi, in whole numbers.
+/// Computes equations 1 to 3 of Birchfield and Tomasi, in integers.
 fn dissimilarity(
     pair: &[GreyImage],
     left: i64,
@@ -111,7 +111,7 @@ impl Volume {
     }
 }
 
-/// Equation 13 of Hirschmueller for the paths that come from `(dx, dy)` away.
+/// Computes equation 13 of Hirschmueller for the paths that come from `(dx, dy)` away.
 pub fn path(
     costs: &Volume,
     grey: &GreyImage,
@@ -180,7 +180,7 @@ pub fn without_speckles(image: &[f32], width: usize, min_pixels: usize, step: f3
     cleaned
 }
 
-/// Half of Sobel's sum across pixel `x` of row `y`.
+/// Returns half of Sobel's sum across pixel `x` of row `y`.
 fn sobel(image: &GreyImage, x: i64, y: i64) -> u32 {
     let at = |dx, dy| i64::from(clamped(image, x + dx, y + dy));
     let sum: i64 =
@@ -204,15 +204,15 @@ pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f3
     (0..row.len()).map(kept).collect()
 }
 
-/// Brightness and slope of a smoothed row at `x`; its border goes on.
+/// Returns brightness and slope of a smoothed row at `x`; its border is continued.
 fn smoothed(image: &GreyImage, x: i64, y: i64) -> (f64, f64) {
     let at = |x: i64| f64::from(clamped(image, x, y));
     let level = |x: i64| 0.25 * (at(x - 1) + 2.0 * at(x) + at(x + 1));
     (level(x), 0.5 * (level(x + 1) - level(x - 1)))
 }
 
-/// Slope, and slope times disparity, of a pixel, as Lucas and Kanade have them, with
-/// less weight on strong slopes.
+/// Returns slope, and slope times disparity, of a pixel as in Lucas and Kanade, with less weight on
+/// strong slopes.
 fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64, gain: f64) -> (f64, f64) {
     let (own, own_slope) = smoothed(&pair[0], x as i64, y as i64);
     let (other, slope) = matched(&pair[1], x, y, d);
@@ -221,7 +221,7 @@ fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64, gain: f64) -> (f64, 
     (weight * g, weight * (g * d + other - gain * own))
 }
 
-/// Brightness and slope of the right image where pixel `x` of the left one is.
+/// Returns brightness and slope of the right image at the match of pixel `x` of the left one.
 fn matched(right: &GreyImage, x: usize, y: usize, d: f64) -> (f64, f64) {
     let last = right.width() as i64 - 1;
     let at = (x as f64 - d).clamp(0.0, last as f64);
@@ -231,7 +231,7 @@ fn matched(right: &GreyImage, x: usize, y: usize, d: f64) -> (f64, f64) {
     (a + part * (b - a), a_slope + part * (b_slope - a_slope))
 }
 
-/// The ratio of the deviations of a row's brightness in the two images.
+/// Returns the ratio of the deviations of a row's brightness in the two images.
 fn gain(pair: &[GreyImage], row: &[f32], y: usize) -> f64 {
     let known: Vec<usize> = (0..row.len()).filter(|x| !row[*x].is_nan()).collect();
     let variance = |level: &dyn Fn(usize) -> f64| {
@@ -244,8 +244,8 @@ fn gain(pair: &[GreyImage], row: &[f32], y: usize) -> f64 {
     (right / left).sqrt().clamp(0.5, 2.0)
 }
 
-/// Sums of squares and products around the means, over the window's part of a row
-/// that is of one surface with column `x`.
+/// Returns the sums of squares and products around the means, over the window's part of a row that
+/// is of one surface with column `x`.
 fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: usize) -> (f64, f64) {
     let near = x.saturating_sub(radius)..(x + radius + 1).min(row.len());
     let same: Vec<usize> = near.filter(|near| (row[*near] - row[x]).abs() <= 1.0).collect();
@@ -280,8 +280,8 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
     (0..disparities.len()).map(one).collect()
 }
 
-/// The disparities of winners that stand the tests, and how many fail: outside of the
-/// right image, not unique, contradicted from the right.
+/// Returns the disparities of winners that pass the tests, and the numbers that fail: outside of
+/// the right image, not unique, contradicted from the right.
 pub fn judged(winners: &Winners, uniqueness: f32, tolerance: u8) -> (Vec<f32>, [u32; 3]) {
     let d = |x: usize| usize::from(winners.disparity[x]);
     let mut counts = [0; 3];

@@ -6,7 +6,7 @@ use tagalong_tuning::Objective;
 use crate::bench::args::FolderArgs;
 use crate::reproduce::TableFormat;
 
-/// What `--help` says after the arguments.
+/// Text of `--help` after the arguments.
 pub const HELP: &str = "\
 For each room the settings in `[tune]` of a config are chosen by the other rooms, and scored in this
 one. All rooms choose among the same settings, so each of them runs once on each log; results are
@@ -17,7 +17,7 @@ Examples:
   tagalong bench rooms benches/rooms.toml --configs configs/depth-ekf.toml --budget 60 --jobs 2
   tagalong bench rooms my-rooms.toml --logs-dir logs --objective MOTA --format json | jq .pipelines";
 
-/// The arguments of `tagalong bench --leave-one-room-out`.
+/// Arguments of `tagalong bench --leave-one-room-out`.
 #[derive(Args, Clone, Debug)]
 pub struct RoomsArgs {
     /// The rooms and their logs, a TOML file.
@@ -26,18 +26,18 @@ pub struct RoomsArgs {
     /// The pipelines [default: every config in configs with a table `[tune]`].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
-    /// Where the logs lie [default: the `folder` that the rooms name].
+    /// Folder of the logs [default: the `folder` that the rooms name].
     #[arg(long, value_name = "DIR")]
     pub logs_dir: Option<PathBuf>,
-    /// What is made as large as possible: the mean of this figure over the rooms.
+    /// The objective: the mean of this figure over the rooms is maximised.
     #[arg(long, value_enum, default_value_t)]
     pub objective: ObjectiveChoice,
-    /// Most settings that are tried for a pipeline, its own among them: all combinations
-    /// where they are so few, otherwise a sample.
+    /// Most settings that are tried for a pipeline, its own among them: all combinations where they
+    /// are so few, otherwise a sample.
     #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,
-    /// Which sample.
+    /// Seed of the sample.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Runs at once; the results are the same.
@@ -46,22 +46,22 @@ pub struct RoomsArgs {
     pub jobs: u16,
     #[command(flatten)]
     pub folder: FolderArgs,
-    /// How to print.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
 }
 
-/// What is made as large as possible.
+/// Figure to maximise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ObjectiveChoice {
-    /// Finding people and knowing them again, alike.
+    /// Detection and association, with equal weight.
     #[default]
     #[value(name = "HOTA")]
     Hota,
-    /// Knowing people again.
+    /// Association.
     #[value(name = "IDF1")]
     Idf1,
-    /// Finding people, and nobody else.
+    /// Detection, with few false positives.
     #[value(name = "MOTA")]
     Mota,
 }

@@ -7,35 +7,35 @@ use crate::bench::plan::{self, Annotated, Candidate, sha256};
 use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
 
-/// A room with its logs.
+/// Room with its logs.
 pub struct Location {
     pub name: String,
     pub about: String,
     pub logs: Vec<Annotated>,
 }
 
-/// A pipeline with all settings that are tried.
+/// Pipeline with all settings that are tried.
 pub struct Contestant {
-    /// As it is shipped.
+    /// Config as it is shipped.
     pub config: Candidate,
-    /// What is tried, the shipped settings first.
+    /// Tried settings, the shipped ones first.
     pub settings: Vec<Setting>,
-    /// Combinations that contradict themselves.
+    /// Number of combinations that contradict themselves.
     pub refused: usize,
 }
 
 /// Values of the tunable settings, and the config that has them.
 pub struct Setting {
-    /// In the order of the tunables.
+    /// Values in the order of the tunables.
     pub values: Vec<toml::Value>,
-    /// The config.
+    /// Config with these values.
     pub file: ConfigFile,
-    /// Of the config with all defaults, and of the files that it names.
+    /// Hash of the config with all defaults, and of the files that it names.
     hash: String,
 }
 
 impl Contestant {
-    /// Builds every pipeline once.
+    /// Builds the pipeline once with each combination.
     ///
     /// # Errors
     /// Values that a setting does not allow, with their line.
@@ -58,7 +58,7 @@ impl Contestant {
         self.config.file.stem()
     }
 
-    /// Returns the settings in words: `manager.config.confirm_hits = 2, ...`.
+    /// Returns the settings as text: `manager.config.confirm_hits = 2, ...`.
     pub fn words(&self, setting: usize) -> String {
         let word = |(tunable, value): (&Tunable, &toml::Value)| {
             format!("{} = {}", tunable.key, shown(value))
@@ -69,7 +69,7 @@ impl Contestant {
     }
 }
 
-/// A number without the digits that come of dividing a range.
+/// Formats a value without the digits that come from dividing a range.
 pub fn shown(value: &toml::Value) -> String {
     match value {
         toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),
@@ -78,7 +78,7 @@ pub fn shown(value: &toml::Value) -> String {
 }
 
 impl Setting {
-    /// `None` if each value is allowed, but not all of them together.
+    /// Returns `None` if each value is allowed, but not all of them together.
     fn new(
         config: &Candidate,
         resolved: &str,
@@ -89,6 +89,7 @@ impl Setting {
         let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
         let text = with_values(resolved, &named).map_err(|error| Failure::usage(error.message))?;
         let file = config.file.with_text(text);
+        // `check_tuning` has accepted each value alone, so the combination is at fault.
         let Ok((pipeline, _)) = file.pipeline(registry, None) else { return Ok(None) };
         let outer = config.outer.resolved();
         let files = plan::file_hashes(&file)?;
@@ -97,7 +98,7 @@ impl Setting {
         Ok(Some(Self { values, file, hash }))
     }
 
-    /// Returns the name of its result on a log: a hash of all that it depends on.
+    /// Returns the name of its result on a log: a hash of everything that it depends on.
     pub fn run_hash(&self, log: &Annotated, version: &str) -> String {
         let Annotated { sha256: log, truth_sha256, whole_bodies, .. } = log;
         let everything = format!("{version}\n{}\n{log}\n{truth_sha256}\n{whole_bodies}", self.hash);

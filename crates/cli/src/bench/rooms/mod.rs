@@ -1,5 +1,5 @@
-//! `tagalong bench --leave-one-room-out`: the settings that a config names in `[tune]` are
-//! chosen by all rooms but one, and scored in that one.
+//! `tagalong bench --leave-one-room-out`: the settings that a config names in `[tune]` are fitted
+//! on all rooms but one, and scored in that one.
 
 mod args;
 mod contest;
@@ -22,10 +22,10 @@ use crate::reproduce::TableFormat;
 use crate::scoring::read_text;
 use crate::suggest::check_log_path;
 
-/// Does all that and prints the tables.
+/// Runs the whole procedure and prints the tables.
 ///
 /// # Errors
-/// What cannot be read; a pipeline that fails on some log.
+/// Files that cannot be read; a pipeline that fails on some log.
 pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
     let locations = locations(args)?;
     let contestants = contestants(args, registry)?;
@@ -49,7 +49,7 @@ pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
     Ok(if done.lost { Ended::WithLoss } else { Ended::Well })
 }
 
-/// The rooms and their logs, all of which have truth.
+/// Returns the rooms and their logs, all of which have truth.
 fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
     let path = &args.rooms;
     let shown = path.display().to_string();
@@ -73,7 +73,7 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
     Ok(locations)
 }
 
-/// The pipelines with all settings that are tried.
+/// Returns the pipelines with all settings that are tried.
 fn contestants(args: &RoomsArgs, registry: &Registry) -> Result<Vec<Contestant>, Failure> {
     let named = &args.configs;
     let mut configs = match named.is_empty() {
@@ -82,6 +82,7 @@ fn contestants(args: &RoomsArgs, registry: &Registry) -> Result<Vec<Contestant>,
             named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?
         }
     };
+    // A config that is named takes part even without `[tune]`, for comparison.
     if named.is_empty() {
         configs.retain(|config| !config.tune.is_empty());
     }

@@ -1,4 +1,4 @@
-//! What was chosen, and what it is worth.
+//! Chosen settings, with their scores.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub struct Report {
     pipelines: Vec<Fitted>,
 }
 
-/// A room.
+/// Room with its logs.
 #[derive(Serialize)]
 struct About {
     name: String,
@@ -29,20 +29,20 @@ struct About {
     logs: Vec<String>,
 }
 
-/// A pipeline.
+/// Results of a pipeline.
 #[derive(Serialize)]
 struct Fitted {
     name: String,
-    /// Settings that were tried, those of the config among them.
+    /// Number of tried settings, those of the config among them.
     settings: usize,
-    /// Settings that contradict themselves, which were not tried.
+    /// Number of settings that contradict themselves, which were not tried.
     refused: usize,
     /// Logs that it cannot read.
     skipped: Vec<Skipped>,
     shipped: Values,
     chosen_with_all: Values,
     rooms: Vec<InRoom>,
-    /// Why there is nothing to say.
+    /// Reason for an empty result.
     #[serde(skip_serializing_if = "Option::is_none")]
     too_few: Option<String>,
 }
@@ -56,25 +56,25 @@ struct Skipped {
     why: String,
 }
 
-/// A pipeline in a room.
+/// Results of a pipeline in a room.
 #[derive(Serialize)]
 struct InRoom {
     room: String,
-    /// What the other rooms chose.
+    /// Settings that the other rooms chose.
     chosen_without: Values,
-    /// What that is worth here.
+    /// Their score here.
     without: Figures,
-    /// What the choice of all rooms is worth here.
+    /// Score of the choice of all rooms here.
     with_all: Figures,
-    /// What the settings of the config are worth here.
+    /// Score of the config's settings here.
     shipped: Figures,
 }
 
 impl Report {
-    /// Chooses.
+    /// Chooses the settings of all pipelines.
     ///
     /// # Errors
-    /// A result that is not there.
+    /// A missing result.
     pub fn new(
         args: &RoomsArgs,
         locations: &[Location],
@@ -125,7 +125,7 @@ impl Report {
         std::iter::once(self.summary()).chain(each).collect()
     }
 
-    /// The means over the rooms.
+    /// Returns the means over the rooms.
     fn summary(&self) -> Table {
         let row = |fitted: &Fitted| {
             let rooms = Cell::number(fitted.rooms.len() as f64, 0);
@@ -175,7 +175,7 @@ impl About {
     }
 }
 
-/// Gathers what is known of one pipeline.
+/// Access to the results of one pipeline.
 struct Scorer<'a> {
     locations: &'a [Location],
     desk: &'a Desk<'a>,
@@ -202,6 +202,7 @@ impl Scorer<'_> {
                 rooms.push((location, readable));
             }
         }
+        // With one room there is no other one to choose the settings by.
         let too_few = (rooms.len() < 2)
             .then(|| format!("can read logs of {} room, and two are needed", rooms.len()));
         if too_few.is_some() {
@@ -248,7 +249,7 @@ impl Scorer<'_> {
 }
 
 impl Fitted {
-    /// The means over the rooms.
+    /// Returns the means over the rooms.
     fn mean(&self) -> InRoom {
         let of = |figures: fn(&InRoom) -> &Figures| mean(self.rooms.iter().map(figures));
         InRoom {
@@ -295,7 +296,7 @@ impl Fitted {
         notes
     }
 
-    /// The values that are not those of the config.
+    /// Formats the values that differ from those of the config.
     fn changes(&self, values: &Values) -> String {
         let changed = values.iter().filter(|(key, value)| self.shipped.get(*key) != Some(*value));
         let words: Vec<String> = changed
@@ -305,7 +306,7 @@ impl Fitted {
     }
 }
 
-/// The columns of all tables.
+/// Returns the columns of all tables.
 fn columns() -> impl Iterator<Item = String> {
     [
         "HOTA w/o",

@@ -1,5 +1,5 @@
-//! Runs all settings of all pipelines over all logs. Those that see the same frames go over
-//! a log side by side and share what they find in it.
+//! Runs all settings of all pipelines over all logs. Runs that see the same frames go over a log
+//! side by side and share their findings.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,10 +19,10 @@ use crate::outcome::Failure;
 use crate::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use crate::signals::Signals;
 
-/// Most pipelines side by side: what a signal loses is no more than one pass of these.
+/// Most pipelines side by side; a signal loses at most one pass of these per job.
 const LANES: usize = 48;
 
-/// A setting of a contestant on a log, by their places in the lists.
+/// Setting of a contestant on a log, by their places in the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Run {
     pub contestant: usize,
@@ -30,16 +30,16 @@ pub struct Run {
     pub log: usize,
 }
 
-/// What is kept of a run.
+/// Stored result of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoomResult {
-    /// The figures.
+    /// Figures of the run.
     pub figures: Figures,
-    /// Part of the log was lost.
+    /// True if part of the log was lost.
     pub data_lost: bool,
 }
 
-/// How the runs ended.
+/// Summary of the runs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Done {
     pub asked: usize,
@@ -48,14 +48,14 @@ pub struct Done {
     pub signal: Option<u8>,
 }
 
-/// What all jobs share.
+/// State that all jobs share.
 pub struct Desk<'a> {
     store: &'a Store,
     registry: &'a Registry,
     contestants: &'a [Contestant],
     logs: &'a [&'a Annotated],
     version: String,
-    /// Why a contestant cannot run on a log, if it cannot.
+    /// Reasons for which a contestant cannot run on a log.
     skips: BTreeMap<(usize, usize), String>,
 }
 
@@ -85,12 +85,12 @@ impl<'a> Desk<'a> {
         Ok(Self { store, registry, contestants, logs, version: version()?, skips })
     }
 
-    /// Returns why a contestant cannot run on a log, if it cannot.
+    /// Returns the reason for which a contestant cannot run on a log, if there is one.
     pub fn skip(&self, contestant: usize, log: usize) -> Option<&str> {
         self.skips.get(&(contestant, log)).map(String::as_str)
     }
 
-    /// Returns the result of a run, if it is there.
+    /// Returns the result of a run, if it exists.
     pub fn result(&self, run: Run) -> Option<RoomResult> {
         self.store.get(&self.name(run))
     }
@@ -139,7 +139,7 @@ impl<'a> Desk<'a> {
         runs
     }
 
-    /// Runs that see the same frames: of one log, read the same way.
+    /// Groups the runs that see the same frames: of one log, read the same way.
     fn passes(&self, due: Vec<Run>, jobs: usize) -> VecDeque<Vec<Run>> {
         let mut groups: BTreeMap<(usize, String), Vec<Run>> = BTreeMap::new();
         for run in due {
@@ -151,14 +151,14 @@ impl<'a> Desk<'a> {
     }
 }
 
-/// The jobs at work.
+/// Jobs at work.
 struct Shift<'a> {
     desk: &'a Desk<'a>,
     signals: &'a Signals,
     bar: &'a ProgressBar,
-    /// There is no use in going on.
+    /// Set when it is useless to go on.
     stop: AtomicBool,
-    /// By run, so that the same one is told first for any number of jobs.
+    /// Errors by run, so that the same one is reported first for any number of jobs.
     failed: Mutex<BTreeMap<Run, String>>,
 }
 
@@ -177,6 +177,7 @@ impl Shift<'_> {
             }
         };
         std::thread::scope(|scope| {
+            // One job fewer: the calling thread works, too.
             for _ in 1..jobs {
                 scope.spawn(work);
             }
@@ -192,8 +193,8 @@ impl Shift<'_> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).entry(run).or_insert(why);
     }
 
-    /// Goes over a log once, with all pipelines of the pass. A pipeline that fails leaves
-    /// the others alone.
+    /// Goes over a log once, with all pipelines of the pass. A failed pipeline does not affect the
+    /// others.
     fn pass(&self, pass: &[Run]) -> Result<(), Failure> {
         let Some(first) = pass.first() else { return Ok(()) };
         let Desk { contestants, logs, .. } = self.desk;
@@ -206,6 +207,7 @@ impl Shift<'_> {
             pass.iter().map(|run| Lane::new(|| self.pipeline(*run))).collect();
         let mut shots = Shots::default();
         while let Some(item) = source.next_frame() {
+            // Partial results are discarded: a stored result is always one of a whole log.
             if self.has_to_stop() {
                 return Ok(());
             }
@@ -226,18 +228,19 @@ impl Shift<'_> {
     fn pipeline(&self, run: Run) -> Result<tagalong_pipeline::Pipeline, Failure> {
         let setting = &self.desk.contestants[run.contestant].settings[run.setting];
         let (mut pipeline, _) = setting.file.pipeline(self.desk.registry, None)?;
+        // The settings of a pass differ mostly behind the detectors, so detections can be shared.
         pipeline.share_findings();
         Ok(pipeline)
     }
 
-    /// A disk that fails does so for every run.
+    /// Stores a result. A disk that fails stops all jobs, as it would fail for every run.
     fn keep(&self, run: Run, result: &RoomResult) -> Result<(), Failure> {
         let json = serde_json::to_vec(result).map_err(Failure::failed)?;
         let kept = self.desk.store.put(&self.desk.name(run), &json);
         kept.inspect_err(|_| self.stop.store(true, Ordering::Relaxed))
     }
 
-    /// Tells the first run that failed.
+    /// Returns the error of the first run that failed.
     fn verdict(&self) -> Result<(), Failure> {
         let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
         let Some((run, why)) = failed.first_key_value() else { return Ok(()) };
@@ -252,7 +255,7 @@ impl Shift<'_> {
     }
 }
 
-/// The figures of boxes where the truth has them, otherwise of places.
+/// Returns the figures of boxes where the truth has them, otherwise of positions.
 fn figures(
     lane: Lane,
     log: &Annotated,

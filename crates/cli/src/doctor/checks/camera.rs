@@ -1,4 +1,4 @@
-//! The lens, and where the camera is.
+//! Checks of the lens and of the camera's pose.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use tagalong_log::camera_info::CalibrationError;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Do the intrinsics belong to the images?
+/// Checks that the intrinsics belong to the images.
 pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     let finding = |severity, measured: String| {
         Finding::new("intrinsics", severity, measured)
@@ -33,6 +33,7 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     }
     let (width, height) = (camera.width as f64, camera.height as f64);
     let view = (2.0 * (0.5 * width / lens.fx).atan()).to_degrees();
+    // Half a pixel: centres of pixels have whole coordinates.
     let off = ((lens.cx + 0.5) / width - 0.5).abs().max(((lens.cy + 0.5) / height - 0.5).abs());
     let narrow = if (30.0..=130.0).contains(&view) { 0.0 } else { 1.0 };
     let severity =
@@ -50,7 +51,7 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     ))
 }
 
-/// Do the frames of tf hang together, and is the camera's an optical one?
+/// Checks that the frames of tf are connected, and that the camera's is an optical one.
 pub fn frames(evidence: &Evidence) -> Option<Finding> {
     let (facts, tf) = (&evidence.inspection.facts, &evidence.inspection.transforms);
     let camera = evidence.samples.camera.as_ref()?;
@@ -66,6 +67,8 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
         return Some(cut(evidence, &name));
     }
     let (pitch, roll) = (camera.pitch_down_rad().to_degrees(), camera.roll_rad().to_degrees());
+    // A body frame in place of the optical one turns the camera by 90 degrees, far beyond these
+    // limits.
     let upright = pitch.abs() <= 65.0 && roll.abs() <= 45.0;
     if upright || camera.panorama().is_some() {
         return ok(format!("{} hangs below {}", name, facts.robot_frame));
@@ -82,7 +85,7 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     )))
 }
 
-/// The camera's frame does not hang below the robot's.
+/// Reports that the camera's frame is not connected to the robot's.
 fn cut(evidence: &Evidence, camera: &str) -> Finding {
     let (facts, tf) = (&evidence.inspection.facts, &evidence.inspection.transforms);
     let names: BTreeSet<&str> = tf.iter().flat_map(|(a, b)| [a.as_str(), b.as_str()]).collect();
@@ -113,10 +116,11 @@ fn cut(evidence: &Evidence, camera: &str) -> Finding {
         .remedy(remedy)
 }
 
-/// The topmost frame above one.
+/// Returns the topmost frame above one.
 fn root_of(evidence: &Evidence, frame: &str) -> Option<String> {
     let tf = &evidence.inspection.transforms;
     let mut at = frame;
+    // Bounded by the number of frames, because a broken tf may have a cycle.
     for _ in 0..tf.len() {
         let Some(parent) = tf.get(at) else { break };
         at = parent;
@@ -124,7 +128,7 @@ fn root_of(evidence: &Evidence, frame: &str) -> Option<String> {
     (at != frame).then(|| at.to_owned())
 }
 
-/// Height, pitch and roll by the floor, each the median over the frames.
+/// Returns height, pitch and roll by the floor, each the median over the frames.
 fn by_floor(evidence: &Evidence) -> Option<[f64; 3]> {
     let floors = &evidence.samples.floors;
     let median = |value: &dyn Fn(usize) -> f64| {
@@ -139,7 +143,7 @@ fn by_floor(evidence: &Evidence) -> Option<[f64; 3]> {
     ])
 }
 
-/// The settings that give the camera's pose, by the floor where it is seen.
+/// Returns the settings for the camera's pose, by the floor where it is visible.
 fn mount_lines(evidence: &Evidence) -> String {
     match by_floor(evidence) {
         Some([height, pitch, roll]) => format!(
@@ -149,7 +153,7 @@ fn mount_lines(evidence: &Evidence) -> String {
     }
 }
 
-/// Is the floor seen?
+/// Checks that the floor is visible.
 pub fn floor(evidence: &Evidence) -> Option<Finding> {
     let (found, tried) = (evidence.samples.floors.len(), evidence.samples.depths.len());
     let camera = evidence.samples.camera.as_ref()?;
@@ -162,9 +166,10 @@ pub fn floor(evidence: &Evidence) -> Option<Finding> {
     Some(Finding::new("floor", severity, measured).figure("share", share))
 }
 
-/// Do height and tilt of the camera agree with the floor that it sees?
+/// Checks that height and tilt of the camera agree with the visible floor.
 pub fn mount(evidence: &Evidence) -> Option<Finding> {
     let floors = &evidence.samples.floors;
+    // A pose that comes from the floor itself would always agree with it.
     if evidence.inspection.facts.camera_source.starts_with("the floor")
         || floors.len() < 3.min(evidence.samples.count)
     {
@@ -194,6 +199,7 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
         .figure("pitch_off_deg", pitch)
         .figure("roll_off_deg", roll)
         .why("heads are looked for at the height of heads above the floor");
+    // A wrong unit of depth scales the height and leaves the angles as they are.
     let scaled = pitch.abs() < 3.0 && roll.abs() < 3.0 && !(0.7..1.4).contains(&(seen / told));
     Some(finding.remedy(if scaled {
         format!(

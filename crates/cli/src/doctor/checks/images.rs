@@ -1,14 +1,14 @@
-//! Light, readings of depth, and whether depth lies on colour.
+//! Checks of the light, the depth readings, and the registration of depth to colour.
 
 use tagalong_vision::quality::DepthQuality;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// An image with more black, or more white, than this shows nothing.
+/// Share of black, or of white, above which an image is useless.
 const BLIND: f64 = 0.9;
 
-/// Can anything be seen?
+/// Checks the exposure.
 pub fn exposure(evidence: &Evidence) -> Option<Finding> {
     let all = &evidence.samples.exposures;
     if all.is_empty() {
@@ -42,10 +42,10 @@ pub fn exposure(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(remedy))
 }
 
-/// Where the median of the depth readings of a robot's camera lies, m.
+/// Plausible median of the depth readings of a robot's camera, m.
 const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.6..=15.0;
 
-/// Unit, scale, holes and steps of depth.
+/// Checks unit, scale, holes and steps of depth.
 pub fn depth(evidence: &Evidence) -> Option<Finding> {
     evidence.inspection.facts.depth_topic.as_ref()?;
     let images = &evidence.samples.depths;
@@ -61,6 +61,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     };
     let far = !PLAUSIBLE_M.contains(&quality.median_m);
     let step = quality.step_m.unwrap_or(0.0);
+    // The steps of stereo depth grow with the square of the distance.
     let coarse = step / quality.median_m.powi(2).max(0.1);
     let severity = Severity::beyond(if far { 1.0 } else { 0.0 }, 0.5, 0.5)
         .max(Severity::beyond(quality.without, 0.6, 0.9))
@@ -86,8 +87,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     })
 }
 
-/// The unit by which the median would be some metres: a power of ten times the
-/// present one.
+/// Returns the unit by which the median would be some metres: a power of ten times the present one.
 fn better_unit(evidence: &Evidence, median_m: f64) -> f64 {
     let topic = evidence.inspection.facts.depth_topic.as_ref();
     let image = topic.and_then(|t| evidence.inspection.topic(t)).and_then(|t| t.image.as_ref());
@@ -95,14 +95,14 @@ fn better_unit(evidence: &Evidence, median_m: f64) -> f64 {
     let unit = evidence.input.depth_unit_m.unwrap_or(usual);
     let tens = (3.0 / median_m).log10().round();
     let better = unit * 10f64.powf(tens);
-    // As short as it is meant: 0.001, not 0.0010000000000000002.
+    // In the short form: 0.001, not 0.0010000000000000002.
     format!("{better:.9}").parse().unwrap_or(better)
 }
 
-/// Offsets are judged as in an image of this many columns.
+/// Columns of the image that the limits on offsets refer to.
 const USUAL_COLUMNS: f64 = 640.0;
 
-/// Does depth lie on colour?
+/// Checks the registration of depth to colour.
 pub fn registration(evidence: &Evidence) -> Option<Finding> {
     let camera = evidence.samples.camera.as_ref()?;
     let facts = &evidence.inspection.facts;
@@ -125,6 +125,7 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
     };
     let off = f64::from(dx).hypot(f64::from(dy));
     let scale = (camera.width as f64 / USUAL_COLUMNS).clamp(0.5, 2.0);
+    // An offset within its own error is no evidence of a misregistration.
     if offset.contrast < 0.25 || error > 0.5 * off.max(4.0 * scale) {
         let measured = format!(
             "outlines in depth and colour do not tell ({dx:+}, {dy:+} px, give or take {error:.1})"
@@ -132,7 +133,7 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
         return unknown(&measured).map(figures);
     }
     let limits = [3.0, 5.0].map(|px| px * scale);
-    // Moving it has to make a difference.
+    // An offset without a gain in overlap is ignored.
     let deviation = if offset.gain < 0.05 { 0.0 } else { off };
     let measured = format!(
         "depth has to be moved by {dx:+}, {dy:+} px (give or take {error:.1}) to lie on colour; {:.0} % more edges there",

@@ -1,5 +1,5 @@
-//! One small function for each thing that can be wrong. `None`: there is nothing
-//! to look at, in a log without depth for example.
+//! One small function for each possible problem. `None`: the log lacks the data to check, for
+//! example depth.
 
 mod camera;
 mod images;
@@ -9,10 +9,10 @@ mod times;
 use super::evidence::Evidence;
 use super::finding::Finding;
 
-/// A check.
+/// Function that checks one aspect.
 pub type Check = fn(&Evidence) -> Option<Finding>;
 
-/// All of them, causes before their consequences.
+/// All checks, causes before their consequences.
 pub const ALL: &[Check] = &[
     people::needs,
     people::damage,

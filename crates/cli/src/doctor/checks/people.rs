@@ -1,11 +1,11 @@
-//! What the pipeline needs, gets, and finds.
+//! Checks of the pipeline's inputs and of its results.
 
 use tagalong_log::{Inputs, LogError, Usage};
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Does the log have what the config needs?
+/// Checks that the log has the inputs that the config needs.
 pub fn needs(evidence: &Evidence) -> Option<Finding> {
     let usable = evidence.inspection.usable.join(", ");
     let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
@@ -28,10 +28,10 @@ fn words(inputs: Inputs) -> String {
     if names.is_empty() { "any image".into() } else { names.join(", ") }
 }
 
-/// Counters that say what was read, not what was lost.
+/// Counters of read items, as opposed to lost ones.
 const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
-/// Was anything in the file damaged or unusable?
+/// Checks that no part of the file was damaged or unusable.
 pub fn damage(evidence: &Evidence) -> Option<Finding> {
     let inspection = &evidence.inspection;
     if !inspection.data_lost {
@@ -48,10 +48,10 @@ pub fn damage(evidence: &Evidence) -> Option<Finding> {
     )))
 }
 
-/// Fewer frames than this say little.
+/// Number of frames below which an empty result means little.
 const FEW_FRAMES: u64 = 10;
 
-/// Is anybody found?
+/// Checks that people are found.
 pub fn people(evidence: &Evidence) -> Option<Finding> {
     let trial = &evidence.trial;
     if let Some(why) = &trial.failure {

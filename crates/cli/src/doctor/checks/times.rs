@@ -1,22 +1,22 @@
-//! Rates, stamps, and what belongs to the same moment.
+//! Checks of rates, stamps, and the pairing of images.
 
 use tagalong_log::{Timing, TopicFacts};
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// How fast people walk, m/s.
+/// Walking speed of people, m/s.
 const WALK_MPS: f64 = 1.4;
 
 impl Evidence {
-    /// The topic that makes the frames.
+    /// Returns the topic that makes the frames.
     fn primary(&self) -> Option<&TopicFacts> {
         let facts = &self.inspection.facts;
         let topic = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref())?;
         self.inspection.topic(topic)
     }
 
-    /// The topics of the images, with their stamps.
+    /// Returns the topics of the images, with their stamps.
     fn timings(&self) -> impl Iterator<Item = (&str, Timing)> {
         let facts = &self.inspection.facts;
         let topics = [&facts.colour_topic, &facts.depth_topic, &facts.right_topic];
@@ -25,7 +25,7 @@ impl Evidence {
     }
 }
 
-/// Images a second.
+/// Checks the rate of the images.
 pub fn rate(evidence: &Evidence) -> Option<Finding> {
     let topic = evidence.primary()?;
     let Some(timing) = topic.timing else {
@@ -49,13 +49,14 @@ pub fn rate(evidence: &Evidence) -> Option<Finding> {
     )))
 }
 
-/// Gaps, and clocks that jump.
+/// Checks for gaps, and clocks that jump.
 pub fn stamps(evidence: &Evidence) -> Option<Finding> {
     let judged = evidence.timings().map(|(topic, timing)| judge(topic, &timing));
+    // With equal severity the first topic wins: `max_by` alone would return the last.
     judged.max_by(|a, b| a.severity.cmp(&b.severity).then(std::cmp::Ordering::Greater))
 }
 
-/// What is wrong with the stamps of a topic, worst first.
+/// Returns the worst problem with the stamps of a topic.
 fn judge(topic: &str, timing: &Timing) -> Finding {
     let period = timing.median_period_s;
     let finding = |severity, measured| {
@@ -91,13 +92,14 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
     finding(Severity::Ok, format!("in order, the longest pause is {:.2} s", timing.longest_gap_s))
 }
 
-/// Is there a depth image to each colour image?
+/// Checks that each colour image has a depth image.
 pub fn skew(evidence: &Evidence) -> Option<Finding> {
     let skew = evidence.inspection.skew?;
     let facts = &evidence.inspection.facts;
     let count = |topic: &Option<String>| {
         topic.as_ref().and_then(|t| evidence.inspection.topic(t)).map_or(0, |t| t.count)
     };
+    // A slower depth camera cannot pair with every colour image, which is no fault of the stamps.
     let possible =
         (count(&facts.depth_topic) as f64 / count(&facts.colour_topic).max(1) as f64).min(1.0);
     let share = skew.paired / possible.max(1e-9);
@@ -128,7 +130,7 @@ pub fn skew(evidence: &Evidence) -> Option<Finding> {
     }))
 }
 
-/// Is the robot's motion known?
+/// Checks that the robot's motion is known.
 pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let counters = &evidence.inspection.counters;
     let count = |name| counters.get(name).copied().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Logs broken on purpose: every message of a good one is passed through a change.
+//! Logs broken on purpose: every message of a good one passes through a change.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -13,7 +13,7 @@ use tagalong_log::msgs::{CameraInfo, CompressedImage, Header, Image, TFMessage, 
 /// A depth reading by column and row, from the readings of the log and their width.
 pub type Readings = Box<dyn Fn(&[u16], usize, i64, i64) -> u16>;
 
-/// What is changed in a log; what is `None` stays.
+/// Changes to a log; `None` leaves the messages as they are.
 #[derive(Default)]
 pub struct Changes {
     /// Depth readings.
@@ -30,7 +30,7 @@ pub struct Changes {
     pub stamp: Option<fn(u64) -> u64>,
     /// Topics that are left out, by a part of their name.
     pub without: &'static [&'static str],
-    /// The topic whose images lose every so many.
+    /// Topic that keeps only some of its images, and the interval.
     pub thinned: Option<(&'static str, u64)>,
 }
 

@@ -1,4 +1,4 @@
-//! A small drawn log, and the programs under test.
+//! A small simulated log, and the programs under test.
 
 pub mod broken;
 
@@ -23,7 +23,7 @@ pub const WIDTH: usize = 160;
 pub const HEIGHT: usize = 120;
 pub const FIRST_NS: u64 = 1_700_000_000_000_000_000;
 
-/// What a command says whose output nobody reads to the end.
+/// Output of a command after its stdout was closed early.
 pub fn unread(command: &mut Command) -> Output {
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
@@ -52,7 +52,7 @@ pub fn code(output: &Output) -> i32 {
     output.status.code().expect("the program was not killed")
 }
 
-/// A config that tracks whatever is nearest.
+/// A config that tracks the nearest object.
 pub fn config(folder: &Path, extra: &str) -> PathBuf {
     let path = folder.join("nearest.toml");
     let text = format!(
@@ -70,13 +70,13 @@ pub fn camera() -> Camera {
     Camera::mounted(LENS, WIDTH, HEIGHT, 1.2, 0.0, 0.0)
 }
 
-/// What a drawn log consists of.
+/// Contents of a simulated log.
 pub struct Drawn {
     pub frames: u64,
     pub depth: bool,
     /// Frames that are written twice, with the same stamp.
     pub twice: u64,
-    /// Truth that stands in the log itself.
+    /// Truth that is written into the log itself.
     pub truth: Vec<TruthFrame>,
     /// Boxes of the walker on `/detections`, as another program records them.
     pub boxes: bool,
@@ -89,7 +89,7 @@ impl Drawn {
         Self { frames, depth: true, twice: 0, truth: Vec::new(), boxes: false, in_space: false }
     }
 
-    /// Writes a log of somebody who walks to the left, ten frames a second.
+    /// Writes a log of a person walking to the left, ten frames a second.
     pub fn write(&self, path: &Path) {
         let mut log = Log::create(path);
         log.send("/tf_static", FIRST_NS, &mount());
@@ -200,7 +200,7 @@ fn mount() -> TFMessage {
     }
 }
 
-/// Where the walker of the drawn log is, as `people.csv` says it.
+/// Positions of the walker of the simulated log, as `people.csv`.
 pub fn people(frames: u64) -> String {
     let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
                   visible,occluder,ignore,interpolated\n";
