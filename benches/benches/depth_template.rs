@@ -9,13 +9,12 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point2, Point3};
-use tagalong_core::{
-    Camera, DepthImage, Detector, Distortion, Frame, Funnel, Images, Motion, Pinhole, Registry,
-    Search, Stamp,
-};
+use tagalong_config::Registry;
+use tagalong_core::{DepthImage, Detector, Frame, Funnel, Images, Motion, Search, Stamp};
 use tagalong_depth_template::{
     Bank, DepthTemplate, DepthTemplateConfig, Direction, Matcher, Pose, render,
 };
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_pipeline::Pipeline;
 use tagalong_vision::RowSums;
 

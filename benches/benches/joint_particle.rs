@@ -7,10 +7,9 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point2, Point3, Vector2};
-use tagalong_core::{
-    Camera, DepthImage, Distortion, Frame, Images, Likelihood, Motion, Person, Pinhole, Stamp,
-};
+use tagalong_core::{DepthImage, Frame, Images, Likelihood, Motion, Person, Stamp};
 use tagalong_depth_template::{DepthTemplateConfig, Weigher, render};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 const HEADS: [Point3<f64>; 2] = [Point3::new(2.5, 0.1, 1.6), Point3::new(3.4, -0.15, 1.65)];
 

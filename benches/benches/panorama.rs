@@ -5,7 +5,8 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use tagalong_core::{Camera, Frame, Funnel, GreyImage, Images, Lens, Motion, RgbImage, Stamp};
+use tagalong_core::{Frame, Funnel, GreyImage, Images, Motion, RgbImage, Stamp};
+use tagalong_geometry::{Camera, Lens};
 use tagalong_omni_appearance::{Config, Eyes};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
 use tagalong_vision::{Unwrapper, Unwrapping};

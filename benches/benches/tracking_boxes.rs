@@ -9,11 +9,13 @@ use std::sync::Arc;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_compressive::{Compressive, Config};
+use tagalong_config::Registry;
 use tagalong_core::{
-    Camera, DepthImage, Detector, Distortion, Estimate, Frame, Funnel, GreyImage, Images, Motion,
-    Person, Pinhole, Recorded, Rect, Registry, Search, Stamp, Track, TrackId,
+    DepthImage, Detector, Estimate, Frame, Funnel, GreyImage, Images, Motion, Person, Recorded,
+    Search, Stamp, Track, TrackId,
 };
 use tagalong_correlation::Correlation;
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 use tagalong_pipeline::Pipeline;
 
 const RECORDED: &str = include_str!("../../configs/recorded.toml");

@@ -7,7 +7,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
-use tagalong_core::{Context, Detector, Frame, Funnel, Search, Wheels};
+use tagalong_config::Context;
+use tagalong_core::{Detector, Frame, Funnel, Search, Wheels};
 use tagalong_face_rgbd::FaceRgbd;
 use tagalong_hog_upper_body::HogUpperBody;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};

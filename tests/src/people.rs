@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use tagalong_core::Rect;
+use tagalong_geometry::Rect;
 
 /// Least overlap of a box with the person that it covers.
 const MIN_IOU: f64 = 0.5;

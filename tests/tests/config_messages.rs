@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::{ConfigError, Registry};
+use tagalong_config::{ConfigError, Registry};
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Pipeline, RunSettings};
 

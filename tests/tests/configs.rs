@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_pipeline::{Options, Pipeline};
 use toml::{Table, Value};
 

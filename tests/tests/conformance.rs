@@ -1,7 +1,7 @@
 //! Every plugin of the catalog passes the checks of its kind.
 
+use tagalong_config::Registry;
 use tagalong_conformance::Suite;
-use tagalong_core::Registry;
 
 /// Detectors that discover the simulated person in a depth or colour image. A freshly generated
 /// detector finds no people and is not listed; a working one is listed, so that it has to keep

@@ -5,8 +5,8 @@ mod broken;
 
 use std::collections::BTreeSet;
 
+use tagalong_config::{Kind, Registry};
 use tagalong_conformance::{Suite, check_names};
-use tagalong_core::{Kind, Registry};
 
 /// Checks that the healthy plugin passes, that each fault is caught by its check, and that there is
 /// a fault for every check of the kind.

@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tagalong_core::{
-    Camera, DepthImage, Frame, Images, Lens, Motion, Registry, Stamp, Track, WheelSpeeds,
-};
+use tagalong_config::Registry;
+use tagalong_core::{DepthImage, Frame, Images, Motion, Stamp, Track, WheelSpeeds};
+use tagalong_geometry::{Camera, Lens};
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};

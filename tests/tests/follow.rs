@@ -5,7 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, Frame, Motion, Registry, Stamp, TrackId};
+use tagalong_config::Registry;
+use tagalong_core::{Frame, Motion, Stamp, TrackId};
+use tagalong_geometry::Camera;
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth, Variant};
 

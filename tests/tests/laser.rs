@@ -7,7 +7,8 @@ mod legs;
 use std::path::Path;
 
 use legs::{Config, Legs};
-use tagalong_core::{Rect, Registry};
+use tagalong_config::Registry;
+use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::Pipeline;
 

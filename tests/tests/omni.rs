@@ -6,7 +6,9 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::{ConicalMirror, Panorama, Registry, RgbImage, Stamp};
+use tagalong_config::Registry;
+use tagalong_core::{RgbImage, Stamp};
+use tagalong_geometry::{ConicalMirror, Panorama};
 use tagalong_log::camera_info::UNWRAPPED;
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;

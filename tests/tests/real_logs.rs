@@ -10,7 +10,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::{Funnel, Registry};
+use tagalong_config::Registry;
+use tagalong_core::Funnel;
 use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::Pipeline;
 use tagalong_tests::people::{Boxes, Score, read, score};

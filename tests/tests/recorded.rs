@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_reproduce::{DrawnScenes, Lab, Progress, Table, system};
 
 /// Published MOTA of SORT for its six validation sequences together, per cent (its README).

@@ -5,7 +5,8 @@
 
 use std::path::Path;
 
-use tagalong_core::{Frame, Registry};
+use tagalong_config::Registry;
+use tagalong_core::Frame;
 use tagalong_pipeline::{FrameReport, Pipeline, with_values};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Draw};

@@ -9,7 +9,7 @@
 use std::path::Path;
 
 use nalgebra::Point2;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::{FrameReport, Pipeline};
 

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_eval::Tally;
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Judge, each};

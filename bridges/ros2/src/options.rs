@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Pipeline, RobotSettings};
 
@@ -112,7 +112,7 @@ impl Options {
         let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
         let pipelines = tagalong_pipeline::Options { foreign, seed: None };
         let mistake =
-            |error: tagalong_core::ConfigError| BridgeError::Config(error.render(&shown, &text));
+            |error: tagalong_config::ConfigError| BridgeError::Config(error.render(&shown, &text));
         let (pipeline, run) = Pipeline::from_toml_with(&text, folder, &registry, &pipelines)
             .map_err(mistake)?;
         let input = run.table("input").map_err(mistake)?;

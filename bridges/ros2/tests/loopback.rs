@@ -18,7 +18,8 @@ use ros2_client::{
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use tagalong_core::{Camera, Lens, Stamp};
+use tagalong_core::Stamp;
+use tagalong_geometry::{Camera, Lens};
 use tagalong_log::msgs::{
     CameraInfo, Detection3DArray, Header, Image, Message, Odometry, Pose, PoseStamped, StringMsg,
     TFMessage, TransformStamped, TwistStamped,

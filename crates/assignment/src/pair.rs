@@ -2,7 +2,8 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Detection, Rect, Track};
+use tagalong_core::{Detection, Track};
+use tagalong_geometry::Rect;
 
 use crate::assign;
 
@@ -128,7 +129,8 @@ fn overlap(a: &Rect, b: &Rect, kind: Overlap) -> f64 {
 mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
     use proptest::prelude::*;
-    use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, TrackId};
+    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
 

@@ -5,7 +5,7 @@
 //! fails on a plugin folder that is not listed. `cargo xtask new-plugin` inserts its line in sorted
 //! order.
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {

@@ -12,7 +12,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use tagalong_core::{Command, Registry, Stamp};
+use tagalong_config::Registry;
+use tagalong_core::{Command, Stamp};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Variant};
 use tagalong_trials::Draw;

@@ -11,9 +11,9 @@ use std::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Input, Inputs,
-    Rect, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
 };
+use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 
 fn main() -> ExitCode {
     tagalong_cli::main_with(|registry| {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tagalong_core::{ConfigError, Registry, Settings, parse_settings};
+use tagalong_config::{ConfigError, Registry, Settings, parse_settings};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_sim::{Scene, Simulation};
 

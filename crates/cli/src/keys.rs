@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use schemars::schema_for;
 use serde_json::{Map, Value, json};
-use tagalong_core::{PluginInfo, Registry};
+use tagalong_config::{PluginInfo, Registry};
 use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings};
 
 use crate::config_file::OuterSettings;

@@ -41,7 +41,7 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::Parser;
 use outcome::{Outcome, say};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Runs the whole program: registers the plugins, parses the command line, dispatches the command.
 pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {

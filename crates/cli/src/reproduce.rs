@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_reproduce::{
     DrawnScenes, Experiment, Found, Lab, Progress, SYSTEMS, System, Table, system,
 };

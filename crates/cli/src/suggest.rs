@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::nearest;
+use tagalong_config::nearest;
 
 use crate::outcome::Failure;
 

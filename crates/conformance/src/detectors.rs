@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use tagalong_core::{Camera, Detection, Detector, Error, Frame, Funnel, Inputs, Search, Usage};
+use tagalong_core::{Detection, Detector, Error, Frame, Funnel, Inputs, Search, Usage};
+use tagalong_geometry::Camera;
 
 use crate::figure::Figure;
 use crate::scenes::{bare_frame, drawn, level, mountings, odd_frames, required, restricted, track};

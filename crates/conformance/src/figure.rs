@@ -7,7 +7,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Rotation3, Vector3};
-use tagalong_core::{Camera, DepthImage, Images, RgbImage};
+use tagalong_core::{DepthImage, Images, RgbImage};
+use tagalong_geometry::Camera;
 
 use crate::random::Random;
 
@@ -172,7 +173,7 @@ fn body(figure: &Figure) -> impl Iterator<Item = Ellipsoid> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::{Distortion, HEAD_RADIUS_M, Pinhole};
+    use tagalong_geometry::{Distortion, HEAD_RADIUS_M, Pinhole};
 
     use super::*;
 

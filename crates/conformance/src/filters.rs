@@ -8,9 +8,10 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Motion,
-    Person, Support, TrackId,
+    Detection, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Motion, Person,
+    Support, TrackId,
 };
+use tagalong_geometry::Camera;
 
 use crate::random::Random;
 use crate::scenes::{DT_S, level, moving_frame, odd_frames, sighting};

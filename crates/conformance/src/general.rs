@@ -1,6 +1,6 @@
 //! Checks of all kinds of plugin.
 
-use tagalong_core::nearest;
+use tagalong_config::nearest;
 
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};

@@ -5,8 +5,8 @@
 //! `tagalong_core`. A crate outside the workspace runs the same suite over its own registry:
 //!
 //! ```
-//! # fn register(_: &mut tagalong_core::Registry) {}
-//! let mut registry = tagalong_core::Registry::default();
+//! # fn register(_: &mut tagalong_config::Registry) {}
+//! let mut registry = tagalong_config::Registry::default();
 //! register(&mut registry);
 //! let failures = tagalong_conformance::check_all(&registry);
 //! assert!(failures.is_empty(), "{failures:#?}");
@@ -38,7 +38,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::slice;
 
-use tagalong_core::{Context, Kind, Registry};
+use tagalong_config::{Context, Kind, Registry};
 
 pub use controllers::target;
 use subject::{Subject, WHEELS};

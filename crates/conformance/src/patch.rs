@@ -4,9 +4,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
-use tagalong_core::{
-    Camera, Detection, Distortion, Frame, GreyImage, Images, Motion, Pinhole, Rect, Stamp,
-};
+use tagalong_core::{Detection, Frame, GreyImage, Images, Motion, Stamp};
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 /// Renders a dark head above dark shoulders before a bright wall, or bars: 64x64, with noise from a
 /// seed.

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    Camera, DepthImage, Detection, Distortion, Estimate, Frame, Image, Images, Inputs, Motion,
-    Person, Pinhole, RgbImage, RightImage, Stamp, Track, TrackId, Usage,
+    DepthImage, Detection, Estimate, Frame, Image, Images, Inputs, Motion, Person, RgbImage,
+    RightImage, Stamp, Track, TrackId, Usage,
 };
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::figure::{Figure, World};
 use crate::random::Random;

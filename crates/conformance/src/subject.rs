@@ -1,9 +1,7 @@
 use std::path::Path;
 
-use tagalong_core::{
-    Associator, ConfigError, Context, Controller, Detector, Filter, PluginInfo, Registry,
-    TrackManager, Value, Verifier, Wheels,
-};
+use tagalong_config::{ConfigError, Context, PluginInfo, Registry, Value};
+use tagalong_core::{Associator, Controller, Detector, Filter, TrackManager, Verifier, Wheels};
 use toml::de::{DeTable, DeValue};
 
 /// The drive in checks of controllers.
@@ -66,7 +64,7 @@ impl Subject<'_> {
 
     /// Builds the plugin and drops it.
     pub(crate) fn try_build(&self, from: From<'_>) -> Result<(), String> {
-        use tagalong_core::Kind::{Associator, Controller, Detector, Filter, Manager, Verifier};
+        use tagalong_config::Kind::{Associator, Controller, Detector, Filter, Manager, Verifier};
         match self.info.kind {
             Detector => self.detector(from).map(drop),
             Verifier => self.verifier(from).map(drop),

@@ -1,6 +1,7 @@
 //! Checks of verifiers.
 
-use tagalong_core::{Detection, Error, Frame, Rect, Verifier};
+use tagalong_core::{Detection, Error, Frame, Verifier};
+use tagalong_geometry::Rect;
 
 use crate::figure::Figure;
 use crate::random::Random;

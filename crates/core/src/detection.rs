@@ -1,11 +1,11 @@
 use nalgebra::{Matrix3, Point3};
 
-use crate::Rect;
+use tagalong_geometry::Rect;
 
 /// One detection of a person: an image region and a position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// Upper-body square in the image (see [`crate::Camera::upper_body`]).
+    /// Upper-body square in the image (see [`tagalong_geometry::Camera::upper_body`]).
     pub region: Rect,
     /// Centre of the head in the robot frame, m.
     pub position: Point3<f64>,

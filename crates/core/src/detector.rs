@@ -1,6 +1,7 @@
 use nalgebra::Point3;
 
-use crate::{Capabilities, Detection, Error, Frame, Funnel, Inputs, Person, Rect, Result, Track};
+use crate::{Capabilities, Detection, Error, Frame, Funnel, Inputs, Person, Result, Track};
+use tagalong_geometry::Rect;
 
 /// Query to a detector.
 #[derive(Clone, Copy)]
@@ -215,9 +216,11 @@ mod tests {
 
     #[test]
     fn many_scenes_are_weighed_one_after_the_other() {
-        let lens = crate::Distortion::None;
-        let lens = crate::Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: lens };
-        let camera = std::sync::Arc::new(crate::Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
+        let lens = tagalong_geometry::Distortion::None;
+        let lens =
+            tagalong_geometry::Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: lens };
+        let camera =
+            std::sync::Arc::new(tagalong_geometry::Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
         let motion = crate::Motion::at_rest(0.0);
         let frame =
             Frame::new(1, crate::Stamp::default(), camera, motion, crate::Images::default());

@@ -2,7 +2,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 
-use crate::{Camera, Detection, Frame, Inputs, Likelihood, Motion, Rect, Result, Sketch, TrackId};
+use crate::{Detection, Frame, Inputs, Likelihood, Motion, Result, Sketch, TrackId};
+use tagalong_geometry::{Camera, Rect};
 
 /// State of a person in the robot frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -260,7 +261,8 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
-    use crate::{Distortion, Images, Pinhole, Stamp};
+    use crate::{Images, Stamp};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     /// A filter that keeps the last position, moved along by the robot.
     struct Last;

@@ -3,9 +3,10 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::{
-    Camera, DepthImage, Error, GreyImage, Input, Inputs, LaserScan, Motion, Recorded, Result,
-    RgbImage, Stamp,
+    DepthImage, Error, GreyImage, Input, Inputs, LaserScan, Motion, Recorded, Result, RgbImage,
+    Stamp,
 };
+use tagalong_geometry::Camera;
 
 /// Images of one moment. All have the size of the camera's image, and show the same view unless the
 /// name says otherwise.
@@ -223,7 +224,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     static COMPUTED: AtomicUsize = AtomicUsize::new(0);
 

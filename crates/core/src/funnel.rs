@@ -1,4 +1,4 @@
-use crate::Rect;
+use tagalong_geometry::Rect;
 
 /// Number of candidates that one test dropped, with one example.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-use crate::Rect;
+use tagalong_geometry::Rect;
 
 /// Samples per side of a region at which its depth is read.
 const TAPS: usize = 5;

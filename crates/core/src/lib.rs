@@ -25,7 +25,6 @@
 //!   [`Context`]. Same log, same config, same seed: same bytes.
 
 mod associator;
-mod camera;
 mod control;
 mod detection;
 mod detector;
@@ -33,27 +32,19 @@ mod error;
 mod filter;
 mod frame;
 mod funnel;
-mod guarded;
 mod image;
 mod inputs;
 mod manager;
 mod mixture;
 mod motion;
-mod names;
-mod panorama;
 mod recorded;
-mod rect;
-mod registry;
 mod scan;
 mod sent;
-mod settings;
 mod sketch;
 mod time;
 mod track;
-mod trainer;
 
 pub use associator::{Association, Associations, Associator, Gate};
-pub use camera::{Camera, Distortion, Lens, Pinhole};
 pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
 pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Search, Trust, Verifier};
@@ -61,7 +52,6 @@ pub use error::{Error, Result};
 pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Support};
 pub use frame::{Derived, Frame, Images, RightImage};
 pub use funnel::{Dropped, Funnel};
-pub use guarded::{Guarded, StepError};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use manager::{
@@ -69,31 +59,9 @@ pub use manager::{
 };
 pub use mixture::match_moments;
 pub use motion::{Motion, Wheels, planar_pose};
-pub use names::nearest;
-pub use panorama::{ConicalMirror, Panorama};
 pub use recorded::Recorded;
-pub use rect::Rect;
-pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use scan::LaserScan;
 pub use sent::Sent;
-pub use settings::{
-    ConfigError, Settings, Value, check_settings, commented_defaults, parse_settings,
-};
 pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;
 pub use track::{Track, TrackId};
-pub use trainer::{Example, Fitted, Trainer};
-
-/// Distance from the visible surface of a head to its centre, in metres.
-///
-/// Annotated heads carry the surface; states carry the centre, because that point stays the same
-/// when the robot drives around the person.
-pub const HEAD_RADIUS_M: f64 = 0.08;
-
-/// Side of the upper-body square (head and shoulders) at the person, in metres (the upper-body
-/// template of Jafari et al., ICRA 2014, spans the same 0.57 m).
-pub const UPPER_BODY_SIDE_M: f64 = 0.57;
-
-/// Distance of the head centre below the upper edge of the upper-body square, in metres (2.5 cm of
-/// air and half a head).
-pub const HEAD_BELOW_TOP_M: f64 = 0.14;

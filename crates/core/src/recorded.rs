@@ -1,6 +1,6 @@
 use nalgebra::Point3;
 
-use crate::Rect;
+use tagalong_geometry::Rect;
 
 /// A detection by a detector outside of Tagalong, as recorded in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -1,6 +1,7 @@
 use nalgebra::Point2;
 
-use crate::{Rect, TrackId};
+use crate::TrackId;
+use tagalong_geometry::Rect;
 
 /// Visualisation of a plugin's inner state. It is made on request only.
 #[derive(Clone, Debug, Default, PartialEq)]

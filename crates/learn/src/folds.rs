@@ -1,6 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use tagalong_core::Example;
+use tagalong_config::Example;
 
 /// Deals the groups out to `folds` parts, those with people and those without in turn, so that each
 /// part has both. The deal depends on the seed, not on the order of the examples.

@@ -1,6 +1,7 @@
 //! Variants of an example: mirrored, and shifted a little.
 
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 /// Mirrors the picture horizontally.
 pub fn mirrored(grey: &GreyImage) -> GreyImage {

@@ -1,6 +1,6 @@
 //! Lens of a camera from `sensor_msgs/CameraInfo`.
 
-use tagalong_core::{ConicalMirror, Distortion, Panorama, Pinhole};
+use tagalong_geometry::{ConicalMirror, Distortion, Panorama, Pinhole};
 
 use crate::msgs::{CameraInfo, Header};
 

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::check_settings;
+use tagalong_config::check_settings;
 
 use crate::LogError;
 

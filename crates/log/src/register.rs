@@ -1,7 +1,8 @@
 //! Registration of a depth image to the view of the colour camera.
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
-use tagalong_core::{Camera, DepthImage, Lens};
+use tagalong_core::DepthImage;
+use tagalong_geometry::{Camera, Lens};
 
 /// Overlap of neighbouring splats, so that stretching leaves no holes.
 const OVERLAP: f64 = 1.1;
@@ -90,7 +91,7 @@ fn covered(centre: f64, side: f64, size: usize) -> std::ops::Range<usize> {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

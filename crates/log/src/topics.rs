@@ -1,6 +1,7 @@
 //! Choice of the topics of a log: colour images, depth images, and so on.
 
-use tagalong_core::{Input, Inputs, nearest};
+use tagalong_config::nearest;
+use tagalong_core::{Input, Inputs};
 
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};

@@ -44,7 +44,7 @@ pub struct TruthPerson {
     pub head_in_robot_m: Option<[f64; 3]>,
     /// Upper-body square clipped to the image: x, y, width, height, pixels. With a conical mirror
     /// it lies in the unwrapped panorama, and may continue beyond the right edge (see
-    /// `tagalong_core::Panorama`).
+    /// `tagalong_geometry::Panorama`).
     pub upper_body_px: Option<[f64; 4]>,
     /// Visible part of it, likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -6,7 +6,8 @@ mod common;
 use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
 use mcap::WriteOptions;
 use nalgebra::{Isometry3, Point2, Vector3};
-use tagalong_core::{Camera, DepthImage};
+use tagalong_core::DepthImage;
+use tagalong_geometry::Camera;
 use tagalong_log::msgs::{CameraInfo, Header, Image, LaserScan, encode_big_endian};
 use tagalong_log::{
     FrameSource, Input, InputSettings, Inputs, Limits, LogError, LogFrame, MountSettings,

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use common::{LogWriter, at, camera, info_of};
 use nalgebra::Point3;
-use tagalong_core::{ConicalMirror, Panorama};
+use tagalong_geometry::{ConicalMirror, Panorama};
 use tagalong_log::camera_info::UNWRAPPED;
 use tagalong_log::msgs::{CameraInfo, Header, Image};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};

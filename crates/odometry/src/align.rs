@@ -6,7 +6,7 @@
 //! never far away.
 
 use nalgebra::{Isometry2, Isometry3, Matrix3, Matrix4, Vector2, Vector3, Vector4};
-use tagalong_core::{Camera, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 
 use crate::keyframe::{Keyframe, Point, Pyramid};
 use crate::patch::Difference;
@@ -217,7 +217,8 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Point2;
-    use tagalong_core::{DepthImage, Distortion, GreyImage};
+    use tagalong_core::{DepthImage, GreyImage};
+    use tagalong_geometry::Distortion;
 
     use super::*;
     use crate::OdometrySettings;

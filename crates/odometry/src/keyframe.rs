@@ -1,7 +1,8 @@
 //! Image that later images are compared with.
 
 use nalgebra::{Isometry2, Point2, Point3, Vector2};
-use tagalong_core::{Camera, DepthImage, GreyImage};
+use tagalong_core::{DepthImage, GreyImage};
+use tagalong_geometry::Camera;
 
 use crate::OdometrySettings;
 use crate::patch::Patch;
@@ -148,7 +149,7 @@ fn surface_m(depth: &DepthImage, x: usize, y: usize) -> Option<f32> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

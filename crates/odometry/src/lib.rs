@@ -17,7 +17,8 @@ mod settings;
 mod tests;
 
 use nalgebra::{Isometry2, Point2, Vector3};
-use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Lens, Motion, Pinhole};
+use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Motion};
+use tagalong_geometry::{Lens, Pinhole};
 
 use align::{Fit, Prior, View};
 use keyframe::{Keyframe, Pyramid};

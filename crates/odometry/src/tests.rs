@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Vector2};
-use tagalong_core::{
-    Camera, DepthImage, Distortion, Frame, Funnel, GreyImage, Images, Lens, Motion, Pinhole, Stamp,
-};
+use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Images, Motion, Stamp};
+use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
 use crate::{OdometrySettings, VisualOdometry};
 

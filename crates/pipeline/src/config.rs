@@ -4,12 +4,11 @@
 use std::ops::Range;
 use std::path::Path;
 
-use tagalong_core::{
-    Associator, ConfigError, Context, Filter, Guarded, Registry, Settings, TrackManager, Value,
-    Verifier, nearest, parse_settings,
-};
+use tagalong_config::{ConfigError, Context, Registry, Settings, Value, nearest, parse_settings};
+use tagalong_core::{Associator, Filter, TrackManager, Verifier};
 use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
+use tagalong_tracking::Guarded;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 

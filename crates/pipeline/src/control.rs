@@ -1,7 +1,7 @@
 use tagalong_core::{
-    Command, Controller, Frame, Guarded, Inputs, Motion, Reason, Scene, Stamp, StepError, Track,
-    TrackId, WheelSpeeds,
+    Command, Controller, Frame, Inputs, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
 };
+use tagalong_tracking::{Guarded, StepError};
 
 use crate::governor::{Aim, Governor, Surroundings, Wish};
 use crate::target::{Lock, Search};

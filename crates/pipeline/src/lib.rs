@@ -51,9 +51,9 @@ pub use governor::{CorridorSettings, GovernorSettings, Orders};
 pub use pipeline::Pipeline;
 pub use report::FrameReport;
 pub use settings::{PipelineSettings, PluginSettings, RobotSettings};
-pub use tagalong_core::StepError;
 pub use tagalong_odometry::OdometrySettings;
 pub use tagalong_stereo::StereoSettings;
+pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
     Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings, OcclusionSettings, Outcome,
     Role, Weighing,

@@ -1,7 +1,8 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use tagalong_core::{Command, Frame, Inputs, Reason, Stamp, StepError, TrackId};
+use tagalong_core::{Command, Frame, Inputs, Reason, Stamp, TrackId};
+use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
 use crate::control::{Steered, Steering};

@@ -1,9 +1,10 @@
 //! Stages that complete a frame: `[stereo]` and `[odometry]`.
 
 use nalgebra::Point2;
-use tagalong_core::{Frame, Funnel, Guarded, Motion, Result};
+use tagalong_core::{Frame, Funnel, Motion, Result};
 use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
+use tagalong_tracking::Guarded;
 use tagalong_tracking::{Preprocessed, Preprocessor};
 
 /// Depth from the stereo pair, for frames that have none.

@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn every_table_of_an_experiment_names_the_seeds_of_its_draws() {
-        let registry = tagalong_core::Registry::default();
+        let registry = tagalong_config::Registry::default();
         let mut lab = crate::lab::testing::lab(&registry, false, None);
         let experiment = Experiment { name: "draws", about: "", run: drawing };
         let mut find = |first_seed| {

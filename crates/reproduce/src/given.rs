@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cpu_time::ThreadTime;
-use tagalong_core::{Camera, Distortion, Frame, Images, Motion, Pinhole, Stamp};
+use tagalong_core::{Frame, Images, Motion, Stamp};
 use tagalong_eval::formats::mot::{Rules, SequenceInfo, parse_info, parse_truth};
 use tagalong_eval::formats::{FormatError, Timeline};
 use tagalong_eval::{Comparison, Region, Report, Sequence, SetDistance, Similarity, Tally};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_pipeline::FrameReport;
 use tagalong_trials::Contender;
 

@@ -1,7 +1,8 @@
 //! P3: joint particles that weigh scenes of overlapping silhouettes.
 
 use nalgebra::Point3;
-use tagalong_core::{Camera, Track};
+use tagalong_core::Track;
+use tagalong_geometry::Camera;
 use tagalong_pipeline::{FrameReport, StereoSettings};
 use tagalong_sim::{Scene, Split, Truth};
 use tagalong_trials::{Contender, Crossing, Failing, Moment, Run, Trial, TrialError, crossing};
@@ -423,7 +424,7 @@ fn pixels_apart(camera: &Camera, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64
 /// Returns true if two people's upper-body squares overlap.
 fn overlaps(moment: &Moment) -> bool {
     let squares: Vec<_> = moment.truth.iter().filter_map(|truth| truth.upper_body).collect();
-    let meets = |(at, square): (usize, &tagalong_core::Rect)| {
+    let meets = |(at, square): (usize, &tagalong_geometry::Rect)| {
         squares[at + 1..].iter().any(|other| square.intersection(other).area() > 0.0)
     };
     squares.iter().enumerate().any(meets)

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_pipeline::{StereoSettings, flattened};
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Trial, TrialError, each, in_order};

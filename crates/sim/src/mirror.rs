@@ -4,7 +4,8 @@
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Camera, ConicalMirror, Distortion, Image, Lens, Panorama, Pinhole, Rect};
+use tagalong_core::Image;
+use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole, Rect};
 
 use crate::parallel::in_pieces;
 use crate::random::Random;

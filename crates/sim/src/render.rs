@@ -4,7 +4,8 @@
 //! draws the same image.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
-use tagalong_core::{Camera, Image};
+use tagalong_core::Image;
+use tagalong_geometry::Camera;
 
 use crate::parallel::in_pieces;
 use crate::shape::Shape;
@@ -185,7 +186,7 @@ pub struct Visibility {
 mod tests {
     use nalgebra::Rotation3;
     use proptest::prelude::*;
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
     use crate::material::Material;

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::ConfigError;
+use tagalong_config::ConfigError;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 

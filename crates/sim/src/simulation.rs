@@ -7,9 +7,8 @@ use std::sync::Arc;
 use nalgebra::{
     Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
 };
-use tagalong_core::{
-    Camera, Distortion, Image, Images, Panorama, Pinhole, Rect, RgbImage, RightImage, WheelSpeeds,
-};
+use tagalong_core::{Image, Images, RgbImage, RightImage, WheelSpeeds};
+use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use serde::Serialize;
-use tagalong_core::{ConfigError, nearest};
+use tagalong_config::{ConfigError, nearest};
 
 /// Seeds of one split.
 const SEEDS: u64 = 1_000_000_000;

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use serde::Deserialize;
-use tagalong_core::ConfigError;
+use tagalong_config::ConfigError;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, ValueDeserializer};
 

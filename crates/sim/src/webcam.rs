@@ -4,7 +4,8 @@
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Camera, Distortion, Pinhole, RgbImage};
+use tagalong_core::RgbImage;
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::render::draw;
 use crate::sensor::{Exposure, Moment};

@@ -1,7 +1,8 @@
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use tagalong_core::{DepthImage, Error, Frame, Funnel, GreyImage, Lens, Result};
+use tagalong_core::{DepthImage, Error, Frame, Funnel, GreyImage, Result};
+use tagalong_geometry::Lens;
 
 use crate::matcher::size_error;
 use crate::rectification::Rectification;

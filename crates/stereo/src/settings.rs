@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::{Error, Result};
 
 /// Method of stereo matching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

@@ -3,9 +3,8 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{
-    Camera, Distortion, Frame, Funnel, GreyImage, Images, Motion, Pinhole, RightImage, Stamp,
-};
+use tagalong_core::{Frame, Funnel, GreyImage, Images, Motion, RightImage, Stamp};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_stereo::{Method, StereoDepth, StereoSettings};
 
 const SIZE: (usize, usize) = (96, 64);

@@ -199,7 +199,8 @@ const CHI_SQUARED_2_99: f64 = 9.21;
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
-    use tagalong_core::{Association, Camera, Distortion, Pinhole, Rect};
+    use tagalong_core::Association;
+    use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
     use super::*;
 

@@ -31,6 +31,7 @@
 mod clock;
 mod detections;
 mod duplicates;
+mod guarded;
 mod memo;
 mod occlusion;
 mod preprocess;
@@ -42,6 +43,7 @@ mod table;
 mod tracker;
 mod weighing;
 
+pub use guarded::{Guarded, StepError};
 pub use memo::Identities;
 pub use preprocess::{Preprocessed, Preprocessor};
 pub use report::{Candidate, Fate, Outcome, TrackingReport};

@@ -2,7 +2,8 @@
 //! predicted positions, from near to far.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use tagalong_core::{Camera, Detection, Estimate, Frame, Rect};
+use tagalong_core::{Detection, Estimate, Frame};
+use tagalong_geometry::{Camera, Rect};
 
 use crate::OcclusionSettings;
 
@@ -197,7 +198,7 @@ pub(crate) fn cover_seen(seen: &Detection, expected: &Estimate, frame: &Frame) -
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::{ConicalMirror, Distortion, Lens, Panorama, Pinhole};
+    use tagalong_geometry::{ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 
     use super::*;
 

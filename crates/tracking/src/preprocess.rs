@@ -1,5 +1,6 @@
+use crate::{Guarded, StepError};
 use nalgebra::Point2;
-use tagalong_core::{Frame, Funnel, Guarded, Motion, StepError};
+use tagalong_core::{Frame, Funnel, Motion};
 
 use crate::stage::StageLog;
 

@@ -1,8 +1,7 @@
 //! Detection in a frame, and verification of the detections.
 
-use tagalong_core::{
-    Detector, Frame, Funnel, Guarded, Likelihood, Search, StepError, Track, Verifier,
-};
+use crate::{Guarded, StepError};
+use tagalong_core::{Detector, Frame, Funnel, Likelihood, Search, Track, Verifier};
 
 use crate::detections::PendingDetection;
 use crate::memo::{self, Identities};

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use tagalong_core::{Camera, Estimate, Observation, Track, TrackHealth, TrackId};
+use tagalong_core::{Estimate, Observation, Track, TrackHealth, TrackId};
+use tagalong_geometry::Camera;
 
 use crate::occlusion::range_m;
 

@@ -1,10 +1,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::{Guarded, StepError};
 use nalgebra::{Point2, Point3};
 use tagalong_core::{
-    Associations, Associator, Detection, Estimate, Evidence, Filter, Frame, Gate, Guarded,
-    Initiation, Likelihood, Motion, Observation, ObservedTrack, Search, StepError, Support, Track,
-    TrackId, TrackManager, Unassociated, Verifier,
+    Associations, Associator, Detection, Estimate, Evidence, Filter, Frame, Gate, Initiation,
+    Likelihood, Motion, Observation, ObservedTrack, Search, Support, Track, TrackId, TrackManager,
+    Unassociated, Verifier,
 };
 
 use crate::clock::{Clock, Tick};

@@ -1,7 +1,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use tagalong_core::{Frame, Likelihood, Person, Rect, Result};
+use tagalong_core::{Frame, Likelihood, Person, Result};
+use tagalong_geometry::Rect;
 
 /// Cost of the scene likelihood in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,7 +67,8 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::Point3;
-    use tagalong_core::{Camera, Distortion, Images, Motion, Pinhole, Stamp};
+    use tagalong_core::{Images, Motion, Stamp};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     fn frame() -> Frame {
         let lens =

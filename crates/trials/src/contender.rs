@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_pipeline::{Options, Pipeline};
 
 use crate::TrialError;

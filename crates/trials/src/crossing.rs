@@ -1,7 +1,8 @@
 use std::collections::BTreeSet;
 
 use nalgebra::Vector2;
-use tagalong_core::{Camera, Track, TrackId};
+use tagalong_core::{Track, TrackId};
+use tagalong_geometry::Camera;
 use tagalong_sim::Truth;
 
 use crate::{Run, Trial};

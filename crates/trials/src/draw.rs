@@ -2,7 +2,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, DepthImage, Frame, Images, Lens, Motion, Stamp, WheelSpeeds};
+use tagalong_core::{DepthImage, Frame, Images, Motion, Stamp, WheelSpeeds};
+use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapping;
 

@@ -1,9 +1,10 @@
 use nalgebra::{Isometry2, Point2};
-use tagalong_core::{Rect, Track};
+use tagalong_core::Track;
 use tagalong_eval::{
     Clear, Comparison, Frame, Match, Prepared, Region, Report, Role, Sequence, SetDistance,
     Similarity, Tally, Truth,
 };
+use tagalong_geometry::Rect;
 use tagalong_pipeline::FrameReport;
 
 use crate::{Moment, Run, Trial, TrialError};

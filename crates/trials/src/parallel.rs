@@ -1,6 +1,6 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_sim::Scene;
 
 use crate::{Contender, Trial, TrialError};

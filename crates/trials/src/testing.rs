@@ -1,7 +1,8 @@
 //! Trials written by hand.
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
-use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, Stamp, Track, TrackId};
+use tagalong_core::{Estimate, Person, Stamp, Track, TrackId};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_pipeline::FrameReport;
 use tagalong_sim::Truth;
 

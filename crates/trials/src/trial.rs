@@ -1,7 +1,9 @@
 use cpu_time::ThreadTime;
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, Funnel, Registry, Stamp};
+use tagalong_config::Registry;
+use tagalong_core::{Funnel, Stamp};
 use tagalong_eval::EvalError;
+use tagalong_geometry::Camera;
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_sim::{Furniture, Scene, Truth};
 use tagalong_stereo::{StereoDepth, StereoSettings};

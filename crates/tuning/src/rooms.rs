@@ -3,7 +3,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use tagalong_core::ConfigError;
+use tagalong_config::ConfigError;
 use toml::Spanned;
 
 /// Fewest rooms: one is left out, and one has to remain.

@@ -5,7 +5,8 @@
 //! not the largest plane but the *lowest* large one: points below a plane count against it.
 
 use nalgebra::{Matrix3, Point2, Point3, Unit, Vector3};
-use tagalong_core::{Camera, DepthImage};
+use tagalong_core::DepthImage;
+use tagalong_geometry::Camera;
 
 /// Settings of the ground estimation.
 #[derive(Clone, Debug, PartialEq)]
@@ -198,7 +199,7 @@ impl Sequence {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

@@ -9,7 +9,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use tagalong_core::{Error, Image, Images, Panorama, Result};
+use tagalong_core::{Error, Image, Images, Result};
+use tagalong_geometry::Panorama;
 
 /// Pixel type that can be interpolated.
 pub trait Blend: Copy + Default {
@@ -92,7 +93,8 @@ impl Level {
 /// Unwraps raw images of one camera, with buffers that are kept between images.
 ///
 /// ```
-/// use tagalong_core::{ConicalMirror, GreyImage, Panorama};
+/// use tagalong_core::GreyImage;
+/// use tagalong_geometry::{ConicalMirror, Panorama};
 /// use tagalong_vision::Unwrapper;
 /// let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
 /// let mirror = ConicalMirror::from_coefficients(175.0, [239.5, 239.5], &d).unwrap();
@@ -268,7 +270,8 @@ fn tap(panorama: &Panorama, levels: &[Level], level: usize, column: usize, row: 
 mod tests {
     use nalgebra::Point2;
     use proptest::prelude::*;
-    use tagalong_core::{ConicalMirror, GreyImage, RgbImage};
+    use tagalong_core::{GreyImage, RgbImage};
+    use tagalong_geometry::ConicalMirror;
 
     use super::*;
 

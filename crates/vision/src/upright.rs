@@ -1,5 +1,6 @@
 use nalgebra::{Point2, Point3, Vector2};
-use tagalong_core::{Camera, DepthImage, GreyImage};
+use tagalong_core::{DepthImage, GreyImage};
+use tagalong_geometry::Camera;
 
 /// Upright plane through a person's head, perpendicular to the line of sight, sampled from an
 /// image: the whole body, always at the same scale and from the floor up.
@@ -140,7 +141,7 @@ fn nearest(place: f64, size: usize) -> (usize, bool) {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

@@ -7,7 +7,8 @@ pub mod patient;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Detection, Frame, Input, Inputs, Registry, Result, Verifier};
+use tagalong_config::Registry;
+use tagalong_core::{Detection, Frame, Input, Inputs, Result, Verifier};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "own-contrast";

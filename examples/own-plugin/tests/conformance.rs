@@ -2,7 +2,7 @@
 
 #[test]
 fn it_conforms() {
-    let mut registry = tagalong_core::Registry::default();
+    let mut registry = tagalong_config::Registry::default();
     own_plugin::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");

@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::{Error, Result};
 
 /// The way to the target (P1, Figure 7; P4, Figure 8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -25,7 +25,7 @@ mod trail;
 pub use config::{Config, Path};
 pub use control::ArcFollow;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "arc-follow";

@@ -6,11 +6,10 @@ mod states;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Vector2};
+use tagalong_config::Registry;
 use tagalong_conformance::target;
-use tagalong_core::{
-    Camera, Controller, Distortion, Frame, Images, Motion, Pinhole, Registry, Scene, Stamp, Track,
-    WheelSpeeds, Wheels,
-};
+use tagalong_core::{Controller, Frame, Images, Motion, Scene, Stamp, Track, WheelSpeeds, Wheels};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::{ArcFollow, Config, Path};
 

@@ -52,7 +52,9 @@ impl Associator for Hungarian {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
-    use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, Rect, Registry, TrackId};
+    use tagalong_config::Registry;
+    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
     use super::*;
 

@@ -1,7 +1,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_assignment::{Cost, Overlap, PairCost};
-use tagalong_core::{Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::Result;
 
 /// Settings of the associator `associate-hungarian`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -11,7 +11,7 @@ mod config;
 pub use associate::Hungarian;
 pub use config::Config;
 pub use tagalong_assignment::{Cost, Overlap};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers the associator `associate-hungarian`.
 pub fn register(registry: &mut Registry) {

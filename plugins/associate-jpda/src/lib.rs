@@ -19,7 +19,7 @@ mod marginals;
 
 pub use associate::Jpda;
 pub use config::Config;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers the associator `associate-jpda`.
 pub fn register(registry: &mut Registry) {

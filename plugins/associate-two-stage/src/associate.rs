@@ -82,7 +82,9 @@ impl Associator for TwoStage {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
-    use tagalong_core::{Estimate, Person, Rect, Registry, TrackId};
+    use tagalong_config::Registry;
+    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_geometry::Rect;
 
     use super::*;
 

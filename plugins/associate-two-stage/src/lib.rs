@@ -11,7 +11,7 @@ mod config;
 pub use associate::TwoStage;
 pub use config::Config;
 pub use tagalong_assignment::{Cost, Overlap};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers the associator `associate-two-stage`.
 pub fn register(registry: &mut Registry) {

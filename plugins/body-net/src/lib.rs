@@ -21,7 +21,7 @@ mod view;
 pub use config::{Config, Training};
 pub use model::Model;
 pub use net::{Net, Pass};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 pub use verify::BodyNet;
 pub use view::View;
 

@@ -1,8 +1,9 @@
 use std::sync::Arc;
 
+use tagalong_config::Registry;
 use tagalong_conformance::context;
 use tagalong_conformance::patch::{candidate, frame, picture};
-use tagalong_core::{DepthImage, Frame, Registry, Verifier};
+use tagalong_core::{DepthImage, Frame, Verifier};
 
 use crate::{BodyNet, Config};
 
@@ -161,7 +162,7 @@ mod network {
 
 #[cfg(feature = "train")]
 mod training {
-    use tagalong_core::{Example, Trainer};
+    use tagalong_config::{Example, Trainer};
 
     use super::*;
     use crate::train::NetTrainer;

@@ -1,4 +1,5 @@
-use tagalong_core::{Context, Detection, Frame, Input, Inputs, Result, Trust, Verifier};
+use tagalong_config::Context;
+use tagalong_core::{Detection, Frame, Input, Inputs, Result, Trust, Verifier};
 
 use crate::{Config, Model, Pass, View};
 

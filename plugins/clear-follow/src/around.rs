@@ -1,7 +1,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Point2;
-use tagalong_core::{Camera, DepthImage, Motion};
+use tagalong_core::{DepthImage, Motion};
+use tagalong_geometry::Camera;
 
 /// Directions around the robot.
 const DIRECTIONS: usize = 90;
@@ -138,7 +139,7 @@ mod tests {
     /// A camera 1 m above the floor that sees a board 1 m ahead, to the left.
     #[test]
     fn what_is_looked_at_replaces_what_was_remembered_there() {
-        use tagalong_core::{Distortion, Pinhole};
+        use tagalong_geometry::{Distortion, Pinhole};
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
         let board =

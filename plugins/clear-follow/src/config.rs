@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::{Error, Result};
 
 /// Settings of the controller `clear-follow`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -22,7 +22,7 @@ mod tests;
 pub use config::Config;
 pub use control::ClearFollow;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "clear-follow";

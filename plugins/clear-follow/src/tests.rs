@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Vector2};
 use proptest::prelude::*;
+use tagalong_config::Registry;
 use tagalong_conformance::target;
 use tagalong_core::{
-    Camera, Controller, DepthImage, Distortion, Frame, Images, Motion, Pinhole, Registry, Scene,
-    Stamp, Track, WheelSpeeds, Wheels,
+    Controller, DepthImage, Frame, Images, Motion, Scene, Stamp, Track, WheelSpeeds, Wheels,
 };
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::{ClearFollow, Config};
 

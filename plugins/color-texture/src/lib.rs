@@ -24,7 +24,7 @@ mod verify;
 pub use config::{Config, Training};
 pub use features::{COUNT, Family, Features};
 pub use model::{Model, Stump, Tree};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 pub use verify::ColorTexture;
 
 /// The name of this plugin in configs.

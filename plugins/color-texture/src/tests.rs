@@ -1,6 +1,7 @@
+use tagalong_config::Registry;
 use tagalong_conformance::context;
 use tagalong_conformance::patch::{candidate, frame, picture};
-use tagalong_core::{Registry, Verifier};
+use tagalong_core::Verifier;
 
 use crate::{ColorTexture, Config};
 
@@ -50,7 +51,7 @@ fn the_bias_is_added_to_every_answer() {
 
 #[cfg(feature = "train")]
 mod training {
-    use tagalong_core::{Example, Trainer};
+    use tagalong_config::{Example, Trainer};
 
     use super::*;
     use crate::train::TreeTrainer;

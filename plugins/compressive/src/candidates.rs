@@ -1,6 +1,6 @@
 //! Which boxes are looked at.
 
-use tagalong_core::Rect;
+use tagalong_geometry::Rect;
 
 /// A box in whole pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::{Error, Result};
 
 /// Settings of `compressive`. Distances in the image are in widths of the box:
 /// a pixel of the papers, whose boxes are some 64 pixels wide, is 0.016.

@@ -3,9 +3,10 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{
-    Camera, Capabilities, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M, Input,
-    Inputs, Rect, Result, Search, Track, TrackId,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
+    Track, TrackId,
 };
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
@@ -444,7 +445,8 @@ impl Detector for Compressive {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{Distortion, Estimate, Person, Pinhole};
+    use tagalong_core::{Estimate, Person};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

@@ -29,7 +29,7 @@ pub use appearance::Appearance;
 pub use config::Config;
 pub use detect::Compressive;
 pub use features::{Features, Rectangle, Scaled};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "compressive";

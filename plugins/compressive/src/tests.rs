@@ -2,10 +2,12 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use proptest::prelude::*;
+use tagalong_config::Registry;
 use tagalong_core::{
-    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, GreyImage,
-    HEAD_RADIUS_M, Images, Motion, Person, Pinhole, Rect, Registry, Search, Stamp, Track, TrackId,
+    DepthImage, Detection, Detector, Estimate, Frame, Funnel, GreyImage, Images, Motion, Person,
+    Search, Stamp, Track, TrackId,
 };
+use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;

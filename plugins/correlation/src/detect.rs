@@ -2,9 +2,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use tagalong_core::{
-    Camera, Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, HEAD_RADIUS_M,
-    Input, Inputs, Rect, Result, Search, Stamp, Track, TrackId, UPPER_BODY_SIDE_M,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Input, Inputs, Result,
+    Search, Stamp, Track, TrackId,
 };
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
 use crate::picture::{Distance, SIDE};
 use crate::strip::Lattice;

@@ -24,7 +24,7 @@ pub use config::Config;
 pub use detect::Correlation;
 pub use picture::Picture;
 pub use strip::{Fit, Strip};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "correlation";

@@ -1,5 +1,6 @@
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, GreyImage, Rect};
+use tagalong_core::{DepthImage, GreyImage};
+use tagalong_geometry::Rect;
 
 use crate::Picture;
 use crate::picture::{Distance, SIDE, Shows, brightness, nearest};

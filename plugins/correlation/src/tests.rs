@@ -2,10 +2,12 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use proptest::prelude::*;
+use tagalong_config::Registry;
 use tagalong_core::{
-    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, GreyImage,
-    HEAD_RADIUS_M, Images, Motion, Person, Pinhole, Registry, Search, Stamp, Track, TrackId,
+    DepthImage, Detection, Detector, Estimate, Frame, Funnel, GreyImage, Images, Motion, Person,
+    Search, Stamp, Track, TrackId,
 };
+use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
 
 use crate::picture::{CELLS, Distance, SIDE};
 use crate::strip::Lattice;
@@ -354,7 +356,7 @@ fn depth_says_whether_somebody_else_is_before_or_behind() {
 
 #[test]
 fn the_lattice_goes_on_around_the_square() {
-    let square = tagalong_core::Rect::new(100.0, 50.0, 48.0, 48.0);
+    let square = tagalong_geometry::Rect::new(100.0, 50.0, 48.0, 48.0);
     let lattice = Lattice::around(&square, 2, 1);
     assert_eq!((lattice.columns, lattice.rows, lattice.step), (SIDE + 4, SIDE + 2, 2.0));
     let middles: Vec<_> = lattice.middles().collect();

@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::HEAD_RADIUS_M;
+use tagalong_geometry::HEAD_RADIUS_M;
 
 use crate::bank::Direction;
 

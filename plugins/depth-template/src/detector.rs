@@ -1,10 +1,12 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
+use tagalong_config::check_settings;
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Input,
-    Inputs, Likelihood, Rect, Result, Search, Track, check_settings,
+    Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood,
+    Result, Search, Track,
 };
+use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 use tagalong_vision::RowSums;
 
 use crate::NAME;

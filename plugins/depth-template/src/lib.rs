@@ -33,7 +33,7 @@ pub use detector::DepthTemplate;
 pub use matching::{Match, Matcher};
 pub use weigher::Weigher;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "depth-template";

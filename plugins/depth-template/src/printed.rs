@@ -164,9 +164,8 @@ fn bounds(spans: impl Iterator<Item = Span>) -> Option<Span> {
 mod tests {
     use nalgebra::{Point3, Vector2};
     use proptest::prelude::*;
-    use tagalong_core::{
-        Camera, DepthImage, Distortion, Images, Likelihood, Motion, Person, Pinhole, Stamp,
-    };
+    use tagalong_core::{DepthImage, Images, Likelihood, Motion, Person, Stamp};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
     use crate::bank::{Bank, Direction, Pose, Template};
@@ -203,7 +202,7 @@ mod tests {
 
     impl Painted {
         fn new(person: &Person, direction: Direction) -> Self {
-            let depth_m = person.position.x - tagalong_core::HEAD_RADIUS_M;
+            let depth_m = person.position.x - tagalong_geometry::HEAD_RADIUS_M;
             let pixel = camera().project(&person.position).unwrap();
             let pose = Pose::nearest(direction, 0.0, 0.0, 80.0 / depth_m);
             let template = Bank::new(usize::MAX).template(pose).clone();

@@ -1,7 +1,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{Camera, DepthImage, Derived, Frame, HEAD_RADIUS_M, Rect, Result};
+use tagalong_core::{DepthImage, Derived, Frame, Result};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_vision::RowSums;
 
 /// The reduced inverse-depth image of a frame, shared by whoever matches

@@ -1,7 +1,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tagalong_core::{Camera, Frame, HEAD_RADIUS_M, Likelihood, Person, Rect, Result};
+use tagalong_core::{Frame, Likelihood, Person, Result};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 
 use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;

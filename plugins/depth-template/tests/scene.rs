@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix5, Point3, Vector2};
 use tagalong_core::{
-    Camera, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel, HEAD_RADIUS_M,
-    Images, Motion, Person, Pinhole, Search, Stamp, Track, TrackId,
+    DepthImage, Detection, Detector, Estimate, Frame, Funnel, Images, Motion, Person, Search,
+    Stamp, Track, TrackId,
 };
 use tagalong_depth_template::{Cost, DepthTemplate, DepthTemplateConfig, render};
+use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
 
 const CAMERA_HEIGHT_M: f64 = 1.2;
 

@@ -1,7 +1,8 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector3, Vector5};
 use tagalong_core::{
-    Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support, match_moments,
+    Detection, Estimate, Motion, Person, PersonFilter, Result, Support, match_moments,
 };
+use tagalong_geometry::Camera;
 
 use crate::Config;
 

@@ -17,7 +17,8 @@ mod tests;
 
 pub use config::Config;
 pub use filter::{Belief, Ekf};
-use tagalong_core::{PerPerson, Registry};
+use tagalong_config::Registry;
+use tagalong_core::PerPerson;
 
 /// Registers the filter `ekf`.
 pub fn register(registry: &mut Registry) {

@@ -2,8 +2,9 @@
 //! PICTURE RUNS`. For the comparison with OpenCV in `benches/peers/`.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
 use tagalong_face_rgbd::{Cascade, Scanner, grouped, scales};
+use tagalong_geometry::Rect;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);

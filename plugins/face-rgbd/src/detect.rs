@@ -1,8 +1,9 @@
 use nalgebra::Point2;
+use tagalong_config::Context;
 use tagalong_core::{
-    Camera, Capabilities, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M,
-    Input, Inputs, Rect, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
 };
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
@@ -145,9 +146,8 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{
-        Distortion, Estimate, Images, Motion, Person, Pinhole, Stamp, Track, TrackId,
-    };
+    use tagalong_core::{Estimate, Images, Motion, Person, Stamp, Track, TrackId};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
     use crate::tests::{noise, small};

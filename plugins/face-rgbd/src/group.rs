@@ -1,6 +1,6 @@
 //! Many windows of one face become one (OpenCV's `groupRectangles`).
 
-use tagalong_core::Rect;
+use tagalong_geometry::Rect;
 
 /// Windows whose edges differ by less than this part of their size are alike.
 const ALIKE: f64 = 0.2;

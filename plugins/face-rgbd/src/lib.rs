@@ -35,7 +35,7 @@ pub use group::{Group, Grouping, Hit, grouped};
 pub use level::Level;
 pub use propose::Proposals;
 pub use scan::{Scanner, Seen, scales, whole};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "face-rgbd";

@@ -3,7 +3,8 @@
 //! Vo-Duc, Masselli and Zell 2012).
 
 use nalgebra::Point2;
-use tagalong_core::{Camera, DepthImage, Frame, Rect, RgbImage};
+use tagalong_core::{DepthImage, Frame, RgbImage};
+use tagalong_geometry::{Camera, Rect};
 use tagalong_vision::islands;
 
 use crate::Config;
@@ -213,7 +214,8 @@ fn skin(image: &RgbImage, x: i64, y: i64) -> bool {
 mod tests {
     use std::sync::Arc;
 
-    use tagalong_core::{Distortion, Images, Motion, Pinhole, Stamp};
+    use tagalong_core::{Images, Motion, Stamp};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

@@ -1,7 +1,8 @@
 //! Windows over an image in many sizes, as OpenCV's `detectMultiScale` looks at
 //! them.
 
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 use crate::cascade::{Cascade, Part};
 use crate::compiled::{Block, Compiled, LANES};

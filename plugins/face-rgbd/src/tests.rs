@@ -1,5 +1,7 @@
 use proptest::prelude::*;
-use tagalong_core::{GreyImage, Rect, Registry};
+use tagalong_config::Registry;
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 use crate::{
     Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Seen, Split, Stage, grouped, whole,

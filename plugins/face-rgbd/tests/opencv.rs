@@ -9,8 +9,9 @@
 use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node};
-use tagalong_core::{GreyImage, Rect, RgbImage};
+use tagalong_core::{GreyImage, RgbImage};
 use tagalong_face_rgbd::{Cascade, Scanner, grouped, scales};
+use tagalong_geometry::Rect;
 
 /// A box is the expected one if its edges are off by this part of its width, or
 /// by so many pixels, at most.

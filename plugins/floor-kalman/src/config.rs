@@ -1,7 +1,8 @@
 use nalgebra::Matrix2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::{Error, Result};
 
 /// How a person's next position is predicted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -2,8 +2,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry2, Matrix2, Matrix2x3, Point3, Rotation2, SMatrix, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
+    Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
 };
+use tagalong_geometry::Camera;
 
 use crate::belief::Belief;
 use crate::{Config, Measurement};

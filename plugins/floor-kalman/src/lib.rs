@@ -17,7 +17,7 @@ mod tests;
 
 pub use config::{Config, Form, Measurement};
 pub use filter::FloorKalman;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "floor-kalman";

@@ -3,9 +3,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry2, Matrix2, Matrix2x3, Matrix3, Point2, Point3, Vector2};
 use proptest::prelude::*;
 use tagalong_core::{
-    Camera, Detection, Distortion, Estimate, Evidence, Filter, Frame, Images, Matched, Motion,
-    Pinhole, Rect, Stamp, TrackId,
+    Detection, Estimate, Evidence, Filter, Frame, Images, Matched, Motion, Stamp, TrackId,
 };
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use crate::belief::Belief;
 use crate::{Config, FloorKalman, Form, Measurement};
@@ -137,7 +137,7 @@ fn settings_that_cannot_work_are_refused() {
 
 #[test]
 fn it_keeps_the_promises_of_its_kind() {
-    let mut registry = tagalong_core::Registry::default();
+    let mut registry = tagalong_config::Registry::default();
     crate::register(&mut registry);
     assert!(registry.find(crate::NAME).is_ok());
     let failures = tagalong_conformance::check_all(&registry);

@@ -2,7 +2,8 @@
 //! RUNS`. For the comparison with OpenCV in `benches/peers/`.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 use tagalong_hog_upper_body::{Grid, Model, Scanner, Wanted, merge, window_of};
 
 fn main() {

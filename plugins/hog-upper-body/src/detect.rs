@@ -1,10 +1,11 @@
 use std::ops::RangeInclusive;
 
 use nalgebra::Matrix3;
+use tagalong_config::Context;
 use tagalong_core::{
-    Camera, Capabilities, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_RADIUS_M,
-    Input, Inputs, Rect, Result, Search, UPPER_BODY_SIDE_M,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
 };
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
 use crate::lattice::Lattice;
 use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
@@ -212,9 +213,8 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{
-        Distortion, Estimate, GreyImage, Images, Motion, Person, Pinhole, Stamp, Track, TrackId,
-    };
+    use tagalong_core::{Estimate, GreyImage, Images, Motion, Person, Stamp, Track, TrackId};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

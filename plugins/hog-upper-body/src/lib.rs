@@ -40,7 +40,7 @@ pub use model::{Field, Kind, Machine, Model, NUMBERS};
 pub use resample::resampled;
 pub use scan::{Grid, Scanner, Wanted, Window, merge, window_numbers, window_of};
 pub use spans::Spans;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 pub use trees::{ROUND, Tree, Trees};
 
 /// The name of this plugin in configs.

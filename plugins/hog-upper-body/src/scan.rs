@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 use tagalong_vision::islands;
 
 use crate::hog::CELL;

@@ -1,5 +1,7 @@
 use proptest::prelude::*;
-use tagalong_core::{GreyImage, Rect, Registry};
+use tagalong_config::Registry;
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 use crate::channels::{self, DEPTH};
 use crate::hog::{BINS, BLOCK, CELL};

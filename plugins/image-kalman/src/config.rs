@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::Result;
 
 /// Settings of `image-kalman`. Lengths in the image are given in widths of the
 /// box, so that near and far people are treated alike; the box of an upper body

@@ -1,8 +1,7 @@
 use std::collections::BTreeMap;
 
-use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Motion, Result, Support, TrackId,
-};
+use tagalong_core::{Detection, Estimate, Evidence, Filter, Motion, Result, Support, TrackId};
+use tagalong_geometry::Camera;
 
 use crate::{Belief, Config};
 

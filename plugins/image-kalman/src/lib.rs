@@ -22,7 +22,7 @@ mod tests;
 pub use config::Config;
 pub use filter::ImageKalman;
 pub use model::Belief;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "image-kalman";

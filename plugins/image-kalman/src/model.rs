@@ -1,7 +1,8 @@
 //! The belief in one person, and what time, the robot and a sighting do to it.
 
 use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5};
-use tagalong_core::{Camera, Detection, Estimate, Motion, Person, Rect, Support};
+use tagalong_core::{Detection, Estimate, Motion, Person, Support};
+use tagalong_geometry::{Camera, Rect};
 
 use crate::Config;
 use crate::space::{Place, Seen, pixel_covariance, range};

@@ -1,7 +1,8 @@
 //! Between the image and the robot's world.
 
 use nalgebra::{Matrix2, Matrix3x2, Point2, Point3, SMatrix, Vector2, Vector3};
-use tagalong_core::{Camera, Motion};
+use tagalong_core::Motion;
+use tagalong_geometry::Camera;
 
 /// Nearer than this to the plane of the lens there are no pixels, m.
 const NEAREST_M: f64 = 0.1;

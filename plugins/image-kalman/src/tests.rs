@@ -2,10 +2,9 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Point3, Vector3};
 use proptest::prelude::*;
-use tagalong_core::{
-    Camera, Detection, Distortion, Evidence, Filter, Frame, Images, Matched, Motion, Pinhole, Rect,
-    Registry, Stamp, TrackId,
-};
+use tagalong_config::Registry;
+use tagalong_core::{Detection, Evidence, Filter, Frame, Images, Matched, Motion, Stamp, TrackId};
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use crate::space::{Place, pixel_covariance};
 use crate::{Belief, Config, ImageKalman};

@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::Result;
 
 /// How the particles of people whose silhouettes overlap are weighed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

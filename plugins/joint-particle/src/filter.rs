@@ -2,9 +2,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Input, Inputs, Motion, Person, Result, Sketch,
-    Support, TrackId,
+    Detection, Estimate, Evidence, Filter, Input, Inputs, Motion, Person, Result, Sketch, Support,
+    TrackId,
 };
+use tagalong_geometry::Camera;
 
 use crate::config::{Config, Method};
 use crate::group::Group;
@@ -284,7 +285,8 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::Matrix3;
-    use tagalong_core::{Distortion, Frame, Images, Likelihood, Matched, Pinhole, Rect, Stamp};
+    use tagalong_core::{Frame, Images, Likelihood, Matched, Stamp};
+    use tagalong_geometry::{Distortion, Pinhole, Rect};
 
     use super::*;
 

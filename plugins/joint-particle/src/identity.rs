@@ -119,7 +119,8 @@ const MAX_PIXELS: usize = 2000;
 mod tests {
     use std::sync::Arc;
 
-    use tagalong_core::{Camera, Distortion, Images, Motion, Pinhole, Stamp};
+    use tagalong_core::{Images, Motion, Stamp};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
 

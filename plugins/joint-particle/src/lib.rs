@@ -29,7 +29,7 @@ mod weighing;
 
 pub use config::{Chosen, Config, Method};
 pub use filter::JointParticle;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers the filter `joint-particle`.
 pub fn register(registry: &mut Registry) {

@@ -1,6 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use tagalong_core::{Estimate, Rect, TrackId};
+use tagalong_core::{Estimate, TrackId};
+use tagalong_geometry::Rect;
 
 use crate::config::Config;
 

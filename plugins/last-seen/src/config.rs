@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::Result;
 
 /// Settings of the filter `last-seen`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

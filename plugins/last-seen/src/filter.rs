@@ -1,7 +1,8 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Matrix2, Matrix3, Point2, Point3, SMatrix, Vector2};
-use tagalong_core::{Camera, Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
+use tagalong_core::{Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
+use tagalong_geometry::Camera;
 
 use crate::Config;
 
@@ -111,7 +112,7 @@ fn turn_back(motion: &Motion) -> Matrix2<f64> {
 mod tests {
     use std::f64::consts::FRAC_PI_2;
 
-    use tagalong_core::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, Pinhole, Rect};
 
     use super::*;
 

@@ -10,7 +10,8 @@ mod filter;
 
 pub use config::Config;
 pub use filter::{Belief, LastSeen};
-use tagalong_core::{PerPerson, Registry};
+use tagalong_config::Registry;
+use tagalong_core::PerPerson;
 
 /// Registers the filter `last-seen`.
 pub fn register(registry: &mut Registry) {

@@ -14,7 +14,7 @@ mod track;
 
 pub use config::Config;
 pub use manage::MOfN;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers the track manager `manage-m-of-n`.
 pub fn register(registry: &mut Registry) {

@@ -1,8 +1,9 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_core::{
-    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Rect, Track,
+    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Track,
     TrackChanges, TrackId, TrackManager, Unassociated,
 };
+use tagalong_geometry::Rect;
 
 use crate::{Config, MOfN};
 

@@ -20,7 +20,7 @@ mod tests;
 
 pub use config::Config;
 pub use manage::Sprt;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// Registers the track manager `manage-sprt`.
 pub fn register(registry: &mut Registry) {

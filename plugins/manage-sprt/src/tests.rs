@@ -1,8 +1,10 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+use tagalong_config::Registry;
 use tagalong_core::{
-    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Rect, Registry,
-    Track, TrackId, TrackManager, Unassociated,
+    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Track, TrackId,
+    TrackManager, Unassociated,
 };
+use tagalong_geometry::Rect;
 
 use crate::{Config, Sprt};
 

@@ -1,8 +1,9 @@
 use nalgebra::{Matrix3, Point3, Vector3};
+use tagalong_config::Context;
 use tagalong_core::{
-    Camera, Capabilities, Context, Detection, Detector, Error, Frame, Funnel, Input, Inputs,
-    Result, Search, Track,
+    Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Result, Search, Track,
 };
+use tagalong_geometry::Camera;
 
 use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, View};
 
@@ -174,7 +175,8 @@ fn fits(search: &Search<'_>, person: &Detection) -> bool {
 mod tests {
     use nalgebra::{Matrix2, SMatrix, Vector2};
     use tagalong_conformance::context;
-    use tagalong_core::{ConicalMirror, Estimate, Lens, Panorama, Person, Rect, TrackId};
+    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_geometry::{ConicalMirror, Lens, Panorama, Rect};
 
     use super::*;
 

@@ -40,7 +40,7 @@ pub use eyes::Eyes;
 pub use model::{Geometry, Head, Line, Model, Person, Ridge, Signature, View};
 pub use network::Network;
 pub use segment::{Counts, Segmenter};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "omni-appearance";

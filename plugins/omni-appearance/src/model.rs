@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Camera, Panorama};
+use tagalong_geometry::{Camera, Panorama};
 
 use crate::blob::FEATURES;
 use crate::{Blob, Distance, Features, Network};

@@ -1,11 +1,10 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3};
+use tagalong_config::Registry;
 use tagalong_conformance::context;
-use tagalong_core::{
-    Camera, ConicalMirror, Detection, Detector, Frame, Funnel, Images, Lens, Motion, Panorama,
-    Registry, RgbImage, Search, Stamp,
-};
+use tagalong_core::{Detection, Detector, Frame, Funnel, Images, Motion, RgbImage, Search, Stamp};
+use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama};
 
 use crate::{Config, Distance, Model, OmniAppearance};
 

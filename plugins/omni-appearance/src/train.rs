@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Point3};
-use tagalong_core::{Detection, Error, Example, Fitted, Frame, Funnel, Result, Trainer};
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, Funnel, Result};
 use tagalong_learn::mix;
 
 use crate::fit::mean_and_scale;

@@ -1,7 +1,8 @@
 //! The background after the robot has moved.
 
 use nalgebra::{Point2, Point3};
-use tagalong_core::{Camera, Motion, Panorama};
+use tagalong_core::Motion;
+use tagalong_geometry::{Camera, Panorama};
 
 /// Places are computed at every so many columns and rows, and between them
 /// interpolated.
@@ -256,7 +257,7 @@ fn fold(out: &mut [u8], with: &[u8], pick: impl Fn(u8, u8) -> u8 + Copy) {
 mod tests {
     use nalgebra::Matrix3;
     use proptest::prelude::*;
-    use tagalong_core::{ConicalMirror, Lens};
+    use tagalong_geometry::{ConicalMirror, Lens};
 
     use super::*;
 

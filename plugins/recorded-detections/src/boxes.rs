@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tagalong_core::{Error, Recorded, Rect, Result};
+use tagalong_core::{Error, Recorded, Result};
+use tagalong_geometry::Rect;
 
 /// Boxes by the number of their frame, from 1.
 pub(crate) type Boxes = BTreeMap<u64, Vec<Recorded>>;

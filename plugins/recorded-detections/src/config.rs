@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Result, check_settings};
+use tagalong_config::check_settings;
+use tagalong_core::Result;
 
 /// What a recorded box is drawn around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -1,8 +1,10 @@
 use nalgebra::{Matrix3, Point3};
+use tagalong_config::Context;
 use tagalong_core::{
-    Capabilities, Context, DepthImage, Detection, Detector, Frame, Funnel, HEAD_BELOW_TOP_M,
-    HEAD_RADIUS_M, Input, Inputs, Recorded, Rect, Result, Search, Track, UPPER_BODY_SIDE_M,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Recorded, Result,
+    Search, Track,
 };
+use tagalong_geometry::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};

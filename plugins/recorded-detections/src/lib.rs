@@ -15,7 +15,7 @@ mod tests;
 
 pub use config::{Body, Config, ScoreScale};
 pub use detect::RecordedDetections;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "recorded-detections";

@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix5, Point3, Vector2};
+use tagalong_config::{Context, Registry};
 use tagalong_core::{
-    Camera, Context, DepthImage, Detection, Detector, Distortion, Estimate, Frame, Funnel,
-    HEAD_RADIUS_M, Images, Motion, Person, Pinhole, Recorded, Rect, Registry, Search, Stamp, Track,
-    TrackId, Wheels,
+    DepthImage, Detection, Detector, Estimate, Frame, Funnel, Images, Motion, Person, Recorded,
+    Search, Stamp, Track, TrackId, Wheels,
 };
+use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 
 use super::*;
 

@@ -27,7 +27,7 @@ mod verify;
 pub use config::{Config, Scaling, Training};
 pub use model::Model;
 pub use patch::{PIXELS, Patch, SIDE, Sampler};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 pub use verify::SvmPatch;
 
 /// The name of this plugin in configs.

@@ -1,4 +1,5 @@
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 use crate::{Scaling, gradients};
 

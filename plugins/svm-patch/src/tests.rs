@@ -1,6 +1,7 @@
+use tagalong_config::Registry;
 use tagalong_conformance::context;
 use tagalong_conformance::patch::{candidate, frame, picture};
-use tagalong_core::{Registry, Verifier};
+use tagalong_core::Verifier;
 
 use crate::{Config, SvmPatch};
 
@@ -39,7 +40,7 @@ fn the_limit_holds() {
 
 #[cfg(feature = "train")]
 mod training {
-    use tagalong_core::{Example, Trainer};
+    use tagalong_config::{Example, Trainer};
 
     use super::*;
     use crate::train::{PatchTrainer, Trial};

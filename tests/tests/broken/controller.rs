@@ -1,4 +1,5 @@
-use tagalong_core::{Controller, Registry, Scene, WheelSpeeds};
+use tagalong_config::Registry;
+use tagalong_core::{Controller, Scene, WheelSpeeds};
 
 use super::{mood, register_with_fault};
 

@@ -1,8 +1,10 @@
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use tagalong_config::Registry;
 use tagalong_core::{
-    Capabilities, Detection, Detector, Error, Frame, Funnel, HEAD_RADIUS_M, Input, Inputs,
-    Likelihood, Person, Registry, Result, Search, Track,
+    Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood, Person,
+    Result, Search, Track,
 };
+use tagalong_geometry::HEAD_RADIUS_M;
 
 use super::{mood, register_with_fault};
 

@@ -1,10 +1,12 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{SMatrix, SVector, Vector2};
+use tagalong_config::Registry;
 use tagalong_core::{
-    Camera, Detection, Estimate, Evidence, Filter, Matched, Motion, PerPerson, Person,
-    PersonFilter, Registry, Result, Support, TrackId,
+    Detection, Estimate, Evidence, Filter, Matched, Motion, PerPerson, Person, PersonFilter,
+    Result, Support, TrackId,
 };
+use tagalong_geometry::Camera;
 
 use super::{mood, register_with_fault};
 

@@ -1,4 +1,5 @@
-use tagalong_core::{Detection, Error, Frame, Input, Inputs, Registry, Result, Verifier};
+use tagalong_config::Registry;
+use tagalong_core::{Detection, Error, Frame, Input, Inputs, Result, Verifier};
 
 use super::{mood, register_with_fault};
 

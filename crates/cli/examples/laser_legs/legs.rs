@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Point2, Point3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, LaserScan, Rect, Result,
-    Search,
+    Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, LaserScan, Result, Search,
 };
+use tagalong_geometry::Rect;
 
 /// Settings of `legs`.
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]

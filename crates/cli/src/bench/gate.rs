@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde_json::{Map, Value};
-use tagalong_core::nearest;
+use tagalong_config::nearest;
 use tagalong_eval::Scores;
 use tagalong_report::{Benchmark, Outcome, TaskResult};
 

@@ -21,7 +21,7 @@ use args::{FolderArgs, PlanArgs, Step};
 use gate::Gate;
 use plan::Task;
 use store::Store;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use work::Tally;
 
 use crate::args::Format;

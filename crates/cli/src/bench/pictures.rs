@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use tagalong_core::{Images, Rect};
+use tagalong_core::Images;
 use tagalong_eval::Frame;
+use tagalong_geometry::Rect;
 use tagalong_report::EventRow;
 
 use super::store::Stored;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Limits, LogError, read_truth};
 use tagalong_pipeline::Tunable;
 

@@ -1,7 +1,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Usage};
 use tagalong_pipeline::Pipeline;
 

@@ -1,4 +1,4 @@
-use tagalong_core::{PluginInfo, Registry, commented_defaults};
+use tagalong_config::{PluginInfo, Registry, commented_defaults};
 use tagalong_pipeline::PipelineSettings;
 
 use crate::config_file::OuterSettings;

@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 
 use crate::args::Format;
 use crate::outcome::{Ended, Outcome, print};

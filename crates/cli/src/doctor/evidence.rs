@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{Camera, DepthImage};
+use tagalong_core::DepthImage;
+use tagalong_geometry::Camera;
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tagalong_vision::quality::Exposure;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_log::{FrameSource, Input, examine};
 use tagalong_pipeline::Pipeline;

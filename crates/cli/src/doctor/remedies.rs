@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn every_setting_of_the_table_exists() {
-        let mut registry = tagalong_core::Registry::default();
+        let mut registry = tagalong_config::Registry::default();
         tagalong_catalog::register(&mut registry);
         let mut known: BTreeSet<String> = BTreeSet::new();
         let mut keys = |text: &str| {

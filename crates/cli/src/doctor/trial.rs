@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tagalong_core::{Frame, Funnel, Rect, RgbImage};
+use tagalong_core::{Frame, Funnel, RgbImage};
+use tagalong_geometry::Rect;
 use tagalong_pipeline::{Fate, FrameReport, Pipeline};
 
 use crate::overlay::background;

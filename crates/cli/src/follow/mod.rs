@@ -12,7 +12,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use log::RideLog;
 use serde::Serialize;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
 use tagalong_sim::{Scene, Seeds, Split, Variant};

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use tagalong_core::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use super::ImportArgs;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::Isometry3;
-use tagalong_core::{Distortion, Pinhole, Stamp};
+use tagalong_core::Stamp;
+use tagalong_geometry::{Distortion, Pinhole};
 use tagalong_log::msgs::{
     CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, TransformStamped,
 };

@@ -1,6 +1,7 @@
 use font8x8::legacy::BASIC_LEGACY;
 use nalgebra::Point2;
-use tagalong_core::{Rect, RgbImage};
+use tagalong_core::RgbImage;
+use tagalong_geometry::Rect;
 
 /// Colour with its opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]

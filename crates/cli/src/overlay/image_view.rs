@@ -1,5 +1,6 @@
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, Images, Rect, RgbImage, Sketch, SketchMap, SketchPoint, Track};
+use tagalong_core::{DepthImage, Images, RgbImage, Sketch, SketchMap, SketchPoint, Track};
+use tagalong_geometry::Rect;
 use tagalong_pipeline::Fate;
 
 use super::canvas::{Canvas, Ink, LINE_PX};

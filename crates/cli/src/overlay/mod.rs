@@ -17,7 +17,8 @@ use std::sync::Arc;
 use self::canvas::{Canvas, Ink};
 pub use image_view::background;
 use nalgebra::Isometry2;
-use tagalong_core::{Camera, Images, RgbImage};
+use tagalong_core::{Images, RgbImage};
+use tagalong_geometry::Camera;
 use tagalong_pipeline::FrameReport;
 use trails::Trails;
 

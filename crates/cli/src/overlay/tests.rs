@@ -1,8 +1,9 @@
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Distortion, Estimate, Person, Pinhole, Rect, Silhouette, Sketch,
-    SketchMap, SketchPoint, Stamp, Track, TrackId,
+    DepthImage, Detection, Estimate, Person, Silhouette, Sketch, SketchMap, SketchPoint, Stamp,
+    Track, TrackId,
 };
+use tagalong_geometry::{Distortion, Pinhole, Rect};
 use tagalong_pipeline::{Candidate, Fate};
 
 use super::canvas::LINE_PX;

@@ -1,7 +1,8 @@
 //! Edges of people in depth against their true places. Structured light frays them, stereo matching
 //! with windows fattens them.
 
-use tagalong_core::{DepthImage, Rect};
+use tagalong_core::DepthImage;
+use tagalong_geometry::Rect;
 use tagalong_sim::Truth;
 use tagalong_trials::{Drawn, TrialError};
 

@@ -3,7 +3,7 @@
 //! robot.
 
 use nalgebra::Point2;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_pipeline::{Candidate, Fate};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Run, Trial, TrialError, each};

@@ -12,7 +12,8 @@ use std::fmt::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use tagalong_core::{DepthImage, Frame, Funnel, Registry};
+use tagalong_config::Registry;
+use tagalong_core::{DepthImage, Frame, Funnel};
 use tagalong_sim::{CameraKind, Scene, Variant};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::{Draw, Drawn, TrialError};

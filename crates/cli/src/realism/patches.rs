@@ -9,8 +9,9 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
-use tagalong_core::{DepthImage, Rect};
+use tagalong_core::DepthImage;
 use tagalong_eval::formats::people;
+use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_trials::TrialError;
 

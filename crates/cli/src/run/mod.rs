@@ -15,7 +15,7 @@ use frames::{Frames, Item};
 use pictures::Pictures;
 use progress::Progress;
 use report::{FileFacts, RunReport, Tally};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};

@@ -128,6 +128,6 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
 }
 
 /// Converts a rectangle to the type of the metrics.
-pub fn region(rect: &tagalong_core::Rect) -> Region {
+pub fn region(rect: &tagalong_geometry::Rect) -> Region {
     Region::new(rect.x, rect.y, rect.width, rect.height)
 }

@@ -3,10 +3,10 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
-use tagalong_core::{HEAD_RADIUS_M, Rect};
 use tagalong_eval::formats::mot::{self, SequenceInfo};
 use tagalong_eval::formats::{Timeline, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
+use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
 
 use super::{Shots, odd_labels, read_text, region, without_area};

@@ -2,7 +2,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, Images, Rect, RgbImage};
+use tagalong_core::{DepthImage, Images, RgbImage};
+use tagalong_geometry::Rect;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapper;
 

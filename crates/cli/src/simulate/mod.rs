@@ -10,7 +10,7 @@ use std::thread::available_parallelism;
 use clap::Args;
 use indicatif::ProgressBar;
 pub use record::Recorder;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 

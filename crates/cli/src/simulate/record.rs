@@ -3,9 +3,8 @@ use std::path::Path;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
-use tagalong_core::{
-    Camera, ConicalMirror, DepthImage, GreyImage, Lens, Panorama, Rect, RgbImage, Stamp,
-};
+use tagalong_core::{DepthImage, GreyImage, RgbImage, Stamp};
+use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 use tagalong_log::msgs::{
     CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry, PoseStamped,
     StringMsg, TFMessage, TransformStamped, TwistStamped,

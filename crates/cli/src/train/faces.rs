@@ -6,7 +6,9 @@ use std::io::Read as _;
 use std::path::Path;
 
 use flate2::read::GzDecoder;
-use tagalong_core::{Example, GreyImage, Rect};
+use tagalong_config::Example;
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 use super::photos::{Take, candidate, fingerprint, frame, photos, read};
 use crate::outcome::Failure;

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point2;
 use serde::Serialize;
-use tagalong_core::{Detection, Registry, Track, Verifier};
+use tagalong_config::Registry;
+use tagalong_core::{Detection, Track, Verifier};
 use tagalong_eval::{CONFIDENCE, wilson};
 use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 

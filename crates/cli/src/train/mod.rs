@@ -22,9 +22,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use tagalong_core::{
-    ConfigError, Context, Detection, Example, Frame, Kind, Registry, Trainer, Verifier, Wheels,
-};
+use tagalong_config::{ConfigError, Context, Example, Kind, Registry, Trainer};
+use tagalong_core::{Detection, Frame, Verifier, Wheels};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{CameraKind, Split};
 use toml::Spanned;
@@ -394,7 +393,7 @@ fn settings(path: Option<&Path>) -> Result<toml::Table, Failure> {
 /// Builds something from a table of settings.
 fn with_value<T>(
     settings: &toml::Table,
-    build: impl FnOnce(Option<tagalong_core::Value<'_>>) -> Result<T, ConfigError>,
+    build: impl FnOnce(Option<tagalong_config::Value<'_>>) -> Result<T, ConfigError>,
 ) -> Result<T, Failure> {
     let text = settings.to_string();
     let table = DeTable::parse(&text).map_err(Failure::usage)?;

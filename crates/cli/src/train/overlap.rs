@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use tagalong_core::{Detection, Example, Frame, GreyImage};
+use tagalong_config::Example;
+use tagalong_core::{Detection, Frame, GreyImage};
 use tagalong_learn::{CALIBRATION, Use, use_of};
 use tagalong_testdata::find;
 

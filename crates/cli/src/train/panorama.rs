@@ -2,7 +2,9 @@
 //! simulated rooms with known positions.
 
 use nalgebra::Matrix3;
-use tagalong_core::{Detection, Example, Frame, Rect, Trainer};
+use tagalong_config::{Example, Trainer};
+use tagalong_core::{Detection, Frame};
+use tagalong_geometry::Rect;
 use tagalong_sim::{Scene, Split, Truth, Variant};
 use tagalong_trials::Draw;
 

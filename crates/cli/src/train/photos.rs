@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
-use tagalong_core::{
-    Camera, Detection, Distortion, Example, Frame, GreyImage, Images, Motion, Pinhole, Rect, Stamp,
-};
+use tagalong_config::Example;
+use tagalong_core::{Detection, Frame, GreyImage, Images, Motion, Stamp};
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use super::rooms::Chance;
 use crate::outcome::Failure;

@@ -1,7 +1,7 @@
 //! Scenes for training and for testing: random rooms from a seed, and the suites that are used for
 //! all other tests, each with its own seeds.
 
-use tagalong_core::ConfigError;
+use tagalong_config::ConfigError;
 use tagalong_sim::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Split, Variant,

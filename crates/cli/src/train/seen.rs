@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::Point2;
-use tagalong_core::{Detection, Frame, Funnel, Rect};
+use tagalong_core::{Detection, Frame, Funnel};
 use tagalong_eval::{Role, Truth};
+use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_sim::Scene;
 use tagalong_stereo::{StereoDepth, StereoSettings};

@@ -7,7 +7,8 @@ use super::card::WindowCard;
 use super::photos::{Take, photos};
 use super::{Session, faces, write};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
-use tagalong_core::{Detection, Example, Frame, Trainer};
+use tagalong_config::{Example, Trainer};
+use tagalong_core::{Detection, Frame};
 
 /// Folders of the data that are read.
 const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];

@@ -1,4 +1,4 @@
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_eval::{Clear, Identity};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Crossing, Judge, Trial, TrialError, crossing, each};

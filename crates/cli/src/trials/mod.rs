@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::Contender;
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::ConicalMirror;
+use tagalong_geometry::ConicalMirror;
 use tagalong_log::msgs::{CameraInfo, PoseStamped, TFMessage, decode};
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::Scene;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    Camera, ConicalMirror, DepthImage, Distortion, Frame, Images, Input, LaserScan as Scan, Lens,
-    Motion, Panorama, Pinhole, RightImage, Stamp, planar_pose,
+    DepthImage, Frame, Images, Input, LaserScan as Scan, Motion, RightImage, Stamp, planar_pose,
 };
+use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
 
 use super::LogFrame;

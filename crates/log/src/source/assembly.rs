@@ -1,6 +1,6 @@
 //! Frames from messages of any source.
 
-use tagalong_core::Camera;
+use tagalong_geometry::Camera;
 
 use super::assemble::Assembler;
 use super::intake::Intake;

@@ -1,7 +1,8 @@
 //! Pose of the camera on the robot.
 
 use nalgebra::Isometry3;
-use tagalong_core::{Camera, ConicalMirror, Pinhole, Stamp};
+use tagalong_core::Stamp;
+use tagalong_geometry::{Camera, ConicalMirror, Pinhole};
 
 use crate::scan::Scan;
 use crate::tf::TfBuffer;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{Camera, ConicalMirror, DepthImage, Lens};
+use tagalong_core::DepthImage;
+use tagalong_geometry::{Camera, ConicalMirror, Lens};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 
 use super::assembly::{Assembly, Messages};

@@ -1,7 +1,8 @@
 //! Detections by other programs that were recorded in a log.
 
 use nalgebra::{Isometry3, Point3};
-use tagalong_core::{Recorded, Rect};
+use tagalong_core::Recorded;
+use tagalong_geometry::Rect;
 
 use super::intake::Intake;
 use super::mount::robot_frame;

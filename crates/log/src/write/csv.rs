@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn boxes_have_ten_columns_and_stay_in_the_image() {
         let mut one = track(12);
-        one.estimate.region = tagalong_core::Rect::new(-10.0, 400.0, 100.0, 100.0);
+        one.estimate.region = tagalong_geometry::Rect::new(-10.0, 400.0, 100.0, 100.0);
         one.score = 0.0;
         let (text, _) = lines(&[one], 0.0);
         assert_eq!(text, "7,12,0.00,400.00,90.00,80.00,0.500000,-1,-1,-1\n");
@@ -105,7 +105,7 @@ mod tests {
         let mut coasting = track(2);
         (coasting.seen, coasting.unseen_s) = (false, 0.4);
         let mut outside = track(3);
-        outside.estimate.region = tagalong_core::Rect::new(700.0, 0.0, 50.0, 50.0);
+        outside.estimate.region = tagalong_geometry::Rect::new(700.0, 0.0, 50.0, 50.0);
         let tracks = [tentative, coasting, outside];
         assert_eq!(lines(&tracks, 0.0).0, "");
         assert!(lines(&tracks, 0.5).0.starts_with("7,2,"), "a coasting track may be asked for");

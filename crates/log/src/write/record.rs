@@ -1,6 +1,7 @@
 use nalgebra::{Isometry2, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Camera, Rect, Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_geometry::{Camera, Rect};
 
 /// Settings of the output, `[output]` of a config.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,7 +1,8 @@
 //! A camera and a track for the tests of the writers.
 
 use nalgebra::{Point3, SMatrix, Vector2};
-use tagalong_core::{Camera, Distortion, Estimate, Person, Pinhole, Track, TrackId};
+use tagalong_core::{Estimate, Person, Track, TrackId};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 pub(super) fn camera() -> Camera {
     let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };

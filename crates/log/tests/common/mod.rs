@@ -9,7 +9,8 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::Serialize;
-use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
+use tagalong_core::Stamp;
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_log::msgs::{
     CameraInfo, Header, Image, Message, Odometry, Pose, TFMessage, Transform, TransformStamped,
     encode,
@@ -152,7 +153,7 @@ fn transform(parent: &str, child: &str, stamp: Stamp, pose: &Isometry3<f64>) -> 
 }
 
 pub fn info_of(frame: &str, camera: &Camera) -> CameraInfo {
-    let tagalong_core::Lens::Pinhole(lens) = &camera.lens else { panic!("pinhole") };
+    let tagalong_geometry::Lens::Pinhole(lens) = &camera.lens else { panic!("pinhole") };
     let size = (camera.width, camera.height);
     CameraInfo::of_lens(&Header::new(at(0.0), frame), lens, size, 0.0)
 }

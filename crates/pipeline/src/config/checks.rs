@@ -1,6 +1,7 @@
 use std::ops::Range;
 
-use tagalong_core::{ConfigError, Error, Result};
+use tagalong_config::ConfigError;
+use tagalong_core::{Error, Result};
 use toml::de::DeTable;
 
 use crate::PipelineSettings;

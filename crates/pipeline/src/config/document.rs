@@ -6,7 +6,7 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use tagalong_core::ConfigError;
+use tagalong_config::ConfigError;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 

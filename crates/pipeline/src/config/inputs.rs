@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use tagalong_core::{ConfigError, Input, Inputs};
+use tagalong_config::ConfigError;
+use tagalong_core::{Input, Inputs};
 
 use super::PipelineSettings;
 

@@ -1,4 +1,4 @@
-use tagalong_core::{ConfigError, Registry};
+use tagalong_config::{ConfigError, Registry};
 use toml::{Table, Value};
 
 use tagalong_tracking::DetectorSettings;

@@ -3,7 +3,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::commented_defaults;
+use tagalong_config::commented_defaults;
 
 use super::{Options, RunSettings};
 use crate::tests::doubles::{PLAIN, World, frame, person};

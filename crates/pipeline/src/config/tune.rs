@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
-use tagalong_core::{ConfigError, Registry, Value, nearest};
+use tagalong_config::{ConfigError, Registry, Value, nearest};
 use toml::de::{DeArray, DeValue};
 
 use super::{OWN, Options, PLUGINS};

@@ -1,5 +1,6 @@
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{Camera, DepthImage, Motion, Person, Track, TrackId};
+use tagalong_core::{DepthImage, Motion, Person, Track, TrackId};
+use tagalong_geometry::Camera;
 
 use super::CorridorSettings;
 use super::corridor::{Ahead, Sign, ahead, is_thing};
@@ -391,7 +392,7 @@ fn reach_m(settings: &CorridorSettings) -> f64 {
 mod tests {
     use nalgebra::Vector2;
     use tagalong_conformance::target;
-    use tagalong_core::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
 

@@ -1,4 +1,5 @@
-use tagalong_core::{Frame, HEAD_BELOW_TOP_M, Rect, Track, UPPER_BODY_SIDE_M};
+use tagalong_core::{Frame, Track};
+use tagalong_geometry::{HEAD_BELOW_TOP_M, Rect, UPPER_BODY_SIDE_M};
 
 /// Bins of hues.
 const HUES: usize = 12;
@@ -334,9 +335,8 @@ mod tests {
 
         use nalgebra::{Point3, Vector2};
         use tagalong_conformance::target;
-        use tagalong_core::{
-            Camera, DepthImage, Distortion, Images, Motion, Pinhole, RgbImage, Stamp,
-        };
+        use tagalong_core::{DepthImage, Images, Motion, RgbImage, Stamp};
+        use tagalong_geometry::{Camera, Distortion, Pinhole};
 
         use super::*;
 

@@ -7,12 +7,14 @@ use std::sync::{Arc, Mutex};
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_config::Registry;
 use tagalong_core::{
-    Association, Associations, Associator, Camera, Capabilities, Controller, Detection, Detector,
-    Distortion, Error, Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs,
-    Likelihood, Motion, PerPerson, Person, PersonFilter, Pinhole, Registry, Result, Scene, Search,
-    Stamp, Support, Track, TrackId, Verifier, WheelSpeeds,
+    Association, Associations, Associator, Capabilities, Controller, Detection, Detector, Error,
+    Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs, Likelihood, Motion,
+    PerPerson, Person, PersonFilter, Result, Scene, Search, Stamp, Support, Track, TrackId,
+    Verifier, WheelSpeeds,
 };
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::{FrameReport, Pipeline};
 

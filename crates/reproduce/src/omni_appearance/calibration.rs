@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2, Vector3};
-use tagalong_core::{Camera, Lens};
+use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate, find_hat};
 

@@ -1,8 +1,9 @@
 //! Fits the parameters that the papers do not print, for their printed forms: a comparison with
 //! untuned parameters would be unfair to them. All scenes have seeds of `validation`.
 
-use tagalong_core::{Camera, Frame, Funnel};
+use tagalong_core::{Frame, Funnel};
 use tagalong_eval::Tally;
+use tagalong_geometry::Camera;
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Scene, Split};
 use tagalong_stereo::{StereoDepth, StereoSettings};

@@ -4,9 +4,8 @@
 
 use std::fs;
 
-use tagalong_core::{
-    ConfigError, Context, Detection, Example, Frame, Funnel, Trainer, Value, Verifier, Wheels,
-};
+use tagalong_config::{ConfigError, Context, Example, Trainer, Value};
+use tagalong_core::{Detection, Frame, Funnel, Verifier, Wheels};
 use tagalong_pipeline::{Fate, Pipeline};
 use tagalong_sim::{Furniture, FurnitureKind, Scene, Split, Truth};
 use tagalong_stereo::StereoDepth;

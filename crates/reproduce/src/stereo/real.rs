@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry2, Isometry3, Point3};
-use tagalong_core::{Frame, HEAD_RADIUS_M, Rect};
+use tagalong_core::Frame;
 use tagalong_eval::formats::people::{self, Row as Annotated};
+use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::Truth;

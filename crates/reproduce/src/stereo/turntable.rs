@@ -1,7 +1,8 @@
 //! P1, Fig. 4 and P4, Fig. 3: detection of a turning body in all directions, and the accuracy of
 //! its depth.
 
-use tagalong_core::{Camera, Detection};
+use tagalong_core::Detection;
+use tagalong_geometry::Camera;
 use tagalong_pipeline::{Candidate, Fate};
 use tagalong_trials::{Contender, Moment, Trial, TrialError};
 

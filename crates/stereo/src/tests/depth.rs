@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{
-    Camera, DepthImage, Distortion, Frame, Funnel, GreyImage, Images, Lens, Motion, Pinhole,
-    RightImage, Stamp,
-};
+use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Images, Motion, RightImage, Stamp};
+use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
 use super::kernels::noise_pair;
 use crate::{Method, StereoDepth, StereoSettings};

@@ -5,7 +5,8 @@ mod judge;
 use std::time::Instant;
 
 pub use judge::{Episode, Ridden, RideJudge};
-use tagalong_core::{Registry, Stamp, WheelSpeeds};
+use tagalong_config::Registry;
+use tagalong_core::{Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_sim::{Clearance, Event, Scene, Simulation};
 

@@ -8,7 +8,9 @@ use crate::workspace::Workspace;
 /// Who may lean on whom in `crates/`, apart from dev-dependencies. The map of
 /// the house in `crates/README.md` says why.
 const ARROWS: &[(&str, &[&str])] = &[
-    ("core", &[]),
+    ("geometry", &[]),
+    ("core", &["geometry"]),
+    ("config", &["core", "geometry"]),
     ("vision", &["core"]),
     ("learn", &["core"]),
     ("stereo", &["core", "vision"]),

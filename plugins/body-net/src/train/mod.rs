@@ -5,7 +5,8 @@
 mod adam;
 mod changes;
 
-use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, Result};
 use tagalong_learn::{Line, accepted, area, mix, parts, platt, side_by_side};
 
 use self::adam::Adam;

@@ -1,4 +1,5 @@
-use tagalong_core::{Camera, Detection, GreyImage};
+use tagalong_core::{Detection, GreyImage};
+use tagalong_geometry::Camera;
 use tagalong_vision::{Upright, UprightGrey};
 
 use super::gradients::{Blocks, DIRECTIONS};
@@ -55,7 +56,7 @@ fn mean_of(plane: &UprightGrey, block: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
-    use tagalong_core::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, Pinhole, Rect};
 
     use super::*;
 

@@ -1,4 +1,5 @@
-use tagalong_core::{Camera, Detection};
+use tagalong_core::Detection;
+use tagalong_geometry::Camera;
 
 /// Numbers of the place.
 pub const COUNT: usize = 4;
@@ -16,7 +17,7 @@ pub fn push(camera: &Camera, candidate: &Detection, out: &mut Vec<f32>) {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
-    use tagalong_core::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, Pinhole, Rect};
 
     use super::*;
 

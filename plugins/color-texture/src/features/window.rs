@@ -1,4 +1,5 @@
-use tagalong_core::{DepthImage, GreyImage, Image, Rect, RgbImage};
+use tagalong_core::{DepthImage, GreyImage, Image, RgbImage};
+use tagalong_geometry::Rect;
 
 /// Cells along each side of the window.
 pub const SIDE: usize = 32;

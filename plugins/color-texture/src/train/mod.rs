@@ -5,7 +5,8 @@
 mod boost;
 
 pub use boost::Examples;
-use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, Result};
 use tagalong_learn::{Line, accepted, area, parts, platt, side_by_side};
 
 use crate::{COUNT, Family, Features, Model, Stump, Training, Tree};

@@ -1,6 +1,7 @@
 use nalgebra::{Point3, Vector2};
 use proptest::prelude::*;
-use tagalong_core::{DepthImage, Distortion, Images, Motion, Pinhole, Stamp};
+use tagalong_core::{DepthImage, Images, Motion, Stamp};
+use tagalong_geometry::{Distortion, Pinhole};
 
 use super::*;
 

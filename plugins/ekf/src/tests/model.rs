@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, SMatrix, Vector2, Vector3, Vector5};
 use proptest::prelude::*;
-use tagalong_core::{Context, Motion, PersonFilter, Registry, Wheels};
+use tagalong_config::{Context, Registry};
+use tagalong_core::{Motion, PersonFilter, Wheels};
 
 use super::world::{DT_S, Random, World, camera, detection};
 use crate::filter::{motion_jacobian, state_jacobian};

@@ -2,7 +2,8 @@
 //! that the numbers are the same everywhere.
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
-use tagalong_core::{Camera, Detection, Distortion, Motion, PersonFilter, Pinhole, Rect};
+use tagalong_core::{Detection, Motion, PersonFilter};
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use crate::{Belief, Ekf};
 

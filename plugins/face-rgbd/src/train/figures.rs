@@ -1,6 +1,6 @@
 //! What a cascade is worth on pictures that it was not trained with.
 
-use tagalong_core::Rect;
+use tagalong_geometry::Rect;
 use tagalong_learn::{Line, platt};
 
 use super::{Picture, Use};

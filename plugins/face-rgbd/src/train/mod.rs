@@ -15,7 +15,9 @@ use std::sync::Arc;
 use boost::{Samples, stage};
 use figures::{calibration, figures};
 use patch::{Patch, window};
-use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, GreyImage, Result};
+use tagalong_geometry::Rect;
 use tagalong_learn::{Use, mirrored, mix, shifted, use_of};
 
 use crate::{Cascade, Config, Scanner, Training, scales, whole};

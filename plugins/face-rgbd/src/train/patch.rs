@@ -1,6 +1,7 @@
 //! Windows, cut out.
 
-use tagalong_core::{GreyImage, Rect};
+use tagalong_core::GreyImage;
+use tagalong_geometry::Rect;
 
 use crate::compiled::Compiled;
 use crate::{Cascade, Level, Seen};

@@ -12,7 +12,9 @@ use std::sync::Arc;
 
 use boosted::boosted;
 use svm::{Windows, separate};
-use tagalong_core::{Detection, Error, Example, Fitted, Frame, GreyImage, Rect, Result, Trainer};
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, GreyImage, Result};
+use tagalong_geometry::Rect;
 use tagalong_learn::{
     CALIBRATION, Line, Use, accepted, area, mirrored, mix, platt, shifted, use_of,
 };

@@ -2,9 +2,10 @@ use std::sync::{Arc, Mutex};
 
 use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 use tagalong_core::{
-    Camera, Detection, Distortion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched,
-    Motion, Person, Pinhole, Rect, Result, RgbImage, Sketch, Stamp, Support, TrackId,
+    Detection, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Motion, Person,
+    Result, RgbImage, Sketch, Stamp, Support, TrackId,
 };
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use crate::{Config, JointParticle};
 

@@ -111,7 +111,7 @@ pub fn keep(samples: &mut Vec<Sample>, most: [usize; 2], seed: u64) {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::Example;
+    use tagalong_config::Example;
 
     use super::*;
     use crate::PIXELS;

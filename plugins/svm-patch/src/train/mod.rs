@@ -6,7 +6,8 @@ mod choose;
 mod solver;
 
 pub use choose::Trial;
-use tagalong_core::{Detection, Error, Example, Fitted, Frame, Result, Trainer};
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, Result};
 use tagalong_learn::{Line, platt};
 
 use crate::{Model, Patch, Sampler, Training};

@@ -56,7 +56,7 @@ fn penalties(samples: &[&Sample], penalty: f64) -> Result<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::Example;
+    use tagalong_config::Example;
 
     use super::*;
 

@@ -1,4 +1,4 @@
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_pipeline::{Tunable, with_values};
 use tagalong_tuning::candidates;
 

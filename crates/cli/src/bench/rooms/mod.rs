@@ -11,7 +11,7 @@ use std::path::Path;
 pub use args::{HELP, RoomsArgs};
 use contest::{Contestant, Location};
 use report::Report;
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_tuning::Rooms;
 use work::Desk;
 
@@ -55,7 +55,7 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
     let shown = path.display().to_string();
     let text = read_text(path).map_err(|failure| Failure::usage(failure.message))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let at = |error: tagalong_core::ConfigError| Failure::usage(error.render(&shown, &text));
+    let at = |error: tagalong_config::ConfigError| Failure::usage(error.render(&shown, &text));
     let rooms = Rooms::parse(&text, folder, args.logs_dir.as_deref()).map_err(at)?;
     let mut locations = Vec::new();
     for room in rooms.rooms {
@@ -63,7 +63,7 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
         for log in &room.logs {
             let here = |failure: Failure| {
                 let span = Some(log.place.clone());
-                at(tagalong_core::ConfigError { message: failure.message, span })
+                at(tagalong_config::ConfigError { message: failure.message, span })
             };
             check_log_path(&log.path).map_err(here)?;
             logs.push(plan::with_truth(&log.path).map_err(here)?);

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
-use tagalong_core::Registry;
+use tagalong_config::Registry;
 use tagalong_report::TaskResult;
 use tagalong_tuning::Figures;
 

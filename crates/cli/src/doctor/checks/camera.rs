@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use tagalong_core::{Camera, Lens, nearest};
+use tagalong_config::nearest;
+use tagalong_geometry::{Camera, Lens};
 use tagalong_log::LogError;
 use tagalong_log::camera_info::CalibrationError;
 

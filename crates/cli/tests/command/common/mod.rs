@@ -11,7 +11,8 @@ use std::process::{Command, Output, Stdio};
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 use nalgebra::Isometry3;
-use tagalong_core::{Camera, Distortion, Pinhole, Stamp};
+use tagalong_core::Stamp;
+use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_log::msgs::{
     BoundingBox2D, BoundingBox3D, CameraInfo, Detection2D, Detection2DArray, Detection3D,
     Detection3DArray, Header, Image, Message, ObjectHypothesis, ObjectHypothesisWithPose, Point2D,

@@ -20,7 +20,7 @@ use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 /// [`MODEL`](Self::MODEL), and D the [`coefficients`](Self::coefficients).
 ///
 /// ```
-/// use tagalong_core::ConicalMirror;
+/// use tagalong_geometry::ConicalMirror;
 /// let mirror = ConicalMirror::from_coefficients(
 ///     170.0, [239.5, 239.5], &[67.5_f64.to_radians(), 0.05, 8.0, 230.0],
 /// ).unwrap();

@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use toml::{Spanned, de::DeValue};
 
-use crate::{Error, nearest};
+use crate::nearest;
+use tagalong_core::Error;
 
 /// A TOML value with its place in the file.
 pub type Value<'a> = Spanned<DeValue<'a>>;
@@ -93,7 +94,7 @@ impl From<toml::de::Error> for ConfigError {
 ///
 /// # Errors
 /// [`Error::Settings`] names the first such key, its range and its value.
-pub fn check_settings<T: Settings>(settings: &T) -> crate::Result<()> {
+pub fn check_settings<T: Settings>(settings: &T) -> tagalong_core::Result<()> {
     let value = toml::Value::try_from(settings).map_err(|why| Error::Other(why.to_string()))?;
     let schema = schemars::schema_for!(T).to_value();
     match out_of_range(&value, &schema, &schema, "") {

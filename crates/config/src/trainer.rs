@@ -1,4 +1,4 @@
-use crate::{Detection, Frame, Result};
+use tagalong_core::{Detection, Frame, Result};
 
 /// Label of a training candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub trait Trainer: Send {
     /// Adds one labelled candidate.
     ///
     /// # Errors
-    /// [`crate::Error::MissingImage`] if the frame lacks an input that the plugin needs.
+    /// [`tagalong_core::Error::MissingImage`] if the frame lacks an input that the plugin needs.
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()>;
 
     /// Fits a model to all examples so far. The same examples in the same order give the same

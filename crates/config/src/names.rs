@@ -2,7 +2,7 @@
 /// of its letters differ.
 ///
 /// ```
-/// use tagalong_core::nearest;
+/// use tagalong_config::nearest;
 /// assert_eq!(nearest("kalmann", ["ekf", "kalman"]), Some("kalman"));
 /// assert_eq!(nearest("zebra", ["ekf", "kalman"]), None);
 /// ```

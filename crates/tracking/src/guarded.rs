@@ -2,7 +2,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use crate::{Error, Frame, Result};
+use tagalong_core::{Error, Frame, Result};
 
 /// Failure to process a frame. A pipeline that returned one is stopped.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -102,7 +102,7 @@ impl Camera {
     ///
     /// ```
     /// use nalgebra::{Point2, Point3};
-    /// use tagalong_core::{Camera, Distortion, Pinhole};
+    /// use tagalong_geometry::{Camera, Distortion, Pinhole};
     /// let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
     /// let camera = Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0);
     /// let pixel = camera.project(&Point3::new(2.0, 0.0, 1.2)).unwrap();

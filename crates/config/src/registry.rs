@@ -2,9 +2,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::{
-    Associator, ConfigError, Controller, Detector, Error, Filter, Result, Settings, TrackManager,
-    Trainer, Value, Verifier, Wheels, commented_defaults, nearest, parse_settings,
+use crate::{ConfigError, Settings, Trainer, Value, commented_defaults, nearest, parse_settings};
+use tagalong_core::{
+    Associator, Controller, Detector, Error, Filter, Result, TrackManager, Verifier, Wheels,
 };
 
 /// The six kinds of plugin.
@@ -452,7 +452,8 @@ mod tests {
     use serde::{Deserialize, Serialize};
 
     use super::*;
-    use crate::{Detection, Example, Fitted, Frame, Inputs};
+    use crate::{Example, Fitted};
+    use tagalong_core::{Detection, Frame, Inputs};
 
     #[derive(Default, Serialize, Deserialize, JsonSchema)]
     #[serde(default, deny_unknown_fields)]
@@ -517,71 +518,83 @@ mod tests {
     struct Idle;
 
     impl Detector for Idle {
-        fn capabilities(&self) -> crate::Capabilities {
-            crate::Capabilities::default()
+        fn capabilities(&self) -> tagalong_core::Capabilities {
+            tagalong_core::Capabilities::default()
         }
 
         fn detect(
             &mut self,
             _: &Frame,
-            _: &crate::Search<'_>,
-            _: &mut crate::Funnel,
+            _: &tagalong_core::Search<'_>,
+            _: &mut tagalong_core::Funnel,
         ) -> Result<Vec<Detection>> {
             Ok(Vec::new())
         }
     }
 
     impl Filter for Idle {
-        fn start(&mut self, _: crate::TrackId, _: &Detection, _: &crate::Camera) {}
+        fn start(
+            &mut self,
+            _: tagalong_core::TrackId,
+            _: &Detection,
+            _: &tagalong_geometry::Camera,
+        ) {
+        }
 
-        fn predict(&mut self, _: &crate::Motion, _: &crate::Camera) {}
+        fn predict(&mut self, _: &tagalong_core::Motion, _: &tagalong_geometry::Camera) {}
 
         fn update(
             &mut self,
-            _: &crate::Evidence<'_>,
-        ) -> Result<BTreeMap<crate::TrackId, crate::Support>> {
+            _: &tagalong_core::Evidence<'_>,
+        ) -> Result<BTreeMap<tagalong_core::TrackId, tagalong_core::Support>> {
             Ok(BTreeMap::new())
         }
 
-        fn estimates(&self, _: &crate::Camera) -> BTreeMap<crate::TrackId, crate::Estimate> {
+        fn estimates(
+            &self,
+            _: &tagalong_geometry::Camera,
+        ) -> BTreeMap<tagalong_core::TrackId, tagalong_core::Estimate> {
             BTreeMap::new()
         }
 
-        fn stop(&mut self, _: crate::TrackId) {}
+        fn stop(&mut self, _: tagalong_core::TrackId) {}
     }
 
     impl Associator for Idle {
-        fn fits(&self, _: &crate::Track, _: &Detection, _: &crate::Gate) -> bool {
+        fn fits(&self, _: &tagalong_core::Track, _: &Detection, _: &tagalong_core::Gate) -> bool {
             false
         }
 
         fn associate(
             &mut self,
-            _: &[crate::Track],
+            _: &[tagalong_core::Track],
             _: &[Detection],
-            _: &crate::Gate,
-        ) -> crate::Associations {
-            crate::Associations::default()
+            _: &tagalong_core::Gate,
+        ) -> tagalong_core::Associations {
+            tagalong_core::Associations::default()
         }
     }
 
     impl TrackManager for Idle {
         fn initiate(
             &mut self,
-            _: crate::TrackId,
-            _: &crate::Unassociated<'_>,
-        ) -> crate::Initiation {
-            crate::Initiation::Drop("idle")
+            _: tagalong_core::TrackId,
+            _: &tagalong_core::Unassociated<'_>,
+        ) -> tagalong_core::Initiation {
+            tagalong_core::Initiation::Drop("idle")
         }
 
-        fn manage(&mut self, _: &[crate::ObservedTrack<'_>]) -> crate::TrackChanges {
-            crate::TrackChanges::default()
+        fn manage(
+            &mut self,
+            _: &[tagalong_core::ObservedTrack<'_>],
+        ) -> tagalong_core::TrackChanges {
+            tagalong_core::TrackChanges::default()
         }
     }
 
     impl Controller for Idle {
-        fn command(&mut self, _: &crate::Scene<'_>) -> crate::WheelSpeeds {
-            crate::WheelSpeeds::STOP
+        fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::WheelSpeeds {
+            tagalong_core::WheelSpeeds::STOP
         }
     }
 

@@ -63,7 +63,7 @@ impl Rect {
     /// Returns the intersection over union, 0 to 1; 0 when both are empty.
     ///
     /// ```
-    /// use tagalong_core::Rect;
+    /// use tagalong_geometry::Rect;
     /// let a = Rect::new(0.0, 0.0, 2.0, 2.0);
     /// assert_eq!(a.iou(&a), 1.0);
     /// assert_eq!(a.iou(&Rect::new(1.0, 0.0, 2.0, 2.0)), 2.0 / 6.0);

@@ -1,0 +1,19 @@
+//! Settings and their ranges, and the registry of plugins that a config names.
+//!
+//! * [`Settings`]: a struct with documented fields, defaults and ranges. [`parse_settings`]
+//!   reads it from TOML and refuses unknown keys and numbers out of range, with their place.
+//! * [`Registry`]: the plugins of a program. A plugin crate has a `register` function that the
+//!   program calls.
+//! * [`ConfigError`]: a mistake with its place in the text.
+
+mod names;
+mod registry;
+mod settings;
+mod trainer;
+
+pub use names::nearest;
+pub use registry::{Context, Kind, PluginInfo, Registry};
+pub use settings::{
+    ConfigError, Settings, Value, check_settings, commented_defaults, parse_settings,
+};
+pub use trainer::{Example, Fitted, Trainer};

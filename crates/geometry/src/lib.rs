@@ -1,0 +1,27 @@
+//! Cameras with their mounts, the mirror of a panoramic camera, and boxes in images.
+//!
+//! A [`Camera`] translates between the robot frame (X forward, Y left, Z up, m) and pixels,
+//! whatever its [`Lens`]: pinhole with distortion, unwrapped panorama, or none at all for a
+//! robot with a laser scanner only.
+
+mod camera;
+mod panorama;
+mod rect;
+
+pub use camera::{Camera, Distortion, Lens, Pinhole};
+pub use panorama::{ConicalMirror, Panorama};
+pub use rect::Rect;
+
+/// Distance from the visible surface of a head to its centre, in metres.
+///
+/// Annotated heads carry the surface; states carry the centre, because that point stays the same
+/// when the robot drives around the person.
+pub const HEAD_RADIUS_M: f64 = 0.08;
+
+/// Side of the upper-body square (head and shoulders) at the person, in metres (the upper-body
+/// template of Jafari et al., ICRA 2014, spans the same 0.57 m).
+pub const UPPER_BODY_SIDE_M: f64 = 0.57;
+
+/// Distance of the head centre below the upper edge of the upper-body square, in metres (2.5 cm of
+/// air and half a head).
+pub const HEAD_BELOW_TOP_M: f64 = 0.14;
