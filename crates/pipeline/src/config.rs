@@ -14,11 +14,10 @@ use toml::de::{DeTable, DeValue};
 
 use tagalong_tracking::{DetectorSettings, DetectorSlot, Parts, Role, Tracker};
 
-use crate::GovernorSettings;
-use crate::control::Steering;
 use crate::pipeline::Pipeline;
 use crate::preprocessors::preprocessors;
-use crate::settings::{PipelineSettings, PluginSettings, RobotSettings};
+use crate::settings::{PipelineSettings, PluginSettings};
+use tagalong_following::{GovernorSettings, RobotSettings, Steering};
 
 mod checks;
 mod document;
@@ -380,7 +379,7 @@ impl Builder<'_> {
             return Err(ConfigError { message, span: section.span_of("plugin") });
         }
         let name = section.settings.plugin;
-        Ok(Some(Steering::new(name, plugin, self.settings)))
+        Ok(Some(Steering::new(name, plugin, self.settings.following())))
     }
 }
 

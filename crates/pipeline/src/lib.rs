@@ -33,13 +33,10 @@
 //! | `track: ...` | a track, by the reason for which it ended |
 
 mod config;
-mod control;
-mod governor;
 mod pipeline;
 mod preprocessors;
 mod report;
 mod settings;
-mod target;
 #[cfg(test)]
 mod tests;
 
@@ -47,17 +44,17 @@ pub use config::{
     DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Tunable, check_tuning,
     flattened, with_values,
 };
-pub use governor::{CorridorSettings, GovernorSettings, Orders};
 pub use pipeline::Pipeline;
 pub use report::FrameReport;
-pub use settings::{PipelineSettings, PluginSettings, RobotSettings};
+pub use settings::{PipelineSettings, PluginSettings};
+pub use tagalong_following::{
+    CorridorSettings, Differences, GovernorSettings, Likeness, LockReport, LockState,
+    LooksSettings, Orders, RobotSettings, SearchSettings, TargetSettings,
+};
 pub use tagalong_odometry::OdometrySettings;
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
     Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings, OcclusionSettings, Outcome,
     Role, Weighing,
-};
-pub use target::{
-    Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,
 };

@@ -5,8 +5,8 @@ use tagalong_core::{Command, Frame, Inputs, Reason, Stamp, TrackId};
 use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
-use crate::control::{Steered, Steering};
 use crate::{FrameReport, Orders, PipelineSettings};
+use tagalong_following::{Steered, Steering};
 
 /// Tracker, with the controller that drives the robot after one of its tracks.
 pub struct Pipeline {
@@ -64,7 +64,7 @@ impl Pipeline {
 
     /// Returns a copy of the state behind [`Pipeline::command_at`], for use in another thread.
     pub fn orders(&self) -> Option<Orders> {
-        Some(self.steering.as_ref()?.governor().orders())
+        Some(self.steering.as_ref()?.orders())
     }
 
     /// Follows the person of this track from the next frame on, and forgets the previous target.
@@ -87,14 +87,14 @@ impl Pipeline {
 
     /// Returns the fault that holds the robot until [`Pipeline::arm`], if there is one.
     pub fn fault(&self) -> Option<&'static str> {
-        self.steering.as_ref()?.governor().fault()
+        self.steering.as_ref()?.fault()
     }
 
     /// Stops the robot until [`Pipeline::arm`]: after a press of a stop button, or a fault that no
     /// frame shows.
     pub fn disarm(&mut self, why: &'static str) {
         if let Some(steering) = &mut self.steering {
-            steering.governor_mut().latch(why);
+            steering.disarm(why);
         }
     }
 
@@ -103,7 +103,7 @@ impl Pipeline {
     pub fn arm(&mut self) {
         // A failed plugin may hold broken state, so a pipeline with one is never armed again.
         if let Some(steering) = self.steering.as_mut().filter(|_| self.failed.is_none()) {
-            steering.governor_mut().arm();
+            steering.arm();
         }
     }
 

@@ -1,12 +1,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Input, Wheels};
+use tagalong_core::Input;
+use tagalong_following::{FollowSettings, GovernorSettings, RobotSettings, TargetSettings};
 use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 
 use tagalong_tracking::{ClockSettings, MergeSettings, OcclusionSettings, TrackerSettings};
-
-use crate::{GovernorSettings, TargetSettings};
 
 /// Keys of the pipeline itself. Beside them a config has the plugin sections `[[detectors]]`,
 /// `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` and `[controller]`, each with the name
@@ -42,38 +41,16 @@ pub struct PipelineSettings {
 }
 
 impl PipelineSettings {
+    /// Returns the settings of the steering.
+    pub(crate) fn following(&self) -> FollowSettings {
+        let Self { robot, governor, target, .. } = self.clone();
+        FollowSettings { robot, governor, target }
+    }
+
     /// Returns the settings of the tracker.
     pub(crate) fn tracker(&self) -> TrackerSettings {
         let Self { clock, merge, occlusion, .. } = self.clone();
         TrackerSettings { clock, merge, occlusion }
-    }
-}
-
-/// Drive of the robot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobotSettings {
-    /// Half the distance between the driven wheels, m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub wheel_half_separation_m: f64,
-    /// Standard deviation of a wheel's travel, as a fraction of it.
-    #[schemars(range(min = 0.0))]
-    pub wheel_slip: f64,
-    /// Speed limit of a wheel, m/s.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub max_speed_mps: f64,
-}
-
-impl Default for RobotSettings {
-    fn default() -> Self {
-        Self { wheel_half_separation_m: 0.167, wheel_slip: 0.02, max_speed_mps: 0.9 }
-    }
-}
-
-impl RobotSettings {
-    /// Returns the drive as the type of the core crate.
-    pub fn wheels(&self) -> Wheels {
-        Wheels { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }
     }
 }
 

@@ -496,12 +496,23 @@ fn logit(probability: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use nalgebra::SMatrix;
     use tagalong_conformance::target;
+    use tagalong_core::{Images, Stamp};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::super::settings::LooksSettings;
     use super::*;
-    use crate::tests::doubles::frame;
+
+    fn frame(index: u64, t_s: f64) -> Frame {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+        let stamp = Stamp::from_nanos(1_000_000_000_000).plus_seconds(t_s);
+        Frame::new(index, stamp, camera, Motion::at_rest(0.1), Images::default())
+    }
 
     /// There are no images: people are distinguished by their height.
     fn settings() -> TargetSettings {

@@ -4,14 +4,14 @@ use tagalong_core::{
 use tagalong_tracking::{Guarded, StepError};
 
 use crate::governor::{Aim, Governor, Surroundings, Wish};
-use crate::target::{Lock, Search};
-use crate::{LockReport, LockState, PipelineSettings, RobotSettings, SearchSettings};
+use crate::target_lock::{Lock, Search};
+use crate::{FollowSettings, LockReport, LockState, Orders, RobotSettings, SearchSettings};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
 
 /// Controller, target lock, and governor of the commands.
-pub(crate) struct Steering {
+pub struct Steering {
     controller: Guarded<dyn Controller>,
     lock: Lock,
     search: Search,
@@ -24,60 +24,72 @@ pub(crate) struct Steering {
 }
 
 /// Result of one frame.
-pub(crate) struct Steered {
-    pub(crate) command: Command,
-    pub(crate) target: Option<TrackId>,
-    pub(crate) lock: LockReport,
+pub struct Steered {
+    /// The command.
+    pub command: Command,
+    /// The target, if it is among the tracks.
+    pub target: Option<TrackId>,
+    /// The state of the target lock.
+    pub lock: LockReport,
 }
 
 impl Steering {
-    pub(crate) fn new(
-        name: String,
-        controller: Box<dyn Controller>,
-        settings: &PipelineSettings,
-    ) -> Self {
-        let PipelineSettings { robot, governor, target, .. } = settings;
+    /// Creates the steering by a controller, which is called `name` in reports.
+    pub fn new(name: String, controller: Box<dyn Controller>, settings: FollowSettings) -> Self {
+        let FollowSettings { robot, governor, target } = settings;
         Self {
             controller: Guarded::new(name, controller),
-            lock: Lock::new(target.clone()),
-            search: Search::default(),
             search_settings: target.search.clone(),
+            lock: Lock::new(target),
+            search: Search::default(),
             surroundings: Surroundings::default(),
-            governor: Governor::new(governor.clone(), robot.wheels(), robot.max_speed_mps),
-            robot: robot.clone(),
+            governor: Governor::new(governor, robot.wheels(), robot.max_speed_mps),
+            robot,
             fresh: FRESH_FRAMES,
             last: None,
         }
     }
 
     /// Forgets all positions after a jump of the clock, and starts the wait of `FRESH_FRAMES`.
-    pub(crate) fn reset(&mut self) {
+    pub fn reset(&mut self) {
         self.lock.reset();
         self.surroundings.clear();
         self.fresh = 0;
     }
 
     /// Follows this track from now on.
-    pub(crate) fn follow(&mut self, track: TrackId) {
+    pub fn follow(&mut self, track: TrackId) {
         self.lock.choose(track);
     }
 
     /// Returns the distance that the controller keeps, m, if it keeps one.
-    pub(crate) fn stand_off_m(&self) -> Option<f64> {
+    pub fn stand_off_m(&self) -> Option<f64> {
         self.controller.plugin().stand_off_m()
     }
 
     /// Returns the controller's name and its inputs.
-    pub(crate) fn inputs(&self) -> (&str, Inputs) {
+    pub fn inputs(&self) -> (&str, Inputs) {
         (self.controller.name(), self.controller.plugin().inputs())
     }
 
-    pub(crate) fn governor(&self) -> &Governor {
-        &self.governor
+    /// Returns a copy of the source of commands, for a control loop in another thread.
+    pub fn orders(&self) -> Orders {
+        self.governor.orders()
     }
 
-    pub(crate) fn governor_mut(&mut self) -> &mut Governor {
-        &mut self.governor
+    /// Returns the reason why the robot stands until [`Steering::arm`], if it does.
+    pub fn fault(&self) -> Option<&'static str> {
+        self.governor.fault()
+    }
+
+    /// Stops the robot until [`Steering::arm`].
+    pub fn disarm(&mut self, why: &'static str) {
+        self.governor.latch(why);
+    }
+
+    /// Lets the robot move again after a fault.
+    pub fn arm(&mut self) {
+        self.governor.arm();
     }
 
     /// Returns the command for a frame, and the target; `motion` is the robot's since the last
@@ -85,7 +97,7 @@ impl Steering {
     ///
     /// # Errors
     /// The controller panicked.
-    pub(crate) fn steer(
+    pub fn steer(
         &mut self,
         frame: &Frame,
         motion: &Motion,

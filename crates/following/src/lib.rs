@@ -1,0 +1,28 @@
+//! Following one person: from tracks to commands that a robot may execute.
+//!
+//! [`Steering`] runs four stages for each frame, in this order:
+//!
+//! | stage | module | settings |
+//! |---|---|---|
+//! | choice of the target, and its recovery after a loss | `target_lock` | [`TargetSettings`] |
+//! | wish of the controller, or of the search for a lost target | the controller, `target_lock` | [`SearchSettings`] |
+//! | obstacles around the robot | `governor` | [`CorridorSettings`] |
+//! | limits of the command | `governor` | [`GovernorSettings`] |
+//!
+//! # Invariants
+//!
+//! * A fault, a pause of the frames and a number that is not finite end in a stop.
+//! * A command is valid for a limited time; [`Orders`] answers with zero after that.
+//! * This is no safety function in the sense of the standards.
+
+mod governor;
+mod settings;
+mod steering;
+mod target_lock;
+
+pub use governor::{CorridorSettings, GovernorSettings, Orders};
+pub use settings::{FollowSettings, RobotSettings};
+pub use steering::{Steered, Steering};
+pub use target_lock::{
+    Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,
+};

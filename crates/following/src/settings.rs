@@ -1,0 +1,44 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::Wheels;
+
+use crate::{GovernorSettings, TargetSettings};
+
+/// Settings of the steering.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FollowSettings {
+    /// The robot's drive.
+    pub robot: RobotSettings,
+    /// Limits of the commands.
+    pub governor: GovernorSettings,
+    /// Target lock and search.
+    pub target: TargetSettings,
+}
+
+/// Drive of the robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotSettings {
+    /// Half the distance between the driven wheels, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub wheel_half_separation_m: f64,
+    /// Standard deviation of a wheel's travel, as a fraction of it.
+    #[schemars(range(min = 0.0))]
+    pub wheel_slip: f64,
+    /// Speed limit of a wheel, m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub max_speed_mps: f64,
+}
+
+impl Default for RobotSettings {
+    fn default() -> Self {
+        Self { wheel_half_separation_m: 0.167, wheel_slip: 0.02, max_speed_mps: 0.9 }
+    }
+}
+
+impl RobotSettings {
+    /// Returns the drive as the type of the core crate.
+    pub fn wheels(&self) -> Wheels {
+        Wheels { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }
+    }
+}
