@@ -1,5 +1,5 @@
-//! Scans a picture with a cascade, again and again: `time_cascade CASCADE.xml
-//! PICTURE RUNS`. For the comparison with OpenCV in `benches/peers/`.
+//! Scans an image with a cascade repeatedly: `time_cascade CASCADE.xml PICTURE RUNS`. For the
+//! comparison with OpenCV in `benches/peers/`.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
 use tagalong_core::GreyImage;

@@ -1,4 +1,4 @@
-//! What a cascade is made of.
+//! Parts of a cascade.
 
 /// A rectangle of a window, in its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,54 +13,54 @@ pub struct Part {
     pub height: usize,
 }
 
-/// What a node of a tree looks at.
+/// Feature of a window in the question of a node.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Feature {
-    /// Two or three rectangles and their weights: the weighted sum of their grey
-    /// values, divided by the contrast of the window (Viola and Jones 2001).
+    /// Two or three rectangles and their weights: the weighted sum of their grey values, divided by
+    /// the contrast of the window (Viola and Jones 2001).
     Haar(Vec<(Part, f32)>),
-    /// Which of eight neighbours of a block, all of the same size, are at least
-    /// as bright as it: bits from the upper left clockwise, highest first. The
-    /// part is the upper left block.
+    /// Comparison of eight neighbours with the block between them, all of the same size: a bit is
+    /// set if the neighbour is at least as bright; from the upper left clockwise, highest bit
+    /// first. The part is the upper left block.
     Binary(Part),
 }
 
-/// The question of a node: yes is left.
+/// Question of a node: yes is left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Split {
-    /// Is the value of the feature below this?
+    /// True if the value of the feature is below this.
     Below(f32),
-    /// Is the pattern of bits one of these? One bit for each of 256.
+    /// True if the pattern of bits is one of these; one bit for each of 256.
     Among([u32; 8]),
 }
 
-/// Where a node leads to.
+/// Target of a node's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
     /// Another node of the tree.
     Node(usize),
-    /// The end, with this to add to the sum of the stage.
+    /// A leaf, with the value to add to the sum of the stage.
     Leaf(f32),
 }
 
 /// A node of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// Number of the feature.
+    /// Index of the feature.
     pub feature: usize,
-    /// What is asked.
+    /// Question about the feature.
     pub split: Split,
-    /// If yes, if no.
+    /// Targets if yes, if no.
     pub next: [Next; 2],
 }
 
 /// A small decision tree; the first node is its root.
 pub type Tree = Vec<Node>;
 
-/// Trees whose sum a window has to reach.
+/// Trees with a sum that a window has to reach.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
-    /// The least sum.
+    /// Least sum.
     pub threshold: f32,
     /// The trees.
     pub trees: Vec<Tree>,
@@ -73,37 +73,36 @@ pub struct Cascade {
     pub width: usize,
     /// Rows of a window.
     pub height: usize,
-    /// What nodes look at.
+    /// Features of the nodes.
     pub features: Vec<Feature>,
     /// The stages.
     pub stages: Vec<Stage>,
-    /// Log-odds that a group of windows is a face, as a line of the logarithm of
-    /// its strength: slope and offset. Files of OpenCV have none.
+    /// Log-odds that a group of windows is a face, as a straight line in the logarithm of its
+    /// strength: slope and offset. Files of OpenCV have none.
     pub calibration: Option<(f64, f64)>,
 }
 
 impl Cascade {
-    /// One that takes everything for a face, for windows of `side` pixels.
+    /// Creates a cascade that accepts all windows, of `side` pixels.
     pub fn without_stages(side: usize) -> Self {
         let (features, stages) = (Vec::new(), Vec::new());
         Self { width: side, height: side, features, stages, calibration: None }
     }
 
-    /// True if windows are judged relative to their contrast.
+    /// Returns true if windows are normalised by their contrast.
     pub fn is_normalised(&self) -> bool {
         self.features.iter().any(|feature| matches!(feature, Feature::Haar(_)))
     }
 
-    /// The part of a window whose contrast counts: all but a border of a pixel.
+    /// Returns the part of a window in which the contrast is measured: all but a border of a pixel.
     pub fn middle(&self) -> Part {
         Part { x: 1, y: 1, width: self.width - 2, height: self.height - 2 }
     }
 
-    /// Says what is wrong with a cascade that cannot be run: parts outside of the
-    /// window, unknown features, trees that never end.
+    /// Checks that a cascade can be run: parts inside the window, known features, finite trees.
     ///
     /// # Errors
-    /// In a sentence.
+    /// The first fault, as one sentence.
     pub fn check(&self) -> Result<(), String> {
         if !(8..=256).contains(&self.width) || !(8..=256).contains(&self.height) {
             return Err(format!("its windows are {} x {} pixels", self.width, self.height));
@@ -130,6 +129,7 @@ impl Cascade {
         match trees.flat_map(|tree| tree.iter().enumerate().map(move |n| (n, tree.len()))).find(
             |((at, node), nodes)| {
                 let ends = |next: &Next| match next {
+                    // A target behind its node cannot form a loop.
                     Next::Node(to) => to > at && to < nodes,
                     Next::Leaf(value) => value.is_finite(),
                 };
@@ -141,7 +141,7 @@ impl Cascade {
         }
     }
 
-    /// True if the node asks what can be asked of its feature.
+    /// Returns true if the question of a node is one for its kind of feature.
     fn is_asked(&self, node: &Node) -> bool {
         match (self.features.get(node.feature), node.split) {
             (Some(Feature::Haar(_)), Split::Below(value)) => value.is_finite(),

@@ -1,18 +1,18 @@
-//! A cascade for windows side by side: features are offsets into sums.
+//! A cascade for neighbouring windows: features are offsets into sums.
 
 use crate::cascade::{Cascade, Feature, Next, Node, Part, Split, Tree};
 use crate::level::Level;
 
-/// Windows side by side that are judged together.
+/// Number of neighbouring windows that are classified together.
 pub(crate) const LANES: usize = 16;
-/// So many windows of those are judged one by one.
+/// Number of remaining windows from which these are classified one by one.
 const FEW: u32 = 2;
-/// Less contrast than this, grey values, and a window is empty.
+/// Least standard deviation of a window's grey values; a window with less is empty.
 const LEAST_CONTRAST: f64 = 10.0;
 
-/// The four corners of a rectangle, as offsets from a window's first sum.
+/// Four corners of a rectangle, as offsets from a window's first sum.
 pub(crate) type Corners = [u32; 4];
-/// The rectangles of a feature and their weights; the last weight may be 0.
+/// Rectangles of a feature and their weights; the last weight may be 0.
 pub(crate) type Haar = [(Corners, f32); 3];
 
 /// A feature of windows anywhere in an image.
@@ -26,10 +26,10 @@ enum Look {
 /// A question about rectangles, and one more on either side.
 #[derive(Clone, Debug)]
 struct Pair {
-    /// The first question, the one if yes, and the one if not.
+    /// Features of the first question, the one if yes, and the one if no.
     parts: [Haar; 3],
     thresholds: [f32; 3],
-    /// Yes and yes, yes and no, no and yes, no and no.
+    /// Values for yes and yes, yes and no, no and yes, no and no.
     values: [f32; 4],
 }
 
@@ -41,7 +41,7 @@ enum Weak {
         threshold: f32,
         values: [f32; 2],
     },
-    /// Two of them.
+    /// Two such questions in a row.
     Pair(Box<Pair>),
     Tree(Tree),
 }
@@ -52,7 +52,7 @@ impl Weak {
     }
 }
 
-/// The rectangles and the threshold of a node.
+/// Returns the rectangles and the threshold of a node.
 fn asked(node: &Node, looks: &[Look]) -> Option<(Haar, f32)> {
     match (looks.get(node.feature)?, node.split) {
         (Look::Haar(parts), Split::Below(threshold)) => Some((*parts, threshold)),
@@ -66,7 +66,8 @@ fn stump(tree: &Tree, looks: &[Look]) -> Option<Weak> {
     Some(Weak::Stump { parts, threshold, values: [yes, no] })
 }
 
-/// A leaf where a question could be asks one that everybody answers with yes.
+/// Converts a tree of depth two; a leaf in place of a question becomes one that is always answered
+/// with yes.
 fn pair(tree: &Tree, looks: &[Look]) -> Option<Weak> {
     let (first, threshold) = asked(tree.first()?, looks)?;
     let mut pair = Pair {
@@ -95,7 +96,7 @@ struct Stage {
     weak: Vec<Weak>,
 }
 
-/// A cascade whose features are offsets for one layout of sums.
+/// A cascade with features as offsets for one layout of sums.
 #[derive(Clone, Debug)]
 pub struct Compiled {
     layout: (usize, usize),
@@ -106,21 +107,21 @@ pub struct Compiled {
     is_normalised: bool,
 }
 
-/// Neighbouring windows, and which of them are still in question.
+/// Neighbouring windows, and those of them that are not rejected yet.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// Where the sums of the first one begin.
+    /// Offset of the first window's sums.
     start: usize,
-    /// One through the contrast of each window; 0 for empty ones.
+    /// Reciprocal of the area times the contrast of each window; 0 for empty ones.
     contrast: [f32; LANES],
     /// Sums of the current stage.
     sums: [f32; LANES],
-    /// A bit for each window.
+    /// One bit per window that is not rejected.
     pub alive: u32,
 }
 
 impl Compiled {
-    /// Offsets for the sums of a level; `cascade` was checked.
+    /// Computes the offsets for the sums of a level; `cascade` was checked.
     pub fn new(cascade: &Cascade, level: &Level) -> Self {
         let look = |feature: &Feature| match feature {
             Feature::Haar(parts) => Look::Haar(rectangles(parts, level)),
@@ -150,13 +151,13 @@ impl Compiled {
         }
     }
 
-    /// True if the offsets are those of a level's sums.
+    /// Returns true if the offsets are those of a level's sums.
     pub fn fits(&self, level: &Level) -> bool {
         self.layout == level.layout()
     }
 
-    /// The windows from (x, y) on, after the first stage; all of them are in question,
-    /// whatever it says. `x` is a column that a window can begin at.
+    /// Starts the windows from (x, y) on, with their sums of the first stage; none are rejected
+    /// yet. `x` is a column at which a window can begin.
     pub fn start(&self, level: &Level, (x, y): (usize, usize)) -> Block {
         let start = level.offset(x, y);
         let mut block = Block {
@@ -173,24 +174,26 @@ impl Compiled {
         block
     }
 
-    /// True if a window is not empty.
+    /// Returns true if a window is not empty.
     pub fn is_worth_it(block: &Block, lane: usize) -> bool {
         block.contrast[lane] != 0.0
     }
 
-    /// True if a window's sum reaches what the stage wants.
+    /// Returns true if a window's sum reaches the threshold of the stage.
     pub fn passes(&self, stage: usize, block: &Block, lane: usize) -> bool {
         block.sums[lane] >= self.stages[stage].threshold
     }
 
-    /// By how much a window's sum of the last stage is larger than it has to be.
+    /// Returns the excess of a window's sum over the threshold of the last stage.
     pub fn margin(&self, block: &Block, lane: usize) -> f32 {
         self.stages.last().map_or(0.0, |stage| block.sums[lane] - stage.threshold)
     }
 
-    /// Drops the windows in question that do not pass all stages but the first.
+    /// Rejects the windows that do not pass all stages but the first.
     pub fn finish(&self, level: &Level, block: &mut Block) {
         let mut stage = 1;
+        // A stage for all windows costs the same however few remain, so the last ones are
+        // classified one by one.
         while stage < self.stages.len() && block.alive.count_ones() > FEW {
             self.judge(stage, level, block);
             block.keep(|block, lane| self.passes(stage, block, lane));
@@ -205,7 +208,7 @@ impl Compiled {
         }
     }
 
-    /// The sums of a stage for all windows of a block.
+    /// Computes the sums of a stage for all windows of a block.
     fn judge(&self, stage: usize, level: &Level, block: &mut Block) {
         let sums = &level.sums()[block.start..];
         block.sums = [0.0; LANES];
@@ -224,8 +227,8 @@ impl Compiled {
         }
     }
 
-    /// The sum of the last stage for one window; `None` if it fails a stage from
-    /// `first` on.
+    /// Returns the sum of the last stage for one window; `None` if it fails a stage from `first`
+    /// on.
     fn alone(&self, first: usize, sums: &[u32], contrast: f32) -> Option<f32> {
         let mut last = 0.0;
         for stage in &self.stages[first..] {
@@ -252,7 +255,7 @@ impl Compiled {
         }
     }
 
-    /// Where a window ends up in a tree.
+    /// Returns the value of the leaf that a window reaches in a tree.
     fn leaf(&self, tree: &Tree, sums: &[u32], contrast: f32) -> f32 {
         let mut at = 0;
         loop {
@@ -276,13 +279,13 @@ impl Compiled {
 }
 
 impl Block {
-    /// The windows in question, from left to right.
+    /// Returns the windows that are not rejected, from left to right.
     pub fn lanes(&self) -> impl Iterator<Item = usize> + use<> {
         let alive = self.alive;
         (0..LANES).filter(move |lane| alive >> lane & 1 == 1)
     }
 
-    /// Drops windows that are in question.
+    /// Rejects windows that fail a test.
     pub fn keep(&mut self, mut is_good: impl FnMut(&mut Self, usize) -> bool) {
         for lane in self.lanes() {
             if !is_good(self, lane) {
@@ -308,18 +311,20 @@ pub(crate) fn rectangles(parts: &[(Part, f32)], level: &Level) -> Haar {
 
 fn sum(sums: &[u32], corners: &Corners) -> u32 {
     let [a, b, c, d] = corners.map(|corner| sums[corner as usize]);
+    // The corners are sums modulo 2^32, and wrapping differences of them are exact.
     a.wrapping_sub(b).wrapping_sub(c).wrapping_add(d)
 }
 
 pub(crate) fn haar(parts: &Haar, sums: &[u32]) -> f32 {
     let [first, second, third] = parts;
+    // Sums over a window fit into i32, which vector instructions convert to f32 directly.
     let of = |(corners, weight): &(Corners, f32)| weight * sum(sums, corners) as i32 as f32;
     let two = of(first) + of(second);
     if third.1 == 0.0 { two } else { two + of(third) }
 }
 
-/// Neighbours clockwise from the upper left, and the middle, as the upper left
-/// corners of blocks among 4x4 corners.
+/// Neighbours clockwise from the upper left, and the middle, as the upper left corners of blocks
+/// among 4x4 corners.
 const AROUND: [usize; 8] = [0, 1, 2, 6, 10, 9, 8, 4];
 const MIDDLE: usize = 5;
 
@@ -329,8 +334,8 @@ fn pattern(corners: &[u32; 16], sums: &[u32]) -> usize {
     AROUND.iter().fold(0, |bits, k| bits << 1 | usize::from(block(*k) >= middle))
 }
 
-/// Sums over a rectangle of windows side by side. Loops, since what is handed to
-/// `map` and its like is not compiled for the instructions of the caller.
+/// Returns the sums over a rectangle of neighbouring windows. Written as loops, because closures in
+/// `map` and the like are not compiled for the instructions of the caller.
 #[inline(always)]
 fn sums_beside(sums: &[u32], corners: &Corners) -> [u32; LANES] {
     let [a, b, c, d] = corners;
@@ -345,7 +350,7 @@ fn sums_beside(sums: &[u32], corners: &Corners) -> [u32; LANES] {
     out
 }
 
-/// As [`haar`], for windows side by side.
+/// Computes [`haar`] for neighbouring windows.
 #[inline(always)]
 fn haar_beside(parts: &Haar, sums: &[u32]) -> [f32; LANES] {
     let mut values = [0.0; LANES];
@@ -389,12 +394,13 @@ fn add_stump(
     }
 }
 
-/// One through the area times the standard deviation of the windows; 0 for empty
+/// Computes the reciprocal of the area times the standard deviation of the windows; 0 for empty
 /// ones.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn contrasts(sums: &[u32], squares: &[u32], corners: &Corners, area: f64, out: &mut [f32; LANES]) {
     let (sums, squares) = (sums_beside(sums, corners), sums_beside(squares, corners));
     for lane in 0..LANES {
+        // In f64, because the difference of two large products is small.
         let (sum, square) = (f64::from(sums[lane]), f64::from(squares[lane]));
         let root = (area * square - sum * sum).max(0.0).sqrt();
         let is_empty = root <= LEAST_CONTRAST * area;

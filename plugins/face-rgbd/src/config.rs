@@ -7,62 +7,61 @@ use tagalong_core::Result;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Cascade in OpenCV's XML, relative to the config; empty: the one that is
-    /// built in. Training goes on from it; empty: begins anew.
+    /// Cascade in OpenCV's XML, relative to the config; empty: the built-in one. Training continues
+    /// from it; empty: begins anew.
     pub model: String,
     /// Faces with lower log-odds are dropped.
     pub min_score: f64,
-    /// Log-odds are limited to this.
+    /// Upper limit of the log-odds.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_score: f64,
     /// A face is a group of more windows than this.
     pub min_neighbours: usize,
-    /// Narrowest window that is looked for, pixels.
+    /// Narrowest window in a search, pixels.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub min_side_px: f64,
-    /// Widest, as a fraction of the shorter side of the image.
+    /// Widest window, as a fraction of the shorter side of the image.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_side: f64,
-    /// Each size is so many times the one before.
+    /// Ratio of each size to the one before.
     #[schemars(range(min = 1.02, max = 4.0))]
     pub scale_step: f64,
-    /// Looks where depth and geometry allow a face only; off: everywhere.
+    /// Searches only where depth and geometry allow a face; off: everywhere.
     pub depth_proposals: bool,
-    /// With depth: windows are as wide as this at least, m.
+    /// With depth: least width of a window, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub min_face_m: f64,
-    /// With depth: windows are as wide as this at most, m.
+    /// With depth: largest width of a window, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_face_m: f64,
-    /// Distances at which faces are looked for, m.
+    /// Range of distances of faces, m.
     pub min_depth_m: f64,
     /// See `min_depth_m`.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_depth_m: f64,
-    /// Heights of faces above the floor, m.
+    /// Range of heights of faces above the floor, m.
     pub min_height_m: f64,
     /// See `min_height_m`.
     pub max_height_m: f64,
-    /// Sampling points (one in 8 x 8 pixels) that are searched at most; regions
-    /// with much skin come first.
+    /// Most sampling points (one in 8 x 8 pixels) that are searched; regions with much skin come
+    /// first.
     pub max_points: usize,
-    /// The window of a face is so wide, m: tells the distance where there is no
-    /// depth.
+    /// Width of the window of a face, m: gives the distance where there is no depth.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub face_m: f64,
-    /// The centre of the head is so far above that of the window, as a fraction
-    /// of the window's side.
+    /// Distance of the centre of the head above that of the window, as a fraction of the window's
+    /// side.
     pub head_above: f64,
-    /// Standard deviation of a window's place, as a fraction of its side.
+    /// Standard deviation of the position of a window, as a fraction of its side.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_place: f64,
     /// Standard deviation of a distance from the depth image, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_depth_m: f64,
-    /// Standard deviation of a distance that only the size tells, as a fraction.
+    /// Standard deviation of a distance from the size of the window alone, as a fraction.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
-    /// How a cascade is trained; only `tagalong train cascade` reads it.
+    /// Settings of the training; only `tagalong train cascade` reads them.
     pub training: Training,
 }
 
@@ -94,34 +93,32 @@ impl Default for Config {
     }
 }
 
-/// How a cascade is trained: Gentle AdaBoost, stage by stage.
+/// Settings of the training of a cascade: Gentle AdaBoost, stage by stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
     /// Side of a window, pixels.
     pub side: usize,
-    /// Faces are shown as they are, and turned by this at most, rad.
+    /// Largest angle by which copies of the faces are turned, rad.
     pub tilt: f64,
-    /// Stages at most.
+    /// Most stages.
     pub stages: usize,
     /// Part of the faces that every stage has to pass.
     pub min_hit_rate: f64,
     /// Part of the other windows that a stage may pass.
     pub max_false_alarm: f64,
-    /// Trees of a stage at most.
+    /// Most trees of a stage.
     pub max_trees: usize,
-    /// Questions from the root of a tree to a leaf.
+    /// Number of questions from the root of a tree to a leaf.
     pub depth: usize,
-    /// Features that a stage chooses from, drawn anew for each.
+    /// Number of features that a stage chooses from, sampled anew for each stage.
     pub features: usize,
-    /// Other windows that a stage is trained with, and that all stages before it
-    /// pass.
+    /// Number of other windows for the training of a stage; all stages before it pass them.
     pub others: usize,
-    /// Where fewer than this are to be found, a stage would know them by heart: it
-    /// is done.
+    /// Fewest other windows for a further stage: it would learn fewer by heart, so training ends.
     pub fewest_others: usize,
-    /// Tenths of the pictures, 2 to 9, that calibrate and validate; 0 and 1 are held out,
-    /// and the others are trained with.
+    /// Tenths of the pictures, 2 to 9, for calibration and validation; 0 and 1 are held out, and
+    /// the others are trained with.
     pub calibration: Vec<u64>,
 }
 
@@ -144,14 +141,14 @@ impl Default for Training {
 }
 
 impl Config {
-    /// Refuses numbers that cannot work.
+    /// Refuses settings outside their ranges.
     pub(crate) fn check(&self) -> Result<()> {
         check_settings(self)
     }
 }
 
 impl Training {
-    /// Refuses numbers that cannot work.
+    /// Refuses settings outside their ranges.
     #[cfg(feature = "train")]
     pub(crate) fn check(&self) -> Result<()> {
         let is_part = |v: f64| v > 0.0 && v < 1.0;

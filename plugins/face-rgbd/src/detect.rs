@@ -7,14 +7,14 @@ use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
-/// The cascade that is part of the program.
+/// Cascade that is compiled into the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/cascade.xml");
 
-/// Finds faces, and says whose upper bodies they belong to.
+/// Detector of people by their faces.
 pub struct FaceRgbd {
     config: Config,
     cascade: Cascade,
-    /// Log-odds of a group as a line of the logarithm of its strength.
+    /// Log-odds of a group as a straight line in the logarithm of its strength.
     line: (f64, f64),
     scanner: Scanner,
     proposals: Proposals,
@@ -23,11 +23,11 @@ pub struct FaceRgbd {
 }
 
 impl FaceRgbd {
-    /// A detector; reads its cascade.
+    /// Creates a detector and reads its cascade.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no cascade,
-    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is not a cascade,
+    /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let cascade = context.model(&config.model, BUILT_IN, Cascade::from_xml)?;
@@ -42,7 +42,7 @@ impl FaceRgbd {
         })
     }
 
-    /// All windows that pass, of all sizes.
+    /// Collects the windows of all sizes that pass the cascade.
     fn search(&mut self, frame: &Frame, near: Option<Rect>, funnel: &mut Funnel) -> Result<()> {
         let Self { config, cascade, scanner, proposals, hits, .. } = self;
         let camera = &*frame.camera;
@@ -72,7 +72,7 @@ impl FaceRgbd {
         Ok(())
     }
 
-    /// The person whose face the windows show.
+    /// Returns the detection of the person with the face that the windows show.
     fn detection(
         &self,
         camera: &Camera,
@@ -87,6 +87,7 @@ impl FaceRgbd {
         };
         let centre = group.region.centre();
         let head_px = Point2::new(centre.x, centre.y - config.head_above * side);
+        // The depth is that of the face's surface, and the position that of the head's centre.
         let depth_m = face_m + HEAD_RADIUS_M;
         let position = camera.back_project(head_px, depth_m);
         let (slope, offset) = self.line;
@@ -94,6 +95,7 @@ impl FaceRgbd {
             region: camera.upper_body(&position),
             position,
             covariance: camera.covariance(head_px, depth_m, config.sigma_place * side, sigma_m),
+            // The logarithm needs a positive strength.
             score: (slope * group.strength.max(1e-3).ln() + offset).min(config.max_score),
             source: NAME,
         };
@@ -165,7 +167,7 @@ mod tests {
         Camera::mounted(lens, 160, 120, 1.5, 0.0, 0.0)
     }
 
-    /// A detector whose cascade passes some of the noise.
+    /// A detector with a cascade that passes some of the noise.
     fn detector(config: Config) -> FaceRgbd {
         let cascade = small();
         FaceRgbd {
@@ -202,7 +204,7 @@ mod tests {
         }
     }
 
-    /// Low enough for noise.
+    /// Thresholds that are low enough for noise.
     fn eager() -> Config {
         Config { min_score: -99.0, min_side_px: 12.0, max_side: 0.3, ..Config::default() }
     }

@@ -1,50 +1,49 @@
-//! Many windows of one face become one (OpenCV's `groupRectangles`).
+//! Grouping of the windows of one face (OpenCV's `groupRectangles`).
 
 use tagalong_geometry::Rect;
 
-/// Windows whose edges differ by less than this part of their size are alike.
+/// Part of their size by which the edges of similar windows may differ.
 const ALIKE: f64 = 0.2;
-/// Fewer windows than this are outvoted by those around them.
+/// Number of windows below which a group inside another one is removed.
 const FEW: usize = 3;
 
 /// A window that passed all stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// The window, whole pixels of the image.
+    /// The window, in whole pixels of the image.
     pub region: Rect,
-    /// By how much the sum of the last stage exceeds what it has to reach.
+    /// Excess of the sum of the last stage over its threshold.
     pub margin: f32,
 }
 
-/// Windows that are alike.
+/// A group of similar windows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Group {
-    /// Their mean, rounded to whole pixels.
+    /// Mean of the windows, rounded to whole pixels.
     pub region: Rect,
-    /// How many they are.
+    /// Number of windows.
     pub count: usize,
     /// Sum of their margins.
     pub strength: f64,
 }
 
-/// Puts windows into groups; keeps its memory from one image to the next.
+/// Grouping of windows; the memory is reused for the next image.
 #[derive(Clone, Debug, Default)]
 pub struct Grouping {
-    /// The group of each window.
+    /// Index of the group of each window.
     labels: Vec<usize>,
-    /// Windows whose like have still to be looked for.
+    /// Windows of the current group with neighbours still to be searched.
     open: Vec<usize>,
     groups: Vec<Group>,
     kept: Vec<Group>,
 }
 
-/// Belongs to no group yet.
+/// Label of a window without a group.
 const FREE: usize = usize::MAX;
 
 impl Grouping {
-    /// Like windows, and those like them, belong together. Groups of `fewest` and less
-    /// go, and those inside of stronger ones. Groups come in the order of their first
-    /// windows.
+    /// Groups similar windows, and those similar to them. Groups of `fewest` windows or less are
+    /// removed, and those inside of stronger ones. Groups are in the order of their first windows.
     pub fn group(&mut self, hits: &[Hit], fewest: usize) {
         self.label(hits);
         self.sum_up(hits);
@@ -54,7 +53,7 @@ impl Grouping {
         kept.extend(groups.iter().filter(|group| !groups.iter().any(|o| outvotes(o, group))));
     }
 
-    /// The groups that were not outvoted.
+    /// Returns the groups that were not removed.
     pub fn kept(&self) -> &[Group] {
         &self.kept
     }
@@ -93,7 +92,7 @@ impl Grouping {
             *strength += f64::from(hit.margin);
         }
         for Group { region, count, .. } in &mut self.groups {
-            // As OpenCV: in 32 bits, by the reciprocal, and halves to the even number.
+            // As in OpenCV: in 32 bits, by the reciprocal, and halves to the even number.
             let part = 1.0 / *count as f32;
             let mean = |sum: f64| f64::from((sum as f32 * part).round_ties_even());
             let Rect { x, y, width, height } = *region;
@@ -102,14 +101,14 @@ impl Grouping {
     }
 }
 
-/// As [`Grouping::group`], once.
+/// Groups windows as [`Grouping::group`], once.
 pub fn grouped(hits: &[Hit], fewest: usize) -> Vec<Group> {
     let mut grouping = Grouping::default();
     grouping.group(hits, fewest);
     grouping.kept
 }
 
-/// True if a group lies inside of a stronger one.
+/// Returns true if a group lies inside of a stronger one.
 fn outvotes(outer: &Group, inner: &Group) -> bool {
     let (r, o) = (&inner.region, &outer.region);
     let [dx, dy] = [o.width, o.height].map(|size| (size * ALIKE).round_ties_even());

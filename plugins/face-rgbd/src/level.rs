@@ -7,10 +7,10 @@ use crate::compiled::LANES;
 
 /// A part of an image in another size, with the sums of its values and of their squares.
 ///
-/// Rows of sums are as long as those of the largest image so far, so that the
-/// offsets of features stay what they are from size to size. Where windows begin at
-/// every second column, the sums of even columns come first in a row and those of odd
-/// columns after them: what windows side by side look at then lies side by side.
+/// Rows of sums are as long as those of the largest image so far, so that the offsets of features
+/// stay the same from size to size. Where windows begin at every second column, the sums of even
+/// columns come first in a row and those of odd columns after them: the sums of neighbouring
+/// windows are then adjacent in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Level {
     width: usize,
@@ -20,65 +20,64 @@ pub struct Level {
     pixels: Vec<u8>,
     sums: Vec<u32>,
     squares: Vec<u32>,
-    /// For each column: where it begins in the source, and the share of the next
-    /// pixel in 256ths.
+    /// For each column: its first source column, and the share of the next one in 256ths.
     columns: Vec<(usize, u32)>,
     /// A row between two rows of the source, in 256ths.
     between: Vec<u32>,
 }
 
 impl Level {
-    /// Columns of the image.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows of the image.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// What offsets depend on: sums in a row, and columns from window to window.
+    /// Returns the numbers on which offsets depend: sums in a row, and columns from window to
+    /// window.
     pub fn layout(&self) -> (usize, usize) {
         (self.stride, self.step)
     }
 
-    /// Where the sum of what is above and left of the upper left corner of pixel
-    /// (x, y) is. Offsets of pixels in a window add up with that of its first pixel,
-    /// where a window can begin.
+    /// Returns the offset of the sum above and left of the upper left corner of pixel (x, y).
+    /// Offsets of pixels in a window add up with that of its first pixel, where a window can begin.
     pub fn offset(&self, x: usize, y: usize) -> usize {
         let step = self.step.max(1);
         y * self.stride + x % step * (self.stride / step) + x / step
     }
 
-    /// The values, row by row.
+    /// Returns the values, row by row.
     pub fn pixels(&self) -> &[u8] {
         &self.pixels[..self.width * self.height]
     }
 
-    /// Sums of what is above and left of each corner of the pixels, modulo 2^32.
+    /// Returns the sums above and left of each corner of the pixels, modulo 2^32.
     pub fn sums(&self) -> &[u32] {
         &self.sums
     }
 
-    /// The same of squares.
+    /// Returns the same sums of squares.
     pub fn squares(&self) -> &[u32] {
         &self.squares
     }
 
-    /// Takes the place of another size: all of an image, `width` by `height` pixels of it
-    /// (see [`Level::fill_part`]).
+    /// Computes the level of a whole image, resampled to `width` by `height` pixels (see
+    /// [`Level::fill_part`]).
     pub fn fill(&mut self, image: &GreyImage, (width, height): (usize, usize), step: usize) {
         let whole = Part { x: 0, y: 0, width, height };
         self.fill_part(image, (width, height), whole, step);
     }
 
-    /// Takes the place of another size: a part of an image that would have `size`,
-    /// interpolated between four of its pixels; no mean over what is skipped, so
-    /// that windows look as those did that OpenCV's cascades were made for. Windows
-    /// begin at each pixel (`step` 1) or at every second one (2).
+    /// Computes the level of a part of an image resampled to `size`, interpolated between four of
+    /// its pixels; skipped pixels are not averaged, because OpenCV's cascades were trained on
+    /// windows of this kind. Windows begin at each pixel (`step` 1) or at every second one (2).
     pub fn fill_part(&mut self, image: &GreyImage, size: (usize, usize), part: Part, step: usize) {
         (self.width, self.height, self.step) = (part.width, part.height, step.clamp(1, 2));
+        // Even, so that sums of even and of odd columns have equal room in a row.
         self.stride = (image.width().max(size.0) + 1).next_multiple_of(2);
         self.pixels.resize((part.width * part.height).max(self.pixels.len()), 0);
         if part.width * part.height == 0 || image.width() * image.height() == 0 {
@@ -102,6 +101,7 @@ impl Level {
             let below = (above + 1).min(image.height() - 1);
             let rows = [above, below].map(|y| &image.row(y)[first..end]);
             blend_rows(rows, share, between);
+            // The last column has no right neighbour, and is repeated.
             if end < last + 2 {
                 between[end - first] = between[end - first - 1];
             }
@@ -111,7 +111,7 @@ impl Level {
 
     fn sum_up(&mut self) {
         let Self { width, height, stride, step, pixels, sums, squares, .. } = self;
-        // Windows side by side may hang over behind the last one.
+        // The last block of neighbouring windows may extend beyond the end.
         let length = *stride * (*height + 1) + LANES;
         for sums in [&mut *sums, &mut *squares] {
             sums.resize(length.max(sums.len()), 0);
@@ -124,7 +124,7 @@ impl Level {
     }
 }
 
-/// The sums below a row, of values and of squares, from those above it.
+/// Computes the sums below a row, of values and of squares, from those above it.
 fn add_row<const STEP: usize>(row: &[u8], stride: usize, sums: &mut [u32], squares: &mut [u32]) {
     let ((above, below), (squares_above, squares_below)) =
         (sums.split_at_mut(stride), squares.split_at_mut(stride));
@@ -142,16 +142,17 @@ fn add_row<const STEP: usize>(row: &[u8], stride: usize, sums: &mut [u32], squar
     }
 }
 
-/// Where pixel `x` of `count` lies among `of` pixels: the one before it, and the
+/// Returns the position of pixel `x` of `count` among `of` pixels: the pixel before it, and the
 /// share of the next in 256ths.
 fn place(x: usize, count: usize, of: usize) -> (usize, u32) {
+    // Positions refer to pixel centres, so half a pixel is added and removed.
     let at = (x as f64 + 0.5) * of as f64 / count as f64 - 0.5;
     let at = at.clamp(0.0, (of - 1) as f64);
     let before = (at as usize).min(of.saturating_sub(2));
     (before, ((at - before as f64) * 256.0).round() as u32)
 }
 
-/// A row between two rows, in 256ths.
+/// Interpolates a row between two rows, in 256ths.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn blend_rows([above, below]: [&[u8]; 2], share: u32, out: &mut [u32]) {
     for ((out, above), below) in out.iter_mut().zip(above).zip(below) {
@@ -159,9 +160,10 @@ fn blend_rows([above, below]: [&[u8]; 2], share: u32, out: &mut [u32]) {
     }
 }
 
-/// Pixels between the columns of a row.
+/// Interpolates pixels between the columns of a row.
 fn blend_columns(row: &[u32], columns: &[(usize, u32)], out: &mut [u8]) {
     for (pixel, &(x, right)) in out.iter_mut().zip(columns) {
+        // Half of the divisor rounds to the nearest value.
         *pixel = ((row[x] * (256 - right) + row[x + 1] * right + 32768) >> 16) as u8;
     }
 }

@@ -1,18 +1,16 @@
-//! `face-rgbd`: faces by a cascade of Haar-like features, where depth and
-//! geometry allow them (P2, section III-A; P. Viola and M. Jones, *Rapid object
-//! detection using a boosted cascade of simple features*, CVPR 2001).
+//! `face-rgbd`: faces by a cascade of Haar-like features, where depth and geometry allow them (P2,
+//! section III-A; P. Viola and M. Jones, *Rapid object detection using a boosted cascade of simple
+//! features*, CVPR 2001).
 //!
-//! Points all over the depth image are sampled. Those at heights and distances
-//! where faces can be are connected to regions, which are ranked by how much of
-//! them has the colour of skin. Only there, and only in the sizes that the
-//! distance allows, the windows of a [`Cascade`] are looked at. Without depth it
-//! looks everywhere, in all sizes.
+//! The depth image is sampled on a grid of points. Those at heights and distances of faces are
+//! connected to regions, which are ranked by their share of skin colour. The windows of a
+//! [`Cascade`] are scanned only there, and only in the sizes that the distance allows. Without
+//! depth the whole image is scanned, in all sizes.
 //!
-//! What is found is no face but a person: the detection is the upper-body square
-//! of whoever has this face.
+//! A detection is that of a person: the upper-body square below the face.
 //!
-//! Cascades are XML files as OpenCV has them; with the feature `train` the plugin
-//! offers a trainer that makes them (`train`).
+//! Cascades are XML files of OpenCV's format; with the feature `train` the plugin offers a trainer
+//! for them (`train`).
 
 mod cascade;
 mod compiled;
@@ -37,10 +35,10 @@ pub use propose::Proposals;
 pub use scan::{Scanner, Seen, scales, whole};
 use tagalong_config::Registry;
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "face-rgbd";
 
-/// The name of its trainer: what it makes is a cascade.
+/// Name of its trainer, which makes cascades.
 #[cfg(feature = "train")]
 pub const TRAINER: &str = "cascade";
 

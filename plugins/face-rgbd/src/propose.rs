@@ -1,6 +1,5 @@
-//! Where faces can be: sampling points that depth and geometry allow, in
-//! regions that are ranked by the colour of skin (P2, section III-A, after
-//! Vo-Duc, Masselli and Zell 2012).
+//! Proposals for faces: sampling points that depth and geometry allow, in regions that are ranked
+//! by the colour of skin (P2, section III-A, after Vo-Duc, Masselli and Zell 2012).
 
 use nalgebra::Point2;
 use tagalong_core::{DepthImage, Frame, RgbImage};
@@ -9,28 +8,28 @@ use tagalong_vision::islands;
 
 use crate::Config;
 
-/// Pixels from one sampling point to the next.
+/// Distance of neighbouring sampling points, pixels.
 const GRID_PX: usize = 8;
-/// Neighbours whose depths differ by less belong to one region, m.
+/// Largest difference in depth of neighbours in one region, m.
 const SAME_SURFACE_M: f32 = 0.15;
 
-/// The sampling points of a frame; keeps its memory from one to the next.
+/// Sampling points of a frame; the memory is reused for the next frame.
 #[derive(Clone, Debug, Default)]
 pub struct Proposals {
     columns: usize,
     rows: usize,
-    /// Depth of the points that are kept; NaN for the others.
+    /// Depth of the possible points; NaN for the others.
     depth: Vec<f32>,
     skin: Vec<bool>,
     /// Points that belong to a region.
     is_taken: Vec<bool>,
-    /// The points of the regions, one after the other.
+    /// Points of the regions, one after the other.
     members: Vec<usize>,
-    /// Where each begins, and how many of its points look like skin.
+    /// Range of each region in `members`, and the number of its points with the colour of skin.
     regions: Vec<Region>,
-    /// The points that are searched, those of the best regions, by depth.
+    /// Points that are searched, those of the best regions, by depth.
     searched: Vec<usize>,
-    /// Windows of the size in question may have their centre near these points, ...
+    /// Windows of the current size may have their centre near these points, ...
     fitting: Vec<usize>,
     /// ... that is, in these cells, ...
     allowed: Vec<bool>,
@@ -56,8 +55,8 @@ impl Region {
 }
 
 impl Proposals {
-    /// Samples a frame; returns how many points there were, how many geometry
-    /// allows, and how many are searched.
+    /// Samples a frame; returns the number of all points, of those that geometry allows, and of
+    /// those that are searched.
     pub fn sample(&mut self, frame: &Frame, depth: &DepthImage, config: &Config) -> [u64; 3] {
         let camera = &*frame.camera;
         (self.columns, self.rows) = (camera.width / GRID_PX, camera.height / GRID_PX);
@@ -75,7 +74,7 @@ impl Proposals {
         [self.depth.len() as u64, allowed, self.rank(config.max_points)]
     }
 
-    /// Points that touch and are about as far away as each other.
+    /// Connects adjacent points of similar depth to regions.
     fn connect(&mut self) {
         self.members.clear();
         self.regions.clear();
@@ -118,8 +117,8 @@ impl Proposals {
         }
     }
 
-    /// Keeps the regions with the largest share of skin, as many as the points
-    /// that may be searched allow, and always one.
+    /// Keeps the regions with the largest share of skin, while their points do not exceed the
+    /// limit, and always one.
     fn rank(&mut self, max_points: usize) -> u64 {
         self.regions.sort_by(|a, b| b.share().total_cmp(&a.share()).then(a.start.cmp(&b.start)));
         self.searched.clear();
@@ -130,13 +129,14 @@ impl Proposals {
             }
             self.searched.extend(points);
         }
+        // Sorted by depth, the points of one size are a range that is found by bisection.
         let depth = &self.depth;
         self.searched.sort_unstable_by(|a, b| depth[*a].total_cmp(&depth[*b]).then(a.cmp(b)));
         self.searched.len() as u64
     }
 
-    /// Prepares for windows of `side` pixels: they may be where a face that is as
-    /// large would be as far away as a sampling point, or beside that.
+    /// Prepares for windows of `side` pixels: they are allowed at and beside sampling points at the
+    /// distance of a face of this size.
     pub fn for_side(&mut self, camera: &Camera, side: f64, config: &Config) {
         let Self { columns, rows, depth, searched, fitting, allowed, areas, .. } = self;
         let metres = |at: &usize| side * f64::from(depth[*at]) / camera.focal_px();
@@ -155,18 +155,18 @@ impl Proposals {
         }
         areas.clear();
         let place = |at: &usize| [(at % *columns) as i64, (at / *columns) as i64];
-        // Windows of islands that are this far apart share no pixels.
+        // Windows of islands at this distance share no pixels.
         let gap = (side / GRID_PX as f64).ceil() as i64 + 3;
         islands(fitting, place, gap, &mut |island| areas.push(around(island.iter().map(place))));
     }
 
-    /// Where the centres of all windows are that [`Proposals::allows`], pixels; the areas
-    /// do not overlap.
+    /// Returns the areas that contain the centres of all windows that [`Proposals::allows`],
+    /// pixels; they do not overlap.
     pub fn areas(&self) -> &[Rect] {
         &self.areas
     }
 
-    /// True if a window of the size of [`Proposals::for_side`] is worth a look.
+    /// Returns true if a window of the size of [`Proposals::for_side`] is to be scanned.
     pub fn allows(&self, window: &Rect) -> bool {
         let Point2 { coords } = window.centre();
         let (x, y) = (coords.x as usize / GRID_PX, coords.y as usize / GRID_PX);
@@ -174,7 +174,7 @@ impl Proposals {
     }
 }
 
-/// The cells of sampling points and of their neighbours.
+/// Returns the rectangle of the cells of sampling points and of their neighbours.
 fn around(points: impl Iterator<Item = [i64; 2]>) -> Rect {
     let none = [i64::MAX, i64::MAX, i64::MIN, i64::MIN];
     let [left, top, right, bottom] = points.fold(none, |[left, top, right, bottom], [x, y]| {
@@ -185,7 +185,7 @@ fn around(points: impl Iterator<Item = [i64; 2]>) -> Rect {
     Rect::new(x, y, width, height)
 }
 
-/// The pixel of a sampling point: the middle of its cell.
+/// Returns the pixel of a sampling point: the middle of its cell.
 fn place(at: usize, columns: usize) -> (i64, i64) {
     let middle = |cell: usize| (cell * GRID_PX + GRID_PX / 2) as i64;
     (middle(at % columns), middle(at / columns))
@@ -201,11 +201,12 @@ fn is_possible(camera: &Camera, x: i64, y: i64, metres: f32, config: &Config) ->
     (config.min_height_m..=config.max_height_m).contains(&height_m)
 }
 
-/// Kovac, Peer and Solina's rule for daylight. It fails for many complexions and
-/// lamps, so nothing is decided by it alone.
+/// Tests for skin by Kovac, Peer and Solina's rule for daylight. It fails for many complexions and
+/// lamps, so it only ranks regions and decides nothing alone.
 fn skin(image: &RgbImage, x: i64, y: i64) -> bool {
     image.get(x, y).is_some_and(|[r, g, b]| {
         let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+        // `r > g` stands before `r - g`, which would otherwise overflow.
         r > 95 && g > 40 && b > 20 && most - least > 15 && r > b && r > g && r - g > 15
     })
 }
@@ -235,7 +236,7 @@ mod tests {
         Camera::mounted(lens, 160, 120, 1.3, 0.0, 0.0)
     }
 
-    /// Sampling points, by their columns and rows, that show something.
+    /// Sampling points with an object, by their columns and rows.
     struct Block {
         columns: std::ops::Range<usize>,
         rows: std::ops::Range<usize>,
@@ -344,7 +345,7 @@ mod tests {
         };
         assert_eq!(counts(0.1), [300, 24, 24], "one surface");
         assert_eq!(counts(0.2), [300, 24, 12], "two");
-        // One above the other is one surface as well.
+        // Points one above the other are one surface as well.
         let above = Block { rows: 3..6, ..block(4..8, 2.05, false) };
         let config = Config { max_points: 1, ..Config::default() };
         assert_eq!(sampled(&[above, block(4..8, 2.0, true)], &config).1, [300, 24, 24]);

@@ -1,5 +1,4 @@
-//! Windows over an image in many sizes, as OpenCV's `detectMultiScale` looks at
-//! them.
+//! Scan of windows over an image in many sizes, as in OpenCV's `detectMultiScale`.
 
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
@@ -9,26 +8,25 @@ use crate::compiled::{Block, Compiled, LANES};
 use crate::group::Hit;
 use crate::level::Level;
 
-/// Images that are smaller than one through this are looked at pixel by pixel,
-/// others at every second.
+/// Scale from which windows begin at every pixel of the shrunk image; below it at every second one.
 const FINE_FROM: f64 = 2.0;
 
-/// A window that passed all stages, as the cascade saw it.
+/// A window that passed all stages, with the pixels that the cascade read.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
-    /// What there is of the image in the size in question.
+    /// Computed part of the image in the current size.
     pub level: &'a Level,
-    /// Which part of it that is.
+    /// Position of this part in the whole image of that size.
     pub part: Part,
     /// Left edge in the level.
     pub x: usize,
     /// Upper edge in the level.
     pub y: usize,
-    /// By how much the last stage was passed.
+    /// Excess over the threshold of the last stage.
     pub margin: f32,
 }
 
-/// Looks at the windows of images; keeps its memory from one to the next.
+/// Scanner of the windows of images; the memory is reused for the next image.
 #[derive(Clone, Debug, Default)]
 pub struct Scanner {
     level: Level,
@@ -39,12 +37,12 @@ pub struct Scanner {
 }
 
 impl Scanner {
-    /// How many windows were looked at so far.
+    /// Returns the number of windows scanned so far.
     pub fn looked_at(&self) -> u64 {
         self.looked_at
     }
 
-    /// Forgets the cascade of before: the next scan may be with another one.
+    /// Discards the compiled cascade: the next scan may use another one.
     pub fn forget(&mut self) {
         self.compiled = [None, None];
     }
@@ -63,9 +61,8 @@ impl Scanner {
         }
     }
 
-    /// Adds the windows of one size that pass, whose middle is in one of some `areas` and
-    /// that `propose` allows; all in pixels of the image. A window in two areas comes
-    /// twice.
+    /// Adds the windows of one size that pass, with their middle in one of some `areas`, and that
+    /// `propose` allows; all in pixels of the image. A window in two areas is added twice.
     pub fn scan_within(
         &mut self,
         image: &GreyImage,
@@ -87,8 +84,9 @@ impl Scanner {
         }
     }
 
-    /// The windows of one size, in the image shrunk by `scale`, whose middle is in an area
-    /// of the image. `propose` is given the upper left corner in the shrunk image.
+    /// Passes to `take` the windows of one size that pass, in the image shrunk by `scale`, with
+    /// their middle in an area of the image. `propose` is given the upper left corner in the shrunk
+    /// image.
     pub fn size(
         &mut self,
         image: &GreyImage,
@@ -121,6 +119,7 @@ impl Scanner {
         let Self { level, compiled, wanted, looked_at } = self;
         level.fill_part(image, size.into(), part, step);
         let compiled = &mut compiled[step - 1];
+        // A larger image makes rows of sums longer, and compiled offsets invalid.
         compiled.take_if(|compiled| !compiled.fits(level));
         let compiled = compiled.get_or_insert_with(|| Compiled::new(cascade, level));
         for y in (top..=bottom).step_by(step) {
@@ -134,13 +133,13 @@ impl Scanner {
     }
 }
 
-/// To the nearest whole number; `value` is not negative. Called for each window, where
+/// Rounds a value that is not negative to the nearest whole number. Called for each window, where
 /// `round` would be a call of a library.
 fn rounded(value: f64) -> f64 {
     (value + 0.5) as i64 as f64
 }
 
-/// All of an image.
+/// Returns the area of a whole image.
 pub fn whole(image: &GreyImage) -> Rect {
     Rect::new(0.0, 0.0, image.width() as f64, image.height() as f64)
 }
@@ -152,14 +151,15 @@ struct Row<'a> {
     part: Part,
     y: usize,
     step: usize,
-    /// The next window is the neighbour of one that failed the first stage.
+    /// True if the next window is the neighbour of one that failed the first stage.
     is_skipped: bool,
 }
 
 impl Row<'_> {
-    /// Looks at the wanted windows from column `x` on; returns how many it looked at.
+    /// Scans the wanted windows from column `x` on; returns their number.
     fn look(&mut self, wanted: &[bool], x: usize, take: &mut impl FnMut(Seen<'_>)) -> u64 {
         if !wanted.contains(&true) {
+            // A gap in the wanted windows interrupts the row, so no neighbour is skipped behind it.
             self.is_skipped = false;
             return 0;
         }
@@ -174,8 +174,8 @@ impl Row<'_> {
         looked_at
     }
 
-    /// Keeps the wanted windows that pass the first stage. As in OpenCV, the neighbour
-    /// of one that fails is not looked at.
+    /// Keeps the wanted windows that pass the first stage. As in OpenCV, the neighbour of one that
+    /// fails is skipped.
     fn choose(&mut self, wanted: &[bool], block: &mut Block) -> u64 {
         let mut looked_at = 0;
         block.keep(|block, lane| {
@@ -193,11 +193,11 @@ impl Row<'_> {
     }
 }
 
-/// The scales at which windows are between `least` and `most` pixels wide, each
-/// `step` times the one before, counted from a window as it is.
+/// Returns the scales at which windows are between `least` and `most` pixels wide, each `step`
+/// times the one before, beginning with 1.
 pub fn scales(cascade: &Cascade, least: f64, most: f64, step: f64) -> impl Iterator<Item = f64> {
     let width = cascade.width as f64;
-    // Scales are kept as 32-bit numbers by OpenCV, and rounded windows depend on it.
+    // OpenCV keeps scales as 32-bit numbers, and rounded windows depend on it.
     std::iter::successors(Some(1.0_f64), move |scale| Some(scale * step))
         .map(|scale| f64::from(scale as f32))
         .take_while(move |scale| (width * scale).round() <= most)

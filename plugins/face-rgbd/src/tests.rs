@@ -87,7 +87,7 @@ fn slow_answer(image: &GreyImage, at: (usize, usize), cascade: &Cascade, node: &
     }
 }
 
-/// How many stages a window passes.
+/// The number of stages that a window passes.
 fn slow_stages(image: &GreyImage, at: (usize, usize), cascade: &Cascade) -> usize {
     let leaf = |tree: &Vec<Node>| {
         let mut node = &tree[0];
@@ -102,8 +102,8 @@ fn slow_stages(image: &GreyImage, at: (usize, usize), cascade: &Cascade) -> usiz
     cascade.stages.iter().take_while(passes).count()
 }
 
-/// The windows that pass, in OpenCV's order: the one after a window that fails the
-/// first stage is not looked at.
+/// The windows that pass, in OpenCV's order: the one after a window that fails the first stage is
+/// skipped.
 fn slow_scan(image: &GreyImage, cascade: &Cascade, step: usize) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     for y in (0..=image.height() - cascade.height).step_by(step) {
@@ -132,7 +132,7 @@ proptest! {
     fn a_scan_finds_what_the_slow_reference_finds(
         seed: u64, width in 12..60usize, height in 12..30usize, step in 1..=2usize,
     ) {
-        // From half of the size on, each pixel is looked at and not every second one.
+        // From half of the size on, windows begin at each pixel instead of every second one.
         let scale = [2.0, 1.0][step - 1];
         let image = noise(width * (3 - step), height * (3 - step), seed);
         let mut level = Level::default();
@@ -180,7 +180,7 @@ proptest! {
         let (image, cascade) = (noise(90, 70, seed), small());
         let area = |k: usize| Rect::new(90.0 * at[k], 70.0 * at[k + 1], 90.0 * long[k], 70.0 * long[k + 1]);
         let areas = [area(0), area(2)];
-        // The neighbour of the last window of one is not in the other.
+        // The neighbour of the last window of one area is not in the other.
         let Rect { x, y, width, height } = areas[0];
         let beside = Rect::new(x - 8.0, y - 8.0, width + 16.0, height + 16.0);
         prop_assume!(beside.iou(&areas[1]) == 0.0);
@@ -270,12 +270,12 @@ fn like_windows_are_one_face_and_single_ones_none() {
     assert_eq!(groups.len(), 1);
     assert_eq!((groups[0].count, groups[0].strength), (3, 1.5));
     assert_eq!(groups[0].region, Rect::new(11.0, 11.0, 30.0, 30.0));
-    // A chain holds together though its ends do not overlap enough.
+    // A chain holds together although its ends do not overlap enough.
     let chain: Vec<Hit> = (0..8).map(|k| hit(f64::from(k) * 5.0, 0.0, 30.0)).collect();
     assert_eq!(grouped(&chain, 2).len(), 1);
 }
 
-/// What `cv2.groupRectangles(.., 3, 0.2)` of OpenCV 4.14 answers.
+/// The results of `cv2.groupRectangles(.., 3, 0.2)` of OpenCV 4.14.
 #[test]
 fn groups_are_rounded_as_opencv_does() {
     let hit = |x: f64, y: f64, side: f64| Hit { region: Rect::new(x, y, side, side), margin: 0.0 };

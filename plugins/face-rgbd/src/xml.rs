@@ -1,9 +1,9 @@
-//! The XML files of OpenCV: the layout of `opencv_traincascade`, read and
-//! written, and the older one of `opencv_haartraining`, read.
+//! XML files of OpenCV: the layout of `opencv_traincascade`, read and written, and the older one of
+//! `opencv_haartraining`, read.
 //!
-//! In the newer layout a node is `left right feature` and its question; positive
-//! numbers lead to other nodes, others, negated, to leaves, so 0 is leaf 0. The
-//! older one spells everything out.
+//! In the newer layout a node is `left right feature` and its question; positive numbers lead to
+//! other nodes, others, negated, to leaves, so 0 is leaf 0. In the older one all parts are named
+//! elements.
 
 use std::fmt::Write as _;
 
@@ -11,17 +11,16 @@ use roxmltree::{Document, Node as Element, ParsingOptions};
 
 use crate::cascade::{Cascade, Feature, Next, Node, Part, Split, Stage, Tree};
 
-/// OpenCV compares with a threshold that is lower by this than the file's.
+/// Amount by which OpenCV lowers the threshold of a file.
 const SLACK: f32 = 1e-5;
 
 type Found<T> = Result<T, String>;
 
 impl Cascade {
-    /// Reads a file of either layout.
+    /// Parses a file of either layout.
     ///
-    /// # Errors
-    /// In a sentence, what is wrong with the text: not XML, not a cascade, of
-    /// features that are tilted or unknown, or broken.
+    /// Text that is not XML, not a cascade, has tilted or unknown features, or is inconsistent; the
+    /// message is one sentence.
     pub fn from_xml(text: &str) -> Found<Self> {
         let options =
             ParsingOptions { allow_dtd: false, nodes_limit: 2_000_000, ..Default::default() };
@@ -37,7 +36,7 @@ impl Cascade {
         Ok(cascade)
     }
 
-    /// The content of a file in the newer layout.
+    /// Formats a file in the newer layout.
     pub fn to_xml(&self) -> String {
         let mut out = String::from("<?xml version=\"1.0\"?>\n<opencv_storage>\n");
         // Writing to a string cannot fail.
@@ -109,7 +108,7 @@ fn write_feature(feature: &Feature, out: &mut String) -> std::fmt::Result {
     }
 }
 
-/// The layout of `opencv_traincascade`.
+/// Parses the layout of `opencv_traincascade`.
 fn new(root: Element<'_, '_>) -> Found<Cascade> {
     let features = elements(wanted(root, "features")?).map(feature).collect::<Found<Vec<_>>>()?;
     let stages = elements(wanted(root, "stages")?);
@@ -135,7 +134,7 @@ fn new_stage(stage: Element<'_, '_>, features: &[Feature]) -> Found<Stage> {
 }
 
 fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> Found<Tree> {
-    // Leaves that no window of the training reached are no numbers in some files.
+    // Some files have NaN in leaves that no window of the training reached.
     let leaves: Vec<f32> = numbers(wanted(tree, "leafValues")?)?;
     let leaves: Vec<f32> = leaves.into_iter().map(|v| if v.is_nan() { 0.0 } else { v }).collect();
     let words = numbers::<f64>(wanted(tree, "internalNodes")?)?;
@@ -154,6 +153,7 @@ fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> Found<Tree> {
     let node = |words: &[f64]| {
         let split = if is_binary {
             let mut bits = [0; 8];
+            // OpenCV writes the bits as signed numbers.
             bits.iter_mut().zip(&words[3..]).for_each(|(bits, word)| *bits = *word as i32 as u32);
             Split::Among(bits)
         } else {
@@ -190,7 +190,7 @@ fn part(words: &[f64]) -> Found<Part> {
     }
 }
 
-/// The layout of `opencv_haartraining`.
+/// Parses the layout of `opencv_haartraining`.
 fn old(root: Element<'_, '_>, size: Element<'_, '_>) -> Found<Cascade> {
     let [width, height] = numbers::<usize>(size)?[..] else {
         return Err("its `size` is not two numbers".into());

@@ -1,5 +1,5 @@
-//! The boxes that OpenCV's own tests expect of its cascades, on its photographs.
-//! Without `../shared/data/opencv` each test says that it skips.
+//! Tests against the boxes that OpenCV's own tests expect of its cascades, on its photographs.
+//! Without `../shared/data/opencv` each test is skipped with a message.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -13,12 +13,12 @@ use tagalong_core::{GreyImage, RgbImage};
 use tagalong_face_rgbd::{Cascade, Scanner, grouped, scales};
 use tagalong_geometry::Rect;
 
-/// A box is the expected one if its edges are off by this part of its width, or
-/// by so many pixels, at most.
+/// Largest difference of the edges of a box from the expected one, as a part of its width or in
+/// pixels, whichever is more.
 const OFF: f64 = 0.05;
 const OFF_PX: f64 = 8.0;
-/// Boxes without a partner, in either list, as a part of those expected:
-/// `noPairE` of the file.
+/// Largest share of boxes without a partner, in either list, of those expected: `noPairE` of the
+/// file.
 const UNPAIRED: f64 = 0.1;
 
 fn data(file: &str) -> Option<PathBuf> {
@@ -29,7 +29,7 @@ fn text(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap()
 }
 
-/// Grey values spread as OpenCV's `equalizeHist` does.
+/// Equalises grey values as OpenCV's `equalizeHist` does.
 fn equalised(grey: &GreyImage) -> GreyImage {
     let mut counts = [0_u32; 256];
     grey.pixels().iter().for_each(|v| counts[usize::from(*v)] += 1);
@@ -64,7 +64,7 @@ fn boxes(words: &[String]) -> Vec<Rect> {
     numbers.chunks_exact(4).map(|b| Rect::new(b[0], b[1], b[2], b[3])).collect()
 }
 
-/// What the cascade finds as OpenCV's tests call it.
+/// The faces that the cascade finds with the settings of OpenCV's tests.
 fn found(cascade: &Cascade, image: &GreyImage) -> Vec<Rect> {
     let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
     let fitting = scales(cascade, 0.0, image.width() as f64, 1.1)
@@ -79,7 +79,7 @@ fn is_same(a: &Rect, b: &Rect) -> bool {
     edges.iter().all(|off| off.abs() <= most)
 }
 
-/// How many of `these` have no partner among `those`.
+/// The number of `these` without a partner among `those`.
 fn unpaired(these: &[Rect], those: &[Rect]) -> usize {
     these.iter().filter(|a| !those.iter().any(|b| is_same(a, b))).count()
 }

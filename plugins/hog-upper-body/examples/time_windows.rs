@@ -1,5 +1,5 @@
-//! Scans a picture with a model, again and again: `time_windows MODEL.toml PICTURE
-//! RUNS`. For the comparison with OpenCV in `benches/peers/`.
+//! Scans an image with a model repeatedly: `time_windows MODEL.toml PICTURE RUNS`. For the
+//! comparison with OpenCV in `benches/peers/`.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
 use tagalong_core::GreyImage;
@@ -16,7 +16,7 @@ fn main() {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
     let (mut scanner, mut windows) = (Scanner::new(&model), Vec::new());
-    // OpenCV looks at no windows that hang over.
+    // OpenCV does not scan windows that extend beyond the image.
     let is_inside = |square: &Rect| {
         let window = window_of(square);
         let is_inside = window.x.min(window.y) >= 0.0
@@ -25,7 +25,7 @@ fn main() {
         is_inside.then_some(None)
     };
     for _ in 0..runs {
-        // Windows are 64 pixels and more, and twice as wide as the upper body.
+        // Windows are at least 64 pixels wide, and twice as wide as the upper body.
         let most = 0.5 * width.min(height) as f64;
         let sides = std::iter::successors(Some(32.0), |side| Some(side * 1.15));
         let least = model.sum_at(0.0);

@@ -1,6 +1,6 @@
-//! Aggregated channels: brightness, gradients and their directions, averaged over
-//! small cells and compared with what is around (after P. Dollar et al., *Fast
-//! feature pyramids for object detection*, PAMI 36, 2014).
+//! Aggregated channels: brightness, gradients and their directions, averaged over small cells and
+//! normalised by their surroundings (after P. Dollar et al., *Fast feature pyramids for object
+//! detection*, PAMI 36, 2014).
 
 use std::ops::Range;
 
@@ -10,39 +10,38 @@ use crate::hog::CELL as HOG_CELL;
 
 /// Side of a cell, pixels.
 pub(crate) const CELL: usize = HOG_CELL / HALVES;
-/// Cells along a side of those that histograms are made of.
+/// Number of these cells along a side of a cell of histograms.
 const HALVES: usize = 2;
-/// Directions, over half a turn.
+/// Number of directions, over half a turn.
 const BINS: usize = 6;
-/// Numbers of a cell: brightness, length of gradients, and length by direction.
+/// Number of values in a cell: brightness, length of gradients, and length by direction.
 pub(crate) const DEPTH: usize = 2 + BINS;
-/// Gradients that are no longer than this, of grey values from 0 to 1, are
-/// compared with this and not with those around.
+/// Constant that is added to the mean gradient around a cell before gradients are divided by it,
+/// for grey values from 0 to 1: faint gradients are not amplified.
 const FAINT: f32 = 0.005;
 
-/// The channels of an image, cell by cell.
+/// Channels of an image, cell by cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Channels {
     columns: usize,
     rows: usize,
     values: Vec<f32>,
-    /// Scratch: the lengths of gradients around a cell, and what a pass reads.
+    /// Scratch: lengths of gradients around a cell, and input of a pass.
     around: Vec<f32>,
     before: Vec<f32>,
     gradients: Gradients,
-    /// Scratch: the sums of each column in a row of cells.
+    /// Scratch: sums of each column in a row of cells.
     columns_of: Vec<Columns>,
 }
 
-/// Sums of neighbouring columns of pixels: brightness, length of gradients, and
-/// length by direction.
+/// Sums of neighbouring columns of pixels: brightness, length of gradients, and length by
+/// direction.
 type Columns = Votes<DEPTH>;
 
 impl Channels {
-    /// Takes the place of the channels of another image: `pixels` of grey values,
-    /// `width` to a row. The outermost pixels belong to no cell; they are there
-    /// for the gradients of their neighbours. Only cells in `spans` are looked at; others
-    /// are as if there were nothing.
+    /// Computes the channels of another image: `pixels` of grey values, `width` to a row. The
+    /// outermost pixels belong to no cell; they serve for the gradients of their neighbours. Only
+    /// cells in `spans` are computed; the others are zero.
     pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         self.columns = HALVES * (width.saturating_sub(2) / HOG_CELL);
         self.rows = HALVES * spans.cells().len();
@@ -60,7 +59,7 @@ impl Channels {
         smooth(&mut self.values, &mut self.before, size, DEPTH, &[0.25, 0.5, 0.25]);
     }
 
-    /// Makes row `y` of cells from the rows of pixels that begin above it.
+    /// Computes row `y` of cells from the rows of pixels that begin above it.
     fn add(&mut self, pixels: &[f32], width: usize, y: usize, span: &Range<usize>) {
         let lanes = span.len() * HOG_CELL / LANES;
         self.columns_of.clear();
@@ -77,7 +76,7 @@ impl Channels {
         sum_columns(&self.columns_of, row);
     }
 
-    /// Divides gradients by what is usual around their cell.
+    /// Divides gradients by the mean around their cell.
     fn compare(&mut self) {
         self.around.clear();
         self.around.extend(self.values.chunks_exact(DEPTH).map(|cell| cell[1]));
@@ -90,13 +89,15 @@ impl Channels {
         }
     }
 
-    /// The numbers from cell (x, y) on.
+    /// Returns the values from cell (x, y) on.
     pub fn from(&self, x: usize, y: usize) -> &[f32] {
         &self.values[(y * self.columns + x) * DEPTH..]
     }
 
-    /// The same numbers in another order.
+    /// Copies the values into planes.
     pub(crate) fn planes(&self, planes: &mut Planes) {
+        // Planes never shrink, so that places in them stay valid from one size of the image to the
+        // next.
         let half = (self.columns.div_ceil(2) + LANES).max(planes.half);
         planes.half = half;
         let rows = self.values.chunks_exact((self.columns * DEPTH).max(1)).take(self.rows);
@@ -111,9 +112,9 @@ impl Channels {
     }
 }
 
-/// The numbers of cells, row by row: those of one kind of all even columns, and those
-/// of all odd ones. Windows begin at even columns, so what windows side by side look at
-/// lies side by side. Planes are as long as those of the largest image so far.
+/// Values of cells, row by row: those of one kind of all even columns, and those of all odd ones.
+/// Windows begin at even columns, so the values of neighbouring windows are adjacent in memory.
+/// Planes are as long as those of the largest image so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Planes {
     half: usize,
@@ -121,12 +122,12 @@ pub(crate) struct Planes {
 }
 
 impl Planes {
-    /// What the places of numbers depend on.
+    /// Returns the number on which the places of values depend.
     pub(crate) fn layout(&self) -> usize {
         self.half
     }
 
-    /// Where number `k` of cell (x, y) is. Places in a window add up with that of its
+    /// Returns the place of value `k` of cell (x, y). Places in a window add up with that of its
     /// first cell.
     pub(crate) fn place(&self, x: usize, y: usize, k: usize) -> usize {
         ((y * 2 + x % 2) * DEPTH + k) * self.half + x / 2
@@ -137,8 +138,8 @@ impl Planes {
     }
 }
 
-/// Weighted means over neighbours in columns and then in rows; at the border what
-/// is there counts more. `scratch` is as long as the values, at least.
+/// Computes weighted means over neighbours in columns and then in rows; at the border the weights
+/// of the missing neighbours are shared by the others. `scratch` is at least as long as the values.
 fn smooth(
     values: &mut [f32],
     scratch: &mut [f32],
@@ -159,6 +160,7 @@ fn smooth(
     for (from, to) in scratch.chunks_exact(row).zip(values.chunks_exact_mut(row)).take(rows) {
         to.fill(0.0);
         let whole = reach.min(columns)..columns.saturating_sub(reach).max(reach.min(columns));
+        // Columns away from the border have all neighbours: they are added in one pass per weight.
         for (k, weight) in weights.iter().enumerate().filter(|_| !whole.is_empty()) {
             let begin = (whole.start + k - reach) * depth;
             let inner = &mut to[whole.start * depth..whole.end * depth];
@@ -175,8 +177,8 @@ fn smooth(
     }
 }
 
-/// The first neighbour that is there, the weights of those that are, and what
-/// makes them sum to 1.
+/// Returns the first existing neighbour, the weights of the existing ones, and the factor by which
+/// these sum to 1.
 fn present(at: usize, length: usize, weights: &[f32]) -> (usize, &[f32], f32) {
     let reach = weights.len() / 2;
     let (first, last) = (at.saturating_sub(reach), (at + reach).min(length - 1));
@@ -189,7 +191,7 @@ fn add_scaled(to: &mut [f32], from: &[f32], scale: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * from);
 }
 
-/// Adds a row of pixels to their columns.
+/// Adds a row of pixels to the sums of their columns.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn add_row(gradients: &Gradients, grey: &[f32], columns: &mut [Columns]) {
     let grey = grey.chunks(LANES);
@@ -208,14 +210,15 @@ fn add_row(gradients: &Gradients, grey: &[f32], columns: &mut [Columns]) {
     }
 }
 
-/// The numbers of cells from the sums of their columns: means of grey values from 0
-/// to 1 and of their gradients.
+/// Computes the values of cells from the sums of their columns: means of grey values from 0 to 1
+/// and of their gradients.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn sum_columns(columns: &[Columns], row: &mut [f32]) {
     let share = 1.0 / (255.0 * (CELL * CELL) as f32);
     for (cells, columns) in row.chunks_mut(DEPTH * LANES / CELL).zip(columns) {
         for (side, cell) in cells.chunks_exact_mut(DEPTH).enumerate() {
             for (number, lanes) in cell.iter_mut().zip(columns) {
+                // Centred differences span two pixels and were not halved before.
                 *number = 0.5 * share * lanes[side * CELL..][..CELL].iter().sum::<f32>();
             }
             cell[0] *= 2.0; // Brightness is no difference of two pixels.

@@ -9,64 +9,63 @@ use crate::Kind;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// What judges windows: `trees`, or `linear` as P2 has it.
+    /// Machine that classifies windows: `trees`, or `linear` as in P2.
     pub machine: Kind,
-    /// Model file, relative to the config; it says by itself what machine it has.
-    /// Empty: the model of that machine that is built in.
+    /// Model file, relative to the config; the file states its machine. Empty: the built-in model
+    /// of the chosen machine.
     pub model: String,
     /// Windows with lower log-odds are dropped.
     pub min_score: f64,
-    /// Log-odds are limited to this.
+    /// Upper limit of the log-odds.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_score: f64,
-    /// Smallest upper body that is looked for, pixels.
+    /// Smallest upper body in a search, pixels.
     #[schemars(range(min = 16.0, max = 1e5))]
     pub min_side_px: f64,
-    /// Largest, as a fraction of the shorter side of the image.
+    /// Largest upper body, as a fraction of the shorter side of the image.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_side: f64,
-    /// Each size is so many times the one before.
+    /// Ratio of each size to the one before.
     #[schemars(range(min = 1.02, max = 4.0))]
     pub scale_step: f64,
-    /// With depth: a window may be larger or smaller than the distance says by
-    /// this factor.
+    /// With depth: factor by which a window may be larger or smaller than its distance predicts.
     #[schemars(range(min = 1.0, max = 1e3))]
     pub size_tolerance: f64,
-    /// Distances at which people are looked for, m.
+    /// Range of distances of people, m.
     pub min_depth_m: f64,
     /// See `min_depth_m`.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_depth_m: f64,
-    /// With depth: where most of what is above a square is as far away as what it shows,
-    /// give or take this, it shows no head, m; 0: not asked.
+    /// With depth: a square shows no head if most of the points above it are as far away as it is,
+    /// to within this, m; 0: not tested.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub above_m: f64,
-    /// Heights of a head's centre above the floor, m.
+    /// Range of heights of a head's centre above the floor, m.
     pub min_head_height_m: f64,
     /// See `min_head_height_m`.
     pub max_head_height_m: f64,
-    /// Looks at windows that depth and geometry allow only; off: at all.
+    /// Scans only windows that depth and geometry allow; off: all windows.
     pub depth_proposals: bool,
-    /// Two windows that overlap by more (IoU) are of one person ...
+    /// Two windows that overlap by more (IoU) belong to one person ...
     #[schemars(range(min = 0.0, max = 1e6))]
     pub overlap: f64,
     /// ... unless they are farther apart than this in depth, m.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub apart_m: f64,
-    /// A search near a track looks at windows whose centre is nearer than this
-    /// to the expected one, widths.
+    /// A search near a track scans windows with their centre nearer than this to the expected one,
+    /// widths.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub near: f64,
-    /// Standard deviation of a window's place, as a fraction of its side.
+    /// Standard deviation of the position of a window, as a fraction of its side.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_place: f64,
     /// Standard deviation of a distance from the depth image, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_depth_m: f64,
-    /// Standard deviation of a distance that only the size tells, as a fraction.
+    /// Standard deviation of a distance from the size of the window alone, as a fraction.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
-    /// How a model is fitted; only `tagalong train` reads it.
+    /// Settings of the fit; only `tagalong train` reads them.
     pub training: Training,
 }
 
@@ -98,28 +97,27 @@ impl Default for Config {
     }
 }
 
-/// How a model is fitted.
+/// Settings of the fit of a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
     /// Linear: penalty of a training error, of windows with people ...
     pub person_penalty: f64,
-    /// ... and of others.
+    /// ... and of windows without.
     pub other_penalty: f64,
-    /// Linear: passes over all windows at most.
+    /// Linear: most passes over all windows.
     pub epochs: usize,
-    /// Trees of the last round; each round before has a quarter of those of the
-    /// next.
+    /// Number of trees of the last round; each round has a quarter of the trees of the next.
     pub trees: usize,
-    /// Numbers of a window that a tree chooses from, drawn anew for each.
+    /// Number of values of a window that a tree chooses from, sampled anew for each tree.
     pub numbers: usize,
-    /// Windows by chance from each picture without anybody, at first.
+    /// Number of random windows from each picture without people, at first.
     pub random_windows: usize,
-    /// How often pictures without anybody are searched for false alarms.
+    /// Number of searches for false alarms in pictures without people.
     pub mining_rounds: usize,
-    /// False alarms that are kept of a picture and round at most.
+    /// Most false alarms that are kept of one picture in one round.
     pub mined_per_picture: usize,
-    /// False alarms that are kept of a round at most.
+    /// Most false alarms that are kept of one round.
     pub mined_per_round: usize,
 }
 
@@ -140,7 +138,7 @@ impl Default for Training {
 }
 
 impl Config {
-    /// Refuses numbers that cannot work.
+    /// Refuses settings outside their ranges.
     pub(crate) fn check(&self) -> Result<()> {
         check_settings(self)
     }

@@ -10,19 +10,19 @@ use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 use crate::lattice::Lattice;
 use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
 
-/// The models that are part of the program.
+/// Models that are compiled into the program.
 const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
 const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
 
-/// What is above a head is looked at so far above the square, sides; the windows that show
-/// a head best end there well above it.
+/// Distance above the square at which depth is read to test for the end of a head, in sides; the
+/// windows that show a head best end well above it.
 const ABOVE: f64 = 0.25;
-/// In so many places.
+/// Number of places at which it is read.
 const TAPS: usize = 5;
-/// A search near a track looks at windows so many times as wide as the track expects.
+/// Widths in a search near a track, relative to that of the track.
 const ALIKE: RangeInclusive<f64> = 0.7..=1.4;
 
-/// Finds heads and shoulders.
+/// Detector of heads and shoulders.
 pub struct HogUpperBody {
     config: Config,
     model: Model,
@@ -32,11 +32,11 @@ pub struct HogUpperBody {
 }
 
 impl HogUpperBody {
-    /// A detector; reads its model.
+    /// Creates a detector and reads its model.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
-    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is not a model,
+    /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
@@ -67,7 +67,7 @@ impl HogUpperBody {
     }
 }
 
-/// The sizes that are looked for, pixels; near a track, those like its own.
+/// Returns the sizes of a search, pixels; near a track, those similar to its own.
 fn sides(config: &Config, camera: &Camera, near: Option<Rect>) -> impl Iterator<Item = f64> {
     let most = config.max_side * camera.width.min(camera.height) as f64;
     let step = config.scale_step;
@@ -76,13 +76,13 @@ fn sides(config: &Config, camera: &Camera, near: Option<Rect>) -> impl Iterator<
         .filter(move |side| near.is_none_or(|near| ALIKE.contains(&(side / near.width.max(1.0)))))
 }
 
-/// Which windows are worth a look, and how many were not, by test.
+/// Selector of the windows to scan, with the number of windows that each test rejects.
 struct Proposer<'a> {
     config: &'a Config,
     camera: &'a Camera,
     depth: Option<&'a DepthImage>,
     lattice: &'a mut Lattice,
-    /// The square that a search near a track expects.
+    /// Expected square in a search near a track.
     near: Option<Rect>,
     unfit: u64,
     goes_on: u64,
@@ -101,7 +101,7 @@ impl<'a> Proposer<'a> {
         Self { config, camera, depth, lattice, near, unfit, goes_on, out_of_place }
     }
 
-    /// Adds the windows of one size that are worth a look.
+    /// Adds the windows of one size that are to be scanned.
     fn propose(&mut self, grid: &Grid, wanted: &mut Vec<Wanted>) {
         match self.depth {
             Some(depth) => self.propose_by_depth(depth, grid, wanted),
@@ -109,7 +109,7 @@ impl<'a> Proposer<'a> {
         }
     }
 
-    /// Those that show something as far away as somebody would be who is so large.
+    /// Adds the windows in which the depth is that of a person of this size.
     fn propose_by_depth(&mut self, depth: &DepthImage, grid: &Grid, wanted: &mut Vec<Wanted>) {
         let config = self.config;
         let fits_m = self.camera.focal_px() * UPPER_BODY_SIDE_M / grid.side;
@@ -117,6 +117,7 @@ impl<'a> Proposer<'a> {
         let farthest_m = (fits_m * config.size_tolerance).min(config.max_depth_m);
         self.lattice.fill(depth, grid, nearest_m..=farthest_m);
         let mut index = 0..;
+        // The grid and the lattice count their windows in the same order.
         wanted.extend(grid.windows(|square| {
             let index = index.next()?;
             if !self.is_near(square) {
@@ -128,7 +129,7 @@ impl<'a> Proposer<'a> {
         }));
     }
 
-    /// True if what is in a square ends there, at a height where heads are.
+    /// Returns true if the object in a square ends there, at a height where heads are.
     fn is_head(&mut self, depth: &DepthImage, square: &Rect, face_m: f64) -> bool {
         if self.goes_on_above(depth, square, face_m) {
             self.goes_on += 1;
@@ -141,7 +142,7 @@ impl<'a> Proposer<'a> {
         in_place
     }
 
-    /// True for what has no upper end here: walls, trunks of people, furniture.
+    /// Returns true if the object has no upper end here: walls, trunks of people, furniture.
     fn goes_on_above(&self, depth: &DepthImage, square: &Rect, face_m: f64) -> bool {
         let y = (square.y - ABOVE * square.height) as i64;
         let column = |i: usize| (square.x + square.width * (0.25 + 0.125 * i as f64)) as i64;
@@ -197,6 +198,7 @@ impl Detector for HogUpperBody {
         funnel.drop_many("window: beside a better one", (all - windows.len()) as u64);
         let mut found: Vec<Detection> =
             self.windows.iter().filter_map(|window| self.detection(camera, window)).collect();
+        // `merge` has sorted the windows by their sums, so the first is the best.
         if near.is_some() {
             found.truncate(1);
         }
@@ -218,8 +220,8 @@ mod tests {
 
     use super::*;
 
-    /// Whether the square of somebody 3 m away whose surroundings are at `depth` shows a
-    /// head, and how many squares do not because what they show goes on above.
+    /// Tests the square of a person 3 m away with surroundings at `depth`: returns true if it shows
+    /// a head, and the number of squares that are rejected because the object goes on above.
     fn is_head(depth: impl Fn(f64) -> f32) -> (bool, u64) {
         let camera = camera();
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
@@ -314,7 +316,8 @@ mod tests {
         assert_eq!(detector.detection(&camera, &sure).unwrap().score, config.max_score);
     }
 
-    /// A frame of noise, and how many windows were dropped by depth and by gradients.
+    /// Returns the numbers of windows that are rejected by depth and by gradients in a frame of
+    /// noise, and the number of detections.
     fn dropped(config: Config, depth_m: Option<f32>, near: Option<&Track>) -> ([u64; 2], usize) {
         let lens =
             Pinhole { fx: 131.0, fy: 131.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };

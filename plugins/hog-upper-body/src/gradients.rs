@@ -1,12 +1,12 @@
-//! Gradients of a row of pixels, and what they say of directions.
+//! Gradients of a row of pixels, and their votes for directions.
 
-/// Pixels that are dealt with at once.
+/// Number of pixels that are processed at once.
 pub(crate) const LANES: usize = 8;
 
-/// The votes of as many pixels for each direction.
+/// Votes of these pixels for each direction.
 pub(crate) type Votes<const BINS: usize> = [[f32; LANES]; BINS];
 
-/// Lengths and directions; keeps its memory from one row to the next.
+/// Lengths and directions of gradients; the memory is reused for the next row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Gradients {
     length: Vec<f32>,
@@ -14,9 +14,9 @@ pub(crate) struct Gradients {
 }
 
 impl Gradients {
-    /// Those of the pixels of a row but the first and the last, up to `lanes`
-    /// times [`LANES`]; as many as `before` that have no length come first, and
-    /// where the row is shorter, more of them at the end.
+    /// Computes the gradients of all pixels of a row but the first and the last, up to `lanes`
+    /// times [`LANES`]; `before` gradients without length come first, and more of them at the end
+    /// if the row is shorter.
     pub(crate) fn fill(&mut self, [above, row, below]: [&[f32]; 3], before: usize, lanes: usize) {
         let whole = lanes * LANES;
         self.length.resize(whole, 0.0);
@@ -28,15 +28,15 @@ impl Gradients {
         of_row(above, row, below, length, turn);
     }
 
-    /// Length of each gradient, of centred differences that are not halved, and its
-    /// direction, in half turns from 0 to 1; opposite ones are the same.
+    /// Returns the length of each gradient, of centred differences that are not halved, and its
+    /// direction, in half turns from 0 to 1; opposite directions are the same.
     pub(crate) fn lanes(&self) -> impl Iterator<Item = (&[f32; LANES], &[f32; LANES])> {
         self.length.as_chunks().0.iter().zip(self.turn.as_chunks().0)
     }
 }
 
-/// Shares the length of each gradient between the two directions that are nearest
-/// to its own. The first direction is at `first` of a bin's width.
+/// Divides the length of each gradient between the two nearest directions. The first direction is
+/// at `first` of a bin's width.
 #[inline(always)]
 pub(crate) fn votes<const BINS: usize>(
     length: &[f32; LANES],
@@ -48,7 +48,7 @@ pub(crate) fn votes<const BINS: usize>(
         let length = length[lane];
         // In widths of a bin, times the length.
         let mut away = length * (turn[lane] * BINS as f32 - first);
-        // Half a turn on, the first direction follows the last one.
+        // The directions close on themselves: after half a turn, the first follows the last.
         let last = (-away).max(0.0);
         for votes in &mut votes {
             votes[lane] = (length - away.abs()).max(0.0);
@@ -72,7 +72,7 @@ fn of_row(above: &[f32], row: &[f32], below: &[f32], length: &mut [f32], turn: &
     }
 }
 
-/// The angle of a line, in half turns, by a polynomial in the tangent: off by
+/// Returns the angle of a line, in half turns, by a polynomial in the tangent: with an error of
 /// less than 1e-5, and without branches.
 #[inline(always)]
 fn half_turns(x: f32, y: f32) -> f32 {
@@ -80,6 +80,7 @@ fn half_turns(x: f32, y: f32) -> f32 {
         [0.318_302_6, -0.105_877_35, 0.061_606_795, -0.037_061_73, 0.016_760_074, -0.003_730_975];
     let (across, down) = (x.abs(), y.abs());
     let (less, more) = (across.min(down), across.max(down));
+    // The small constant makes the angle of a zero gradient 0 instead of NaN.
     let t = less / (more + 1e-20);
     let s = t * t;
     let [a, b, c, d, e, f] = TERMS;

@@ -1,23 +1,22 @@
-//! Cells and blocks.
+//! Cells and normalised blocks of histograms of gradients.
 
 use crate::Spans;
 use crate::gradients::{Gradients, LANES, Votes, votes};
 
 /// Side of a cell, pixels.
 pub(crate) const CELL: usize = 8;
-/// Directions, over half a turn.
+/// Number of directions, over half a turn.
 pub(crate) const BINS: usize = 9;
-/// Numbers of a block: 2x2 cells.
+/// Number of values of a block: 2x2 cells.
 pub(crate) const BLOCK: usize = 4 * BINS;
-/// No number of a normalised block is larger (L2-Hys).
+/// Largest value of a normalised block before it is normalised again (L2-Hys).
 const CLIP: f32 = 0.2;
-/// The middle of the first direction, in widths of a bin.
+/// Middle of the first direction, in widths of a bin.
 const FIRST: f32 = 0.5;
-/// Pixels that are half a cell or less left of the first cell's middle: so many lie
-/// outside of it.
+/// Number of pixels left of the first cell that are within half a cell of it.
 const BEFORE: usize = CELL / 2;
 
-/// The normalised blocks of an image; neighbours share cells.
+/// Normalised blocks of an image; neighbours share cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Blocks {
     columns: usize,
@@ -25,8 +24,8 @@ pub struct Blocks {
     values: Vec<[f32; BLOCK]>,
     /// Histograms of the cells.
     cells: Vec<[f32; BINS]>,
-    /// Scratch: square roots of all pixels, the gradients of a row, and their votes
-    /// for the row of cells above them and for the one below.
+    /// Scratch: square roots of all pixels, the gradients of a row, and their votes for the row of
+    /// cells above them and for the one below.
     roots: Vec<f32>,
     gradients: Gradients,
     above: Vec<Votes<BINS>>,
@@ -34,13 +33,13 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Takes the place of the blocks of another image: `pixels` of grey values,
-    /// `width` to a row. The outermost pixels belong to no cell; they are there
-    /// for the gradients of their neighbours. Only cells in `spans` are looked at;
-    /// other blocks are of no use.
+    /// Computes the blocks of another image: `pixels` of grey values, `width` to a row. The
+    /// outermost pixels belong to no cell; they serve for the gradients of their neighbours. Only
+    /// cells in `spans` are computed; other blocks are undefined.
     pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         let (across, down) = (width.saturating_sub(2) / CELL, spans.cells().len());
         (self.columns, self.rows) = (across.saturating_sub(1), down.saturating_sub(1));
+        // The last, additional block lets a product in full lanes read past the end of a window.
         self.values.resize(self.columns * self.rows + 1, [0.0; BLOCK]);
         if self.columns * self.rows == 0 {
             return;
@@ -57,7 +56,7 @@ impl Blocks {
         }
     }
 
-    /// Takes the square roots of the pixels that are needed.
+    /// Computes the square roots of the pixels that are needed.
     fn root(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         self.roots.resize(pixels.len(), 0.0);
         let rows = pixels.chunks_exact(width).zip(self.roots.chunks_exact_mut(width));
@@ -68,8 +67,8 @@ impl Blocks {
         }
     }
 
-    /// The histograms of all cells: each gradient votes for the two directions and
-    /// the four cells that are nearest.
+    /// Computes the histograms of all cells: each gradient votes for the two nearest directions and
+    /// the four nearest cells.
     fn vote(&mut self, width: usize, spans: &Spans) {
         let across = self.columns + 1;
         self.cells.resize(across * spans.cells().len(), [0.0; BINS]);
@@ -79,7 +78,8 @@ impl Blocks {
         }
         for (row, span) in spans.cells().iter().enumerate() {
             for pixel in 0..CELL {
-                // Half a cell below a cell's first row its own middle is passed.
+                // From the middle of a cell on, pixels vote for the cells of the next row instead
+                // of those above.
                 if pixel == CELL / 2 {
                     self.finish(row, spans);
                 }
@@ -97,7 +97,8 @@ impl Blocks {
         self.finish(spans.cells().len(), spans);
     }
 
-    /// The row of cells above row `y` has all its votes. There is none above the first.
+    /// Completes the row of cells above row `y`, which has all its votes. There is none above the
+    /// first.
     fn finish(&mut self, y: usize, spans: &Spans) {
         if let Some(y) = y.checked_sub(1) {
             let (span, across) = (&spans.cells()[y], self.columns + 1);
@@ -109,24 +110,23 @@ impl Blocks {
         self.below.fill([[0.0; LANES]; BINS]);
     }
 
-    /// Blocks in a row.
+    /// Returns the number of blocks in a row.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Rows of blocks.
+    /// Returns the number of rows of blocks.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// The numbers from block (x, y) on; behind the last block there is one without
-    /// any.
+    /// Returns the values from block (x, y) on; the last block is followed by an empty one.
     pub fn from(&self, x: usize, y: usize) -> &[f32] {
         self.values[y * self.columns + x..].as_flattened()
     }
 }
 
-/// The share of the next cell in a pixel that is so many pixels behind a cell's
+/// Returns the share of the next cell in the vote of a pixel at this distance behind a cell's
 /// middle.
 const fn ramp(pixel: usize) -> f32 {
     (pixel as f32 + 0.5) / CELL as f32
@@ -150,7 +150,7 @@ fn add_votes(
     }
 }
 
-/// The histogram of a cell from the pixels left and right of its middle.
+/// Sums the histogram of a cell from the pixels left and right of its middle.
 fn histogram(sides: &[Votes<BINS>]) -> [f32; BINS] {
     let mut cell = [0.0; BINS];
     for (bin, sum) in cell.iter_mut().enumerate() {
@@ -164,8 +164,7 @@ fn histogram(sides: &[Votes<BINS>]) -> [f32; BINS] {
     cell
 }
 
-/// Makes the blocks of two rows of cells. L2-Hys: divided by the length, clipped,
-/// divided again.
+/// Computes the blocks of two rows of cells. L2-Hys: divided by the length, clipped, divided again.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn normalise(above: &[[f32; BINS]], below: &[[f32; BINS]], blocks: &mut [[f32; BLOCK]]) {
     for ((above, below), out) in above.windows(2).zip(below.windows(2)).zip(blocks) {
@@ -175,6 +174,7 @@ fn normalise(above: &[[f32; BINS]], below: &[[f32; BINS]], blocks: &mut [[f32; B
         }
         let scale = 1.0 / (norm(&block) + 0.1 * BLOCK as f32 / 255.0_f32.sqrt());
         block.iter_mut().for_each(|v| *v = (*v * scale).min(CLIP));
+        // An empty block has no length to divide by.
         let scale = 1.0 / (norm(&block) + 1e-3);
         block.iter_mut().for_each(|v| *v *= scale);
         *out = block;

@@ -1,4 +1,4 @@
-//! Machines as they are run: windows side by side, of an image in one size.
+//! Machines in the form in which they are run: on neighbouring windows of an image in one size.
 
 use crate::Spans;
 use crate::channels::{Channels, DEPTH, Planes};
@@ -6,14 +6,14 @@ use crate::hog::{BLOCK, Blocks};
 use crate::model::{Machine, Model, SIDE};
 use crate::trees::{CELLS, ROUND, Tree, Trees};
 
-/// Windows or numbers that are dealt with at once.
+/// Number of windows or values that are processed at once.
 pub(crate) const LANES: usize = 8;
-/// Products that are summed up apart from each other, so that none waits for another.
+/// Number of separate sums of products, so that no addition waits for another.
 const MANY: usize = 4 * LANES;
-/// Numbers of a row of blocks in a window, in lanes that are full.
+/// Number of values in a row of blocks of a window, rounded up to full lanes.
 const ROW: usize = (SIDE * BLOCK).next_multiple_of(MANY);
 
-/// A machine, and what it looks at.
+/// A machine and its input.
 #[derive(Clone, Debug)]
 pub(crate) enum Judge {
     Linear(Linear),
@@ -28,7 +28,7 @@ impl Judge {
         }
     }
 
-    /// Takes the place of another image (see [`Blocks::fill`]).
+    /// Computes the input from another image (see [`Blocks::fill`]).
     pub(crate) fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         match self {
             Self::Linear(linear) => linear.blocks.fill(pixels, width, spans),
@@ -36,8 +36,8 @@ impl Judge {
         }
     }
 
-    /// The sums of as many windows side by side as there are `sums`; the first one
-    /// begins at cell (x, y), of 8 pixels.
+    /// Computes the sums of neighbouring windows, as many as there are `sums`; the first one begins
+    /// at cell (x, y), of 8 pixels.
     pub(crate) fn sums(&self, (x, y): (usize, usize), sums: &mut [f32]) {
         match self {
             Self::Linear(linear) => linear.sums((x, y), sums),
@@ -46,11 +46,11 @@ impl Judge {
     }
 }
 
-/// A weighted sum of blocks.
+/// Weighted sum of blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct Linear {
     blocks: Blocks,
-    /// With zeros for the numbers that fill the last lanes of a row: those are of the
+    /// Weights, with zeros for the values that fill the last lanes of a row: those belong to the
     /// block behind the window.
     weights: Vec<[f32; ROW]>,
     bias: f32,
@@ -75,8 +75,7 @@ impl Linear {
     }
 }
 
-/// The product of the weights with a window that begins with the first block of each
-/// row.
+/// Returns the product of the weights with a window that begins with the first block of each row.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn product(weights: &[[f32; ROW]], rows: [&[f32]; SIDE]) -> f32 {
     let mut lanes = [0.0_f32; MANY];
@@ -91,14 +90,14 @@ fn product(weights: &[[f32; ROW]], rows: [&[f32]; SIDE]) -> f32 {
     lanes.iter().sum()
 }
 
-/// Trees whose numbers are places in planes.
+/// Trees that refer to places in planes.
 #[derive(Clone, Debug)]
 pub(crate) struct Forest {
     trees: Trees,
     channels: Channels,
     planes: Planes,
-    /// For the layout of the planes: where each tree's numbers are, from a window's
-    /// first cell on.
+    /// Places of each tree's values for the layout of the planes, relative to a window's first
+    /// cell.
     places: Vec<[u32; 3]>,
     layout: usize,
 }
@@ -112,6 +111,7 @@ impl Forest {
     fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         self.channels.fill(pixels, width, spans);
         self.channels.planes(&mut self.planes);
+        // Places depend on the layout only, which rarely changes from one image to the next.
         if self.layout != self.planes.layout() {
             let place = |number: u16| {
                 let (cell, k) = (usize::from(number) / DEPTH, usize::from(number) % DEPTH);
@@ -126,6 +126,7 @@ impl Forest {
     fn sums(&self, (x, y): (usize, usize), sums: &mut [f32]) {
         for (sums, x) in sums.chunks_mut(LANES).zip((x..).step_by(LANES)) {
             let mut lanes = [0.0; LANES];
+            // A cell of 8 pixels is two cells of the channels.
             let cells = &self.planes.values()[self.planes.place(2 * x, 2 * y, 0)..];
             add_trees(&self.trees, &self.places, cells, &mut lanes);
             sums.copy_from_slice(&lanes[..sums.len()]);
@@ -133,7 +134,7 @@ impl Forest {
     }
 }
 
-/// The sums of windows side by side; see [`Trees::sum_of`].
+/// Computes the sums of neighbouring windows; see [`Trees::sum_of`].
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn add_trees(trees: &Trees, places: &[[u32; 3]], cells: &[f32], sums: &mut [f32; LANES]) {
     let rounds = trees.trees.chunks(ROUND).zip(places.chunks(ROUND)).zip(&trees.least);
@@ -145,6 +146,8 @@ fn add_trees(trees: &Trees, places: &[[u32; 3]], cells: &[f32], sums: &mut [f32;
             let b = &cells[*b as usize..][..LANES];
             let c = &cells[*c as usize..][..LANES];
             for lane in 0..LANES {
+                // Both answers are selected without a branch, so that the loop can use vector
+                // instructions.
                 let if_yes = if b[lane] < yes { yes_yes } else { yes_no };
                 let if_no = if c[lane] < no { no_yes } else { no_no };
                 sums[lane] += if a[lane] < first { if_yes } else { if_no };

@@ -1,9 +1,9 @@
-//! What a depth image shows in the middle of all windows of a size.
+//! Depth in the middle of all windows of one size.
 //!
-//! Windows lie a quarter of their square apart, and what one shows is read in five by
-//! five places that are an eighth of it apart. So neighbours share places: all
-//! windows together ask on one lattice, each place once, and whether the median of a
-//! window's readings lies within a range is told by counts of those before and behind it.
+//! Windows lie a quarter of their square apart, and the depth of one is read at five by five places
+//! that are an eighth of it apart. Neighbours therefore share places: all windows together are read
+//! on one lattice, each place once, and counts of the readings before and behind a range decide if
+//! the median of a window's readings lies within it.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -11,38 +11,38 @@ use tagalong_core::DepthImage;
 
 use crate::Grid;
 
-/// Places along a side of a window.
+/// Number of places along a side of a window.
 const TAPS: usize = 5;
-/// Places from a window to the next one.
+/// Number of places from a window to the next one.
 const STRIDE: usize = 2;
-/// Places to a side of the square; the first one is so many from its edge.
+/// Number of places to a side of the square, and from its edge to the first place.
 const PLACES: f64 = 8.0;
 const EDGE: f64 = 2.0;
-/// Readings that a window needs to show anything.
+/// Fewest readings of a window that has a depth.
 const LEAST_READINGS: u32 = 8;
 
-/// Counts of readings side by side in one number: all, those before a range, those behind.
+/// Counts of readings packed into one number: all, those before a range, those behind.
 type Counts = u32;
 const BITS: u32 = 8;
 
-/// Readings of all windows of a size; keeps its memory from one size to the next.
+/// Readings of all windows of one size; the memory is reused for the next size.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lattice {
-    /// The image's column of each column of places.
+    /// Image column of each column of places.
     columns: Vec<usize>,
-    /// Row by row; NaN outside of the image.
+    /// Depths row by row, m; NaN outside of the image.
     readings: Vec<f32>,
     counts: Vec<Counts>,
-    /// Scratch: counts of a row of windows, and of others between them.
+    /// Scratch: counts of a row of windows, and of the places between them.
     sums: Vec<Counts>,
-    /// Of each window, row by row: does what it shows lie within the range?
+    /// For each window, row by row: true if its depth lies within the range.
     is_within: Vec<bool>,
-    /// Windows in a row.
+    /// Number of windows in a row.
     across: usize,
 }
 
 impl Lattice {
-    /// Reads what the windows of a grid show, and asks whether it is within a range, m.
+    /// Reads the depths of the windows of a grid, and tests if they lie within a range, m.
     pub(crate) fn fill(&mut self, depth: &DepthImage, grid: &Grid, range_m: RangeInclusive<f64>) {
         let [across, down] = [&grid.columns, &grid.rows].map(|cells| cells.clone().count());
         let first = grid.square(grid.columns.start, grid.rows.start);
@@ -74,8 +74,8 @@ impl Lattice {
         }
     }
 
-    /// The depth of what a window shows, m: the median of its readings, if that is within
-    /// the range. Windows are counted row by row.
+    /// Returns the depth of a window, m: the median of its readings, if that is within the range.
+    /// Windows are counted row by row.
     pub(crate) fn surface_m(&self, window: usize) -> Option<f64> {
         self.is_within.get(window).filter(|is_within| **is_within)?;
         let (x, y) = (window % self.across, window / self.across);
@@ -86,7 +86,7 @@ impl Lattice {
         Some(f64::from(median(readings)))
     }
 
-    /// Where the rows of places lie that row `y` of windows shows.
+    /// Returns the ranges of the rows of places that belong to row `y` of windows.
     fn window_rows(&self, y: usize) -> [Range<usize>; TAPS] {
         let width = self.columns.len();
         std::array::from_fn(|row| {
@@ -96,8 +96,8 @@ impl Lattice {
     }
 }
 
-/// Columns or rows of the image in which `windows` are read, the first of which begins at
-/// `from`; what is negative becomes larger than any image.
+/// Returns the columns or rows of the image at which `windows` are read, the first of which begins
+/// at `from`; negative ones become larger than any image.
 fn places(from: f64, side: f64, windows: usize) -> impl Iterator<Item = usize> {
     let count = if windows == 0 { 0 } else { STRIDE * (windows - 1) + TAPS };
     (0..count).map(move |k| (from + side * (EDGE + k as f64) / PLACES).floor() as i64 as usize)
@@ -118,7 +118,7 @@ fn count(readings: &[f32], least: f32, most: f32, counts: &mut Vec<Counts>) {
     }
 }
 
-/// The counts of five by five places, for each place that begins them.
+/// Sums the counts of five by five places, for each place at which they begin.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn add_places(rows: [&[Counts]; TAPS], sums: &mut Vec<Counts>) {
     let [a, b, c, d, e] = rows;
@@ -126,14 +126,15 @@ fn add_places(rows: [&[Counts]; TAPS], sums: &mut Vec<Counts>) {
     for (i, sum) in sums.iter_mut().enumerate() {
         *sum = a[i] + b[i] + c[i] + d[i] + e[i];
     }
+    // In place: each sum reads only counts that were not overwritten before.
     for i in 0..(sums.len() + 1).saturating_sub(TAPS) {
         sums[i] = sums[i] + sums[i + 1] + sums[i + 2] + sums[i + 3] + sums[i + 4];
     }
     sums.truncate((sums.len() + 1).saturating_sub(TAPS));
 }
 
-/// The median of those that are readings (of an even number the farther one). Their bits
-/// are in the order of the numbers.
+/// Returns the median of the valid readings (of an even number the farther one). The bits of
+/// positive numbers are in the order of the numbers.
 fn median(readings: [f32; TAPS * TAPS]) -> f32 {
     let key = |metres: f32| if is_reading(metres) { metres.to_bits() } else { u32::MAX };
     let mut keys = readings.map(key);
@@ -141,8 +142,8 @@ fn median(readings: [f32; TAPS * TAPS]) -> f32 {
     f32::from_bits(keys[keys.partition_point(|key| *key < u32::MAX) / 2])
 }
 
-/// Whether there are readings enough, and the median (of an even number the farther one)
-/// is neither before the range nor behind it.
+/// Returns true if there are enough readings, and the median (of an even number the farther one) is
+/// neither before the range nor behind it.
 fn is_middle_within(counts: Counts) -> bool {
     let of = |kind: u32| counts >> (kind * BITS) & ((1 << BITS) - 1);
     let [all, before, behind] = [0, 1, 2].map(of);

@@ -1,17 +1,15 @@
-//! `hog-upper-body`: upper bodies by histograms of oriented gradients and a
-//! linear support vector machine (P2, section III-B; N. Dalal and B. Triggs,
-//! *Histograms of oriented gradients for human detection*, CVPR 2005), or, with
-//! fewer mistakes, by boosted trees over finer cells.
+//! `hog-upper-body`: upper bodies by histograms of oriented gradients and a linear support vector
+//! machine (P2, section III-B; N. Dalal and B. Triggs, *Histograms of oriented gradients for human
+//! detection*, CVPR 2005), or, with fewer errors, by boosted trees over finer cells.
 //!
-//! The image is looked at in several sizes. In each, what machines look at is
-//! made once: cells of 8x8 pixels and normalised blocks of them ([`Blocks`]), or
-//! cells of 4x4 pixels ([`Channels`]). A window is then a dot product of 7x7
-//! blocks with the weights of a [`Model`], or what its trees say of 16x16 cells,
-//! both read where they lie.
+//! The image is scanned in several sizes. In each, the features are computed once: cells of 8x8
+//! pixels and normalised blocks of them ([`Blocks`]), or cells of 4x4 pixels ([`Channels`]). A
+//! window is then a dot product of 7x7 blocks with the weights of a [`Model`], or the sum of its
+//! trees over 16x16 cells, both read in place.
 //!
-//! With depth, a window is looked at only if a person who is as far as its
-//! middle shows would be as large as it is, and would have their head at a
-//! height where heads are. Without, all of them are.
+//! With depth, a window is scanned only if a person at the distance of its middle would be as large
+//! as it is, and would have the head at a height where heads are. Without depth, all windows are
+//! scanned.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 
@@ -43,7 +41,7 @@ pub use spans::Spans;
 use tagalong_config::Registry;
 pub use trees::{ROUND, Tree, Trees};
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "hog-upper-body";
 
 /// Registers the plugin, and its trainer if that is compiled in.

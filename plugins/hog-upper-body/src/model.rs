@@ -8,39 +8,39 @@ use crate::channels::Channels;
 use crate::hog::{BLOCK, Blocks};
 use crate::trees::{self, Trees};
 
-/// Blocks along a side of a window: 64 pixels.
+/// Number of blocks along a side of a window, of 64 pixels.
 pub(crate) const SIDE: usize = 7;
-/// Numbers of a window for a linear machine.
+/// Number of values of a window for a linear machine.
 pub const NUMBERS: usize = SIDE * SIDE * BLOCK;
 
 const FORMAT: &str = "hog-upper-body 3";
 
-/// What judges windows.
+/// Kind of machine that classifies windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Normalised blocks of cells and a linear machine, as P2 has it.
+    /// Normalised blocks of cells and a linear machine, as in P2.
     Linear,
-    /// Finer cells and boosted trees: fewer mistakes.
+    /// Finer cells and boosted trees: fewer errors.
     #[default]
     Trees,
 }
 
-/// A machine that judges windows.
+/// Machine that classifies windows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Machine {
-    /// A weighted sum of the numbers of all blocks.
+    /// Weighted sum of the values of all blocks.
     Linear {
-        /// A weight for each number of a window, block row by block row.
+        /// Weights of the values of a window, block row by block row.
         weights: Vec<f32>,
-        /// Added to the weighted sum.
+        /// Constant that is added to the weighted sum.
         bias: f32,
     },
-    /// A sum of what trees say of cells.
+    /// Sum of the values of trees over cells.
     Trees(Trees),
 }
 
-/// What a machine looks at, for all windows of an image in one size.
+/// Features of all windows of an image in one size.
 #[derive(Clone, Debug)]
 pub enum Field {
     /// For linear machines.
@@ -50,7 +50,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// Nothing yet, for a machine of some kind.
+    /// Creates an empty field for one kind of machine.
     pub fn new(kind: Kind) -> Self {
         match kind {
             Kind::Linear => Self::Blocks(Blocks::default()),
@@ -58,7 +58,7 @@ impl Field {
         }
     }
 
-    /// Takes the place of another image (see [`Blocks::fill`]).
+    /// Computes the features of another image (see [`Blocks::fill`]).
     pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
         match self {
             Self::Blocks(blocks) => blocks.fill(pixels, width, spans),
@@ -66,7 +66,7 @@ impl Field {
         }
     }
 
-    /// The numbers of the window that begins at cell (x, y), of 8 pixels.
+    /// Returns the values of the window that begins at cell (x, y), of 8 pixels.
     pub fn numbers(&self, x: usize, y: usize) -> Vec<f32> {
         match self {
             Self::Blocks(blocks) => {
@@ -81,24 +81,25 @@ impl Field {
     }
 }
 
-/// A machine with its calibration.
+/// Machine with its calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// The machine.
     pub machine: Machine,
     /// Log-odds per unit of the sum.
     pub slope: f64,
-    /// Log-odds of the sum 0.
+    /// Log-odds at the sum 0.
     pub offset: f64,
 }
 
-/// The model as it is kept.
+/// Content of a model file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Kept {
     format: String,
     machine: Kind,
-    /// The bias of a linear machine; below what trees give a window up, for each round.
+    /// Bias of a linear machine; for trees, the sum below which a window is rejected, for each
+    /// round.
     levels: Vec<f32>,
     slope: f64,
     offset: f64,
@@ -107,7 +108,7 @@ struct Kept {
 }
 
 impl Model {
-    /// What kind of machine it has.
+    /// Returns the kind of machine.
     pub fn kind(&self) -> Kind {
         match self.machine {
             Machine::Linear { .. } => Kind::Linear,
@@ -115,7 +116,7 @@ impl Model {
         }
     }
 
-    /// The sum of a window's numbers.
+    /// Returns the sum of a window's values.
     pub fn sum_of(&self, numbers: &[f32]) -> f32 {
         match &self.machine {
             Machine::Linear { weights, bias } => dot(weights, numbers) + bias,
@@ -123,17 +124,18 @@ impl Model {
         }
     }
 
-    /// Log-odds of a sum.
+    /// Returns the log-odds of a sum.
     pub fn log_odds(&self, sum: f32) -> f64 {
         self.slope * f64::from(sum) + self.offset
     }
 
-    /// The sum at which the log-odds are `score`.
+    /// Returns the sum at which the log-odds are `score`.
     pub fn sum_at(&self, score: f64) -> f32 {
+        // A tiny slope would send the sum to infinity.
         ((score - self.offset) / self.slope.max(1e-6)) as f32
     }
 
-    /// The content of a model file.
+    /// Formats the model file.
     pub fn to_text(&self) -> String {
         let (levels, bytes) = match &self.machine {
             Machine::Linear { weights, bias } => {
@@ -152,10 +154,10 @@ impl Model {
         toml::to_string(&kept).unwrap_or_default()
     }
 
-    /// Reads a model file.
+    /// Parses a model file.
     ///
     /// # Errors
-    /// In a sentence, what is wrong with the text.
+    /// Text that is not a model; the message is one sentence.
     pub fn from_text(text: &str) -> Result<Self, String> {
         let kept: Kept = toml::from_str(text).map_err(|error| error.to_string())?;
         if kept.format != FORMAT {
@@ -197,7 +199,7 @@ fn weights(bytes: &[u8]) -> Result<Vec<f32>, String> {
     Ok(weights)
 }
 
-/// Sums in eight lanes of a fixed order: fast, and the same on every machine.
+/// Computes the product in eight lanes of a fixed order: fast, and the same on every machine.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut lanes = [0.0_f32; 8];

@@ -1,4 +1,4 @@
-//! Images in other sizes.
+//! Resampling of images to other sizes.
 
 use std::ops::Range;
 
@@ -7,20 +7,21 @@ use tagalong_core::GreyImage;
 use crate::Spans;
 use crate::hog::CELL;
 
-/// Weights of the source pixels that a sample is the mean of.
+/// Weights of the source pixels of each sample.
 #[derive(Clone, Debug, Default)]
 struct Taps {
-    /// The first source pixel of each sample, and where its weights begin.
+    /// First source pixel of each sample, and index of its first weight.
     starts: Vec<(i64, usize)>,
     weights: Vec<f32>,
 }
 
 impl Taps {
-    /// `count` samples, `step` pixels apart, the first one centred half a step
-    /// behind `origin`.
+    /// Computes the weights of `count` samples, `step` pixels apart, the first one centred half a
+    /// step behind `origin`.
     fn fill(&mut self, origin: f64, step: f64, count: usize) {
         self.starts.clear();
         self.weights.clear();
+        // In an enlarged image a triangle narrower than a pixel could miss all of them.
         let reach = step.max(1.0);
         for i in 0..count {
             let centre = origin + (i as f64 + 0.5) * step - 0.5;
@@ -32,7 +33,7 @@ impl Taps {
         }
     }
 
-    /// The first source pixel of some samples, and the weights from there on.
+    /// Returns the first source pixel of some samples, and the weights from there on.
     fn of(&self, samples: Range<usize>) -> impl Iterator<Item = (i64, &[f32])> {
         let end = |sample: usize| self.starts.get(sample + 1).map(|(_, from)| *from);
         samples.map(move |sample| {
@@ -41,7 +42,7 @@ impl Taps {
         })
     }
 
-    /// The source pixels of some samples.
+    /// Returns the source pixels of some samples.
     fn sources(&self, samples: Range<usize>) -> Range<i64> {
         let start = self.starts[samples.start].0;
         let last = self.of(samples.end - 1..samples.end);
@@ -49,28 +50,27 @@ impl Taps {
     }
 }
 
-/// Rows of the result that are made at once.
+/// Number of rows of the result that are computed at once.
 const LANES: usize = 8;
 
-/// Brings images to other sizes; keeps its memory from one to the next.
+/// Resampler of images; the memory is reused for the next image.
 #[derive(Clone, Debug, Default)]
 pub struct Resampler {
     columns: Taps,
     rows: Taps,
-    /// Some rows of the result in all columns of the source that matter.
+    /// Some rows of the result in all columns of the source that are needed.
     tall: [Vec<f32>; LANES],
-    /// The same, side by side for each column.
+    /// The same rows, interleaved for each column.
     beside: Vec<[f32; LANES]>,
-    /// Samples of these rows, side by side for each column of the result.
+    /// Samples of these rows, interleaved for each column of the result.
     across: Vec<[f32; LANES]>,
 }
 
 impl Resampler {
-    /// `width` by `height` samples of an image, `step` of its pixels apart, the
-    /// first one centred half a step right of and below `origin` (pixel edges).
-    /// Each is a triangular mean as wide as the step, so that small sizes do not
-    /// alias; outside the image its border goes on. Samples that are not in `spans` stay
-    /// what they are.
+    /// Computes `width` by `height` samples of an image, `step` of its pixels apart, the first one
+    /// centred half a step right of and below `origin` (pixel edges). Each is a triangular mean as
+    /// wide as the step, so that small sizes do not alias; outside the image its border is
+    /// continued. Samples that are not in `spans` keep their old values.
     pub fn fill(
         &mut self,
         image: &GreyImage,
@@ -96,7 +96,7 @@ impl Resampler {
         }
     }
 
-    /// Some samples of a few rows.
+    /// Computes some samples of a few rows.
     fn fill_rows(
         &mut self,
         image: &GreyImage,
@@ -118,8 +118,8 @@ impl Resampler {
     }
 }
 
-/// The weighted mean of rows from `start` on, in some columns; both may lie outside
-/// of the image.
+/// Computes the weighted mean of rows from `start` on, in some columns; both may lie outside of the
+/// image.
 fn add_rows(
     image: &GreyImage,
     (start, weights): (i64, &[f32]),
@@ -130,7 +130,7 @@ fn add_rows(
     let inside = columns.start.clamp(0, last_column)..columns.end.clamp(1, last_column + 1);
     out.clear();
     out.resize((columns.end - columns.start) as usize, 0.0);
-    // Where nothing of the image is wanted, its border is what goes on.
+    // If no column lies in the image, the nearest border column is read and continued.
     let at = (inside.start - columns.start).clamp(0, out.len() as i64 - 1) as usize;
     let length = (inside.end - inside.start).max(1) as usize;
     let middle = at..(at + length).min(out.len());
@@ -155,7 +155,7 @@ fn lay_beside(rows: [&[f32]; LANES], beside: &mut Vec<[f32; LANES]>) {
     }
 }
 
-/// Samples of several rows from the values of their columns.
+/// Computes samples of several rows from the values of their columns.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn blend_columns<'a>(
     columns: impl Iterator<Item = (i64, &'a [f32])>,
@@ -180,8 +180,8 @@ fn add_scaled(to: &mut [f32], from: &[u8], scale: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * f32::from(*from));
 }
 
-/// As `Resampler::fill`, once: `cells` by `cells` cells of 8 samples, and a sample more on
-/// each side.
+/// Resamples as `Resampler::fill`, once: `cells` by `cells` cells of 8 samples, and one more sample
+/// on each side.
 pub fn resampled(image: &GreyImage, origin: (f64, f64), step: f64, cells: usize) -> Vec<f32> {
     let (side, mut out) = (cells * CELL + 2, Vec::new());
     let spans = Spans::whole(side, side);

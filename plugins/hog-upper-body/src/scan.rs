@@ -1,4 +1,4 @@
-//! Windows over an image in many sizes.
+//! Scan of windows over an image in many sizes.
 
 use std::ops::Range;
 
@@ -14,15 +14,14 @@ use crate::spans::Spans;
 
 /// Side of a window, pixels of the resampled image.
 pub(crate) const WINDOW_PX: usize = (SIDE + 1) * CELL;
-/// The upper-body square fills this much of the width of a window: arms, hips and
-/// what is around a person tell more than the outline of head and shoulders alone.
+/// Part of a window's width that the upper-body square fills: arms, hips and the surroundings of a
+/// person carry more information than the outline of head and shoulders alone.
 pub(crate) const FILLED: f64 = 0.5;
-/// The square is in the middle of the columns, and this part of a window is above
-/// it.
+/// Part of a window that is above the square; the square is in the middle of its columns.
 const ABOVE: f64 = 0.1;
 
-/// Cells that are resampled around windows: they have a share in the outermost
-/// cells of a window, and for trees they say what is usual there.
+/// Returns the number of cells that are resampled around windows: they have a share in the
+/// outermost cells of a window, and for trees in the normalisation there.
 const fn around(kind: Kind) -> usize {
     match kind {
         Kind::Linear => 1,
@@ -30,27 +29,27 @@ const fn around(kind: Kind) -> usize {
     }
 }
 
-/// The same in pixels, with one more for the gradients.
+/// Returns the same in pixels, with one more for the gradients.
 const fn around_px(kind: Kind) -> usize {
     around(kind) * CELL + 1
 }
 
-/// A window that was looked at.
+/// A scanned window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// The upper-body square, pixels of the image.
+    /// Upper-body square, pixels of the image.
     pub region: Rect,
-    /// Depth of what it shows, m, where that is known.
+    /// Depth of its object, m, if known.
     pub depth_m: Option<f64>,
-    /// The weighted sum.
+    /// Sum of the machine.
     pub sum: f32,
 }
 
-/// Looks at the windows of images; keeps its memory from one to the next.
+/// Scanner of the windows of images; the memory is reused for the next image.
 #[derive(Clone, Debug)]
 pub struct Scanner {
     judge: Judge,
-    /// Of the model.
+    /// Kind of the model's machine.
     kind: Kind,
     resampler: Resampler,
     pixels: Vec<f32>,
@@ -60,19 +59,19 @@ pub struct Scanner {
     looked_at: u64,
 }
 
-/// A window that is worth a look.
+/// A window that is to be scanned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wanted {
-    /// Column of the cell at which it begins, of 8 pixels of the resampled image ...
+    /// Column of the cell at which the window begins, of 8 pixels of the resampled image ...
     pub x: i64,
     /// ... and the row. A window may begin outside of the image.
     pub y: i64,
-    /// Depth of what its square shows, m, where that is known.
+    /// Depth of the object in its square, m, if known.
     pub depth_m: Option<f64>,
 }
 
 impl Scanner {
-    /// For one model.
+    /// Creates a scanner for one model.
     pub fn new(model: &Model) -> Self {
         Self {
             judge: Judge::new(model),
@@ -86,14 +85,13 @@ impl Scanner {
         }
     }
 
-    /// How many windows were looked at so far.
+    /// Returns the number of windows scanned so far.
     pub fn looked_at(&self) -> u64 {
         self.looked_at
     }
 
-    /// Adds all windows whose upper-body square has one of `sides`, pixels, and that
-    /// `propose` adds to those of their size that are wanted, row by row. Windows below
-    /// `least` are left out.
+    /// Adds all windows with an upper-body square of one of `sides`, pixels, that `propose` adds
+    /// for their size, row by row. Windows with sums below `least` are left out.
     pub fn scan(
         &mut self,
         image: &GreyImage,
@@ -119,7 +117,7 @@ impl Scanner {
         self.wanted = wanted;
     }
 
-    /// Makes what the machine looks at, for wanted windows within bounds.
+    /// Computes the features of the machine for wanted windows within bounds.
     fn fill(&mut self, image: &GreyImage, step: f64, wanted: &[Wanted], bounds: Bounds) {
         let (around, around_px) = (around(self.kind), around_px(self.kind));
         let side = SIDE + 1 + 2 * around;
@@ -134,7 +132,7 @@ impl Scanner {
         self.judge.fill(&self.pixels, size.0, spans);
     }
 
-    /// Adds the wanted windows that reach `least`; neighbours are judged together.
+    /// Adds the wanted windows that reach `least`; neighbours are classified together.
     fn judge(
         &mut self,
         wanted: &[Wanted],
@@ -161,18 +159,18 @@ impl Scanner {
 /// All windows of one size.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// The side of their squares, pixels of the image.
+    /// Side of their squares, pixels of the image.
     pub side: f64,
-    /// The cells at which they begin.
+    /// Columns of the cells at which windows begin.
     pub columns: Range<i64>,
-    /// See `columns`.
+    /// Rows of the cells at which windows begin.
     pub rows: Range<i64>,
-    /// A pixel of the resampled image, pixels.
+    /// Size of a pixel of the resampled image, pixels.
     step: f64,
 }
 
 impl Grid {
-    /// For an image of some width and height.
+    /// Creates the grid for an image of some width and height.
     pub(crate) fn new((width, height): (usize, usize), side: f64) -> Self {
         let step = side / (FILLED * WINDOW_PX as f64);
         let (left_px, above_px) = margins();
@@ -181,15 +179,15 @@ impl Grid {
         Self { side, columns, rows, step }
     }
 
-    /// The upper-body square of the window that begins at a cell.
+    /// Returns the upper-body square of the window that begins at a cell.
     pub fn square(&self, x: i64, y: i64) -> Rect {
         let (left_px, above_px) = margins();
         let at = |cell: i64, margin: f64| ((cell * CELL as i64) as f64 + margin) * self.step;
         Rect::new(at(x, left_px), at(y, above_px), self.side, self.side)
     }
 
-    /// Every window that `ask` allows, row by row; it is given the square and says the
-    /// depth of what that shows, if there is one to say.
+    /// Returns the windows that `ask` allows, row by row; it is given the square, and returns the
+    /// depth of its object if that is known.
     pub fn windows(
         &self,
         mut ask: impl FnMut(&Rect) -> Option<Option<f64>>,
@@ -199,21 +197,21 @@ impl Grid {
     }
 }
 
-/// What a window shows left of and above the upper-body square, pixels of the
-/// resampled image.
+/// Returns the margins of a window left of and above the upper-body square, pixels of the resampled
+/// image.
 fn margins() -> (f64, f64) {
     (0.5 * (1.0 - FILLED) * WINDOW_PX as f64, ABOVE * WINDOW_PX as f64)
 }
 
-/// The first cells of the windows whose square lies in an image of `length`
-/// pixels; the rest of a window may hang over, where the border goes on.
+/// Returns the first cells of the windows with their square in an image of `length` pixels; the
+/// rest of a window may extend beyond it, where the border is continued.
 fn inside(length: f64, margin: f64) -> Range<i64> {
     let cell = CELL as f64;
     let last = (length - margin - FILLED * WINDOW_PX as f64) / cell;
     (-margin / cell).ceil() as i64..last.floor() as i64 + 1
 }
 
-/// The window of an upper-body square, pixels of the image.
+/// Returns the window of an upper-body square, pixels of the image.
 pub fn window_of(square: &Rect) -> Rect {
     let step = square.width / (FILLED * WINDOW_PX as f64);
     let (left, above) = margins();
@@ -231,8 +229,7 @@ fn bounds(wanted: &[Wanted]) -> Bounds {
     })
 }
 
-/// The numbers of the window whose upper-body square is `square`, for machines of
-/// one kind.
+/// Returns the values of the window of an upper-body square, for one kind of machine.
 pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> {
     let step = square.width.max(1.0) / (FILLED * WINDOW_PX as f64);
     let (window, margin) = (window_of(square), around_px(kind) as f64 * step);
@@ -243,9 +240,9 @@ pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> 
     field.numbers(around(kind), around(kind))
 }
 
-/// Leaves the best of each group of windows, best first: greedily, best first, those that overlap
-/// a better one by more than `overlap` go, unless they are `apart_m` nearer or
-/// farther. Two people one behind the other both stay.
+/// Keeps the best of each group of windows, best first: a window that overlaps a better one by more
+/// than `overlap` is removed, unless the two are `apart_m` or more apart in depth. Two people one
+/// behind the other both stay.
 pub fn merge(windows: &mut Vec<Window>, overlap: f64, apart_m: f64) {
     windows.sort_by(|a, b| b.sum.total_cmp(&a.sum));
     let mut kept = 0;

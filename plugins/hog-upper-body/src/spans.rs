@@ -1,23 +1,22 @@
-//! What of an island is needed: windows seldom fill the rectangle around them.
+//! Parts of an island that are needed: windows seldom fill the rectangle around them.
 
 use std::ops::Range;
 
 use crate::hog::CELL;
 
-/// For each row of cells, of 8 pixels, of a resampled part of an image: the columns of
-/// cells that are needed. The part has one pixel more on each side, for gradients.
+/// Needed columns of cells in each row of cells, of 8 pixels, of a resampled part of an image. The
+/// part has one pixel more on each side, for gradients.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spans(Vec<Range<usize>>);
 
 impl Spans {
-    /// All that `width` by `height` pixels have.
+    /// Returns spans of all cells in `width` by `height` pixels.
     pub fn whole(width: usize, height: usize) -> Self {
         let [across, down] = [width, height].map(|length| length.saturating_sub(2) / CELL);
         Self(vec![0..across; down])
     }
 
-    /// Takes the place of others: those of squares of `side` cells that begin at `places`,
-    /// in `rows` rows.
+    /// Computes the spans of squares of `side` cells that begin at `places`, in `rows` rows.
     pub(crate) fn fill(
         &mut self,
         places: impl Iterator<Item = (usize, usize)>,
@@ -33,13 +32,13 @@ impl Spans {
         }
     }
 
-    /// Columns of cells in each row of them.
+    /// Returns the columns of cells in each row of cells.
     pub(crate) fn cells(&self) -> &[Range<usize>] {
         &self.0
     }
 
-    /// Columns of pixels in the `index`th 8 rows of pixels: those of the cells there and
-    /// in the row above, and one more on each side.
+    /// Returns the columns of pixels in the `index`th 8 rows of pixels: those of the cells there
+    /// and in the row above, and one more on each side.
     pub(crate) fn pixels(&self, index: usize) -> Range<usize> {
         let row = |index: usize| self.0.get(index).cloned().unwrap_or_default();
         let above = index.checked_sub(1).map_or(0..0, row);
@@ -48,7 +47,7 @@ impl Spans {
     }
 }
 
-/// The least span that has both.
+/// Returns the smallest span that contains both.
 fn union(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     match (a.is_empty(), b.is_empty()) {
         (true, _) => b.clone(),

@@ -31,7 +31,7 @@ fn it_conforms() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// The histogram of one cell, gradient by gradient, over the whole image.
+/// Histogram of one cell, gradient by gradient, over the whole image.
 fn slow_cell(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; BINS] {
     let height = pixels.len() / width;
     let root = |x: usize, y: usize| pixels[y * width + x].sqrt();
@@ -91,7 +91,7 @@ fn scan(
     found
 }
 
-/// True for sums that differ by little, or of windows that are both given up.
+/// True for sums that differ by little, or that are both of rejected windows.
 fn same(a: f32, b: f32, by: f32) -> bool {
     a == b || (a - b).abs() <= by
 }
@@ -101,7 +101,7 @@ fn linear() -> Model {
     Model { machine: Machine::Linear { weights, bias: 0.25 }, slope: 1.0, offset: 0.0 }
 }
 
-/// Trees that give up some windows.
+/// Trees that reject some windows.
 fn trees() -> Model {
     let tree = |k: usize| Tree {
         numbers: [k * 131, k * 57 + 9, k * 733 + 1].map(|n| (n % CHANNEL_NUMBERS) as u16),
@@ -120,7 +120,7 @@ fn a_scan_gives_each_window_the_sum_of_its_numbers() {
         let windows = scan(&mut scanner, &image, &[32.0, 45.0], |_| true);
         assert_eq!(scanner.looked_at(), windows.len() as u64);
         assert!(windows.len() > 100, "{}", windows.len());
-        // What is at the edge of what was resampled has other neighbours.
+        // At the edge of the resampled part, cells have other neighbours.
         let inner = |w: &&Window| {
             let r = crate::window_of(&w.region);
             r.x > 0.0 && r.y > 0.0 && r.right() < 160.0 && r.bottom() < 130.0
@@ -131,7 +131,7 @@ fn a_scan_gives_each_window_the_sum_of_its_numbers() {
         };
         let inner: Vec<&Window> = windows.iter().filter(inner).collect();
         let different = inner.iter().filter(|w| differs(w)).count();
-        // A number may be a hair's breadth from what it is compared with.
+        // A value may lie so close to its threshold that the two ways differ.
         assert!(inner.len() > 20 && different * 50 <= inner.len(), "{different}");
         let given_up = inner.iter().filter(|w| w.sum == f32::NEG_INFINITY).count();
         let some = 1..inner.len();
@@ -139,7 +139,7 @@ fn a_scan_gives_each_window_the_sum_of_its_numbers() {
     }
 }
 
-/// The numbers of a cell, pixel by pixel, before neighbours are looked at.
+/// Values of a cell, pixel by pixel, before the normalisation by neighbours.
 fn slow_channels(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; DEPTH] {
     let bins = DEPTH - 2;
     let mut numbers = [0.0; DEPTH];
@@ -173,7 +173,7 @@ fn channels_are_those_of_the_slow_reference() {
     let (columns, rows) = (12_i64, 10_i64);
     let cell = |x: i64, y: i64| slow_channels(&pixels, 50, (x as usize, y as usize));
     let inside = |x: i64, y: i64| (0..columns).contains(&x) && (0..rows).contains(&y);
-    // A weighted mean of what there is around a cell.
+    // Weighted mean over the existing cells around a cell.
     let mean = |x: i64, y: i64, weights: &[f32], number: &dyn Fn(i64, i64) -> f32| {
         let reach = weights.len() as i64 / 2;
         let (mut sum, mut total) = (0.0, 0.0);

@@ -1,25 +1,26 @@
-//! Boosted trees of two questions each.
+//! Boosted trees of depth two.
 
 use crate::channels::DEPTH;
 use crate::model::SIDE;
 
-/// Cells along a side of a window.
+/// Number of cells along a side of a window.
 pub(crate) const CELLS: usize = 2 * (SIDE + 1);
-/// Numbers of a window.
+/// Number of values of a window.
 pub(crate) const CHANNEL_NUMBERS: usize = CELLS * CELLS * DEPTH;
-/// Trees after which windows may be given up, and again after as many.
+/// Number of trees after which windows may be rejected, and again after as many.
 pub const ROUND: usize = 8;
-/// Bytes of a tree in a file.
+/// Number of bytes of a tree in a file.
 const BYTES: usize = 3 * 6 + 4 * 4;
 
 /// A question, and one more on either side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tree {
-    /// Which numbers of a window are looked at: first, if below, if not.
+    /// Indices of the values of a window in the questions: the first, the one if below, the one if
+    /// not.
     pub numbers: [u16; 3],
-    /// What each of them is compared with.
+    /// Thresholds of the questions.
     pub below: [f32; 3],
-    /// What is added: yes and yes, yes and no, no and yes, no and no.
+    /// Values of the leaves: yes and yes, yes and no, no and yes, no and no.
     pub values: [f32; 4],
 }
 
@@ -49,24 +50,24 @@ impl Tree {
     }
 }
 
-/// Trees in rounds, one after the other; after each round, windows are given up.
+/// Trees in rounds, one after the other; after each round, windows may be rejected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trees {
     /// The trees, [`ROUND`] to a round.
     pub trees: Vec<Tree>,
-    /// For each round: a window whose sum is less after it is given up. A person may
-    /// have to catch up early, and not late.
+    /// For each round: the sum below which a window is rejected after it. A person may have to
+    /// catch up early, and not late.
     pub least: Vec<f32>,
 }
 
 impl Trees {
-    /// Trees that give up all windows below the same sum.
+    /// Creates trees that reject all windows below the same sum.
     pub fn new(trees: Vec<Tree>, least: f32) -> Self {
         let rounds = trees.len().div_ceil(ROUND);
         Self { trees, least: vec![least; rounds] }
     }
 
-    /// The sum of a window's numbers; minus infinity if the window is given up.
+    /// Returns the sum of a window's values; minus infinity if the window is rejected.
     pub fn sum_of(&self, numbers: &[f32]) -> f32 {
         let mut last = 0.0;
         for (sum, least) in self.on_the_way(numbers).zip(&self.least) {
@@ -75,7 +76,7 @@ impl Trees {
         last
     }
 
-    /// The sum after each round, whether the window is given up or not.
+    /// Returns the sum after each round, also after that in which the window is rejected.
     pub(crate) fn on_the_way(&self, numbers: &[f32]) -> impl Iterator<Item = f32> {
         self.trees.chunks(ROUND).scan(0.0, |sum, round| {
             round.iter().for_each(|tree| *sum += tree.value(numbers));
@@ -88,10 +89,10 @@ pub(crate) fn to_bytes(trees: &[Tree]) -> Vec<u8> {
     trees.iter().flat_map(|tree| tree.to_bytes()).collect()
 }
 
-/// Trees of a file.
+/// Parses the trees of a file.
 ///
 /// # Errors
-/// In a sentence, what is wrong with the bytes.
+/// Bytes that are not trees; the message is one sentence.
 pub(crate) fn from_bytes(bytes: &[u8], least: Vec<f32>) -> Result<Trees, String> {
     let trees: Vec<Tree> = bytes.chunks_exact(BYTES).map(Tree::from_bytes).collect();
     let is_right = |tree: &Tree| {

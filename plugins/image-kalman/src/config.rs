@@ -3,30 +3,28 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
-/// Settings of `image-kalman`. Lengths in the image are given in widths of the
-/// box, so that near and far people are treated alike; the box of an upper body
-/// is 0.57 m wide.
+/// Settings of `image-kalman`. Lengths in the image are given in widths of the box, so that they
+/// hold at every distance; the box of an upper body is 0.57 m wide.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Spectral density of the white acceleration of the box, widths²/s³.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub acceleration_noise: f64,
-    /// How fast the width may wander, as a fraction of it per square root of a
-    /// second.
+    /// Random walk of the width, as a fraction of it per square root of a second.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub scale_noise: f64,
     /// Spectral density of the white acceleration along the ray, m²/s³.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub range_noise: f64,
-    /// Standard deviation of the velocity of a newcomer's box, widths/s.
+    /// Standard deviation of the velocity of a new track's box, widths/s.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub initial_speed: f64,
-    /// Standard deviation of a newcomer's velocity along the ray, m/s.
+    /// Standard deviation of a new track's velocity along the ray, m/s.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub initial_range_speed_mps: f64,
-    /// Standard deviation added to that of a box's centre, widths: what
-    /// detectors do not know about themselves.
+    /// Standard deviation added to that of a box's centre, widths: errors that detectors leave out
+    /// of their covariance.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_centre: f64,
     /// Standard deviation of a box's width, as a fraction of it.
@@ -35,14 +33,14 @@ pub struct Config {
     /// Standard deviation added to that of a range, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_range_m: f64,
-    /// Weight of a sighting in the shape of the box (its height over its width,
-    /// and where in it the head is), 0 to 1.
+    /// Weight of a detection in the shape of the box (its height over its width, and the place of
+    /// the head in it), 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub shape_weight: f64,
-    /// As printed: the measurement matrix of eq. 8, which has the time step in
-    /// it. Lags by one frame's way.
+    /// As printed: the measurement matrix of eq. 8, which contains the time step. The estimate then
+    /// lags by the motion of one frame.
     pub compat_printed_measurement: bool,
-    /// As printed: nothing is done about the robot's own motion.
+    /// As printed: the robot's own motion is ignored.
     pub compat_printed_ego_motion: bool,
 }
 
@@ -65,7 +63,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Refuses numbers that cannot work.
+    /// Refuses settings outside their ranges.
     pub(crate) fn check(&self) -> Result<()> {
         check_settings(self)
     }

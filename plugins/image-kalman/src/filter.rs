@@ -5,17 +5,17 @@ use tagalong_geometry::Camera;
 
 use crate::{Belief, Config};
 
-/// The filter.
+/// Kalman filter of the box in the image, with one state for each track.
 pub struct ImageKalman {
     config: Config,
     beliefs: BTreeMap<TrackId, Belief>,
 }
 
 impl ImageKalman {
-    /// A filter.
+    /// Creates a filter without tracks.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
         Ok(Self { config, beliefs: BTreeMap::new() })

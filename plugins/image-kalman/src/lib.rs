@@ -1,16 +1,14 @@
 //! `image-kalman`: a Kalman filter of the box in the image (P2, section III-D).
 //!
-//! The state is (x, y, vx, vy, s): centre and velocity of the box in pixels, and
-//! its width. Thinking in pixels needs neither depth nor calibration to work, and
-//! it is what a box says; but the picture moves when the robot does. So each
-//! prediction takes the belief into space, moves it as the odometry says, and
-//! brings it back: a person who stands still has no velocity, however the robot
+//! The state is (x, y, vx, vy, s): centre and velocity of the box in pixels, and its width. A state
+//! in pixels needs neither depth nor calibration, and it is the quantity that a box measures; but
+//! the image moves when the robot does. Each prediction therefore takes the state into space, moves
+//! it by the odometry, and projects it back: a standing person has no velocity, however the robot
 //! turns.
 //!
-//! For that, and for the place in metres that every filter owes, the range of the
-//! head is believed in beside the box, with as much uncertainty as the detection
-//! had: a few centimetres from a depth image, a fifth of the distance from the
-//! size of a box.
+//! For that, and for the position in metres that every filter must estimate, the range of the head
+//! is estimated beside the box, with the uncertainty of the detection: a few centimetres from a
+//! depth image, a fifth of the distance from the size of a box.
 
 mod config;
 mod filter;
@@ -24,7 +22,7 @@ pub use filter::ImageKalman;
 pub use model::Belief;
 use tagalong_config::Registry;
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "image-kalman";
 
 /// Registers the plugin.

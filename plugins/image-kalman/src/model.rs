@@ -1,4 +1,4 @@
-//! The belief in one person, and what time, the robot and a sighting do to it.
+//! State of one track, its prediction over time and robot motion, and its update by a detection.
 
 use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5};
 use tagalong_core::{Detection, Estimate, Motion, Person, Support};
@@ -9,34 +9,34 @@ use crate::space::{Place, Seen, pixel_covariance, range};
 
 type Matrix3x5 = SMatrix<f64, 3, 5>;
 
-/// The narrowest box, pixels.
+/// Narrowest box, pixels.
 const MIN_WIDTH_PX: f64 = 1.0;
-/// The nearest range that is believed, m.
+/// Nearest range that is accepted, m.
 const MIN_RANGE_M: f64 = 0.15;
-/// Step of the derivatives by the robot's motion, m and rad.
+/// Step of the derivatives with respect to the robot's motion, m and rad.
 const MOTION_STEP: f64 = 1e-4;
 
-/// What is believed of one person.
+/// Gaussian state of one person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Belief {
-    /// (x, y, vx, vy, s): centre of the box, pixels; its velocity without what
-    /// the robot's motion adds, pixels/s; its width, pixels.
+    /// (x, y, vx, vy, s): centre of the box, pixels; its velocity with the robot's motion taken
+    /// out, pixels/s; its width, pixels.
     pub image: Vector5<f64>,
-    /// Its covariance.
+    /// Covariance of `image`.
     pub image_covariance: Matrix5<f64>,
     /// Distance of the centre of the head from the camera, m, and its rate, m/s.
     pub range: Vector2<f64>,
-    /// Its covariance.
+    /// Covariance of `range`.
     pub range_covariance: Matrix2<f64>,
     shape: Shape,
-    /// Whom the robot's motion took behind the camera has no pixel, and is kept
-    /// in space until they come back.
+    /// Position in space of a person behind the camera, after a motion of the robot: there is no
+    /// pixel, so the person is kept here until in front again.
     behind: Option<Place>,
-    /// Time since the frame before, s.
+    /// Time since the previous frame, s.
     step_s: f64,
 }
 
-/// What of a box does not move with it.
+/// Parts of a box that do not change as it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shape {
     /// Height over width.
@@ -46,8 +46,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// The shape of a detection; `None` of a box without area or of a head
-    /// behind the camera.
+    /// Returns the shape of a detection; `None` for a box without area or a head behind the camera.
     fn of(detection: &Detection, camera: &Camera) -> Option<Self> {
         let Rect { width, height, .. } = detection.region;
         let head = camera.project(&detection.position)?;
@@ -65,7 +64,7 @@ impl Shape {
 }
 
 impl Belief {
-    /// The belief after the first sighting.
+    /// Initialises the state from the first detection.
     pub fn start(config: &Config, detection: &Detection, camera: &Camera) -> Self {
         let centre = detection.region.centre();
         let width = detection.region.width.max(MIN_WIDTH_PX);
@@ -90,9 +89,11 @@ impl Belief {
         }
     }
 
-    /// Forward in time (eq. 7), and into the robot's new frame.
+    /// Predicts forward in time (eq. 7), and into the robot's new frame.
     pub fn predict(&mut self, config: &Config, motion: &Motion, camera: &Camera) {
         self.step_s = motion.dt;
+        // The pixel velocity is that of the old frame, so the time step comes before the change
+        // of frame.
         self.walk(config, motion.dt);
         if !config.compat_printed_ego_motion {
             self.turn_with(motion, camera);
@@ -100,7 +101,7 @@ impl Belief {
         self.stay_in_range();
     }
 
-    /// Constant velocity; the width and the rate of the range wander.
+    /// Applies the constant-velocity model; the width and the rate of the range are random walks.
     fn walk(&mut self, config: &Config, dt: f64) {
         let mut step = Matrix5::identity();
         (step[(0, 2)], step[(1, 3)]) = (dt, dt);
@@ -113,8 +114,7 @@ impl Belief {
             + white_acceleration(config.range_noise, dt);
     }
 
-    /// Takes out the robot's own motion: the head is moved in space, and the box
-    /// with it.
+    /// Compensates the robot's own motion: the head is moved in space, and the box with it.
     fn turn_with(&mut self, motion: &Motion, camera: &Camera) {
         let before = self.seen();
         let last = before.in_space(camera);
@@ -129,6 +129,7 @@ impl Belief {
             return;
         };
         self.doubt_the_motion(&before, &after, motion, camera);
+        // The floor keeps the ratio of the widths finite for a head beside the lens.
         let depth = |place: &Place| camera.depth_of(&place.position).max(MIN_RANGE_M);
         self.image[4] *= depth(&last) / depth(&place);
         self.image.fixed_rows_mut::<2>(2).copy_from(&after.velocity);
@@ -137,8 +138,8 @@ impl Belief {
         self.range = after.range;
     }
 
-    /// What the errors of the odometry add, and how far the picture moves depends
-    /// on the range, which is not known well either.
+    /// Adds the errors of the odometry, and the error of the image shift that follows from the
+    /// uncertain range.
     fn doubt_the_motion(&mut self, before: &Seen, after: &Seen, motion: &Motion, camera: &Camera) {
         let mut by_motion = Matrix3::zeros();
         for (column, step) in steps(motion).into_iter().enumerate() {
@@ -149,6 +150,7 @@ impl Belief {
         let mut place = self.image_covariance.fixed_view_mut::<2, 2>(0, 0);
         place += noise.fixed_view::<2, 2>(0, 0);
         self.range_covariance[(0, 0)] += noise[(2, 2)];
+        // The shift at one standard deviation of the range gives that error to first order.
         let sigma = Vector2::new(self.range_covariance[(0, 0)].max(0.0).sqrt(), 0.0);
         let farther = Seen { range: before.range + sigma, ..*before };
         if let Some(moved) = farther.after(motion, camera) {
@@ -159,10 +161,11 @@ impl Belief {
         self.image_covariance = symmetric(self.image_covariance);
     }
 
-    /// Corrects by a sighting (eq. 8, with the measurement matrix in order), in
-    /// Joseph form.
+    /// Updates the state with a detection (eq. 8, with a correct measurement matrix), in Joseph
+    /// form.
     pub fn correct(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Support {
         if self.behind.is_some() {
+            // The image state means nothing behind the camera, so the track starts anew.
             *self = Self::start(config, seen, camera);
             return Support::default();
         }
@@ -177,7 +180,7 @@ impl Belief {
         Support { nis: parts.into_iter().flatten().reduce(sum) }
     }
 
-    /// The normalised innovation squared of centre and width.
+    /// Updates the box; returns the normalised innovation squared of centre and width.
     fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
         let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
         let look = measurement(dt);
@@ -195,7 +198,7 @@ impl Belief {
         Some(innovation.dot(&spread.solve(&innovation)))
     }
 
-    /// The normalised innovation squared of the range.
+    /// Updates the range; returns its normalised innovation squared.
     fn correct_range(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
         let (measured, noise) = measured_range(config, seen, camera);
         if measured < MIN_RANGE_M {
@@ -208,11 +211,12 @@ impl Belief {
         self.range += gain * innovation;
         let kept = Matrix2::identity() - gain * Vector2::x().transpose();
         let corrected = kept * p * kept.transpose() + gain * noise * gain.transpose();
+        // Rounding would make the matrix asymmetric over many frames.
         self.range_covariance = 0.5 * (corrected + corrected.transpose());
         Some(innovation * innovation / spread)
     }
 
-    /// In the common form.
+    /// Returns position, velocity and box in the common form.
     pub fn estimate(&self, camera: &Camera) -> Estimate {
         let head = self.seen();
         let place = self.behind.unwrap_or_else(|| head.in_space(camera));
@@ -234,7 +238,7 @@ impl Belief {
         }
     }
 
-    /// The head as the camera sees it.
+    /// Returns the head in image coordinates and range.
     fn seen(&self) -> Seen {
         let centre = Point2::new(self.image[0], self.image[1]);
         Seen {
@@ -250,8 +254,8 @@ impl Belief {
     }
 }
 
-/// H of eq. 8. In print it holds the time step, although it is applied to what
-/// was already predicted; rightly `dt` is 0.
+/// Returns H of eq. 8. In print it contains the time step, although it is applied to a state that
+/// is already predicted; correctly `dt` is 0.
 fn measurement(dt: f64) -> Matrix3x5 {
     let mut look = Matrix3x5::zeros();
     (look[(0, 0)], look[(1, 1)], look[(2, 4)]) = (1.0, 1.0, 1.0);
@@ -272,13 +276,13 @@ fn process_noise(config: &Config, width: f64, dt: f64) -> Matrix5<f64> {
     noise
 }
 
-/// Noise of (place, velocity) by white acceleration of density `q` over `dt`.
+/// Returns the noise of (position, velocity) under white acceleration of density `q` over `dt`.
 fn white_acceleration(q: f64, dt: f64) -> Matrix2<f64> {
     let cross = q * dt.powi(2) / 2.0;
     Matrix2::new(q * dt.powi(3) / 3.0, cross, cross, q * dt)
 }
 
-/// Measurement noise of (x, y, s), pixels².
+/// Returns the measurement noise of (x, y, s), pixels².
 fn image_noise(
     config: &Config,
     detection: &Detection,
@@ -289,13 +293,14 @@ fn image_noise(
     let scale = (config.sigma_scale * width).powi(2);
     let mut noise = Matrix3::from_diagonal(&Vector3::new(own, own, scale));
     let mut place = noise.fixed_view_mut::<2, 2>(0, 0);
+    // Half the detection's covariance and half its transpose: the sum is exactly symmetric.
     if let Some(known) = pixel_covariance(camera, &detection.position, &detection.covariance) {
         place += 0.5 * (known + known.transpose());
     }
     noise
 }
 
-/// Range of the head, m, and its measurement noise, m².
+/// Returns the range of the head, m, and its measurement noise, m².
 fn measured_range(config: &Config, detection: &Detection, camera: &Camera) -> (f64, f64) {
     let (range, variance) = range(camera, &detection.position, &detection.covariance);
     (range, variance + config.sigma_range_m.powi(2))
@@ -306,7 +311,7 @@ fn is_still(motion: &Motion) -> bool {
     *forward == 0.0 && *left == 0.0 && *turn == 0.0 && *covariance == Matrix3::zeros()
 }
 
-/// The motion, with a little more of each of its three parts.
+/// Returns the motion with a small step added to each of its three components in turn.
 fn steps(motion: &Motion) -> [Motion; 3] {
     [
         Motion { forward: motion.forward + MOTION_STEP, ..*motion },
@@ -315,7 +320,7 @@ fn steps(motion: &Motion) -> [Motion; 3] {
     ]
 }
 
-/// Pixel and range of the one less those of the other.
+/// Returns pixel and range of `a` minus those of `b`.
 fn difference(a: &Seen, b: &Seen) -> Vector3<f64> {
     let pixel = a.pixel - b.pixel;
     Vector3::new(pixel.x, pixel.y, a.range.x - b.range.x)

@@ -1,25 +1,24 @@
-//! Between the image and the robot's world.
+//! Conversion between the image and the robot frame.
 
 use nalgebra::{Matrix2, Matrix3x2, Point2, Point3, SMatrix, Vector2, Vector3};
 use tagalong_core::Motion;
 use tagalong_geometry::Camera;
 
-/// Nearer than this to the plane of the lens there are no pixels, m.
+/// Least depth of a point that has a pixel, m.
 const NEAREST_M: f64 = 0.1;
 
 /// Steps of the derivatives: pixels, pixels/s, m, m/s.
 const STEPS: [f64; 6] = [1e-2, 1e-2, 1e-2, 1e-2, 1e-5, 1e-5];
 
-/// A moving point as the camera sees it.
+/// A moving point in image coordinates and range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Its pixel.
+    /// Pixel of the point.
     pub(crate) pixel: Point2<f64>,
-    /// How fast that moves, pixels/s.
+    /// Velocity of the pixel, pixels/s.
     pub(crate) velocity: Vector2<f64>,
-    /// Distance from the camera, m, and its rate, m/s. (Depth would do in the
-    /// middle of the image; far from it a small error of the depth is a large
-    /// one of the place.)
+    /// Distance from the camera, m, and its rate, m/s. (Depth would do in the middle of the image;
+    /// far from it a small error of the depth is a large error of the position.)
     pub(crate) range: Vector2<f64>,
 }
 
@@ -31,13 +30,14 @@ pub(crate) struct Place {
 }
 
 impl Seen {
-    /// Where it is: P = R u r + t and V = R (u r' + u' r), with the viewing ray
-    /// u of unit length.
+    /// Returns the point in space: P = R u r + t and V = R (u r' + u' r), with the viewing ray u of
+    /// unit length.
     pub(crate) fn in_space(&self, camera: &Camera) -> Place {
         let rotation = camera.robot_from_camera.rotation;
         let ray = camera.ray(self.pixel);
         let (length, turning) = (ray.norm(), ray_slope(camera, self.pixel) * self.velocity);
         let unit = ray / length;
+        // Only the part across the ray turns the unit vector.
         let turning = (turning - unit * unit.dot(&turning)) / length;
         let velocity = unit * self.range.y + turning * self.range.x;
         Place {
@@ -46,14 +46,13 @@ impl Seen {
         }
     }
 
-    /// The same point after the robot's motion; `None` when that takes it
-    /// behind the camera.
+    /// Returns the same point after the robot's motion; `None` if that takes it behind the camera.
     pub(crate) fn after(&self, motion: &Motion, camera: &Camera) -> Option<Self> {
         self.in_space(camera).after(motion).seen(camera)
     }
 
-    /// Derivative of (X, Y, Z, VX, VY) in the robot frame by (x, y, vx, vy) in
-    /// the image, by the range and its rate.
+    /// Returns the derivative of (X, Y, Z, VX, VY) in the robot frame with respect to (x, y, vx,
+    /// vy) in the image, the range and its rate.
     pub(crate) fn jacobian(&self, camera: &Camera) -> SMatrix<f64, 5, 6> {
         let here = self.in_space(camera);
         let mut jacobian = SMatrix::<f64, 5, 6>::zeros();
@@ -67,7 +66,7 @@ impl Seen {
         jacobian
     }
 
-    /// With one of its six numbers changed.
+    /// Returns the point with one of its six numbers changed.
     fn shifted(&self, number: usize, by: f64) -> Self {
         let mut other = *self;
         match number {
@@ -80,12 +79,12 @@ impl Seen {
 }
 
 impl Place {
-    /// After some time, the robot standing still.
+    /// Returns the point after `dt` seconds, the robot standing still.
     pub(crate) fn walked(&self, dt: f64) -> Self {
         Self { position: self.position + self.velocity * dt, ..*self }
     }
 
-    /// After the robot's motion, in its new frame.
+    /// Returns the point in the robot's new frame after its motion.
     pub(crate) fn after(&self, motion: &Motion) -> Self {
         let floor = motion.apply_to_point(self.position.xy());
         let velocity = motion.apply_to_velocity(self.velocity.xy());
@@ -95,7 +94,7 @@ impl Place {
         }
     }
 
-    /// How the camera sees it; `None` behind it.
+    /// Projects the point into the image; `None` behind the camera.
     pub(crate) fn seen(&self, camera: &Camera) -> Option<Seen> {
         let in_camera = camera.robot_from_camera.inverse_transform_point(&self.position);
         let (depth, range) = (in_camera.z, in_camera.coords.norm());
@@ -110,7 +109,7 @@ impl Place {
     }
 }
 
-/// Covariance of the pixel of a point, from that of its place in the robot frame.
+/// Returns the covariance of the pixel of a point, from that of its position in the robot frame.
 pub(crate) fn pixel_covariance(
     camera: &Camera,
     position: &Point3<f64>,
@@ -126,7 +125,7 @@ pub(crate) fn pixel_covariance(
     Some(by_place * covariance * by_place.transpose())
 }
 
-/// Distance of a point from the camera, m, and the variance of that, m².
+/// Returns the distance of a point from the camera, m, and its variance, m².
 pub(crate) fn range(
     camera: &Camera,
     position: &Point3<f64>,
@@ -134,11 +133,12 @@ pub(crate) fn range(
 ) -> (f64, f64) {
     let ray = position.coords - camera.robot_from_camera.translation.vector;
     let range = ray.norm();
+    // At the camera itself the ray has no direction; the floor avoids a division by 0.
     let unit = ray / range.max(NEAREST_M);
     (range, unit.dot(&(covariance * unit)).max(0.0))
 }
 
-/// Derivative of the viewing ray by the pixel.
+/// Returns the derivative of the viewing ray with respect to the pixel.
 fn ray_slope(camera: &Camera, pixel: Point2<f64>) -> Matrix3x2<f64> {
     let ray = |dx: f64, dy: f64| camera.ray(pixel + Vector2::new(dx, dy));
     let by_x = ray(0.5, 0.0) - ray(-0.5, 0.0);

@@ -26,7 +26,7 @@ fn person(head: Point3<f64>) -> Detection {
     }
 }
 
-/// Feeds one person's sightings, each after a motion of the robot.
+/// Filters the detections of one person, each after a motion of the robot.
 fn fed(config: Config, sightings: &[Detection], motion: Motion) -> Belief {
     let camera = camera();
     let mut belief = Belief::start(&config, &sightings[0], &camera);
@@ -37,7 +37,7 @@ fn fed(config: Config, sightings: &[Detection], motion: Motion) -> Belief {
     belief
 }
 
-/// A box that slides by 120 pixels a second.
+/// Detections of a box that moves by 120 pixels a second.
 fn sliding(frames: usize) -> Vec<Detection> {
     let start = person(Point3::new(4.0, 1.0, 1.6));
     let shifted = |i: usize| Rect { x: start.region.x + 120.0 * DT_S * i as f64, ..start.region };
@@ -65,7 +65,7 @@ fn the_printed_measurement_lags_by_one_frame_and_ours_does_not() {
     assert!((lag(true) - step).abs() < 0.2, "{} instead of {step}", lag(true));
 }
 
-/// Sightings of a standing person from a robot that turns and drives.
+/// Detections of a standing person from a robot that turns and drives.
 fn from_a_moving_robot(motion: &Motion, frames: usize) -> Vec<Detection> {
     let mut place = Point3::new(5.0, -0.5, 1.65);
     let mut seen = vec![person(place)];
@@ -186,7 +186,7 @@ fn settings_that_cannot_work_are_refused() {
     assert!(wrong.into_iter().all(|config| ImageKalman::new(config).is_err()));
 }
 
-/// A level camera, and somebody right ahead of it whose place is known exactly.
+/// A level camera, and a person straight ahead at an exactly known position.
 fn ahead(range_m: f64) -> (Camera, Detection) {
     let lens = Pinhole { fx: 525.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
     let camera = Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0);
@@ -197,7 +197,7 @@ fn ahead(range_m: f64) -> (Camera, Detection) {
     (camera, Detection { region, position, covariance, score: 1.0, source: "test" })
 }
 
-/// A place and its rate, by the equations of a textbook.
+/// Position and rate of one axis, filtered by the textbook equations.
 struct Line {
     mean: [f64; 2],
     covariance: [[f64; 2]; 2],
@@ -216,7 +216,7 @@ impl Line {
         self.covariance = [[place, cross], [cross, d + density * dt]];
     }
 
-    /// The normalised innovation squared.
+    /// Updates by a measurement; returns the normalised innovation squared.
     fn correct(&mut self, measured: f64, noise: f64) -> f64 {
         let [[a, b], [_, d]] = self.covariance;
         let (spread, innovation) = (a + noise, measured - self.mean[0]);
@@ -282,8 +282,8 @@ fn a_step_is_that_of_the_textbook() {
     assert!((belief.image[4] - widened).abs() < 1e-9);
 }
 
-/// What is added to the variances of x and y in the image and of the range by errors of
-/// the robot's motion of this covariance, when it does not move.
+/// Increase of the variances of x and y in the image and of the range, for a robot at rest with
+/// errors of the odometry of these standard deviations.
 fn doubts(range_m: f64, [forward, left, turn]: [f64; 3]) -> [f64; 3] {
     let ((camera, seen), config) = (ahead(range_m), Config::default());
     let sigmas = Vector3::new(forward, left, turn);
@@ -321,8 +321,8 @@ fn a_box_grows_as_the_robot_comes_near() {
     assert_eq!((still.image[4], still.range.x), (seen.region.width, 4.0));
 }
 
-/// A sideways step moves a near person farther in the image than a far one: how far is
-/// as uncertain as the range is.
+/// A sideways step moves a near person farther in the image than a far one: the shift is as
+/// uncertain as the range.
 #[test]
 fn a_range_that_is_a_guess_makes_the_place_after_a_step_one() {
     let ((camera, sure), config) = (ahead(4.0), Config::default());
@@ -367,7 +367,7 @@ fn the_shape_follows_what_is_seen_by_its_weight() {
         let Rect { width, height, .. } = belief.estimate(&camera).region;
         assert!((height / width - aspect).abs() < 1e-9, "{shape_weight}: {}", height / width);
     }
-    // A box without area has no shape: that of an upper body stays.
+    // A box without area has no shape, so that of an upper body is kept.
     let config = Config { shape_weight: 1.0, ..Config::default() };
     for flat in [Rect::new(x, y, width, 0.5), Rect::new(x, y, 0.5, height)] {
         let mut belief = Belief::start(&config, &seen, &camera);
@@ -424,7 +424,7 @@ proptest! {
         let toward = (seen.position - camera().robot_from_camera.translation.vector).coords;
         let unit = toward.normalize();
         let found = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-        // What ties range and direction together is left out, the rest is kept.
+        // Correlation of range and direction is left out, the rest is kept.
         let along = |m: Matrix3<f64>| unit.dot(&(m * unit));
         let across = Matrix3::identity() - unit * unit.transpose();
         prop_assert!((along(found) - along(covariance)).abs() < 1e-4);

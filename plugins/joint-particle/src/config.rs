@@ -3,33 +3,32 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
-/// How the particles of people whose silhouettes overlap are weighed.
+/// Method by which particles of people with overlapping silhouettes are weighed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Person after person, from front to back, each with the nearer ones held
-    /// (MacCormick and Blake 1999). For any number of people.
+    /// One person after the other, from front to back, each with the nearer ones held (MacCormick
+    /// and Blake 1999). For any number of people.
     Partitioned,
-    /// The scene of every particle is compared with the image (P3, II-C).
+    /// The scene of each particle is compared with the image (P3, II-C).
     All,
-    /// A full table over the lateral places of two people, looked up by every
+    /// A full table over the lateral positions of two people is computed, and looked up by each
     /// particle (P3, III: 21 x 61).
     Table,
-    /// Some particles are compared; the likelihood of all is their sum of
-    /// kernels (P3, III).
+    /// Some particles are compared; the likelihood of all is the sum of kernels at these (P3, III).
     Kde,
-    /// Some particles are compared; the likelihood of all is interpolated by a
-    /// Gaussian process with the same kernels.
+    /// Some particles are compared; the likelihood of all is interpolated by a Gaussian process
+    /// with the same kernels.
     Gp,
 }
 
-/// Which particles `kde` and `gp` compare with the image.
+/// Particles that `kde` and `gp` compare with the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chosen {
-    /// Those that were most likely in the frame before (P3).
+    /// The most likely ones of the previous frame (P3).
     PreviousBest,
-    /// Evenly many of the predicted ones, and a coarse grid of 3 x 3 places.
+    /// Predicted ones at regular intervals, and a coarse grid of 3 x 3 places.
     Spread,
 }
 
@@ -37,118 +36,115 @@ pub enum Chosen {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// How people whose silhouettes overlap are weighed.
+    /// Method for people with overlapping silhouettes.
     pub method: Method,
-    /// Particles of a person alone (P3: 100).
+    /// Number of particles of a single person (P3: 100).
     #[schemars(range(min = 1, max = 100000))]
     pub particles: usize,
-    /// `all`, `table`, `kde`, `gp`: this many particles of each of two people
-    /// are combined with each other (P3: 25, which makes 625).
+    /// `all`, `table`, `kde`, `gp`: number of particles of each of two people that are combined
+    /// with each other (P3: 25, which makes 625).
     #[schemars(range(min = 1, max = 300))]
     pub joint_side: usize,
-    /// `partitioned`: most particles of a group; how many there are follows
-    /// from their spread (KLD sampling) ...
+    /// `partitioned`: most particles of a group; their number follows from their spread (KLD
+    /// sampling) ...
     #[schemars(range(min = 1, max = 100000))]
     pub max_particles: usize,
     /// ... so that the error of their distribution stays below this, nats, ...
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub kld_error: f64,
-    /// ... with this normal quantile of certainty (2.33 is 99 %).
+    /// ... with the probability of this normal quantile (2.33 is 99 %).
     #[schemars(range(min = -10.0, max = 10.0))]
     pub kld_quantile: f64,
-    /// Only the place across the viewing ray is drawn; depth, height and
-    /// velocity are small Kalman filters in each particle. Otherwise
-    /// everything is drawn, as P3 does.
+    /// Only the position across the viewing ray is sampled; depth, height and velocity are small
+    /// Kalman filters in each particle. Otherwise all are sampled, as in P3.
     pub marginalise: bool,
     /// Spectral density of a person's white acceleration, m²/s³.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub acceleration_noise: f64,
-    /// Standard deviation of the place on the floor beside what velocity
-    /// explains, m per square root of a second.
+    /// Standard deviation of the position on the floor, beside the motion by velocity, m per square
+    /// root of a second.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub position_noise: f64,
     /// Standard deviation of the height, m per square root of a second.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub height_noise: f64,
-    /// Standard deviation of the velocity beside what acceleration explains,
-    /// m/s per square root of a second.
+    /// Standard deviation of the velocity, beside the acceleration, m/s per square root of a
+    /// second.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub velocity_noise: f64,
-    /// Variance of each velocity component of a newcomer, m²/s².
+    /// Variance of each velocity component of a new track, m²/s².
     #[schemars(range(min = 0.0, max = 1e3))]
     pub initial_velocity_variance: f64,
-    /// `table`, `kde`, `gp` with `marginalise = false`: two people who are
-    /// weighed together keep their depth and height, as P3 assumes of a short
-    /// occlusion. Nothing in the map speaks of them.
+    /// `table`, `kde`, `gp` with `marginalise = false`: two people that are weighed together keep
+    /// their depth and height, as P3 assumes for a short occlusion. The map contains no information
+    /// on them.
     pub hold_depth: bool,
-    /// People face where the template fits best, of the three. Where false, and
-    /// where all fit alike, where the track walks (P3).
+    /// People face in the direction of the best of three templates. If false, or if all fit alike,
+    /// in the direction of the track's velocity (P3); a standing person outside of groups faces by
+    /// the image in both cases.
     pub facing_by_image: bool,
-    /// This part of the particles is moved to what a detector found, 0 to 1.
+    /// Part of the particles that is moved to the detection, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub from_detection: f64,
-    /// A person is seen if the scene is more likely by this with than without
-    /// the person, nats, ...
+    /// A person is seen if the scene is more likely by this with the person than without, nats, ...
     pub min_support: f64,
-    /// by this where a detector found the person in this very frame, ...
+    /// by this if a detector found the person in this very frame, ...
     pub min_support_found: f64,
-    /// ... and by this where no detector found the person for longer than
-    /// `trust_s`: furniture explains a little of the image, a person most of it.
+    /// ... and by this if no detector found the person for longer than `trust_s`: furniture
+    /// explains a little of the image, a person most of it.
     pub min_support_unfound: f64,
-    /// Time for which a silhouette is trusted that no detector finds, s.
+    /// Time for which a silhouette without detections is trusted, s.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub trust_s: f64,
-    /// Upper-body squares are enlarged by this part of their size before they
-    /// are asked whether they overlap.
+    /// Part of their size by which upper-body squares are enlarged before they are tested for
+    /// overlap.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub inflate: f64,
-    /// People part when they are farther from each other than this on the
-    /// floor, m, ...
+    /// People leave their group when they are farther from each other than this on the floor, m,
+    /// ...
     #[schemars(range(min = 0.0, max = 100.0))]
     pub split_m: f64,
-    /// ... and their squares do not overlap in this many frames in a row.
+    /// ... and their squares have not overlapped in this many frames in a row.
     pub split_frames: u32,
-    /// `kde`, `gp`: particles that are compared with the image (P3: 30 or 50).
+    /// `kde`, `gp`: number of particles that are compared with the image (P3: 30 or 50).
     #[schemars(range(min = 1, max = 1000))]
     pub points: usize,
-    /// `kde`, `gp`: which ones.
+    /// `kde`, `gp`: selection of these particles.
     pub chosen: Chosen,
-    /// Width of the kernel along the place of the near person, m (P3: 0.04).
+    /// Width of the kernel along the lateral position of the near person, m (P3: 0.04).
     #[schemars(range(min = 1e-4, max = 10.0))]
     pub kernel_near_m: f64,
-    /// Width of the kernel along the place of the far person, m (P3: 0.1).
+    /// Width of the kernel along the lateral position of the far person, m (P3: 0.1).
     #[schemars(range(min = 1e-4, max = 10.0))]
     pub kernel_far_m: f64,
     /// `gp`: variance of the likelihood that the kernels do not explain.
     #[schemars(range(min = 1e-9, max = 10.0))]
     pub nugget: f64,
-    /// `table`: reach of the near person's place, m (P3: 0.3).
+    /// `table`: largest lateral position of the near person, m (P3: 0.3).
     #[schemars(range(min = 0.0, max = 10.0))]
     pub reach_near_m: f64,
-    /// `table`: reach of the far person's place, m (P3: 0.9).
+    /// `table`: largest lateral position of the far person, m (P3: 0.9).
     #[schemars(range(min = 0.0, max = 10.0))]
     pub reach_far_m: f64,
-    /// `table`: distance of its places, m (P3: 0.03).
+    /// `table`: spacing of the positions, m (P3: 0.03).
     #[schemars(range(min = 5e-3, max = 10.0))]
     pub step_m: f64,
-    /// After people part, their colours are compared with those before; they
-    /// change names if that is more likely by this, in Bhattacharyya
-    /// coefficients. 2 is never.
+    /// After people leave a group, their colours are compared with those before; they exchange
+    /// their tracks if that is more likely by this, in Bhattacharyya coefficients. 2 is never.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub swap_margin: f64,
     /// As printed: kernels with 2 sigma in place of 2 sigma² (millimetres).
     pub compat_printed_kernel: bool,
-    /// As printed: places along the robot's Y axis instead of across the
-    /// viewing ray.
+    /// As printed: lateral positions along the robot's Y axis instead of across the viewing ray.
     pub compat_printed_axes: bool,
-    /// As printed: people in a group are moved by the same noise.
+    /// As printed: all people of a group are moved by the same noise.
     pub compat_shared_noise: bool,
-    /// As printed: the most likely particles are kept when groups form and
-    /// part, instead of drawing from all.
+    /// As printed: the most likely particles are kept when groups form and part, instead of
+    /// resampling from all.
     pub compat_top: bool,
-    /// As OpenCV's ConDensation, which P3 used: resampling in every frame
-    /// without a random offset, uniform noise from generators that are seeded
-    /// alike for everybody, and the prediction reported as the estimate.
+    /// As in OpenCV's ConDensation, which P3 used: resampling in every frame without a random
+    /// offset, uniform noise from generators with the same seeds for every track, and the
+    /// prediction reported as the estimate.
     pub compat_condensation: bool,
 }
 
@@ -196,7 +192,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Refuses numbers that cannot work.
+    /// Refuses settings outside their ranges.
     pub(crate) fn check(&self) -> Result<()> {
         check_settings(self)
     }

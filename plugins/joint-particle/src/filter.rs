@@ -15,27 +15,27 @@ use crate::particle::{Particle, Transition};
 use crate::resampling::{effective_size, kld_size};
 use crate::weighing::{Look, facing, sketch, support, weigh};
 
-/// The filter: particles of people, alone or together.
+/// Particle filter of people, single or in groups.
 pub struct JointParticle {
     config: Config,
     seed: u64,
     groups: Vec<Group>,
     overlaps: Overlaps,
-    /// Where bodies face, m/s; kept while somebody stands.
+    /// Direction in which each body faces, m/s; kept while the person stands.
     headings: BTreeMap<TrackId, Vector2<f64>>,
     wardrobe: Wardrobe,
-    /// Since when no detector found somebody, s.
+    /// Time since a detector last found each person, s.
     unfound_s: BTreeMap<TrackId, f64>,
-    /// ConDensation reports the state this much later, s.
+    /// Time by which the reported state is predicted (ConDensation), s.
     ahead_s: f64,
     dt_s: f64,
 }
 
 impl JointParticle {
-    /// A filter whose random numbers start from `seed`.
+    /// Creates a filter with random numbers from `seed`.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config, seed: u64) -> Result<Self> {
         config.check()?;
         Ok(Self {
@@ -51,7 +51,7 @@ impl JointParticle {
         })
     }
 
-    /// Resamples groups in which few particles carry the weight.
+    /// Resamples groups in which few particles have most of the weight.
     fn renew(&mut self) {
         let config = &self.config;
         for group in &mut self.groups {
@@ -70,9 +70,10 @@ impl JointParticle {
         }
     }
 
-    /// People whose silhouettes overlap come together, others part.
+    /// Forms groups of people with overlapping silhouettes, and splits the others.
     fn regroup(&mut self, camera: &Camera) {
         let wanted = self.overlaps.groups(&self.estimates(camera), &self.config);
+        // Splitting and merging resamples, so unchanged groups are left alone.
         if self.groups.iter().map(ids).collect::<BTreeSet<_>>() == wanted.iter().cloned().collect()
         {
             return;
@@ -86,7 +87,7 @@ impl JointParticle {
         self.groups.sort_by(|a, b| a.ids.cmp(&b.ids));
     }
 
-    /// Cuts a group along the borders of the wanted ones.
+    /// Splits a group along the borders of the wanted ones.
     fn split(&mut self, mut group: Group, wanted: &[BTreeSet<TrackId>]) {
         let columns = |people: &BTreeSet<TrackId>| -> Vec<usize> {
             (0..group.people()).filter(|i| people.contains(&group.ids[*i])).collect()
@@ -102,7 +103,7 @@ impl JointParticle {
         self.groups.extend(parts.collect::<Vec<_>>());
     }
 
-    /// Brings the groups together that make up a wanted one.
+    /// Merges the groups that make up a wanted one.
     fn join(&mut self, people: &BTreeSet<TrackId>) {
         let is_part = |group: &mut Group| group.ids.iter().any(|id| people.contains(id));
         let parts: Vec<Group> = self.groups.extract_if(.., is_part).collect();
@@ -110,7 +111,8 @@ impl JointParticle {
         self.groups.extend(joined);
     }
 
-    /// Bodies face where the image says, or else where people walk, or as before.
+    /// Returns the headings of all bodies: by the image, otherwise by the velocity, otherwise as
+    /// before.
     fn turn(&mut self, look: &mut Look<'_>) -> Result<BTreeMap<TrackId, Vector2<f64>>> {
         let mut headings = self.headings.clone();
         for group in &self.groups {
@@ -129,7 +131,7 @@ impl JointParticle {
         Ok(headings)
     }
 
-    /// Gives people whose colours say so each other's particles.
+    /// Exchanges the particles of two people, after their colours have shown a swap.
     fn swap(&mut self, (a, b): (TrackId, TrackId)) {
         let other = |id: TrackId| if id == a { b } else { a };
         for id in self.groups.iter_mut().flat_map(|group| &mut group.ids) {
@@ -141,7 +143,7 @@ impl JointParticle {
         self.headings.extend(of_a.map(|h| (b, h)).into_iter().chain(of_b.map(|h| (a, h))));
     }
 
-    /// Those who are alone and seen, with their heads.
+    /// Returns the head positions of seen people outside of groups.
     fn alone(&self, seen: &BTreeMap<TrackId, Support>) -> BTreeMap<TrackId, Point3<f64>> {
         let single = self.groups.iter().filter(|g| g.people() == 1 && seen.contains_key(&g.ids[0]));
         single
@@ -152,9 +154,8 @@ impl JointParticle {
             .collect()
     }
 
-    /// Whether a silhouette that explains so many nats is the person: a
-    /// likelihood only compares, and without a person the best place is some
-    /// furniture or the edge of the image.
+    /// Returns true if a silhouette that explains this many nats is the person: a likelihood only
+    /// compares, and without a person the best place is some furniture or the edge of the image.
     fn is_seen(&self, id: TrackId, nats: f64) -> bool {
         let unfound_s = self.unfound_s.get(&id).copied().unwrap_or_default();
         let config = &self.config;
@@ -179,7 +180,7 @@ impl JointParticle {
     }
 }
 
-/// Who is faster than this faces where they walk, m/s.
+/// Speed above which a person faces in the direction of the velocity, m/s.
 const WALKING_MPS: f64 = 0.35;
 
 fn ids(group: &Group) -> BTreeSet<TrackId> {
@@ -211,6 +212,8 @@ impl Filter for JointParticle {
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
         let Some(likelihood) = evidence.likelihood else { return Ok(BTreeMap::new()) };
         self.renew();
+        // Groups are formed before the weighing, because a scene needs all people that overlap
+        // in it.
         self.regroup(&evidence.frame.camera);
         let sightings: BTreeMap<TrackId, Particle> = evidence
             .best_matches()
@@ -270,7 +273,7 @@ impl Filter for JointParticle {
 }
 
 impl JointParticle {
-    /// What is left of a group when somebody is forgotten.
+    /// Keeps these people of a group and forgets the others.
     fn keep_columns(&mut self, mut group: Group, people: &BTreeSet<TrackId>) {
         let columns: Vec<usize> =
             (0..group.people()).filter(|i| people.contains(&group.ids[*i])).collect();
@@ -290,8 +293,8 @@ mod tests {
 
     use super::*;
 
-    /// Everybody fits everywhere and explains so many nats, as a cupboard that
-    /// looks like a person may.
+    /// A likelihood that is the same at all places: each person explains this many nats, as a
+    /// cupboard that looks like a person may.
     struct Flattering(f64);
 
     impl Likelihood for Flattering {
@@ -313,8 +316,8 @@ mod tests {
         Detection { region, position, covariance, score: 3.0, source: "drawn" }
     }
 
-    /// In which of twelve frames without a sighting a person is seen who
-    /// explains so many nats, and whether after one more with a sighting.
+    /// Returns for twelve frames without a detection if a person that explains this many nats is
+    /// seen, and then for one more frame with a detection.
     fn seen(nats: f64) -> (Vec<bool>, bool) {
         let (mut filter, id) = (JointParticle::new(Config::default(), 1).unwrap(), TrackId(1));
         let (frame, detection) = (frame(), detection());

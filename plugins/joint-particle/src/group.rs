@@ -6,20 +6,19 @@ use crate::particle::{Particle, Transition};
 use crate::random::Random;
 use crate::resampling::{heaviest, normalise, systematic, without_offset};
 
-/// People who are weighed together, as joint particles: rows of one
-/// [`Particle`] for each of them.
+/// People that are weighed together, as joint particles: each row has one [`Particle`] per person.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
-    /// The people, in the order of the columns.
+    /// Tracks in the order of the columns.
     pub(crate) ids: Vec<TrackId>,
-    /// Row after row.
+    /// Particles, row after row.
     parts: Vec<Particle>,
-    /// Of each row; they sum to 1.
+    /// Weight of each row; they sum to 1.
     pub(crate) weights: Vec<f64>,
-    /// How likely each row was in the last frame, relative to the best one.
+    /// Likelihood of each row in the last frame, relative to the best one.
     pub(crate) likelihoods: Vec<f64>,
     random: Random,
-    /// ConDensation: one generator for each dimension, seeded by its number.
+    /// ConDensation: one generator for each dimension, seeded by its index.
     dimensions: Vec<Random>,
 }
 
@@ -31,7 +30,7 @@ pub(crate) struct Moments {
 }
 
 impl Group {
-    /// A newcomer, drawn from the first sighting.
+    /// Creates a group of one new person, from the first detection.
     pub(crate) fn single(id: TrackId, first: &Particle, seed: u64, config: &Config) -> Self {
         let count = config.particles;
         let mut group = Self {
@@ -48,33 +47,33 @@ impl Group {
         group
     }
 
-    /// Number of people.
+    /// Returns the number of people.
     pub(crate) fn people(&self) -> usize {
         self.ids.len()
     }
 
-    /// Number of particles.
+    /// Returns the number of particles.
     pub(crate) fn rows(&self) -> usize {
         self.weights.len()
     }
 
-    /// One particle: everybody in it.
+    /// Returns one joint particle: all people of a row.
     pub(crate) fn row(&self, row: usize) -> &[Particle] {
         &self.parts[row * self.people()..(row + 1) * self.people()]
     }
 
-    /// All particles of one person.
+    /// Returns all particles of one person.
     pub(crate) fn column_mut(&mut self, person: usize) -> impl Iterator<Item = &mut Particle> {
         let people = self.people();
         self.parts.iter_mut().skip(person).step_by(people)
     }
 
-    /// Moves everybody.
+    /// Predicts all particles.
     pub(crate) fn predict(&mut self, transition: &Transition) {
         self.parts.iter_mut().for_each(|particle| transition.apply(particle));
     }
 
-    /// Draws what the particles of one person know only as a variance.
+    /// Samples from the particles of one person the numbers that they hold only as a variance.
     pub(crate) fn draw(&mut self, person: usize, eye: &Point2<f64>, config: &Config) {
         let people = self.people();
         let Self { parts, random, dimensions, .. } = self;
@@ -88,7 +87,7 @@ impl Group {
         }
     }
 
-    /// As printed in P3: everybody in a particle is moved by the same noise.
+    /// Moves all people of a row by the same noise, as printed in P3.
     pub(crate) fn draw_shared(&mut self, config: &Config) {
         let people = self.people();
         let Self { parts, random, dimensions, .. } = self;
@@ -98,20 +97,21 @@ impl Group {
         }
     }
 
-    /// Moves part of one person's particles to a sighting.
+    /// Moves part of one person's particles to a detection.
     pub(crate) fn restart(&mut self, person: usize, at: &Particle, part: f64) {
         if part <= 0.0 {
             return;
         }
         let position = at.person().position;
         let covariance = at.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        // Every n-th row: after resampling, neighbouring rows are copies of the same particle.
         let every = (1.0 / part).round().max(1.0) as usize;
         for particle in self.column_mut(person).step_by(every) {
             particle.move_to(&position, &covariance);
         }
     }
 
-    /// Keeps the given rows, equally heavy.
+    /// Keeps the given rows, with equal weights.
     pub(crate) fn keep(&mut self, rows: &[usize]) {
         let parts = rows.iter().flat_map(|row| self.row(*row)).cloned().collect();
         self.likelihoods = rows.iter().map(|row| self.likelihoods[*row]).collect();
@@ -120,7 +120,7 @@ impl Group {
         normalise(&mut self.weights);
     }
 
-    /// Draws `count` rows by their weights, and says which.
+    /// Samples `count` rows by their weights, and returns their indices.
     pub(crate) fn resample(&mut self, count: usize, config: &Config) -> Vec<usize> {
         let rows = match config.compat_condensation {
             true => without_offset(&self.weights),
@@ -130,22 +130,23 @@ impl Group {
         rows
     }
 
-    /// How many cells of 10 cm, for each person, the rows occupy.
+    /// Returns the number of cells of 10 cm, for all people jointly, that the rows occupy.
     pub(crate) fn occupied(&self) -> usize {
         let cell = |p: &Particle| [p.mean[0], p.mean[1]].map(|v| (v / CELL_M).floor() as i64);
+        // Rows of negligible weight would make the distribution look wider than it is.
         let heavy = 0.01 / self.rows() as f64;
         let rows = (0..self.rows()).filter(|row| self.weights[*row] > heavy);
         let cells = rows.map(|row| self.row(row).iter().map(cell).collect::<Vec<_>>());
         cells.collect::<std::collections::BTreeSet<_>>().len()
     }
 
-    /// The heaviest row.
+    /// Returns the heaviest row.
     pub(crate) fn best(&self) -> usize {
         let heavier = |a: usize, b: usize| if self.weights[b] > self.weights[a] { b } else { a };
         (1..self.rows()).fold(0, heavier)
     }
 
-    /// Mean and covariance of one person.
+    /// Returns mean and covariance of one person.
     pub(crate) fn moments(&self, person: usize) -> Moments {
         let column = || (0..self.rows()).map(|row| (self.weights[row], &self.row(row)[person]));
         let mean: Vector5<f64> = column().map(|(w, p)| p.mean * w).sum();
@@ -158,7 +159,7 @@ impl Group {
         Moments { mean, covariance: 0.5 * (covariance + covariance.transpose()) }
     }
 
-    /// Two groups become one.
+    /// Merges two groups into one.
     pub(crate) fn merge(mut self, mut other: Self, config: &Config) -> Self {
         let pairs = match config.method {
             Method::Partitioned => self.paired(&mut other),
@@ -181,16 +182,18 @@ impl Group {
         merged
     }
 
-    /// Each of one group with one of the other, at random.
+    /// Pairs each row of one group with a random row of the other.
     fn paired(&mut self, other: &mut Self) -> Vec<(usize, usize, f64)> {
         let count = self.rows().max(other.rows());
         let mine = systematic(&self.weights, count, &mut self.random);
         let mut theirs = systematic(&other.weights, count, &mut other.random);
+        // Resampled rows are in the order of their indices, which would correlate the two
+        // people.
         self.random.shuffle(&mut theirs);
         mine.into_iter().zip(theirs).map(|(a, b)| (a, b, 1.0)).collect()
     }
 
-    /// A few of one group, each with a few of the other (P3: 25 x 25).
+    /// Combines some rows of one group with some of the other, all with all (P3: 25 x 25).
     fn combined(&mut self, other: &mut Self, config: &Config) -> Vec<(usize, usize, f64)> {
         let few = |group: &mut Self| match config.compat_top {
             true => heaviest(&group.weights, config.joint_side),
@@ -205,7 +208,7 @@ impl Group {
         pairs.collect()
     }
 
-    /// The people at `columns` as a group of their own.
+    /// Returns the people at `columns` as a group of their own.
     pub(crate) fn part(&mut self, columns: &[usize], seed: u64, config: &Config) -> Self {
         let count = if columns.len() == 1 { config.particles } else { self.rows() };
         let rows = match config.compat_top {
@@ -222,6 +225,8 @@ impl Group {
             weights: vec![1.0 / rows.len() as f64; rows.len()],
             likelihoods: rows.iter().map(|row| self.likelihoods[*row]).collect(),
             dimensions: dimensions(ids.len()),
+            // A number of the old generator in the seed keeps the parts of one group
+            // independent.
             random: Random::new(seed ^ self.random.uniform().to_bits(), stream),
             ids,
         }
@@ -231,8 +236,8 @@ impl Group {
 /// Side of the cells by which the spread of particles is measured, m.
 const CELL_M: f64 = 0.1;
 
-/// Noise of variance one for the five numbers of a person: normal, or, as OpenCV's
-/// ConDensation has it, uniform from one generator a dimension.
+/// Returns noise of variance one for the five numbers of a person: normal, or, as in OpenCV's
+/// ConDensation, uniform from one generator per dimension.
 fn noise(random: &mut Random, dimensions: &mut [Random], config: &Config) -> Vector5<f64> {
     match config.compat_condensation {
         true => Vector5::from_fn(|i, _| dimensions[i].flat()),
@@ -240,7 +245,7 @@ fn noise(random: &mut Random, dimensions: &mut [Random], config: &Config) -> Vec
     }
 }
 
-/// One generator for each dimension, the same ones for everybody (OpenCV).
+/// Creates one generator for each dimension, with the same seeds in every group (OpenCV).
 fn dimensions(people: usize) -> Vec<Random> {
     (0..5 * people as u64).map(|dimension| Random::new(dimension, 0)).collect()
 }
@@ -251,7 +256,7 @@ mod tests {
 
     use super::*;
 
-    /// Somebody at places along Y that are as heavy as said.
+    /// A single person at places along Y with these weights.
     fn at_places(id: u32, places: &[f64], weights: &[f64]) -> Group {
         let particle = |y: &f64| Particle {
             mean: Vector5::new(2.0, *y, 1.6, 0.0, 0.1),
@@ -303,7 +308,7 @@ mod tests {
         let far = merged.part(&[1], 1, &config);
         assert_eq!((places(&far, 0), far.ids.clone()), (vec![1.0, 1.0, 3.0], vec![TrackId(2)]));
         assert_eq!(far.weights, [1.0 / 3.0; 3]);
-        // Otherwise all are drawn from, by their weights.
+        // Otherwise rows are sampled from all, by their weights.
         let drawn = Config { joint_side: 10, compat_top: false, ..config };
         let merged = one.merge(other, &drawn);
         let count = |person, y| places(&merged, person).iter().filter(|at| **at == y).count();

@@ -3,22 +3,22 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Point3;
 use tagalong_core::{Frame, RgbImage, TrackId};
 
-/// Colours per channel.
+/// Number of shades per channel.
 const SHADES: usize = 6;
-/// Weight of a frame in the colours of a person.
+/// Weight of a new frame in the colours of a person.
 const RATE: f64 = 0.2;
-/// The chest: from and to below the centre of the head, and half its width, m.
+/// Extent of the chest: upper and lower end below the centre of the head, and half its width, m.
 const CHEST_M: [f64; 3] = [0.22, 0.5, 0.13];
 
-/// How often each colour occurs on a chest; sums to 1.
+/// Frequency of each colour on a chest; sums to 1.
 type Histogram = Vec<f64>;
 
-/// What people wear, learned while they are alone, and asked again after they
-/// were too close to be told apart by their silhouettes.
+/// Colours of people's clothes, learned outside of groups, and compared again after people were too
+/// close for their silhouettes to tell them apart.
 #[derive(Default)]
 pub(crate) struct Wardrobe {
     known: BTreeMap<TrackId, Histogram>,
-    /// Pairs that parted and were not told apart since.
+    /// Pairs that left a group and were not compared since.
     parted: BTreeSet<(TrackId, TrackId)>,
 }
 
@@ -28,15 +28,15 @@ impl Wardrobe {
         self.parted.retain(|(a, b)| *a != id && *b != id);
     }
 
-    /// People who were in one group are in two.
+    /// Marks the people of a group that is split for a comparison.
     pub(crate) fn part(&mut self, ids: &[TrackId]) {
         for a in ids {
             self.parted.extend(ids.iter().filter(|b| *b > a).map(|b| (*a, *b)));
         }
     }
 
-    /// Learns the colours of the people who are alone and seen; returns the
-    /// pairs that have each other's colours.
+    /// Learns the colours of the seen people outside of groups; returns the pairs that have
+    /// exchanged their colours.
     pub(crate) fn look(
         &mut self,
         frame: &Frame,
@@ -57,6 +57,7 @@ impl Wardrobe {
         let swapped: Vec<_> =
             asked.iter().copied().filter(|pair| self.is_swapped(pair, &seen, margin)).collect();
         self.parted.retain(|pair| !asked.contains(pair));
+        // In a frame with a swap the colours belong to the wrong tracks, so none are learned.
         if swapped.is_empty() {
             seen.into_iter().for_each(|(id, colours)| self.learn(id, colours));
         }
@@ -64,6 +65,7 @@ impl Wardrobe {
     }
 
     fn learn(&mut self, id: TrackId, seen: Histogram) {
+        // Until the pair is compared, the track may have the other person's colours.
         if self.parted.iter().any(|(a, b)| *a == id || *b == id) {
             return;
         }
@@ -86,12 +88,12 @@ impl Wardrobe {
     }
 }
 
-/// Bhattacharyya coefficient: 1 for the same colours, 0 for none in common.
+/// Returns the Bhattacharyya coefficient: 1 for the same colours, 0 for none in common.
 fn coefficient(a: &Histogram, b: &Histogram) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum()
 }
 
-/// The colours of the chest below a head; `None` outside of the image.
+/// Returns the colours of the chest below a head; `None` outside of the image.
 fn colours(frame: &Frame, image: &RgbImage, head: &Point3<f64>) -> Option<Histogram> {
     let [from, to, half] = CHEST_M;
     let centre = frame.camera.project(head)?;
@@ -110,9 +112,9 @@ fn colours(frame: &Frame, image: &RgbImage, head: &Point3<f64>) -> Option<Histog
     (sum >= MIN_PIXELS).then(|| histogram.into_iter().map(|count| count / sum).collect())
 }
 
-/// Fewer pixels have no colour.
+/// Fewest pixels of a histogram.
 const MIN_PIXELS: f64 = 12.0;
-/// Nobody is larger, pixels.
+/// Most rows and columns of a chest that are read, pixels.
 const MAX_PIXELS: usize = 2000;
 
 #[cfg(test)]
@@ -173,7 +175,7 @@ mod tests {
         };
         let (red, blue) = (of(false), of(true));
         assert!((red.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-        // 200 and 20 of 256 in six shades are 4 and 0.
+        // In six shades, 200 and 20 of 256 are 4 and 0.
         assert_eq!((red[4 * 36], blue[4]), (1.0, 1.0));
         assert_eq!((coefficient(&red, &red), coefficient(&red, &blue)), (1.0, 0.0));
         let mut wardrobe = Wardrobe::default();

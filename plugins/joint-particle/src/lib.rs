@@ -1,17 +1,14 @@
-//! `joint-particle`: a particle filter that weighs scenes of overlapping
-//! silhouettes (P3).
+//! `joint-particle`: a particle filter that weighs scenes of overlapping silhouettes (P3).
 //!
-//! A person alone is a cloud of particles. When silhouettes overlap in the
-//! image, the clouds become one of joint particles: each is a scene, the
-//! nearer person painted over the farther one, and the detector's likelihood
-//! says how well the scene explains the image. Who is hidden gets a flat
-//! likelihood, and moves on as before.
+//! A single person is a cloud of particles. When silhouettes overlap in the image, the clouds
+//! become one of joint particles: each is a scene, with the nearer person in front of the farther
+//! one, and the detector's likelihood measures how well the scene explains the image. A hidden
+//! person gets a flat likelihood, and moves on as before.
 //!
-//! Why not every number drawn, as in P3? Because 100 or 625 particles in five
-//! or ten dimensions are few, and depth and height then get lost as in P3's
-//! Figure 9. Only the place across the viewing ray has a likelihood with
-//! several peaks (left or right of the nearer person?), so only that is drawn;
-//! the rest of each particle is a small Kalman filter that knows what was drawn
+//! P3 samples every number of the state. But 100 or 625 particles in five or ten dimensions are
+//! few, and depth and height then get lost as in P3's Figure 9. Only the position across the
+//! viewing ray has a likelihood with several peaks (left or right of the nearer person), so only
+//! that is sampled; the rest of each particle is a small Kalman filter, conditioned on the sample
 //! (Rao-Blackwellisation; Schön, Gustafsson and Nordlund 2005).
 //!
 //! The forms of the paper, its likelihood maps included, are settings.

@@ -1,21 +1,19 @@
-//! Likelihood maps over the lateral places of two people (P3, section III).
+//! Likelihood maps over the lateral positions of two people (P3, section III).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::config::{Config, Method};
 
-/// Where two people are across the viewing ray of the near one's mean: near,
-/// far, m.
+/// Positions of two people across the viewing ray of the near one's mean: near, far, m.
 pub type Place = [f64; 2];
 
-/// Widths of the kernel along the two places, m.
+/// Widths of the kernel along the two positions, m.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel([f64; 2]);
 
 impl Kernel {
-    /// P3's kernels: standard deviations of 40 and 100 mm. As printed, with
-    /// `2 sigma` under the square, they are those of which 40 and 100 are the
-    /// variances in mm².
+    /// Creates P3's kernel: standard deviations of 40 and 100 mm. As printed, with `2 sigma` in the
+    /// denominator, 40 and 100 act as variances in mm².
     pub fn new(config: &Config) -> Self {
         let width = |sigma_m: f64| match config.compat_printed_kernel {
             true => (1000.0 * sigma_m).sqrt() / 1000.0,
@@ -30,14 +28,13 @@ impl Kernel {
     }
 }
 
-/// P3's estimate: the sum of kernels at the compared places, each as high as
-/// its likelihood.
+/// Returns P3's estimate: the sum of kernels at the compared places, each scaled by its likelihood.
 pub fn parzen(places: &[Place], likelihoods: &[f64], kernel: Kernel, at: &Place) -> f64 {
     places.iter().zip(likelihoods).map(|(place, l)| l * kernel.at(place, at)).sum()
 }
 
-/// Interpolation by a Gaussian process with the same kernels. A sum of kernels
-/// is higher where more places were compared; this is not.
+/// Interpolation by a Gaussian process with the same kernels. A sum of kernels is higher where more
+/// places were compared; this is not.
 #[derive(Clone, Debug)]
 pub struct Gp {
     places: Vec<Place>,
@@ -46,7 +43,7 @@ pub struct Gp {
 }
 
 impl Gp {
-    /// Fits the process; `None` if the places have no such process.
+    /// Fits the process; `None` if the covariance matrix of the places is singular.
     pub fn fit(
         places: Vec<Place>,
         likelihoods: &[f64],
@@ -55,6 +52,7 @@ impl Gp {
     ) -> Option<Self> {
         let count = places.len().min(likelihoods.len());
         let gram = DMatrix::from_fn(count, count, |i, j| {
+            // The nugget keeps the matrix regular where places coincide.
             kernel.at(&places[i], &places[j]) + if i == j { nugget } else { 0.0 }
         });
         let known = DVector::from_column_slice(&likelihoods[..count]);
@@ -62,25 +60,25 @@ impl Gp {
         Some(Self { places, coefficients, kernel })
     }
 
-    /// The likelihood at a place; never negative.
+    /// Returns the likelihood at a place; never negative.
     pub fn at(&self, at: &Place) -> f64 {
         parzen(&self.places, self.coefficients.as_slice(), self.kernel, at).max(0.0)
     }
 }
 
-/// The likelihood over the places, known at some of them.
+/// Likelihood over the places, known at some of them.
 #[derive(Clone, Debug)]
 pub enum LikelihoodMap {
-    /// At all places of a table.
+    /// Known at all places of a table.
     Table(Grid, Vec<f64>),
-    /// At a few; a sum of kernels.
+    /// Known at a few; a sum of kernels.
     Kernels(Vec<Place>, Vec<f64>, Kernel),
-    /// At a few; interpolated.
+    /// Known at a few; interpolated.
     Gp(Gp),
 }
 
 impl LikelihoodMap {
-    /// The map of a method. Where there is no Gaussian process, kernels are summed.
+    /// Creates the map of a method. If there is no Gaussian process, kernels are summed.
     pub fn new(method: Method, places: Vec<Place>, known: Vec<f64>, config: &Config) -> Self {
         let kernel = Kernel::new(config);
         let gp = match method {
@@ -91,7 +89,7 @@ impl LikelihoodMap {
         gp.map_or(Self::Kernels(places, known, kernel), Self::Gp)
     }
 
-    /// The likelihood at a place.
+    /// Returns the likelihood at a place.
     pub fn at(&self, at: &Place) -> f64 {
         match self {
             Self::Table(grid, known) => grid.look_up(known, at),
@@ -101,7 +99,7 @@ impl LikelihoodMap {
     }
 }
 
-/// The places of P3's full table.
+/// Places of P3's full table.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
     reach: [f64; 2],
@@ -110,7 +108,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The table of the settings.
+    /// Creates the table of the settings.
     pub fn new(config: &Config) -> Self {
         let reach = [config.reach_near_m, config.reach_far_m];
         let half = reach.map(|reach| ((reach / config.step_m).round() as usize).min(MAX_HALF));
@@ -121,19 +119,19 @@ impl Grid {
         }
     }
 
-    /// All places, near by near.
+    /// Returns all places, ordered by that of the near person.
     pub fn places(&self) -> Vec<Place> {
         let value = |axis: usize, i: usize| i as f64 * self.step - self.reach[axis];
         let rows = 0..self.sides[0];
         rows.flat_map(|i| (0..self.sides[1]).map(move |j| [value(0, i), value(1, j)])).collect()
     }
 
-    /// Places of the far person for each of the near one.
+    /// Returns the number of places of the far person for each of the near one.
     pub fn columns(&self) -> usize {
         self.sides[1]
     }
 
-    /// The value of the nearest place; outside of the table that of its edge.
+    /// Returns the value of the nearest place; outside of the table that of its edge.
     pub fn look_up(&self, table: &[f64], at: &Place) -> f64 {
         let index = |axis: usize| {
             let steps = ((at[axis] + self.reach[axis]) / self.step).round();
@@ -143,7 +141,7 @@ impl Grid {
     }
 }
 
-/// A table has at most this many places on each side of its middle.
+/// Most places on each side of the middle of a table.
 const MAX_HALF: usize = 100;
 
 #[cfg(test)]
@@ -151,14 +149,13 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// A ridge as two people make it: sharp where the near one is, wide and
-    /// leaning where the far one is.
+    /// A likelihood ridge of two people: sharp in the near one, wide and sloping in the far one.
     fn ridge(at: &Place) -> f64 {
         let (near, far) = (at[0] - 0.03, at[1] - 0.2 - 0.5 * at[0]);
         (-0.5 * (near / 0.06).powi(2) - 0.5 * (far / 0.18).powi(2)).exp()
     }
 
-    /// Places near the ridge, as the best particles of the frame before are.
+    /// Places near the ridge, like those of the best particles of the previous frame.
     fn sampled(count: usize, seed: u64) -> Vec<Place> {
         let mut random = Random::new(seed, 0);
         let mut draw = |centre: f64, spread: f64| centre + spread * random.normal();
@@ -174,8 +171,8 @@ mod tests {
         dot(a, ma, b, mb) / (dot(a, ma, a, ma) * dot(b, mb, b, mb)).sqrt()
     }
 
-    /// Mean correlation with the full table over some draws of 50 places:
-    /// printed kernel, corrected kernel, Gaussian process.
+    /// Mean correlation with the full table over ten samples of 50 places: printed kernel,
+    /// corrected kernel, Gaussian process.
     fn correlations() -> [f64; 3] {
         let grid = Grid::new(&Config::default()).places();
         let truth: Vec<f64> = grid.iter().map(ridge).collect();

@@ -5,17 +5,16 @@ use tagalong_geometry::Rect;
 
 use crate::config::Config;
 
-/// Which people are weighed together: their silhouettes overlap, or did so
-/// lately.
+/// Pairs of people that are weighed together: their silhouettes overlap, or did so lately.
 #[derive(Default)]
 pub(crate) struct Overlaps {
-    /// For each linked pair, for how many frames their squares were apart.
+    /// For each linked pair, the number of frames for which their squares were apart.
     links: BTreeMap<(TrackId, TrackId), u32>,
 }
 
 impl Overlaps {
-    /// Takes in where everybody is expected, and returns the groups: the
-    /// connected components of the pairs that are linked.
+    /// Updates the links with the predicted estimates, and returns the groups: the connected
+    /// components of the linked pairs.
     pub(crate) fn groups(
         &mut self,
         people: &BTreeMap<TrackId, Estimate>,
@@ -37,13 +36,14 @@ impl Overlaps {
     }
 }
 
-/// For how many frames a pair that is linked has been apart; `None` if it is
-/// not linked (any more).
+/// Returns the number of frames for which a linked pair has been apart; `None` if it is not linked
+/// (any more).
 fn link(a: &Estimate, b: &Estimate, before: Option<u32>, config: &Config) -> Option<u32> {
     let [one, other] = [a, b].map(|e| inflated(&e.region, config.inflate));
     if one.intersection(&other).area() > 0.0 {
         return Some(0);
     }
+    // Hysteresis: a group that is split for one frame loses the correlations of its people.
     let frames = before? + 1;
     let away = (a.person.position.xy() - b.person.position.xy()).norm();
     (frames < config.split_frames || away <= config.split_m).then_some(frames)

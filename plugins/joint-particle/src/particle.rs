@@ -4,15 +4,15 @@ use tagalong_core::{Detection, Motion, Person};
 use crate::config::Config;
 use crate::random::Random;
 
-/// One person in one particle: a Gaussian over (x, y, z, vx, vy) in the robot
-/// frame, m and m/s over ground. What was drawn in this frame has no variance.
+/// One person in one particle: a Gaussian over (x, y, z, vx, vy) in the robot frame, m and m/s over
+/// ground. The part that was sampled in this frame has no variance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Particle {
     pub(crate) mean: Vector5<f64>,
     pub(crate) covariance: Matrix5<f64>,
 }
 
-/// From one frame to the next: x' = F (x + shift), P' = F P F' + Q.
+/// Prediction from one frame to the next: x' = F (x + shift), P' = F P F' + Q.
 pub(crate) struct Transition {
     f: Matrix5<f64>,
     shift: Vector5<f64>,
@@ -21,7 +21,7 @@ pub(crate) struct Transition {
 }
 
 impl Transition {
-    /// For the robot's motion.
+    /// Creates the transition for the robot's motion.
     pub(crate) fn new(motion: &Motion, config: &Config) -> Self {
         let (sin, cos) = motion.turn.sin_cos();
         let back = Matrix2::new(cos, sin, -sin, cos);
@@ -33,7 +33,7 @@ impl Transition {
         Self { f, shift, noise: process_noise(motion.dt, config), motion: *motion }
     }
 
-    /// Moves a particle; what it does not know of the motion becomes variance.
+    /// Predicts a particle; the noise becomes variance.
     pub(crate) fn apply(&self, particle: &mut Particle) {
         particle.mean = self.f * (particle.mean + self.shift);
         particle.covariance = self.f * particle.covariance * self.f.transpose()
@@ -42,8 +42,8 @@ impl Transition {
     }
 }
 
-/// Process noise. It is isotropic on the floor, so that the robot's turn does
-/// not matter.
+/// Returns the process noise. It is isotropic on the floor, so that the robot's turn does not
+/// matter.
 fn process_noise(dt: f64, config: &Config) -> Matrix5<f64> {
     let q = config.acceleration_noise;
     let position = q * dt.powi(3) / 3.0 + config.position_noise.powi(2) * dt;
@@ -58,7 +58,7 @@ fn process_noise(dt: f64, config: &Config) -> Matrix5<f64> {
     noise
 }
 
-/// What the uncertainty of the robot's own motion adds to the place.
+/// Returns the noise that the uncertainty of the robot's own motion adds to the position.
 fn ego_noise(predicted: &Vector5<f64>, motion: &Motion) -> Matrix5<f64> {
     let (sin, cos) = motion.turn.sin_cos();
     let (x, y) = (predicted[0], predicted[1]);
@@ -70,7 +70,7 @@ fn ego_noise(predicted: &Vector5<f64>, motion: &Motion) -> Matrix5<f64> {
 }
 
 impl Particle {
-    /// The belief after the first sighting.
+    /// Initialises the state from the first detection.
     pub(crate) fn of(detection: &Detection, config: &Config) -> Self {
         let p = detection.position;
         let mut covariance = Matrix5::zeros();
@@ -80,7 +80,7 @@ impl Particle {
         Self { mean: Vector5::new(p.x, p.y, p.z, 0.0, 0.0), covariance }
     }
 
-    /// Puts the person where a detection is; the velocity stays.
+    /// Moves the person to a detection; the velocity stays.
     pub(crate) fn move_to(&mut self, position: &Point3<f64>, covariance: &Matrix3<f64>) {
         self.mean.fixed_rows_mut::<3>(0).copy_from(&position.coords);
         self.covariance.fixed_view_mut::<3, 2>(0, 3).fill(0.0);
@@ -88,7 +88,7 @@ impl Particle {
         self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(covariance);
     }
 
-    /// Draws all five numbers from the Gaussian with independent `noise`.
+    /// Samples all five numbers from the Gaussian with independent `noise`.
     pub(crate) fn draw_all(&mut self, noise: &Vector5<f64>) {
         if let Some(root) = root(&self.covariance) {
             self.mean += root * noise;
@@ -96,18 +96,19 @@ impl Particle {
         }
     }
 
-    /// Draws the place across the viewing ray of a camera at `eye` and keeps
-    /// the rest as a Gaussian that knows it (Rao and Blackwell).
+    /// Samples the position across the viewing ray of a camera at `eye`, and conditions the rest of
+    /// the Gaussian on it (Rao and Blackwell).
     pub(crate) fn draw_across(&mut self, eye: &Point2<f64>, random: &mut Random) {
         let across = across(&(self.floor() - eye));
         let h = Vector5::new(across.x, across.y, 0.0, 0.0, 0.0);
         let variance = (self.covariance * h).dot(&h).max(0.0);
         let drawn = h.dot(&self.mean) + variance.sqrt() * random.normal();
+        // A measurement without noise is the same as conditioning on the sample.
         self.correct(&h, drawn, 0.0);
     }
 
-    /// Takes back what the last `dt_s` seconds, and what is not known of them,
-    /// changed along a direction on the floor and in height.
+    /// Takes back the changes of the last `dt_s` seconds, and their variance, along a direction on
+    /// the floor and in height.
     pub(crate) fn hold(&mut self, along: &Vector2<f64>, dt_s: f64) {
         let speed = along.dot(&self.person().velocity);
         let mut free = Matrix5::identity();
@@ -123,10 +124,11 @@ impl Particle {
         self.covariance = free * self.covariance * free;
     }
 
-    /// Kalman update by a measurement of `h . x` with the given variance.
+    /// Updates by a measurement of `h . x` with the given variance (Kalman).
     pub(crate) fn correct(&mut self, h: &Vector5<f64>, measured: f64, variance: f64) {
         let ph = self.covariance * h;
         let total = h.dot(&ph) + variance;
+        // Along a direction without variance the gain is undefined, and there is nothing to update.
         if total > 1e-12 {
             let gain = ph / total;
             self.mean += gain * (measured - h.dot(&self.mean));
@@ -146,19 +148,21 @@ impl Particle {
     }
 }
 
-/// The horizontal unit vector to the left of a viewing ray; robot's Y at none.
+/// Returns the horizontal unit vector to the left of a viewing ray; the robot's Y axis if there is
+/// none.
 pub(crate) fn across(ray: &Vector2<f64>) -> Vector2<f64> {
     let length = ray.norm();
     if length > 1e-9 { Vector2::new(-ray.y, ray.x) / length } else { Vector2::y() }
 }
 
-/// A square root of a covariance that may be singular; `None` if it is zero or
-/// no covariance.
+/// Returns a square root of a covariance that may be singular; `None` if it is zero or not a
+/// covariance.
 fn root(covariance: &Matrix5<f64>) -> Option<Matrix5<f64>> {
     let size = covariance.trace();
     if !(size.is_finite() && size > 0.0) {
         return None;
     }
+    // Cholesky needs a positive definite matrix; the ridge is far below any real variance.
     let ridge = Matrix5::identity() * (1e-12 * size);
     (covariance + ridge).cholesky().map(|c| c.unpack())
 }
@@ -176,8 +180,8 @@ mod tests {
     }
 
     proptest! {
-        /// Drawing a part and keeping the rest as a Gaussian is drawing from
-        /// the whole: mean and covariance of many draws are those before.
+        /// Sampling a part and keeping the rest as a Gaussian is the same as sampling the whole:
+        /// mean and covariance over many samples are those before.
         #[test]
         fn what_is_drawn_and_what_is_kept_make_up_the_whole(
             entries in prop::array::uniform25(-0.2..0.2f64), seed in 0u64..100,

@@ -1,38 +1,39 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Seeded random numbers that are the same on every machine. The distributions
-/// are our own, because those of general libraries change between versions.
+/// Seeded random numbers that are the same on every machine. The distributions are implemented
+/// here, because those of general libraries change between versions.
 #[derive(Clone, Debug)]
 pub struct Random(ChaCha8Rng);
 
 impl Random {
-    /// Numbers of one purpose: each stream of a seed is independent of the
-    /// others.
+    /// Creates a generator for one purpose: the streams of a seed are independent of each other.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream);
         Self(generator)
     }
 
-    /// Uniform in (0, 1].
+    /// Returns a number that is uniform in (0, 1].
     pub fn uniform(&mut self) -> f64 {
+        // 53 bits are the precision of f64; 0 is excluded for the logarithm in `normal`.
         ((self.0.next_u64() >> 11) + 1) as f64 / (1u64 << 53) as f64
     }
 
-    /// Standard normal (Box & Muller 1958).
+    /// Returns a standard normal number (Box & Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 
-    /// Uniform with mean zero and variance one.
+    /// Returns a uniform number with mean zero and variance one.
     pub fn flat(&mut self) -> f64 {
         (2.0 * self.uniform() - 1.0) * 3f64.sqrt()
     }
 
-    /// A whole number below `end`, which must not be 0.
+    /// Returns a whole number below `end`, which must not be 0.
     pub fn below(&mut self, end: usize) -> usize {
+        // `uniform` includes 1, which would give `end` itself.
         ((self.uniform() * end as f64) as usize).min(end.saturating_sub(1))
     }
 

@@ -1,8 +1,8 @@
-//! Which particles live on.
+//! Weights and resampling of particles.
 
 use crate::random::Random;
 
-/// Scales `weights` to sum 1; all alike where there is no sum.
+/// Scales `weights` to sum 1; makes them equal if the sum is not usable.
 pub fn normalise(weights: &mut [f64]) {
     let sum: f64 = weights.iter().sum();
     let even = 1.0 / weights.len().max(1) as f64;
@@ -10,34 +10,35 @@ pub fn normalise(weights: &mut [f64]) {
     weights.iter_mut().for_each(|w| *w = if usable { *w / sum } else { even });
 }
 
-/// Weights whose logarithms are known up to a constant, scaled to sum 1.
+/// Converts log-weights that are known up to a constant to weights of sum 1.
 pub fn from_logs(logs: &mut [f64]) {
+    // Relative to the largest one, no exponential overflows, and the largest does not underflow.
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     logs.iter_mut().for_each(|l| *l = if most.is_finite() { (*l - most).exp() } else { 1.0 });
     normalise(logs);
 }
 
-/// How many equally heavy particles say as much (Kong, Liu & Wong 1994).
+/// Returns the number of equal particles with the same information (Kong, Liu & Wong 1994).
 pub fn effective_size(weights: &[f64]) -> f64 {
     1.0 / weights.iter().map(|w| w * w).sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
-/// Systematic resampling (Kitagawa 1996): `count` indices, each as often as its
-/// weight says, up to one, at evenly spaced points with a random offset.
+/// Resamples systematically (Kitagawa 1996): returns `count` indices, each in proportion to its
+/// weight, up to one, at evenly spaced points with a random offset.
 pub fn systematic(weights: &[f64], count: usize, random: &mut Random) -> Vec<usize> {
     let offset = 1.0 - random.uniform();
     pick(weights, (0..count).map(|i| (i as f64 + offset) / count as f64))
 }
 
-/// OpenCV's ConDensation: as above without the random offset, so that it
-/// prefers low indices.
+/// Resamples as OpenCV's ConDensation: as above without the random offset, which favours low
+/// indices.
 pub fn without_offset(weights: &[f64]) -> Vec<usize> {
     let count = weights.len();
     pick(weights, (0..count).map(|i| i as f64 / count as f64))
 }
 
-/// For each rising point in 0..1 the first index whose cumulated weight is
-/// above it.
+/// Returns for each of the ascending points in 0..1 the first index with a cumulated weight above
+/// it.
 fn pick(weights: &[f64], points: impl Iterator<Item = f64>) -> Vec<usize> {
     let (mut index, mut sum) = (0, weights.first().copied().unwrap_or_default());
     points
@@ -51,7 +52,7 @@ fn pick(weights: &[f64], points: impl Iterator<Item = f64>) -> Vec<usize> {
         .collect()
 }
 
-/// The heaviest `count` indices, heaviest first.
+/// Returns the heaviest `count` indices, heaviest first.
 pub fn heaviest(weights: &[f64], count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..weights.len()).collect();
     order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
@@ -59,9 +60,9 @@ pub fn heaviest(weights: &[f64], count: usize) -> Vec<usize> {
     order
 }
 
-/// How many particles keep the error of a histogram with `bins` occupied bins
-/// below `error` (Kullback-Leibler divergence) with the probability whose
-/// normal quantile is `z` (Fox 2003, equation 12).
+/// Returns the number of particles that keeps the error of a histogram with `bins` occupied bins
+/// below `error` (Kullback-Leibler divergence), with the probability of the normal quantile `z`
+/// (Fox 2003, equation 12).
 pub fn kld_size(bins: usize, error: f64, z: f64) -> usize {
     if bins < 2 {
         return 1;

@@ -1,4 +1,4 @@
-//! The filter against references, and each setting by its effect.
+//! Tests of the filter against references, and of each setting by its effect.
 
 mod flags;
 mod reference;

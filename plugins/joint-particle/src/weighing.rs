@@ -1,4 +1,4 @@
-//! How well the particles of a group explain the image.
+//! Likelihood of the particles of a group.
 
 use std::collections::BTreeMap;
 
@@ -13,16 +13,16 @@ use crate::maps::{Grid, LikelihoodMap, Place};
 use crate::particle::{Particle, across};
 use crate::resampling::{effective_size, from_logs, heaviest, normalise};
 
-/// What is needed to look at a frame.
+/// Inputs for the weighing in one frame, and the scenes for the next query.
 pub(crate) struct Look<'a> {
     pub(crate) frame: &'a Frame,
     pub(crate) likelihood: &'a dyn Likelihood,
     pub(crate) config: &'a Config,
-    /// Where people's bodies face, m/s.
+    /// Directions in which bodies face, m/s.
     pub(crate) headings: &'a BTreeMap<TrackId, Vector2<f64>>,
-    /// What a detector found, by track.
+    /// Detections by track.
     pub(crate) sightings: &'a BTreeMap<TrackId, Particle>,
-    /// The camera on the floor.
+    /// Camera position on the floor.
     pub(crate) eye: Point2<f64>,
     scenes: Vec<Person>,
 }
@@ -39,22 +39,23 @@ impl<'a> Look<'a> {
         Self { frame, likelihood, config, headings, sightings, eye, scenes: Vec::new() }
     }
 
-    /// A person as the likelihood wants it: facing where the track faces, not
-    /// where one particle believes to walk.
+    /// Returns a person for the likelihood: with the heading of the track, because the velocity of
+    /// a single particle is too uncertain.
     fn person(&self, id: TrackId, particle: &Particle) -> Person {
         let velocity = self.headings.get(&id).copied().unwrap_or_default();
         Person { velocity, ..particle.person() }
     }
 
-    /// Puts a person into the scene that is being collected.
+    /// Adds a person to the scenes that are being collected.
     fn add(&mut self, id: TrackId, particle: &Particle) {
         let person = self.person(id, particle);
         self.scenes.push(person);
     }
 
-    /// Log-likelihoods of the scenes that were collected.
+    /// Returns the log-likelihoods of the collected scenes, and clears them.
     fn ask(&mut self, people_per_scene: usize) -> Result<Vec<f64>> {
         let mut out = Vec::new();
+        // The buffer is put back afterwards, so that its memory is reused in the next query.
         let scenes = std::mem::take(&mut self.scenes);
         self.likelihood.log_likelihoods(self.frame, &scenes, people_per_scene, &mut out)?;
         self.scenes = scenes;
@@ -62,7 +63,7 @@ impl<'a> Look<'a> {
         Ok(out)
     }
 
-    /// Log-likelihoods of all particles, as far as they speak of some people.
+    /// Returns the log-likelihoods of all particles, with some of their people only.
     fn rows(&mut self, group: &Group, people: &[usize]) -> Result<Vec<f64>> {
         for row in 0..group.rows() {
             let parts = group.row(row);
@@ -71,7 +72,7 @@ impl<'a> Look<'a> {
         self.ask(people.len())
     }
 
-    /// Log-likelihoods of one particle with one person changed.
+    /// Returns the log-likelihoods of one particle with one person changed.
     fn variants(
         &mut self,
         group: &Group,
@@ -91,7 +92,7 @@ impl<'a> Look<'a> {
         self.ask(group.people())
     }
 
-    /// The people of a group from near to far.
+    /// Returns the people of a group from near to far.
     fn order(&self, group: &Group) -> Vec<usize> {
         let depth = |person: usize| {
             let m = group.moments(person).mean;
@@ -109,7 +110,7 @@ impl<'a> Look<'a> {
         group.draw(person, &self.eye, self.config);
     }
 
-    /// P3: during a short occlusion people move parallel to the image.
+    /// Holds depth and height (P3: during a short occlusion people move parallel to the image).
     fn hold_depth(&self, group: &mut Group) {
         let view = self.frame.camera.robot_from_camera * Vector3::z();
         let along = view.xy().try_normalize(1e-6).unwrap_or_else(Vector2::x);
@@ -127,7 +128,7 @@ impl<'a> Look<'a> {
     }
 }
 
-/// Draws what is to be drawn and weighs the particles.
+/// Samples and weighs the particles.
 pub(crate) fn weigh(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     match look.config.method {
         Method::Partitioned => partitioned(group, look)?,
@@ -140,7 +141,7 @@ pub(crate) fn weigh(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Every particle's whole scene is compared with the image.
+/// Compares the whole scene of each particle with the image.
 fn all(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     look.draw_everybody(group);
     let everybody: Vec<usize> = (0..group.people()).collect();
@@ -149,18 +150,21 @@ fn all(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Front to back: who is nearest is weighed without the others; each farther
-/// person is drawn for, and hidden by, the nearer ones that survived.
+/// Weighs front to back: the nearest person without the others; each farther person is sampled for,
+/// and hidden by, the nearer ones that survived.
 fn partitioned(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     let order = look.order(group);
     let mut before = vec![0.0; group.rows()];
     for (k, person) in order.iter().enumerate() {
         look.draw(group, *person);
         let now = look.rows(group, &order[..=k])?;
+        // The nearer people are counted in the weights already; only the gain of this person is
+        // new.
         let gained: Vec<f64> = now.iter().zip(&before).map(|(n, b)| n - b).collect();
         take_in(group, &gained);
         before = now;
         let few = effective_size(&group.weights) < 0.5 * group.rows() as f64;
+        // After the last person the weights are kept: the estimate is computed from them.
         if few && k + 1 < order.len() {
             let rows = group.resample(group.rows(), look.config);
             before = rows.into_iter().map(|row| before[row]).collect();
@@ -178,17 +182,17 @@ fn take_in(group: &mut Group, logs: &[f64]) {
     group.likelihoods = relative(logs);
 }
 
-/// Likelihoods relative to the largest one.
+/// Returns the likelihoods relative to the largest one.
 fn relative(logs: &[f64]) -> Vec<f64> {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     logs.iter().map(|log| (log - most).exp()).collect()
 }
 
-/// Lateral places of two people: P3 holds depth and height.
+/// Frame of the lateral positions of two people: P3 holds depth and height.
 struct Lateral {
     near: usize,
     far: usize,
-    /// Where the near person's mean is: both places count from there.
+    /// Mean position of the near person: both lateral positions are measured from it.
     origin: Point2<f64>,
     across: Vector2<f64>,
     means: [Vector5<f64>; 2],
@@ -211,7 +215,7 @@ impl Lateral {
         (0..group.rows()).map(|row| self.place(group.row(row))).collect()
     }
 
-    /// The map of a method: from a table, or from the chosen places.
+    /// Computes the map of a method: at all places of a table, or at the chosen ones.
     fn map(
         &self,
         group: &Group,
@@ -233,7 +237,7 @@ impl Lateral {
         [self.near, self.far].map(|p| self.across.dot(&(row[p].floor() - self.origin)))
     }
 
-    /// The scene with the two people at a place, in the order of the columns.
+    /// Returns the scene with the two people at a place, in the order of the columns.
     fn scene(&self, place: &Place) -> [Particle; 2] {
         let moved = |i: usize| {
             let mut mean = self.means[i];
@@ -248,8 +252,8 @@ impl Lateral {
     }
 }
 
-/// P3, section III: a map of the likelihood over the lateral places is made
-/// from a table, or from a few particles, and looked up by all.
+/// Weighs by a map of the likelihood over the lateral positions (P3, section III), which is made
+/// from a table or from a few particles, and looked up by all.
 fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     let before = group.likelihoods.clone();
     if look.config.hold_depth {
@@ -266,7 +270,7 @@ fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
     Ok(())
 }
 
-/// The places that are compared with the image.
+/// Returns the places that are compared with the image.
 fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
     if config.chosen == Chosen::PreviousBest {
         return heaviest(before, config.points).into_iter().map(|row| all[row]).collect();
@@ -281,9 +285,9 @@ fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
     coarse.iter().copied().chain(spread).collect()
 }
 
-/// Corrects the depth and then the height of one person in all particles: the
-/// likelihood along a line through the best particle, times what was believed,
-/// has a mean and a variance, which are those of a measurement.
+/// Updates the depth and then the height of one person in all particles: the likelihood along a
+/// line through the best particle, times the prior, has a mean and a variance, which are converted
+/// to those of a measurement.
 fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
     for line in [Line::Range, Line::Height] {
         let row = group.best();
@@ -302,8 +306,11 @@ fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
         let variants: Vec<Person> = (0..SAMPLES).map(moved).collect();
         let logs = look.variants(group, row, person, variants.into_iter())?;
         let Some((shift, spread)) = measurement(&logs, sigma) else { continue };
+        // A sampled likelihood may be sharper than the templates are accurate.
         let spread = spread.max(line.finest_m(&best, &look.eye).powi(2));
         let measured = line.value(&best, &look.eye) + shift;
+        // All particles use the measurement from one line: a line for each would need as many
+        // comparisons as there are particles.
         for particle in group.column_mut(person) {
             let h = line.direction(particle, &look.eye);
             let now = line.value(particle, &look.eye);
@@ -313,12 +320,12 @@ fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
     Ok(())
 }
 
-/// Lines along which a person is looked for.
+/// Lines along which the likelihood is sampled.
 #[derive(Clone, Copy)]
 enum Line {
     /// Along the viewing ray, on the floor.
     Range,
-    /// Up and down.
+    /// Along the vertical.
     Height,
 }
 
@@ -348,22 +355,22 @@ impl Line {
     }
 }
 
-/// Places along a line at which the likelihood is asked for.
+/// Number of samples along a line.
 const SAMPLES: usize = 15;
-/// They reach this many standard deviations to both sides.
+/// Reach of the samples to both sides, in standard deviations.
 const REACH: f64 = 3.5;
-/// No line tells more than this, m ...
+/// Least standard deviation of a measurement along a line, m ...
 const FINEST_M: f64 = 0.02;
-/// ... and none along a viewing ray more than this part of the distance:
-/// likelihoods tell depths apart by a few per cent.
+/// ... and along a viewing ray, as a part of the distance: likelihoods tell depths apart by a few
+/// per cent.
 const FINEST_PART: f64 = 0.015;
 
 fn offset(i: usize, sigma: f64) -> f64 {
     REACH * sigma * (2.0 * i as f64 / (SAMPLES - 1) as f64 - 1.0)
 }
 
-/// The measurement that turns the prior N(0, sigma²) into the posterior: its
-/// value and variance; `None` if the likelihood says nothing.
+/// Returns value and variance of the measurement that turns the prior N(0, sigma²) into the
+/// posterior; `None` if the likelihood is flat.
 fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
     let prior = |i: usize| -0.5 * (offset(i, sigma) / sigma).powi(2);
     let mut weights: Vec<f64> = logs.iter().enumerate().map(|(i, log)| log + prior(i)).collect();
@@ -371,6 +378,7 @@ fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
     let mean: f64 = weights.iter().enumerate().map(|(i, w)| w * offset(i, sigma)).sum();
     let square = |i: usize| (offset(i, sigma) - mean).powi(2);
     let variance: f64 = weights.iter().enumerate().map(|(i, w)| w * square(i)).sum();
+    // A posterior about as wide as the prior would mean a measurement of unbounded variance.
     if variance.is_nan() || variance >= 0.95 * sigma * sigma {
         return None;
     }
@@ -378,13 +386,14 @@ fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
     Some((mean * (1.0 + spread / (sigma * sigma)), spread))
 }
 
-/// By how much each person makes the best particle's scene more likely, nats.
+/// Returns the gain in log-likelihood of the best particle's scene by each person, nats.
 pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
     let row = group.best();
     let everybody: Vec<usize> = (0..group.people()).collect();
     let scene = |look: &mut Look<'_>, people: &[usize]| -> Result<f64> {
         let parts = group.row(row);
         people.iter().for_each(|p| look.add(group.ids[*p], &parts[*p]));
+        // Likelihoods are relative to the empty scene.
         if people.is_empty() {
             return Ok(0.0);
         }
@@ -398,8 +407,8 @@ pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
         .collect()
 }
 
-/// What there is to see of a group: its particles, the scene of the best one, and
-/// how likely the lateral places of two people are.
+/// Adds a group to the sketch: its particles, the scene of the best one, and the likelihood over
+/// the lateral positions of two people.
 pub(crate) fn sketch(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Result<()> {
     let best = group.best();
     let heaviest = group.weights[best].max(f64::MIN_POSITIVE);
@@ -421,8 +430,8 @@ pub(crate) fn sketch(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) ->
     Ok(())
 }
 
-/// P3, Figure 7: the table (b), and what a few particles make of it (d). Their
-/// peaks are so sharp that fourth roots are shown.
+/// Adds the maps of P3, Figure 7: the table (b), and its approximation from a few particles (d).
+/// Their peaks are so sharp that fourth roots are shown.
 fn sketch_maps(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Result<()> {
     let (lateral, grid) = (Lateral::new(group, look), Grid::new(look.config));
     let chosen = chosen(&lateral.places(group), &group.likelihoods, look.config);
@@ -441,9 +450,8 @@ fn sketch_maps(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Resul
     Ok(())
 }
 
-/// Which way somebody faces: the template that fits best of those seen along the
-/// viewing ray, facing left and facing right. `None` where they fit alike, as
-/// those of somebody hidden do.
+/// Returns the direction in which a person faces: that of the best template of those seen along the
+/// viewing ray, facing left and facing right. `None` if they fit alike, as for a hidden person.
 pub(crate) fn facing(
     group: &Group,
     person: usize,
@@ -460,7 +468,7 @@ pub(crate) fn facing(
     Ok(tells.then_some(ways[order[0]]))
 }
 
-/// Templates that differ by less fit alike, nats.
+/// Least difference between the best and the worst template that tells the direction, nats.
 const TELLING_NATS: f64 = 0.5;
 
 #[cfg(test)]
@@ -499,7 +507,7 @@ mod tests {
         assert!(group.likelihoods.iter().zip(&[0.25, 1.0, 0.5]).map(off).all(|off| off < 1e-12));
     }
 
-    /// What `work` makes of two people one behind the other, seen with a likelihood.
+    /// Runs `work` on two people one behind the other, with a likelihood.
     fn looking<T>(
         config: &Config,
         likelihood: &Formula,

@@ -1,46 +1,46 @@
 use crate::Config;
 use crate::warp::{Sweep, Warp};
 
-/// The background is renewed in so many turns while the robot stands.
+/// Number of parts in which the background is renewed while the robot stands.
 pub(crate) const TURNS: usize = 4;
-/// While the robot moves an image is this part of what it makes.
+/// Weight of a new image in the mean while the robot moves.
 const MOVING_PART: f32 = 0.5;
 
-/// How fast the background follows.
+/// Rate at which the background follows the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     /// Part of the difference that is taken over in one image.
     pub(crate) part: f32,
-    /// What differs for longer is background, s.
+    /// Time after which a differing pixel becomes background, s.
     pub(crate) absorb_s: f32,
-    /// Since the image before, s.
+    /// Time since the previous image, s.
     pub(crate) dt_s: f32,
-    /// One row in so many has its turn in each image.
+    /// One row in this many is renewed in each image.
     pub(crate) turns: usize,
 }
 
-/// What the empty room looks like: three colours a pixel, row by row.
+/// Model of the empty scene: three colours per pixel, row by row.
 ///
-/// The first images make mean and spread (P5, section 4.2: the mean of five).
-/// Of five images no pixel's spread is known, so it is pooled along the rows.
+/// The first images give mean and spread (P5, section 4.2: the mean of five). Few images do not
+/// give the spread of a single pixel, so it is pooled along the rows.
 #[derive(Clone, Debug)]
 pub struct Background {
     width: usize,
     frames: u32,
-    /// Of these, how many while the robot stood.
+    /// Number of these images that were taken while the robot stood.
     still: u32,
     mean: Vec<f32>,
     squares: Vec<f32>,
-    /// For how long each pixel has differed, s.
+    /// Time for which each pixel has differed, s.
     taken_s: Vec<f32>,
-    /// The mean, rounded.
+    /// Rounded mean.
     pub(crate) level: Vec<u8>,
-    /// A colour that differs by more differs from the background.
+    /// Largest difference of a colour value from the background that is still background.
     pub(crate) limit: Vec<u8>,
 }
 
 impl Background {
-    /// Of an image with so many columns and rows; nothing is known of it yet.
+    /// Creates a background for images of this size, without data.
     pub fn new(width: usize, height: usize) -> Self {
         let values = 3 * width * height;
         Self {
@@ -55,22 +55,22 @@ impl Background {
         }
     }
 
-    /// Images that it is made of.
+    /// Returns the number of images it was made of.
     pub fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Colours of all pixels, as many as the image has.
+    /// Returns the number of colour values, three per pixel.
     pub fn len(&self) -> usize {
         self.level.len()
     }
 
-    /// True if the image has no pixels.
+    /// Returns true if the image has no pixels.
     pub fn is_empty(&self) -> bool {
         self.level.is_empty()
     }
 
-    /// Takes in an image of the empty room.
+    /// Adds an image of the empty scene.
     pub fn add(&mut self, colours: &[u8], config: &Config) {
         self.frames += 1;
         self.still += 1;
@@ -86,8 +86,8 @@ impl Background {
         self.set_limits(config);
     }
 
-    /// Takes in an image of the empty room while the robot moves: what does not
-    /// fit the mean is no noise then.
+    /// Adds an image of the empty scene while the robot moves: differences from the mean are then
+    /// errors of the odometry, not noise, and do not enter the spread.
     pub(crate) fn add_moving(&mut self, colours: &[u8], config: &Config) {
         self.frames += 1;
         let part = if self.frames == 1 { 1.0 } else { MOVING_PART };
@@ -104,7 +104,7 @@ impl Background {
         for (limits, squares) in self.limit.chunks_mut(row).zip(self.squares.chunks(row)) {
             let pooled = squares.iter().sum::<f32>() / (count * row as f32);
             for (limit, squares) in limits.iter_mut().zip(squares) {
-                // A pixel's own spread says something after a dozen images.
+                // The spread of a single pixel is reliable only after a dozen images.
                 let own = if self.still >= 12 { squares / count } else { 0.0 };
                 let sigmas = config.threshold_sigmas as f32 * pooled.max(own).sqrt();
                 *limit = (sigmas.ceil() as u8).max(config.threshold_floor);
@@ -112,10 +112,11 @@ impl Background {
         }
     }
 
-    /// Follows an image: by a part where `taken` is 0; at once where it has not
-    /// been 0 for long. One row in [`Pace::turns`] has its turn.
+    /// Follows an image: by a part where `taken` is 0; completely where it has not been 0 for
+    /// longer than [`Pace::absorb_s`]. One row in [`Pace::turns`] is renewed.
     pub(crate) fn follow(&mut self, colours: &[u8], taken: &[u8], pace: &Pace, phase: usize) {
         let turns = pace.turns.max(1);
+        // One row's turn makes up for the images in which other rows had theirs.
         let part = 1.0 - (1.0 - pace.part.clamp(0.0, 1.0)).powi(turns as i32);
         let passed_s = turns as f32 * pace.dt_s;
         let width = self.width.max(1);
@@ -142,7 +143,7 @@ impl Background {
         }
     }
 
-    /// Moves all that is known of each pixel, as `sweep` finds it moved.
+    /// Moves mean and time of each pixel with the robot's motion, as `sweep` estimates it.
     pub(crate) fn move_by(&mut self, sweep: &mut Sweep, warps: &[Warp], colours: &[u8]) {
         sweep.apply(warps, colours, &mut self.mean, &mut self.taken_s);
         for (level, mean) in self.level.iter_mut().zip(&self.mean) {

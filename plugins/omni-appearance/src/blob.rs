@@ -3,38 +3,38 @@ use serde::{Deserialize, Serialize};
 use crate::Counts;
 use crate::circular::{Run, mean};
 
-/// The features' names, in the order of [`Features::values`].
+/// Names of the features, in the order of [`Features::values`].
 pub const FEATURES: [&str; 9] =
     ["width", "bottom", "pixels", "top", "middle", "core", "low", "inverse_core", "inverse_height"];
 
-/// Columns with at least this part of the fullest column's pixels are the core
-/// of a person: trunk and head, without arms and what is left of shadows.
+/// Part of the fullest column's pixels from which a column belongs to the core of a person: trunk
+/// and head, without arms and remains of shadows.
 const CORE: f64 = 0.4;
 /// Fewest pixels in a row of the core.
 const ROW_PIXELS: u32 = 2;
 
-/// What is measured of a person in the panorama; all in columns and rows.
+/// Measurements of a person in the panorama, in columns and rows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Features {
-    /// Feature 1 of P5: from the first to the last column.
+    /// Feature 1 of P5: number of columns from the first to the last.
     pub width: f64,
-    /// Feature 2: from the lowest row to the lower edge of the image.
+    /// Feature 2: rows from the lowest row of the person to the lower edge of the image.
     pub bottom: f64,
-    /// Feature 3: pixels that differ.
+    /// Feature 3: number of pixels that differ.
     pub pixels: f64,
-    /// The highest row.
+    /// Highest row.
     pub top: f64,
-    /// The row above which half of the pixels are.
+    /// Row above which half of the pixels are.
     pub middle: f64,
-    /// Columns of the core.
+    /// Number of columns of the core.
     pub core: f64,
-    /// The row above which 95 % of the pixels are.
+    /// Row above which 95 % of the pixels are.
     pub low: f64,
 }
 
 impl Features {
-    /// As numbers, the three of the paper first; what falls with the distance is
-    /// there as its inverse, too, which grows with it.
+    /// Returns the features as numbers, the three of the paper first; two that fall with the
+    /// distance are repeated as their inverses, which grow with it.
     pub fn values(&self) -> [f64; 9] {
         [
             self.width,
@@ -44,12 +44,13 @@ impl Features {
             self.middle,
             self.core,
             self.low,
+            // At least one column and row: an empty extent must not divide by 0.
             1.0 / self.core.max(1.0),
             1.0 / (self.low - self.top).max(1.0),
         ]
     }
 
-    /// The lowest row in an image of so many.
+    /// Returns the lowest row of the person in an image with this many rows.
     pub fn lowest_row(&self, rows: usize) -> f64 {
         rows as f64 - 1.0 - self.bottom
     }
@@ -58,27 +59,27 @@ impl Features {
 /// A run of columns that may be a person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blob {
-    /// Its columns.
+    /// Columns of the run.
     pub run: Run,
     /// Mean column, weighted by the pixels in each (P5, section 4.2).
     pub column: f64,
-    /// What is measured of it.
+    /// Measurements of the run.
     pub features: Features,
-    /// Mean colour of its upper half.
+    /// Mean colour of the upper half.
     pub colour: [f64; 3],
-    /// How much of the person it shows, from 0 to 1: the rest is hidden behind
-    /// somebody who is known to be there.
+    /// Visible part of the person, from 0 to 1: the rest is hidden behind another tracked person.
     pub visible: f64,
 }
 
 impl Blob {
-    /// Measures a run of columns; `None` if no row of it has pixels enough.
-    /// `colours` is the image in which `counts` were made.
+    /// Measures a run of columns; `None` if no row of it has enough pixels. `colours` is the image
+    /// from which `counts` were computed.
     pub fn measure(run: Run, counts: &Counts, colours: &[u8]) -> Option<Self> {
         let columns = &counts.columns;
         let width = columns.len();
         let height = |column: usize| f64::from(columns[column]);
         let fullest = run.columns(width).map(height).fold(0.0, f64::max);
+        // Bottom and top come from the core: an arm or a remnant of a shadow would shift them.
         let core: Vec<usize> =
             run.columns(width).filter(|c| height(*c) >= CORE * fullest).collect();
         let rows: Vec<u32> = counts
@@ -104,7 +105,7 @@ impl Blob {
     }
 }
 
-/// The row above which this part of the pixels lies, between rows.
+/// Returns the row above which this part of the pixels lies, interpolated between rows.
 fn above(rows: &[u32], part: f64) -> f64 {
     let wanted = part * f64::from(rows.iter().sum::<u32>());
     let mut sum = 0.0;

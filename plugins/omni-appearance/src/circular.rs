@@ -1,25 +1,25 @@
-//! Columns of an image that goes once around.
+//! Columns of a panorama that closes on itself.
 
-/// A run of columns: the first, from 0 up to the width, and how many. It
-/// continues beyond the last column at the first one.
+/// A run of columns: the first, from 0 up to the width, and their number. It continues beyond the
+/// last column at the first one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     /// First column.
     pub first: usize,
-    /// Columns, at most all there are.
+    /// Number of columns, at most the width.
     pub length: usize,
 }
 
 impl Run {
-    /// The columns, each below `width`.
+    /// Returns the columns, each below `width`.
     pub fn columns(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
         let (first, length) = (self.first, self.length);
         (0..length).map(move |i| (first + i) % width)
     }
 }
 
-/// The runs of columns that are `true`, in the order of their first columns;
-/// gaps of up to `bridge` columns belong to the run around them.
+/// Returns the runs of columns that are `true`, in the order of their first columns; gaps of up to
+/// `bridge` columns belong to the run around them.
 ///
 /// ```
 /// use tagalong_omni_appearance::circular::{Run, runs};
@@ -57,9 +57,10 @@ fn join_across_the_seam(found: &mut Vec<Run>, width: usize, bridge: usize) {
     }
 }
 
-/// The mean column of weights over a run, from 0 up to `width`; the middle of
-/// the run if there is no weight.
+/// Returns the weighted mean column of a run, from 0 up to `width`; the middle of the run if there
+/// is no weight.
 pub fn mean(run: &Run, width: usize, weight: impl Fn(usize) -> f64) -> f64 {
+    // Offsets from the start of the run do not jump at the seam, as column numbers do.
     let (mut sum, mut total) = (0.0, 0.0);
     for (offset, column) in run.columns(width).enumerate() {
         sum += offset as f64 * weight(column);
@@ -75,7 +76,7 @@ mod tests {
 
     use super::*;
 
-    /// True for the columns of any run, gaps included: by trying every gap.
+    /// Marks the columns of all runs, gaps included, by trying every gap.
     fn covered(on: &[bool], bridge: usize) -> Vec<bool> {
         let width = on.len();
         let mut all = on.to_vec();

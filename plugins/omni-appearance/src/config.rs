@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result};
 
-/// How the distance follows from what is seen.
+/// Method by which the distance is computed from the features.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -13,11 +13,11 @@ pub enum Distance {
     Network,
     /// The same network, trained as in the paper: by back-propagation at a rate of 0.3.
     Printed,
-    /// A network of all features that are measured.
+    /// A network with all measured features as inputs.
     Rich,
-    /// A straight line in the lower edge, its square, its inverse, width and area.
+    /// Ridge regression on the lower edge, its square, its inverse, width and area.
     Ridge,
-    /// Where the ray of the lower edge meets the floor.
+    /// The range at which the ray of the lower edge meets the floor.
     Analytic,
 }
 
@@ -25,72 +25,69 @@ pub enum Distance {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Model file, relative to the config; empty: the model that is built in.
+    /// Model file, relative to the config; empty: the built-in model.
     pub model: String,
-    /// How the distance is found: `network`, `printed`, `rich`, `ridge` or
-    /// `analytic`.
+    /// Method for the distance: `network`, `printed`, `rich`, `ridge` or `analytic`.
     pub distance: Distance,
-    /// Name of the person in the model whose head is used; `general` for
-    /// everybody's, `nearest` for the one whose looks fit best.
+    /// Name of the person in the model with the fit to use; `general` for the fit to
+    /// all people, `nearest` for the person with the closest appearance.
     pub person: String,
-    /// Images of the empty room that make the background; nobody is found before.
+    /// Images of the empty scene from which the background is made; there are no detections before.
     #[schemars(range(min = 1, max = 10000))]
     pub background_frames: u32,
-    /// A pixel differs from the background by more than so many standard
-    /// deviations ...
+    /// A pixel differs from the background by more than this many standard deviations ...
     #[schemars(range(min = 0.0, max = 100.0))]
     pub threshold_sigmas: f64,
     /// ... and by more than this, grey levels.
     pub threshold_floor: u8,
-    /// Time in which the background follows a change, s; 0 keeps it as it is.
+    /// Time constant with which the background follows a change, s; 0 keeps it as it is.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub adapt_s: f64,
-    /// What differs for so long without a break becomes background, s; 0: nothing.
+    /// Time after which a pixel that differs without a break becomes background, s; 0: never.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub absorb_s: f64,
-    /// A pixel whose colours are all darker, but not below this part of the
-    /// background, may be shadow; 1 finds none.
+    /// A pixel of which the colours are darker on average, but not below this part of the
+    /// background, may be shadow; 1 finds no shadow.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub shadow_min: f64,
-    /// Nor above this part.
+    /// Upper limit of that part.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub shadow_max: f64,
-    /// Most difference between the colours' parts in a shadow.
+    /// Largest difference between the three colours' parts in a shadow.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub shadow_tint: f64,
-    /// Fewest pixels in a column of a person; more if the empty room had more.
+    /// Fewest pixels in a column of a person; more if columns of the empty scene had more.
     #[schemars(range(min = 1, max = 1000))]
     pub column_pixels: u16,
-    /// Gaps of up to so many columns do not divide a person.
+    /// Widest gap, in columns, that does not divide a person.
     #[schemars(range(max = 100))]
     pub bridge_columns: usize,
     /// Fewest pixels of a person.
     pub min_pixels: u32,
-    /// A run is divided where its columns fall below this part of the lower one
-    /// of the peaks beside; 0 divides none.
+    /// A run is divided where its columns fall below this part of the lower of the two peaks
+    /// beside; 0 divides none.
     #[schemars(range(min = 0.0, max = 0.999))]
     pub valley: f64,
     /// Most people in an image; the largest are kept.
     #[schemars(range(min = 1, max = 100))]
     pub max_people: usize,
-    /// Heights of heads that are believed, m.
+    /// Lowest and highest head that is accepted, m.
     #[schemars(inner(range(min = -0.999, max = 3.999)))]
     pub head_height_m: [f64; 2],
     /// Standard deviation of the bearing, degrees, ...
     #[schemars(range(min = 0.01, max = 90.0))]
     pub sigma_bearing_deg: f64,
-    /// ... and of what is seen of a body about its middle, m: arms and legs swing.
+    /// ... and of the visible body about its middle, m: arms and legs swing.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub sigma_aside_m: f64,
-    /// Standard deviation of the head's height, m.
+    /// Standard deviation of the height of the head, m.
     #[schemars(range(min = 0.001, max = 10.0))]
     pub sigma_height_m: f64,
-    /// Walls and furniture are taken to be at one of these distances, whichever fits
-    /// best, when the background follows the robot's motion, m.
+    /// Walls and furniture are assumed at one of these distances, whichever fits best, when the
+    /// background is moved with the robot, m.
     #[schemars(length(min = 1, max = 16), inner(range(min = 0.5, max = 1000.0)))]
     pub walls_m: Vec<f64>,
-    /// The background is known to within so many columns and rows after the
-    /// robot has moved.
+    /// Uncertainty of the background after the robot has moved, columns and rows.
     #[schemars(inner(range(max = 20)))]
     pub slack_px: [usize; 2],
     /// As printed: columns are averaged as if the panorama ended at its seam.
@@ -128,7 +125,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Refuses numbers that cannot work.
+    /// Refuses settings outside their ranges.
     pub(crate) fn check(&self) -> Result<()> {
         check_settings(self)?;
         let [low, high] = self.head_height_m;

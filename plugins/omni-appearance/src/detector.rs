@@ -7,22 +7,22 @@ use tagalong_geometry::Camera;
 
 use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, View};
 
-/// The model that is part of the program.
+/// Model that is compiled into the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/omni-distance.toml");
-/// The top of a head is so far above its centre, m.
+/// Distance from the centre of a head to its top, m.
 const HALF_HEAD_M: f64 = 0.115;
-/// Score of somebody of ordinary height, and what a height off by a standard
-/// deviation of this many metres costs.
+/// Score of a person of usual height.
 const SURE: f64 = 3.0;
+/// Usual height of a head above the floor and its standard deviation, m, by which the score falls.
 const STATURE: [f64; 2] = [1.6, 0.2];
-/// Of whom less is seen the distance is told by the feet alone.
+/// Visible part of a person below which the distance is computed from the feet alone.
 const WHOLE: f64 = 0.8;
-/// What is wholly hidden would move the middle by so much, m.
+/// Standard deviation of the middle of a person that is wholly hidden, m.
 const HIDDEN_M: f64 = 0.25;
-/// A search near a track takes what is within so many standard deviations.
+/// Radius of a search near a track, in standard deviations of the track.
 const NEAR_SIGMAS: f64 = 3.0;
 
-/// The detector.
+/// Detector of people in a panorama by their difference from the background.
 pub struct OmniAppearance {
     config: Config,
     model: Model,
@@ -30,11 +30,11 @@ pub struct OmniAppearance {
 }
 
 impl OmniAppearance {
-    /// A detector; reads its model.
+    /// Creates a detector and reads its model.
     ///
     /// # Errors
-    /// [`Error::Model`] for a file that cannot be read or is no model, or a
-    /// person whom it does not know; [`Error::Settings`] for impossible numbers.
+    /// [`Error::Model`] for a file that cannot be read or is not a model, or for a person that is
+    /// not in it; [`Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
         let known = ["general", "nearest"].contains(&config.person.as_str())
@@ -47,17 +47,18 @@ impl OmniAppearance {
         Ok(Self { eyes: Eyes::new(config.clone())?, config, model })
     }
 
-    /// The model in use.
+    /// Returns the model in use.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The place of somebody.
+    /// Returns the detection of a blob: its position by distance and bearing.
     fn placed(&self, blob: &Blob, camera: &Camera, view: &View<'_>) -> Detection {
-        // Width and area of a part say nothing of the whole; feet do.
+        // Width and area of a visible part do not give the distance of the whole; the feet do.
         let how = if blob.visible < WHOLE { Distance::Analytic } else { self.config.distance };
         let head = self.model.head(&self.config.person, blob, view, how);
         let (distance, sigma) = head.distance(&blob.features, view, how);
+        // The regressions may extrapolate far beyond the distances they were fitted to.
         let distance = distance.clamp(0.3, 30.0);
         let bearing = view.panorama.bearing(blob.column);
         let (sine, cosine) = bearing.sin_cos();
@@ -65,6 +66,8 @@ impl OmniAppearance {
         let mut position = camera.robot_from_camera * flat;
         let [low, high] = self.config.head_height_m;
         let top = view.top_m(&blob.features, distance);
+        // Outside the accepted heights the exact value does not matter: the detection is
+        // dropped.
         position.z = (top - HALF_HEAD_M).clamp(low - 0.5, high + 0.5);
         Detection {
             region: camera.upper_body(&position),
@@ -75,8 +78,8 @@ impl OmniAppearance {
         }
     }
 
-    /// Polar: the distance's own spread along the ray, across it that of the bearing,
-    /// of the body about its middle, and of what is hidden of it.
+    /// Returns the covariance in polar form: that of the distance along the ray; across it the sum
+    /// of those of the bearing, of the body about its middle, and of its hidden part.
     fn covariance(
         &self,
         position: &Point3<f64>,
@@ -159,7 +162,7 @@ impl Detector for OmniAppearance {
     }
 }
 
-/// Whether a search wants somebody.
+/// Returns true if a detection lies where the search looks.
 fn fits(search: &Search<'_>, person: &Detection) -> bool {
     match search {
         Search::Everywhere { .. } => true,

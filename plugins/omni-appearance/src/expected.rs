@@ -1,5 +1,5 @@
-//! People who are known, and where in the image they should be: two who are seen
-//! as one run of columns are told apart by that.
+//! Image columns in which known people are expected: they separate two people that are seen as one
+//! run of columns.
 
 use nalgebra::{Isometry2, Point3};
 use tagalong_core::{Frame, Track};
@@ -9,11 +9,11 @@ use crate::circular::Run;
 
 /// Half the width of a person, arms included, m.
 const HALF_WIDTH_M: f64 = 0.27;
-/// Whoever was not seen for longer is expected nowhere, s.
+/// Longest time since a track was seen for which it is expected in the image, s.
 const FRESH_S: f64 = 1.5;
-/// Nearer to the axis nobody is expected, m.
+/// Least distance from the axis at which a person is expected, m.
 const NEAREST_M: f64 = 0.4;
-/// Who shows a smaller part of their width is hidden: nothing is measured of them.
+/// Least visible part of a person's width; with less the person is hidden and not measured.
 const LEAST_VISIBLE: f64 = 0.4;
 
 /// A track that was seen lately.
@@ -30,7 +30,8 @@ impl Known {
         fresh.then_some(Self { position: person.position, velocity: person.velocity })
     }
 
-    /// After a time, seen by a robot that has moved: `before_from_now` is its motion.
+    /// Predicts over `dt_s` seconds, and into the frame of a robot that has moved:
+    /// `before_from_now` is its motion.
     pub(crate) fn moved(&self, dt_s: f64, before_from_now: &Isometry2<f64>) -> Self {
         let back = before_from_now.inverse();
         let there = self.position.xy() + dt_s * self.velocity;
@@ -42,7 +43,7 @@ impl Known {
     }
 }
 
-/// Where somebody should be seen.
+/// Expected columns of a person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Expected {
     /// Middle column, from 0 up to the width.
@@ -52,11 +53,11 @@ pub(crate) struct Expected {
     range_m: f64,
 }
 
-/// Columns of a run that are one person's, and how much of that person they show.
+/// Columns of a run that belong to one person, and the visible part of that person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
     pub(crate) run: Run,
-    /// From 0 to 1.
+    /// Visible part, from 0 to 1.
     pub(crate) visible: f64,
 }
 
@@ -70,7 +71,7 @@ impl Expected {
         Self { column, half: half * width, range_m }
     }
 
-    /// How far a column is off the middle, in half widths; right is positive.
+    /// Returns the offset of a column from the middle, in half widths; right is positive.
     fn off(&self, column: usize, width: usize) -> f64 {
         let width = width as f64;
         let columns = (column as f64 - self.column + 0.5 * width).rem_euclid(width) - 0.5 * width;
@@ -78,7 +79,7 @@ impl Expected {
     }
 }
 
-/// The parts of a run that are different people's; itself if it is one person's.
+/// Divides a run into the parts of different people; returns the run itself if it is of one person.
 pub(crate) fn divided(run: Run, width: usize, expected: &[Expected]) -> Vec<Part> {
     let inside = visible(run, width, expected);
     if inside.len() < 2 {
@@ -92,7 +93,7 @@ pub(crate) fn divided(run: Run, width: usize, expected: &[Expected]) -> Vec<Part
             _ => parts.push((owner, Run { first: (run.first + offset) % width, length: 1 })),
         }
     }
-    // Who is seen on both sides of somebody nearer is measured by the larger one.
+    // A person that is seen on both sides of a nearer one is measured by the larger part.
     let largest = |who: usize| {
         let own = parts.iter().filter(|(owner, _)| *owner == who).map(|(_, part)| *part);
         own.max_by_key(|part| part.length)
@@ -105,7 +106,7 @@ pub(crate) fn divided(run: Run, width: usize, expected: &[Expected]) -> Vec<Part
     inside.iter().enumerate().filter_map(part).collect()
 }
 
-/// Who is expected in a run and not hidden behind the others, from near to far.
+/// Returns the people that are expected in a run and not hidden behind others, from near to far.
 fn visible(run: Run, width: usize, expected: &[Expected]) -> Vec<Expected> {
     let mut inside: Vec<Expected> =
         expected.iter().filter(|e| shares(e, run, width)).copied().collect();
@@ -124,14 +125,14 @@ fn visible(run: Run, width: usize, expected: &[Expected]) -> Vec<Expected> {
     seen
 }
 
-/// Somebody is expected in a run if the middle of theirs is in it.
+/// Returns true if the middle of the expected person is in the run.
 fn shares(expected: &Expected, run: Run, width: usize) -> bool {
     let middle = expected.column.round() as usize % width.max(1);
     (middle + width - run.first) % width < run.length
 }
 
-/// Whose a column is: of those whose width it is in, the nearest person; otherwise
-/// the one whose edge is nearest. `inside` goes from near to far.
+/// Returns the person that a column belongs to: the nearest of those that cover it; otherwise the
+/// one with the nearest edge. `inside` goes from near to far.
 fn owner(column: usize, width: usize, inside: &[Expected]) -> usize {
     let off = |who: usize| inside[who].off(column, width).abs();
     let covering = (0..inside.len()).find(|who| off(*who) <= 1.0);

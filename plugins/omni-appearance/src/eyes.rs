@@ -5,50 +5,50 @@ use crate::expected::{Expected, Known, divided};
 use crate::warp::{Bounds, Sweep, Warp, is_moving};
 use crate::{Background, Blob, Config, Segmenter, View};
 
-/// Sees who differs from the background, image after image.
+/// Tracks the background over the images, and finds the blobs that differ from it.
 pub struct Eyes {
     config: Config,
     scene: Option<Scene>,
 }
 
-/// What is kept from image to image of one size.
+/// State that is kept between images of one size.
 struct Scene {
     size: (usize, usize),
     background: Background,
     segmenter: Segmenter,
     bounds: Bounds,
     sweep: Sweep,
-    /// The image that was looked at last, and who is in it.
+    /// Frame number and time of the image in `blobs`.
     seen: Option<(u64, Stamp)>,
     blobs: Vec<Blob>,
-    /// Who was known after the image before.
+    /// Tracks that were known after the previous image.
     known: Vec<Known>,
-    /// The robot has moved since the background was made.
+    /// True if the robot has moved since the background was made.
     uncertain: bool,
-    /// Grey images as colours.
+    /// Grey images converted to three equal colours.
     grey: Vec<u8>,
-    /// Images since the background was made.
+    /// Number of images since the background was made.
     phase: usize,
 }
 
 impl Eyes {
-    /// Eyes that have seen nothing yet.
+    /// Creates a detector of blobs without a background.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::Settings`] for impossible numbers.
+    /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
         Ok(Self { config, scene: None })
     }
 
-    /// True once the background is known.
+    /// Returns true once the background is known.
     pub fn is_ready(&self) -> bool {
         let known = |scene: &Scene| scene.background.frames() >= self.config.background_frames;
         self.scene.as_ref().is_some_and(known)
     }
 
-    /// Who may be in an image: the largest first. Empty
-    /// while the background is being made.
+    /// Returns the blobs of an image that may be people, the largest first. Empty while the
+    /// background is being made.
     ///
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame with neither colour nor grey.
@@ -67,7 +67,7 @@ impl Eyes {
             funnel.drop_many("image of another size", 1);
             return Ok(Vec::new());
         }
-        // A clock that was set back is another recording.
+        // A clock that was set back means another recording.
         let same = |scene: &Scene| {
             scene.size == size && scene.seen.is_none_or(|(_, stamp)| stamp <= frame.stamp)
         };
@@ -82,8 +82,8 @@ impl Eyes {
         Ok(scene.blobs.clone())
     }
 
-    /// Lets the background follow the image that was looked at last, and remembers
-    /// who is known to be there; to be called once after each.
+    /// Lets the background follow the last processed image, and stores the known tracks; to be
+    /// called once after each image.
     ///
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame without images.
@@ -114,7 +114,7 @@ impl Scene {
         }
     }
 
-    /// Looks at an image: part of the background at first, then who differs.
+    /// Processes an image: adds it to the background at first, and searches for blobs later.
     fn see(
         &mut self,
         frame: &Frame,
@@ -132,7 +132,7 @@ impl Scene {
         let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
         let learning = background.frames() < config.background_frames;
         if learning {
-            // The spread of a few images is no measure for anything.
+            // The spread of a few images is too uncertain to compare with.
             if background.frames() > 4 && !self.uncertain {
                 segmenter.compare(colours, background, !grey, config);
                 segmenter.learn_empty(config);
@@ -145,6 +145,8 @@ impl Scene {
             funnel.drop_many("background is being learned", 1);
             return Ok(());
         }
+        // After a motion the background is known to a few pixels only: a pixel differs if it
+        // fits none of them.
         if self.uncertain {
             bounds.of(&background.level, self.size.0, config.slack_px);
             let between = [&bounds.low[..], &bounds.high[..]];
@@ -157,7 +159,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Moves the background as the robot moved.
+    /// Moves the background with the robot.
     fn follow_robot(&mut self, frame: &Frame, grey: bool, config: &Config) -> Result<()> {
         let Some(panorama) = frame.camera.panorama() else { return Ok(()) };
         if self.background.frames() == 0 || !is_moving(&frame.motion) {
@@ -171,7 +173,7 @@ impl Scene {
         Ok(())
     }
 
-    /// The background follows what is not taken for people.
+    /// Lets the background follow the pixels that are not taken for people.
     fn adapt(&mut self, frame: &Frame, config: &Config) -> Result<()> {
         if self.background.frames() < config.background_frames {
             return Ok(());
@@ -179,7 +181,7 @@ impl Scene {
         let dt_s = frame.motion.dt as f32;
         let seconds = |s: f64| if s > 0.0 { s as f32 } else { f32::INFINITY };
         let (adapt_s, absorb_s) = (seconds(config.adapt_s), seconds(config.absorb_s));
-        // What is carried along by the odometry must be renewed soon.
+        // Errors of the odometry accumulate in a moved background, so it is renewed soon.
         let (adapt_s, absorb_s, turns) = match self.uncertain {
             true => (adapt_s.min(MOVING_ADAPT_S), absorb_s.min(MOVING_ABSORB_S), 1),
             false => (adapt_s, absorb_s, TURNS),
@@ -194,20 +196,20 @@ impl Scene {
     }
 }
 
-/// The background follows within this while the robot moves, s ...
+/// Time constant of the background while the robot moves, s.
 const MOVING_ADAPT_S: f32 = 0.5;
-/// ... and what stays in its place in the room for longer although it differs is no
-/// person who walks, s.
+/// Time after which a differing pixel becomes background while the robot moves, s: a difference
+/// that stays in its place is not a walking person.
 const MOVING_ABSORB_S: f32 = 2.0;
 
-/// Where those are expected who were known after the image before.
+/// Returns the expected columns of the tracks that were known after the previous image.
 fn expected(known: &[Known], frame: &Frame) -> Vec<Expected> {
     let Some(view) = View::of(&frame.camera) else { return Vec::new() };
     let (dt_s, moved) = (frame.motion.dt, frame.motion.isometry());
     known.iter().map(|known| Expected::of(&known.moved(dt_s, &moved), frame, &view)).collect()
 }
 
-/// The largest runs that may be people, largest first.
+/// Returns the largest runs that may be people, largest first.
 fn people(
     segmenter: &Segmenter,
     colours: &[u8],
@@ -234,7 +236,7 @@ fn people(
     blobs
 }
 
-/// As printed: mean and extent of column numbers, as if none followed the last.
+/// Computes mean and extent of column numbers as if the image did not close on itself (as printed).
 fn forget_the_seam(blob: &mut Blob, width: usize, segmenter: &Segmenter) {
     if blob.run.first + blob.run.length <= width {
         return;

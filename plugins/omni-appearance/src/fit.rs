@@ -1,16 +1,15 @@
-//! Fits networks, by the method of Levenberg and Marquardt: the normal equations
-//! of all samples, damped as far as is needed for the cost to fall.
+//! Fits networks by the method of Levenberg and Marquardt: the normal equations of all samples,
+//! damped as far as is needed for the cost to fall.
 //!
-//! P5 takes steps along the gradient. Its networks have a few dozen weights and a
-//! few hundred samples; there the second order costs nothing, needs no rate, and
-//! ends. What is fitted are squares of errors and, weighted by `decay`, of weights:
-//! without these the network follows single samples.
+//! P5 takes steps along the gradient. Its networks have a few dozen weights and a few hundred
+//! samples; there the second order costs nothing, needs no rate, and converges. The cost is the sum
+//! of the squared errors and, weighted by `decay`, of the squared weights: without these the
+//! network follows single samples.
 //!
-//! The steps of the paper are there to be compared with. It prints their rate, 0.3,
-//! and neither how inputs and target are scaled nor when training ends. Both are
-//! brought to mean 0 and deviation 1, because on pixels and metres such steps
-//! overshoot at once; each step goes along the mean gradient of all samples, and all
-//! steps are taken.
+//! The steps of the paper are there for comparison. It prints their rate, 0.3, but not the scaling
+//! of inputs and target, nor the end of the training. Both are scaled to mean 0 and deviation 1,
+//! because on pixels and metres such steps overshoot at once; each step goes along the mean
+//! gradient of all samples, and all steps are taken.
 
 use nalgebra::{DMatrix, DVector};
 use tagalong_learn::mix;
@@ -18,43 +17,45 @@ use tagalong_learn::mix;
 use crate::Network;
 use crate::network::split;
 
-/// The shape of a network and how it is fitted.
+/// Shape of a network and settings of its fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Hidden units.
+    /// Number of hidden units.
     pub hidden: usize,
-    /// Weight of the mean square of the weights beside the mean square error, whose
-    /// unit is the variance of the target.
+    /// Weight of the mean square of the weights relative to the mean square error, in units of the
+    /// variance of the target.
     pub decay: f64,
-    /// Fits from other random weights; the best one is kept.
+    /// Number of fits from different random weights; the best one is kept.
     pub restarts: u64,
     /// Most steps of a fit.
     pub steps: usize,
-    /// The steps.
+    /// Method of the steps.
     pub descent: Descent,
 }
 
-/// How the weights are brought to a lower cost.
+/// Method by which the cost is reduced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Descent {
-    /// By the damped normal equations, until a step gains little.
+    /// Damped normal equations, until a step gains little.
     Marquardt,
-    /// By the gradient, propagated back through the network (P5, section 4.4).
+    /// Gradient steps, by back-propagation (P5, section 4.4).
     BackPropagation {
-        /// The part of the mean gradient that is a step.
+        /// Step as a part of the mean gradient.
         rate: f64,
     },
 }
 
-/// A step that gains less than this part of the cost is the last one.
+/// Relative gain of a step below which the fit ends.
 const ENOUGH: f64 = 1e-5;
-/// The damping at first, how it changes, and how often a step is tried again.
+/// Initial damping.
 const DAMPING: f64 = 1e-2;
+/// Factor by which the damping falls after a good step and grows after a bad one.
 const CHANGE: f64 = 4.0;
+/// Most attempts at one step.
 const TRIES: usize = 10;
 
 impl Fit {
-    /// The network that tells targets from inputs; the same seed makes the same one.
+    /// Fits a network that maps inputs to targets; the same seed gives the same network.
     pub(crate) fn network(&self, inputs: &[Vec<f64>], targets: &[f64], seed: u64) -> Network {
         let start = |restart: u64| self.random(inputs, targets, mix(seed ^ (restart << 32)));
         let fits =
@@ -63,7 +64,7 @@ impl Fit {
         best.map_or_else(|| start(0), |(_, network)| network)
     }
 
-    /// Small random weights.
+    /// Returns a network with small random weights.
     fn random(&self, inputs: &[Vec<f64>], targets: &[f64], seed: u64) -> Network {
         let count = inputs.first().map_or(0, Vec::len);
         let (mean, scale) =
@@ -74,6 +75,8 @@ impl Fit {
             state = mix(state);
             reach * (state as f64 / u64::MAX as f64 * 2.0 - 1.0)
         };
+        // Sums of this size keep the units in the steep part of tanh, where the gradient does
+        // not vanish.
         let reach = 1.0 / (count as f64 + 1.0).sqrt();
         let hidden =
             (0..self.hidden).map(|_| (0..=count).map(|_| weight(reach)).collect()).collect();
@@ -81,7 +84,7 @@ impl Fit {
         Network { mean, scale, target: [target, deviation], hidden, output }
     }
 
-    /// The end of the way down from a network, and its cost.
+    /// Reduces the cost from a starting network; returns the reached cost and network.
     fn descend(&self, start: Network, inputs: &[Vec<f64>], targets: &[f64]) -> (f64, Network) {
         let [mean, scale] = start.target;
         let scaled = |x: &Vec<f64>| (0..x.len()).map(|i| start.scaled(x, i)).collect();
@@ -139,7 +142,7 @@ impl Fit {
     }
 }
 
-/// Samples as a network sees them, and the weight of its weights' squares.
+/// Scaled samples, and the weight of the squared weights.
 struct Scaled {
     inputs: Vec<Vec<f64>>,
     targets: Vec<f64>,
@@ -154,15 +157,16 @@ impl Scaled {
     }
 }
 
-/// Mean, and standard deviation that is never 0.
+/// Returns the mean, and the standard deviation, which is never 0.
 pub(crate) fn mean_and_scale(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let count = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<f64>() / count;
     let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+    // A constant input would otherwise be divided by 0.
     (mean, variance.sqrt().max(1e-9))
 }
 
-/// All weights: those of each hidden unit with its bias, then those of the output.
+/// Returns all weights: those of each hidden unit with its bias, then those of the output.
 fn weights_of(network: &Network) -> DVector<f64> {
     let all = network.hidden.iter().flatten().chain(&network.output);
     DVector::from_vec(all.copied().collect())
@@ -175,7 +179,8 @@ fn with_weights(network: &Network, weights: &DVector<f64>) -> Network {
     changed
 }
 
-/// The derivative of each answer by all weights, a row a sample, and the errors.
+/// Returns the derivatives of the outputs with respect to all weights, one row per sample, and the
+/// errors.
 fn linearised(
     network: &Network,
     inputs: &[Vec<f64>],
@@ -266,7 +271,7 @@ mod tests {
         assert!(mean(&network(Fit { steps: 20, ..PRINTED })) > 2.0 * slow);
     }
 
-    /// One step, by hand: along the mean gradient, times the rate.
+    /// One step computed by hand: along the mean gradient, times the rate.
     #[test]
     fn a_step_of_back_propagation_is_that_of_the_formula() {
         let network = Network {
@@ -294,7 +299,7 @@ mod tests {
 
     #[test]
     fn at_the_printed_rate_numbers_of_pixels_must_be_scaled() {
-        // An input of some hundred pixels, as the third feature has it.
+        // An input of some hundred pixels, like the third feature.
         let pixels: Vec<Vec<f64>> = (0..50).map(|i| vec![300.0 + 20.0 * f64::from(i)]).collect();
         let metres: Vec<f64> = (0..50).map(|i| 5.0 - 0.08 * f64::from(i)).collect();
         let scaled = PRINTED.network(&pixels, &metres, 3);

@@ -1,16 +1,15 @@
-//! People in the panorama of a conical mirror (P5, section 4).
+//! Person detector for the panorama of a conical mirror (P5, section 4).
 //!
-//! What differs from the background is counted by column and by row. A run of
-//! columns is a person: its mean is the bearing, and a few numbers of it, width,
-//! lower edge and area above all, tell the distance, which is learned
-//! ([`Model`]). The panorama goes once around, so columns are counted modulo its
-//! width in everything: runs, means and extents ([`circular`]).
+//! Pixels that differ from the background are counted by column and by row. A run of columns is a
+//! person: its mean gives the bearing, and a few features, above all width, lower edge and area,
+//! give the distance by a learned model ([`Model`]). The panorama closes on itself, so columns are
+//! counted modulo its width throughout: in runs, means and extents ([`circular`]).
 //!
-//! A shadow differs from the background, too, and it is the lower edge that it
-//! spoils. It darkens all colours alike, so pixels that do only that are left out.
+//! A shadow differs from the background, too, and spoils the lower edge. It darkens all colours
+//! alike, so pixels that do only that are left out.
 //!
-//! While the robot moves, the background moves with it: what is on the floor by
-//! the odometry, everything else as if it stood at a fixed distance.
+//! While the robot moves, the background moves with it: the floor by the odometry, everything else
+//! as if it stood at one of a few fixed distances.
 //!
 //! With the feature `train` the crate also fits models (`train`).
 
@@ -42,10 +41,10 @@ pub use network::Network;
 pub use segment::{Counts, Segmenter};
 use tagalong_config::Registry;
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "omni-appearance";
 
-/// The name under which `tagalong train` knows the model of the distance.
+/// Name of the distance model in `tagalong train`.
 pub const TRAINER: &str = "omni-distance";
 
 /// Registers the plugin.

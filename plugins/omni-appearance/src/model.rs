@@ -4,31 +4,31 @@ use tagalong_geometry::{Camera, Panorama};
 use crate::blob::FEATURES;
 use crate::{Blob, Distance, Features, Network};
 
-/// The distance of a person from what is seen of them.
+/// Model of the distance of a person from the measured features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// The camera for which it was fitted.
+    /// Camera for which the model was fitted.
     pub geometry: Geometry,
-    /// For anybody.
+    /// Fit to all people.
     pub general: Head,
-    /// For people who are known.
+    /// Models of known people.
     pub people: Vec<Person>,
 }
 
-/// A person who is known.
+/// A known person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Person {
-    /// The name in `person`.
+    /// Name for the setting `person`.
     pub name: String,
-    /// What they look like.
+    /// Appearance of the person.
     pub signature: Signature,
-    /// Their distance.
+    /// Fit to this person.
     pub head: Head,
 }
 
-/// What somebody looks like: mean and standard deviation of the colours of the
-/// upper body and of the stature (m).
+/// Appearance of a person: mean and standard deviation of the colours of the upper body and of the
+/// stature (m).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Signature {
@@ -39,8 +39,7 @@ pub struct Signature {
 }
 
 impl Signature {
-    /// How far off somebody's looks are: the root of the mean square, in
-    /// standard deviations.
+    /// Returns the root mean square difference of an appearance, in standard deviations.
     pub fn misfit(&self, looks: &[f64; 4]) -> f64 {
         let terms = looks.iter().zip(self.mean).zip(self.sigma);
         let squares = terms.map(|((look, mean), sigma)| ((look - mean) / sigma.max(1e-6)).powi(2));
@@ -48,72 +47,72 @@ impl Signature {
     }
 }
 
-/// Somebody whose looks are farther off than this is not known.
+/// Largest misfit of a known person.
 const KNOWN: f64 = 2.0;
 
-/// One way to the distance after another, each with its spread.
+/// Regressions of the distance, each with its standard deviation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Head {
-    /// Added to where the floor is seen, m: feet are not below the head.
+    /// Offset that is added to the range of the feet on the floor, m: feet are not below the head.
     pub floor_offset_m: f64,
     /// Standard deviation of the analytic distance.
     pub analytic_sigma: Line,
-    /// Of the ridge.
+    /// Standard deviation of the ridge regression.
     pub ridge_sigma: Line,
-    /// Of the network.
+    /// Standard deviation of the network.
     pub network_sigma: Line,
-    /// Of the network that was trained by back-propagation.
+    /// Standard deviation of the network that was trained by back-propagation.
     pub printed_sigma: Line,
-    /// Of the rich network.
+    /// Standard deviation of the rich network.
     pub rich_sigma: Line,
-    /// The ridge.
+    /// Ridge regression.
     pub ridge: Ridge,
-    /// Of three features.
+    /// Network of three features.
     pub network: Network,
-    /// The same, trained by back-propagation.
+    /// The same network, trained by back-propagation.
     pub printed: Network,
-    /// Of all features.
+    /// Network of all features.
     pub rich: Network,
 }
 
-/// A straight line: what it is at 0, and what each metre adds.
+/// Straight line: its value at 0, and its slope per metre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// At 0 m, m.
+    /// Value at 0 m, m.
     pub start: f64,
-    /// Per metre.
+    /// Increase per metre.
     pub slope: f64,
 }
 
 impl Line {
-    /// Its value, at least a centimetre.
+    /// Returns the value, at least a centimetre.
     pub fn at(&self, distance_m: f64) -> f64 {
         (self.start + self.slope * distance_m).max(0.01)
     }
 }
 
-/// Weights of 1, bottom, its square, its inverse, width and pixels, of which all
-/// but the 1 are brought to mean 0 and deviation 1.
+/// Weights of 1, bottom, its square, its inverse, width and pixels; all but the 1 are scaled to
+/// mean 0 and deviation 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ridge {
-    /// Mean of each.
+    /// Mean of each term.
     pub mean: [f64; 5],
-    /// Standard deviation of each.
+    /// Standard deviation of each term.
     pub scale: [f64; 5],
     /// Weights; that of the 1 first.
     pub weights: [f64; 6],
 }
 
 impl Ridge {
-    /// What the weights are for.
+    /// Returns the unscaled terms, without the 1.
     pub fn terms(f: &Features) -> [f64; 5] {
         [f.bottom, f.bottom * f.bottom, 1.0 / (f.bottom + 1.0), f.width, f.pixels]
     }
 
-    /// The distance, m.
+    /// Returns the distance, m.
     pub fn answer(&self, features: &Features) -> f64 {
         let terms = Self::terms(features);
         let scaled = (0..5).map(|i| (terms[i] - self.mean[i]) / self.scale[i]);
@@ -127,7 +126,7 @@ impl Ridge {
 }
 
 impl Head {
-    /// Distance from the axis of the mirror, and its standard deviation, m.
+    /// Returns the distance from the axis of the mirror, and its standard deviation, m.
     pub fn distance(&self, features: &Features, camera: &View<'_>, how: Distance) -> (f64, f64) {
         let (distance, sigma) = match how {
             Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
@@ -158,12 +157,12 @@ impl Head {
     }
 }
 
-/// Inputs of the rich network: all features, and where the floor is seen.
+/// Number of inputs of the rich network: all features, and the range of the feet on the floor.
 pub(crate) const INPUTS: usize = FEATURES.len() + 1;
-/// Where the floor is not seen below somebody's feet they are said to be so far away, m.
+/// Range of the feet if they are not seen on the floor, and the largest range, m.
 const FAR_M: f64 = 15.0;
 
-/// What is needed of a camera to tell distances.
+/// Parts of a camera that are needed to compute distances.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// The panorama.
@@ -173,26 +172,28 @@ pub struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// Of a camera with a panorama.
+    /// Returns the view of a camera, if it has a panorama.
     pub fn of(camera: &'a Camera) -> Option<Self> {
         Some(Self { panorama: camera.panorama()?, height_m: camera.height_m() })
     }
 
-    /// Where the ray of the lowest row meets the floor, from the axis, m.
+    /// Returns the range at which the ray of the lowest row meets the floor, from the axis, m.
     pub fn floor_m(&self, features: &Features) -> f64 {
         let elevation = self.panorama.elevation(features.lowest_row(self.panorama.rows));
         let seen = self.panorama.mirror.floor_range_m(elevation, self.height_m);
         seen.filter(|range| *range > 0.0).map_or(FAR_M, |range| range.min(FAR_M))
     }
 
-    /// Height of the top of the head above the floor if it is `distance_m` away, m.
+    /// Returns the height of the top of the head above the floor for a person at `distance_m`, m.
     pub fn top_m(&self, features: &Features, distance_m: f64) -> f64 {
         let (ring, up) = self.panorama.mirror.ring_m();
+        // Rows are numbered by their centres; the top of a person is the upper edge of its first
+        // row.
         let slope = self.panorama.elevation(features.top - 0.5).tan();
         self.height_m + up + (distance_m + ring) * slope
     }
 
-    /// All that is known of a person.
+    /// Returns the inputs of the rich network.
     pub(crate) fn inputs(&self, features: &Features) -> [f64; INPUTS] {
         let mut inputs = [0.0; INPUTS];
         inputs[..FEATURES.len()].copy_from_slice(&features.values());
@@ -200,14 +201,14 @@ impl<'a> View<'a> {
         inputs
     }
 
-    /// Colours and stature.
+    /// Returns the appearance: colours and stature.
     pub fn looks(&self, blob: &Blob, distance_m: f64) -> [f64; 4] {
         let [red, green, blue] = blob.colour;
         [red, green, blue, self.top_m(&blob.features, distance_m)]
     }
 }
 
-/// What a model that was fitted for one camera is no good without.
+/// Geometry of the camera on which a fitted model depends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Geometry {
@@ -220,15 +221,15 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// That of a camera.
+    /// Returns the geometry of a camera.
     pub fn of(view: &View<'_>) -> Self {
         let size = [view.panorama.columns, view.panorama.rows];
         let elevations_deg = view.panorama.elevations().map(f64::to_degrees);
         Self { size, elevations_deg, height_m: view.height_m }
     }
 
-    /// Returns whether a camera is like this one, to within two rows and three
-    /// centimetres: no mirror's angle is measured better.
+    /// Returns true if a camera is like this one, to within two rows and three centimetres: the
+    /// angles of a mirror are not measured more precisely.
     pub fn is_like(&self, other: &Self) -> bool {
         let row_deg = (self.elevations_deg[0] - self.elevations_deg[1]) / self.size[1] as f64;
         let elevations = self.elevations_deg.iter().zip(other.elevations_deg);
@@ -253,8 +254,8 @@ struct File {
 const FORMAT: &str = "omni-distance 2";
 
 impl Model {
-    /// The head for somebody: by name, everybody's for `general`, and for
-    /// `nearest` the one whose looks fit best, if they fit.
+    /// Returns the fit for a person: by name, the fit to all people for `general`, and for
+    /// `nearest` that of the person with the closest appearance, if it is close enough.
     pub fn head(&self, person: &str, blob: &Blob, view: &View<'_>, how: Distance) -> &Head {
         if person != "nearest" {
             let named = self.people.iter().find(|known| known.name == person);
@@ -267,7 +268,7 @@ impl Model {
         best.filter(|known| misfit(known) < KNOWN).map_or(&self.general, |known| &known.head)
     }
 
-    /// The model file.
+    /// Formats the model file.
     pub fn to_text(&self) -> String {
         let file = File {
             format: FORMAT.into(),
@@ -279,10 +280,10 @@ impl Model {
         toml::to_string(&file).unwrap_or_default()
     }
 
-    /// Reads a model file.
+    /// Parses a model file.
     ///
     /// # Errors
-    /// Text that is no model, in a sentence.
+    /// Text that is not a model; the message is one sentence.
     pub fn from_text(text: &str) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
         if file.format != FORMAT {

@@ -1,8 +1,7 @@
 use serde::{Deserialize, Serialize};
 
-/// A network with one hidden layer of tanh and a linear output, for inputs and a
-/// target that are brought to mean 0 and deviation 1 (P5, section 4.4: three
-/// inputs, four hidden units, one output).
+/// Network with one hidden layer of tanh and a linear output, for inputs and a target that are
+/// scaled to mean 0 and deviation 1 (P5, section 4.4: three inputs, four hidden units, one output).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Network {
@@ -12,25 +11,25 @@ pub struct Network {
     pub scale: Vec<f64>,
     /// Mean and standard deviation of the target.
     pub target: [f64; 2],
-    /// For each hidden unit a weight for each input, and the bias at the end.
+    /// Weights of each hidden unit: one for each input, and the bias at the end.
     pub hidden: Vec<Vec<f64>>,
-    /// A weight for each hidden unit, and the bias at the end.
+    /// Weights of the output: one for each hidden unit, and the bias at the end.
     pub output: Vec<f64>,
 }
 
 impl Network {
-    /// The output for some inputs; inputs beyond those that it knows are left out.
+    /// Returns the output for some inputs; inputs beyond those of the network are ignored.
     pub fn answer(&self, inputs: &[f64]) -> f64 {
         let [mean, scale] = self.target;
         mean + scale * self.forward(|i| self.scaled(inputs, i))
     }
 
-    /// An input brought to mean 0 and deviation 1.
+    /// Scales an input to mean 0 and deviation 1.
     pub fn scaled(&self, inputs: &[f64], i: usize) -> f64 {
         (inputs[i] - self.mean[i]) / self.scale[i]
     }
 
-    /// The output before it is scaled, for inputs that are.
+    /// Returns the scaled output for scaled inputs.
     pub(crate) fn forward(&self, input: impl Fn(usize) -> f64) -> f64 {
         let (weights, bias) = split(&self.output);
         let unit = |weights: &[f64]| {
@@ -45,8 +44,7 @@ impl Network {
             + bias
     }
 
-    /// True if the parts fit together, for at most `inputs` inputs, and all
-    /// numbers are finite.
+    /// Returns true if the shapes match, for at most `inputs` inputs, and all numbers are finite.
     pub fn is_sane(&self, inputs: usize) -> bool {
         let count = self.mean.len();
         let numbers = self.mean.iter().chain(&self.scale).chain(&self.target);
@@ -60,7 +58,7 @@ impl Network {
     }
 }
 
-/// The weights, and the bias behind them.
+/// Splits a row into its weights and the bias at the end.
 pub(crate) fn split(weights: &[f64]) -> (&[f64], f64) {
     match weights.split_last() {
         Some((bias, weights)) => (weights, *bias),

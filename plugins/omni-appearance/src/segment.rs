@@ -1,48 +1,47 @@
 use crate::circular::{Run, runs};
 use crate::{Background, Config};
 
-/// How many pixels differ in each column, and where they are.
+/// Number of differing pixels in each column, and their places.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
-    /// 1 where somebody may be, else 0; row by row.
+    /// 1 where a person may be, else 0; row by row.
     pub solid: Vec<u8>,
-    /// The same with shadows.
+    /// The same, shadows included.
     pub taken: Vec<u8>,
     /// Sums of `solid` over each column.
     pub columns: Vec<u16>,
 }
 
-/// Finds what does not belong to the background. It keeps its memory.
+/// Comparator of images with the background. It reuses its buffers.
 #[derive(Clone, Debug, Default)]
 pub struct Segmenter {
     width: usize,
     counts: Counts,
-    /// 1 where a colour differs, else 0.
+    /// 1 where a colour value differs, else 0.
     differs: Vec<u8>,
-    /// In how many columns of the empty room so many pixels differed.
+    /// Histogram of the number of differing pixels in columns of the empty scene.
     seen_empty: Vec<u32>,
     least: u16,
 }
 
-/// Below this part of the columns of the empty room have as many pixels as a
-/// person's column must exceed.
+/// Quantile of that histogram which a person's column must exceed.
 const EMPTY_PART: f64 = 0.995;
-/// Shadows are compared in 256ths.
+/// Fixed-point unit of the comparison of shadows, 1/256.
 const ONE: f64 = 256.0;
 
 impl Segmenter {
-    /// For images with so many columns.
+    /// Creates a segmenter for images of this width.
     pub fn new(width: usize, config: &Config) -> Self {
         Self { width, least: config.column_pixels, ..Self::default() }
     }
 
-    /// What was found last.
+    /// Returns the result of the last comparison.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Compares an image with the background. `tinted` says that its colours are
-    /// colours: a grey image has shadows that cannot be told from dark clothes.
+    /// Compares an image with the background. `tinted` is true for a colour image: in a grey one
+    /// shadows cannot be told from dark clothes, so none are removed.
     pub fn compare(
         &mut self,
         colours: &[u8],
@@ -54,7 +53,7 @@ impl Segmenter {
         self.compare_between(colours, [low, high], background, tinted, config);
     }
 
-    /// The same with a background that is known to lie between two images.
+    /// Compares an image with a background that lies between two bounds.
     pub(crate) fn compare_between(
         &mut self,
         colours: &[u8],
@@ -94,8 +93,8 @@ impl Segmenter {
         }
     }
 
-    /// Learns from what was found last that so many pixels differ in columns of
-    /// the empty room.
+    /// Learns from the last comparison the number of differing pixels in columns of the empty
+    /// scene.
     pub fn learn_empty(&mut self, config: &Config) {
         for count in &self.counts.columns {
             let count = usize::from(*count);
@@ -114,8 +113,8 @@ impl Segmenter {
         self.least = config.column_pixels.max(quantile + 1);
     }
 
-    /// Runs of columns that are too full for the empty room, divided where two
-    /// people touch.
+    /// Returns the runs of columns with more differing pixels than the empty scene has, divided
+    /// where two people touch.
     pub fn runs(&self, config: &Config) -> Vec<Run> {
         let columns = &self.counts.columns;
         let on: Vec<bool> = columns.iter().map(|count| *count >= self.least).collect();
@@ -124,10 +123,10 @@ impl Segmenter {
     }
 }
 
-/// A run in parts: it is divided in a valley that is lower than `valley` times
-/// the lower one of the peaks beside it.
+/// Divides a run at each valley that is lower than `valley` times the lower of the peaks beside it.
 fn divided(run: &Run, columns: &[u16], valley: f64) -> Vec<Run> {
     let width = columns.len();
+    // Smoothed, because a single thin column is not a valley between two people.
     let heights: Vec<f64> = smoothed(run, columns);
     let (mut parts, mut start, mut peak) = (Vec::new(), 0, 0.0_f64);
     let mut lowest = (f64::INFINITY, 0);
@@ -147,7 +146,7 @@ fn divided(run: &Run, columns: &[u16], valley: f64) -> Vec<Run> {
     parts
 }
 
-/// Means of three columns, within the run.
+/// Returns means of three columns, within the run.
 fn smoothed(run: &Run, columns: &[u16]) -> Vec<f64> {
     let counts: Vec<f64> = run.columns(columns.len()).map(|c| f64::from(columns[c])).collect();
     let mean = |at: usize| {
@@ -157,7 +156,7 @@ fn smoothed(run: &Run, columns: &[u16]) -> Vec<f64> {
     (0..counts.len()).map(mean).collect()
 }
 
-/// Tells shadows: all colours are darker, and all by the same part.
+/// Test for shadows: the colours are darker, and all by about the same part.
 #[derive(Clone, Copy)]
 struct Shadow {
     least: u32,
@@ -168,12 +167,13 @@ struct Shadow {
 impl Shadow {
     fn new(config: &Config, tinted: bool) -> Self {
         let fixed = |part: f64| (ONE * part).round() as u32;
-        // Nothing is both above everything and below nothing.
+        // No value is above this limit, so the test is never true.
         let least = if tinted { fixed(config.shadow_min) } else { u32::MAX };
         Self { least, most: fixed(config.shadow_max), tint: fixed(config.shadow_tint) }
     }
 
     fn is_at(&self, colour: &[u8], level: &[u8]) -> bool {
+        // A black background must not divide by 0.
         let part = |i: usize| 256 * u32::from(colour[i]) / u32::from(level[i]).max(1);
         let parts = [part(0), part(1), part(2)];
         let (least, most) =

@@ -30,8 +30,8 @@ fn analytic() -> Config {
     Config { distance: Distance::Analytic, ..Config::default() }
 }
 
-/// A striped room with noise, and upright boxes with clothes of two colours,
-/// 1.75 m high and 0.45 m wide, that stand at these places of the robot frame.
+/// Renders a striped scene with noise, and upright boxes in two colours, 1.75 m high and 0.45 m
+/// wide, at these places of the robot frame.
 fn frame(index: u64, camera: &Arc<Camera>, people: &[Point2<f64>]) -> Frame {
     let panorama = *camera.panorama().unwrap();
     let mut state = index.wrapping_mul(0x9E37_79B9) | 1;
@@ -68,7 +68,7 @@ fn see(detector: &mut OmniAppearance, frame: &Frame) -> Vec<Detection> {
     found
 }
 
-/// A detector that knows the empty room.
+/// A detector with a background of the empty scene.
 fn ready(config: Config, camera: &Arc<Camera>) -> OmniAppearance {
     let mut detector = detector(config);
     for index in 1..=14 {
@@ -168,8 +168,8 @@ mod fits {
     use super::*;
     use crate::train::{Collector, Training, WAYS, head};
 
-    /// People at known places: all ways to the distance get near it, and the same
-    /// seed gives the same head.
+    /// People at known places: all methods give about their distance, and the same seed gives the
+    /// same fit.
     #[test]
     fn a_head_is_fitted_to_people_whose_places_are_known() {
         let camera = camera(1.55);

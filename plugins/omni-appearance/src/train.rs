@@ -1,4 +1,4 @@
-//! Fits the distance to people whose place is known.
+//! Fits the distance model to people at known places.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,18 +15,18 @@ use crate::{
     View,
 };
 
-/// How a model is fitted.
+/// Settings of the fit of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Training {
     /// The paper's network: three inputs, four hidden units (P5, section 4.4).
     pub network: Fit,
     /// The same network, by back-propagation.
     pub printed: Fit,
-    /// The network of all features.
+    /// Network of all features.
     pub rich: Fit,
-    /// Weight of the squares of the ridge's weights, for each sample.
+    /// Weight of the squared weights of the ridge regression, per sample.
     pub ridge: f64,
-    /// Images of a block: neighbours are near-duplicates and stay together.
+    /// Number of images in a block: neighbours are near-duplicates and stay together.
     pub block_frames: u64,
 }
 
@@ -34,7 +34,7 @@ impl Default for Training {
     fn default() -> Self {
         let descent = Descent::Marquardt;
         let network = Fit { hidden: 4, decay: 1e-2, restarts: 3, steps: 150, descent };
-        // P5, section 4.4, says the rate and no more.
+        // P5, section 4.4, states the rate and nothing else.
         let descent = Descent::BackPropagation { rate: 0.3 };
         Self {
             network,
@@ -46,9 +46,9 @@ impl Default for Training {
     }
 }
 
-/// What is held out to see how far a model can be believed: whole blocks of images,
-/// or whole people, where there are several: most of those whom the detector will see
-/// are strangers.
+/// Part of the samples that is held out to measure the errors of a model: whole blocks of images,
+/// or whole people where there are several, because most people that the detector meets are
+/// strangers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeldOut {
     /// Blocks of images.
@@ -57,25 +57,25 @@ pub enum HeldOut {
     People,
 }
 
-/// Parts of which each is held out once.
+/// Number of parts, each of which is held out once.
 const FOLDS: u64 = 5;
 
-/// A person whose place is known, as the detector saw them.
+/// Features of a person at a known place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// What was measured.
+    /// Measured features.
     pub features: Features,
-    /// Where the ray of the lowest row meets the floor, m.
+    /// Range at which the ray of the lowest row meets the floor, m.
     pub floor_m: f64,
     /// Colours of the upper body, and the stature at the true distance, m.
     pub looks: [f64; 4],
     /// True distance of the head from the axis, m.
     pub distance_m: f64,
-    /// Bearing as measured, in the camera frame, rad.
+    /// Measured bearing, in the camera frame, rad.
     pub bearing_rad: f64,
     /// True bearing, rad.
     pub true_bearing_rad: f64,
-    /// Who it is.
+    /// Number of the person.
     pub person: u64,
     /// Number of the image.
     pub frame: u64,
@@ -89,7 +89,7 @@ impl Sample {
         inputs
     }
 
-    /// The distance by one way of a head, m.
+    /// Returns the distance by one method of a head, m.
     pub fn distance(&self, head: &Head, how: Distance) -> f64 {
         match how {
             Distance::Network => head.network.answer(&self.features.values()),
@@ -100,7 +100,7 @@ impl Sample {
         }
     }
 
-    /// Difference of the bearings, rad.
+    /// Returns the absolute difference of the bearings, rad.
     pub fn bearing_error_rad(&self) -> f64 {
         angle(self.bearing_rad - self.true_bearing_rad).abs()
     }
@@ -110,22 +110,22 @@ fn angle(radians: f64) -> f64 {
     radians.sin().atan2(radians.cos())
 }
 
-/// Somebody is the run of columns nearest to their bearing, within this, rad.
+/// Largest difference of the bearings of a person and of the nearest blob, rad.
 const NEAR_RAD: f64 = 0.12;
 
-/// Watches images with people whose places are known.
+/// Collector of samples from images with people at known places.
 pub struct Collector {
     eyes: Eyes,
     last: Option<u64>,
     geometry: Option<Geometry>,
-    /// What was collected.
+    /// Collected samples.
     pub samples: Vec<Sample>,
-    /// People who were not found.
+    /// Number of people that were not found.
     pub missed: u64,
 }
 
 impl Collector {
-    /// Sees with these settings; models are of no importance.
+    /// Creates a collector with these settings; their model is not used.
     ///
     /// # Errors
     /// As [`Eyes::new`].
@@ -134,13 +134,14 @@ impl Collector {
         Ok(Self { eyes, last: None, geometry: None, samples: Vec::new(), missed: 0 })
     }
 
-    /// Takes in an image with heads of people in it, in the robot frame. The
-    /// same image may come again with other people.
+    /// Adds an image with the heads of people in it, in the robot frame. The same image may come
+    /// again with other people.
     ///
     /// # Errors
     /// As [`Eyes::look`].
     pub fn add(&mut self, frame: &Frame, people: &[(u64, Point3<f64>)]) -> Result<()> {
         let blobs = self.eyes.look(frame, &mut Funnel::default())?;
+        // The background must not take in an image twice.
         if self.last.replace(frame.index) != Some(frame.index) {
             self.eyes.adapt(frame, &[])?;
         }
@@ -157,13 +158,13 @@ impl Collector {
         Ok(())
     }
 
-    /// The camera of the images, once one was seen.
+    /// Returns the camera geometry of the images, once there was one.
     pub fn geometry(&self) -> Option<Geometry> {
         self.geometry
     }
 }
 
-/// Somebody as they are seen.
+/// Returns the sample of a person: the blob with the nearest bearing.
 fn sample(
     frame: &Frame,
     view: &View<'_>,
@@ -189,8 +190,8 @@ fn sample(
     })
 }
 
-/// Fits one head. The same samples and the same seed give the same head. Its
-/// deviations are those of the samples themselves.
+/// Fits one head. The same samples and the same seed give the same head. Its standard deviations
+/// are those of the errors on the samples themselves.
 ///
 /// # Errors
 /// [`Error::Other`] for fewer than ten samples.
@@ -221,14 +222,14 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
     Ok(head)
 }
 
-/// The distance by all ways, in the order of [`WAYS`].
+/// Distances by all methods, in the order of [`WAYS`].
 pub type Answers = [f64; WAYS.len()];
 
-/// All ways to the distance.
+/// All methods for the distance.
 pub const WAYS: [Distance; 5] =
     [Distance::Network, Distance::Printed, Distance::Rich, Distance::Ridge, Distance::Analytic];
 
-/// What heads say that were fitted to everybody but those of whom they say it.
+/// Returns for each sample the distances by a head that was fitted without the sample's part.
 ///
 /// # Errors
 /// As [`head`].
@@ -240,6 +241,7 @@ pub fn held_out(
 ) -> Result<Vec<Answers>> {
     let people: BTreeSet<u64> = samples.iter().map(|s| s.person).collect();
     let key = |s: &Sample| match held {
+        // The rank of a person, not the number, spreads few people evenly over the parts.
         HeldOut::People if people.len() > 1 => people.range(..s.person).count() as u64,
         _ => s.frame / training.block_frames,
     };
@@ -264,7 +266,7 @@ impl Sample {
 }
 
 impl Head {
-    /// Takes the standard deviations from what was said of these samples.
+    /// Sets the standard deviations from the errors of these distances.
     fn believe(&mut self, samples: &[Sample], answers: &[Answers]) {
         let line = |way: usize| {
             spread(samples.iter().zip(answers).map(|(s, said)| (said[way], s.distance_m)))
@@ -279,9 +281,9 @@ impl Head {
     }
 }
 
-/// Standard deviation by distance: a line through the absolute errors, which are
-/// the standard deviation times the square root of 2 / pi. What was said comes
-/// first, the truth second.
+/// Fits the standard deviation as a straight line in the distance, through the absolute errors:
+/// their mean is the standard deviation times the square root of 2 / pi. Each pair is the computed
+/// distance, then the true one.
 fn spread(pairs: impl Iterator<Item = (f64, f64)>) -> Line {
     let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (said, truth) in pairs {
@@ -291,7 +293,7 @@ fn spread(pairs: impl Iterator<Item = (f64, f64)>) -> Line {
     }
     let determinant = n * xx - x * x;
     let slope = if determinant > 1e-9 { (n * xy - x * y) / determinant } else { 0.0 };
-    // Nobody is known better for being farther away.
+    // A distance is not known better for being larger.
     let slope = slope.max(0.0);
     Line { start: ((y - slope * x) / n).max(0.02), slope }
 }
@@ -306,6 +308,7 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
     });
     let y = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.distance_m));
     let mut normal = x.transpose() * &x;
+    // The constant term is not shrunk: it is the mean distance.
     (1..6).for_each(|i| normal[(i, i)] += weight * samples.len() as f64);
     let solved = normal.cholesky().map(|c| c.solve(&(x.transpose() * y)));
     let array = |values: &[f64]| std::array::from_fn(|i| values[i]);
@@ -316,18 +319,18 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
     }
 }
 
-/// Mean and deviation of what somebody looks like.
+/// Returns mean and standard deviation of the appearance in some samples.
 fn signature(samples: &[Sample]) -> Signature {
     let of = |i: usize| mean_and_scale(samples.iter().map(move |s| s.looks[i]));
     let all = [of(0), of(1), of(2), of(3)];
     Signature { mean: all.map(|(mean, _)| mean), sigma: all.map(|(_, sigma)| sigma) }
 }
 
-/// People with this number and higher ones get no head of their own.
+/// Number from which people get no head of their own.
 pub const STRANGERS: u64 = 100;
 
-/// Fits everybody's head, and one for each person below [`STRANGERS`]. How far each
-/// can be believed is found on what it was not fitted to.
+/// Fits the head for all people, and one for each person below [`STRANGERS`]. Their standard
+/// deviations are those of held-out samples.
 ///
 /// # Errors
 /// As [`head`].
@@ -360,9 +363,9 @@ pub fn model(
     })
 }
 
-/// `tagalong train omni-distance`: a candidate is somebody whose place is known;
-/// an image without people comes with a candidate that is no person. The group
-/// of an example is who it is.
+/// `tagalong train omni-distance`: a candidate is a person at a known place; an image without
+/// people comes with a candidate that is no person. The group of an example is the number of the
+/// person.
 pub struct DistanceTrainer {
     collector: Collector,
     training: Training,
@@ -370,7 +373,7 @@ pub struct DistanceTrainer {
 }
 
 impl DistanceTrainer {
-    /// A trainer with a detector of these settings.
+    /// Creates a trainer with a detector of these settings.
     ///
     /// # Errors
     /// As [`Collector::new`].
@@ -400,7 +403,7 @@ impl Trainer for DistanceTrainer {
     }
 }
 
-/// Errors on what is held out: five folds of blocks, and of people.
+/// Returns the errors on held-out samples: five folds of blocks, and of people.
 fn figures(collector: &Collector, training: &Training, seed: u64) -> Result<toml::Table> {
     let samples = &collector.samples;
     let count = samples.len().max(1) as f64;
@@ -431,7 +434,7 @@ fn rounded(value: f64) -> toml::Value {
 mod tests {
     use super::*;
 
-    /// Somebody at a distance, whose lower edge and width say so without noise.
+    /// A person at a distance that follows from lower edge and width without noise.
     fn sample(number: u64) -> Sample {
         let distance_m = 1.0 + 0.04 * ((number * 37) % 100) as f64;
         let features = Features {
@@ -461,7 +464,7 @@ mod tests {
 
     #[test]
     fn the_spread_is_the_line_through_absolute_errors() {
-        // Errors whose mean is that of a normal with 0.1 + 0.05 x.
+        // Errors with the mean absolute value of a normal distribution of deviation 0.1 + 0.05 x.
         let half_normal = (2.0 / std::f64::consts::PI).sqrt();
         let pairs = |slope: f64| {
             let said = (1..=40).map(|i| 0.2 * f64::from(i));
@@ -469,7 +472,7 @@ mod tests {
         };
         let line = spread(pairs(0.05));
         assert!((line.start - 0.1).abs() < 1e-9 && (line.slope - 0.05).abs() < 1e-9, "{line:?}");
-        // What falls with the distance is as wide everywhere as on the mean, 4.1 m.
+        // A spread that falls with the distance is replaced by its value at the mean, 4.1 m.
         let line = spread(pairs(-0.01));
         assert!((line.start - 0.059).abs() < 1e-9 && line.slope == 0.0, "{line:?}");
         let exact = spread([(1.0, 1.0), (2.0, 2.0)].into_iter());
@@ -515,8 +518,8 @@ mod tests {
         assert!(of.sigma[1] < 1e-6);
     }
 
-    /// The analytic way of a head is the floor and a mean: what it says of a sample
-    /// tells which others it was fitted to.
+    /// The analytic method of a head is the range on the floor plus a mean offset: its answer for a
+    /// sample reveals the samples it was fitted to.
     #[test]
     fn answers_come_from_everybody_else() {
         let mut all = samples(60);
@@ -538,7 +541,7 @@ mod tests {
                 assert!((said[analytic] - sample.floor_m - mean).abs() < 1e-9, "{held:?}");
             }
         }
-        // Of one person alone blocks are held out, whatever is asked for.
+        // With one person alone, blocks are held out in both cases.
         let alone: Vec<Sample> = all.iter().map(|s| Sample { person: 3, ..*s }).collect();
         let of = |held| held_out(&alone, held, &training, 1).unwrap();
         assert_eq!(of(HeldOut::People), of(HeldOut::Blocks));
@@ -603,7 +606,7 @@ mod tests {
         assert_eq!(card["bearing_error_deg"].as_float(), Some(2.8648));
         let folds = card["five_folds_of_people"].as_table().unwrap();
         assert_eq!(folds.len(), WAYS.len());
-        // The floor is 0.1 m short for everybody, so the held-out mean corrects it.
+        // The floor is 0.1 m short for all samples, so the held-out mean corrects it.
         assert_eq!(folds["analytic_error_m"].as_float(), Some(0.0));
         assert!(folds.contains_key("printed_error_m"));
         assert_eq!(rounded(0.123_449), toml::Value::Float(0.1234));

@@ -1,27 +1,27 @@
-//! The background after the robot has moved.
+//! Motion of the background with the robot.
 
 use nalgebra::{Point2, Point3};
 use tagalong_core::Motion;
 use tagalong_geometry::{Camera, Panorama};
 
-/// Places are computed at every so many columns and rows, and between them
+/// Spacing, in columns and rows, of the nodes at which places are computed; between them they are
 /// interpolated.
 const STEP: usize = 8;
-/// A smaller motion moves nothing by half a pixel: m and rad.
+/// Largest motion that is ignored: it moves nothing by half a pixel, m and rad.
 const STILL: [f64; 2] = [0.002, 0.001];
 
-/// True if the robot moved enough to move the background.
+/// Returns true if the robot moved enough to move the background.
 pub(crate) fn is_moving(motion: &Motion) -> bool {
     motion.forward.hypot(motion.left) > STILL[0] || motion.turn.abs() > STILL[1]
 }
 
-/// Moves the background by the odometry: what is nearer than `wall_m` on the
-/// floor by the floor, all else as if it stood `wall_m` away.
+/// Displacement of the background by the odometry: the floor as the floor where it is nearer than
+/// `wall_m`, all else as if it stood `wall_m` away.
 pub(crate) struct Warp {
     columns: usize,
     rows: usize,
-    /// Where the nodes of a grid were before the motion: column, unwrapped so
-    /// that it stays near the node's own, and row.
+    /// Places of the nodes of a grid before the motion: column, unwrapped so that it stays near the
+    /// node's own, and row.
     nodes: Vec<[f32; 2]>,
     across: usize,
 }
@@ -38,7 +38,7 @@ impl Warp {
         Self { columns, rows, nodes: nodes.map(|(row, c)| node(row, c)).collect(), across }
     }
 
-    /// Where a pixel was.
+    /// Returns the place of a pixel before the motion.
     fn place(&self, column: usize, row: usize) -> [f32; 2] {
         let (i, j) = (row / STEP * self.across + column / STEP, column % STEP);
         let (x, y) = (j as f32 / STEP as f32, (row % STEP) as f32 / STEP as f32);
@@ -51,7 +51,7 @@ impl Warp {
         [mix(0), mix(1)]
     }
 
-    /// The pixel nearest to where a pixel was.
+    /// Returns the pixel nearest to the place of a pixel before the motion.
     fn nearest(&self, column: usize, row: usize) -> usize {
         let [x, y] = self.place(column, row);
         let column = (x.round() as i64).rem_euclid(self.columns as i64) as usize;
@@ -59,7 +59,7 @@ impl Warp {
         row * self.columns + column
     }
 
-    /// Reads three colours a pixel from where they were; bilinear.
+    /// Reads three colours per pixel from their places before the motion; bilinear.
     pub(crate) fn apply(&self, from: &[f32], to: &mut [f32]) {
         for row in 0..self.rows {
             for column in 0..self.columns {
@@ -91,12 +91,13 @@ impl Warp {
 
     fn row(&self, y: f32) -> (usize, f32) {
         let y = y.clamp(0.0, self.rows as f32 - 1.0);
+        // One row short of the end, so that the row below exists.
         let top = (y as usize).min(self.rows.saturating_sub(2));
         (top, y - top as f32)
     }
 }
 
-/// Where what a pixel shows now was before the motion.
+/// Returns the place before the motion of the point that a pixel shows now.
 fn before(
     camera: &Camera,
     panorama: &Panorama,
@@ -114,25 +115,23 @@ fn before(
     [camera.column_near(seen.x, pixel.x) as f32, seen.y as f32]
 }
 
-/// Blocks of so many columns and rows are moved as if all in them were equally far
-/// away.
+/// Side of the blocks that are moved as if all in them were equally far away, columns and rows.
 const BLOCK: usize = 8;
 
-/// The background after the robot has moved, where nobody knows how far away walls
-/// and furniture are: it is moved as if they stood at each of several distances, and
-/// each block is taken from that one of these images which looks most like the new
-/// image there, and around it.
+/// The background after the robot has moved, with unknown distances of walls and furniture: it is
+/// moved as if they stood at each of several distances, and each block is taken from the one of
+/// these images that is most like the new image there and around it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sweep {
     images: Vec<Vec<f32>>,
-    /// Differences to the new image: a row of blocks after the other, all images.
+    /// Differences to the new image: one row of blocks after the other, for each distance.
     costs: Vec<Vec<f32>>,
     times: Vec<f32>,
 }
 
 impl Sweep {
-    /// Moves colours, and a number for each pixel, to where `warps` say, one for each
-    /// distance; `colours` is the new image.
+    /// Moves colours, and a number for each pixel, by `warps`, one for each distance; `colours` is
+    /// the new image.
     pub(crate) fn apply(
         &mut self,
         warps: &[Warp],
@@ -159,6 +158,8 @@ impl Sweep {
             for y in row * BLOCK..(row * BLOCK + BLOCK).min(rows) {
                 let pixels = 3 * (y * columns + across.start)..3 * (y * columns + across.end);
                 mean[pixels.clone()].copy_from_slice(&self.images[best][pixels]);
+                // Times are not averages: they are taken from the nearest pixel instead of
+                // interpolated.
                 for x in across.clone() {
                     times[y * columns + x] = self.times[warps[best].nearest(x, y)];
                 }
@@ -167,7 +168,7 @@ impl Sweep {
     }
 }
 
-/// Sums of absolute differences over blocks.
+/// Sums the absolute differences over blocks.
 fn differences(image: &[f32], colours: &[u8], columns: usize, sums: &mut Vec<f32>) {
     let across = columns.div_ceil(BLOCK);
     sums.clear();
@@ -183,15 +184,15 @@ fn differences(image: &[f32], colours: &[u8], columns: usize, sums: &mut Vec<f32
     }
 }
 
-/// The sum over a block and those around it; columns are counted modulo their number.
+/// Sums over a block and its neighbours; columns are counted modulo their number.
 fn around(sums: &[f32], (row, column): (usize, usize), (down, across): (usize, usize)) -> f32 {
     let rows = row.saturating_sub(1)..(row + 2).min(down);
     let columns = [column + across - 1, column, column + 1].map(|c| c % across);
     rows.flat_map(|row| columns.map(|column| sums[row * across + column])).sum()
 }
 
-/// Lowest and highest value within some columns and rows, for each colour. What
-/// is known to within so many pixels lies between them.
+/// Lowest and highest value within some columns and rows, for each colour. A background that is
+/// known to within that many pixels lies between them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Bounds {
     pub(crate) low: Vec<u8>,
@@ -200,9 +201,11 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// `slack` are columns and rows to each side.
+    /// Computes the bounds; `slack` is the number of columns and rows to each side.
     pub(crate) fn of(&mut self, level: &[u8], columns: usize, slack: [usize; 2]) {
         let stride = 3 * columns;
+        // The extrema of a rectangle: first along the rows, then across them, at the cost of two
+        // sides.
         let [low, high] = &mut self.rows;
         low.resize(level.len(), 0);
         high.resize(level.len(), 0);
@@ -217,7 +220,7 @@ impl Bounds {
     }
 }
 
-/// Around the row: pixels are counted modulo its length.
+/// Combines along a row: pixels are counted modulo its length.
 fn along(row: &[u8], out: &mut [u8], slack: usize, pick: impl Fn(u8, u8) -> u8 + Copy) {
     out.copy_from_slice(row);
     let width = row.len();
@@ -275,7 +278,7 @@ mod tests {
         }
     }
 
-    /// A pattern on the floor and on a round wall about the place of the first image.
+    /// Renders a pattern on the floor and on a round wall about the place of the first image.
     fn room(camera: &Camera, pose: &nalgebra::Isometry2<f64>, wall_m: f64) -> Vec<f32> {
         let panorama = camera.panorama().unwrap();
         let pixels = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (column, row)));
@@ -302,7 +305,8 @@ mod tests {
         let mut moved = vec![0.0; before.len()];
         let panorama = camera.panorama().unwrap();
         Warp::new(&camera, panorama, &motion, 3.5).apply(&before, &mut moved);
-        // A wall that is always as far away is none of this world; the floor is.
+        // The wall is at a fixed distance from the robot, which no real wall is; only the floor is
+        // compared.
         let near = |row: &usize| {
             let elevation = panorama.elevation(*row as f64);
             panorama.mirror.floor_range_m(elevation, 1.5).is_some_and(|r| (0.0..3.0).contains(&r))
@@ -324,7 +328,7 @@ mod tests {
             Motion { dt: 0.3, forward: 0.2, left: 0.0, turn: 0.05, covariance: Matrix3::zeros() };
         let before = room(&camera, &nalgebra::Isometry2::identity(), 2.0);
         let warps = [1.2, 2.0, 6.0].map(|wall| Warp::new(&camera, panorama, &motion, wall));
-        // What somebody sees to whom the wall is where the middle distance has it.
+        // The new image if the wall is at the middle distance.
         let mut now = vec![0.0; before.len()];
         warps[1].apply(&before, &mut now);
         let colours: Vec<u8> = now.iter().map(|value| value.round() as u8).collect();

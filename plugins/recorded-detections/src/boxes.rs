@@ -1,4 +1,4 @@
-//! `det.txt` of the MOTChallenge.
+//! Reader of `det.txt` of the MOTChallenge.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,13 +6,13 @@ use std::path::Path;
 use tagalong_core::{Error, Recorded, Result};
 use tagalong_geometry::Rect;
 
-/// Boxes by the number of their frame, from 1.
+/// Boxes by frame number, from 1.
 pub(crate) type Boxes = BTreeMap<u64, Vec<Recorded>>;
 
 /// Reads a file of boxes.
 ///
 /// # Errors
-/// A file that cannot be read, or a line that is no detection: names both.
+/// A file that cannot be read, or a line that is not a detection: the message names both.
 pub(crate) fn read(path: &Path) -> Result<Boxes> {
     let shown = path.display();
     let text = std::fs::read_to_string(path)
@@ -44,6 +44,7 @@ fn parse(line: &str) -> std::result::Result<(u64, Recorded), String> {
     if region.width <= 0.0 || region.height <= 0.0 {
         return Err("a box without area".into());
     }
+    // A box without a score counts as certain.
     let score = if fields.len() > 6 { number(6, "score")? } else { 1.0 };
     Ok((frame as u64, Recorded { region: Some(region), head: None, score }))
 }

@@ -3,20 +3,20 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
-/// What a recorded box is drawn around.
+/// Part of the body that a recorded box encloses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Body {
     /// The whole person, from head to feet; its upper-body square is tracked.
     Full,
-    /// The whole person, and the box is tracked as it is. Its place is that of
-    /// `full`. For data sets whose truth is whole bodies, too.
+    /// The whole person, and the box is tracked as it is. Its position is computed as for `full`.
+    /// For data sets with whole bodies in their ground truth, too.
     FullBox,
     /// Head and shoulders, as a square.
     Upper,
 }
 
-/// What the recorded score means.
+/// Meaning of the recorded score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ScoreScale {
@@ -30,36 +30,35 @@ pub enum ScoreScale {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score;
-    /// frames from 1, pixels), relative to the config. Empty: the topic of the
-    /// log that `[input] detections_topic` names.
+    /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score; frames from 1,
+    /// pixels), relative to the config. Empty: the log topic that `[input] detections_topic` names.
     pub path: String,
-    /// Boxes with a lower score are dropped, on the recorded scale.
+    /// Boxes with a lower score, on the recorded scale, are dropped.
     pub min_score: f64,
-    /// What the score means.
+    /// Meaning of the score.
     pub score: ScoreScale,
-    /// What the boxes are drawn around.
+    /// Part of the body that a box encloses.
     pub body: Body,
-    /// How tall a person is taken to be whose whole body fills a box, m.
+    /// Assumed height of a person, m, if a box encloses the whole body.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub height_m: f64,
-    /// Standard deviation of a box's place, pixels.
+    /// Standard deviation of the position of a box, pixels.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_px: f64,
     /// Standard deviation of the depth of a face read from the depth image, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_depth_m: f64,
-    /// Standard deviation of a distance that only the size of the box tells, as
-    /// a fraction of the distance.
+    /// Standard deviation of a distance that is computed from the size of the box alone, as a
+    /// fraction of the distance.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
     /// Standard deviation of a recorded position in space, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_position_m: f64,
-    /// A search near a track takes boxes that overlap the expected one by this
-    /// much (IoU), or ...
+    /// A search near a track accepts boxes of uncertain distance that overlap the expected box by
+    /// this much (IoU), and ...
     pub near_overlap: f64,
-    /// ... positions this near on the floor, m.
+    /// ... positions within this distance on the floor, m.
     pub near_m: f64,
 }
 

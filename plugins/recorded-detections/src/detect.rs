@@ -10,27 +10,27 @@ use crate::NAME;
 use crate::boxes::{Boxes, read};
 use crate::config::{Body, Config, ScoreScale};
 
-/// Half of the part of a face that is looked at for its depth, m.
+/// Half the side of the square of the face in which depth is read, m.
 const HALF_FACE_M: f64 = 0.07;
 
-/// Depth readings that a face needs to be believed.
+/// Fewest depth readings from which the depth of a face is computed.
 const LEAST_READINGS: usize = 4;
 
-/// Probabilities are kept this far from 0 and 1.
+/// Distance of probabilities from 0 and 1 at least.
 const SURE: f64 = 1e-3;
 
-/// Gives back what another detector recorded, with a place for each box.
+/// Detector that returns recorded detections, with a position for each box.
 pub struct RecordedDetections {
     config: Config,
-    /// The boxes of the file; `None`: those of the log.
+    /// Boxes of the file; `None`: those of the log.
     boxes: Option<Boxes>,
 }
 
 impl RecordedDetections {
-    /// A detector with these settings.
+    /// Creates a detector, and reads its file if the settings name one.
     ///
     /// # Errors
-    /// Settings that cannot work, or a file that cannot be read.
+    /// Settings outside their ranges, or a file that cannot be read.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let boxes = match config.path.as_str() {
@@ -40,7 +40,7 @@ impl RecordedDetections {
         Ok(Self { config, boxes })
     }
 
-    /// What was recorded of a frame.
+    /// Returns the recorded detections of a frame.
     fn recorded<'a>(&'a self, frame: &'a Frame, funnel: &mut Funnel) -> &'a [Recorded] {
         let found = match &self.boxes {
             Some(boxes) => Some(boxes.get(&frame.index).map_or(&[][..], Vec::as_slice)),
@@ -81,8 +81,8 @@ impl RecordedDetections {
         }
     }
 
-    /// A place for an upper-body square: by the depth image where it shows the
-    /// face, else by the square's size, with the uncertainty of either.
+    /// Returns the head position for an upper-body square, with its covariance: from the depth
+    /// image where that shows the face, otherwise from the size of the square.
     fn placed(&self, frame: &Frame, region: &Rect) -> Option<(Point3<f64>, Matrix3<f64>)> {
         let camera = &*frame.camera;
         let measured = frame.images().depth.as_deref().and_then(|depth| face_depth(depth, region));
@@ -105,25 +105,26 @@ impl RecordedDetections {
         match self.config.score {
             ScoreScale::LogOdds => score,
             ScoreScale::Probability => {
+                // The log-odds of 0 and 1 are infinite.
                 let sure = score.clamp(SURE, 1.0 - SURE);
                 (sure / (1.0 - sure)).ln()
             }
         }
     }
 
-    /// How well a detection fits a track, if it is near it at all.
+    /// Returns a score of the fit of a detection to a track; `None` if it is not near.
     fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
         let overlap = track.estimate.region.iou(&detection.region);
         let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
-        // A box whose distance is a guess is near if it overlaps.
+        // The distance by size alone may be far off on the floor, so overlap is enough for such a
+        // box.
         let guessed = detection.covariance.diagonal().xy().max() > 0.25 * self.config.near_m;
         let near = away_m <= self.config.near_m || guessed && overlap >= self.config.near_overlap;
         near.then_some(overlap - away_m)
     }
 }
 
-/// The median depth of the face in an upper-body square, if there are enough
-/// readings.
+/// Returns the median depth of the face in an upper-body square, if there are enough readings.
 fn face_depth(depth: &DepthImage, region: &Rect) -> Option<f64> {
     let px_per_m = region.width / UPPER_BODY_SIDE_M;
     let half = HALF_FACE_M * px_per_m;
@@ -136,6 +137,7 @@ fn face_depth(depth: &DepthImage, region: &Rect) -> Option<f64> {
         .flat_map(|y| depth.row(y)[left..right.max(left)].iter().copied())
         .filter(|metres| metres.is_finite())
         .collect();
+    // The median ignores the background that shows beside a narrow face.
     readings.sort_by(f32::total_cmp);
     let enough = readings.len() >= LEAST_READINGS;
     enough.then(|| f64::from(readings[readings.len() / 2]))
@@ -169,6 +171,7 @@ impl Detector for RecordedDetections {
                 None => funnel.drop_at("outside", recorded.region.unwrap_or_default()),
             }
         }
+        // The best fit comes first, because the search is for one person.
         if let Search::Near(track) = search {
             let mut near: Vec<(f64, Detection)> =
                 found.into_iter().filter_map(|d| Some((self.fit(track, &d)?, d))).collect();

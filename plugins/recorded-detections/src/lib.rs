@@ -1,11 +1,10 @@
-//! Gives back what another detector recorded: any detector there is can stand
-//! in a pipeline, by running it elsewhere and recording what it found.
+//! Replays the detections of another detector: any detector can serve in a pipeline by running
+//! elsewhere and recording its output.
 //!
-//! Boxes come from a text file or from a topic of the log; positions come from
-//! the depth image, from the recording, or from the size of the box with an
-//! honestly large uncertainty. Nothing here looks at pixels of colour, so that
-//! every tracker gets exactly the same detections, as tracking benchmarks with
-//! given ("public") detections want it.
+//! Boxes come from a text file or from a topic of the log; positions come from the depth image,
+//! from the recording, or from the size of the box with a correspondingly large uncertainty. No
+//! colour image is read, so that every tracker gets exactly the same detections, as tracking
+//! benchmarks with given ("public") detections require.
 
 mod boxes;
 mod config;
@@ -17,7 +16,7 @@ pub use config::{Body, Config, ScoreScale};
 pub use detect::RecordedDetections;
 use tagalong_config::Registry;
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "recorded-detections";
 
 /// Registers the plugin.

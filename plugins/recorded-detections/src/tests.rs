@@ -38,7 +38,7 @@ fn detect(detector: &mut RecordedDetections, frame: &Frame) -> Vec<Detection> {
     detector.detect(frame, &EVERYWHERE, &mut Funnel::default()).unwrap()
 }
 
-/// A person at this head position, as a whole-body box of the file.
+/// Formats a person at this head position as a whole-body box of the file.
 fn whole_body(head: Point3<f64>) -> String {
     let upper = camera().upper_body(&head);
     let px_per_m = upper.width / 0.57;
@@ -181,7 +181,7 @@ fn track_at(head: Point3<f64>) -> Track {
     }
 }
 
-/// Whether a search near somebody 3 m ahead finds a position that the log tells.
+/// Returns true if a search near a track 3 m ahead finds a position from the log.
 fn finds_near(at: Point3<f64>, config: Config) -> bool {
     let mut detector = RecordedDetections::new(config, &context(".".as_ref())).unwrap();
     let recorded = Recorded { region: None, head: Some(at), score: 0.9 };
@@ -195,7 +195,7 @@ fn near_a_track_is_what_is_near_on_the_floor() {
     let at = |x: f64, y: f64| finds_near(Point3::new(x, y, 1.6), Config::default());
     assert!(at(3.79, 0.0) && at(3.0, -0.79) && !at(3.81, 0.0) && !at(3.6, 0.6));
     assert!(finds_near(Point3::new(3.0, 0.0, 1.2), Config::default()), "whatever the height");
-    // The same direction, and so the same place in the image, a metre behind.
+    // The same direction, and so nearly the same box, a metre behind.
     assert!(!at(4.0, 0.0), "a place that is told is no guess");
     let vague = Config { sigma_position_m: 0.5, ..Config::default() };
     assert!(finds_near(Point3::new(4.0, 0.0, 1.6), vague.clone()), "it overlaps");

@@ -1,23 +1,23 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done to the grey values of a patch.
+/// Normalisation of the grey values of a patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scaling {
-    /// The mean is subtracted, then the length of the vector becomes 1: two
-    /// patches are apart by twice one minus their correlation.
+    /// The mean is subtracted, then the vector is scaled to length 1: the squared distance of two
+    /// patches is twice one minus their correlation.
     #[default]
     Unit,
-    /// Histograms of the directions of gradients in their place (Dalal and
-    /// Triggs, CVPR 2005): 5x5 cells of 16 directions with sign, each divided
-    /// by the strength around it; then the length becomes 1.
+    /// Histograms of gradient directions replace the grey values (Dalal and Triggs, CVPR 2005): 5x5
+    /// cells of 16 signed directions, each divided by the gradient strength around it; then the
+    /// vector is scaled to length 1.
     Gradients,
-    /// Grey values are divided by their largest, so that they are 0 to 1. With the
-    /// paper's gamma nearly all patches are far from each other.
+    /// Grey values are divided by 255, so that they are 0 to 1. With the paper's gamma nearly all
+    /// patches are far from each other.
     Fraction,
-    /// Nothing; grey values are 0 to 255. This is what the paper prints, and
-    /// with its gamma every patch is infinitely far from every other.
+    /// No normalisation; grey values are 0 to 255. The paper prints this, and with its gamma every
+    /// patch is practically infinitely far from every other.
     Raw,
 }
 
@@ -25,14 +25,14 @@ pub enum Scaling {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Model file, relative to the config; empty: the model that is built in.
+    /// Model file, relative to the config; empty: the built-in model.
     pub model: String,
-    /// Weight of this verifier's log-odds beside the detector's score.
+    /// Weight of this verifier's log-odds relative to the detector's score.
     pub weight: f64,
-    /// Log-odds of one frame are limited to plus and minus this: one patch is
-    /// never beyond doubt.
+    /// Log-odds of one frame are limited to plus and minus this: a single patch never decides
+    /// alone.
     pub limit: f64,
-    /// How a model is fitted; only `tagalong train` reads it.
+    /// Settings of the fit; only `tagalong train` reads them.
     pub training: Training,
 }
 
@@ -42,30 +42,29 @@ impl Default for Config {
     }
 }
 
-/// How a model is fitted. What matters at run time is kept in the model file.
+/// Settings of the fit. Those needed at run time are stored in the model file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
-    /// What is done to the grey values: `unit`, `gradients`, `fraction` or `raw`.
+    /// Normalisation of the grey values: `unit`, `gradients`, `fraction` or `raw`.
     pub scaling: Scaling,
-    /// The square of a candidate is enlarged by this fraction of its side.
+    /// Fraction of its side by which a candidate's square is enlarged.
     pub grow: f64,
-    /// Widths of the kernel `exp(-gamma |a - b|^2)` that are tried (P4: 8).
+    /// Widths of the kernel `exp(-gamma |a - b|^2)` to try (P4: 8).
     pub gammas: Vec<f64>,
-    /// Penalties of a training error that are tried; each class is weighted by
-    /// the inverse of its share.
+    /// Penalties of a training error to try; each class is weighted by the inverse of its share.
     pub penalties: Vec<f64>,
-    /// Parts into which the groups are divided, each held out once.
+    /// Number of parts into which the groups are divided; each is held out once.
     pub folds: usize,
-    /// Examples in the cross-validation at most.
+    /// Most examples in the cross-validation.
     pub max_tried: usize,
-    /// Examples in the final fit at most; memory grows with the square.
+    /// Most examples in the final fit; memory grows with the square.
     pub max_samples: usize,
-    /// Support vectors in the model file at most; each takes half a kilobyte.
+    /// Most support vectors in the model file; each takes half a kilobyte.
     pub max_vectors: usize,
-    /// Examples of people that are used at most, by chance (P4: 438); 0: all.
+    /// Most examples of people, sampled at random (P4: 438); 0: all.
     pub people: usize,
-    /// Examples of others that are used at most, by chance (P4: 146); 0: all.
+    /// Most examples of other objects, sampled at random (P4: 146); 0: all.
     pub others: usize,
 }
 

@@ -1,5 +1,4 @@
-//! A patch as histograms of the directions of its gradients (N. Dalal and
-//! B. Triggs, CVPR 2005).
+//! Histograms of the gradient directions of a patch (N. Dalal and B. Triggs, CVPR 2005).
 
 use std::f32::consts::TAU;
 
@@ -9,17 +8,19 @@ use crate::patch::{PIXELS, Patch, SIDE};
 const CELL: usize = 4;
 /// Cells along a side of the patch.
 const CELLS: usize = SIDE / CELL;
-/// Directions in a whole turn: dark before bright is not bright before dark.
+/// Directions in a full turn: dark before bright differs from bright before dark.
 const DIRECTIONS: usize = PIXELS / (CELLS * CELLS);
-/// Gradients weaker than this on average are noise, grey values per pixel.
+/// Mean gradient strength below which a gradient is noise, grey values per pixel.
 const NOISE: f32 = 1.0;
 
-/// The histograms, cell by cell, each divided by the strength around it; all of
-/// them have length one, or are zero where there are no gradients.
+/// Returns the histograms cell by cell, each the square root of its share of the gradient strength
+/// around it; the whole vector has length 1, or is zero where there are no gradients.
 pub fn of(grey: &Patch) -> Patch {
     let histograms = histograms(grey);
     let mut out = [0.0; PIXELS];
     for (cell, histogram) in out.chunks_exact_mut(DIRECTIONS).enumerate() {
+        // The noise term keeps flat cells near zero, instead of scaling their noise up to full
+        // strength.
         let around = strength_around(&histograms, cell) + NOISE * (CELL * CELL) as f32;
         let own = &histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS];
         histogram.iter_mut().zip(own).for_each(|(out, own)| *out = (own / around).sqrt());
@@ -42,13 +43,15 @@ fn histograms(grey: &Patch) -> Patch {
         let cell = row / CELL * CELLS + column / CELL;
         let histogram = &mut histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS];
         let strength = dx.hypot(dy);
+        // Linear interpolation between two directions: a small rotation changes the histogram a
+        // little.
         histogram[first] += (1.0 - (turn - lower)) * strength;
         histogram[(first + 1) % DIRECTIONS] += (turn - lower) * strength;
     }
     histograms
 }
 
-/// Half the difference of the neighbours; one-sided at the border.
+/// Returns half the difference of the neighbours; one-sided at the border.
 fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
     let at = |row: usize, column: usize| grey[row.min(SIDE - 1) * SIDE + column.min(SIDE - 1)];
     [
@@ -57,7 +60,7 @@ fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
     ]
 }
 
-/// Mean strength of a cell and its neighbours.
+/// Returns the mean gradient strength of a cell and its neighbours.
 fn strength_around(histograms: &Patch, cell: usize) -> f32 {
     let span = |k: usize| k.saturating_sub(1)..(k + 2).min(CELLS);
     let (rows, columns) = (span(cell / CELLS), span(cell % CELLS));

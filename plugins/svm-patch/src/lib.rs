@@ -1,18 +1,16 @@
-//! Doubts candidates by their intensity patch, with a support vector machine
-//! (P4, section II-C).
+//! Verifies candidates by their intensity patch, with a support vector machine (P4, section II-C).
 //!
-//! Silhouettes in depth cannot tell a person from a coat on a stand; the grey
-//! values inside often can. A candidate's square is reduced to 20x20 grey
-//! values ([`Sampler`]), freed of brightness and contrast or turned into directions
-//! of gradients, and compared with
-//! the support vectors of a [`Model`] by a radial basis function. The decision
-//! value becomes log-odds by a calibration on held-out groups.
+//! Silhouettes in depth cannot tell a person from a coat on a stand; the grey values inside often
+//! can. A candidate's square is reduced to 20x20 grey values ([`Sampler`]), which are normalised
+//! for brightness and contrast or replaced by gradient directions, and compared with the support
+//! vectors of a [`Model`] by a radial basis function. The decision value becomes log-odds by a
+//! calibration on held-out groups.
 //!
-//! The margin is evidence alone: the prior, one person in so many candidates,
-//! is the business of the detector, whose score the pipeline adds.
+//! The log-odds assume even priors: the prior, one person in many candidates, belongs to the score
+//! of the detector, which the pipeline adds.
 //!
-//! With the feature `train` the plugin also offers a trainer (`train`).
-//! Without it there is no solver in the program.
+//! With the feature `train` the plugin also offers a trainer (`train`). Without it no solver is
+//! compiled in.
 
 mod config;
 mod gradients;
@@ -30,7 +28,7 @@ pub use patch::{PIXELS, Patch, SIDE, Sampler};
 use tagalong_config::Registry;
 pub use verify::SvmPatch;
 
-/// The name of this plugin in configs.
+/// Name of this plugin in configs.
 pub const NAME: &str = "svm-patch";
 
 /// Registers the plugin, and its trainer if that is compiled in.

@@ -5,35 +5,35 @@ use serde::{Deserialize, Serialize};
 use crate::patch::{PIXELS, Patch};
 use crate::{Sampler, Scaling};
 
-/// Largest number of a quantised coordinate.
+/// Largest absolute value of a quantised coordinate.
 const FULL: f32 = 127.0;
 
-/// Support vectors a model file may hold at most.
+/// Most support vectors in a model file.
 const MOST_VECTORS: usize = 10_000;
 
-/// A fitted machine: `f(x) = sum_i weight_i exp(-gamma |v_i - x|^2) + bias`,
-/// and the straight line that turns `f` into log-odds.
+/// A fitted machine: `f(x) = sum_i weight_i exp(-gamma |v_i - x|^2) + bias`, and the straight line
+/// that maps `f` to log-odds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// How patches are cut.
+    /// Sampling of patches from the image.
     pub sampler: Sampler,
     /// Width of the kernel.
     pub gamma: f32,
-    /// The constant term.
+    /// Constant term of `f`.
     pub bias: f32,
     /// Log-odds per unit of `f` ...
     pub slope: f64,
-    /// ... and those of `f` = 0.
+    /// ... and the log-odds at `f` = 0.
     pub offset: f64,
     /// Support vectors, one after the other.
     vectors: Vec<f32>,
-    /// Their squared lengths.
+    /// Squared lengths of the support vectors.
     squares: Vec<f32>,
-    /// Their weights; positive for people.
+    /// Weights of the support vectors; positive for people.
     weights: Vec<f32>,
 }
 
-/// A model as TOML. Vectors are kept with 8 bits a coordinate.
+/// A model as TOML. Vectors are stored with 8 bits per coordinate.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -59,8 +59,8 @@ struct Entry {
 const FORMAT: &str = "svm-patch 1";
 
 impl Model {
-    /// A model from support vectors and their weights, quantised as in its
-    /// file. The calibration is the identity.
+    /// Builds a model from support vectors and their weights, quantised as in its file. The
+    /// calibration is the identity.
     pub fn new<'a>(
         sampler: Sampler,
         gamma: f64,
@@ -78,6 +78,8 @@ impl Model {
             weights: Vec::new(),
         };
         for (vector, weight) in support {
+            // Quantising here gives the fitted model the same answers as the one read back from
+            // its file.
             let step = step_of(vector);
             model.push(vector.iter().map(|v| step * quantised(*v, step)), weight as f32);
         }
@@ -91,22 +93,24 @@ impl Model {
         self.weights.push(weight);
     }
 
-    /// Number of support vectors.
+    /// Returns the number of support vectors.
     pub fn len(&self) -> usize {
         self.weights.len()
     }
 
-    /// True for a model that decides nothing.
+    /// Returns true for a model without support vectors.
     pub fn is_empty(&self) -> bool {
         self.weights.is_empty()
     }
 
-    /// The decision value; positive for people.
+    /// Returns the decision value; positive for people.
     pub fn decision(&self, patch: &Patch) -> f64 {
         let square: f32 = patch.iter().map(|v| v * v).sum();
         let each = self.vectors.chunks_exact(PIXELS).zip(&self.squares).zip(&self.weights);
         let sum: f64 = each
             .map(|((vector, own), weight)| {
+                // |a - b|² from the stored squares costs one scalar product; rounding may bring
+                // it below 0.
                 let distance = (square + own - 2.0 * dot(vector, patch)).max(0.0);
                 f64::from(weight * (-self.gamma * distance).exp())
             })
@@ -114,12 +118,12 @@ impl Model {
         sum + f64::from(self.bias)
     }
 
-    /// Log-odds that the patch shows a person, with even priors.
+    /// Returns the log-odds that the patch shows a person, with even priors.
     pub fn log_odds(&self, patch: &Patch) -> f64 {
         self.slope * self.decision(patch) + self.offset
     }
 
-    /// The model file.
+    /// Formats the model file.
     pub fn to_text(&self) -> String {
         let file = File {
             format: FORMAT.into(),
@@ -134,10 +138,10 @@ impl Model {
         toml::to_string(&file).unwrap_or_default()
     }
 
-    /// Reads a model file.
+    /// Parses a model file.
     ///
     /// # Errors
-    /// Text that is no model, in a sentence.
+    /// Text that is not a model; the message is one sentence.
     pub fn from_text(text: &str) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
         if file.format != FORMAT {
@@ -150,6 +154,7 @@ impl Model {
         let mut model = Self::new(sampler, file.gamma.into(), file.bias.into(), []);
         (model.slope, model.offset) = (file.slope, file.offset);
         for (number, entry) in file.vectors.iter().enumerate() {
+            // Invalid base64 becomes a vector of the wrong length, which the next check reports.
             let bytes = STANDARD.decode(&entry.bytes).unwrap_or_default();
             if bytes.len() != PIXELS {
                 return Err(format!("vector {number} does not have {PIXELS} bytes"));
@@ -173,7 +178,7 @@ fn entry((vector, weight): (&[f32], &f32)) -> Entry {
     Entry { weight: *weight, step, bytes: STANDARD.encode(bytes) }
 }
 
-/// The step by which the largest coordinate is 127 steps.
+/// Returns the step of which the largest coordinate is 127.
 fn step_of(vector: &[f32]) -> f32 {
     vector.iter().fold(0.0f32, |most, v| most.max(v.abs())) / FULL
 }
@@ -182,8 +187,9 @@ fn quantised(value: f32, step: f32) -> f32 {
     if step > 0.0 { (value / step).round().clamp(-FULL, FULL) } else { 0.0 }
 }
 
-/// The scalar product, in lanes that the compiler turns into vectors.
+/// Returns the scalar product.
 fn dot(a: &[f32], b: &[f32]) -> f32 {
+    // Independent sums let the compiler use vector instructions.
     const LANES: usize = 16;
     let mut lanes = [0.0f32; LANES];
     for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
@@ -219,7 +225,7 @@ mod tests {
         Model::new(SAMPLER, gamma, 0.25, patches.iter().zip(weights))
     }
 
-    /// The sum as it is defined, in double precision.
+    /// The sum by its definition, in double precision.
     fn slow(model: &Model, x: &Patch) -> f64 {
         let kernel = |v: &[f32]| {
             let distance: f64 =

@@ -5,28 +5,28 @@ use crate::{Scaling, gradients};
 
 /// Rows and columns of a patch (P4, section II-C).
 pub const SIDE: usize = 20;
-/// Grey values of a patch.
+/// Number of grey values in a patch.
 pub const PIXELS: usize = SIDE * SIDE;
 
-/// The grey values of a candidate in row order, scaled.
+/// Normalised grey values of a candidate, row by row.
 pub type Patch = [f32; PIXELS];
 
-/// A patch whose grey values vary by less than this (root mean square) shows
-/// nothing but noise.
+/// Least root mean square of the grey values about their mean; below it a patch shows nothing but
+/// noise.
 const LEAST_CONTRAST: f32 = 1.0;
 
-/// Cuts patches.
+/// Sampler of patches from an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampler {
-    /// The square is enlarged by this fraction of its side.
+    /// Fraction of its side by which the square is enlarged.
     pub grow: f64,
-    /// What is done to the grey values.
+    /// Normalisation of the grey values.
     pub scaling: Scaling,
 }
 
 impl Sampler {
-    /// The patch of a region. What lies outside the image continues its border;
-    /// a patch without contrast is all zeros.
+    /// Samples the patch of a region. Outside the image its border is continued; a patch without
+    /// contrast is all zeros (not with `fraction` and `raw`).
     pub fn patch(&self, grey: &GreyImage, region: &Rect) -> Patch {
         let mut patch = [0.0; PIXELS];
         if grey.width() == 0 || grey.height() == 0 {
@@ -56,10 +56,12 @@ fn sum_of(greys: &[u8]) -> u64 {
     greys.iter().map(|grey| u64::from(*grey)).sum()
 }
 
-/// The pixels of each of the 20 cells along one axis, at least one a cell.
+/// Returns the pixel range of each of the 20 cells along one axis, at least one pixel each.
 fn cells(start: f64, length: f64, size: usize) -> [(usize, usize); SIDE] {
     let edge = |k: usize| (start + length * k as f64 / SIDE as f64).clamp(0.0, size as f64);
     std::array::from_fn(|k| {
+        // Cells outside the image collapse to its first or last pixel, which continues the
+        // border.
         let first = (edge(k) as usize).min(size - 1);
         (first, (edge(k + 1) as usize).clamp(first + 1, size))
     })
@@ -69,6 +71,8 @@ fn cells(start: f64, length: f64, size: usize) -> [(usize, usize); SIDE] {
 fn normalise(patch: &mut Patch) {
     let mean = patch.iter().sum::<f32>() / PIXELS as f32;
     patch.iter_mut().for_each(|v| *v -= mean);
+    // The length is the root mean square times the root of the number of pixels, which is
+    // `SIDE`.
     let length = patch.iter().map(|v| v * v).sum::<f32>().sqrt();
     let enough = length >= LEAST_CONTRAST * SIDE as f32;
     let factor = if enough { 1.0 / length } else { 0.0 };
@@ -85,7 +89,7 @@ mod tests {
     const RAW: Sampler = Sampler { grow: 0.0, scaling: Scaling::Raw };
     const GRADIENTS: Sampler = Sampler { grow: 0.0, scaling: Scaling::Gradients };
 
-    /// The mean of every pixel whose column and row fall into a cell.
+    /// The mean of all pixels with column and row in a cell.
     fn slow(grey: &GreyImage, x0: usize, y0: usize, block: usize) -> Vec<f32> {
         let mut sums = vec![0.0f64; PIXELS];
         for y in 0..SIDE * block {

@@ -136,8 +136,8 @@ mod training {
         values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
     }
 
-    /// As printed: gamma = 8 on grey values from 0 to 255. Every patch is so
-    /// far from every other that the answer no longer depends on it.
+    /// As printed: gamma = 8 on grey values from 0 to 255. All patches are so far from each other
+    /// that the answer no longer depends on the patch.
     #[test]
     fn the_printed_width_on_unscaled_patches_is_constant() {
         let printed = Training {
@@ -150,7 +150,7 @@ mod training {
         let scaled = Training { scaling: Scaling::Unit, ..printed.clone() };
         let first = |training| trainer(training, 60).trials(&mut |_| {}).unwrap().remove(0);
         let (raw, unit) = (first(printed), first(scaled));
-        // Each of the two parts has its own constant.
+        // Each of the two folds has its own constant.
         let mut distinct: Vec<f64> = raw.held_out.iter().map(|(f, _)| *f).collect();
         distinct.dedup();
         assert!(distinct.len() <= 2, "{distinct:?}");

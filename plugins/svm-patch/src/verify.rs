@@ -3,21 +3,21 @@ use tagalong_core::{Detection, Frame, Input, Inputs, Result, Trust, Verifier};
 
 use crate::{Config, Model};
 
-/// The model that is part of the program.
+/// Model that is compiled into the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/svm-patch.toml");
 
-/// The verifier.
+/// Verifier by a support vector machine on grey patches.
 pub struct SvmPatch {
     model: Model,
     trust: Trust,
 }
 
 impl SvmPatch {
-    /// A verifier; reads its model.
+    /// Creates a verifier and reads its model.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
-    /// [`tagalong_core::Error::Settings`] for weights that are no weights.
+    /// [`tagalong_core::Error::Model`] for a file that cannot be read or is not a model,
+    /// [`tagalong_core::Error::Settings`] for a weight or limit outside its range.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         let trust = Trust::new(config.weight, config.limit, 0.0)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;

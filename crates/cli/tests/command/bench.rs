@@ -102,6 +102,8 @@ fn before_result(home: &Home) -> String {
 #[test]
 fn figures_and_events_are_in_the_report() {
     let home = Home::new();
+    let late = "[manager.config]\nconfirm_hits = 3\nconfirm_within = 5\nconfirm_score = 4.0\n";
+    home.config("near", late);
     ok(home.bench(&["--logs", "logs/long.mcap", "--configs", "configs/near.toml", "-o", "out"]));
     let report = home.report("out");
     let task = &report["tasks"][0];

@@ -21,18 +21,19 @@ fn slow_run(home: &Path) -> Child {
         .unwrap()
 }
 
-/// Waits until the file has some content.
-fn wait_for(file: &Path) {
+/// Waits until the file has so many bytes.
+fn wait_for(file: &Path, bytes: u64) {
     let started = Instant::now();
-    while fs::metadata(file).map_or(0, |about| about.len()) == 0 {
+    while fs::metadata(file).map_or(0, |about| about.len()) < bytes {
         let late = started.elapsed() > Duration::from_secs(60);
-        assert!(!late, "nothing was written to {}", file.display());
+        assert!(!late, "too little was written to {}", file.display());
         thread::sleep(Duration::from_millis(20));
     }
 }
 
+/// Waits for the tracks of some twenty frames, so that a second of them is on disk.
 fn wait_for_tracks(home: &Path) {
-    wait_for(&home.join("out/tracks.csv.partial"));
+    wait_for(&home.join("out/tracks.csv.partial"), 1000);
 }
 
 fn interrupt(child: &Child, signal: &str) {
@@ -118,7 +119,7 @@ fn an_interrupted_simulation_leaves_a_whole_log() {
     let mut simulate = tagalong();
     simulate.current_dir(home.path()).args(["simulate", "long.toml", "-o", "long.mcap"]);
     let child = simulate.stderr(Stdio::piped()).spawn().unwrap();
-    wait_for(&home.path().join("long.mcap.partial"));
+    wait_for(&home.path().join("long.mcap.partial"), 1);
     interrupt(&child, "INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(code(&output), 130, "{}", text(&output.stderr));

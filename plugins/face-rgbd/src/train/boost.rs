@@ -1,4 +1,4 @@
-//! One stage: boosted trees that ask about features by chance.
+//! Training of one stage: boosted trees over random features.
 
 use tagalong_learn::boost::{self, Boosting, Levels, Question};
 use tagalong_learn::mix;
@@ -9,10 +9,10 @@ use crate::{Cascade, Feature, Next, Node, Part, Split, Stage, Training, Tree};
 
 /// Columns and rows of the kinds of features: pairs, triples, chequered.
 const KINDS: [(usize, usize); 5] = [(2, 1), (1, 2), (3, 1), (1, 3), (2, 2)];
-/// Smaller blocks are noise, pixels.
+/// Least area of a block, pixels: smaller ones are noise.
 const LEAST_BLOCK: usize = 4;
 
-/// What a stage is trained with.
+/// Training samples of a stage.
 pub(super) struct Samples<'a> {
     pub(super) faces: &'a [Patch],
     pub(super) others: &'a [Patch],
@@ -24,7 +24,7 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Features by chance, and their values in all samples.
+/// Generates random features, and computes their values in all samples.
 fn drawn_features(samples: &Samples<'_>, training: &Training, seed: u64) -> (Vec<Feature>, Levels) {
     let Training { side, features, .. } = *training;
     let drawn: Vec<Feature> = (0..features as u64).map(|i| drawn(side, mix(seed ^ i))).collect();
@@ -39,7 +39,7 @@ fn drawn_features(samples: &Samples<'_>, training: &Training, seed: u64) -> (Vec
     (drawn, table)
 }
 
-/// A feature by chance.
+/// Generates a random feature.
 fn drawn(side: usize, seed: u64) -> Feature {
     let mut state = seed;
     let mut below = |n: usize| {
@@ -58,8 +58,8 @@ fn drawn(side: usize, seed: u64) -> Feature {
     }
 }
 
-/// All blocks with weight -1, and the inner ones, or two of them crosswise, so
-/// much more that they weigh the same.
+/// Returns a feature with weight -1 for all blocks, and a positive weight for one block, or for two
+/// of them crosswise, that balances it.
 fn haar_feature((columns, rows): (usize, usize), first: Part) -> Feature {
     let block = |x: usize, y: usize| Part {
         x: first.x + x * first.width,
@@ -95,7 +95,7 @@ pub(super) fn stage(cascade: &mut Cascade, samples: &Samples<'_>, training: &Tra
     cascade.stages.push(built);
 }
 
-/// A tree of the cascade, and its features with it.
+/// Converts a tree to one of the cascade, and adds its features.
 fn kept(tree: &[Question], features: &[Feature], cascade: &mut Cascade) -> Tree {
     let next = |next: boost::Next| match next {
         boost::Next::Question(to) => Next::Node(to),
@@ -109,11 +109,11 @@ fn kept(tree: &[Question], features: &[Feature], cascade: &mut Cascade) -> Tree 
     tree.iter().map(node).collect()
 }
 
-/// The largest threshold that so many of the sums reach.
+/// Returns the largest threshold that this part of the sums reaches.
 fn passed_by(sums: &[f32], part: f64) -> f32 {
     let mut sorted = sums.to_vec();
     sorted.sort_by(f32::total_cmp);
     let may_fail = ((1.0 - part) * sorted.len() as f64) as usize;
-    // Sums are added in another order elsewhere.
+    // The scanner may add the values in another order, with other rounding errors.
     sorted[may_fail.min(sorted.len() - 1)] - 1e-4
 }

@@ -1,4 +1,4 @@
-//! What a cascade is worth on pictures that it was not trained with.
+//! Accuracy of a cascade on pictures that it was not trained with.
 
 use tagalong_geometry::Rect;
 use tagalong_learn::{Line, platt};
@@ -6,20 +6,20 @@ use tagalong_learn::{Line, platt};
 use super::{Picture, Use};
 use crate::{Cascade, Config, Scanner, grouped, scales};
 
-/// A window is of a face if they overlap by this (IoU).
+/// Least overlap (IoU) of a window and the face that it shows.
 const SAME: f64 = 0.5;
-/// Windows of faces that count: those of faces that are 40 pixels wide.
+/// Least width of a face's window that counts, pixels: that of a face 40 pixels wide.
 const LEAST_PX: f64 = 34.0;
-/// False alarms a picture at which the found part is told.
+/// Numbers of false alarms per picture at which the share of found faces is reported.
 const FALSE_ALARMS: [f64; 3] = [1.0, 0.3, 0.1];
 
-/// What was found in pictures for one purpose.
+/// Groups found in the pictures for one purpose.
 #[derive(Default)]
 struct Found {
-    /// Logarithm of the strength; whether it is a face. Small faces are neither.
+    /// Logarithm of the strength, and true for a face. Groups of small faces are left out.
     groups: Vec<(f64, bool)>,
     faces: usize,
-    /// Pictures with faces.
+    /// Number of pictures.
     pictures: usize,
 }
 
@@ -45,12 +45,13 @@ impl Found {
             let best = (0..free.len()).max_by(|a, b| iou(&free[*a]).total_cmp(&iou(&free[*b])));
             let face = best.filter(|i| iou(&free[*i]) >= SAME).map(|i| free.remove(i));
             if face.is_none_or(|face| face.width >= LEAST_PX) {
+                // The logarithm needs a positive strength.
                 self.groups.push((group.strength.max(1e-3).ln(), face.is_some()));
             }
         }
     }
 
-    /// The part of the faces that is found with so many false alarms a picture.
+    /// Returns the part of the faces that is found with this number of false alarms per picture.
     fn found_at(&self, false_alarms: f64) -> f64 {
         let allowed = (false_alarms * self.pictures as f64) as usize;
         let mut sorted = self.groups.clone();
@@ -85,14 +86,14 @@ fn search(
     found
 }
 
-/// Slope and offset of the log-odds.
+/// Fits slope and offset of the log-odds.
 pub(super) fn calibration(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> (f64, f64) {
     let found = search(cascade, config, pictures, |p| p.use_ == Use::Calibration);
     let Line { slope, offset } = platt(&found.groups);
     (slope.max(1e-3), offset)
 }
 
-/// What a cascade finds in pictures for one purpose, with faces or without.
+/// Searches the pictures for one purpose, with faces or without.
 fn found_in(
     cascade: &Cascade,
     config: &Config,
@@ -103,9 +104,9 @@ fn found_in(
     search(cascade, config, pictures, |p| p.use_ == use_ && p.faces.is_empty() != with_faces)
 }
 
-/// The figures of the card: of the pictures that nothing was chosen with, and of those of
-/// the calibration, with which settings may be chosen. With those, it also says what the
-/// cascade would find that had fewer stages, down to half of them.
+/// Computes the figures of the card: on held-out pictures, and on those of the calibration, which
+/// may be used to choose settings. On the latter, also the share of faces that cascades of fewer
+/// stages find, down to half of them.
 pub(super) fn figures(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::Table {
     let empty = found_in(cascade, config, pictures, Use::Figures, false);
     let integer = |n: usize| toml::Value::Integer(n as i64);
@@ -126,8 +127,8 @@ pub(super) fn figures(cascade: &Cascade, config: &Config, pictures: &[Picture]) 
     table
 }
 
-/// The part of the faces that the last stage finds at one false alarm a picture, and
-/// before it what fewer stages find.
+/// Returns the share of faces that the cascade finds at one false alarm per picture, after those
+/// that fewer stages find.
 fn by_stages(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::Value {
     let stages = cascade.stages.len();
     let found = (stages / 2 + 1..=stages).map(|count| {

@@ -1,10 +1,9 @@
-//! Trains a [`Cascade`]: stage after stage by Gentle AdaBoost, each with windows
-//! of others that all stages before it take for faces (Viola and Jones 2001; J.
-//! Friedman, T. Hastie and R. Tibshirani, *Additive logistic regression*, Annals
-//! of Statistics 28, 2000).
+//! Trainer of a [`Cascade`]: stage after stage by Gentle AdaBoost, each with the false alarms of
+//! all stages before it (Viola and Jones 2001; J. Friedman, T. Hastie and R. Tibshirani, *Additive
+//! logistic regression*, Annals of Statistics 28, 2000).
 //!
-//! A tenth of the groups is kept for the calibration and a fifth for the figures
-//! of the card; the stages see neither.
+//! By default, a tenth of the groups is held out for the calibration and a fifth for the figures of
+//! the card; the stages see neither.
 
 mod boost;
 mod figures;
@@ -22,19 +21,19 @@ use tagalong_learn::{Use, mirrored, mix, shifted, use_of};
 
 use crate::{Cascade, Config, Scanner, Training, scales, whole};
 
-/// How a face with surroundings is shown: shifted a little, as parts of its window, grown,
-/// and turned, as a part of the most that faces are turned.
+/// Variants of a face with surroundings: a small shift, as parts of its window, a growth, and a
+/// turn, as a part of the largest tilt.
 const VARIANTS: [((f64, f64, f64), f64); 4] = [
     ((0.0, 0.0, 1.0), 0.0),
     ((0.05, -0.04, 1.06), 1.0),
     ((-0.05, 0.04, 0.94), -1.0),
     ((0.02, 0.06, 1.1), 0.5),
 ];
-/// Windows that overlap a face by less than this (IoU) are of others.
+/// Overlap (IoU) with a face below which a window is one of others.
 const BESIDE: f64 = 0.3;
-/// The factor between the sizes that are searched for others.
+/// Ratio of the sizes in the search for others.
 const SCALE_STEP: f64 = 1.25;
-/// A picture gives this part of what a stage needs at most.
+/// Number of pictures at least from which the others of a stage are taken.
 const PICTURES: usize = 25;
 
 /// A picture, and the windows of the faces in it.
@@ -44,14 +43,14 @@ struct Picture {
     faces: Vec<Rect>,
 }
 
-/// Collects windows and pictures, and trains cascades with them.
+/// Trainer that collects windows and pictures, and trains cascades with them.
 ///
-/// A face is a candidate whose region is its window. A picture without a face is
-/// shown by candidates somewhere in it.
+/// The region of a face's candidate is the window of the face. A picture without faces comes with
+/// candidates somewhere in it.
 pub struct CascadeTrainer {
     config: Config,
     seed: u64,
-    /// The stages that there are already.
+    /// Cascade to continue from.
     begun: Cascade,
     faces: Vec<Patch>,
     others: Vec<Patch>,
@@ -59,12 +58,13 @@ pub struct CascadeTrainer {
 }
 
 impl CascadeTrainer {
-    /// A trainer without examples, that measures and calibrates with the other settings of
-    /// the detector, and goes on from a cascade, if there is one: with all stages or more
-    /// there already, those are calibrated and measured again.
+    /// Creates a trainer without examples. It measures and calibrates with the detector's settings,
+    /// and continues from a cascade, if there is one: surplus stages are removed, and a complete
+    /// cascade is only calibrated and measured again.
     ///
     /// # Errors
-    /// [`Error::Settings`] for numbers that cannot work, or windows of another size.
+    /// [`Error::Settings`] for settings outside their ranges, or a cascade with windows of another
+    /// size.
     pub fn new(config: Config, begun: Option<Cascade>, seed: u64) -> Result<Self> {
         config.training.check()?;
         let side = config.training.side;
@@ -77,8 +77,7 @@ impl CascadeTrainer {
         Ok(Self { config, seed, begun, faces, others, pictures: Vec::new() })
     }
 
-    /// A face, as it is and mirrored; in all variants if the picture shows what is
-    /// around it.
+    /// Adds a face, as it is and mirrored; in all variants if the picture shows its surroundings.
     fn add_face(&mut self, grey: &GreyImage, face: &Rect) {
         let Training { side, tilt, .. } = self.config.training;
         let variants = if is_inside(grey, &face.inflated(0.2)) { VARIANTS.len() } else { 1 };
@@ -92,8 +91,8 @@ impl CascadeTrainer {
         }
     }
 
-    /// Windows that the cascade takes for faces, from pictures in an order by
-    /// chance, until there are enough.
+    /// Adds windows that the cascade takes for faces, from pictures in random order, until there
+    /// are enough.
     fn mine(&self, cascade: &Cascade, others: &mut Vec<Patch>, progress: &mut Mined) {
         let wanted = self.config.training.others;
         let mut order: Vec<usize> =
@@ -113,8 +112,8 @@ impl CascadeTrainer {
         progress.looked_at += scanner.looked_at();
     }
 
-    /// Up to `most` of the windows of one picture that the cascade takes for
-    /// faces, chosen by chance.
+    /// Returns up to `most` randomly chosen windows of one picture that the cascade takes for
+    /// faces.
     fn mistakes(
         &self,
         scanner: &mut Scanner,
@@ -134,6 +133,8 @@ impl CascadeTrainer {
                 faces.iter().all(|face| face.iou(&window) < BESIDE)
             };
             scanner.size(grey, cascade, scale, &whole(grey), &is_other, &mut |window| {
+                // Reservoir sampling: all windows have the same chance, though their number is not
+                // known before.
                 seen += 1;
                 let place = mix(salt ^ mix(index as u64) ^ seen) % seen;
                 let place = if found.len() < most { found.len() } else { place as usize };
@@ -155,6 +156,7 @@ impl CascadeTrainer {
         let (mut faces, mut others) = (self.faces.clone(), self.others.clone());
         others.truncate(wanted);
         let begun = self.begun.stages.len();
+        // Further stages are trained without the patches that the existing ones reject.
         for stage in 1..=begun {
             let until =
                 Cascade { stages: self.begun.stages[..stage].to_vec(), ..self.begun.clone() };
@@ -181,7 +183,7 @@ impl CascadeTrainer {
     }
 }
 
-/// How the others of a stage were found.
+/// Statistics of the search for the others of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Mined {
     found: usize,
@@ -232,7 +234,7 @@ impl Trainer for CascadeTrainer {
     }
 }
 
-/// True if a region lies in a picture.
+/// Returns true if a region lies in a picture.
 fn is_inside(grey: &GreyImage, region: &Rect) -> bool {
     let (width, height) = (grey.width() as f64, grey.height() as f64);
     region.x >= 0.0 && region.y >= 0.0 && region.right() <= width && region.bottom() <= height

@@ -1,4 +1,4 @@
-//! Windows, cut out.
+//! Windows, cut out of pictures.
 
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
@@ -6,7 +6,7 @@ use tagalong_geometry::Rect;
 use crate::compiled::Compiled;
 use crate::{Cascade, Level, Seen};
 
-/// A window as its sums, and one through its contrast.
+/// A window as its sums, and the reciprocal of its contrast.
 #[derive(Clone)]
 pub(super) struct Patch {
     pub(super) level: Level,
@@ -14,7 +14,7 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// `None` for a window without contrast.
+    /// Creates a patch; `None` for a window without contrast.
     pub(super) fn new(pixels: &GreyImage, side: usize) -> Option<Self> {
         let mut level = Level::default();
         level.fill(pixels, (side, side), 1);
@@ -26,14 +26,14 @@ impl Patch {
         (root > 10.0 * area).then(|| Self { level, contrast: (1.0 / root) as f32 })
     }
 
-    /// A window that a scan took for a face.
+    /// Cuts out a window that a scan took for a face.
     pub(super) fn of(seen: &Seen<'_>, side: usize) -> Option<Self> {
         let (pixels, width) = (seen.level.pixels(), seen.level.width());
         let cut = GreyImage::from_fn(side, side, |x, y| pixels[(seen.y + y) * width + seen.x + x]);
         Self::new(&cut, side)
     }
 
-    /// True if the last stage of the cascade takes it for a face.
+    /// Returns true if the patch passes the last stage of the cascade.
     pub(super) fn passes_last(&self, cascade: &Cascade) -> bool {
         let last = cascade.stages.last().into_iter().cloned().collect();
         let only = Cascade { stages: last, features: cascade.features.clone(), ..*cascade };
@@ -42,8 +42,8 @@ impl Patch {
     }
 }
 
-/// A window, `side` pixels wide, as a scan would see it: interpolated, without
-/// means over what is skipped. Outside the picture its border goes on. It is turned
+/// Cuts out a window and resamples it to `side` pixels as a scan does: interpolated, without
+/// averaging over skipped pixels. Outside the picture its border is continued. The window is turned
 /// clockwise about its middle by `tilt`, rad.
 pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) -> GreyImage {
     let (scale, middle) = (region.width / side as f64, region.centre());

@@ -1,4 +1,4 @@
-//! Boosted trees over the numbers of windows.
+//! Training of boosted trees over the values of windows.
 
 use tagalong_learn::boost::{Boosting, Levels, Next, Question};
 use tagalong_learn::mix;
@@ -6,8 +6,7 @@ use tagalong_learn::mix;
 use super::svm::Windows;
 use crate::Tree;
 
-/// `count` trees, each of two questions about some of `numbers` numbers that are
-/// drawn by chance.
+/// Fits `count` trees, each of two questions about some of `numbers` randomly sampled values.
 pub(crate) fn boosted(windows: &Windows, count: usize, numbers: usize, seed: u64) -> Vec<Tree> {
     let width = windows.width();
     let mut table = Levels::new(windows.len());
@@ -22,8 +21,8 @@ pub(crate) fn boosted(windows: &Windows, count: usize, numbers: usize, seed: u64
     (0..count).map(|tree| flat(&boosting.grow(&drawn(tree), 2))).collect()
 }
 
-/// A tree in the form that is run; a leaf where a question could be asks one that
-/// does not matter.
+/// Converts a tree to the form that is run; a leaf in place of a question becomes a question with
+/// the same value for both answers.
 fn flat(questions: &[Question]) -> Tree {
     let mut tree = Tree::default();
     let mut set = |at: usize, question: &Question| {

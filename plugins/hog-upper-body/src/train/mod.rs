@@ -1,9 +1,9 @@
-//! Fits a [`Model`], linear or of trees: people in several small shifts and mirrored, others by
-//! chance at first, and after that whatever the machine takes for people in
-//! pictures without anybody.
+//! Trainer of a [`Model`], linear or of trees: with people in several small shifts and mirrored,
+//! with random other windows at first, and after that with the false alarms of the machine in
+//! pictures without people.
 //!
-//! A tenth of the groups is kept for the calibration and a fifth for the figures
-//! of the card; the machine sees neither.
+//! A tenth of the groups is held out for the calibration and a fifth for the figures of the card;
+//! the machine sees neither.
 
 mod boosted;
 mod svm;
@@ -24,47 +24,45 @@ use crate::{
     Grid, Kind, Machine, Model, Scanner, Training, Trees, Wanted, merge, window_numbers, window_of,
 };
 
-/// Sizes at which pictures without anybody are searched, pixels of the
-/// upper-body square, and the factor between them.
+/// Smallest upper-body square in the search for false alarms, pixels, and the ratio of the sizes.
 const SMALLEST_PX: f64 = 32.0;
 const SCALE_STEP: f64 = 1.15;
-/// Windows of a picture overlap by less than this to be mined.
+/// Largest overlap (IoU) of windows of one picture that are both mined.
 const MINED_OVERLAP: f64 = 0.5;
-/// Windows with lower sums are no near misses: they are neither mined nor matter
-/// for the calibration. A linear machine wants people above 1; sums of trees spread
-/// more.
+/// Sum below which a window is not a near miss: it is neither mined nor used for the calibration. A
+/// linear machine is trained to give people more than 1; sums of trees spread more.
 const NEAR_MISS: [f32; 2] = [-1.0, -10.0];
-/// While others are mined, trees give a window up below this.
+/// Sum below which trees reject a window during the mining.
 const HOPELESS: f32 = -14.0;
-/// In use, they may give up this part of the people who would be found.
+/// Part of the people with sufficient sums that the final trees may reject early.
 const GIVEN_UP: f64 = 0.01;
 /// Small shifts of a person, as fractions of the square, and its growth.
 const SHIFTS: [(f64, f64, f64); 4] =
     [(0.0, 0.0, 1.0), (0.05, -0.04, 1.05), (-0.05, 0.03, 0.95), (0.02, 0.05, 1.02)];
-/// A person is shown if no more than this part of their window is outside the
-/// picture: a portrait does not show what a window shows.
+/// Largest part of a person's window that may lie outside the picture: a portrait does not show the
+/// surroundings that a window includes.
 const OUTSIDE: f64 = 0.2;
-/// The miss rate is told at this many false alarms a window.
+/// Rates of false alarms per window at which the miss rate is reported.
 const FALSE_ALARMS: [f64; 3] = [1e-3, 1e-4, 1e-5];
 
-/// Collects windows and pictures, and fits models to them.
+/// Trainer that collects windows and pictures, and fits models to them.
 pub struct HogTrainer {
     kind: Kind,
     training: Training,
     seed: u64,
     windows: Windows,
-    /// Windows of people that are kept apart, as they are.
+    /// Held-out windows of people.
     people: Vec<(Use, Vec<f32>)>,
     pictures: Vec<(Use, Arc<GreyImage>)>,
-    /// People whose windows the pictures do not show.
+    /// Number of people with too much of their window outside the picture.
     cut_off: usize,
 }
 
 impl HogTrainer {
-    /// A trainer without examples.
+    /// Creates a trainer without examples.
     ///
     /// # Errors
-    /// [`Error::Settings`] for numbers that cannot work.
+    /// [`Error::Settings`] for settings outside their ranges.
     pub fn new(kind: Kind, training: Training, seed: u64) -> Result<Self> {
         let penalties = [training.person_penalty, training.other_penalty];
         if !penalties.iter().all(|p| *p > 0.0 && p.is_finite())
@@ -102,19 +100,21 @@ impl HogTrainer {
         }
     }
 
-    /// Windows by chance from the pictures without anybody.
+    /// Adds random windows from the pictures without people.
     fn add_chance(&mut self) {
         for (index, (use_, picture)) in self.pictures.iter().enumerate() {
             if *use_ != Use::Fit {
                 continue;
             }
             let small = FILLED * picture.width().min(picture.height()) as f64;
+            // In a picture hardly larger than a window, all windows are nearly the same.
             let count = if small < 2.0 * SMALLEST_PX { 1 } else { self.training.random_windows };
             for window in 0..count {
                 let part = |k: u64| {
                     let number = mix(self.seed ^ mix((index * 1000 + window) as u64 * 4 + k));
                     (number >> 11) as f64 / (1_u64 << 53) as f64
                 };
+                // The square favours small windows, which are also the most numerous in a search.
                 let side = SMALLEST_PX + (small - SMALLEST_PX).max(0.0) * part(0).powi(2);
                 let x = part(1) * (picture.width() as f64 - side);
                 let y = part(2) * (picture.height() as f64 - side);
@@ -124,7 +124,7 @@ impl HogTrainer {
         }
     }
 
-    /// The machine of a round; the last one is the best that there can be.
+    /// Fits the machine of a round; the last one is the best.
     fn machine(&self, round: usize) -> Model {
         let Training { person_penalty, other_penalty, epochs, trees, numbers, .. } = self.training;
         let rounds_left = self.training.mining_rounds.saturating_sub(round) as u32;
@@ -135,6 +135,7 @@ impl HogTrainer {
                 Machine::Linear { weights, bias }
             }
             Kind::Trees => {
+                // The early machines only select false alarms, for which fewer trees are enough.
                 let count = (trees >> (2 * rounds_left).min(31)).max(16);
                 let trees = boosted(&self.windows, count, numbers, self.seed);
                 Machine::Trees(Trees::new(trees, HOPELESS))
@@ -143,7 +144,7 @@ impl HogTrainer {
         Model { machine, slope: 1.0, offset: 0.0 }
     }
 
-    /// Adds what the machine takes for people; returns how many that are.
+    /// Adds the false alarms of the machine; returns their number.
     fn mine(&mut self, model: &Model) -> usize {
         let Training { mined_per_picture, mined_per_round, .. } = self.training;
         let mut scanner = Scanner::new(model);
@@ -164,9 +165,8 @@ impl HogTrainer {
         mined.len()
     }
 
-    /// Sums of the windows that were kept apart for one purpose: those of
-    /// people, those of others that are not far from being people, and how many
-    /// others there were altogether.
+    /// Returns the sums of the windows that are held out for one purpose: those of people and those
+    /// of near misses, and the number of all other windows that were scanned.
     fn apart(&self, model: &Model, wanted: Use, merged: bool) -> (Vec<(f64, bool)>, u64) {
         let people = self.people.iter().filter(|(use_, _)| *use_ == wanted);
         let mut sums: Vec<(f64, bool)> =
@@ -210,9 +210,9 @@ impl HogTrainer {
         NEAR_MISS[usize::from(self.kind == Kind::Trees)]
     }
 
-    /// Lets trees give windows up as early as people allow who are kept apart and would be
-    /// found (after C. Zhang and P. Viola, *Multiple-instance pruning for learning efficient
-    /// cascade detectors*, NIPS 2007).
+    /// Lets trees reject windows as early as the held-out people allow that would be found (after
+    /// C. Zhang and P. Viola, *Multiple-instance pruning for learning efficient cascade detectors*,
+    /// NIPS 2007).
     fn hurry(&self, model: &mut Model) {
         let near_miss = self.near_miss();
         let Machine::Trees(trees) = &mut model.machine else { return };
@@ -238,6 +238,7 @@ impl Trainer for HogTrainer {
             self.add_person(grey, &candidate.region, use_);
             return Ok(());
         }
+        // A picture comes once for each of its candidates, and is stored once.
         let is_known = self.pictures.last().is_some_and(|(_, last)| **last == *grey);
         if !is_known {
             self.pictures.push((use_, Arc::new(grey.clone())));
@@ -261,6 +262,7 @@ impl Trainer for HogTrainer {
         self.hurry(&mut model);
         let (sums, _) = self.apart(&model, Use::Calibration, true);
         let Line { slope, offset } = platt(&sums);
+        // A slope of 0 or less would be refused when the model is read.
         model = Model { slope: slope.max(1e-3), offset, ..model };
         progress(1.0);
         let figures = self.figures(&model, &mined);
@@ -268,7 +270,7 @@ impl Trainer for HogTrainer {
     }
 }
 
-/// All windows of a picture above `least`.
+/// Returns all windows of a picture above `least`.
 fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::Window> {
     let most = picture.width().min(picture.height()) as f64;
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
@@ -278,8 +280,8 @@ fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::
     found
 }
 
-/// The share of people below the sum that so many of the `windows` of others
-/// exceed.
+/// Returns the share of people with sums not above the one that this rate of the `windows` of
+/// others exceeds.
 fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f32) -> f64 {
     let mut others: Vec<f64> = sums.iter().filter(|(_, is)| !is).map(|(sum, _)| *sum).collect();
     others.sort_by(|a, b| b.total_cmp(a));
@@ -290,8 +292,9 @@ fn miss_rate(sums: &[(f64, bool)], windows: u64, false_alarms: f64, near_miss: f
     missed as f64 / people.len().max(1) as f64
 }
 
-/// What nobody's sums are below who is like those whose sums after each round are known:
-/// the least of theirs, less what somebody may be behind all others. At most 0.
+/// Returns for each round a sum below which a person like those with the given sums after each
+/// round does not fall: the least of these, minus the margin by which one person may be behind all
+/// others. At most 0.
 fn least_on_the_way(ways: &[Vec<f32>]) -> Vec<f32> {
     let rounds = ways.first().map_or(0, Vec::len);
     let mut least_two = vec![[0.0_f32; 2]; rounds];
@@ -300,6 +303,7 @@ fn least_on_the_way(ways: &[Vec<f32>]) -> Vec<f32> {
             (*least, *next) = (least.min(*sum), next.min(sum.max(*least)));
         }
     }
+    // For the person with the lowest sum, the lowest sum of the others is the second one.
     let behind = |way: &Vec<f32>| {
         let behind = way.iter().zip(&least_two).map(|(sum, [_, next])| next - sum);
         behind.fold(0.0, f32::max)
@@ -310,7 +314,7 @@ fn least_on_the_way(ways: &[Vec<f32>]) -> Vec<f32> {
     least_two.iter().map(|[least, _]| least - margin).collect()
 }
 
-/// The sum of somebody's window, who is as good as missed if it is less than `least`.
+/// Returns the sum of a person's window; one below `least` counts as missed, and is raised to it.
 fn sum_of(model: &Model, numbers: &[f32], least: f32) -> f64 {
     f64::from(model.sum_of(numbers).max(least))
 }
@@ -326,7 +330,7 @@ mod tests {
     #[test]
     fn whoever_is_found_may_be_as_far_behind_as_one_was_behind_the_others() {
         let ways = [vec![-1.0, 2.0, 5.0], vec![-3.0, -4.0, 9.0], vec![0.5, -2.0, 1.0]];
-        // The second is 2 behind the next one after two rounds, and nobody farther.
+        // The second is 2 behind the next one after two rounds, and no other is farther behind.
         assert_eq!(least_on_the_way(&ways), [-5.0, -6.0, -2.0]);
         assert!(least_on_the_way(&[]).is_empty());
     }

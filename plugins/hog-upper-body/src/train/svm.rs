@@ -1,13 +1,12 @@
-//! Dual coordinate descent for a linear machine (C.-J. Hsieh et al., *A dual
-//! coordinate descent method for large-scale linear SVM*, ICML 2008, algorithm
-//! 1, with the squared hinge loss).
+//! Dual coordinate descent for a linear machine (C.-J. Hsieh et al., *A dual coordinate descent
+//! method for large-scale linear SVM*, ICML 2008, algorithm 1, with the squared hinge loss).
 
 use crate::model::dot;
 
-/// Changes of a dual variable below this are no changes any more.
+/// Slope of the objective below which a dual variable counts as converged.
 const STILL: f32 = 1e-3;
 
-/// Windows as numbers, one after the other, with their truth.
+/// Values of windows, one after the other, with their truth.
 #[derive(Default)]
 pub(crate) struct Windows {
     pub(crate) numbers: Vec<f32>,
@@ -24,14 +23,14 @@ impl Windows {
         self.is_person.len()
     }
 
-    /// Numbers of a window.
+    /// Returns the number of values of a window.
     pub(crate) fn width(&self) -> usize {
         self.numbers.len() / self.len().max(1)
     }
 }
 
-/// The weights and the bias that separate the windows best; `penalty` is that of
-/// an error with others and with people.
+/// Returns the weights and the bias that separate the windows best; `penalty` is that of an error
+/// with windows of others and with windows of people.
 pub(crate) fn separate(
     windows: &Windows,
     penalty: [f64; 2],
@@ -42,6 +41,7 @@ pub(crate) fn separate(
     let (mut weights, mut bias) = (vec![0.0_f32; width], 0.0_f32);
     let mut alphas = vec![0.0_f32; windows.len()];
     let row = |i: usize| &windows.numbers[i * width..(i + 1) * width];
+    // The bias is the weight of a constant value 1, which adds 1 to each squared length.
     let lengths: Vec<f32> = (0..windows.len()).map(|i| dot(row(i), row(i)) + 1.0).collect();
     let mut order: Vec<usize> = (0..windows.len()).collect();
     for epoch in 0..epochs {
@@ -69,7 +69,7 @@ pub(crate) fn separate(
     (weights, bias)
 }
 
-/// Fisher and Yates, with numbers of splitmix64.
+/// Shuffles by Fisher and Yates, with numbers of splitmix64.
 fn shuffle(order: &mut [usize], seed: u64) {
     let mut state = seed;
     for i in (1..order.len()).rev() {

@@ -1,4 +1,4 @@
-//! Each setting by what it changes.
+//! Tests of each setting by its effect.
 
 use nalgebra::{Point3, Vector2};
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use tagalong_core::{Motion, Person, RgbImage};
 use super::rig::{EXACT, Formula, Rig, sighting};
 use crate::{Chosen, Config, Method};
 
-/// Two people one behind the other, whose places across the view are not known well.
+/// Two people one behind the other, with uncertain positions across the view.
 fn pair(config: Config) -> Rig {
     let mut rig = Rig::new(config, 5);
     rig.start(1, [2.0, 0.0, 1.6], [EXACT, 0.05, EXACT]);
@@ -15,19 +15,19 @@ fn pair(config: Config) -> Rig {
     rig
 }
 
-/// P3's form: everything is drawn.
+/// P3's form: everything is sampled.
 fn drawn() -> Config {
     Config { marginalise: false, method: Method::All, ..Config::default() }
 }
 
-/// How many scenes of two people the first frame asks for.
+/// Counts the scenes of two people for which the first frame needs a likelihood.
 fn scenes_of_two(config: Config) -> usize {
     let (mut rig, likelihood) = (pair(config), Formula::flat(3.0));
     rig.look(&likelihood);
     likelihood.asked().iter().filter(|scene| scene.len() == 2).count()
 }
 
-/// Beside the particles one scene is asked for by `support`, and six by `facing`.
+/// Number of scenes beside those of the particles: one for `support`, and six for `facing`.
 const BESIDE: usize = 7;
 
 #[test]
@@ -117,8 +117,8 @@ fn who_is_weighed_together_keeps_depth_and_height_where_these_are_held() {
     assert!(along > 0.05 && up > 0.02, "alone nothing is held: {along} {up}");
 }
 
-/// The velocities with which a person is imagined after frames whose image tells that
-/// people face to the left.
+/// Returns the velocity with which a person is rendered after frames in which a likelihood favours
+/// people that face to the left.
 fn faces(config: Config, people: usize, walks: Vector2<f64>) -> Vector2<f64> {
     let mut rig = Rig::new(config, 4);
     rig.start(1, [2.0, 0.0, 1.6], [0.05; 3]);
@@ -196,8 +196,8 @@ fn a_part_of_the_particles_starts_again_at_a_sighting() {
     }
 }
 
-/// In how many of ten frames a person is seen who explains so many nats, with a
-/// sighting in all of them or in none.
+/// Returns the number of frames, of ten, in which a person that explains this many nats is seen,
+/// with a detection in all of them or in none.
 fn frames_seen(config: &Config, nats: f64, sighted: bool) -> usize {
     let mut rig = Rig::new(config.clone(), 4);
     rig.start(1, [2.0, 0.0, 1.6], [0.02; 3]);
@@ -226,7 +226,7 @@ fn support_is_asked_of_who_was_found_who_was_not_and_who_was_not_for_long() {
 
 #[test]
 fn who_is_hidden_explains_nothing_and_is_not_seen() {
-    // All that is seen is the near person.
+    // Only the near person is visible.
     let hidden =
         |scene: &[Person]| 7.0 * scene.iter().filter(|p| p.position.x < 2.5).count() as f64;
     let mut rig = pair(Config::default());
@@ -234,7 +234,7 @@ fn who_is_hidden_explains_nothing_and_is_not_seen() {
     assert_eq!(pair(Config::default()).look(&Formula::flat(7.0)), [1, 2]);
 }
 
-/// The lateral displacements of both people over all particles in one frame without
+/// Returns the lateral displacements of both people over all particles in one frame without
 /// information, in standard deviations of the noise.
 fn displacements(config: Config, seed: u64) -> [Vec<f64>; 2] {
     let sigma = 0.3;
@@ -314,7 +314,7 @@ fn condensation_reports_the_prediction() {
     assert!(step > 0.04 && (ahead - step).abs() < 0.05, "{ahead} {step}");
 }
 
-/// The places that a table compares for somebody 45 degrees aside.
+/// Returns the places that a table compares for a person at 45 degrees to the side.
 fn table_places(compat_printed_axes: bool) -> Vec<Point3<f64>> {
     let config = Config { method: Method::Table, compat_printed_axes, ..drawn() };
     let mut rig = Rig::new(config, 1);
@@ -358,7 +358,7 @@ fn the_compared_places_of_both_count_from_the_near_one() {
     assert!(asked.iter().all(|scene| (scene[0].position.z - 1.7).abs() < 0.01));
 }
 
-/// Two people who are not drawn to each other but by their sightings.
+/// Two people with particles that move to their detections alone.
 fn walked(swap_margin: f64, mirrored: bool) -> Rig {
     let config = Config { from_detection: 1.0, swap_margin, ..Config::default() };
     let mut rig = Rig::new(config, 1);
@@ -391,7 +391,7 @@ fn people_who_come_out_with_each_others_colours_get_each_others_names() {
     assert!(straight.place(1).y > 0.5 && straight.place(2).y < -0.5);
     assert!(crossed.place(1).y < -0.5 && crossed.place(2).y > 0.5, "{}", crossed.place(1));
     assert!(walked(2.0, true).place(1).y > 0.5, "2 is never");
-    // The headings were exchanged with the names.
+    // The headings are exchanged with the tracks.
     let mut crossed = crossed;
     let likelihood = Formula::flat(5.0);
     crossed.look(&likelihood);
@@ -415,7 +415,7 @@ fn who_is_forgotten_leaves_the_others_as_they_were() {
     assert_eq!(rig.columns(2).len(), Config::default().particles);
     rig.filter.stop(TrackId(2));
     assert!(!rig.columns(3).is_empty() && rig.columns(2).is_empty());
-    // A number that is given again has no heading from before.
+    // A track number that is used again has no heading from before.
     let left = |scene: &[Person]| 5.0 * scene.iter().filter(|p| p.velocity.y > 0.3).count() as f64;
     rig.look(&Formula::new(left));
     rig.filter.stop(TrackId(3));

@@ -1,5 +1,5 @@
-//! The filter beside references that are slow and obvious: a Kalman filter in the
-//! world for one person, a Bayes filter on a grid for two who hide each other.
+//! Tests of the filter against slow, obvious references: a Kalman filter in the world for one
+//! person, a Bayes filter on a grid for two people that hide each other.
 
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use tagalong_core::{Motion, Person};
@@ -7,7 +7,7 @@ use tagalong_core::{Motion, Person};
 use super::rig::{EXACT, Formula, Rig};
 use crate::{Chosen, Config, Method};
 
-/// A Kalman filter of a place and its velocity along one axis of the world.
+/// Kalman filter of a position and its velocity along one axis of the world.
 struct Axis {
     mean: Vector2<f64>,
     covariance: Matrix2<f64>,
@@ -19,7 +19,7 @@ impl Axis {
         Self { mean: Vector2::new(at, 0.0), covariance }
     }
 
-    /// `density` of a white acceleration, and what place and velocity gain beside it.
+    /// `density` of a white acceleration, and noise of position and velocity beside it.
     fn predict(&mut self, dt: f64, density: f64, place_noise: f64, velocity_noise: f64) {
         let f = Matrix2::new(1.0, dt, 0.0, 1.0);
         let white = Matrix2::new(dt.powi(3) / 3.0, dt * dt / 2.0, dt * dt / 2.0, dt) * density;
@@ -39,9 +39,9 @@ impl Axis {
 const DT_S: f64 = 0.2;
 const LOOK_M: [f64; 3] = [0.1, 0.1, 0.06];
 
-/// A person walks through the world past a robot that drives a curve; the likelihood
-/// is a Gaussian around places that are wrong by a little. Checks the belief after
-/// eight frames against Kalman filters of the three axes.
+/// A person walks through the world past a robot on a curve; the likelihood is a Gaussian around
+/// slightly wrong positions. Compares the estimate after eight frames with Kalman filters of the
+/// three axes.
 fn follows_kalman(config: Config, tolerance: f64) {
     let (q, place, velocity, height) = (
         config.acceleration_noise,
@@ -97,7 +97,7 @@ fn follows_kalman(config: Config, tolerance: f64) {
     }
 }
 
-/// Motion noise of which every part matters.
+/// Motion noise with a noticeable effect of every part.
 fn lively() -> Config {
     Config {
         particles: 400,
@@ -121,7 +121,7 @@ fn drawing_everything_ends_at_the_same_belief() {
     follows_kalman(config, 0.5);
 }
 
-/// A belief about the lateral places of a near and a far person, as numbers on a grid.
+/// Distribution over the lateral positions of a near and a far person, as numbers on a grid.
 struct Grid {
     cells: Vec<f64>,
 }
@@ -183,7 +183,7 @@ fn normal(off: f64, sigma: f64) -> f64 {
 const NEAR_M: f64 = 2.0;
 const FAR_M: f64 = 3.0;
 
-/// Where the two people are seen in a frame: the far one explains nothing while hidden.
+/// Apparent positions of the two people in a frame: the far one explains nothing while hidden.
 #[derive(Clone, Copy)]
 struct Seen {
     near: f64,
@@ -211,8 +211,7 @@ impl Seen {
     }
 }
 
-/// The near person stands while the far one comes out from behind, a little off the
-/// prediction.
+/// The near person stands while the far one comes out from behind, a little off the prediction.
 const WALK: [Seen; 4] = [
     Seen { near: 0.06, far: 0.0 },
     Seen { near: 0.02, far: 0.15 },
@@ -252,7 +251,8 @@ fn by_particles(config: Config, seed: u64, sharp: f64) -> [(f64, f64); 2] {
     })
 }
 
-/// Largest difference of the means, m, and of the spreads, as a ratio's logarithm.
+/// Largest difference of the means, m, and of the standard deviations, as the logarithm of their
+/// ratio.
 fn apart(config: &Config, sharp: f64) -> [f64; 2] {
     let (grid, mut apart) = (by_grid(sharp), [0f64; 2]);
     for seed in 0..3 {

@@ -11,7 +11,7 @@ use crate::{Config, JointParticle};
 
 type Log = dyn Fn(&[Person]) -> f64 + Send + Sync;
 
-/// A likelihood that is a formula; it remembers what it was asked.
+/// A likelihood by a formula; it records the scenes it was asked for.
 pub struct Formula {
     log: Box<Log>,
     asked: Mutex<Vec<Vec<Person>>>,
@@ -22,12 +22,12 @@ impl Formula {
         Self { log: Box::new(log), asked: Mutex::default() }
     }
 
-    /// Says nothing of where people are, and this much of their being there, nats.
+    /// The same likelihood at all places, of this many nats for each person.
     pub fn flat(nats: f64) -> Self {
         Self::new(move |scene| nats * scene.len() as f64)
     }
 
-    /// The scenes that were asked for since the last call.
+    /// Returns the scenes that were asked for since the last call.
     pub fn asked(&self) -> Vec<Vec<Person>> {
         std::mem::take(&mut *self.asked.lock().unwrap())
     }
@@ -48,7 +48,7 @@ pub fn frame(motion: Motion, colour: Option<RgbImage>) -> Frame {
     Frame::new(1, Stamp::default(), camera, motion, images)
 }
 
-/// A sighting with standard deviations along x, y and z, m.
+/// A detection with standard deviations along x, y and z, m.
 pub fn sighting(position: Point3<f64>, sigmas: [f64; 3]) -> Detection {
     let covariance = Matrix3::from_diagonal(&Vector3::from(sigmas).map(|s| s * s));
     let region = Rect::new(40.0, 30.0, 20.0, 20.0);
@@ -70,12 +70,12 @@ impl Rig {
         self.filter.start(TrackId(id), &sighting(Point3::from(position), sigmas), &camera);
     }
 
-    /// One frame without sightings, the robot at rest, a tenth of a second later.
+    /// Runs one frame without detections, the robot at rest, a tenth of a second later.
     pub fn look(&mut self, likelihood: &Formula) -> Vec<u32> {
         self.look_after(Motion::at_rest(0.1), likelihood, &[], None)
     }
 
-    /// One frame; returns who is seen.
+    /// Runs one frame; returns the seen people.
     pub fn look_after(
         &mut self,
         motion: Motion,
@@ -116,12 +116,12 @@ impl Rig {
         self.filter.sketch(&evidence).unwrap()
     }
 
-    /// The columns of the image in which the particles of a person are.
+    /// Returns the image columns of the particles of a person.
     pub fn columns(&self, id: u32) -> Vec<f64> {
         let points = self.sketch(&Formula::flat(0.0)).points.into_iter();
         points.filter(|point| point.id == TrackId(id)).map(|point| point.pixel.x).collect()
     }
 }
 
-/// Standard deviations with which a sighting tells all but the place across the view.
+/// Standard deviation of the exactly known components of a detection.
 pub const EXACT: f64 = 1e-6;

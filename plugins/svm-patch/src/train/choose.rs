@@ -6,7 +6,7 @@ use tagalong_learn::{accepted, area, mix, parts, side_by_side};
 use super::{Sample, solver};
 use crate::{Sampler, Training};
 
-/// One combination that was tried, judged by samples that it was not fitted to.
+/// One combination that was tried, and its result on held-out samples.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Width of the kernel.
@@ -18,20 +18,19 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Chance that a person has a larger decision value than another candidate
+    /// Returns the probability that a person has a larger decision value than another candidate
     /// (area under the ROC curve).
     pub fn area(&self) -> f64 {
         area(&self.held_out)
     }
 
-    /// Fraction of a class whose decision value is positive.
+    /// Returns the fraction of a class with a positive decision value.
     pub fn accepted(&self, people: bool) -> f64 {
         accepted(&self.held_out, people)
     }
 }
 
-/// Tries every width with every penalty; samples of one group are always in one
-/// part.
+/// Tries every width with every penalty; samples of one group are always in the same part.
 ///
 /// # Errors
 /// As [`solver::fit`].
@@ -42,6 +41,7 @@ pub fn trials(
     seed: u64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Trial>> {
+    // Frames of one group are near-duplicates: divided between parts they would leak the answer.
     let parts = parts(samples.iter().map(|s| s.example), training.folds, seed);
     let each = training.gammas.iter().flat_map(|g| training.penalties.iter().map(|c| (*g, *c)));
     let grid: Vec<(f64, f64)> = each.collect();
@@ -69,10 +69,11 @@ fn hold_out(
     Ok(values)
 }
 
-/// At most `most` samples, as many of each class as there are up to half, in
-/// the order of a hash.
+/// Selects at most `most` samples, half of each class while there are enough, in the order of a
+/// hash. A class with fewer leaves its share to the other.
 pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
     let of_class = |is_person: bool| {
+        // Sorting by a hash is a random order that is the same on every machine.
         let mut class: Vec<(u64, &Sample)> = samples
             .iter()
             .enumerate()
@@ -92,8 +93,8 @@ pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
     people
 }
 
-/// Leaves so many of the others and of the people at most, in the order of a hash; 0
-/// leaves all.
+/// Keeps at most the given numbers of other objects and of people, in the order of a hash; 0 keeps
+/// all. The order of the samples stays.
 pub fn keep(samples: &mut Vec<Sample>, most: [usize; 2], seed: u64) {
     let mut of_class = [Vec::new(), Vec::new()];
     for (k, sample) in samples.iter().enumerate() {

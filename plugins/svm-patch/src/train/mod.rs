@@ -1,6 +1,6 @@
-//! Fits a [`Model`] to labelled candidates: widths and penalties are chosen by
-//! cross-validation over groups, the decision values of the held-out samples
-//! calibrate the log-odds, and a last fit to more samples makes the model.
+//! Trainer of a [`Model`] from labelled candidates: widths and penalties are chosen by
+//! cross-validation over groups, the decision values of the held-out samples calibrate the
+//! log-odds, and a final fit to more samples makes the model.
 
 mod choose;
 mod solver;
@@ -15,13 +15,13 @@ use crate::{Model, Patch, Sampler, Training};
 /// A labelled patch.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// The patch.
+    /// Normalised grey values.
     pub patch: Box<Patch>,
-    /// What it shows, and the group it belongs to.
+    /// Its label and its group.
     pub example: Example,
 }
 
-/// Collects patches and fits models to them.
+/// Trainer that collects patches and fits models to them.
 pub struct PatchTrainer {
     training: Training,
     sampler: Sampler,
@@ -29,25 +29,25 @@ pub struct PatchTrainer {
     samples: Vec<Sample>,
 }
 
-/// The last fit takes so much of the progress.
+/// Share of the progress that the final fit takes.
 const LAST_FIT: f64 = 0.2;
 
-/// A fit with too many support vectors is repeated with fewer samples: so many
-/// that there would be this part of what is allowed, were they in proportion.
+/// Safety factor of the number of samples when a fit has too many support vectors: it is repeated
+/// with the number that would give this part of the limit, were vectors proportional to samples.
 const ALLOWED: f64 = 0.95;
 
 impl PatchTrainer {
-    /// A trainer without samples.
+    /// Creates a trainer without samples.
     ///
     /// # Errors
-    /// [`Error::Settings`] for grids and numbers that cannot work.
+    /// [`Error::Settings`] for settings outside their ranges.
     pub fn new(training: Training, seed: u64) -> Result<Self> {
         check(&training)?;
         let sampler = Sampler { grow: training.grow, scaling: training.scaling };
         Ok(Self { training, sampler, seed, samples: Vec::new() })
     }
 
-    /// Tries the whole grid.
+    /// Tries the whole grid of widths and penalties.
     ///
     /// # Errors
     /// As [`Trainer::fit`].
@@ -56,7 +56,7 @@ impl PatchTrainer {
         choose::trials(&tried, self.sampler, &self.training, self.seed, progress)
     }
 
-    /// The last fit: to as many samples as the size of the model allows.
+    /// Fits to as many samples as the limit on support vectors allows.
     fn last_fit(&self, gamma: f64, penalty: f64) -> Result<(Model, usize)> {
         let mut most = self.training.max_samples.min(self.samples.len());
         loop {
@@ -107,6 +107,7 @@ impl Trainer for PatchTrainer {
             .max_by(|a, b| a.area().total_cmp(&b.area()))
             .ok_or_else(|| Error::Other("nothing to try".into()))?;
         let (mut model, fitted) = self.last_fit(best.gamma, best.penalty)?;
+        // Held-out decision values: those of fitted samples are too confident.
         let Line { slope, offset } = platt(&best.held_out);
         (model.slope, model.offset) = (slope, offset);
         progress(1.0);

@@ -10,14 +10,13 @@ use crate::{Model, PIXELS, Sampler};
 /// Change of the objective at which the solver stops (that of libsvm).
 const TOLERANCE: f64 = 1e-3;
 
-/// Weights below this are zero.
+/// Least absolute weight of a support vector; smaller ones are zero.
 const LEAST_WEIGHT: f64 = 1e-9;
 
-/// Fits a machine with the kernel `exp(-gamma |a - b|^2)`. Each class weighs
-/// the same, whatever its share.
+/// Fits a machine with the kernel `exp(-gamma |a - b|^2)`. Both classes have the same total weight.
 ///
 /// # Errors
-/// Samples that are not finite (the solver would return nonsense), one class.
+/// Samples that are not finite (the solver would return nonsense), or samples of one class only.
 pub fn fit(samples: &[&Sample], sampler: Sampler, gamma: f64, penalty: f64) -> Result<Model> {
     let (for_people, for_others) = penalties(samples, penalty)?;
     if !samples.iter().all(|s| s.patch.iter().all(|v| v.is_finite())) {
@@ -27,8 +26,8 @@ pub fn fit(samples: &[&Sample], sampler: Sampler, gamma: f64, penalty: f64) -> R
         f64::from(samples[row].patch[column])
     });
     let targets: Array1<bool> = samples.iter().map(|s| s.example.is_person).collect();
-    // The kernel of this library divides by its parameter. Shrinking stays off,
-    // the default: with it, weights are given back to the wrong samples.
+    // The kernel of this library divides by its parameter. Shrinking stays off, the default: with
+    // it, weights are returned for the wrong samples.
     let fitted = Svm::<f64, bool>::params()
         .pos_neg_weights(for_people, for_others)
         .gaussian_kernel(1.0 / gamma)
@@ -42,7 +41,7 @@ pub fn fit(samples: &[&Sample], sampler: Sampler, gamma: f64, penalty: f64) -> R
     Ok(Model::new(sampler, gamma, -fitted.rho, support))
 }
 
-/// The penalty of an error in each class: inverse to its share.
+/// Returns the penalty of an error in each class, inverse to its share.
 fn penalties(samples: &[&Sample], penalty: f64) -> Result<(f64, f64)> {
     let people = samples.iter().filter(|s| s.example.is_person).count();
     let others = samples.len() - people;
