@@ -10,7 +10,7 @@ use std::sync::Arc;
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point2, Point3};
 use tagalong_config::Registry;
-use tagalong_core::{DepthImage, Detector, Frame, Funnel, Images, Motion, Search, Stamp};
+use tagalong_core::{DepthImage, Detector, EgoMotion, Frame, Funnel, Images, Query, Stamp};
 use tagalong_depth_template::{
     Bank, DepthTemplate, DepthTemplateConfig, Direction, Matcher, Pose, render,
 };
@@ -44,7 +44,7 @@ fn depth(camera: &Camera) -> DepthImage {
 fn frame(camera: &Arc<Camera>, depth: &Arc<DepthImage>, index: u64) -> Frame {
     let images = Images { depth: Some(Arc::clone(depth)), ..Images::default() };
     let stamp = Stamp::from_nanos(index * 33_000_000);
-    let motion = Motion::at_rest(if index == 0 { 0.0 } else { 0.033 });
+    let motion = EgoMotion::at_rest(if index == 0 { 0.0 } else { 0.033 });
     Frame::new(index, stamp, Arc::clone(camera), motion, images)
 }
 
@@ -71,7 +71,7 @@ fn frames(c: &mut Criterion) {
     c.bench_function("depth-template, discover, 640x480, 4 people", |b| {
         b.iter(|| {
             let frame = frame(&camera, &depth, 1);
-            let search = Search::Everywhere { occupied: &[] };
+            let search = Query::Discover { occupied: &[] };
             let found = detector.detect(&frame, &search, &mut Funnel::default());
             assert_eq!(found.map(|f| f.len()), Ok(4));
         });

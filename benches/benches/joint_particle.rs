@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point2, Point3, Vector2};
-use tagalong_core::{DepthImage, Frame, Images, Likelihood, Motion, Person, Stamp};
+use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Likelihood, Person, Stamp};
 use tagalong_depth_template::{DepthTemplateConfig, Weigher, render};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -17,7 +17,7 @@ const HEADS: [Point3<f64>; 2] = [Point3::new(2.5, 0.1, 1.6), Point3::new(3.4, -0
 fn frame(index: u64, depth: &Arc<DepthImage>, camera: &Arc<Camera>) -> Frame {
     let images = Images { depth: Some(Arc::clone(depth)), ..Images::default() };
     let stamp = Stamp::from_nanos(index * 100_000_000);
-    Frame::new(index, stamp, Arc::clone(camera), Motion::at_rest(0.1), images)
+    Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.1), images)
 }
 
 fn camera() -> Arc<Camera> {

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use tagalong_core::{Frame, Funnel, GreyImage, Images, Motion, RgbImage, Stamp};
+use tagalong_core::{EgoMotion, Frame, Funnel, GreyImage, Images, RgbImage, Stamp};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_omni_appearance::{Config, Eyes};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
@@ -70,7 +70,7 @@ fn detecting(c: &mut Criterion) {
     let mut frame = |index: u64, raw: &Images| {
         let images = unwrapping.apply(&panorama, raw).expect("the mirror is right");
         let stamp = Stamp::from_nanos(index * 333_000_000);
-        Frame::new(index, stamp, Arc::clone(&camera), Motion::at_rest(0.333), images)
+        Frame::new(index, stamp, Arc::clone(&camera), EgoMotion::at_rest(0.333), images)
     };
     let config = Config { background_frames: 12, ..Config::default() };
     let mut eyes = Eyes::new(config).expect("the settings are right");

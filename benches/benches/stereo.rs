@@ -13,7 +13,7 @@ use cpu_time::ThreadTime;
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
 use tagalong_config::Registry;
-use tagalong_core::{Frame, GreyImage, Images, Motion, Stamp};
+use tagalong_core::{EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::Camera;
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
@@ -155,7 +155,7 @@ impl Bench {
     fn step(&mut self) -> FrameReport {
         self.index += 1;
         let stamp = Stamp::from_nanos(self.index * 100_000_000);
-        let motion = Motion::at_rest(if self.index == 1 { 0.0 } else { 0.1 });
+        let motion = EgoMotion::at_rest(if self.index == 1 { 0.0 } else { 0.1 });
         let camera = Arc::clone(&self.camera);
         let frame = Frame::new(self.index, stamp, camera, motion, self.images.clone());
         self.pipeline.step(&frame).expect("a frame with a pair")

@@ -11,8 +11,8 @@ use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_compressive::{Compressive, Config};
 use tagalong_config::Registry;
 use tagalong_core::{
-    DepthImage, Detector, Estimate, Frame, Funnel, GreyImage, Images, Motion, Person, Recorded,
-    Search, Stamp, Track, TrackId,
+    DepthImage, Detector, EgoMotion, Estimate, ExternalDetection, Frame, Funnel, GreyImage, Images,
+    Person, Query, Stamp, Track, TrackId,
 };
 use tagalong_correlation::Correlation;
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
@@ -36,7 +36,7 @@ fn frame(camera: &Arc<Camera>, of: Rect, index: u64, face_m: f32) -> Frame {
     let images =
         Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
     let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
-    Frame::new(index, stamp, Arc::clone(camera), Motion::at_rest(0.04), images)
+    Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.04), images)
 }
 
 /// Somebody at 3 m who may be elsewhere by so much, m.
@@ -70,7 +70,7 @@ fn correlation(criterion: &mut Criterion) {
     };
     learn(&mut detector);
     let mut find = |frame: &Frame, track: &Track, learns: bool| {
-        let found = detector.detect(frame, &Search::Near(track), &mut Funnel::default());
+        let found = detector.detect(frame, &Query::Track(track), &mut Funnel::default());
         if learns {
             learn(&mut detector);
         }
@@ -93,7 +93,7 @@ fn compressive(criterion: &mut Criterion) {
     criterion.bench_function("compressive: one person, found and learnt", |bencher| {
         bencher.iter(|| {
             let mut funnel = Funnel::default();
-            let found = detector.detect(&frame, &Search::Near(&track), &mut funnel);
+            let found = detector.detect(&frame, &Query::Track(&track), &mut funnel);
             assert_eq!(black_box(found).expect("it has what it needs").len(), 1);
             detector.learn(&frame, std::slice::from_ref(&track)).expect("as before");
         });
@@ -101,11 +101,11 @@ fn compressive(criterion: &mut Criterion) {
 }
 
 /// Eight people who walk to and fro, as boxes of whole bodies.
-fn recorded(index: u64) -> Vec<Recorded> {
+fn recorded(index: u64) -> Vec<ExternalDetection> {
     let person = |k: u64| {
         let x = 300.0 + 200.0 * ((index as f64) * 0.02 + k as f64).sin();
         let region = Some(Rect::new(x, 120.0 + 8.0 * k as f64, 70.0, 190.0));
-        Recorded { region, head: None, score: 0.95 }
+        ExternalDetection { region, head: None, score: 0.95 }
     };
     (0..8).map(person).collect()
 }
@@ -118,7 +118,7 @@ fn boxes(criterion: &mut Criterion) {
         .map(|index| {
             let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
             let images = Images::default();
-            Frame::new(index, stamp, Arc::clone(&camera), Motion::at_rest(0.04), images)
+            Frame::new(index, stamp, Arc::clone(&camera), EgoMotion::at_rest(0.04), images)
                 .with_recorded(Some(recorded(index)))
         })
         .collect();

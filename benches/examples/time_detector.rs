@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use tagalong_config::Context;
-use tagalong_core::{Detector, Frame, Funnel, Search, Wheels};
+use tagalong_core::{Detector, DiffDrive, Frame, Funnel, Query};
 use tagalong_face_rgbd::FaceRgbd;
 use tagalong_hog_upper_body::HogUpperBody;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
@@ -41,7 +41,7 @@ fn settings<C: DeserializeOwned>(words: &[String]) -> C {
 }
 
 fn detector(name: &str, words: &[String]) -> Box<dyn Detector> {
-    let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+    let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
     let context = Context { seed: 1, base_dir: PathBuf::new(), wheels };
     let detector: tagalong_core::Result<Box<dyn Detector>> = match name {
         "face-rgbd" => FaceRgbd::new(settings(words), &context).map(|it| Box::new(it) as _),
@@ -58,7 +58,7 @@ fn main() {
     let runs: usize = runs.parse().expect("RUNS is a number");
     let (mut detector, frames) = (detector(plugin, &settings), frames(Path::new(log)));
     folder.iter().for_each(|folder| write(&frames, Path::new(folder)));
-    let everywhere = Search::Everywhere { occupied: &[] };
+    let everywhere = Query::Discover { occupied: &[] };
     let mut found = 0;
     for frame in std::iter::repeat_n(&frames, runs).flatten() {
         let detections = detector.detect(frame, &everywhere, &mut Funnel::default());

@@ -14,7 +14,7 @@ const GOOD: &str = r#"seed = 3
 
 [[detectors]]
 plugin = "depth-template"
-roles = ["follow", "discover"]
+roles = ["track", "discover"]
 every = 2
 config = { max_depth_m = 5.0 }
 

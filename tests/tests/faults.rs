@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tagalong_config::Registry;
-use tagalong_core::{DepthImage, Frame, Images, Motion, Stamp, Track, WheelSpeeds};
+use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp, Track, WheelSpeeds};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;
@@ -170,7 +170,7 @@ fn t5_depth_at_half_rate_halves_the_frames_and_nothing_else() {
 }
 
 fn frame(camera: &Arc<Camera>, index: usize, images: Images) -> Frame {
-    let motion = Motion::at_rest(if index == 0 { 0.0 } else { PERIOD_S });
+    let motion = EgoMotion::at_rest(if index == 0 { 0.0 } else { PERIOD_S });
     Frame::new(index as u64 + 1, at(index), Arc::clone(camera), motion, images)
 }
 

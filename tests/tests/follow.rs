@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry2;
 use tagalong_config::Registry;
-use tagalong_core::{Frame, Motion, Stamp, TrackId};
+use tagalong_core::{EgoMotion, Frame, Stamp, TrackId};
 use tagalong_geometry::Camera;
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth, Variant};
@@ -39,7 +39,7 @@ impl Recorder {
         let now = (shot.captured_ns, self.odometry);
         let (before_ns, before) = self.last.replace(now).unwrap_or(now);
         let dt = (shot.captured_ns - before_ns) as f64 * 1e-9;
-        let motion = Motion::between(&before, &self.odometry, dt, 0.02);
+        let motion = EgoMotion::between(&before, &self.odometry, dt, 0.02);
         self.frames += 1;
         let stamp = Stamp::from_nanos(1_000_000_000 + shot.captured_ns);
         Frame::new(self.frames, stamp, Arc::clone(&self.camera), motion, shot.images.clone())

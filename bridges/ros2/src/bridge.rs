@@ -16,7 +16,7 @@ use crate::messages::Bool;
 use crate::network::{Ear, Network};
 use crate::options::Setup;
 use crate::stamps::StampClock;
-use crate::wheels::{Told, Wheels};
+use crate::wheels::{CommandCounts, Wheels};
 use crate::{BridgeError, Options};
 
 /// Longest wait for messages before the stop flag is checked.
@@ -41,13 +41,13 @@ pub struct Summary {
     /// Skipped and lost inputs of the frame source, by name.
     pub counters: BTreeMap<&'static str, u64>,
     /// Commands sent to the wheels.
-    pub told: Told,
+    pub told: CommandCounts,
 }
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} frames", self.frames)?;
-        if let Told { commands, zeros } = self.told
+        if let CommandCounts { commands, zeros } = self.told
             && commands > 0
         {
             writeln!(f, "{commands} commands, {zeros} of them zero")?;
@@ -311,7 +311,7 @@ impl Bridge {
             frames: self.frames,
             traffic: self.inbox.traffic(),
             counters: self.source.counters().clone(),
-            told: Told::default(),
+            told: CommandCounts::default(),
         }
     }
 

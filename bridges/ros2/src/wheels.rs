@@ -18,12 +18,12 @@ const BETWEEN_FAREWELLS: Duration = Duration::from_millis(10);
 /// expired, and zero at the end, also after an error.
 pub struct Wheels {
     shared: Arc<Shared>,
-    thread: Option<JoinHandle<Told>>,
+    thread: Option<JoinHandle<CommandCounts>>,
 }
 
 /// Numbers of commands sent to the wheels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Told {
+pub struct CommandCounts {
     /// Commands in total.
     pub commands: u64,
     /// Commands of zero speed.
@@ -77,11 +77,11 @@ impl Wheels {
     }
 
     /// Stops the robot and the thread; returns the counts of commands.
-    pub fn finish(mut self) -> Told {
+    pub fn finish(mut self) -> CommandCounts {
         self.quit()
     }
 
-    fn quit(&mut self) -> Told {
+    fn quit(&mut self) -> CommandCounts {
         self.shared.lock().quits = true;
         self.shared.changed.notify_all();
         // Taken, because `finish` drops the value, which quits once more.
@@ -106,8 +106,8 @@ impl Shared {
         period: Duration,
         now: impl Fn() -> Stamp,
         mut tell: impl FnMut(WheelSpeeds),
-    ) -> Told {
-        let mut told = Told::default();
+    ) -> CommandCounts {
+        let mut told = CommandCounts::default();
         let mut count_and_tell = |wheels| {
             told.commands += 1;
             told.zeros += u64::from(wheels == WheelSpeeds::STOP);

@@ -11,7 +11,7 @@ use std::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
 use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 
@@ -59,7 +59,7 @@ impl Detector for NearestThing {
         }
     }
 
-    fn detect(&mut self, frame: &Frame, _: &Search<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+    fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
         self.frames += 1;
         let limit = self.config.panic_after_frames;
         assert!(limit == 0 || self.frames <= limit, "as the config asked for");

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_config::Registry;
 use tagalong_reproduce::{
-    DrawnScenes, Experiment, Found, Lab, Progress, SYSTEMS, System, Table, system,
+    DrawnScenes, Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, System, Table, system,
 };
 use tagalong_sim::Split;
 
@@ -149,11 +149,11 @@ fn show(tables: &[Table], format: TableFormat) -> Result<(), Failure> {
     })
 }
 
-fn json(all: &[Found]) -> String {
+fn json(all: &[ExperimentFindings]) -> String {
     serde_json::to_string_pretty(all).unwrap_or_default() + "\n"
 }
 
-fn write(folder: &Path, all: &[Found]) -> Result<(), Failure> {
+fn write(folder: &Path, all: &[ExperimentFindings]) -> Result<(), Failure> {
     let save = |name: &str, text: &str| {
         let path = folder.join(name);
         fs::write(&path, text)
@@ -230,7 +230,7 @@ mod tests {
         let table = Table { title: "A table".into(), ..Table::default() };
         let picture = tagalong_reproduce::Picture { name: "plot".into(), svg: "<svg/>".into() };
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
-        let found = Found { experiment: "one", drawn: Vec::new(), findings };
+        let found = ExperimentFindings { experiment: "one", drawn: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
         assert!(read("tables.md").contains("**A table**"));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{ConfigError, Settings, Trainer, Value, commented_defaults, nearest, parse_settings};
 use tagalong_core::{
-    Associator, Controller, Detector, Error, Filter, Result, TrackManager, Verifier, Wheels,
+    Associator, Controller, Detector, DiffDrive, Error, Filter, Result, TrackManager, Verifier,
 };
 
 /// The six kinds of plugin.
@@ -53,7 +53,7 @@ pub struct Context {
     /// The directory against which paths in the config are resolved.
     pub base_dir: PathBuf,
     /// The drive of the robot.
-    pub wheels: Wheels,
+    pub wheels: DiffDrive,
 }
 
 impl Context {
@@ -126,7 +126,7 @@ impl PluginInfo {
 /// struct Trusting;
 /// impl Verifier for Trusting {
 ///     fn inputs(&self) -> Inputs { Inputs::NONE }
-///     fn margin(&mut self, _: &Frame, _: &Detection) -> Result<f64> { Ok(1.0) }
+///     fn log_odds(&mut self, _: &Frame, _: &Detection) -> Result<f64> { Ok(1.0) }
 /// }
 /// let mut registry = Registry::default();
 /// registry.verifier("trusting", "believes everything", |_: Config, _| Ok(Trusting));
@@ -466,7 +466,7 @@ mod tests {
             Inputs::NONE
         }
 
-        fn margin(&mut self, _: &Frame, _: &Detection) -> Result<f64> {
+        fn log_odds(&mut self, _: &Frame, _: &Detection) -> Result<f64> {
             Ok(0.0)
         }
     }
@@ -491,7 +491,7 @@ mod tests {
     }
 
     fn refusal(name: &str) -> String {
-        let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+        let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         let context = Context { seed: 0, base_dir: PathBuf::new(), wheels };
         let built = registry().build_trainer(name, None, &context);
         built.map_or_else(|error| error.to_string(), |_| String::new())
@@ -510,7 +510,7 @@ mod tests {
     }
 
     fn context() -> Context {
-        let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+        let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         Context { seed: 0, base_dir: PathBuf::new(), wheels }
     }
 
@@ -525,7 +525,7 @@ mod tests {
         fn detect(
             &mut self,
             _: &Frame,
-            _: &tagalong_core::Search<'_>,
+            _: &tagalong_core::Query<'_>,
             _: &mut tagalong_core::Funnel,
         ) -> Result<Vec<Detection>> {
             Ok(Vec::new())
@@ -541,12 +541,12 @@ mod tests {
         ) {
         }
 
-        fn predict(&mut self, _: &tagalong_core::Motion, _: &tagalong_geometry::Camera) {}
+        fn predict(&mut self, _: &tagalong_core::EgoMotion, _: &tagalong_geometry::Camera) {}
 
         fn update(
             &mut self,
             _: &tagalong_core::Evidence<'_>,
-        ) -> Result<BTreeMap<tagalong_core::TrackId, tagalong_core::Support>> {
+        ) -> Result<BTreeMap<tagalong_core::TrackId, tagalong_core::Update>> {
             Ok(BTreeMap::new())
         }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use tagalong_core::{Detection, Detector, Error, Frame, Funnel, Inputs, Search, Usage};
+use tagalong_core::{Detection, Detector, Error, Frame, Funnel, Inputs, Query, Usage};
 use tagalong_geometry::Camera;
 
 use crate::figure::Figure;
@@ -28,18 +28,22 @@ pub(crate) const CHECKS: &[Check] = &[
     ("people who left are forgotten", forgets),
 ];
 
-const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
+const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
 
 /// Result of a search, or the lack of an image that the simulation does not provide.
-enum Seen {
+enum SearchOutcome {
     People(Vec<Detection>),
     Lacks,
 }
 
-fn look(detector: &mut dyn Detector, frame: &Frame, search: &Search<'_>) -> Result<Seen, String> {
+fn look(
+    detector: &mut dyn Detector,
+    frame: &Frame,
+    search: &Query<'_>,
+) -> Result<SearchOutcome, String> {
     match detector.detect(frame, search, &mut Funnel::default()) {
-        Ok(people) => Ok(Seen::People(people)),
-        Err(Error::MissingImage { .. }) => Ok(Seen::Lacks),
+        Ok(people) => Ok(SearchOutcome::People(people)),
+        Err(Error::MissingImage { .. }) => Ok(SearchOutcome::Lacks),
         Err(error) => Err(format!("it fails on a drawn frame: {error}")),
     }
 }
@@ -47,11 +51,11 @@ fn look(detector: &mut dyn Detector, frame: &Frame, search: &Search<'_>) -> Resu
 fn people(
     detector: &mut dyn Detector,
     frame: &Frame,
-    search: &Search<'_>,
+    search: &Query<'_>,
 ) -> Result<Vec<Detection>, String> {
     Ok(match look(detector, frame, search)? {
-        Seen::People(people) => people,
-        Seen::Lacks => Vec::new(),
+        SearchOutcome::People(people) => people,
+        SearchOutcome::Lacks => Vec::new(),
     })
 }
 
@@ -59,7 +63,7 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
     let mut detector = subject.detector(From::Nothing)?;
     let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
     for (name, frame) in odd_frames() {
-        for search in [EVERYWHERE, Search::Near(&lost)] {
+        for search in [EVERYWHERE, Query::Track(&lost)] {
             let outcome = detector.detect(&frame, &search, &mut Funnel::default());
             demand(outcome.is_ok(), || match &outcome {
                 Err(error) => format!("the {name} frame is an error: {error}"),
@@ -77,7 +81,7 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
 fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
     let mut detector = subject.detector(From::Nothing)?;
     let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
-    for search in [EVERYWHERE, Search::Near(&lost)] {
+    for search in [EVERYWHERE, Query::Track(&lost)] {
         match detector.detect(&bare_frame(), &search, &mut Funnel::default()) {
             Err(Error::MissingImage { .. }) => {}
             Ok(found) if found.is_empty() => {}
@@ -104,7 +108,7 @@ fn record(detector: &mut dyn Detector, frames: &[Frame]) -> Result<Vec<Detection
     let followed = track(1, Figure::at(2.0, 0.4).head, 0.15, &frames[0].camera);
     let mut all = Vec::new();
     for frame in frames {
-        all.extend(people(detector, frame, &Search::Near(&followed))?);
+        all.extend(people(detector, frame, &Query::Track(&followed))?);
         all.extend(people(detector, frame, &EVERYWHERE)?);
         let learned = detector.learn(frame, std::slice::from_ref(&followed));
         learned.map_err(|error| format!("learning is an error: {error}"))?;
@@ -136,7 +140,7 @@ fn required_suffice(subject: &Subject<'_>) -> Verdict {
         if !inputs.of(Usage::Required).all(|input| frame.holds(input)) {
             return Ok(());
         }
-        for search in [EVERYWHERE, Search::Near(&lost)] {
+        for search in [EVERYWHERE, Query::Track(&lost)] {
             if let Err(error) = detector.detect(&frame, &search, &mut Funnel::default()) {
                 return Err(format!("with the inputs that it requires: {error}"));
             }
@@ -158,7 +162,7 @@ fn roles_are_declared(subject: &Subject<'_>) -> Verdict {
     let camera = level();
     let followed = track(1, Figure::at(2.0, 0.4).head, 0.15, &camera);
     for frame in walk(&camera) {
-        let (everywhere, near) = (EVERYWHERE, Search::Near(&followed));
+        let (everywhere, near) = (EVERYWHERE, Query::Track(&followed));
         let roles = [
             ("discovers", capabilities.discovers, everywhere),
             ("tracks", capabilities.tracks, near),
@@ -195,7 +199,7 @@ fn question_alone(subject: &Subject<'_>) -> Verdict {
     record(&mut *seasoned, &frames)?;
     let followed = track(1, Figure::at(3.0, -0.6).head, 0.15, &level());
     for frame in frames.iter().rev() {
-        for search in [EVERYWHERE, Search::Near(&followed)] {
+        for search in [EVERYWHERE, Query::Track(&followed)] {
             let mut fresh = subject.detector(From::Nothing)?;
             let answer = |detector: &mut dyn Detector| {
                 let mut funnel = Funnel::default();
@@ -255,7 +259,7 @@ fn near_stays_near(subject: &Subject<'_>) -> Verdict {
         let frame = drawn(1, &camera, &couple);
         for wanted in [couple[0].head, couple[1].head, Point3::new(1.8, 0.0, 1.6)] {
             let search = track(1, wanted, sigma_m, &camera);
-            for found in people(detector, &frame, &Search::Near(&search))? {
+            for found in people(detector, &frame, &Query::Track(&search))? {
                 let away = (found.position.xy() - wanted.xy()).norm();
                 demand(away <= window_m, || {
                     format!("camera {name}: {away:.2} m away from a track known to {sigma_m} m")
@@ -273,7 +277,7 @@ fn empty_stays_empty(subject: &Subject<'_>) -> Verdict {
         for index in 1..=3 {
             let frame = drawn(index, &camera, &[]);
             let mut found = people(detector, &frame, &EVERYWHERE)?;
-            found.extend(people(detector, &frame, &Search::Near(&lost))?);
+            found.extend(people(detector, &frame, &Query::Track(&lost))?);
             believed_empty(&found, name)?;
         }
     }
@@ -334,7 +338,7 @@ fn person_is_followed(subject: &Subject<'_>) -> Verdict {
         // The predicted position is off by 10 cm, so that the detector has to search.
         followed.estimate.person.position.y -= 0.1;
         followed.estimate.region = camera.upper_body(&followed.estimate.person.position);
-        let found = people(detector, &drawn(2, &camera, &[figure]), &Search::Near(&followed))?;
+        let found = people(detector, &drawn(2, &camera, &[figure]), &Query::Track(&followed))?;
         let best = found.first().ok_or_else(|| format!("camera {name}: nobody is found"))?;
         is_at(best, &figure, &camera).map_err(|what| format!("camera {name}: {what}"))?;
     }
@@ -358,6 +362,6 @@ fn forgets(subject: &Subject<'_>) -> Verdict {
     }
     let frame = drawn(5, &camera, &[]);
     let mut found = people(detector, &frame, &EVERYWHERE)?;
-    found.extend(people(detector, &frame, &Search::Near(&tracked))?);
+    found.extend(people(detector, &frame, &Query::Track(&tracked))?);
     believed_empty(&found, "after the person has left")
 }

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Vector2};
 use tagalong_core::{
-    Detection, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Motion, Person,
-    Support, TrackId,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
+    TrackId, Update,
 };
 use tagalong_geometry::Camera;
 
@@ -52,14 +52,14 @@ struct Run {
     filter: Box<dyn Filter>,
     camera: Arc<Camera>,
     world_from_robot: Isometry2<f64>,
-    motion: Motion,
+    motion: EgoMotion,
     random: Random,
     index: u64,
     stopped: Vec<TrackId>,
 }
 
 impl Run {
-    fn new(subject: &Subject<'_>, from: From<'_>, motion: Motion) -> Result<Self, String> {
+    fn new(subject: &Subject<'_>, from: From<'_>, motion: EgoMotion) -> Result<Self, String> {
         Ok(Self {
             filter: subject.filter(from)?,
             camera: level(),
@@ -90,7 +90,7 @@ impl Run {
     }
 
     /// Simulates one frame: the robot moves, and the given people are detected.
-    fn step(&mut self, seen: &[(u32, Point3<f64>)]) -> Result<BTreeMap<TrackId, Support>, String> {
+    fn step(&mut self, seen: &[(u32, Point3<f64>)]) -> Result<BTreeMap<TrackId, Update>, String> {
         self.index += 1;
         self.world_from_robot *= self.motion.isometry();
         self.filter.predict(&self.motion, &self.camera);
@@ -111,7 +111,7 @@ impl Run {
         Ok(supported)
     }
 
-    fn only_known_ids(&self, supported: &BTreeMap<TrackId, Support>) -> Verdict {
+    fn only_known_ids(&self, supported: &BTreeMap<TrackId, Update>) -> Verdict {
         let alive = self.estimates();
         let stray = supported.keys().find(|id| !alive.contains_key(id));
         demand(stray.is_none(), || format!("it supports {stray:?}, in whom it does not believe"))?;
@@ -136,19 +136,19 @@ impl Run {
 }
 
 /// Returns a motion of half a metre a second, turning by 0.2 rad/s, with realistic odometry noise.
-fn driving() -> Motion {
+fn driving() -> EgoMotion {
     let turn = 0.2 * DT_S;
     let covariance = Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-6, 1e-6, 1e-7));
-    Motion { dt: DT_S, forward: 0.5 * DT_S, left: 0.0, turn, covariance }
+    EgoMotion { dt: DT_S, forward: 0.5 * DT_S, left: 0.0, turn, covariance }
 }
 
 const COUPLE: [Point3<f64>; 2] = [Point3::new(4.0, 1.2, 1.6), Point3::new(4.5, -0.8, 1.7)];
 
 fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
-    let mut run = Run::new(subject, From::Nothing, Motion::at_rest(0.0))?;
+    let mut run = Run::new(subject, From::Nothing, EgoMotion::at_rest(0.0))?;
     run.start(&COUPLE);
     for (name, frame) in odd_frames() {
-        run.filter.predict(&Motion::at_rest(0.0), &frame.camera);
+        run.filter.predict(&EgoMotion::at_rest(0.0), &frame.camera);
         let oracle = Oracle(Vec::new());
         let evidence = Evidence {
             frame: &frame,
@@ -200,7 +200,7 @@ fn covariance_stays_positive(subject: &Subject<'_>) -> Verdict {
 }
 
 fn uncertainty_grows(subject: &Subject<'_>) -> Verdict {
-    let mut run = Run::new(subject, From::Nothing, Motion::at_rest(DT_S))?;
+    let mut run = Run::new(subject, From::Nothing, EgoMotion::at_rest(DT_S))?;
     run.start(&COUPLE[..1]);
     for _ in 0..10 {
         run.step(&[(1, COUPLE[0])])?;
@@ -226,7 +226,7 @@ fn uncertainty_grows(subject: &Subject<'_>) -> Verdict {
 
 fn standing_person_stands(subject: &Subject<'_>) -> Verdict {
     let place = Point3::new(6.0, 0.8, 1.6);
-    for motion in [driving(), Motion { turn: 0.0, ..driving() }] {
+    for motion in [driving(), EgoMotion { turn: 0.0, ..driving() }] {
         let mut run = Run::new(subject, From::Nothing, motion)?;
         run.start(&[place]);
         let (mut offset, mut drift) = (Vector2::zeros(), Vector2::zeros());
@@ -257,7 +257,7 @@ fn coasts(run: &mut Run, place: &Point3<f64>) -> Verdict {
 }
 
 fn walking_person(subject: &Subject<'_>) -> Verdict {
-    let mut run = Run::new(subject, From::Nothing, Motion::at_rest(DT_S))?;
+    let mut run = Run::new(subject, From::Nothing, EgoMotion::at_rest(DT_S))?;
     let velocity = Vector2::new(0.3, 0.7);
     let place = |i: u32| {
         let floor = Vector2::new(2.5, -1.5) + velocity * (DT_S * f64::from(i));
@@ -275,7 +275,7 @@ fn walking_person(subject: &Subject<'_>) -> Verdict {
 }
 
 fn stop_forgets(subject: &Subject<'_>) -> Verdict {
-    let mut run = Run::new(subject, From::Nothing, Motion::at_rest(DT_S))?;
+    let mut run = Run::new(subject, From::Nothing, EgoMotion::at_rest(DT_S))?;
     run.start(&COUPLE);
     run.step(&[(1, COUPLE[0]), (2, COUPLE[1])])?;
     run.filter.stop(TrackId(1));

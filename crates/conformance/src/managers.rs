@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Track, TrackId,
+    Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
 
@@ -82,7 +82,7 @@ impl Run {
 
     /// Simulates one frame; tracks that are not named are occluded.
     fn step(&mut self, observed: &[(TrackId, Observation)]) -> Verdict {
-        self.manager.predict(&Motion::at_rest(DT_S));
+        self.manager.predict(&EgoMotion::at_rest(DT_S));
         let observed: BTreeMap<TrackId, Observation> = observed.iter().copied().collect();
         for (id, track) in &mut self.tracks {
             let seen = observed.get(id).is_some_and(|observation| observation.is_supported());

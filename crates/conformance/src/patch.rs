@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
-use tagalong_core::{Detection, Frame, GreyImage, Images, Motion, Stamp};
+use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 /// Renders a dark head above dark shoulders before a bright wall, or bars: 64x64, with noise from a
@@ -30,7 +30,7 @@ pub fn frame(grey: GreyImage) -> Frame {
     let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, grey.width(), grey.height(), 1.0, 0.0, 0.0));
     let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
-    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
 }
 
 /// Returns the candidate of that picture: 2 m ahead, of score 1.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Estimate, Frame, Image, Images, Inputs, Motion, Person, RgbImage,
+    DepthImage, Detection, EgoMotion, Estimate, Frame, Image, Images, Inputs, Person, RgbImage,
     RightImage, Stamp, Track, TrackId, Usage,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
@@ -42,7 +42,7 @@ pub(crate) fn mountings() -> [(&'static str, Arc<Camera>); 3] {
 
 /// Returns a frame of a robot at rest.
 pub(crate) fn frame(index: u64, camera: &Arc<Camera>, images: Images) -> Frame {
-    moving_frame(index, camera, images, Motion::at_rest(DT_S))
+    moving_frame(index, camera, images, EgoMotion::at_rest(DT_S))
 }
 
 /// Returns a frame after a motion of the robot.
@@ -50,7 +50,7 @@ pub(crate) fn moving_frame(
     index: u64,
     camera: &Arc<Camera>,
     images: Images,
-    motion: Motion,
+    motion: EgoMotion,
 ) -> Frame {
     let stamp = Stamp::from_nanos(1_000_000_000).plus_seconds(index as f64 * DT_S);
     Frame::new(index, stamp, Arc::clone(camera), motion, images)

@@ -1,11 +1,11 @@
 use std::path::Path;
 
 use tagalong_config::{ConfigError, Context, PluginInfo, Registry, Value};
-use tagalong_core::{Associator, Controller, Detector, Filter, TrackManager, Verifier, Wheels};
+use tagalong_core::{Associator, Controller, Detector, DiffDrive, Filter, TrackManager, Verifier};
 use toml::de::{DeTable, DeValue};
 
 /// The drive in checks of controllers.
-pub(crate) const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+pub(crate) const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
 
 /// The plugin under test, with all that is needed to build it.
 pub(crate) struct Subject<'a> {

@@ -23,7 +23,7 @@ fn margin(
     frame: &Frame,
     candidate: &Detection,
 ) -> Result<f64, String> {
-    let outcome = verifier.margin(frame, candidate);
+    let outcome = verifier.log_odds(frame, candidate);
     let margin = outcome.map_err(|error| format!("it fails on {:?}: {error}", candidate.region))?;
     demand(margin.is_finite(), || format!("margin {margin} for {:?}", candidate.region))?;
     Ok(margin)
@@ -58,7 +58,7 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
 
 fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
     let verifier = &mut *subject.verifier(From::Nothing)?;
-    match verifier.margin(&bare_frame(), &candidates()[0]) {
+    match verifier.log_odds(&bare_frame(), &candidates()[0]) {
         Err(Error::MissingImage { .. }) => Ok(()),
         Err(error) => Err(format!("the error does not name the image: {error}")),
         Ok(margin) => {

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use crate::{Frame, Inputs, Stamp, Track, Wheels};
+use crate::{DiffDrive, Frame, Inputs, Stamp, Track};
 
 /// Speeds over ground of the two driven wheels, m/s.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -114,14 +114,14 @@ pub struct Scene<'a> {
     /// All confirmed tracks, the target included.
     pub tracks: &'a [Track],
     /// The differential drive.
-    pub wheels: Wheels,
+    pub wheels: DiffDrive,
     /// Speed limit of a wheel, m/s.
     pub max_speed_mps: f64,
 }
 
 /// Steers the robot after the target. It cannot fail: when unsure, it stops.
 pub trait Controller: Send {
-    /// Returns the inputs that the controller itself uses. The governor, which checks obstacles for
+    /// Returns the inputs that the controller itself uses. The command limiter, which checks obstacles for
     /// all controllers, declares its own.
     fn inputs(&self) -> Inputs {
         Inputs::NONE

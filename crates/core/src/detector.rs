@@ -5,15 +5,15 @@ use tagalong_geometry::Rect;
 
 /// Query to a detector.
 #[derive(Clone, Copy)]
-pub enum Search<'a> {
+pub enum Query<'a> {
     /// *Discover*: find all people in the image. The people in `occupied` were already found in
     /// this frame and need not be found again.
-    Everywhere {
+    Discover {
         /// Detections already made in this frame.
         occupied: &'a [Detection],
     },
     /// *Follow*: find the person of this track again. The track is predicted to this frame.
-    Near(&'a Track),
+    Track(&'a Track),
 }
 
 /// Performs one or more of three tasks on an image: finding new people (*discover*), finding a
@@ -26,7 +26,7 @@ pub trait Detector: Send {
     fn capabilities(&self) -> Capabilities;
 
     /// Finds people. Candidates that a test drops are counted in `funnel` under the name of the
-    /// test. For [`Search::Near`] the best detection comes first and lies within the uncertainty of
+    /// test. For [`Query::Track`] the best detection comes first and lies within the uncertainty of
     /// the track.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ pub trait Detector: Send {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>>;
 
@@ -114,32 +114,32 @@ pub trait Verifier: Send {
     ///
     /// # Errors
     /// [`crate::Error::MissingImage`] if the frame lacks a required input.
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64>;
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64>;
 }
 
-impl<'a> Search<'a> {
+impl<'a> Query<'a> {
     /// Returns true if `position` belongs to a person that was already found in this frame (nearer
     /// than `within_m` on the floor).
     pub fn is_occupied(&self, position: &Point3<f64>, within_m: f64) -> bool {
         match self {
-            Self::Everywhere { occupied } => {
+            Self::Discover { occupied } => {
                 occupied.iter().any(|d| (d.position.xy() - position.xy()).norm() < within_m)
             }
             // A search near a track has to find that very person, even if already found.
-            Self::Near(_) => false,
+            Self::Track(_) => false,
         }
     }
 }
 
 /// Linear calibration of a verifier's log-odds, with a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trust {
+pub struct ScoreCalibration {
     weight: f64,
     limit: f64,
     bias: f64,
 }
 
-impl Trust {
+impl ScoreCalibration {
     /// Creates the calibration `weight * log_odds + bias`, where the log-odds are clamped to plus
     /// and minus `limit`.
     ///
@@ -158,7 +158,7 @@ impl Trust {
     }
 
     /// Returns the calibrated log-odds for the log-odds of a model.
-    pub fn margin(&self, log_odds: f64) -> f64 {
+    pub fn calibrate(&self, log_odds: f64) -> f64 {
         // Without the limit one overconfident verdict could outweigh all other evidence of a track.
         self.weight * log_odds.clamp(-self.limit, self.limit) + self.bias
     }
@@ -170,14 +170,14 @@ mod tests {
 
     #[test]
     fn one_look_is_never_beyond_doubt() {
-        let trust = Trust::new(2.0, 3.0, -1.0).unwrap();
-        assert_eq!([0.5, 9.0, -9.0].map(|odds| trust.margin(odds)), [0.0, 5.0, -7.0]);
+        let calibration = ScoreCalibration::new(2.0, 3.0, -1.0).unwrap();
+        assert_eq!([0.5, 9.0, -9.0].map(|odds| calibration.calibrate(odds)), [0.0, 5.0, -7.0]);
         for (weight, limit, bias, word) in [
             (-1.0, 1.0, 0.0, "weight"),
             (1.0, f64::NAN, 0.0, "limit"),
             (1.0, 1.0, f64::INFINITY, "bias"),
         ] {
-            let error = Trust::new(weight, limit, bias).unwrap_err().to_string();
+            let error = ScoreCalibration::new(weight, limit, bias).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         }
     }
@@ -195,11 +195,11 @@ mod tests {
     #[test]
     fn a_place_is_taken_by_whoever_was_found_near_it_on_the_floor() {
         let occupied = [seen(3.0, 0.0, 1.6)];
-        let search = Search::Everywhere { occupied: &occupied };
+        let search = Query::Discover { occupied: &occupied };
         assert!(search.is_occupied(&Point3::new(3.2, 0.1, 0.0), 0.3), "whatever the height");
         assert!(!search.is_occupied(&Point3::new(3.31, 0.0, 1.6), 0.3));
         assert!(!search.is_occupied(&Point3::new(0.3, 0.0, 1.6), 0.3));
-        assert!(!Search::Everywhere { occupied: &[] }.is_occupied(&Point3::origin(), 9.0));
+        assert!(!Query::Discover { occupied: &[] }.is_occupied(&Point3::origin(), 9.0));
     }
 
     /// A likelihood that returns the number of people, and refuses three.
@@ -221,7 +221,7 @@ mod tests {
             tagalong_geometry::Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: lens };
         let camera =
             std::sync::Arc::new(tagalong_geometry::Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
-        let motion = crate::Motion::at_rest(0.0);
+        let motion = crate::EgoMotion::at_rest(0.0);
         let frame =
             Frame::new(1, crate::Stamp::default(), camera, motion, crate::Images::default());
         let somebody = Person { position: Point3::origin(), velocity: nalgebra::zero() };

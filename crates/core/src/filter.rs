@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 
-use crate::{Detection, Frame, Inputs, Likelihood, Motion, Result, Sketch, TrackId};
+use crate::{Detection, EgoMotion, Frame, Inputs, Likelihood, Result, Sketch, TrackId};
 use tagalong_geometry::{Camera, Rect};
 
 /// State of a person in the robot frame.
@@ -83,7 +83,7 @@ impl<'a> Evidence<'a> {
 
 /// Result of the update of one track.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Support {
+pub struct Update {
     /// Normalised innovation squared and its degrees of freedom, from filters that have an
     /// innovation. Its mean over a run of a consistent filter equals the degrees of freedom.
     pub nis: Option<(f64, u32)>,
@@ -102,13 +102,13 @@ pub trait Filter: Send {
 
     /// Moves every state into the robot's new frame and forward in time. `camera` is that of the
     /// new frame.
-    fn predict(&mut self, motion: &Motion, camera: &Camera);
+    fn predict(&mut self, motion: &EgoMotion, camera: &Camera);
 
     /// Updates the states with the evidence of a frame and returns the supported tracks.
     ///
     /// # Errors
     /// [`crate::Error::MissingImage`] if a scene cannot be weighed.
-    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>>;
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>>;
 
     /// Returns the estimates of all tracks, with their regions in the image of `camera`.
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate>;
@@ -135,39 +135,38 @@ pub trait Filter: Send {
 /// A filter of one person.
 pub trait PersonFilter: Send {
     /// State of a person.
-    type Belief: Clone + Send;
+    type State: Clone + Send;
 
     /// Returns the state after the first detection.
-    fn start(&self, detection: &Detection) -> Self::Belief;
+    fn start(&self, detection: &Detection) -> Self::State;
 
     /// Moves a state into the robot's new frame and forward in time.
-    fn predict(&self, belief: &mut Self::Belief, motion: &Motion);
+    fn predict(&self, state: &mut Self::State, motion: &EgoMotion);
 
     /// Updates a state with a detection.
-    fn correct(&self, belief: &mut Self::Belief, detection: &Detection, camera: &Camera)
-    -> Support;
+    fn correct(&self, state: &mut Self::State, detection: &Detection, camera: &Camera) -> Update;
 
     /// Merges alternative states of one person into one; the weights sum to 1 and the heaviest
     /// comes first. A filter with mean and covariance matches the moments of the mixture; by
     /// default the heaviest alternative is kept.
-    fn merge(&self, alternatives: &[(f64, Self::Belief)]) -> Self::Belief {
+    fn merge(&self, alternatives: &[(f64, Self::State)]) -> Self::State {
         alternatives[0].1.clone()
     }
 
     /// Converts a state to an estimate.
-    fn estimate(&self, belief: &Self::Belief, camera: &Camera) -> Estimate;
+    fn estimate(&self, state: &Self::State, camera: &Camera) -> Estimate;
 }
 
 /// Adapter from a [`PersonFilter`] to a [`Filter`] with one state per person.
 pub struct PerPerson<F: PersonFilter> {
     filter: F,
-    beliefs: BTreeMap<TrackId, F::Belief>,
+    states: BTreeMap<TrackId, F::State>,
 }
 
 impl<F: PersonFilter> PerPerson<F> {
     /// Wraps `filter`.
     pub fn new(filter: F) -> Self {
-        Self { filter, beliefs: BTreeMap::new() }
+        Self { filter, states: BTreeMap::new() }
     }
 }
 
@@ -176,28 +175,28 @@ impl<F: PersonFilter> PerPerson<F> {
     /// weight that is missing from 1 (Bar-Shalom and Tse's probabilistic data association).
     fn correct_weighted(
         filter: &F,
-        belief: &mut F::Belief,
+        state: &mut F::State,
         matches: &[Matched<'_>],
         camera: &Camera,
-    ) -> Support {
+    ) -> Update {
         let mut supports = Vec::new();
-        let mut alternatives: Vec<(f64, F::Belief)> = Vec::new();
+        let mut alternatives: Vec<(f64, F::State)> = Vec::new();
         for matched in matches {
-            let mut corrected = belief.clone();
+            let mut corrected = state.clone();
             supports.push(filter.correct(&mut corrected, matched.detection, camera));
             alternatives.push((matched.weight, corrected));
         }
         let missed = 1.0 - matches.iter().map(|matched| matched.weight).sum::<f64>();
         if missed > CERTAINTY {
-            alternatives.push((missed, belief.clone()));
+            alternatives.push((missed, state.clone()));
         }
         // The sort is stable, so equal weights keep the order of the detections and runs are
         // repeatable.
         alternatives.sort_by(|a, b| b.0.total_cmp(&a.0));
-        *belief = filter.merge(&alternatives);
+        *state = filter.merge(&alternatives);
         let heaviest =
             matches.iter().zip(&supports).max_by(|a, b| a.0.weight.total_cmp(&b.0.weight));
-        heaviest.map_or(Support::default(), |(_, support)| *support)
+        heaviest.map_or(Update::default(), |(_, support)| *support)
     }
 }
 
@@ -206,27 +205,27 @@ const CERTAINTY: f64 = 1e-9;
 
 impl<F: PersonFilter> Filter for PerPerson<F> {
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
-        self.beliefs.insert(id, self.filter.start(detection));
+        self.states.insert(id, self.filter.start(detection));
     }
 
-    fn predict(&mut self, motion: &Motion, _: &Camera) {
-        for belief in self.beliefs.values_mut() {
-            self.filter.predict(belief, motion);
+    fn predict(&mut self, motion: &EgoMotion, _: &Camera) {
+        for state in self.states.values_mut() {
+            self.filter.predict(state, motion);
         }
     }
 
-    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let camera = &evidence.frame.camera;
         let mut supported = BTreeMap::new();
         for (id, matches) in by_track(evidence.matched) {
-            let Some(belief) = self.beliefs.get_mut(&id) else { continue };
+            let Some(state) = self.states.get_mut(&id) else { continue };
             let support = match &matches[..] {
                 // A single certain match skips the mixture, so that one-to-one associations stay
                 // exact.
                 [only] if only.weight > 1.0 - CERTAINTY => {
-                    self.filter.correct(belief, only.detection, camera)
+                    self.filter.correct(state, only.detection, camera)
                 }
-                several => Self::correct_weighted(&self.filter, belief, several, camera),
+                several => Self::correct_weighted(&self.filter, state, several, camera),
             };
             supported.insert(id, support);
         }
@@ -234,14 +233,11 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-        self.beliefs
-            .iter()
-            .map(|(id, belief)| (*id, self.filter.estimate(belief, camera)))
-            .collect()
+        self.states.iter().map(|(id, state)| (*id, self.filter.estimate(state, camera))).collect()
     }
 
     fn stop(&mut self, id: TrackId) {
-        self.beliefs.remove(&id);
+        self.states.remove(&id);
     }
 }
 
@@ -268,25 +264,25 @@ mod tests {
     struct Last;
 
     impl PersonFilter for Last {
-        type Belief = Point3<f64>;
+        type State = Point3<f64>;
 
         fn start(&self, detection: &Detection) -> Point3<f64> {
             detection.position
         }
 
-        fn predict(&self, belief: &mut Point3<f64>, motion: &Motion) {
-            belief.x -= motion.forward;
+        fn predict(&self, state: &mut Point3<f64>, motion: &EgoMotion) {
+            state.x -= motion.forward;
         }
 
-        fn correct(&self, belief: &mut Point3<f64>, seen: &Detection, _: &Camera) -> Support {
-            let off = seen.position - *belief;
-            *belief = seen.position;
-            Support { nis: Some((off.norm_squared(), 3)) }
+        fn correct(&self, state: &mut Point3<f64>, seen: &Detection, _: &Camera) -> Update {
+            let off = seen.position - *state;
+            *state = seen.position;
+            Update { nis: Some((off.norm_squared(), 3)) }
         }
 
-        fn estimate(&self, belief: &Point3<f64>, camera: &Camera) -> Estimate {
-            let person = Person { position: *belief, velocity: Vector2::zeros() };
-            let region = camera.upper_body(belief);
+        fn estimate(&self, state: &Point3<f64>, camera: &Camera) -> Estimate {
+            let person = Person { position: *state, velocity: Vector2::zeros() };
+            let region = camera.upper_body(state);
             Estimate { person, covariance: SMatrix::identity(), region }
         }
     }
@@ -294,7 +290,7 @@ mod tests {
     fn frame() -> Frame {
         let lens = Pinhole { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 64, 48, 1.2, 0.0, 0.0));
-        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
     }
 
     fn seen(x: f64) -> Detection {
@@ -312,7 +308,7 @@ mod tests {
         };
         filter.start(TrackId(1), &seen(2.0), &frame.camera);
         filter.start(TrackId(2), &seen(5.0), &frame.camera);
-        filter.predict(&Motion { forward: 0.5, ..Motion::at_rest(0.1) }, &frame.camera);
+        filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) }, &frame.camera);
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.5)]);
         let (detection, stranger) = (seen(4.0), seen(9.0));
         let matched =
@@ -320,7 +316,7 @@ mod tests {
         let evidence =
             Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
         let supported = filter.update(&evidence).unwrap();
-        let expected = [(TrackId(2), Support { nis: Some((0.25, 3)) })];
+        let expected = [(TrackId(2), Update { nis: Some((0.25, 3)) })];
         assert_eq!(supported, BTreeMap::from(expected), "and nobody else");
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.0)]);
         filter.stop(TrackId(1));

@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::{
-    DepthImage, Error, GreyImage, Input, Inputs, LaserScan, Motion, Recorded, Result, RgbImage,
-    Stamp,
+    DepthImage, EgoMotion, Error, ExternalDetection, GreyImage, Input, Inputs, LaserScan, Result,
+    RgbImage, Stamp,
 };
 use tagalong_geometry::Camera;
 
@@ -54,9 +54,9 @@ pub struct Frame {
     /// The camera of all images; [`Camera::blind`] in a frame of a laser scan alone.
     pub camera: Arc<Camera>,
     /// The robot's motion since the previous frame.
-    pub motion: Motion,
+    pub motion: EgoMotion,
     images: Images,
-    recorded: Option<Vec<Recorded>>,
+    recorded: Option<Vec<ExternalDetection>>,
     laser: Option<LaserScan>,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
@@ -68,7 +68,7 @@ impl Frame {
         index: u64,
         stamp: Stamp,
         camera: Arc<Camera>,
-        motion: Motion,
+        motion: EgoMotion,
         images: Images,
     ) -> Self {
         Self {
@@ -85,13 +85,13 @@ impl Frame {
     }
 
     /// Returns the frame with the detections that an external detector recorded.
-    pub fn with_recorded(self, recorded: Option<Vec<Recorded>>) -> Self {
+    pub fn with_recorded(self, recorded: Option<Vec<ExternalDetection>>) -> Self {
         Self { recorded, ..self }
     }
 
     /// Returns the detections that an external detector recorded; `None` if no topic is configured
     /// for them (`[input] detections_topic`).
-    pub fn recorded(&self) -> Option<&[Recorded]> {
+    pub fn recorded(&self) -> Option<&[ExternalDetection]> {
         self.recorded.as_deref()
     }
 
@@ -241,7 +241,7 @@ mod tests {
     fn frame(images: Images) -> Frame {
         let lens = Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
-        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), images)
     }
 
     #[test]

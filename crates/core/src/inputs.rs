@@ -140,9 +140,9 @@ impl Inputs {
 pub struct Capabilities {
     /// The inputs that the detector uses.
     pub inputs: Inputs,
-    /// True if it finds people that are not tracked yet ([`crate::Search::Everywhere`]).
+    /// True if it finds people that are not tracked yet ([`crate::Query::Discover`]).
     pub discovers: bool,
-    /// True if it finds a tracked person again ([`crate::Search::Near`]).
+    /// True if it finds a tracked person again ([`crate::Query::Track`]).
     pub tracks: bool,
     /// True if it has a [`crate::Likelihood`].
     pub weighs: bool,

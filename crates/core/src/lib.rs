@@ -25,10 +25,12 @@
 //!   [`Context`]. Same log, same config, same seed: same bytes.
 
 mod associator;
+mod command_history;
 mod control;
 mod detection;
 mod detector;
 mod error;
+mod external;
 mod filter;
 mod frame;
 mod funnel;
@@ -37,19 +39,19 @@ mod inputs;
 mod manager;
 mod mixture;
 mod motion;
-mod recorded;
 mod scan;
-mod sent;
 mod sketch;
 mod time;
 mod track;
 
 pub use associator::{Association, Associations, Associator, Gate};
+pub use command_history::CommandHistory;
 pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
 pub use detection::Detection;
-pub use detector::{Detector, Likelihood, Search, Trust, Verifier};
+pub use detector::{Detector, Likelihood, Query, ScoreCalibration, Verifier};
 pub use error::{Error, Result};
-pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Support};
+pub use external::ExternalDetection;
+pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Update};
 pub use frame::{Derived, Frame, Images, RightImage};
 pub use funnel::{Dropped, Funnel};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
@@ -58,10 +60,8 @@ pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
 pub use mixture::match_moments;
-pub use motion::{Motion, Wheels, planar_pose};
-pub use recorded::Recorded;
+pub use motion::{DiffDrive, EgoMotion, planar_pose};
 pub use scan::LaserScan;
-pub use sent::Sent;
 pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

@@ -1,4 +1,4 @@
-use crate::{Detection, Motion, Track, TrackId};
+use crate::{Detection, EgoMotion, Track, TrackId};
 
 /// A detection without a track.
 #[derive(Clone, Copy, Debug)]
@@ -108,7 +108,7 @@ pub trait TrackManager: Send {
 
     /// Advances to the next frame: positions that the manager remembers move into the robot's new
     /// frame, and age.
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &EgoMotion) {
         let _ = motion;
     }
 

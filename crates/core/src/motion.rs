@@ -2,7 +2,7 @@ use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Vector2, Vector3};
 
 /// Motion of the robot between two image stamps, in its frame at the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct EgoMotion {
     /// Time between the images, s; never negative.
     pub dt: f64,
     /// Displacement along the first heading, m.
@@ -17,14 +17,14 @@ pub struct Motion {
 
 /// A differential drive. The wheels are `2 * half_separation_m` apart, as in P1, section 2.3.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wheels {
+pub struct DiffDrive {
     /// Half the distance between the wheels, m.
     pub half_separation_m: f64,
     /// Slip: standard deviation of a wheel's travel as a fraction of it.
     pub slip: f64,
 }
 
-impl Motion {
+impl EgoMotion {
     /// Returns the motion of a robot at rest for `dt` seconds.
     pub fn at_rest(dt: f64) -> Self {
         Self { dt, forward: 0.0, left: 0.0, turn: 0.0, covariance: Matrix3::zeros() }
@@ -33,7 +33,7 @@ impl Motion {
     /// Integrates wheel speeds held for `dt` seconds (P1, section 2.3.1). The chord is `v dt
     /// sinc(turn / 2)`, which has no singularity at equal speeds; the printed form divides by their
     /// difference.
-    pub fn from_wheels(left_mps: f64, right_mps: f64, wheels: &Wheels, dt: f64) -> Self {
+    pub fn from_wheels(left_mps: f64, right_mps: f64, wheels: &DiffDrive, dt: f64) -> Self {
         let d = wheels.half_separation_m;
         let turn = (right_mps - left_mps) / (2.0 * d) * dt;
         let chord = 0.5 * (right_mps + left_mps) * dt * sinc(0.5 * turn);
@@ -116,11 +116,11 @@ mod tests {
 
     use super::*;
 
-    const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+    const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
 
     #[test]
     fn equal_speeds_drive_straight() {
-        let motion = Motion::from_wheels(0.5, 0.5, &WHEELS, 0.1);
+        let motion = EgoMotion::from_wheels(0.5, 0.5, &WHEELS, 0.1);
         assert_eq!((motion.forward, motion.left, motion.turn), (0.05, 0.0, 0.0));
     }
 
@@ -133,14 +133,14 @@ mod tests {
                 let h = dt / 2000.0;
                 pose *= Isometry2::new(Vector2::new(v * h, 0.0), w * h);
             }
-            let motion = Motion::from_wheels(l, r, &WHEELS, dt).isometry();
+            let motion = EgoMotion::from_wheels(l, r, &WHEELS, dt).isometry();
             prop_assert!((motion.translation.vector - pose.translation.vector).norm() < 1e-3);
             prop_assert!((motion.rotation.inverse() * pose.rotation).angle().abs() < 1e-9);
         }
 
         #[test]
         fn a_fixed_point_stays_fixed(x in -5.0..5.0f64, y in -5.0..5.0f64, f in -1.0..1.0f64, t in -1.0..1.0f64) {
-            let motion = Motion { forward: f, turn: t, ..Motion::at_rest(0.1) };
+            let motion = EgoMotion { forward: f, turn: t, ..EgoMotion::at_rest(0.1) };
             let seen = motion.apply_to_point(Point2::new(x, y));
             prop_assert!((motion.isometry() * seen - Point2::new(x, y)).norm() < 1e-12);
         }
@@ -152,7 +152,7 @@ mod tests {
     fn what_a_wheel_slips_is_uncertain_ahead_and_in_heading() {
         let d = WHEELS.half_separation_m;
         let slipped = 0.02 * 0.5 * 0.1;
-        let of = |left, right| Motion::from_wheels(left, right, &WHEELS, 0.1).covariance;
+        let of = |left, right| EgoMotion::from_wheels(left, right, &WHEELS, 0.1).covariance;
         let (left, right) = (of(0.5, 0.0), of(0.0, 0.5));
         for covariance in [left, right] {
             assert!((covariance[(0, 0)].sqrt() - 0.5 * slipped).abs() < 1e-12);
@@ -179,7 +179,7 @@ mod tests {
     fn odometry_poses_give_the_way_between_them_and_how_sure_it_is() {
         let before = Isometry2::new(Vector2::new(1.0, 2.0), std::f64::consts::FRAC_PI_2);
         let after = before * Isometry2::new(Vector2::new(0.3, 0.4), -0.2);
-        let motion = Motion::between(&before, &after, 0.25, 0.1);
+        let motion = EgoMotion::between(&before, &after, 0.25, 0.1);
         let way = [motion.dt, motion.forward, motion.left, motion.turn];
         for (found, expected) in way.iter().zip([0.25, 0.3, 0.4, -0.2]) {
             assert!((found - expected).abs() < 1e-12, "{way:?}");
@@ -196,9 +196,14 @@ mod tests {
     fn one_motion_after_another_is_one_motion() {
         let quarter = std::f64::consts::FRAC_PI_2;
         let covariance = Matrix3::identity() * 0.01;
-        let first =
-            Motion { forward: 1.0, left: 0.5, turn: quarter, covariance, ..Motion::at_rest(0.1) };
-        let next = Motion { forward: 2.0, turn: 0.3, covariance, ..Motion::at_rest(0.2) };
+        let first = EgoMotion {
+            forward: 1.0,
+            left: 0.5,
+            turn: quarter,
+            covariance,
+            ..EgoMotion::at_rest(0.1)
+        };
+        let next = EgoMotion { forward: 2.0, turn: 0.3, covariance, ..EgoMotion::at_rest(0.2) };
         let whole = first.then(&next);
         let found = [whole.dt, whole.forward, whole.left, whole.turn];
         for (found, expected) in found.iter().zip([0.3, 1.0, 2.5, quarter + 0.3]) {
@@ -210,7 +215,7 @@ mod tests {
     #[test]
     fn a_velocity_over_ground_is_turned_and_not_moved() {
         let turn = std::f64::consts::FRAC_PI_2;
-        let motion = Motion { forward: 5.0, left: 1.0, turn, ..Motion::at_rest(0.1) };
+        let motion = EgoMotion { forward: 5.0, left: 1.0, turn, ..EgoMotion::at_rest(0.1) };
         let seen = motion.apply_to_velocity(Vector2::new(1.0, 0.0));
         assert!((seen - Vector2::new(0.0, -1.0)).norm() < 1e-12, "{seen}");
     }

@@ -236,14 +236,14 @@ fn check(sequence: &Sequence, similarity: Similarity) -> Result<(), EvalError> {
                 frame: index + 1,
             });
         }
-        let at = Place { sequence: &sequence.name, frame: index + 1, similarity };
+        let at = FrameContext { sequence: &sequence.name, frame: index + 1, similarity };
         at.check_side("truth", frame.truths.iter().map(Someone::from).collect())?;
         at.check_side("track", frame.reports.iter().map(Someone::from).collect())?;
     }
     Ok(())
 }
 
-struct Place<'a> {
+struct FrameContext<'a> {
     sequence: &'a str,
     frame: usize,
     similarity: Similarity,
@@ -288,7 +288,7 @@ impl From<&Report> for Someone {
     }
 }
 
-impl Place<'_> {
+impl FrameContext<'_> {
     fn check_side(&self, side: &'static str, mut all: Vec<Someone>) -> Result<(), EvalError> {
         let (sequence, frame) = (|| self.sequence.to_owned(), self.frame);
         for Someone { id, has_region, has_floor, may_lack_place, sane } in &all {

@@ -6,8 +6,8 @@
 //! |---|---|---|
 //! | choice of the target, and its recovery after a loss | `target_lock` | [`TargetSettings`] |
 //! | wish of the controller, or of the search for a lost target | the controller, `target_lock` | [`SearchSettings`] |
-//! | obstacles around the robot | `governor` | [`CorridorSettings`] |
-//! | limits of the command | `governor` | [`GovernorSettings`] |
+//! | obstacles around the robot | `command_limiter` | [`CollisionMonitorSettings`] |
+//! | limits of the command | `command_limiter` | [`CommandLimiterSettings`] |
 //!
 //! # Invariants
 //!
@@ -15,12 +15,12 @@
 //! * A command is valid for a limited time; [`Orders`] answers with zero after that.
 //! * This is no safety function in the sense of the standards.
 
-mod governor;
+mod command_limiter;
 mod settings;
 mod steering;
 mod target_lock;
 
-pub use governor::{CorridorSettings, GovernorSettings, Orders};
+pub use command_limiter::{CollisionMonitorSettings, CommandLimiterSettings, Orders};
 pub use settings::{FollowSettings, RobotSettings};
 pub use steering::{Steered, Steering};
 pub use target_lock::{

@@ -1,8 +1,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::Wheels;
+use tagalong_core::DiffDrive;
 
-use crate::{GovernorSettings, TargetSettings};
+use crate::{CollisionMonitorSettings, CommandLimiterSettings, TargetSettings};
 
 /// Settings of the steering.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -10,7 +10,9 @@ pub struct FollowSettings {
     /// The robot's drive.
     pub robot: RobotSettings,
     /// Limits of the commands.
-    pub governor: GovernorSettings,
+    pub command_limiter: CommandLimiterSettings,
+    /// Obstacles ahead that stop the robot.
+    pub collision_monitor: CollisionMonitorSettings,
     /// Target lock and search.
     pub target: TargetSettings,
 }
@@ -38,7 +40,7 @@ impl Default for RobotSettings {
 
 impl RobotSettings {
     /// Returns the drive as the type of the core crate.
-    pub fn wheels(&self) -> Wheels {
-        Wheels { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }
+    pub fn wheels(&self) -> DiffDrive {
+        DiffDrive { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }
     }
 }

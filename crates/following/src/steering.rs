@@ -1,23 +1,24 @@
 use tagalong_core::{
-    Command, Controller, Frame, Inputs, Motion, Reason, Scene, Stamp, Track, TrackId, WheelSpeeds,
+    Command, Controller, EgoMotion, Frame, Inputs, Reason, Scene, Stamp, Track, TrackId,
+    WheelSpeeds,
 };
 use tagalong_tracking::{Guarded, StepError};
 
-use crate::governor::{Aim, Governor, Surroundings, Wish};
-use crate::target_lock::{Lock, Search};
+use crate::command_limiter::{Aim, CommandLimiter, ObstacleMemory, Wish};
+use crate::target_lock::{Search, TargetLock};
 use crate::{FollowSettings, LockReport, LockState, Orders, RobotSettings, SearchSettings};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
 
-/// Controller, target lock, and governor of the commands.
+/// Controller, target lock, and command limiter of the commands.
 pub struct Steering {
     controller: Guarded<dyn Controller>,
-    lock: Lock,
+    lock: TargetLock,
     search: Search,
     search_settings: SearchSettings,
-    surroundings: Surroundings,
-    governor: Governor,
+    obstacles: ObstacleMemory,
+    limiter: CommandLimiter,
     robot: RobotSettings,
     fresh: u32,
     last: Option<Stamp>,
@@ -36,14 +37,19 @@ pub struct Steered {
 impl Steering {
     /// Creates the steering by a controller, which is called `name` in reports.
     pub fn new(name: String, controller: Box<dyn Controller>, settings: FollowSettings) -> Self {
-        let FollowSettings { robot, governor, target } = settings;
+        let FollowSettings { robot, command_limiter, collision_monitor, target } = settings;
         Self {
             controller: Guarded::new(name, controller),
             search_settings: target.search.clone(),
-            lock: Lock::new(target),
+            lock: TargetLock::new(target),
             search: Search::default(),
-            surroundings: Surroundings::default(),
-            governor: Governor::new(governor, robot.wheels(), robot.max_speed_mps),
+            obstacles: ObstacleMemory::default(),
+            limiter: CommandLimiter::new(
+                command_limiter,
+                collision_monitor,
+                robot.wheels(),
+                robot.max_speed_mps,
+            ),
             robot,
             fresh: FRESH_FRAMES,
             last: None,
@@ -53,7 +59,7 @@ impl Steering {
     /// Forgets all positions after a jump of the clock, and starts the wait of `FRESH_FRAMES`.
     pub fn reset(&mut self) {
         self.lock.reset();
-        self.surroundings.clear();
+        self.obstacles.clear();
         self.fresh = 0;
     }
 
@@ -74,22 +80,22 @@ impl Steering {
 
     /// Returns a copy of the source of commands, for a control loop in another thread.
     pub fn orders(&self) -> Orders {
-        self.governor.orders()
+        self.limiter.orders()
     }
 
     /// Returns the reason why the robot stands until [`Steering::arm`], if it does.
     pub fn fault(&self) -> Option<&'static str> {
-        self.governor.fault()
+        self.limiter.fault()
     }
 
     /// Stops the robot until [`Steering::arm`].
     pub fn disarm(&mut self, why: &'static str) {
-        self.governor.latch(why);
+        self.limiter.latch(why);
     }
 
     /// Lets the robot move again after a fault.
     pub fn arm(&mut self) {
-        self.governor.arm();
+        self.limiter.arm();
     }
 
     /// Returns the command for a frame, and the target; `motion` is the robot's since the last
@@ -100,12 +106,12 @@ impl Steering {
     pub fn steer(
         &mut self,
         frame: &Frame,
-        motion: &Motion,
+        motion: &EgoMotion,
         tracks: &[Track],
     ) -> Result<Steered, StepError> {
         // Checked first: a jump of the odometry latches the fault before this frame's command is
         // made.
-        self.governor.check_odometry(&frame.motion);
+        self.limiter.check_odometry(&frame.motion);
         let settled = self.is_settled();
         let lock = self.lock.update(frame, motion, tracks, settled);
         let followed = self.lock.followed();
@@ -122,17 +128,16 @@ impl Steering {
         self.last = Some(frame.stamp);
         let place = |track: &Track| track.estimate.person.position.xy();
         let person = target.map(|track| &track.estimate.person);
-        let (corridor, camera) = (self.governor.corridor(), &frame.camera);
+        let (monitor, camera) = (self.limiter.monitor(), &frame.camera);
         // Obstacles are updated after the lock, because points of the target are no obstacles.
-        self.surroundings.look(corridor, camera, frame.depth().ok(), motion, person);
-        self.surroundings.feel(corridor, frame.laser().map(|scan| &scan.points[..]));
-        self.surroundings.meet(tracks, followed);
-        let look = |corridor: &_, curvature| {
-            self.surroundings.ahead(corridor, curvature, target.map(place))
-        };
-        let command = self.governor.govern(&wish, look);
+        self.obstacles.update(monitor, camera, frame.depth().ok(), motion, person);
+        self.obstacles.add_scan(monitor, frame.laser().map(|scan| &scan.points[..]));
+        self.obstacles.add_tracks(tracks, followed);
+        let look =
+            |monitor: &_, curvature| self.obstacles.ahead(monitor, curvature, target.map(place));
+        let command = self.limiter.limit(&wish, look);
         // The search learns only now that its wish was blocked; it reacts in the next frame.
-        self.search.hear(command.reason == Reason::Blocked, motion.dt);
+        self.search.add_block(command.reason == Reason::Blocked, motion.dt);
         Ok(Steered { command, target: target.map(|track| track.id), lock })
     }
 

@@ -20,7 +20,7 @@ pub struct InputSettings {
     /// Topic of the odometry; without one, tf from `odom_frame` to the robot is used.
     pub odometry_topic: Option<String>,
     /// Topic of a laser scanner's scans (`sensor_msgs` LaserScan), for detectors that use them and
-    /// for the governor of a steered robot.
+    /// for the command limiter of a steered robot.
     pub laser_topic: Option<String>,
     /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
     /// Detection3DArray), for `recorded-detections`.

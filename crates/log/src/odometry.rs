@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Isometry2, Matrix3};
-use tagalong_core::{Motion, Stamp};
+use tagalong_core::{EgoMotion, Stamp};
 
 /// Gap in the odometry beyond which poses are stale, s.
 pub const MAX_GAP_S: f64 = 0.5;
@@ -127,9 +127,9 @@ fn blend(
 
 /// Returns the motion over `dt` seconds without valid odometry: at rest, with the uncertainty of a
 /// robot that may have driven at 1 m/s and turned at 1 rad/s, for at most 5 s.
-pub fn unknown_motion(dt: f64) -> Motion {
+pub fn unknown_motion(dt: f64) -> EgoMotion {
     let reach = dt.clamp(0.0, 5.0);
-    Motion { covariance: Matrix3::identity() * (reach * reach), ..Motion::at_rest(dt) }
+    EgoMotion { covariance: Matrix3::identity() * (reach * reach), ..EgoMotion::at_rest(dt) }
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ struct Equations {
 }
 
 /// Camera with the images of a frame, and the keyframe they are compared with.
-pub struct View<'a> {
+pub struct AlignmentInput<'a> {
     pub keyframe: &'a Keyframe,
     pub camera: &'a Camera,
     pub camera_from_robot: Isometry3<f64>,
@@ -78,7 +78,7 @@ pub struct View<'a> {
     pub images: Pyramid<'a>,
 }
 
-impl View<'_> {
+impl AlignmentInput<'_> {
     /// Estimates the pose, starting from a guess of the pose and the pitch; `None` if too few
     /// points are visible.
     pub fn align(&self, prior: &Prior, guess: (Isometry2<f64>, f64)) -> Option<Fit> {
@@ -113,7 +113,7 @@ impl View<'_> {
     /// difference (Geman and McClure); `None` with too few points.
     fn equations(&self, level: usize, at: &State) -> Option<Equations> {
         let stance = Stance::new(at);
-        let looks: Vec<Look> =
+        let looks: Vec<PointComparison> =
             self.keyframe.points.iter().filter_map(|p| self.look(p, level, &stance)).collect();
         // At least one squared grey level, the order of quantisation: a perfect match would
         // otherwise have infinite weight.
@@ -129,7 +129,12 @@ impl View<'_> {
     }
 
     /// Returns the difference of a point at a state and the derivative of its pixel by the state.
-    fn look<'p>(&self, point: &'p Point, level: usize, stance: &Stance) -> Option<Look<'p>> {
+    fn look<'p>(
+        &self,
+        point: &'p Point,
+        level: usize,
+        stance: &Stance,
+    ) -> Option<PointComparison<'p>> {
         let here = point.after(&stance.pose);
         let seen = stance.nod(&(self.camera_from_robot * here).coords);
         if seen.z < NEAREST_M {
@@ -149,7 +154,7 @@ impl View<'_> {
         ];
         let (across, down) = (seen.x / seen.z, seen.y / seen.z);
         let [fx, fy] = [self.lens.fx, self.lens.fy].map(|f| f * scale / seen.z);
-        Some(Look {
+        Some(PointComparison {
             difference,
             products: &point.patches[level].products,
             columns: moves.map(|m| fx * (m.x - across * m.z)).into(),
@@ -159,7 +164,7 @@ impl View<'_> {
 }
 
 /// Comparison of a point of the keyframe with the image.
-struct Look<'p> {
+struct PointComparison<'p> {
     difference: Difference,
     /// Sums of the products of the slopes of its patch: xx, xy, yy.
     products: &'p [f64; 3],
@@ -168,7 +173,7 @@ struct Look<'p> {
     rows: State,
 }
 
-impl Look<'_> {
+impl PointComparison<'_> {
     fn add_to(&self, equations: &mut Equations, weight: f64) {
         let ([xx, xy, yy], [x, y]) = (self.products, self.difference.along);
         let (by_columns, by_rows) =
@@ -244,7 +249,7 @@ mod tests {
         let settings = OdometrySettings { max_depth_m: 9.0, ..OdometrySettings::default() };
         let keyframe = Keyframe::new(&settings, &camera, &[&image, &half], &depth, &[]);
         assert!(keyframe.points.len() > 4);
-        let view = View {
+        let view = AlignmentInput {
             keyframe: &keyframe,
             camera: &camera,
             camera_from_robot: camera.robot_from_camera.inverse(),

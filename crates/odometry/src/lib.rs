@@ -17,10 +17,10 @@ mod settings;
 mod tests;
 
 use nalgebra::{Isometry2, Point2, Vector3};
-use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Motion};
+use tagalong_core::{DepthImage, EgoMotion, Frame, Funnel, GreyImage};
 use tagalong_geometry::{Lens, Pinhole};
 
-use align::{Fit, Prior, View};
+use align::{AlignmentInput, Fit, Prior};
 use keyframe::{Keyframe, Pyramid};
 pub use settings::OdometrySettings;
 
@@ -70,10 +70,10 @@ impl VisualOdometry {
     pub fn see(
         &mut self,
         frame: &Frame,
-        motion: Option<Motion>,
+        motion: Option<EgoMotion>,
         people: &[Point2<f64>],
         funnel: &mut Funnel,
-    ) -> Option<Motion> {
+    ) -> Option<EgoMotion> {
         let (Ok(grey), Ok(depth), Lens::Pinhole(lens)) =
             (frame.grey(), frame.depth(), &frame.camera.lens)
         else {
@@ -88,7 +88,7 @@ impl VisualOdometry {
             reference.compare(settings, frame, (lens, images), motion, funnel)
         });
         let (reference, motion) = compared.unwrap_or((None, motion));
-        let moved = motion.unwrap_or(Motion::at_rest(0.0));
+        let moved = motion.unwrap_or(EgoMotion::at_rest(0.0));
         self.reference = reference.or_else(|| {
             // The positions of the people are those of the previous frame; the keyframe is this
             // one.
@@ -123,11 +123,11 @@ impl Reference {
         settings: &OdometrySettings,
         frame: &Frame,
         (lens, images): (&Pinhole, Pyramid<'_>),
-        motion: Motion,
+        motion: EgoMotion,
         funnel: &mut Funnel,
-    ) -> (Option<Self>, Option<Motion>) {
+    ) -> (Option<Self>, Option<EgoMotion>) {
         self.by_wheels.go_on(&motion);
-        let view = View {
+        let view = AlignmentInput {
             keyframe: &self.keyframe,
             camera: &frame.camera,
             camera_from_robot: frame.camera.robot_from_camera.inverse(),
@@ -145,7 +145,7 @@ impl Reference {
             return (None, Some(motion));
         }
         let step = self.pose.inverse() * fit.pose;
-        let corrected = Motion {
+        let corrected = EgoMotion {
             forward: step.translation.x,
             left: step.translation.y,
             turn: step.rotation.angle(),
@@ -166,7 +166,7 @@ impl Reference {
 }
 
 impl Way {
-    fn go_on(&mut self, motion: &Motion) {
+    fn go_on(&mut self, motion: &EgoMotion) {
         let step = motion.isometry();
         self.pose *= step;
         self.travel_m += step.translation.vector.norm();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Vector2};
-use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Images, Motion, Stamp};
+use tagalong_core::{DepthImage, EgoMotion, Frame, Funnel, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
 use crate::{OdometrySettings, VisualOdometry};
@@ -71,7 +71,7 @@ fn frame(index: u64, world: World, robot: Isometry2<f64>) -> Frame {
     let images =
         Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
     let stamp = Stamp::from_nanos(index * 100_000_000);
-    Frame::new(index, stamp, Arc::new(camera(0.0)), Motion::at_rest(0.1), images)
+    Frame::new(index, stamp, Arc::new(camera(0.0)), EgoMotion::at_rest(0.1), images)
 }
 
 /// Returns the pose of the robot after `step` steps of a curve.
@@ -84,9 +84,9 @@ fn real_step() -> Isometry2<f64> {
 }
 
 /// Returns the same step by wheel odometry with a wrong heading.
-fn by_wheels() -> Motion {
+fn by_wheels() -> EgoMotion {
     let wrong = real_step() * Isometry2::new(Vector2::zeros(), 0.004);
-    Motion::between(&Isometry2::identity(), &wrong, 0.1, 0.02)
+    EgoMotion::between(&Isometry2::identity(), &wrong, 0.1, 0.02)
 }
 
 const STEPS: usize = 20;
@@ -174,7 +174,7 @@ fn without_a_motion_or_depth_nothing_is_compared() {
         1,
         Stamp::default(),
         Arc::new(camera(0.0)),
-        Motion::at_rest(0.1),
+        EgoMotion::at_rest(0.1),
         Images { grey: Some(Arc::new(GreyImage::filled(9, 9, 0))), ..Images::default() },
     );
     assert_eq!(odometry.see(&blind, Some(by_wheels()), &[], &mut funnel), Some(by_wheels()));

@@ -17,7 +17,7 @@ use tagalong_tracking::{DetectorSettings, DetectorSlot, Parts, Role, Tracker};
 use crate::pipeline::Pipeline;
 use crate::preprocessors::preprocessors;
 use crate::settings::{PipelineSettings, PluginSettings};
-use tagalong_following::{GovernorSettings, RobotSettings, Steering};
+use tagalong_following::{CommandLimiterSettings, RobotSettings, Steering};
 
 mod checks;
 mod document;
@@ -33,7 +33,7 @@ use inputs::{Declared, declared_inputs};
 use resolve::resolve;
 pub use tune::{Tunable, check_tuning, with_values};
 
-const OWN: [&str; 10] = [
+const OWN: [&str; 11] = [
     "seed",
     "without",
     "robot",
@@ -43,7 +43,8 @@ const OWN: [&str; 10] = [
     "merge",
     "occlusion",
     "target",
-    "governor",
+    "command_limiter",
+    "collision_monitor",
 ];
 const PLUGINS: [&str; 6] =
     ["detectors", "verifiers", "associator", "filter", "manager", "controller"];
@@ -53,13 +54,14 @@ pub const DEFAULT_ASSOCIATOR: &str = "associate-hungarian";
 pub const DEFAULT_MANAGER: &str = "manage-m-of-n";
 
 /// Keys of older configs, with their replacement.
-const RENAMED: [(&str, &str); 2] = [
+const RENAMED: [(&str, &str); 3] = [
     (
         "association",
         "`[associator.config]`; `same_person_m`, `same_person_iou` and `max_detections` stand in \
          `[merge]`",
     ),
     ("lifecycle", "`[manager.config]`"),
+    ("governor", "`[command_limiter]`; `[governor.corridor]` is `[collision_monitor]`"),
 ];
 
 /// Options for reading a config.
@@ -223,7 +225,7 @@ fn own_settings(root: &DeTable<'_>, options: &Options) -> Result<PipelineSetting
 }
 
 /// Spans of a detector section, as a whole and by key.
-struct Place {
+struct SectionSpans {
     section: Range<usize>,
     every: Option<Range<usize>>,
     offset: Option<Range<usize>>,
@@ -296,15 +298,16 @@ impl Builder<'_> {
     fn detectors(
         &self,
         value: Option<Value<'_>>,
-    ) -> Result<(Vec<DetectorSlot>, Vec<Place>), ConfigError> {
+    ) -> Result<(Vec<DetectorSlot>, Vec<SectionSpans>), ConfigError> {
         let mut built = (Vec::new(), Vec::new());
         for (index, value) in list("detectors", value)?.into_iter().enumerate() {
+            refuse_old_role(&value)?;
             let mut section = Section::<DetectorSettings>::new("detectors", value)?;
             let config = section.config.take();
             let context = self.context(0, index);
             let name = &section.settings.plugin;
             let plugin = section.at_plugin(self.registry.build_detector(name, config, &context))?;
-            built.1.push(Place {
+            built.1.push(SectionSpans {
                 section: section.span.clone(),
                 every: section.span_of("every"),
                 offset: section.span_of("offset"),
@@ -372,10 +375,10 @@ impl Builder<'_> {
         let context = self.context(3, 0);
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_controller(name, config, &context))?;
-        let PipelineSettings { robot, governor, .. } = self.settings;
+        let PipelineSettings { robot, command_limiter, .. } = self.settings;
         // The stopping distance is known before the first frame, so an unsafe config is refused
         // here.
-        if let Some(message) = too_near(plugin.stand_off_m(), robot, governor) {
+        if let Some(message) = too_near(plugin.stand_off_m(), robot, command_limiter) {
             return Err(ConfigError { message, span: section.span_of("plugin") });
         }
         let name = section.settings.plugin;
@@ -387,9 +390,9 @@ impl Builder<'_> {
 fn too_near(
     stand_off_m: Option<f64>,
     robot: &RobotSettings,
-    governor: &GovernorSettings,
+    limiter: &CommandLimiterSettings,
 ) -> Option<String> {
-    let stopping_m = governor.stopping_m(robot.max_speed_mps);
+    let stopping_m = limiter.stopping_m(robot.max_speed_mps);
     // Written as `>=` so that a distance that is not a number counts as too near.
     let stops = |distance: f64| distance >= stopping_m;
     let distance_m = stand_off_m.filter(|distance| !stops(*distance))?;
@@ -398,6 +401,20 @@ fn too_near(
          `stand_off_m` or lower `max_speed_mps` in [robot]",
         robot.max_speed_mps
     ))
+}
+
+/// Refuses the former name of the role `track`.
+fn refuse_old_role(section: &Value<'_>) -> Result<(), ConfigError> {
+    let roles = section.get_ref().as_table().and_then(|table| table.get("roles"));
+    let roles = roles.and_then(|roles| roles.get_ref().as_array());
+    let old = roles.into_iter().flatten().find(|role| role.get_ref().as_str() == Some("follow"));
+    match old {
+        Some(role) => {
+            let message = "the role `follow` is now `track`".to_owned();
+            Err(ConfigError { message, span: Some(role.span()) })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Returns the sections of an array of tables.
@@ -414,7 +431,7 @@ fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, Conf
 }
 
 /// Refuses roles and schedules that parse but cannot work.
-fn check_detectors(detectors: &[DetectorSlot], places: &[Place]) -> Result<(), ConfigError> {
+fn check_detectors(detectors: &[DetectorSlot], places: &[SectionSpans]) -> Result<(), ConfigError> {
     for (slot, place) in detectors.iter().zip(places) {
         let DetectorSettings { plugin, roles, every, offset, .. } = &slot.settings;
         let (message, span) = if *every == 0 {
@@ -449,7 +466,7 @@ fn missing_role(slot: &DetectorSlot) -> Option<(&'static str, &'static str)> {
     let offered = slot.plugin.plugin().capabilities();
     let roles = [
         (Role::Discover, offered.discovers, "discover", "discover people"),
-        (Role::Follow, offered.tracks, "follow", "find a tracked person again"),
+        (Role::Track, offered.tracks, "track", "find a tracked person again"),
         (Role::Weigh, offered.weighs, "weigh", "weigh scenes"),
     ];
     let missing = roles

@@ -48,7 +48,7 @@ pub use pipeline::Pipeline;
 pub use report::FrameReport;
 pub use settings::{PipelineSettings, PluginSettings};
 pub use tagalong_following::{
-    CorridorSettings, Differences, GovernorSettings, Likeness, LockReport, LockState,
+    CollisionMonitorSettings, CommandLimiterSettings, Differences, Likeness, LockReport, LockState,
     LooksSettings, Orders, RobotSettings, SearchSettings, TargetSettings,
 };
 pub use tagalong_odometry::OdometrySettings;

@@ -168,7 +168,7 @@ impl Pipeline {
     /// Steers after the target; stops without one.
     fn steer(&mut self, frame: &Frame, report: &mut FrameReport) -> Result<(), StepError> {
         let Some(steering) = &mut self.steering else { return Ok(()) };
-        // A jump of the clock invalidates every position that the target lock and the governor
+        // A jump of the clock invalidates every position that the target lock and the command limiter
         // remember.
         if matches!(report.outcome, Outcome::ResetBackward { .. } | Outcome::ResetForward { .. }) {
             steering.reset();

@@ -1,7 +1,7 @@
 //! Stages that complete a frame: `[stereo]` and `[odometry]`.
 
 use nalgebra::Point2;
-use tagalong_core::{Frame, Funnel, Motion, Result};
+use tagalong_core::{EgoMotion, Frame, Funnel, Result};
 use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
@@ -14,7 +14,7 @@ impl Preprocessor for DepthOfPair {
     fn process(
         &mut self,
         frame: &Frame,
-        motion: Option<Motion>,
+        motion: Option<EgoMotion>,
         _: &[Point2<f64>],
         funnel: &mut Funnel,
     ) -> Result<Preprocessed> {
@@ -33,7 +33,7 @@ impl Preprocessor for MotionOfImages {
     fn process(
         &mut self,
         frame: &Frame,
-        motion: Option<Motion>,
+        motion: Option<EgoMotion>,
         people: &[Point2<f64>],
         funnel: &mut Funnel,
     ) -> Result<Preprocessed> {

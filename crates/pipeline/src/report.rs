@@ -1,4 +1,4 @@
-use tagalong_core::{Command, Funnel, Motion, Sketch, Stamp, Track, TrackId};
+use tagalong_core::{Command, EgoMotion, Funnel, Sketch, Stamp, Track, TrackId};
 use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing};
 
 use crate::LockReport;
@@ -16,7 +16,7 @@ pub struct FrameReport {
     /// Robot motion since the last processed frame, by its odometry, corrected by static structure
     /// in the images where the config asks for that; at rest where a jump of the clock leaves it
     /// unknown.
-    pub motion: Motion,
+    pub motion: EgoMotion,
     /// All detections, each with its fate.
     pub candidates: Vec<Candidate>,
     /// Number of dropped items per test.

@@ -1,7 +1,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::Input;
-use tagalong_following::{FollowSettings, GovernorSettings, RobotSettings, TargetSettings};
+use tagalong_following::{
+    CollisionMonitorSettings, CommandLimiterSettings, FollowSettings, RobotSettings, TargetSettings,
+};
 use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 
@@ -37,14 +39,16 @@ pub struct PipelineSettings {
     /// Choice and confirmation of the person to follow.
     pub target: TargetSettings,
     /// Limits on the robot's motion, for any wish of the controller.
-    pub governor: GovernorSettings,
+    pub command_limiter: CommandLimiterSettings,
+    /// Obstacles ahead that stop the robot.
+    pub collision_monitor: CollisionMonitorSettings,
 }
 
 impl PipelineSettings {
     /// Returns the settings of the steering.
     pub(crate) fn following(&self) -> FollowSettings {
-        let Self { robot, governor, target, .. } = self.clone();
-        FollowSettings { robot, governor, target }
+        let Self { robot, command_limiter, collision_monitor, target, .. } = self.clone();
+        FollowSettings { robot, command_limiter, collision_monitor, target }
     }
 
     /// Returns the settings of the tracker.

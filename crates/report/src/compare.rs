@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::model::{Benchmark, EventRow, TaskResult};
-use crate::view::View;
+use crate::view::OrderedBenchmark;
 
 /// Maximum time between events of two pipelines that count as the same.
 pub const SAME_EVENT_S: f64 = 0.5;
@@ -27,10 +27,10 @@ pub struct Difference<'a> {
 /// Two events are the same if they are of one kind, concern the same person and lie at most half a
 /// second apart. Ids of tracks are not comparable between pipelines and are ignored.
 pub fn compare<'a>(benchmark: &'a Benchmark, a: &str, b: &str) -> Vec<Difference<'a>> {
-    compare_in(&View::new(benchmark), a, b)
+    compare_in(&OrderedBenchmark::new(benchmark), a, b)
 }
 
-pub fn compare_in<'a>(view: &View<'a>, a: &str, b: &str) -> Vec<Difference<'a>> {
+pub fn compare_in<'a>(view: &OrderedBenchmark<'a>, a: &str, b: &str) -> Vec<Difference<'a>> {
     let mut all = Vec::new();
     for of_a in view.done(a) {
         let same = |t: &&TaskResult| t.log == of_a.log && t.seed == of_a.seed;

@@ -6,12 +6,12 @@ use crate::model::TaskResult;
 
 /// Space in which tracks and truth were compared.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Place {
+pub enum ComparisonSpace {
     Image,
     Floor,
 }
 
-impl Place {
+impl ComparisonSpace {
     pub const ALL: [Self; 2] = [Self::Image, Self::Floor];
 
     /// Returns the prefix of the keys of figures.
@@ -43,7 +43,7 @@ pub struct Figure {
     /// Meaning, in one line.
     pub meaning: &'static str,
     /// Spaces in which it is shown.
-    pub places: &'static [Place],
+    pub places: &'static [ComparisonSpace],
     /// True if pipelines are compared by it in pairs.
     pub compared: bool,
     of: fn(&Scores) -> Option<f64>,
@@ -51,12 +51,12 @@ pub struct Figure {
 
 impl Figure {
     /// Returns the figure of a task, if it is finite.
-    pub fn of(&self, place: Place, task: &TaskResult) -> Option<f64> {
+    pub fn of(&self, place: ComparisonSpace, task: &TaskResult) -> Option<f64> {
         place.scores(task).and_then(self.of).filter(|v| v.is_finite())
     }
 
     /// Returns the key in `report.json`.
-    pub fn key(&self, place: Place) -> String {
+    pub fn key(&self, place: ComparisonSpace) -> String {
         format!("{}.{}", place.key(), self.name)
     }
 
@@ -66,7 +66,7 @@ impl Figure {
     }
 
     /// Returns the figures of a space.
-    pub fn at(place: Place) -> impl Iterator<Item = &'static Self> {
+    pub fn at(place: ComparisonSpace) -> impl Iterator<Item = &'static Self> {
         FIGURES.iter().filter(move |f| f.places.contains(&place))
     }
 }
@@ -74,7 +74,7 @@ impl Figure {
 /// Figure that ranks the pipelines.
 pub const MAIN: &Figure = &FIGURES[0];
 
-const BOTH: &[Place] = &Place::ALL;
+const BOTH: &[ComparisonSpace] = &ComparisonSpace::ALL;
 
 /// Range of times, distances and counts.
 const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
@@ -130,7 +130,7 @@ const FIGURES: &[Figure] = &[
         name: "LAMR",
         higher_is_better: false,
         meaning: "People missed, averaged from one false report in 100 images to one in each.",
-        places: &[Place::Image],
+        places: &[ComparisonSpace::Image],
         compared: true,
         of: |s| s.lamr,
         ..RATE
@@ -161,7 +161,7 @@ const FIGURES: &[Figure] = &[
         decimals: 2,
         higher_is_better: false,
         meaning: "Time from coming into view to the first match; people never found do not enter.",
-        places: &[Place::Image],
+        places: &[ComparisonSpace::Image],
         of: |s| s.time_to_confirm_mean_s,
         ..RATE
     },
@@ -182,7 +182,7 @@ const FIGURES: &[Figure] = &[
         decimals: 3,
         higher_is_better: false,
         meaning: "Distance between a track and its person on the floor.",
-        places: &[Place::Floor],
+        places: &[ComparisonSpace::Floor],
         compared: true,
         of: |s| s.position_error_mean_m,
     },

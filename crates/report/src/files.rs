@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value};
 use tagalong_eval::Scores;
 
-use crate::figures::Place;
+use crate::figures::ComparisonSpace;
 use crate::model::{Benchmark, Outcome, TaskResult};
 use crate::summary::Summary;
-use crate::view::View;
+use crate::view::OrderedBenchmark;
 
 /// Returns the text of `report.json`: one task per line in a fixed order, and the [`Summary`] under
 /// `summary`. Pictures are left out, since they belong to the page. The text can be read back as a
@@ -18,7 +18,7 @@ use crate::view::View;
 ///
 /// None with the types of this crate; the error is that of the JSON writer.
 pub fn json(benchmark: &Benchmark) -> serde_json::Result<String> {
-    let view = View::new(benchmark);
+    let view = OrderedBenchmark::new(benchmark);
     let tasks: Vec<String> =
         view.tasks.iter().map(|task| task_json(task)).collect::<serde_json::Result<_>>()?;
     let version = serde_json::to_string(view.version)?;
@@ -39,7 +39,7 @@ fn task_json(task: &TaskResult) -> serde_json::Result<String> {
 pub fn csv(benchmark: &Benchmark) -> String {
     let names = figure_names();
     let mut rows = vec![header(&names)];
-    rows.extend(View::new(benchmark).tasks.iter().map(|task| row(task, &names)));
+    rows.extend(OrderedBenchmark::new(benchmark).tasks.iter().map(|task| row(task, &names)));
     rows.iter().map(|cells| line(cells)).collect()
 }
 
@@ -73,7 +73,7 @@ fn header(names: &BTreeSet<String>) -> Vec<String> {
         "dropped",
         "events",
     ];
-    let figures = Place::ALL
+    let figures = ComparisonSpace::ALL
         .iter()
         .flat_map(|place| names.iter().map(move |name| format!("{}.{name}", place.key())));
     first.map(str::to_owned).into_iter().chain(figures).collect()
@@ -105,7 +105,7 @@ fn row(task: &TaskResult, names: &BTreeSet<String>) -> Vec<String> {
         task.funnel.iter().map(|d| d.count).sum::<u64>().to_string(),
         task.events.len().to_string(),
     ];
-    for place in Place::ALL {
+    for place in ComparisonSpace::ALL {
         let scores = place.scores(task).map(flat).unwrap_or_default();
         cells.extend(names.iter().map(|name| number(scores.get(name))));
     }

@@ -7,9 +7,9 @@ use tagalong_eval::{
     Gain, Interval, clustered_share, holm, is_significant, mean_interval, paired_gain,
 };
 
-use crate::figures::{Figure, Place};
+use crate::figures::{ComparisonSpace, Figure};
 use crate::model::{Benchmark, Outcome, TaskResult};
-use crate::view::View;
+use crate::view::OrderedBenchmark;
 
 /// Summary of a benchmark.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
@@ -91,9 +91,9 @@ impl Summary {
     /// tasks do not enter, which is why only pipelines with the greatest number of logs can be
     /// best.
     pub fn new(benchmark: &Benchmark) -> Self {
-        let view = View::new(benchmark);
+        let view = OrderedBenchmark::new(benchmark);
         let mut pipelines: Vec<_> = view.pipelines.iter().map(|p| pipeline(&view, p)).collect();
-        for place in Place::ALL {
+        for place in ComparisonSpace::ALL {
             Figure::at(place).for_each(|figure| mark_best(&mut pipelines, figure, place));
         }
         Self { pipelines, pairs: pairs(&view) }
@@ -107,10 +107,10 @@ impl Summary {
 
 /// Returns the figure of a pipeline on each of its logs, mean over seeds.
 pub fn per_log<'a>(
-    view: &View<'a>,
+    view: &OrderedBenchmark<'a>,
     pipeline: &str,
     figure: &Figure,
-    place: Place,
+    place: ComparisonSpace,
 ) -> BTreeMap<&'a str, f64> {
     let mut values: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for task in view.done(pipeline) {
@@ -125,10 +125,10 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-fn pipeline(view: &View<'_>, name: &str) -> PipelineSummary {
+fn pipeline(view: &OrderedBenchmark<'_>, name: &str) -> PipelineSummary {
     let count = |is: fn(&Outcome) -> bool| view.of(name).filter(|t| is(&t.outcome)).count() as u64;
     let mut figures = BTreeMap::new();
-    for place in Place::ALL {
+    for place in ComparisonSpace::ALL {
         for figure in Figure::at(place) {
             let values: Vec<f64> = per_log(view, name, figure, place).into_values().collect();
             if let Some(estimate) = estimate(&values, figure) {
@@ -161,7 +161,7 @@ fn estimate(values: &[f64], figure: &Figure) -> Option<Estimate> {
 }
 
 /// Returns the numbers of people found and of people present, for each log.
-fn people(view: &View<'_>, pipeline: &str) -> Vec<[u64; 2]> {
+fn people(view: &OrderedBenchmark<'_>, pipeline: &str) -> Vec<[u64; 2]> {
     let counts = |task: &TaskResult| {
         let scores = task.image.as_ref().or(task.metres.as_ref())?;
         Some([scores.truth_ids.saturating_sub(scores.never_confirmed), scores.truth_ids])
@@ -171,7 +171,7 @@ fn people(view: &View<'_>, pipeline: &str) -> Vec<[u64; 2]> {
     tasks.filter_map(counts).collect()
 }
 
-fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: Place) {
+fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: ComparisonSpace) {
     let key = figure.key(place);
     let with: Vec<Estimate> =
         pipelines.iter().filter_map(|p| p.figures.get(&key).copied()).collect();
@@ -187,11 +187,11 @@ fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: Place) {
     }
 }
 
-fn pairs(view: &View<'_>) -> Vec<PairSummary> {
+fn pairs(view: &OrderedBenchmark<'_>) -> Vec<PairSummary> {
     let mut pairs = Vec::new();
     for (index, a) in view.pipelines.iter().enumerate() {
         for b in &view.pipelines[index + 1..] {
-            for place in Place::ALL {
+            for place in ComparisonSpace::ALL {
                 let compared = Figure::at(place).filter(|f| f.compared);
                 pairs.extend(compared.filter_map(|f| pair(view, [a, b], f, place)));
             }
@@ -215,7 +215,12 @@ fn correct(pairs: &mut [PairSummary]) {
     }
 }
 
-fn pair(view: &View<'_>, [a, b]: [&str; 2], figure: &Figure, place: Place) -> Option<PairSummary> {
+fn pair(
+    view: &OrderedBenchmark<'_>,
+    [a, b]: [&str; 2],
+    figure: &Figure,
+    place: ComparisonSpace,
+) -> Option<PairSummary> {
     let of_a = per_log(view, a, figure, place);
     let of_b = per_log(view, b, figure, place);
     let common = of_a.iter().filter_map(|(log, &a)| Some((a, *of_b.get(log)?)));

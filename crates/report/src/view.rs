@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use crate::model::{Benchmark, Outcome, TaskResult};
 
 /// Benchmark in an order that does not depend on the way its tasks were run.
-pub struct View<'a> {
+pub struct OrderedBenchmark<'a> {
     pub version: &'a str,
     /// Tasks by pipeline, log, seed and hash.
     pub tasks: Vec<&'a TaskResult>,
@@ -11,7 +11,7 @@ pub struct View<'a> {
     pub logs: Vec<&'a str>,
 }
 
-impl<'a> View<'a> {
+impl<'a> OrderedBenchmark<'a> {
     pub fn new(benchmark: &'a Benchmark) -> Self {
         let mut tasks: Vec<&TaskResult> = benchmark.tasks.iter().collect();
         // With the hash last, the order never depends on that of the input.

@@ -42,14 +42,14 @@ impl Experiment {
     ///
     /// # Errors
     /// As the experiment.
-    pub fn find(&self, lab: &Lab) -> Result<Found, ReproduceError> {
+    pub fn find(&self, lab: &Lab) -> Result<ExperimentFindings, ReproduceError> {
         let mut findings = (self.run)(lab)?;
         let drawn = lab.drawn.take();
         if !drawn.is_empty() {
             let note = seeds_note(&drawn);
             findings.tables.iter_mut().for_each(|table| table.notes.push(note.clone()));
         }
-        Ok(Found { experiment: self.name, drawn, findings })
+        Ok(ExperimentFindings { experiment: self.name, drawn, findings })
     }
 }
 
@@ -68,7 +68,7 @@ fn seeds_note(drawn: &[Drawn]) -> String {
 
 /// An experiment with its findings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Found {
+pub struct ExperimentFindings {
     /// Name of the experiment.
     pub experiment: &'static str,
     /// Scenes that were simulated for it.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cpu_time::ThreadTime;
-use tagalong_core::{Frame, Images, Motion, Stamp};
+use tagalong_core::{EgoMotion, Frame, Images, Stamp};
 use tagalong_eval::formats::mot::{Rules, SequenceInfo, parse_info, parse_truth};
 use tagalong_eval::formats::{FormatError, Timeline};
 use tagalong_eval::{Comparison, Region, Report, Sequence, SetDistance, Similarity, Tally};
@@ -37,7 +37,7 @@ const SORT_ALL: f64 = 34.0;
 const COLUMNS: [&str; 5] = ["MOTA, %", "IDF1, %", "HOTA, %", "switches", "frames/s"];
 
 /// A sequence: the annotated people, and the given boxes.
-struct Given {
+struct GivenSequence {
     info: SequenceInfo,
     truth: String,
     detections: PathBuf,
@@ -57,7 +57,7 @@ pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let config = lab.contender(RECORDED)?;
     let sequences = sequences(lab)?;
     lab.progress.begin(sequences.len(), "sequences of MOT15");
-    let track = |given: &Given| {
+    let track = |given: &GivenSequence| {
         let tracked = given.track(lab, &config);
         lab.progress.step();
         tracked
@@ -108,19 +108,19 @@ fn row(name: &str, all: &[&Tracked]) -> Row {
 }
 
 /// Returns the available sequences of MOT15, in the order of their names.
-fn sequences(lab: &Lab<'_>) -> Result<Vec<Given>, ReproduceError> {
+fn sequences(lab: &Lab<'_>) -> Result<Vec<GivenSequence>, ReproduceError> {
     let Some(root) = lab.data.as_ref().map(|data| data.join("mot")) else { return Ok(Vec::new()) };
     let Ok(entries) = fs::read_dir(root.join("gt/MOT15-train")) else { return Ok(Vec::new()) };
     let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     folders.sort();
-    folders.iter().map(|folder| Given::read(&root, folder)).collect()
+    folders.iter().map(|folder| GivenSequence::read(&root, folder)).collect()
 }
 
 fn other(error: impl ToString) -> ReproduceError {
     ReproduceError::Other(error.to_string())
 }
 
-impl Given {
+impl GivenSequence {
     fn read(root: &Path, folder: &Path) -> Result<Self, ReproduceError> {
         let path = folder.join("seqinfo.ini");
         let info = parse_info(&read(&path)?, &path.display().to_string()).map_err(other)?;
@@ -168,7 +168,7 @@ impl Given {
         let (dt, length) = (1.0 / self.info.rate_hz, u64::from(self.info.length));
         (1..=length).map(move |index| {
             let stamp = Stamp::default().plus_seconds(index as f64 * dt);
-            Frame::new(index, stamp, Arc::clone(&camera), Motion::at_rest(dt), Images::default())
+            Frame::new(index, stamp, Arc::clone(&camera), EgoMotion::at_rest(dt), Images::default())
         })
     }
 

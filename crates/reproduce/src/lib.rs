@@ -23,6 +23,6 @@ mod stereo;
 mod table;
 mod variant;
 
-pub use findings::{Experiment, Findings, Found, Picture, SYSTEMS, System, system};
+pub use findings::{Experiment, ExperimentFindings, Findings, Picture, SYSTEMS, System, system};
 pub use lab::{Drawn, DrawnScenes, Lab, Progress, ReproduceError};
 pub use table::{Cell, Row, Table};

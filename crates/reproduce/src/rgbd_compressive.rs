@@ -113,7 +113,7 @@ const TIMED_SCENES: u64 = 3;
 const TIMED_S: &str = "4";
 
 /// Results of one pipeline on one scene or log.
-struct Done {
+struct PipelineResult {
     tally: Tally,
     work: Work,
 }
@@ -200,7 +200,7 @@ fn table(
     let trials = lab.trials(title, scenes, &contenders, done)?;
     let mut rows = vec![published("P2", published_hz, 6), published("RJ-MCMC, on a GPU", 4.0, 6)];
     for (at, (name, real)) in PIPELINES.iter().zip(&real).enumerate() {
-        let drawn: Vec<&Done> = trials.iter().map(|runs| &runs[at]).collect();
+        let drawn: Vec<&PipelineResult> = trials.iter().map(|runs| &runs[at]).collect();
         let mut cells = scores(real.iter().map(|log| &log.tally)).to_vec();
         cells.extend(scores(drawn.iter().map(|done| &done.tally)));
         cells.extend(Work::sum(drawn.iter().map(|done| done.work)).cells());
@@ -391,9 +391,9 @@ fn without_depth(contender: Contender) -> Contender {
     Contender { config: format!("{key}\n{}", contender.config), ..contender }
 }
 
-fn done(trial: Trial) -> Result<Vec<Done>, TrialError> {
+fn done(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
     let of = |run: &Run| {
-        Ok(Done {
+        Ok(PipelineResult {
             tally: JUDGE.judge(&trial, run)?.tally,
             work: Work::of(&run.reports, run.worked_ms),
         })

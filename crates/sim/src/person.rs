@@ -11,7 +11,7 @@ use crate::shape::{Form, Shape};
 
 /// What somebody wears and carries.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Look {
+pub struct Outfit {
     /// Face and hands.
     pub skin: Colour,
     /// Hair.
@@ -72,7 +72,7 @@ const CLOTHS: &[Colour] = &[
 const TROUSERS: &[Colour] =
     &[[0.03, 0.045, 0.1], [0.025; 3], [0.16; 3], [0.3, 0.24, 0.15], [0.08, 0.12, 0.2]];
 
-impl Look {
+impl Outfit {
     /// Somebody's clothes.
     pub fn random(random: &mut Random) -> Self {
         let (cloth, second) = (random.pick(CLOTHS), random.pick(CLOTHS));
@@ -111,14 +111,14 @@ pub struct Person {
     /// The size.
     pub build: Build,
     /// The appearance.
-    pub look: Look,
+    pub look: Outfit,
 }
 
 impl Person {
     /// Somebody of the population: the same number is the same person.
     pub fn subject(number: u64) -> Self {
         let mut random = Random::new(number, SUBJECT_STREAM);
-        Self { build: Build::random(&mut random), look: Look::random(&mut random) }
+        Self { build: Build::random(&mut random), look: Outfit::random(&mut random) }
     }
 
     /// The solids of the person, those of the upper body (head, trunk above the
@@ -149,7 +149,7 @@ struct Drawing<'a> {
     h: f64,
     /// Height times breadth: for widths.
     w: f64,
-    look: &'a Look,
+    look: &'a Outfit,
     shapes: Vec<Shape>,
 }
 

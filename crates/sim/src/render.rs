@@ -9,7 +9,7 @@ use tagalong_geometry::Camera;
 
 use crate::parallel::in_pieces;
 use crate::shape::Shape;
-use crate::sight::{Sight, before, between};
+use crate::sight::{SightedSolid, before, between};
 use crate::world::{Hit, World};
 
 /// Side of a tile, pixels.
@@ -23,11 +23,11 @@ pub fn draw(
     world_from_robot: &Isometry3<f64>,
     threads: usize,
 ) -> Image<Hit> {
-    View { world, camera, pose: &|_| *world_from_robot, lit: true }.draw(threads)
+    WorldCamera { world, camera, pose: &|_| *world_from_robot, lit: true }.draw(threads)
 }
 
 /// A camera in a world.
-pub struct View<'a> {
+pub struct WorldCamera<'a> {
     /// What there is to see.
     pub world: &'a World,
     /// The camera.
@@ -40,7 +40,7 @@ pub struct View<'a> {
     pub lit: bool,
 }
 
-impl View<'_> {
+impl WorldCamera<'_> {
     /// For each pixel what its ray meets.
     pub fn draw(&self, threads: usize) -> Image<Hit> {
         let mut image = Image::filled(self.camera.width, self.camera.height, Hit::NOTHING);
@@ -117,7 +117,7 @@ impl View<'_> {
         Visibility { fraction, bounds_px: bounds, occluder }
     }
 
-    fn look(&self, tile: &[&Sight], eye: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
+    fn look(&self, tile: &[&SightedSolid], eye: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
         first(tile, ray).map_or(Hit::NOTHING, |(t, sight)| {
             self.world.hit(t, sight.object, sight.shape, (eye, ray), self.lit)
         })
@@ -125,7 +125,10 @@ impl View<'_> {
 }
 
 /// The first solid that a ray of depth one meets, of solids that are sorted.
-fn first<'s, 'a>(sights: &[&'s Sight<'a>], ray: &Vector3<f64>) -> Option<(f64, &'s Sight<'a>)> {
+fn first<'s, 'a>(
+    sights: &[&'s SightedSolid<'a>],
+    ray: &Vector3<f64>,
+) -> Option<(f64, &'s SightedSolid<'a>)> {
     let mut best = None;
     let mut best_t = f64::INFINITY;
     for sight in sights {
@@ -210,7 +213,8 @@ mod tests {
         let balls = [-0.4, 0.5].map(|y| shape(0, [1.2, y, 0.2], 0.3));
         let world = World::new(vec![Object::new(balls.to_vec(), None, true)], vec![], 100.0);
         let pose = |part: f64| Isometry3::rotation(Vector3::z() * 0.2 * part);
-        let rolling = View { world: &world, camera: &camera, pose: &pose, lit: true }.draw(2);
+        let rolling =
+            WorldCamera { world: &world, camera: &camera, pose: &pose, lit: true }.draw(2);
         for (rows, part) in [(0..16, 0.2), (16..32, 0.6), (32..40, 0.9)] {
             let at_once = draw(&world, &camera, &pose(part), 1);
             rows.for_each(|row| assert_eq!(rolling.row(row), at_once.row(row), "{row}"));

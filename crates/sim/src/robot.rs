@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry2, Point2, Vector2};
-use tagalong_core::{Motion, WheelSpeeds, Wheels};
+use tagalong_core::{DiffDrive, EgoMotion, WheelSpeeds};
 
 use crate::random::Random;
 use crate::scene::RobotSettings;
@@ -200,7 +200,7 @@ impl Robot {
 
 /// The motion of wheels at these speeds.
 fn moved([left, right]: [f64; 2], half_separation_m: f64, dt: f64) -> Isometry2<f64> {
-    Motion::from_wheels(left, right, &Wheels { half_separation_m, slip: 0.0 }, dt).isometry()
+    EgoMotion::from_wheels(left, right, &DiffDrive { half_separation_m, slip: 0.0 }, dt).isometry()
 }
 
 #[cfg(test)]

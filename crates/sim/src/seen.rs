@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// A solid as it is seen from one point.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct SolidView {
     /// From the world's axes to those in which the solid is simple: its own,
     /// divided by the half axes where there are any.
     turn: Matrix3<f64>,
@@ -44,7 +44,7 @@ struct Capsule {
     tangent2: [f64; 2],
 }
 
-impl Seen {
+impl SolidView {
     /// An ellipsoid in its own axes, which `turn` leads to.
     pub fn ellipsoid(turn: &Matrix3<f64>, eye: &Vector3<f64>, half: &Vector3<f64>) -> Self {
         let start = eye.component_div(half);

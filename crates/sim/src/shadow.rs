@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::seen::Seen;
+use crate::seen::SolidView;
 use crate::shape::Shape;
 use crate::sight::{before, between};
 
@@ -15,7 +15,7 @@ const CELLS: usize = 16;
 pub struct Shadows {
     lamp: Point3<f64>,
     /// Six faces of rows of cells.
-    cells: Vec<Vec<Seen>>,
+    cells: Vec<Vec<SolidView>>,
 }
 
 impl Shadows {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 
 use crate::material::Material;
-use crate::seen::Seen;
+use crate::seen::SolidView;
 
 /// The geometry of a solid in its own axes, origin at its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,14 +117,14 @@ impl Shape {
     }
 
     /// What of the meeting with a ray depends on nothing but the eye.
-    pub fn seen_from(&self, eye: &Point3<f64>) -> Seen {
+    pub fn seen_from(&self, eye: &Point3<f64>) -> SolidView {
         let turn = self.world_from_own.matrix().transpose();
         let start = self.own(eye);
         match self.form {
-            Form::Ellipsoid(half) => Seen::ellipsoid(&turn, &start, &half),
-            Form::Block(half) => Seen::block(&turn, &start, &half),
+            Form::Ellipsoid(half) => SolidView::ellipsoid(&turn, &start, &half),
+            Form::Block(half) => SolidView::block(&turn, &start, &half),
             Form::Capsule { length, first, second } => {
-                Seen::capsule(&turn, &start, length, first, second)
+                SolidView::capsule(&turn, &start, length, first, second)
             }
         }
     }

@@ -3,27 +3,27 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::seen::Seen;
+use crate::seen::SolidView;
 use crate::shape::Shape;
 
 /// Room for rounding, m.
 const SLACK_M: f64 = 1e-6;
 
 /// A solid before an eye.
-pub struct Sight<'a> {
+pub struct SightedSolid<'a> {
     /// The object that it belongs to.
     pub object: usize,
     /// The solid.
     pub shape: &'a Shape,
     /// As rays meet it.
-    pub seen: Seen,
+    pub seen: SolidView,
     /// Nothing of it is closer to the eye along the optical axis, m.
     pub nearest: f64,
     /// From the eye to its origin.
     way: Vector3<f64>,
 }
 
-impl Sight<'_> {
+impl SightedSolid<'_> {
     /// True if a part of it is on the side of a plane through the eye that the
     /// unit vector points to.
     fn reaches(&self, normal: &Vector3<f64>) -> bool {
@@ -37,13 +37,13 @@ pub fn before<'a>(
     solids: impl Iterator<Item = (usize, &'a Shape)>,
     eye: &Point3<f64>,
     forward: &Vector3<f64>,
-) -> Vec<Sight<'a>> {
+) -> Vec<SightedSolid<'a>> {
     let sight = |(object, shape): (usize, &'a Shape)| {
         let way = shape.origin - eye;
         let nearest = forward.dot(&way) - shape.extent(&-forward);
-        Sight { object, shape, seen: shape.seen_from(eye), nearest, way }
+        SightedSolid { object, shape, seen: shape.seen_from(eye), nearest, way }
     };
-    let ahead = |sight: &Sight| sight.reaches(forward);
+    let ahead = |sight: &SightedSolid| sight.reaches(forward);
     let mut sights: Vec<_> = solids.map(sight).filter(ahead).collect();
     sights.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
     sights
@@ -52,10 +52,10 @@ pub fn before<'a>(
 /// Those that reach between two planes through the eye. Each is given by two
 /// rays in it, and the other's rays are on its inner side.
 pub fn between<'s, 'a>(
-    sights: impl IntoIterator<Item = &'s Sight<'a>>,
+    sights: impl IntoIterator<Item = &'s SightedSolid<'a>>,
     one: [Vector3<f64>; 2],
     other: [Vector3<f64>; 2],
-) -> Vec<&'s Sight<'a>>
+) -> Vec<&'s SightedSolid<'a>>
 where
     'a: 's,
 {

@@ -16,7 +16,7 @@ use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
 use crate::person::Person;
 use crate::random::Random;
-use crate::render::{View, Visibility};
+use crate::render::{Visibility, WorldCamera};
 use crate::robot::{Encoder, Robot};
 use crate::room;
 use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Posture, Scene};
@@ -420,7 +420,8 @@ impl Simulation {
         let (world, _) = self.world();
         let pose = |part| self.world_from_robot(part);
         let camera = &self.true_camera;
-        let seen = View { world: &world, camera, pose: &pose, lit: false }.draw(self.threads);
+        let seen =
+            WorldCamera { world: &world, camera, pose: &pose, lit: false }.draw(self.threads);
         (self.robot, self.walkers) = (robot, walkers);
         Some(seen)
     }
@@ -459,7 +460,8 @@ impl Simulation {
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
         camera.robot_from_camera *= Isometry3::from_parts(aside, tilt);
         let pose = |part| self.world_from_robot(part);
-        let right = View { world, camera: &camera, pose: &pose, lit: true }.draw(self.threads);
+        let right =
+            WorldCamera { world, camera: &camera, pose: &pose, lit: true }.draw(self.threads);
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
         let image = self.exposures[1].grey(&right, &moments[1]);
@@ -474,7 +476,7 @@ impl Simulation {
         pose: &Isometry3<f64>,
     ) -> (Image<Hit>, Vec<Truth>) {
         let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
-        let view = View { world, camera, pose: &|part| self.world_from_robot(part), lit };
+        let view = WorldCamera { world, camera, pose: &|part| self.world_from_robot(part), lit };
         let seen = view.draw(self.threads);
         let truth =
             self.truth(world, uppers, pose, |of, skeleton| sight(&view, &seen, of, skeleton));
@@ -529,7 +531,7 @@ impl Simulation {
 /// How somebody's upper body is seen: the region where it must be, and what there
 /// is to see of it.
 fn sight(
-    view: &View<'_>,
+    view: &WorldCamera<'_>,
     seen: &Image<Hit>,
     of: (u16, &[Shape]),
     skeleton: &Skeleton,

@@ -4,7 +4,7 @@ use tagalong_core::GreyImage;
 
 use crate::cost::Features;
 use crate::paths::{Excess, Penalties};
-use crate::winner::{Found, FromRight, Winners};
+use crate::winner::{FromRight, RowWinners, Winners};
 use crate::{Dropped, Method, StereoSettings, cost, paths, window};
 
 /// Number of rows above a strip from which the paths into it start.
@@ -116,7 +116,7 @@ impl Strip {
         let confidences = &mut output.confidences[place];
         let settings = pair.settings;
         self.winners.find(self.sums.as_chunks::<D>().0);
-        let mut found = Found { disparities, confidences };
+        let mut found = RowWinners { disparities, confidences };
         let refused = self.winners.judge(settings.uniqueness as f32, &mut found);
         let (tolerance, buffers) = (settings.left_right, &mut self.from_right);
         let disagree = self.winners.look_from_right(tolerance, buffers, found.disparities);

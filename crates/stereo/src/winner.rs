@@ -15,7 +15,7 @@ pub struct Winners {
 }
 
 /// Disparities and confidences of a row.
-pub struct Found<'a> {
+pub struct RowWinners<'a> {
     /// Disparities to a fraction of a pixel, px; NaN = unknown.
     pub disparities: &'a mut [f32],
     /// Distance of the second best cost from the best one, as a fraction of the second, 0 to 255.
@@ -50,7 +50,7 @@ impl Winners {
 
     /// Writes the disparities that lie within the right image and have a second best cost that is
     /// higher by at least the fraction `uniqueness` of it.
-    pub fn judge(&self, uniqueness: f32, found: &mut Found<'_>) -> Refused {
+    pub fn judge(&self, uniqueness: f32, found: &mut RowWinners<'_>) -> Refused {
         judge(self, uniqueness, found)
     }
 
@@ -188,7 +188,7 @@ fn rival<const D: usize>(sums: &[u8; D], at: u8) -> u8 {
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn judge(winners: &Winners, uniqueness: f32, found: &mut Found<'_>) -> Refused {
+fn judge(winners: &Winners, uniqueness: f32, found: &mut RowWinners<'_>) -> Refused {
     let width = found.disparities.len();
     let Winners { disparity, cost, below, above, second } = winners;
     let (disparity, cost, second) = (&disparity[..width], &cost[..width], &second[..width]);

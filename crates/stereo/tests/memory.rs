@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{Frame, Funnel, GreyImage, Images, Motion, RightImage, Stamp};
+use tagalong_core::{EgoMotion, Frame, Funnel, GreyImage, Images, RightImage, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_stereo::{Method, StereoDepth, StereoSettings};
 
@@ -33,7 +33,7 @@ fn frame(index: u64) -> Frame {
         right: Some(Arc::new(RightImage { image: right, baseline_m: 0.12 })),
         ..Images::default()
     };
-    Frame::new(index, Stamp::default(), camera, Motion::at_rest(0.1), images)
+    Frame::new(index, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use tagalong_core::{Frame, Funnel, Motion, Stamp};
+use tagalong_core::{EgoMotion, Frame, Funnel, Stamp};
 
 use crate::{ClockSettings, Outcome};
 
@@ -14,7 +14,7 @@ pub(crate) enum Tick {
     /// The frame is not processed.
     Skip(Outcome),
     /// The frame is processed; without a motion, tracks cannot be predicted to it.
-    Go(Outcome, Option<Motion>),
+    Go(Outcome, Option<EgoMotion>),
 }
 
 /// Decides by its stamp if a frame is processed, and over which motion the tracks are predicted to
@@ -23,7 +23,7 @@ pub(crate) struct Clock {
     settings: ClockSettings,
     last: Option<Stamp>,
     /// Motion of the frames that were skipped.
-    pending: Option<Motion>,
+    pending: Option<EgoMotion>,
     periods: VecDeque<f64>,
 }
 
@@ -46,7 +46,7 @@ impl Clock {
         Tick::Skip(outcome)
     }
 
-    fn go(&mut self, stamp: Stamp, outcome: Outcome, motion: Motion) -> Tick {
+    fn go(&mut self, stamp: Stamp, outcome: Outcome, motion: EgoMotion) -> Tick {
         let dt = self.last.map(|last| stamp.seconds_since(last)).filter(|dt| *dt > 0.0);
         self.last = Some(stamp);
         self.pending = None;
@@ -59,17 +59,17 @@ impl Clock {
         // A jump of the clock leaves the time step unknown, and with it the prediction.
         match outcome {
             Outcome::ResetBackward { .. } | Outcome::ResetForward { .. } => Tick::Go(outcome, None),
-            _ => Tick::Go(outcome, dt.map(|dt| Motion { dt, ..motion })),
+            _ => Tick::Go(outcome, dt.map(|dt| EgoMotion { dt, ..motion })),
         }
     }
 
     /// Returns the motion since the last processed frame.
-    fn whole_motion(&self, frame: &Frame, funnel: &mut Funnel) -> Motion {
+    fn whole_motion(&self, frame: &Frame, funnel: &mut Funnel) -> EgoMotion {
         let mut motion = frame.motion;
         // One number that is not finite would spread to the states of all tracks.
         if !is_finite(&motion) {
             funnel.drop_many("motion not finite", 1);
-            motion = Motion::at_rest(0.0);
+            motion = EgoMotion::at_rest(0.0);
         }
         self.pending.map_or(motion, |pending| pending.then(&motion))
     }
@@ -106,7 +106,7 @@ impl Clock {
     }
 }
 
-fn is_finite(motion: &Motion) -> bool {
+fn is_finite(motion: &EgoMotion) -> bool {
     [motion.dt, motion.forward, motion.left, motion.turn].iter().all(|v| v.is_finite())
         && motion.covariance.iter().all(|v| v.is_finite())
 }

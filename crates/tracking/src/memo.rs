@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::sync::{Mutex, PoisonError};
 
-use tagalong_core::{Derived, Detection, Frame, Funnel, Result, Search};
+use tagalong_core::{Derived, Detection, Frame, Funnel, Query, Result};
 
 /// Results by query. They live as long as their frame.
 #[derive(Default)]
@@ -33,14 +33,14 @@ pub struct Identities {
 pub(crate) fn found(
     identity: &str,
     frame: &Frame,
-    search: &Search<'_>,
+    search: &Query<'_>,
     funnel: &mut Funnel,
     find: impl FnOnce(&mut Funnel) -> Result<Vec<Detection>>,
 ) -> Result<Vec<Detection>> {
     let memo = frame.derived::<Memo>()?;
     let question = match search {
-        Search::Everywhere { occupied } => key(identity, occupied),
-        Search::Near(track) => key(identity, track),
+        Query::Discover { occupied } => key(identity, occupied),
+        Query::Track(track) => key(identity, track),
     };
     if let Some((found, dropped)) = lock(&memo.found).get(&question) {
         funnel.merge(dropped);

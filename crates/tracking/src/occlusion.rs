@@ -14,7 +14,7 @@ const SAMPLES: usize = 16;
 const RANGE_UNTOLD_M: f64 = 2.0;
 
 /// A person that may occlude others, as detected or as predicted.
-pub(crate) struct Cover {
+pub(crate) struct Occluder {
     region: Rect,
     range_m: f64,
     sigma_m: f64,
@@ -31,7 +31,7 @@ pub(crate) enum Visibility {
     Outside,
 }
 
-impl Cover {
+impl Occluder {
     /// Creates the occluder of a detection.
     pub(crate) fn of(seen: &Detection, camera: &Camera) -> Self {
         Self::new(seen.region, &seen.position, &seen.covariance, camera)
@@ -75,7 +75,7 @@ fn ray(position: &Point3<f64>, camera: &Camera) -> Vector3<f64> {
 pub(crate) fn visibility(
     region: &Rect,
     position: &Point3<f64>,
-    covers: &[Cover],
+    occluders: &[Occluder],
     camera: &Camera,
     settings: &OcclusionSettings,
 ) -> Visibility {
@@ -84,7 +84,7 @@ pub(crate) fn visibility(
         // hidden.
         return Visibility::Visible;
     }
-    let Shown { all, inside, visible } = shown(region, position, covers, camera, settings);
+    let Shown { all, inside, visible } = shown(region, position, occluders, camera, settings);
     let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
     match (all > 0 && enough(inside), enough(visible)) {
         (false, _) => Visibility::Outside,
@@ -98,18 +98,18 @@ pub(crate) fn visibility(
 pub(crate) fn part_shown(
     region: &Rect,
     position: &Point3<f64>,
-    covers: &[Cover],
+    occluders: &[Occluder],
     camera: &Camera,
     settings: &OcclusionSettings,
 ) -> f64 {
-    let Shown { inside, visible, .. } = shown(region, position, covers, camera, settings);
+    let Shown { inside, visible, .. } = shown(region, position, occluders, camera, settings);
     if inside > 0 { f64::from(visible) / f64::from(inside) } else { 1.0 }
 }
 
 /// Returns the covariance, in the robot frame, m², of the lateral error of a half-hidden person:
-/// the detection covers the visible half, and its middle is off by up to half the width of the
+/// the detection occluders the visible half, and its middle is off by up to half the width of the
 /// hidden part. Without it, a filter takes on the velocity of the person that passes in front.
-pub(crate) fn aside(
+pub(crate) fn lateral_covariance(
     part_shown: f64,
     position: &Point3<f64>,
     camera: &Camera,
@@ -134,12 +134,12 @@ struct Shown {
 fn shown(
     region: &Rect,
     position: &Point3<f64>,
-    covers: &[Cover],
+    occluders: &[Occluder],
     camera: &Camera,
     settings: &OcclusionSettings,
 ) -> Shown {
     let range = range_m(position, camera);
-    let in_front: Vec<&Cover> = covers
+    let in_front: Vec<&Occluder> = occluders
         .iter()
         .filter(|c| range - c.range_m > settings.min_gap_m.max(settings.min_gap_sigmas * c.sigma_m))
         .collect();
@@ -151,7 +151,7 @@ fn shown(
         let near = |x: f64| Point2::new(camera.column_near(point.x, x), point.y);
         if image.contains(near(image.centre().x)) {
             inside += 1;
-            let hides = |c: &&Cover| is_on_body(&c.region, near(c.region.centre().x));
+            let hides = |c: &&Occluder| is_on_body(&c.region, near(c.region.centre().x));
             visible += u32::from(!in_front.iter().any(hides));
         }
     }
@@ -186,14 +186,18 @@ fn is_on_body(region: &Rect, point: Point2<f64>) -> bool {
 }
 
 /// Returns the occluder of a person at the estimated position.
-pub(crate) fn cover(estimate: &Estimate, frame: &Frame) -> Cover {
+pub(crate) fn occluder_of_estimate(estimate: &Estimate, frame: &Frame) -> Occluder {
     let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-    Cover::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
+    Occluder::new(estimate.region, &estimate.person.position, &covariance, &frame.camera)
 }
 
 /// Returns the occluder of a detected person with a known estimate.
-pub(crate) fn cover_seen(seen: &Detection, expected: &Estimate, frame: &Frame) -> Cover {
-    Cover::of(seen, &frame.camera).or(cover(expected, frame))
+pub(crate) fn occluder_of_detection(
+    seen: &Detection,
+    expected: &Estimate,
+    frame: &Frame,
+) -> Occluder {
+    Occluder::of(seen, &frame.camera).or(occluder_of_estimate(expected, frame))
 }
 
 #[cfg(test)]
@@ -211,7 +215,7 @@ mod tests {
     fn behind(near: Point3<f64>, sigma_m: f64, far: Point3<f64>) -> Visibility {
         let camera = camera();
         let covariance = Matrix3::identity() * (sigma_m * sigma_m);
-        let cover = Cover::new(camera.upper_body(&near), &near, &covariance, &camera);
+        let cover = Occluder::new(camera.upper_body(&near), &near, &covariance, &camera);
         let region = camera.upper_body(&far);
         visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
     }
@@ -229,7 +233,7 @@ mod tests {
         let camera = camera();
         let cover = |sigma_m: f64| {
             let covariance = Matrix3::identity() * (sigma_m * sigma_m);
-            Cover::new(camera.upper_body(&near), &near, &covariance, &camera)
+            Occluder::new(camera.upper_body(&near), &near, &covariance, &camera)
         };
         let seen = |cover| {
             let region = camera.upper_body(&far);
@@ -259,7 +263,7 @@ mod tests {
             robot_from_camera: ConicalMirror::upright(1.3),
         };
         let seen = |near: Point3<f64>, far: Point3<f64>| {
-            let cover = Cover::new(camera.upper_body(&near), &near, &Matrix3::zeros(), &camera);
+            let cover = Occluder::new(camera.upper_body(&near), &near, &Matrix3::zeros(), &camera);
             let region = camera.upper_body(&far);
             visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
         };
@@ -277,12 +281,12 @@ mod tests {
     #[test]
     fn who_is_half_hidden_may_stand_aside_and_not_nearer() {
         let settings = OcclusionSettings { body_width_m: 0.5, ..OcclusionSettings::default() };
-        let of = |part| aside(part, &Point3::new(3.0, 0.0, 1.6), &camera(), &settings);
+        let of = |part| lateral_covariance(part, &Point3::new(3.0, 0.0, 1.6), &camera(), &settings);
         assert_eq!(of(1.0), Matrix3::zeros());
         let off = of(0.4);
         assert!((off[(1, 1)].sqrt() - 0.15).abs() < 1e-12, "{off}");
         assert_eq!((off[(0, 0)], off[(2, 2)]), (0.0, 0.0));
-        let left = aside(0.4, &Point3::new(0.0, 3.0, 1.6), &camera(), &settings);
+        let left = lateral_covariance(0.4, &Point3::new(0.0, 3.0, 1.6), &camera(), &settings);
         assert!((left[(0, 0)].sqrt() - 0.15).abs() < 1e-12 && left[(1, 1)] == 0.0, "{left}");
     }
 
@@ -317,7 +321,7 @@ mod tests {
         let region = camera.upper_body(&far);
         let near = Point3::new(2.0, 0.0, 1.6);
         let screen = Rect::new(from_column, region.y - 900.0, 900.0, 900.0);
-        let cover = || Cover::new(screen, &near, &Matrix3::zeros(), &camera);
+        let cover = || Occluder::new(screen, &near, &Matrix3::zeros(), &camera);
         let settings = OcclusionSettings::default();
         (
             part_shown(&region, &far, &[cover()], &camera, &settings),

@@ -1,6 +1,6 @@
 use crate::{Guarded, StepError};
 use nalgebra::Point2;
-use tagalong_core::{Frame, Funnel, Motion};
+use tagalong_core::{EgoMotion, Frame, Funnel};
 
 use crate::stage::StageLog;
 
@@ -11,7 +11,7 @@ pub struct Preprocessed {
     pub frame: Option<Frame>,
     /// A better estimate of the robot's motion since the last processed frame; `None` if there
     /// is none.
-    pub motion: Option<Motion>,
+    pub motion: Option<EgoMotion>,
 }
 
 /// Completes frames before detection: depth from a stereo pair, or egomotion from the images.
@@ -25,7 +25,7 @@ pub trait Preprocessor: Send {
     fn process(
         &mut self,
         frame: &Frame,
-        motion: Option<Motion>,
+        motion: Option<EgoMotion>,
         people: &[Point2<f64>],
         funnel: &mut Funnel,
     ) -> tagalong_core::Result<Preprocessed>;
@@ -35,10 +35,10 @@ pub trait Preprocessor: Send {
 pub(crate) fn preprocess(
     preprocessors: &mut [Guarded<dyn Preprocessor>],
     frame: &Frame,
-    mut motion: Option<Motion>,
+    mut motion: Option<EgoMotion>,
     people: &[Point2<f64>],
     log: &mut StageLog,
-) -> Result<(Option<Frame>, Option<Motion>), StepError> {
+) -> Result<(Option<Frame>, Option<EgoMotion>), StepError> {
     let mut completed: Option<Frame> = None;
     for preprocessor in preprocessors {
         let input = completed.as_ref().unwrap_or(frame);

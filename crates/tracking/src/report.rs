@@ -1,4 +1,4 @@
-use tagalong_core::{Detection, Funnel, Motion, Sketch, Stamp, Track, TrackId};
+use tagalong_core::{Detection, EgoMotion, Funnel, Sketch, Stamp, Track, TrackId};
 
 use crate::Weighing;
 
@@ -67,7 +67,7 @@ pub struct TrackingReport {
     pub outcome: Outcome,
     /// The robot's motion since the last processed frame, as the preprocessors estimate it; at rest
     /// if a jump of the clock leaves it unknown.
-    pub motion: Motion,
+    pub motion: EgoMotion,
     /// All detections with their fates.
     pub candidates: Vec<Candidate>,
     /// Number of dropped candidates, by test.
@@ -96,7 +96,7 @@ impl TrackingReport {
             index,
             stamp,
             outcome: Outcome::Tracked,
-            motion: Motion::at_rest(0.0),
+            motion: EgoMotion::at_rest(0.0),
             candidates: Vec::new(),
             funnel: Funnel::default(),
             tracks: Vec::new(),

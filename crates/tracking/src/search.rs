@@ -1,7 +1,7 @@
 //! Detection in a frame, and verification of the detections.
 
 use crate::{Guarded, StepError};
-use tagalong_core::{Detector, Frame, Funnel, Likelihood, Search, Track, Verifier};
+use tagalong_core::{Detector, Frame, Funnel, Likelihood, Query, Track, Verifier};
 
 use crate::detections::PendingDetection;
 use crate::memo::{self, Identities};
@@ -67,7 +67,7 @@ impl SearchStage {
         let mut best: Option<PendingDetection> = None;
         let mut dropped = Vec::new();
         for &index in detectors {
-            for found in self.detect(frame, index, &Search::Near(track), funnel)? {
+            for found in self.detect(frame, index, &Query::Track(track), funnel)? {
                 let is_better =
                     |best: &PendingDetection| found.detection.score > best.detection.score;
                 let test = match failed_test(&found)? {
@@ -89,7 +89,7 @@ impl SearchStage {
         &mut self,
         frame: &Frame,
         index: usize,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<PendingDetection>, StepError> {
         let slot = &mut self.detectors[index];
@@ -100,7 +100,7 @@ impl SearchStage {
             }),
             None => detector.detect(frame, search, funnel),
         })?;
-        let discovered = matches!(search, Search::Everywhere { .. });
+        let discovered = matches!(search, Query::Discover { .. });
         let mut passed = Vec::new();
         for detection in found {
             if !detection.is_sane() {
@@ -129,9 +129,9 @@ impl SearchStage {
             let candidate = &pending.detection;
             sum += verifier.call(frame.index, |verifier| match &self.shared {
                 Some(shared) => memo::margin(&shared.verifiers[at], frame, candidate, || {
-                    verifier.margin(frame, candidate)
+                    verifier.log_odds(frame, candidate)
                 }),
-                None => verifier.margin(frame, candidate),
+                None => verifier.log_odds(frame, candidate),
             })?;
         }
         if !sum.is_finite() {

@@ -107,7 +107,7 @@ pub enum Role {
     /// It finds people that are not tracked yet.
     Discover,
     /// It finds a tracked person again.
-    Follow,
+    Track,
     /// Its likelihood weighs hypothetical scenes against the image.
     Weigh,
 }

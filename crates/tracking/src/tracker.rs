@@ -3,16 +3,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::{Guarded, StepError};
 use nalgebra::{Point2, Point3};
 use tagalong_core::{
-    Associations, Associator, Detection, Estimate, Evidence, Filter, Frame, Gate, Initiation,
-    Likelihood, Motion, Observation, ObservedTrack, Search, Support, Track, TrackId, TrackManager,
-    Unassociated, Verifier,
+    Associations, Associator, Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Gate,
+    Initiation, Likelihood, Observation, ObservedTrack, Query, Track, TrackId, TrackManager,
+    Unassociated, Update, Verifier,
 };
 
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
 use crate::memo::Identities;
-use crate::occlusion::{Cover, Visibility, aside, cover, cover_seen, part_shown, visibility};
+use crate::occlusion::{
+    Occluder, Visibility, lateral_covariance, occluder_of_detection, occluder_of_estimate,
+    part_shown, visibility,
+};
 use crate::preprocess::preprocess;
 use crate::search::SearchStage;
 use crate::stage::StageLog;
@@ -70,7 +73,7 @@ pub struct Tracked {
 
 /// State of the tracks after the update of one frame.
 struct Posterior {
-    supports: BTreeMap<TrackId, Support>,
+    supports: BTreeMap<TrackId, Update>,
     estimates: BTreeMap<TrackId, Estimate>,
 }
 
@@ -160,9 +163,9 @@ impl Tracker {
     fn preprocess(
         &mut self,
         frame: &Frame,
-        motion: Option<Motion>,
+        motion: Option<EgoMotion>,
         log: &mut StageLog,
-    ) -> Result<(Option<Frame>, Option<Motion>), StepError> {
+    ) -> Result<(Option<Frame>, Option<EgoMotion>), StepError> {
         let mut people: Vec<(TrackId, Point2<f64>)> =
             self.last.iter().map(|t| (t.id, t.estimate.person.position.xy())).collect();
         // The tracks are sorted by range, but preprocessors receive them by number.
@@ -194,7 +197,7 @@ impl Tracker {
     fn predict(
         &mut self,
         frame: &Frame,
-        motion: Option<Motion>,
+        motion: Option<EgoMotion>,
         log: &mut StageLog,
     ) -> Result<Vec<Track>, StepError> {
         if let Some(motion) = motion {
@@ -207,7 +210,7 @@ impl Tracker {
         Ok(self.table.tracks(estimates, &frame.camera))
     }
 
-    fn gate(&self, motion: Option<Motion>) -> Gate {
+    fn gate(&self, motion: Option<EgoMotion>) -> Gate {
         let start_log_odds = self.manager.plugin().start_log_odds();
         Gate { dt_s: motion.map_or(0.0, |motion| motion.dt), start_log_odds }
     }
@@ -223,17 +226,17 @@ impl Tracker {
         log: &mut StageLog,
     ) -> Result<DetectionSet, StepError> {
         let mut detections = DetectionSet::default();
-        let detectors = self.search.with_role(due, Role::Follow);
+        let detectors = self.search.with_role(due, Role::Track);
         if detectors.is_empty() {
             return Ok(detections);
         }
-        let mut covers: Vec<Cover> = Vec::new();
+        let mut occluders: Vec<Occluder> = Vec::new();
         let associator = &mut self.associator;
         // From near to far, so that an occluder is found before the tracks behind it.
         for track in predicted {
             let settings = &self.settings.occlusion;
             let Estimate { region, person, .. } = &track.estimate;
-            let seen = visibility(region, &person.position, &covers, &frame.camera, settings);
+            let seen = visibility(region, &person.position, &occluders, &frame.camera, settings);
             if seen != Visibility::Visible {
                 continue;
             }
@@ -251,7 +254,7 @@ impl Tracker {
                 self.search.find_track(frame, &detectors, track, failed_test, funnel)?;
             detections.add(dropped);
             let Some(found) = found else { continue };
-            covers.push(cover_seen(&found.detection, &track.estimate, frame));
+            occluders.push(occluder_of_detection(&found.detection, &track.estimate, frame));
             detections.add([found]);
         }
         Ok(detections)
@@ -267,7 +270,7 @@ impl Tracker {
     ) -> Result<(), StepError> {
         let occupied = detections.undecided_detections();
         for index in self.search.with_role(due, Role::Discover) {
-            let search = Search::Everywhere { occupied: &occupied };
+            let search = Query::Discover { occupied: &occupied };
             detections.add(self.search.detect(frame, index, &search, &mut log.funnel)?);
         }
         detections.limit(self.settings.merge.max_detections);
@@ -304,17 +307,18 @@ impl Tracker {
             return;
         }
         let camera = &frame.camera;
-        let mut covers: Vec<Cover> = Vec::new();
+        let mut occluders: Vec<Occluder> = Vec::new();
         for track in predicted {
             let Estimate { region, person, .. } = &track.estimate;
-            let part = part_shown(region, &person.position, &covers, camera, settings);
+            let part = part_shown(region, &person.position, &occluders, camera, settings);
             let inflate = |found: &mut Detection| {
-                found.covariance += aside(part, &found.position, camera, settings);
+                found.covariance += lateral_covariance(part, &found.position, camera, settings);
             };
             match detections.change_of_track(track.id, inflate) {
-                Some(found) => covers.push(cover_seen(found, &track.estimate, frame)),
+                Some(found) => occluders.push(occluder_of_detection(found, &track.estimate, frame)),
                 // A confirmed track still hides the people behind it when it is missed.
-                None => covers.extend(track.confirmed.then(|| cover(&track.estimate, frame))),
+                None => occluders
+                    .extend(track.confirmed.then(|| occluder_of_estimate(&track.estimate, frame))),
             }
         }
     }
@@ -480,7 +484,8 @@ impl Tracker {
         let Posterior { supports, estimates } = posterior;
         let supported = supports.keys().chain(started).filter_map(|id| estimates.get(id));
         // Only people found in this frame hide others: a coasting track may be at another place.
-        let covers: Vec<Cover> = supported.map(|estimate| cover(estimate, frame)).collect();
+        let occluders: Vec<Occluder> =
+            supported.map(|estimate| occluder_of_estimate(estimate, frame)).collect();
         for (id, estimate) in estimates.iter().filter(|(id, _)| !started.contains(id)) {
             let found = detections.of_track(*id);
             let (observation, by) = match (supports.contains_key(id), found) {
@@ -490,7 +495,7 @@ impl Tracker {
                     (Observation::Detected { log_odds }, Some(found.detector))
                 }
                 (true, None) => (Observation::Updated, None),
-                _ => (self.unsupported(frame, due, *id, estimate, &covers), None),
+                _ => (self.unsupported(frame, due, *id, estimate, &occluders), None),
             };
             self.table.observe(*id, observation, by);
         }
@@ -503,11 +508,11 @@ impl Tracker {
         due: &[usize],
         id: TrackId,
         estimate: &Estimate,
-        covers: &[Cover],
+        occluders: &[Occluder],
     ) -> Observation {
         let Estimate { region, person, .. } = estimate;
         let settings = &self.settings.occlusion;
-        match visibility(region, &person.position, covers, &frame.camera, settings) {
+        match visibility(region, &person.position, occluders, &frame.camera, settings) {
             Visibility::Hidden => Observation::Occluded,
             Visibility::Outside => Observation::OutOfView,
             Visibility::Visible if self.was_searched(due, id) => Observation::Missed,

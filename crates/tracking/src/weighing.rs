@@ -67,14 +67,14 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::Point3;
-    use tagalong_core::{Images, Motion, Stamp};
+    use tagalong_core::{EgoMotion, Images, Stamp};
     use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     fn frame() -> Frame {
         let lens =
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
-        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
     }
 
     fn standing() -> Person {

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
-use tagalong_core::{DepthImage, Frame, Images, Motion, Stamp, WheelSpeeds};
+use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp, WheelSpeeds};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapping;
@@ -145,13 +145,13 @@ impl Draw {
     }
 
     /// From the frame before; none to a frame that is older than that.
-    fn motion(&mut self, stamp: Stamp, here: Isometry2<f64>) -> Motion {
+    fn motion(&mut self, stamp: Stamp, here: Isometry2<f64>) -> EgoMotion {
         let before = self.previous.filter(|(then, _)| *then < stamp);
         if before.is_some() || self.previous.is_none() {
             self.previous = Some((stamp, here));
         }
-        before.map_or(Motion::at_rest(0.0), |(then, pose)| {
-            Motion::between(&pose, &here, stamp.seconds_since(then), ODOMETRY_SIGMA)
+        before.map_or(EgoMotion::at_rest(0.0), |(then, pose)| {
+            EgoMotion::between(&pose, &here, stamp.seconds_since(then), ODOMETRY_SIGMA)
         })
     }
 }

@@ -146,7 +146,7 @@ fn errors_m(
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector2;
-    use tagalong_core::Motion;
+    use tagalong_core::EgoMotion;
 
     use super::*;
     use crate::testing::trial;
@@ -184,7 +184,8 @@ mod tests {
         }
         let (sin, cos) = 0.3f64.sin_cos();
         for report in &mut trial.runs[0].reports[1..] {
-            report.motion = Motion { forward: 0.9 * sin, left: 0.9 * cos, ..Motion::at_rest(0.1) };
+            report.motion =
+                EgoMotion { forward: 0.9 * sin, left: 0.9 * cos, ..EgoMotion::at_rest(0.1) };
         }
         let judged = judged(Judge::default(), &trial);
         assert!(judged.errors_in_robot_m.iter().all(|e| *e < 1e-12));

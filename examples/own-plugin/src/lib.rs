@@ -50,7 +50,7 @@ impl Verifier for OwnContrast {
         Inputs::NONE.require(Input::Colour)
     }
 
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let grey = frame.grey()?;
         let inside = candidate.region.clipped(grey.width(), grey.height());
         let (left, right) = (inside.x as usize, inside.right() as usize);

@@ -1,5 +1,5 @@
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{Motion, Person};
+use tagalong_core::{EgoMotion, Person};
 
 /// Where the target is in robot axes when the wheels answer.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub(crate) struct Aim {
 impl Aim {
     /// The person after the robot's motion to come, during which they keep
     /// their velocity. `None` if they are nowhere.
-    pub(crate) fn new(person: &Person, to_come: &Motion) -> Option<Self> {
+    pub(crate) fn new(person: &Person, to_come: &EgoMotion) -> Option<Self> {
         let is_known = is_finite(person.velocity.as_slice());
         let walks = if is_known { person.velocity } else { Vector2::zeros() };
         let place = to_come.apply_to_point(person.position.xy() + walks * to_come.dt);

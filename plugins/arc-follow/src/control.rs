@@ -1,7 +1,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::Vector2;
-use tagalong_core::{Controller, Motion, Scene, Sent, Track, WheelSpeeds, Wheels};
+use tagalong_core::{CommandHistory, Controller, DiffDrive, EgoMotion, Scene, Track, WheelSpeeds};
 
 use crate::aim::Aim;
 use crate::config::{Config, MOST, Path};
@@ -20,7 +20,7 @@ pub struct ArcFollow {
     speed_mps: f64,
     /// Turning on the spot: to the left (1) or to the right (-1).
     turning: Option<f64>,
-    sent: Sent,
+    history: CommandHistory,
     trail: Trail,
 }
 
@@ -32,7 +32,7 @@ struct Twist {
 }
 
 impl Twist {
-    fn of_wheels(self, wheels: &Wheels) -> WheelSpeeds {
+    fn of_wheels(self, wheels: &DiffDrive) -> WheelSpeeds {
         let rim = self.turn_rate * wheels.half_separation_m;
         WheelSpeeds { left: self.speed_mps - rim, right: self.speed_mps + rim }
     }
@@ -41,12 +41,12 @@ impl Twist {
 impl Controller for ArcFollow {
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
         let dt = step_s(&scene.frame.motion);
-        self.sent.grow_older(dt);
+        self.history.age(dt);
         let command = match self.steer(scene, dt) {
             Some(twist) => twist.of_wheels(&scene.wheels),
             None => self.halt(),
         };
-        self.sent.add(command);
+        self.history.add(command);
         command
     }
 
@@ -62,8 +62,8 @@ impl ArcFollow {
     /// [`tagalong_core::Error::Settings`] if a number cannot work.
     pub fn new(config: Config) -> tagalong_core::Result<Self> {
         config.check()?;
-        let sent = Sent::new(config.latency_s);
-        Ok(Self { config, speed_mps: 0.0, turning: None, sent, trail: Trail::default() })
+        let history = CommandHistory::new(config.latency_s);
+        Ok(Self { config, speed_mps: 0.0, turning: None, history, trail: Trail::default() })
     }
 
     fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
@@ -72,7 +72,7 @@ impl ArcFollow {
             return None;
         }
         let target = scene.target?;
-        let to_come = self.sent.forecast(wheels);
+        let to_come = self.history.forecast(wheels);
         let aim = Aim::new(&target.estimate.person, &to_come)?;
         let goes_after = aim.range_m > self.config.stand_off_m && aim.bearing.abs() < IN_VIEW_RAD;
         let way = self.way(scene, target, &to_come).filter(|_| goes_after);
@@ -92,7 +92,7 @@ impl ArcFollow {
 
     /// Where the person went, so far ahead as the setting says; `None` if the person is
     /// nearer than that, or straight ahead is the way.
-    fn way(&mut self, scene: &Scene<'_>, target: &Track, to_come: &Motion) -> Option<Aim> {
+    fn way(&mut self, scene: &Scene<'_>, target: &Track, to_come: &EgoMotion) -> Option<Aim> {
         if self.config.trail_m == 0.0 {
             return None;
         }
@@ -184,7 +184,7 @@ impl ArcFollow {
 }
 
 /// Time since the frame before, s.
-fn step_s(motion: &Motion) -> f64 {
+fn step_s(motion: &EgoMotion) -> f64 {
     if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 }
 }
 

@@ -8,21 +8,23 @@ use std::sync::Arc;
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_config::Registry;
 use tagalong_conformance::target;
-use tagalong_core::{Controller, Frame, Images, Motion, Scene, Stamp, Track, WheelSpeeds, Wheels};
+use tagalong_core::{
+    Controller, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, WheelSpeeds,
+};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::{ArcFollow, Config, Path};
 
-const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
+const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
 
-fn frame(motion: Motion) -> Frame {
+fn frame(motion: EgoMotion) -> Frame {
     let lens = Pinhole { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, 1, 1, 1.0, 0.0, 0.0));
     Frame::new(1, Stamp::default(), camera, motion, Images::default())
 }
 
-fn command(controller: &mut ArcFollow, motion: Motion, target: Option<&Track>) -> WheelSpeeds {
+fn command(controller: &mut ArcFollow, motion: EgoMotion, target: Option<&Track>) -> WheelSpeeds {
     let tracks = target.map_or(&[][..], std::slice::from_ref);
     let frame = frame(motion);
     let max_speed_mps = MAX_MPS;
@@ -41,7 +43,7 @@ fn turn_rate(wheels: WheelSpeeds) -> f64 {
 /// longer held back by the acceleration.
 fn settled(config: Config, person: &Track) -> WheelSpeeds {
     let mut controller = ArcFollow::new(config).unwrap();
-    let steps = (0..40).map(|_| command(&mut controller, Motion::at_rest(0.1), Some(person)));
+    let steps = (0..40).map(|_| command(&mut controller, EgoMotion::at_rest(0.1), Some(person)));
     steps.last().unwrap()
 }
 
@@ -49,7 +51,7 @@ fn settled(config: Config, person: &Track) -> WheelSpeeds {
 struct Drive {
     controller: ArcFollow,
     pose: Isometry2<f64>,
-    motion: Motion,
+    motion: EgoMotion,
     pending: Vec<WheelSpeeds>,
     dt: f64,
 }
@@ -59,7 +61,7 @@ impl Drive {
         Self {
             controller: ArcFollow::new(config).unwrap(),
             pose: Isometry2::identity(),
-            motion: Motion::at_rest(dt),
+            motion: EgoMotion::at_rest(dt),
             pending: vec![WheelSpeeds::STOP; delay],
             dt,
         }
@@ -83,7 +85,7 @@ impl Drive {
         let wheels = command(&mut self.controller, self.motion, Some(&seen));
         self.pending.push(wheels);
         let now = self.pending.remove(0);
-        self.motion = Motion::from_wheels(now.left, now.right, &WHEELS, self.dt);
+        self.motion = EgoMotion::from_wheels(now.left, now.right, &WHEELS, self.dt);
         self.pose *= self.motion.isometry();
         wheels
     }
@@ -111,10 +113,10 @@ fn settings_that_cannot_work_are_refused() {
 #[test]
 fn a_drive_that_cannot_be_is_not_steered() {
     let person = target(3.0, 1.0, Vector2::zeros());
-    let frame = frame(Motion::at_rest(0.1));
+    let frame = frame(EgoMotion::at_rest(0.1));
     let mut controller = ArcFollow::new(Config::default()).unwrap();
     let mut drives = |half_separation_m, max_speed_mps| {
-        let wheels = Wheels { half_separation_m, slip: 0.0 };
+        let wheels = DiffDrive { half_separation_m, slip: 0.0 };
         let (target, tracks) = (Some(&person), &[][..]);
         let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
         controller.command(&scene) != WheelSpeeds::STOP

@@ -1,7 +1,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Point2, distance};
-use tagalong_core::{Motion, TrackId};
+use tagalong_core::{EgoMotion, TrackId};
 
 /// Points of the trail are this far apart, m.
 const APART_M: f64 = 0.1;
@@ -18,7 +18,7 @@ pub(crate) struct Trail {
 impl Trail {
     /// The robot has moved, and the person is at a place. What the robot has passed is
     /// forgotten, and all of it if it was somebody else's.
-    pub(crate) fn go_on(&mut self, motion: &Motion, whose: TrackId, place: Point2<f64>) {
+    pub(crate) fn go_on(&mut self, motion: &EgoMotion, whose: TrackId, place: Point2<f64>) {
         if self.whose != Some(whose) {
             *self = Self { whose: Some(whose), points: VecDeque::new() };
         }
@@ -50,7 +50,7 @@ mod tests {
     fn walked(places: &[(f64, f64)]) -> Trail {
         let mut trail = Trail::default();
         for (x, y) in places {
-            trail.go_on(&Motion::at_rest(0.1), TrackId(1), Point2::new(*x, *y));
+            trail.go_on(&EgoMotion::at_rest(0.1), TrackId(1), Point2::new(*x, *y));
         }
         trail
     }
@@ -61,7 +61,7 @@ mod tests {
         let mut trail = walked(&corner);
         assert_eq!(trail.ahead(1.2), Some(Point2::new(1.5, 0.0)));
         assert_eq!(trail.ahead(9.0), None);
-        let on = Motion { forward: 1.4, ..Motion::at_rest(0.1) };
+        let on = EgoMotion { forward: 1.4, ..EgoMotion::at_rest(0.1) };
         trail.go_on(&on, TrackId(1), Point2::new(0.6, 1.2));
         let next = trail.ahead(0.7).unwrap();
         assert!((next - Point2::new(0.6, 0.5)).norm() < 1e-9, "{next}");
@@ -76,9 +76,9 @@ mod tests {
     #[test]
     fn the_trail_of_somebody_else_is_none() {
         let mut trail = walked(&[(1.0, 0.0), (1.5, 0.0)]);
-        trail.go_on(&Motion::at_rest(0.1), TrackId(2), Point2::new(3.0, 0.0));
+        trail.go_on(&EgoMotion::at_rest(0.1), TrackId(2), Point2::new(3.0, 0.0));
         assert_eq!(trail.ahead(0.5), Some(Point2::new(3.0, 0.0)));
-        trail.go_on(&Motion::at_rest(0.1), TrackId(2), Point2::new(f64::NAN, 0.0));
+        trail.go_on(&EgoMotion::at_rest(0.1), TrackId(2), Point2::new(f64::NAN, 0.0));
         assert_eq!(trail.points.len(), 1);
     }
 }

@@ -1,7 +1,7 @@
 //! Doubts candidates by what a small convolutional network makes of all of them.
 //!
 //! An upright plane through the candidate, from the floor to 2 m, is sampled in
-//! intensity and depth ([`View`]), always at one scale. A network of four layers
+//! intensity and depth ([`NetworkInput`]), always at one scale. A network of four layers
 //! ([`Net`]) turns it into log-odds ([`Model`]). Where there is no depth it says nothing:
 //! where the candidate is would be a guess.
 //!
@@ -23,7 +23,7 @@ pub use model::Model;
 pub use net::{Net, Pass};
 use tagalong_config::Registry;
 pub use verify::BodyNet;
-pub use view::View;
+pub use view::NetworkInput;
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "body-net";

@@ -1,6 +1,6 @@
 use std::fmt::Write;
 
-use crate::{Net, Pass, View};
+use crate::{Net, NetworkInput, Pass};
 
 /// A network, and the straight line that turns what it says into log-odds.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ const LINE: usize = 16;
 
 impl Model {
     /// Log-odds that the view is of a person, with even priors.
-    pub fn log_odds(&self, view: &View, pass: &mut Pass) -> f64 {
+    pub fn log_odds(&self, view: &NetworkInput, pass: &mut Pass) -> f64 {
         self.slope * f64::from(self.net.look(view, pass)) + self.offset
     }
 

@@ -1,7 +1,7 @@
 use multiversion::multiversion;
 
 use crate::conv::{Conv, Map};
-use crate::view::View;
+use crate::view::NetworkInput;
 
 /// Added to the standard deviation of the intensities before they are divided by it:
 /// what is even has no texture.
@@ -13,7 +13,7 @@ const JOINED: usize = FIRST + 2;
 /// Channels of the last layer, ...
 const LAST: usize = 32;
 /// ... and its cells: the sides are halved four times, and rounded up.
-const CELLS: usize = View::GREY[0].div_ceil(16) * View::GREY[1].div_ceil(16);
+const CELLS: usize = NetworkInput::GREY[0].div_ceil(16) * NetworkInput::GREY[1].div_ceil(16);
 
 /// The network: four layers of convolutions, each of which halves the image, and a
 /// weighted sum. Depth joins after the first, which has its size.
@@ -41,7 +41,7 @@ pub struct Pass {
 
 impl Default for Pass {
     fn default() -> Self {
-        let [rows, columns] = View::GREY;
+        let [rows, columns] = NetworkInput::GREY;
         let size = |halved: u32| (rows.div_ceil(1 << halved), columns.div_ceil(1 << halved));
         fn map<const CHANNELS: usize>((rows, columns): (usize, usize)) -> Map<CHANNELS> {
             Map::new(rows, columns)
@@ -135,7 +135,7 @@ impl Net {
     ];
 
     /// What the network says of a view; above zero it is rather a person.
-    pub fn look(&self, view: &View, pass: &mut Pass) -> f32 {
+    pub fn look(&self, view: &NetworkInput, pass: &mut Pass) -> f32 {
         pass.show(view);
         forward(self, pass)
     }
@@ -150,7 +150,7 @@ impl Net {
 
 impl Pass {
     /// Intensities of mean zero and a deviation of about one, and the depth.
-    fn show(&mut self, view: &View) {
+    fn show(&mut self, view: &NetworkInput) {
         let count = view.grey.len() as f32;
         let (mut sum, mut squares) = (0u64, 0u64);
         for value in view.grey.iter().map(|value| u64::from(*value)) {

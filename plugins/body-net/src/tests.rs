@@ -32,7 +32,7 @@ fn it_keeps_the_promises_of_its_kind() {
 #[test]
 fn without_depth_it_says_nothing() {
     let config = Config { bias: -3.0, ..Config::default() };
-    let margin = verifier(config).margin(&frame(picture(true, 1)), &candidate()).unwrap();
+    let margin = verifier(config).log_odds(&frame(picture(true, 1)), &candidate()).unwrap();
     assert_eq!(margin, 0.0);
 }
 
@@ -40,7 +40,7 @@ fn without_depth_it_says_nothing() {
 fn the_limit_holds_and_the_bias_is_added() {
     let config = Config { limit: 0.01, weight: 2.0, bias: -3.0, ..Config::default() };
     for seed in 0..4 {
-        let said = verifier(config.clone()).margin(&seen(seed % 2 == 0, seed), &candidate());
+        let said = verifier(config.clone()).log_odds(&seen(seed % 2 == 0, seed), &candidate());
         assert!((said.unwrap() + 3.0).abs() <= 0.02 + 1e-12);
     }
 }
@@ -58,7 +58,7 @@ mod network {
 
     use super::*;
     use crate::conv::{Conv, Map};
-    use crate::{Net, Pass, View};
+    use crate::{Net, NetworkInput, Pass};
 
     fn conv<const IN: usize, const OUT: usize, const SIZE: usize>(
         numbers: &[f32],
@@ -114,8 +114,8 @@ mod network {
         }
     }
 
-    fn view(seed: u32) -> View {
-        View::new(&seen(seed.is_multiple_of(2), seed), &candidate()).unwrap().unwrap()
+    fn view(seed: u32) -> NetworkInput {
+        NetworkInput::new(&seen(seed.is_multiple_of(2), seed), &candidate()).unwrap().unwrap()
     }
 
     fn net() -> Net {
@@ -166,7 +166,7 @@ mod training {
 
     use super::*;
     use crate::train::NetTrainer;
-    use crate::{Model, Pass, Training, View};
+    use crate::{Model, NetworkInput, Pass, Training};
 
     fn small() -> Training {
         Training { epochs: 6, rate: 0.005, batch: 8, ..Training::default() }
@@ -192,7 +192,8 @@ mod training {
         assert!(progress.is_sorted() && progress.last() == Some(&1.0), "{progress:?}");
         let (model, mut pass) = (Model::from_text(&fitted.model).unwrap(), Pass::default());
         for seed in 500..520 {
-            let view = View::new(&seen(seed % 2 == 0, seed), &candidate()).unwrap().unwrap();
+            let view =
+                NetworkInput::new(&seen(seed % 2 == 0, seed), &candidate()).unwrap().unwrap();
             let log_odds = model.log_odds(&view, &mut pass);
             assert!((log_odds > 0.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }

@@ -1,7 +1,7 @@
 use tagalong_config::Context;
-use tagalong_core::{Detection, Frame, Input, Inputs, Result, Trust, Verifier};
+use tagalong_core::{Detection, Frame, Input, Inputs, Result, ScoreCalibration, Verifier};
 
-use crate::{Config, Model, Pass, View};
+use crate::{Config, Model, NetworkInput, Pass};
 
 /// The model that is part of the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/body-net.toml");
@@ -10,7 +10,7 @@ const BUILT_IN: &str = include_str!("../../../configs/models/body-net.toml");
 pub struct BodyNet {
     model: Model,
     pass: Pass,
-    trust: Trust,
+    calibration: ScoreCalibration,
 }
 
 impl BodyNet {
@@ -20,9 +20,9 @@ impl BodyNet {
     /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
     /// [`tagalong_core::Error::Settings`] for weights that are no weights.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        let trust = Trust::new(config.weight, config.limit, config.bias)?;
+        let calibration = ScoreCalibration::new(config.weight, config.limit, config.bias)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { model, pass: Pass::default(), trust })
+        Ok(Self { model, pass: Pass::default(), calibration })
     }
 }
 
@@ -31,8 +31,8 @@ impl Verifier for BodyNet {
         Inputs::NONE.require(Input::Colour).accept(Input::Depth)
     }
 
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
-        let Some(view) = View::new(frame, candidate)? else { return Ok(0.0) };
-        Ok(self.trust.margin(self.model.log_odds(&view, &mut self.pass)))
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+        let Some(view) = NetworkInput::new(frame, candidate)? else { return Ok(0.0) };
+        Ok(self.calibration.calibrate(self.model.log_odds(&view, &mut self.pass)))
     }
 }

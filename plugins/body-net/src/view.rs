@@ -13,13 +13,13 @@ const UNKNOWN: i8 = i8::MIN;
 /// What the network sees of a candidate: an upright plane through it, in intensity and
 /// in depth.
 #[derive(Clone, Debug, PartialEq)]
-pub struct View {
+pub struct NetworkInput {
     pub(crate) grey: Vec<u8>,
     /// How far what is seen is behind the plane, in hundredths of a metre.
     pub(crate) behind: Vec<i8>,
 }
 
-impl View {
+impl NetworkInput {
     /// Rows and columns of the intensity ...
     pub const GREY: [usize; 2] = [Upright::ROWS, Upright::COLUMNS];
     /// ... and of the depth.
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn without_depth_there_is_no_view() {
-        assert_eq!(View::new(&frame(picture(true, 1)), &candidate()).unwrap(), None);
+        assert_eq!(NetworkInput::new(&frame(picture(true, 1)), &candidate()).unwrap(), None);
     }
 
     #[test]
@@ -76,9 +76,9 @@ mod tests {
         };
         let depth = DepthImage::from_fn(64, 64, |x, _| at(x));
         let frame = frame(picture(true, 1)).with_depth(Arc::new(depth));
-        let view = View::new(&frame, &candidate()).unwrap().unwrap();
+        let view = NetworkInput::new(&frame, &candidate()).unwrap().unwrap();
         // A row at the height of the camera; the plane is 27 pixels wide.
-        let row = 20 * View::DEPTH[1];
+        let row = 20 * NetworkInput::DEPTH[1];
         assert_eq!([0, 8, 10, 17].map(|column| view.behind[row + column]), [-100, -100, 25, -128]);
         assert_eq!(view.depth(row + 10), [0.75, 1.0]);
         assert_eq!(view.depth(row + 17), [0.0; 2]);

@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, Motion};
+use tagalong_core::{DepthImage, EgoMotion};
 use tagalong_geometry::Camera;
 
 /// Directions around the robot.
@@ -14,18 +14,18 @@ const RANGE_M: f64 = 4.0;
 
 /// The nearest thing in each direction around the robot, seen or remembered.
 #[derive(Clone, Debug)]
-pub(crate) struct Around {
-    things: Vec<Option<Thing>>,
+pub(crate) struct NearestObstacles {
+    things: Vec<Option<Obstacle>>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Thing {
+struct Obstacle {
     /// Robot frame, m.
     at: Point2<f64>,
     age_s: f64,
 }
 
-impl Around {
+impl NearestObstacles {
     pub(crate) fn new() -> Self {
         Self { things: vec![None; DIRECTIONS] }
     }
@@ -36,12 +36,12 @@ impl Around {
     }
 
     /// The robot has moved; what is older than `memory_s` is forgotten.
-    pub(crate) fn move_along(&mut self, motion: &Motion, memory_s: f64) {
+    pub(crate) fn move_along(&mut self, motion: &EgoMotion, memory_s: f64) {
         let before = std::mem::replace(&mut self.things, vec![None; DIRECTIONS]);
         for thing in before.into_iter().flatten() {
             let age_s = thing.age_s + motion.dt;
             if age_s <= memory_s {
-                self.add(Thing { at: motion.apply_to_point(thing.at), age_s });
+                self.add(Obstacle { at: motion.apply_to_point(thing.at), age_s });
             }
         }
     }
@@ -71,7 +71,7 @@ impl Around {
                 let Some(direction) = direction(&at) else { continue };
                 looked[direction] = true;
                 if (heights[0]..heights[1]).contains(&point.z) && is_thing(&at) {
-                    keep_nearer(&mut seen[direction], Thing { at, age_s: 0.0 });
+                    keep_nearer(&mut seen[direction], Obstacle { at, age_s: 0.0 });
                 }
             }
         }
@@ -80,15 +80,15 @@ impl Around {
         }
     }
 
-    fn add(&mut self, thing: Thing) {
+    fn add(&mut self, thing: Obstacle) {
         if let Some(direction) = direction(&thing.at) {
             keep_nearer(&mut self.things[direction], thing);
         }
     }
 }
 
-fn keep_nearer(place: &mut Option<Thing>, thing: Thing) {
-    let range = |thing: &Thing| thing.at.coords.norm_squared();
+fn keep_nearer(place: &mut Option<Obstacle>, thing: Obstacle) {
+    let range = |thing: &Obstacle| thing.at.coords.norm_squared();
     if place.is_none_or(|known| range(&thing) < range(&known)) {
         *place = Some(thing);
     }
@@ -107,9 +107,9 @@ mod tests {
 
     #[test]
     fn things_stay_where_they_are_while_the_robot_moves_and_are_forgotten() {
-        let mut around = Around::new();
-        around.add(Thing { at: Point2::new(1.0, 0.5), age_s: 0.0 });
-        let step = Motion { forward: 0.5, ..Motion::at_rest(1.0) };
+        let mut around = NearestObstacles::new();
+        around.add(Obstacle { at: Point2::new(1.0, 0.5), age_s: 0.0 });
+        let step = EgoMotion { forward: 0.5, ..EgoMotion::at_rest(1.0) };
         around.move_along(&step, 2.5);
         let places: Vec<_> = around.places().collect();
         assert_eq!(places, [Point2::new(0.5, 0.5)]);
@@ -120,9 +120,9 @@ mod tests {
 
     #[test]
     fn the_nearer_of_two_things_in_a_direction_counts() {
-        let mut around = Around::new();
+        let mut around = NearestObstacles::new();
         for x in [2.0, 1.0, 3.0, f64::NAN, 9.0] {
-            around.add(Thing { at: Point2::new(x, 0.01 * x), age_s: 0.0 });
+            around.add(Obstacle { at: Point2::new(x, 0.01 * x), age_s: 0.0 });
         }
         assert_eq!(around.places().map(|p| p.x).collect::<Vec<_>>(), [1.0]);
     }
@@ -144,7 +144,7 @@ mod tests {
         let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
         let board =
             |to: usize| DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 });
-        let mut around = Around::new();
+        let mut around = NearestObstacles::new();
         let mut least = |depth: &DepthImage, heights, is_thing: &dyn Fn(&Point2<f64>) -> bool| {
             around.look(&camera, depth, heights, is_thing);
             around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)

@@ -1,9 +1,11 @@
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{Controller, Input, Inputs, Motion, Scene, Sent, Track, WheelSpeeds};
+use tagalong_core::{
+    CommandHistory, Controller, EgoMotion, Input, Inputs, Scene, Track, WheelSpeeds,
+};
 
-use crate::around::Around;
+use crate::around::NearestObstacles;
 use crate::config::{Config, MOST};
-use crate::plan::{Surroundings, Twist, Walker, plan};
+use crate::plan::{PlanningInput, Twist, Walker, plan};
 
 /// A longer pause between frames counts as this one, s.
 const LONGEST_STEP_S: f64 = 0.5;
@@ -16,10 +18,10 @@ const LEAST_RANGE_M: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct ClearFollow {
     config: Config,
-    around: Around,
+    around: NearestObstacles,
     /// The forward speed of the last command, m/s.
     speed_mps: f64,
-    sent: Sent,
+    history: CommandHistory,
 }
 
 impl Controller for ClearFollow {
@@ -30,13 +32,13 @@ impl Controller for ClearFollow {
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
         let motion = &scene.frame.motion;
         let dt = if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 };
-        self.sent.grow_older(dt);
+        self.history.age(dt);
         self.look(scene);
         let command = self.steer(scene, dt).unwrap_or_else(|| {
             self.speed_mps = 0.0;
             WheelSpeeds::STOP
         });
-        self.sent.add(command);
+        self.history.add(command);
         command
     }
 
@@ -52,8 +54,8 @@ impl ClearFollow {
     /// [`tagalong_core::Error::Settings`] if a number cannot work.
     pub fn new(config: Config) -> tagalong_core::Result<Self> {
         config.check()?;
-        let sent = Sent::new(config.latency_s);
-        Ok(Self { config, around: Around::new(), speed_mps: 0.0, sent })
+        let history = CommandHistory::new(config.latency_s);
+        Ok(Self { config, around: NearestObstacles::new(), speed_mps: 0.0, history })
     }
 
     /// What stands around; people walk and are told apart.
@@ -79,13 +81,13 @@ impl ClearFollow {
             return None;
         }
         let target = scene.target?;
-        let to_come = self.sent.forecast(wheels);
+        let to_come = self.history.forecast(wheels);
         let person = walker(target, &to_come)?;
         let nominal = self.nominal(&person, self.trust(target), max_mps);
         let others = scene.tracks.iter().filter(|track| track.id != target.id);
         let others: Vec<Walker> = others.filter_map(|track| walker(track, &to_come)).collect();
         let things: Vec<_> = self.around.places().map(|at| to_come.apply_to_point(at)).collect();
-        let around = Surroundings { things: &things, others: &others, person, max_mps };
+        let around = PlanningInput { things: &things, others: &others, person, max_mps };
         let planned = plan(&self.config, nominal, &around);
         let twist = self.ramped(nominal, planned, dt);
         self.speed_mps = twist.speed_mps;
@@ -129,7 +131,7 @@ impl ClearFollow {
 
 /// Somebody as the robot will see them after its motion to come; `None` if they
 /// are nowhere.
-fn walker(track: &Track, to_come: &Motion) -> Option<Walker> {
+fn walker(track: &Track, to_come: &EgoMotion) -> Option<Walker> {
     let person = &track.estimate.person;
     let is_known = person.velocity.iter().all(|v| v.abs() < MOST);
     let velocity = if is_known { person.velocity } else { Vector2::zeros() };

@@ -45,7 +45,7 @@ impl Walker {
 }
 
 /// What a plan has to mind, as the robot will see it when the wheels answer.
-pub(crate) struct Surroundings<'a> {
+pub(crate) struct PlanningInput<'a> {
     pub(crate) things: &'a [Point2<f64>],
     pub(crate) others: &'a [Walker],
     pub(crate) person: Walker,
@@ -53,7 +53,7 @@ pub(crate) struct Surroundings<'a> {
 }
 
 /// The cheapest change of a twist.
-pub(crate) fn plan(config: &Config, nominal: Twist, around: &Surroundings<'_>) -> Twist {
+pub(crate) fn plan(config: &Config, nominal: Twist, around: &PlanningInput<'_>) -> Twist {
     let side = if nominal.turn_rate < 0.0 { -1.0 } else { 1.0 };
     let limit = config.max_turn_rate;
     let candidates = SPEEDS.iter().flat_map(|part| {
@@ -66,7 +66,7 @@ pub(crate) fn plan(config: &Config, nominal: Twist, around: &Surroundings<'_>) -
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(nominal)
 }
 
-fn cost(config: &Config, nominal: Twist, twist: Twist, around: &Surroundings<'_>) -> f64 {
+fn cost(config: &Config, nominal: Twist, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     let slower = (nominal.speed_mps - twist.speed_mps).abs() / around.max_mps;
     let turned = (nominal.turn_rate - twist.turn_rate).abs();
     let room = clearance(config, twist, around) / config.room_m;
@@ -79,7 +79,7 @@ fn cost(config: &Config, nominal: Twist, twist: Twist, around: &Surroundings<'_>
 
 /// The least room to things and people on the way, m. A robot that does not drive
 /// comes nearer to nothing.
-fn clearance(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
+fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     if twist.speed_mps <= 0.0 {
         return f64::INFINITY;
     }
@@ -97,7 +97,7 @@ fn clearance(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
 }
 
 /// How far somebody else is before the person at the end of the horizon, 0 to 1.
-fn hidden(config: &Config, twist: Twist, around: &Surroundings<'_>) -> f64 {
+fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     let pose = twist.after(config.horizon_s);
     let seen =
         |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
@@ -120,7 +120,7 @@ mod tests {
 
     fn planned(things: &[Point2<f64>], others: &[Walker]) -> Twist {
         let person = Walker { at: Point2::new(3.0, 0.0), velocity: Vector2::new(0.8, 0.0) };
-        plan(&Config::default(), AHEAD, &Surroundings { things, others, person, max_mps: 0.9 })
+        plan(&Config::default(), AHEAD, &PlanningInput { things, others, person, max_mps: 0.9 })
     }
 
     #[test]
@@ -170,8 +170,8 @@ mod tests {
     }
 
     /// With the person 3 m ahead.
-    fn around<'a>(things: &'a [Point2<f64>], others: &'a [Walker]) -> Surroundings<'a> {
-        Surroundings { things, others, person: stands(3.0, 0.0), max_mps: 0.9 }
+    fn around<'a>(things: &'a [Point2<f64>], others: &'a [Walker]) -> PlanningInput<'a> {
+        PlanningInput { things, others, person: stands(3.0, 0.0), max_mps: 0.9 }
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
         let person = stands(0.0, 3.0);
         for turn_rate in [1.0, -1.0] {
             let nominal = Twist { speed_mps: 0.6, turn_rate };
-            let scene = Surroundings { things: &wall, others: &[], person, max_mps: 0.9 };
+            let scene = PlanningInput { things: &wall, others: &[], person, max_mps: 0.9 };
             let planned = plan(&config, nominal, &scene);
             assert!(planned.turn_rate.abs() <= 1.2 && planned != nominal, "{planned:?}");
             let mirrored = plan(&config, Twist { turn_rate: -turn_rate, ..nominal }, &scene);

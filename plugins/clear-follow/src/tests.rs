@@ -7,13 +7,13 @@ use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_conformance::target;
 use tagalong_core::{
-    Controller, DepthImage, Frame, Images, Motion, Scene, Stamp, Track, WheelSpeeds, Wheels,
+    Controller, DepthImage, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use crate::{ClearFollow, Config};
 
-const WHEELS: Wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
+const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
 
 fn camera() -> Arc<Camera> {
@@ -23,7 +23,7 @@ fn camera() -> Arc<Camera> {
 
 fn command(
     controller: &mut ClearFollow,
-    motion: Motion,
+    motion: EgoMotion,
     depth: Option<DepthImage>,
     target: Option<&Track>,
 ) -> WheelSpeeds {
@@ -38,7 +38,7 @@ fn command(
 /// seconds; hands out range and bearing at the end.
 fn ride(config: Config, seconds: f64, person: impl Fn(f64) -> Point2<f64>) -> (f64, f64) {
     let mut controller = ClearFollow::new(config).unwrap();
-    let (mut pose, mut motion, dt) = (Isometry2::identity(), Motion::at_rest(0.1), 0.1);
+    let (mut pose, mut motion, dt) = (Isometry2::identity(), EgoMotion::at_rest(0.1), 0.1);
     let mut seen = Point2::origin();
     for step in 0..(seconds / dt) as u32 {
         let now = f64::from(step) * dt;
@@ -47,7 +47,7 @@ fn ride(config: Config, seconds: f64, person: impl Fn(f64) -> Point2<f64>) -> (f
         let velocity = pose.inverse_transform_vector(&velocity);
         let WheelSpeeds { left, right } =
             command(&mut controller, motion, None, Some(&target(seen.x, seen.y, velocity)));
-        motion = Motion::from_wheels(left, right, &WHEELS, dt);
+        motion = EgoMotion::from_wheels(left, right, &WHEELS, dt);
         pose *= motion.isometry();
     }
     (seen.coords.norm(), seen.y.atan2(seen.x))
@@ -85,7 +85,7 @@ fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
     let person = target(4.0, 0.0, Vector2::zeros());
     let settled = |depth: &DepthImage| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
-        let still = Motion::at_rest(0.1);
+        let still = EgoMotion::at_rest(0.1);
         (0..30).map(|_| command(&mut controller, still, Some(depth.clone()), Some(&person))).last()
     };
     let free = settled(&DepthImage::filled(40, 30, 6.0)).unwrap();
@@ -100,7 +100,7 @@ fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
 #[test]
 fn it_speeds_up_and_slows_down_no_faster_than_it_may() {
     let mut controller = ClearFollow::new(prompt()).unwrap();
-    let still = Motion::at_rest(0.1);
+    let still = EgoMotion::at_rest(0.1);
     let mut speed = |x: f64| {
         let person = target(x, 0.0, Vector2::zeros());
         let WheelSpeeds { left, right } = command(&mut controller, still, None, Some(&person));
@@ -119,7 +119,7 @@ fn it_turns_by_the_bearing_and_as_fast_as_the_person_walks_around_it() {
     let turn = |x: f64, y: f64, velocity: Vector2<f64>| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = target(x, y, velocity);
-        let wheels = command(&mut controller, Motion::at_rest(0.0), None, Some(&person));
+        let wheels = command(&mut controller, EgoMotion::at_rest(0.0), None, Some(&person));
         (wheels.right - wheels.left) / (2.0 * WHEELS.half_separation_m)
     };
     assert!((turn(2.0, 1.0, Vector2::zeros()) - 0.5_f64.atan()).abs() < 1e-9);
@@ -134,7 +134,7 @@ fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
     let speed = |unseen_s: f64| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = Track { seen: false, unseen_s, ..target(4.0, 0.0, Vector2::zeros()) };
-        let still = Motion::at_rest(0.1);
+        let still = EgoMotion::at_rest(0.1);
         let steps = (0..30).map(|_| command(&mut controller, still, None, Some(&person)).left);
         steps.last().unwrap()
     };
@@ -151,7 +151,7 @@ fn the_person_is_no_obstacle_and_others_are() {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let images = Images { depth: depth.map(Arc::new), ..Images::default() };
         let tracks: Vec<Track> = other.into_iter().chain([person.clone()]).collect();
-        let frame = Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), images);
+        let frame = Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), images);
         let (target, tracks) = (Some(&person), &tracks[..]);
         let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
@@ -169,7 +169,7 @@ fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
     let after = |seconds: f64| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = target(4.0, 0.0, Vector2::zeros());
-        let still = Motion::at_rest(0.1);
+        let still = EgoMotion::at_rest(0.1);
         let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
         let depth = DepthImage::from_fn(40, 30, post);
         command(&mut controller, still, Some(depth), Some(&person));
@@ -184,9 +184,10 @@ fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
 #[test]
 fn a_drive_that_cannot_be_is_not_steered() {
     let person = target(3.0, 0.5, Vector2::zeros());
-    let frame = Frame::new(1, Stamp::default(), camera(), Motion::at_rest(0.1), Images::default());
+    let frame =
+        Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), Images::default());
     let drives = |half_separation_m, max_speed_mps| {
-        let wheels = Wheels { half_separation_m, slip: 0.0 };
+        let wheels = DiffDrive { half_separation_m, slip: 0.0 };
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let (target, tracks) = (Some(&person), &[][..]);
         let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
@@ -226,9 +227,10 @@ fn any_target() -> impl Strategy<Value = Track> {
     })
 }
 
-fn any_motion() -> impl Strategy<Value = Motion> {
-    (any_number(), any_number(), any_number(), any_number())
-        .prop_map(|(dt, forward, left, turn)| Motion { forward, left, turn, ..Motion::at_rest(dt) })
+fn any_motion() -> impl Strategy<Value = EgoMotion> {
+    (any_number(), any_number(), any_number(), any_number()).prop_map(
+        |(dt, forward, left, turn)| EgoMotion { forward, left, turn, ..EgoMotion::at_rest(dt) },
+    )
 }
 
 /// A million states in release, fewer where the compiler helps less.
@@ -260,7 +262,7 @@ proptest! {
             ClearFollow::new(Config::default()).unwrap(),
         );
         for _ in 0..5 {
-            let still = Motion::at_rest(0.1);
+            let still = EgoMotion::at_rest(0.1);
             let a = command(&mut one, still, None, Some(&target(x, y, Vector2::new(vx, vy))));
             let b = command(&mut other, still, None, Some(&target(x, -y, Vector2::new(vx, -vy))));
             prop_assert!((a.left - b.right).abs() < 1e-9 && (a.right - b.left).abs() < 1e-9, "{a:?} {b:?}");

@@ -33,7 +33,7 @@ fn the_limit_holds() {
     let config = Config { limit: 0.01, weight: 2.0, ..Config::default() };
     let mut verifier = ColorTexture::new(config, &context()).unwrap();
     for seed in 0..4 {
-        let margin = verifier.margin(&frame(picture(seed % 2 == 0, seed)), &candidate()).unwrap();
+        let margin = verifier.log_odds(&frame(picture(seed % 2 == 0, seed)), &candidate()).unwrap();
         assert!(margin.abs() <= 0.02, "{margin}");
     }
 }
@@ -42,7 +42,7 @@ fn the_limit_holds() {
 fn the_bias_is_added_to_every_answer() {
     let mut margins = [0.0, -3.0].map(|bias| {
         let mut verifier = ColorTexture::new(Config { bias, ..Config::default() }, &context());
-        verifier.as_mut().unwrap().margin(&frame(picture(true, 3)), &candidate()).unwrap()
+        verifier.as_mut().unwrap().log_odds(&frame(picture(true, 3)), &candidate()).unwrap()
     });
     margins[0] -= 3.0;
     assert!((margins[0] - margins[1]).abs() < 1e-12, "{margins:?}");

@@ -1,5 +1,5 @@
 use tagalong_config::Context;
-use tagalong_core::{Detection, Frame, Input, Inputs, Result, Trust, Verifier};
+use tagalong_core::{Detection, Frame, Input, Inputs, Result, ScoreCalibration, Verifier};
 
 use crate::{Config, Features, Model};
 
@@ -10,7 +10,7 @@ const BUILT_IN: &str = include_str!("../../../configs/models/color-texture.toml"
 pub struct ColorTexture {
     model: Model,
     features: Features,
-    trust: Trust,
+    calibration: ScoreCalibration,
 }
 
 impl ColorTexture {
@@ -20,10 +20,10 @@ impl ColorTexture {
     /// [`tagalong_core::Error::Model`] for a file that cannot be read or is no model,
     /// [`tagalong_core::Error::Settings`] for weights that are no weights.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        let trust = Trust::new(config.weight, config.limit, config.bias)?;
+        let calibration = ScoreCalibration::new(config.weight, config.limit, config.bias)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
         let features = Features::default();
-        Ok(Self { model, features, trust })
+        Ok(Self { model, features, calibration })
     }
 }
 
@@ -32,8 +32,8 @@ impl Verifier for ColorTexture {
         Inputs::NONE.require(Input::Colour).accept(Input::Depth)
     }
 
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         self.features.look(frame, candidate)?;
-        Ok(self.trust.margin(self.model.log_odds(&self.features)))
+        Ok(self.calibration.calibrate(self.model.log_odds(&self.features)))
     }
 }

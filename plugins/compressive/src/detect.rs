@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
     Track, TrackId,
 };
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
@@ -62,7 +62,7 @@ struct Scored {
 }
 
 /// The images of a frame that this detector looks at.
-struct View<'a> {
+struct FrameImages<'a> {
     integral: Arc<Integral>,
     depth: Option<&'a DepthImage>,
     camera: &'a Camera,
@@ -76,7 +76,7 @@ struct Dropped {
     farther: u64,
 }
 
-impl<'a> View<'a> {
+impl<'a> FrameImages<'a> {
     fn of(frame: &'a Frame) -> Result<Self> {
         let integral = frame.derived::<Integral>()?;
         Ok(Self { integral, depth: frame.images().depth.as_deref(), camera: &frame.camera })
@@ -102,7 +102,12 @@ impl Compressive {
     }
 
     /// Where a person is whose appearance is known.
-    fn near(&mut self, view: &View<'_>, track: &Track, funnel: &mut Funnel) -> Option<Detection> {
+    fn near(
+        &mut self,
+        view: &FrameImages<'_>,
+        track: &Track,
+        funnel: &mut Funnel,
+    ) -> Option<Detection> {
         let Self { config, features, targets, scratch } = self;
         let expected = track.estimate.region;
         let Some(target) = targets.get_mut(&track.id).filter(|target| target.is_taught) else {
@@ -141,7 +146,7 @@ impl Compressive {
     }
 
     /// Adapts the model of one person to this frame.
-    fn teach(&mut self, view: &View<'_>, track: &Track) {
+    fn teach(&mut self, view: &FrameImages<'_>, track: &Track) {
         let Self { config, features, targets, scratch } = self;
         let target = targets.entry(track.id).or_insert_with(|| Target::new(features.len()));
         let found = target.found.take();
@@ -190,7 +195,7 @@ fn memory(config: &Config, track: &Track, found: Option<(Rect, f32)>, is_new: bo
 /// Collects boxes on the person and beside them; false if there are too few.
 fn sample(
     config: &Config,
-    view: &View<'_>,
+    view: &FrameImages<'_>,
     target: &Target,
     of: Pixels,
     scratch: &mut Scratch,
@@ -231,7 +236,7 @@ impl Target {
         &mut self,
         config: &Config,
         features: &Features,
-        view: &View<'_>,
+        view: &FrameImages<'_>,
         track: &Track,
     ) -> Option<()> {
         let expected = track.estimate.region;
@@ -249,7 +254,12 @@ impl Target {
 
     /// Takes the size of a box, and returns it in whole pixels; `None` if it
     /// cannot be used.
-    fn fit_to(&mut self, features: &Features, view: &View<'_>, region: &Rect) -> Option<Pixels> {
+    fn fit_to(
+        &mut self,
+        features: &Features,
+        view: &FrameImages<'_>,
+        region: &Rect,
+    ) -> Option<Pixels> {
         self.set_size(features, view, region.width, region.height)?;
         let (width, height) = self.scaled.size();
         let of = Pixels { x: region.x.round() as i64, y: region.y.round() as i64, width, height };
@@ -259,7 +269,7 @@ impl Target {
     fn set_size(
         &mut self,
         features: &Features,
-        view: &View<'_>,
+        view: &FrameImages<'_>,
         width: f64,
         height: f64,
     ) -> Option<()> {
@@ -276,7 +286,7 @@ impl Target {
 /// The search for one person in one frame.
 struct Hunt<'a> {
     config: &'a Config,
-    view: &'a View<'a>,
+    view: &'a FrameImages<'a>,
     target: &'a Target,
     scratch: &'a mut Scratch,
     /// Expected depth of the face, m.
@@ -422,20 +432,20 @@ impl Detector for Compressive {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         match search {
-            Search::Everywhere { .. } => Ok(Vec::new()),
-            Search::Near(track) => {
-                let view = View::of(frame)?;
+            Query::Discover { .. } => Ok(Vec::new()),
+            Query::Track(track) => {
+                let view = FrameImages::of(frame)?;
                 Ok(self.near(&view, track, funnel).into_iter().collect())
             }
         }
     }
 
     fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
-        let view = View::of(frame)?;
+        let view = FrameImages::of(frame)?;
         self.targets.retain(|id, _| tracks.iter().any(|track| track.id == *id));
         tracks.iter().for_each(|track| self.teach(&view, track));
         Ok(())

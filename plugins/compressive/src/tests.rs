@@ -4,8 +4,8 @@ use nalgebra::{Point3, SMatrix, Vector2};
 use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::{
-    DepthImage, Detection, Detector, Estimate, Frame, Funnel, GreyImage, Images, Motion, Person,
-    Search, Stamp, Track, TrackId,
+    DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
+    Query, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_vision::Integral;
@@ -64,7 +64,7 @@ impl World {
             depth: self.with_depth.then(|| Arc::new(depth)),
             ..Images::default()
         };
-        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.05), images)
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.05), images)
     }
 }
 
@@ -92,7 +92,7 @@ fn near(
 ) -> (Option<Detection>, Funnel) {
     let mut funnel = Funnel::default();
     let track = track(expected, true);
-    let found = detector.detect(frame, &Search::Near(&track), &mut funnel).unwrap();
+    let found = detector.detect(frame, &Query::Track(&track), &mut funnel).unwrap();
     (found.into_iter().next(), funnel)
 }
 
@@ -210,7 +210,7 @@ fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
     expected.estimate.region =
         Rect::new(centre.x - 0.5 * width, centre.y - 0.5 * height, width, height);
     let frame = World::at(now).frame();
-    let search = Search::Near(&expected);
+    let search = Query::Track(&expected);
     let found = detector.detect(&frame, &search, &mut Funnel::default()).unwrap();
     found[0].region.width / camera().upper_body(&before).width
 }

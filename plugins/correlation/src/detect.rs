@@ -2,8 +2,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Input, Inputs, Result,
-    Search, Stamp, Track, TrackId,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Input, Inputs, Query,
+    Result, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
@@ -36,14 +36,14 @@ pub(crate) struct Placed {
 }
 
 /// The images of a frame that this detector looks at.
-struct View<'a> {
+struct FrameImages<'a> {
     stamp: Stamp,
     grey: &'a GreyImage,
     depth: &'a DepthImage,
     camera: &'a Camera,
 }
 
-impl<'a> View<'a> {
+impl<'a> FrameImages<'a> {
     fn of(frame: &'a Frame) -> Result<Self> {
         let stamp = frame.stamp;
         Ok(Self { stamp, grey: frame.grey()?, depth: frame.depth()?, camera: &frame.camera })
@@ -62,7 +62,7 @@ impl Correlation {
     }
 
     /// Where a person is, or the test that failed.
-    fn near(&mut self, view: &View<'_>, track: &Track) -> Found<Detection> {
+    fn near(&mut self, view: &FrameImages<'_>, track: &Track) -> Found<Detection> {
         let Self { config, pictures, strip, fits } = self;
         let (taken, picture) = pictures.get(&track.id).ok_or("correlation: not seen well yet")?;
         if view.stamp.seconds_since(*taken) > config.memory_s {
@@ -82,7 +82,7 @@ impl Correlation {
     }
 
     /// Remembers what a person looks like who is in plain view.
-    fn remember(&mut self, view: &View<'_>, track: &Track) {
+    fn remember(&mut self, view: &FrameImages<'_>, track: &Track) {
         let Some(square) = square(track).filter(|_| track.seen && !track.occluded) else { return };
         let (distance, least) = (distance(&self.config, view.camera, track), self.config.min_body);
         if let Some(picture) = Picture::take(view.grey, view.depth, &square, &distance, least) {
@@ -175,11 +175,11 @@ impl Detector for Correlation {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
-        let Search::Near(track) = search else { return Ok(Vec::new()) };
-        match self.near(&View::of(frame)?, track) {
+        let Query::Track(track) = search else { return Ok(Vec::new()) };
+        match self.near(&FrameImages::of(frame)?, track) {
             Ok(found) => Ok(vec![found]),
             Err(test) => {
                 funnel.drop_at(test, track.estimate.region);
@@ -189,7 +189,7 @@ impl Detector for Correlation {
     }
 
     fn learn(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
-        let view = View::of(frame)?;
+        let view = FrameImages::of(frame)?;
         self.pictures.retain(|id, _| tracks.iter().any(|track| track.id == *id));
         tracks.iter().for_each(|track| self.remember(&view, track));
         Ok(())

@@ -4,8 +4,8 @@ use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::{
-    DepthImage, Detection, Detector, Estimate, Frame, Funnel, GreyImage, Images, Motion, Person,
-    Search, Stamp, Track, TrackId,
+    DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
+    Query, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
 
@@ -73,7 +73,7 @@ impl World {
             ..Images::default()
         };
         let stamp = Stamp::default().plus_seconds(self.at_s);
-        Frame::new(1, stamp, camera, Motion::at_rest(0.05), images)
+        Frame::new(1, stamp, camera, EgoMotion::at_rest(0.05), images)
     }
 }
 
@@ -106,7 +106,7 @@ fn look(taught: &World, now: &World) -> (Option<Detection>, Vec<&'static str>) {
     detector.learn(&taught.frame(), &[track(HEAD, true)]).unwrap();
     let mut funnel = Funnel::default();
     let expected = track(HEAD, false);
-    let found = detector.detect(&now.frame(), &Search::Near(&expected), &mut funnel).unwrap();
+    let found = detector.detect(&now.frame(), &Query::Track(&expected), &mut funnel).unwrap();
     assert!(found.len() <= 1);
     (found.into_iter().next(), funnel.entries().iter().map(|entry| entry.test).collect())
 }
@@ -169,7 +169,7 @@ fn who_left_is_forgotten() {
     detector.learn(&World::at(HEAD).frame(), &[track(HEAD, true)]).unwrap();
     detector.learn(&World::at(HEAD).frame(), &[]).unwrap();
     let (expected, mut funnel) = (track(HEAD, false), Funnel::default());
-    let found = detector.detect(&in_shadow().frame(), &Search::Near(&expected), &mut funnel);
+    let found = detector.detect(&in_shadow().frame(), &Query::Track(&expected), &mut funnel);
     assert_eq!(found.unwrap(), []);
     assert!(funnel.count("correlation: not seen well yet") == 1);
 }
@@ -290,7 +290,7 @@ fn who_is_not_in_plain_view_is_not_remembered() {
         detector.learn(&World::at(HEAD).frame(), std::slice::from_ref(&track)).unwrap();
         let mut funnel = Funnel::default();
         let expected = self::track(HEAD, false);
-        let search = Search::Near(&expected);
+        let search = Query::Track(&expected);
         detector.detect(&in_shadow().frame(), &search, &mut funnel).unwrap();
         funnel.count("correlation: not seen well yet") == 0
     };

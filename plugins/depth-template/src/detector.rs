@@ -4,7 +4,7 @@ use std::sync::Arc;
 use tagalong_config::check_settings;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood,
-    Result, Search, Track,
+    Query, Result, Track,
 };
 use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 use tagalong_vision::RowSums;
@@ -16,7 +16,7 @@ use crate::config::{Cost, DepthTemplateConfig};
 use crate::dissimilarity::Dissimilarity;
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
-use crate::view::{Local, View, Working};
+use crate::view::{Local, MetricImage, Working};
 use crate::weigher::Weigher;
 
 /// The detector: discovers people, and follows them near a prediction.
@@ -24,7 +24,7 @@ pub struct DepthTemplate {
     config: DepthTemplateConfig,
     bank: Bank,
     cells: Vec<Cell>,
-    view: Option<Arc<View>>,
+    view: Option<Arc<MetricImage>>,
     weigher: Weigher,
 }
 
@@ -41,9 +41,9 @@ struct Fitted {
 }
 
 /// A frame, ready for matching.
-struct Scene<'a> {
+struct PreparedFrame<'a> {
     rows: &'a RowSums,
-    view: Arc<View>,
+    view: Arc<MetricImage>,
     matcher: Matcher,
     /// What is compared in place of what the matcher compares, where a config asks for it.
     printed: Option<Dissimilarity>,
@@ -84,17 +84,17 @@ impl DepthTemplate {
     /// and where a silhouette fits well enough to look closer.
     fn scan(
         &mut self,
-        scene: &Scene<'_>,
+        scene: &PreparedFrame<'_>,
         window: &Rect,
         funnel: &mut Funnel,
         admit: impl Fn(&Self, &Local) -> std::result::Result<(), &'static str>,
     ) {
-        let Scene { rows, view, .. } = scene;
+        let PreparedFrame { rows, view, .. } = scene;
         let inside = window.clipped(rows.width(), rows.height());
         let (x0, y0) = (on_grid(inside.x), on_grid(inside.y));
         let mut dropped = Tests::default();
-        for y in (y0..inside.bottom().ceil() as i64).step_by(View::GRID as usize) {
-            for x in (x0..inside.right().ceil() as i64).step_by(View::GRID as usize) {
+        for y in (y0..inside.bottom().ceil() as i64).step_by(MetricImage::GRID as usize) {
+            for x in (x0..inside.right().ceil() as i64).step_by(MetricImage::GRID as usize) {
                 let Some(depth_m) = rows.depth_m(x, y) else { continue };
                 let spacing = spacing(view.px_per_m(depth_m));
                 // A power of two: no division for the many cells that are left here.
@@ -124,10 +124,10 @@ impl DepthTemplate {
     }
 
     /// The view of this frame's camera; it seldom changes.
-    fn view(&mut self, frame: &Frame, rows: &RowSums) -> Arc<View> {
+    fn view(&mut self, frame: &Frame, rows: &RowSums) -> Arc<MetricImage> {
         match &self.view {
             Some(view) if view.is_of(&frame.camera, rows) => Arc::clone(view),
-            _ => Arc::clone(self.view.insert(Arc::new(View::new(&frame.camera, rows)))),
+            _ => Arc::clone(self.view.insert(Arc::new(MetricImage::new(&frame.camera, rows)))),
         }
     }
 
@@ -159,7 +159,7 @@ impl DepthTemplate {
     /// Walks from a cell to where the silhouette fits best: cells lie two and
     /// more pixels apart, and the edge of a silhouette is sharper than that.
     /// Returns the weighted centre of the fits around that place.
-    fn refined(&mut self, scene: &Scene<'_>, cell: &Cell) -> Fitted {
+    fn refined(&mut self, scene: &PreparedFrame<'_>, cell: &Cell) -> Fitted {
         const AROUND: [(i64, i64); 8] =
             [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
         let local = scene.view.local(cell.x, cell.y, cell.depth_m);
@@ -185,7 +185,7 @@ impl DepthTemplate {
 
     /// The best of the body directions; it need not be found where it costs more than
     /// `most`.
-    fn best(&mut self, scene: &Scene<'_>, local: &Local, mut most: f64) -> Option<Match> {
+    fn best(&mut self, scene: &PreparedFrame<'_>, local: &Local, mut most: f64) -> Option<Match> {
         let Self { bank, config, .. } = self;
         let directions = config.directions.iter();
         directions
@@ -209,8 +209,8 @@ impl DepthTemplate {
     fn discover(
         &mut self,
         frame: &Frame,
-        scene: &Scene<'_>,
-        occupied: &Search<'_>,
+        scene: &PreparedFrame<'_>,
+        occupied: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         self.cells.clear();
@@ -242,7 +242,7 @@ impl DepthTemplate {
     fn follow(
         &mut self,
         frame: &Frame,
-        scene: &Scene<'_>,
+        scene: &PreparedFrame<'_>,
         track: &Track,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
@@ -279,7 +279,12 @@ impl DepthTemplate {
         Ok(vec![self.detection(frame, scene, &person)?])
     }
 
-    fn detection(&self, frame: &Frame, scene: &Scene<'_>, person: &Fitted) -> Result<Detection> {
+    fn detection(
+        &self,
+        frame: &Frame,
+        scene: &PreparedFrame<'_>,
+        person: &Fitted,
+    ) -> Result<Detection> {
         let c = &self.config;
         let pixel = scene.view.full_pixel(person.x, person.y);
         let px_per_m = frame.camera.focal_px() / person.depth_m;
@@ -310,7 +315,7 @@ impl Detector for DepthTemplate {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let depth = frame.depth()?;
@@ -331,10 +336,10 @@ impl Detector for DepthTemplate {
         };
         let view = self.view(frame, rows);
         let matcher = Matcher::new(&self.config, background);
-        let scene = Scene { rows, view, matcher, printed };
+        let scene = PreparedFrame { rows, view, matcher, printed };
         match search {
-            Search::Everywhere { .. } => self.discover(frame, &scene, search, funnel),
-            Search::Near(track) => self.follow(frame, &scene, track, funnel),
+            Query::Discover { .. } => self.discover(frame, &scene, search, funnel),
+            Query::Track(track) => self.follow(frame, &scene, track, funnel),
         }
     }
 
@@ -349,7 +354,7 @@ impl Detector for DepthTemplate {
 
 /// The last coordinate of the grid up to `at`.
 fn on_grid(at: f64) -> i64 {
-    at as i64 / View::GRID * View::GRID
+    at as i64 / MetricImage::GRID * MetricImage::GRID
 }
 
 /// Cells are 2, 4 or 8 pixels apart, always a power of two: about 3 cm at the person.
@@ -378,7 +383,7 @@ impl Tests {
         }
     }
 
-    fn report(&self, view: &View, funnel: &mut Funnel) {
+    fn report(&self, view: &MetricImage, funnel: &mut Funnel) {
         for (test, count, (x, y, depth_m)) in &self.entries {
             funnel.drop_at(test, view.region(*x as f64, *y as f64, *depth_m));
             funnel.drop_many(test, count - 1);

@@ -164,7 +164,7 @@ fn bounds(spans: impl Iterator<Item = Span>) -> Option<Span> {
 mod tests {
     use nalgebra::{Point3, Vector2};
     use proptest::prelude::*;
-    use tagalong_core::{DepthImage, Images, Likelihood, Motion, Person, Stamp};
+    use tagalong_core::{DepthImage, EgoMotion, Images, Likelihood, Person, Stamp};
     use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
@@ -181,7 +181,7 @@ mod tests {
 
     fn frame(depth: DepthImage) -> Frame {
         let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
-        Frame::new(1, Stamp::default(), Arc::new(camera()), Motion::at_rest(0.1), images)
+        Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(0.1), images)
     }
 
     fn config(weighing: Weighing) -> DepthTemplateConfig {

@@ -28,7 +28,7 @@ impl Derived for Working {
 }
 
 /// Reduced pixels in metric terms. Made once per camera pose.
-pub struct View {
+pub struct MetricImage {
     camera: Arc<Camera>,
     scale: f64,
     columns: usize,
@@ -87,7 +87,7 @@ impl Local {
     }
 }
 
-impl View {
+impl MetricImage {
     /// Cells of the image that have a geometry are this many pixels apart.
     pub const GRID: i64 = 2;
 

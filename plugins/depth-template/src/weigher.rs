@@ -8,7 +8,7 @@ use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;
 use crate::printed::{Canvas, Printed};
 use crate::scores::{Levels, ONE, Scores};
-use crate::view::{View, Working};
+use crate::view::{MetricImage, Working};
 
 /// Weighs imagined scenes by their overlapping silhouettes (P3, section II-C):
 /// each person is painted over those behind.
@@ -28,11 +28,11 @@ struct Tools {
     tolerance_m: f64,
     one_sided: f64,
     silhouettes: Silhouettes,
-    view: Option<Arc<View>>,
+    view: Option<Arc<MetricImage>>,
     canvas: Option<Arc<Canvas>>,
     scores: Scores,
     cast: Vec<Placed>,
-    alone: HashMap<Spot, Found>,
+    alone: HashMap<Spot, SilhouetteFit>,
     masks: Vec<Span>,
 }
 
@@ -214,10 +214,10 @@ impl Tools {
     }
 
     /// The view of this frame's camera; it seldom changes.
-    fn view_of(&mut self, frame: &Frame, image: &Working) -> Arc<View> {
+    fn view_of(&mut self, frame: &Frame, image: &Working) -> Arc<MetricImage> {
         match &self.view {
             Some(view) if view.is_of(&frame.camera, &image.0) => Arc::clone(view),
-            _ => Arc::clone(self.view.insert(Arc::new(View::new(&frame.camera, &image.0)))),
+            _ => Arc::clone(self.view.insert(Arc::new(MetricImage::new(&frame.camera, &image.0)))),
         }
     }
 
@@ -228,7 +228,7 @@ impl Tools {
         person: &Person,
         direction: Direction,
         camera: &Camera,
-        view: &View,
+        view: &MetricImage,
     ) -> Option<Placed> {
         let depth_m = camera.depth_of(&person.position) - HEAD_RADIUS_M;
         if !(MIN_DEPTH_M..MAX_DEPTH_M).contains(&depth_m) {
@@ -260,10 +260,10 @@ impl Tools {
     }
 
     /// What a person finds where nobody else is.
-    fn alone(&mut self, person: &Placed) -> Found {
+    fn alone(&mut self, person: &Placed) -> SilhouetteFit {
         let Self { scores, alone, .. } = self;
         *alone.entry(person.spot()).or_insert_with(|| {
-            let mut found = Found::default();
+            let mut found = SilhouetteFit::default();
             for (line, row) in person.rows(scores.height()) {
                 let pixels = scores.row(line as usize, person.levels.behind(row.relief_m));
                 let [left, right] = person.beside(row);
@@ -277,15 +277,16 @@ impl Tools {
     /// How much of that the others take: the body where nearer ones hide it,
     /// and what is beside it where it is theirs. Who is clearly farther away is
     /// not what is seen at this person's depth.
-    fn taken(&mut self, scene: &[Placed], k: usize) -> Found {
+    fn taken(&mut self, scene: &[Placed], k: usize) -> SilhouetteFit {
         if scene.len() <= 2 {
             let other = rivals(scene, k).next();
-            return other
-                .map_or_else(Found::default, |other| self.taken_by_one(&scene[k], other, k == 1));
+            return other.map_or_else(SilhouetteFit::default, |other| {
+                self.taken_by_one(&scene[k], other, k == 1)
+            });
         }
         let Self { scores, masks, .. } = self;
         let person = &scene[k];
-        let mut taken = Found::default();
+        let mut taken = SilhouetteFit::default();
         for (line, row) in person.rows(scores.height()) {
             union_of(masks, rivals(scene, k).filter_map(|p| p.body(line)));
             if masks.is_empty() {
@@ -303,10 +304,10 @@ impl Tools {
 
     /// The same where there is one other, who needs no union. Most rows of most
     /// pairs do not meet, and are left before their sums are asked for.
-    fn taken_by_one(&mut self, person: &Placed, other: &Placed, is_nearer: bool) -> Found {
+    fn taken_by_one(&mut self, person: &Placed, other: &Placed, is_nearer: bool) -> SilhouetteFit {
         let half = person.silhouette.half_width;
         let window = (person.x - half, person.x + half + 1);
-        let mut taken = Found::default();
+        let mut taken = SilhouetteFit::default();
         for (line, row) in person.rows(self.scores.height()) {
             let Some(body) = other.body(line).map(|body| common(body, window)) else { continue };
             if body.0 >= body.1 {
@@ -327,7 +328,7 @@ impl Tools {
 
 /// What a silhouette finds in the image, in units of 1 / [`ONE`] pixels.
 #[derive(Clone, Copy, Debug, Default)]
-struct Found {
+struct SilhouetteFit {
     /// Pixels of the body that speak for the person, less those against.
     covered: i64,
     /// Pixels left of the body at the person's depth.
@@ -336,7 +337,7 @@ struct Found {
     right: i64,
 }
 
-impl Found {
+impl SilhouetteFit {
     fn add(&mut self, covered: i32, left: i32, right: i32) {
         self.covered += i64::from(covered);
         self.left += i64::from(left);

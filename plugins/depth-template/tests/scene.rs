@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix5, Point3, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Detector, Estimate, Frame, Funnel, Images, Motion, Person, Search,
+    DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, Images, Person, Query,
     Stamp, Track, TrackId,
 };
 use tagalong_depth_template::{Cost, DepthTemplate, DepthTemplateConfig, render};
@@ -47,13 +47,13 @@ fn frame(width: usize, wall_m: f64, heads: &[Point3<f64>]) -> Frame {
         depth as f32
     });
     let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
-    Frame::new(1, Stamp::from_nanos(1), camera, Motion::at_rest(0.1), images)
+    Frame::new(1, Stamp::from_nanos(1), camera, EgoMotion::at_rest(0.1), images)
 }
 
 fn discover(config: DepthTemplateConfig, frame: &Frame) -> (Vec<Detection>, Funnel) {
     let mut funnel = Funnel::default();
     let mut detector = DepthTemplate::new(config).unwrap();
-    let found = detector.detect(frame, &Search::Everywhere { occupied: &[] }, &mut funnel).unwrap();
+    let found = detector.detect(frame, &Query::Discover { occupied: &[] }, &mut funnel).unwrap();
     (found, funnel)
 }
 
@@ -119,7 +119,7 @@ fn somebody_already_found_is_not_found_again() {
     let (occupied, _) = discover(DepthTemplateConfig::default(), &scene);
     let mut detector = DepthTemplate::new(DepthTemplateConfig::default()).unwrap();
     let mut funnel = Funnel::default();
-    let search = Search::Everywhere { occupied: &occupied };
+    let search = Query::Discover { occupied: &occupied };
     assert!(detector.detect(&scene, &search, &mut funnel).unwrap().is_empty());
     assert_eq!(funnel.count("occupied"), 1);
 }
@@ -149,7 +149,7 @@ fn following_finds_the_person_near_the_prediction_and_nobody_else() {
     let scene = frame(640, 6.0, &[near, far]);
     let mut detector = DepthTemplate::new(DepthTemplateConfig::default()).unwrap();
     let track = track_at(near + nalgebra::Vector3::new(0.1, -0.1, 0.0), &scene.camera);
-    let found = detector.detect(&scene, &Search::Near(&track), &mut Funnel::default()).unwrap();
+    let found = detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap();
     assert_eq!(found.len(), 1);
     assert!((found[0].position - near).norm() < HEAD_RADIUS_M + 0.05);
 }

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector3, Vector5};
 use tagalong_core::{
-    Detection, Estimate, Motion, Person, PersonFilter, Result, Support, match_moments,
+    Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update, match_moments,
 };
 use tagalong_geometry::Camera;
 
@@ -17,7 +17,7 @@ const STUDENT_ROUNDS: usize = 2;
 
 /// What is believed of a person.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Belief {
+pub struct State {
     /// (x, y, z, vx, vy) in the robot frame: m, m/s over ground.
     pub mean: SVector<f64, 5>,
     /// Its covariance.
@@ -67,7 +67,7 @@ impl Ekf {
     }
 
     /// J M J': what the uncertainty of the robot's own motion adds.
-    fn ego_noise(&self, predicted: &Vector5<f64>, motion: &Motion) -> Matrix5 {
+    fn ego_noise(&self, predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5 {
         if self.config.compat_printed_noise {
             return Matrix5::zeros();
         }
@@ -76,7 +76,7 @@ impl Ekf {
     }
 
     /// The mean after the motion.
-    pub(crate) fn transition(&self, mean: &Vector5<f64>, motion: &Motion) -> Vector5<f64> {
+    pub(crate) fn transition(&self, mean: &Vector5<f64>, motion: &EgoMotion) -> Vector5<f64> {
         let back = turn_back(motion);
         let velocity = Vector2::new(mean[3], mean[4]);
         let moved = Vector2::new(mean[0], mean[1]) + velocity * motion.dt;
@@ -90,62 +90,62 @@ impl Ekf {
 }
 
 impl PersonFilter for Ekf {
-    type Belief = Belief;
+    type State = State;
 
-    fn start(&self, detection: &Detection) -> Belief {
+    fn start(&self, detection: &Detection) -> State {
         let mut covariance = Matrix5::zeros();
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.measurement(detection));
         covariance[(3, 3)] = self.config.initial_velocity_variance;
         covariance[(4, 4)] = self.config.initial_velocity_variance;
         let p = &detection.position;
-        Belief { mean: Vector5::new(p.x, p.y, p.z, 0.0, 0.0), covariance }
+        State { mean: Vector5::new(p.x, p.y, p.z, 0.0, 0.0), covariance }
     }
 
-    fn predict(&self, belief: &mut Belief, motion: &Motion) {
+    fn predict(&self, state: &mut State, motion: &EgoMotion) {
         let f = state_jacobian(motion);
-        belief.mean = self.transition(&belief.mean, motion);
-        let covariance = f * belief.covariance * f.transpose()
+        state.mean = self.transition(&state.mean, motion);
+        let covariance = f * state.covariance * f.transpose()
             + self.process_noise(motion.dt)
-            + self.ego_noise(&belief.mean, motion);
-        belief.covariance = symmetric(covariance);
+            + self.ego_noise(&state.mean, motion);
+        state.covariance = symmetric(covariance);
     }
 
     /// The update in Joseph form. S = P + R is positive definite as long as P
-    /// is; where rounding has spoilt that, the belief is left as it is.
-    fn correct(&self, belief: &mut Belief, detection: &Detection, _: &Camera) -> Support {
-        let p = belief.covariance;
+    /// is; where rounding has spoilt that, the state is left as it is.
+    fn correct(&self, state: &mut State, detection: &Detection, _: &Camera) -> Update {
+        let p = state.covariance;
         let prior = p.fixed_view::<3, 3>(0, 0).into_owned();
-        let innovation = detection.position.coords - belief.mean.fixed_rows::<3>(0);
+        let innovation = detection.position.coords - state.mean.fixed_rows::<3>(0);
         let variances = detection.covariance.diagonal();
         let measured = variances.iter().filter(|v| **v < UNMEASURED_M2).count() as u32;
         let normal = self.measurement(detection);
         let Some(s) = symmetric3(prior + normal).cholesky() else {
-            return Support::default();
+            return Update::default();
         };
         let nis = innovation.dot(&s.solve(&innovation));
         let r = normal / self.weight(&prior, &normal, &innovation, measured);
-        let Some(s) = symmetric3(prior + r).cholesky() else { return Support::default() };
+        let Some(s) = symmetric3(prior + r).cholesky() else { return Update::default() };
         let gain: Matrix5x3 = s.solve(&p.fixed_rows::<3>(0).into_owned()).transpose();
-        belief.mean += gain * innovation;
-        belief.covariance = self.corrected(&p, &gain, &r);
-        Support { nis: Some((nis, measured)) }
+        state.mean += gain * innovation;
+        state.covariance = self.corrected(&p, &gain, &r);
+        Update { nis: Some((nis, measured)) }
     }
 
-    fn merge(&self, alternatives: &[(f64, Belief)]) -> Belief {
+    fn merge(&self, alternatives: &[(f64, State)]) -> State {
         let parts: Vec<_> = alternatives
             .iter()
-            .map(|(weight, belief)| (*weight, belief.mean, belief.covariance))
+            .map(|(weight, state)| (*weight, state.mean, state.covariance))
             .collect();
         let (mean, covariance) = match_moments(&parts);
-        Belief { mean, covariance: symmetric(covariance) }
+        State { mean, covariance: symmetric(covariance) }
     }
 
-    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
-        let m = &belief.mean;
+    fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
+        let m = &state.mean;
         let position = Point3::new(m[0], m[1], m[2]);
         Estimate {
             person: Person { position, velocity: Vector2::new(m[3], m[4]) },
-            covariance: belief.covariance,
+            covariance: state.covariance,
             region: camera.upper_body(&position),
         }
     }
@@ -185,13 +185,13 @@ impl Ekf {
 }
 
 /// From the axes before the robot's turn to those after it.
-fn turn_back(motion: &Motion) -> Matrix2<f64> {
+fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
     let (sin, cos) = motion.turn.sin_cos();
     Matrix2::new(cos, sin, -sin, cos)
 }
 
 /// Derivative of the transition by the state.
-pub(crate) fn state_jacobian(motion: &Motion) -> Matrix5 {
+pub(crate) fn state_jacobian(motion: &EgoMotion) -> Matrix5 {
     let back = turn_back(motion);
     let mut f = Matrix5::identity();
     f.fixed_view_mut::<2, 2>(0, 0).copy_from(&back);
@@ -203,7 +203,7 @@ pub(crate) fn state_jacobian(motion: &Motion) -> Matrix5 {
 /// Derivative of the transition by the motion (forward, left, turn), at the
 /// predicted state (x, y, z, vx, vy): turning by a little moves (x, y) by
 /// (y, -x).
-pub(crate) fn motion_jacobian(predicted: &Vector5<f64>, motion: &Motion) -> Matrix5x3 {
+pub(crate) fn motion_jacobian(predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5x3 {
     let mut j = Matrix5x3::zeros();
     j.fixed_view_mut::<2, 2>(0, 0).copy_from(&-turn_back(motion));
     let [x, y, _, vx, vy] = [0, 1, 2, 3, 4].map(|i| predicted[i]);

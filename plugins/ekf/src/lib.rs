@@ -16,7 +16,7 @@ mod filter;
 mod tests;
 
 pub use config::Config;
-pub use filter::{Belief, Ekf};
+pub use filter::{Ekf, State};
 use tagalong_config::Registry;
 use tagalong_core::PerPerson;
 

@@ -17,7 +17,7 @@ pub(crate) type Haar = [(Corners, f32); 3];
 
 /// A feature of windows anywhere in an image.
 #[derive(Clone, Debug)]
-enum Look {
+enum WindowFeature {
     Haar(Haar),
     /// 4x4 corners of 3x3 blocks.
     Binary([u32; 16]),
@@ -47,20 +47,20 @@ enum Weak {
 }
 
 impl Weak {
-    fn new(tree: &Tree, looks: &[Look]) -> Self {
+    fn new(tree: &Tree, looks: &[WindowFeature]) -> Self {
         stump(tree, looks).or_else(|| pair(tree, looks)).unwrap_or_else(|| Self::Tree(tree.clone()))
     }
 }
 
 /// Returns the rectangles and the threshold of a node.
-fn asked(node: &Node, looks: &[Look]) -> Option<(Haar, f32)> {
+fn asked(node: &Node, looks: &[WindowFeature]) -> Option<(Haar, f32)> {
     match (looks.get(node.feature)?, node.split) {
-        (Look::Haar(parts), Split::Below(threshold)) => Some((*parts, threshold)),
+        (WindowFeature::Haar(parts), Split::Below(threshold)) => Some((*parts, threshold)),
         _ => None,
     }
 }
 
-fn stump(tree: &Tree, looks: &[Look]) -> Option<Weak> {
+fn stump(tree: &Tree, looks: &[WindowFeature]) -> Option<Weak> {
     let [Node { next: [Next::Leaf(yes), Next::Leaf(no)], .. }] = tree[..] else { return None };
     let (parts, threshold) = asked(&tree[0], looks)?;
     Some(Weak::Stump { parts, threshold, values: [yes, no] })
@@ -68,7 +68,7 @@ fn stump(tree: &Tree, looks: &[Look]) -> Option<Weak> {
 
 /// Converts a tree of depth two; a leaf in place of a question becomes one that is always answered
 /// with yes.
-fn pair(tree: &Tree, looks: &[Look]) -> Option<Weak> {
+fn pair(tree: &Tree, looks: &[WindowFeature]) -> Option<Weak> {
     let (first, threshold) = asked(tree.first()?, looks)?;
     let mut pair = Pair {
         parts: [first; 3],
@@ -100,7 +100,7 @@ struct Stage {
 #[derive(Clone, Debug)]
 pub struct Compiled {
     layout: (usize, usize),
-    looks: Vec<Look>,
+    looks: Vec<WindowFeature>,
     stages: Vec<Stage>,
     middle: Corners,
     area: f64,
@@ -124,16 +124,16 @@ impl Compiled {
     /// Computes the offsets for the sums of a level; `cascade` was checked.
     pub fn new(cascade: &Cascade, level: &Level) -> Self {
         let look = |feature: &Feature| match feature {
-            Feature::Haar(parts) => Look::Haar(rectangles(parts, level)),
+            Feature::Haar(parts) => WindowFeature::Haar(rectangles(parts, level)),
             Feature::Binary(part) => {
                 let at = |k: usize| {
                     let (x, y) = (part.x + k % 4 * part.width, part.y + k / 4 * part.height);
                     level.offset(x, y) as u32
                 };
-                Look::Binary(std::array::from_fn(at))
+                WindowFeature::Binary(std::array::from_fn(at))
             }
         };
-        let looks: Vec<Look> = cascade.features.iter().map(look).collect();
+        let looks: Vec<WindowFeature> = cascade.features.iter().map(look).collect();
         let weak = |tree: &Tree| Weak::new(tree, &looks);
         let stages = cascade.stages.iter().map(|stage| Stage {
             threshold: stage.threshold,
@@ -261,10 +261,10 @@ impl Compiled {
         loop {
             let node = &tree[at];
             let yes = match (&self.looks[node.feature], node.split) {
-                (Look::Haar(parts), Split::Below(threshold)) => {
+                (WindowFeature::Haar(parts), Split::Below(threshold)) => {
                     haar(parts, sums) * contrast < threshold
                 }
-                (Look::Binary(corners), Split::Among(bits)) => {
+                (WindowFeature::Binary(corners), Split::Among(bits)) => {
                     let pattern = pattern(corners, sums);
                     bits[pattern >> 5] >> (pattern & 31) & 1 == 1
                 }

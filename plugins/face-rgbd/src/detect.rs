@@ -1,7 +1,7 @@
 use nalgebra::Point2;
 use tagalong_config::Context;
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 
@@ -116,12 +116,12 @@ impl Detector for FaceRgbd {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let near = match search {
-            Search::Near(track) => Some(track.estimate.region),
-            Search::Everywhere { .. } => None,
+            Query::Track(track) => Some(track.estimate.region),
+            Query::Discover { .. } => None,
         };
         self.search(frame, near, funnel)?;
         self.grouping.group(&self.hits, self.config.min_neighbours);
@@ -148,7 +148,7 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{Estimate, Images, Motion, Person, Stamp, Track, TrackId};
+    use tagalong_core::{EgoMotion, Estimate, Images, Person, Stamp, Track, TrackId};
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
@@ -187,7 +187,7 @@ mod tests {
             depth: depth_m.map(|metres| Arc::new(DepthImage::filled(160, 120, metres))),
             ..Images::default()
         };
-        Frame::new(1, Stamp::default(), Arc::new(camera()), Motion::at_rest(0.1), images)
+        Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(0.1), images)
     }
 
     fn track(region: Rect) -> Track {
@@ -212,13 +212,13 @@ mod tests {
     fn detect(
         detector: &mut FaceRgbd,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
     ) -> (Vec<Detection>, Funnel) {
         let mut funnel = Funnel::default();
         (detector.detect(frame, search, &mut funnel).unwrap(), funnel)
     }
 
-    const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
+    const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
 
     #[test]
     fn a_face_is_as_far_away_as_depth_says_else_as_its_size_does() {
@@ -271,7 +271,7 @@ mod tests {
         let (all, whole) = detect(&mut detector(eager()), &frame(None), &EVERYWHERE);
         let upper_body = Rect::new(40.0, 30.0, 60.0, 60.0);
         let (found, part) =
-            detect(&mut detector(eager()), &frame(None), &Search::Near(&track(upper_body)));
+            detect(&mut detector(eager()), &frame(None), &Query::Track(&track(upper_body)));
         assert_eq!(found.len(), 1);
         assert!(all.len() > 1);
         let face = camera().project(&found[0].position).unwrap();

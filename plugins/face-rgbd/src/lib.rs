@@ -32,7 +32,7 @@ pub use detect::FaceRgbd;
 pub use group::{Group, Grouping, Hit, grouped};
 pub use level::Level;
 pub use propose::Proposals;
-pub use scan::{Scanner, Seen, scales, whole};
+pub use scan::{PassedWindow, Scanner, scales, whole};
 use tagalong_config::Registry;
 
 /// Name of this plugin in configs.

@@ -215,7 +215,7 @@ fn skin(image: &RgbImage, x: i64, y: i64) -> bool {
 mod tests {
     use std::sync::Arc;
 
-    use tagalong_core::{Images, Motion, Stamp};
+    use tagalong_core::{EgoMotion, Images, Stamp};
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
@@ -264,7 +264,7 @@ mod tests {
             depth: Some(Arc::new(depth)),
             ..Images::default()
         };
-        Frame::new(1, Stamp::default(), Arc::new(camera()), Motion::at_rest(0.1), images)
+        Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(0.1), images)
     }
 
     fn sampled(blocks: &[Block], config: &Config) -> (Proposals, [u64; 3]) {

@@ -13,7 +13,7 @@ const FINE_FROM: f64 = 2.0;
 
 /// A window that passed all stages, with the pixels that the cascade read.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
+pub struct PassedWindow<'a> {
     /// Computed part of the image in the current size.
     pub level: &'a Level,
     /// Position of this part in the whole image of that size.
@@ -94,7 +94,7 @@ impl Scanner {
         scale: f64,
         area: &Rect,
         propose: &impl Fn(usize, usize) -> bool,
-        take: &mut impl FnMut(Seen<'_>),
+        take: &mut impl FnMut(PassedWindow<'_>),
     ) {
         let step = if scale >= FINE_FROM { 1 } else { 2 };
         let size =
@@ -157,7 +157,7 @@ struct Row<'a> {
 
 impl Row<'_> {
     /// Scans the wanted windows from column `x` on; returns their number.
-    fn look(&mut self, wanted: &[bool], x: usize, take: &mut impl FnMut(Seen<'_>)) -> u64 {
+    fn look(&mut self, wanted: &[bool], x: usize, take: &mut impl FnMut(PassedWindow<'_>)) -> u64 {
         if !wanted.contains(&true) {
             // A gap in the wanted windows interrupts the row, so no neighbour is skipped behind it.
             self.is_skipped = false;
@@ -169,7 +169,7 @@ impl Row<'_> {
         for lane in block.lanes() {
             let margin = self.compiled.margin(&block, lane);
             let (x, part) = (x + lane * self.step, self.part);
-            take(Seen { level: self.level, part, x, y: self.y, margin });
+            take(PassedWindow { level: self.level, part, x, y: self.y, margin });
         }
         looked_at
     }

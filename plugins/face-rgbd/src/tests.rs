@@ -4,7 +4,8 @@ use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 
 use crate::{
-    Cascade, Feature, Hit, Level, Next, Node, Part, Scanner, Seen, Split, Stage, grouped, whole,
+    Cascade, Feature, Hit, Level, Next, Node, Part, PassedWindow, Scanner, Split, Stage, grouped,
+    whole,
 };
 
 pub(crate) fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
@@ -140,7 +141,7 @@ proptest! {
         let shrunk = GreyImage::from_pixels(width, height, level.pixels().to_vec()).unwrap();
         for cascade in [small(), binary()] {
             let (mut scanner, mut found) = (Scanner::default(), Vec::new());
-            let mut take = |seen: Seen<'_>| found.push((seen.x, seen.y));
+            let mut take = |seen: PassedWindow<'_>| found.push((seen.x, seen.y));
             scanner.size(&image, &cascade, scale, &whole(&image), &|_, _| true, &mut take);
             prop_assert_eq!(found, slow_scan(&shrunk, &cascade, step));
         }

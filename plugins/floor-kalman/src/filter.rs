@@ -2,21 +2,21 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry2, Matrix2, Matrix2x3, Point3, Rotation2, SMatrix, Vector2};
 use tagalong_core::{
-    Detection, Estimate, Evidence, Filter, Motion, Person, Result, Support, TrackId,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Person, Result, TrackId, Update,
 };
 use tagalong_geometry::Camera;
 
-use crate::belief::Belief;
+use crate::state::State;
 use crate::{Config, Measurement};
 
 /// A coordinate with a larger variance, m², was not measured.
 const UNMEASURED_M2: f64 = 100.0;
 
-/// The filter: beliefs about everybody in the room.
+/// The filter: states about everybody in the room.
 pub struct FloorKalman {
     config: Config,
     room_from_robot: Isometry2<f64>,
-    beliefs: BTreeMap<TrackId, Belief>,
+    states: BTreeMap<TrackId, State>,
 }
 
 impl FloorKalman {
@@ -28,7 +28,7 @@ impl FloorKalman {
         config.check()?;
         let turn = -config.room_heading_deg.to_radians();
         let room_from_robot = Isometry2::new(Vector2::zeros(), turn);
-        Ok(Self { config, room_from_robot, beliefs: BTreeMap::new() })
+        Ok(Self { config, room_from_robot, states: BTreeMap::new() })
     }
 
     fn rotation(&self) -> Matrix2<f64> {
@@ -58,7 +58,7 @@ impl FloorKalman {
 
     /// What the uncertainty of the robot's motion adds to a place in the room as
     /// the robot sees it.
-    fn ego_noise(&self, at: &Vector2<f64>, motion: &Motion) -> Matrix2<f64> {
+    fn ego_noise(&self, at: &Vector2<f64>, motion: &EgoMotion) -> Matrix2<f64> {
         let from_robot = at - self.room_from_robot.translation.vector;
         let mut j = Matrix2x3::zeros();
         j.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.rotation());
@@ -66,22 +66,22 @@ impl FloorKalman {
         j * motion.covariance * j.transpose()
     }
 
-    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+    fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
         let back = self.room_from_robot.inverse();
         let turn = *back.rotation.to_rotation_matrix().matrix();
-        let place = back * nalgebra::Point2::from(belief.position());
-        let position = Point3::new(place.x, place.y, belief.height.0);
-        let (velocity, velocity_covariance) = belief.velocity();
+        let place = back * nalgebra::Point2::from(state.position());
+        let position = Point3::new(place.x, place.y, state.height.0);
+        let (velocity, velocity_covariance) = state.velocity();
         let mut covariance = SMatrix::<f64, 5, 5>::zeros();
         let mut set = |row: usize, column: usize, block: &Matrix2<f64>| {
             covariance.fixed_view_mut::<2, 2>(row, column).copy_from(&turned(&turn, block));
         };
-        set(0, 0, &belief.position_covariance());
+        set(0, 0, &state.position_covariance());
         set(3, 3, &velocity_covariance);
-        let cross = belief.covariance.fixed_view::<2, 2>(0, 2).into_owned();
+        let cross = state.covariance.fixed_view::<2, 2>(0, 2).into_owned();
         set(0, 3, &cross);
         set(3, 0, &cross.transpose());
-        covariance[(2, 2)] = belief.height.1;
+        covariance[(2, 2)] = state.height.1;
         Estimate {
             person: Person { position, velocity: turn * velocity },
             covariance,
@@ -94,40 +94,40 @@ impl Filter for FloorKalman {
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
         let (at, r) = self.measured(detection);
         let height = (detection.position.z, detection.covariance[(2, 2)]);
-        self.beliefs.insert(id, Belief::new(at, &r, height, &self.config));
+        self.states.insert(id, State::new(at, &r, height, &self.config));
     }
 
-    fn predict(&mut self, motion: &Motion, _: &Camera) {
-        let mut beliefs = std::mem::take(&mut self.beliefs);
+    fn predict(&mut self, motion: &EgoMotion, _: &Camera) {
+        let mut states = std::mem::take(&mut self.states);
         self.room_from_robot *= motion.isometry();
-        for belief in beliefs.values_mut() {
-            let ego = self.ego_noise(&belief.position(), motion);
-            belief.predict(motion.dt, &ego, &self.config);
+        for state in states.values_mut() {
+            let ego = self.ego_noise(&state.position(), motion);
+            state.predict(motion.dt, &ego, &self.config);
         }
-        self.beliefs = beliefs;
+        self.states = states;
     }
 
-    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let mut supported = BTreeMap::new();
         for (id, detection) in evidence.best_matches() {
             let (z, r) = self.measured(detection);
-            let Some(belief) = self.beliefs.get_mut(&id) else { continue };
-            let nis = belief.correct(&z, &r, self.config.form);
+            let Some(state) = self.states.get_mut(&id) else { continue };
+            let nis = state.correct(&z, &r, self.config.form);
             let height = detection.covariance[(2, 2)];
             if height < UNMEASURED_M2 {
-                belief.correct_height(detection.position.z, height);
+                state.correct_height(detection.position.z, height);
             }
-            supported.insert(id, Support { nis: nis.map(|nis| (nis, 2)) });
+            supported.insert(id, Update { nis: nis.map(|nis| (nis, 2)) });
         }
         Ok(supported)
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-        self.beliefs.iter().map(|(id, belief)| (*id, self.estimate(belief, camera))).collect()
+        self.states.iter().map(|(id, state)| (*id, self.estimate(state, camera))).collect()
     }
 
     fn stop(&mut self, id: TrackId) {
-        self.beliefs.remove(&id);
+        self.states.remove(&id);
     }
 }
 

@@ -9,9 +9,9 @@
 //! The room is the robot's frame at the start of the run, turned by
 //! `room_heading_deg`; odometry carries it on, so the robot may move.
 
-mod belief;
 mod config;
 mod filter;
+mod state;
 #[cfg(test)]
 mod tests;
 

@@ -3,11 +3,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry2, Matrix2, Matrix2x3, Matrix3, Point2, Point3, Vector2};
 use proptest::prelude::*;
 use tagalong_core::{
-    Detection, Estimate, Evidence, Filter, Frame, Images, Matched, Motion, Stamp, TrackId,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Matched, Stamp, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
-use crate::belief::Belief;
+use crate::state::State;
 use crate::{Config, FloorKalman, Form, Measurement};
 
 const ID: TrackId = TrackId(1);
@@ -19,7 +19,7 @@ fn camera() -> Camera {
 
 fn frame() -> Frame {
     let camera = Arc::new(camera());
-    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
 }
 
 fn sighting(x: f64, y: f64) -> Detection {
@@ -52,7 +52,7 @@ fn after_a_walk(config: Config) -> FloorKalman {
     let mut filter = FloorKalman::new(config).unwrap();
     filter.start(ID, &sighting(2.0, 0.0), &camera());
     for step in 1..=30 {
-        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
+        filter.predict(&EgoMotion::at_rest(1.0 / 3.0), &camera());
         see(&mut filter, &sighting(2.0 + 0.2 * f64::from(step), 0.0));
     }
     filter
@@ -72,7 +72,7 @@ fn the_printed_filter_is_the_printed_filter() {
         let k = p * (p + r).try_inverse().unwrap();
         x += k * (z - x);
         p = (Matrix2::identity() - k) * p;
-        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
+        filter.predict(&EgoMotion::at_rest(1.0 / 3.0), &camera());
         see(&mut filter, &sighting(z.x, z.y));
         let found = estimate(&filter);
         assert!((found.person.position.xy().coords - x).norm() < 1e-12);
@@ -89,7 +89,7 @@ fn a_walk_is_foreseen_by_those_who_know_a_velocity() {
     let ahead = |form, compat_printed_u| {
         let config = Config { form, compat_printed_u, ..Config::default() };
         let mut filter = after_a_walk(config);
-        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
+        filter.predict(&EgoMotion::at_rest(1.0 / 3.0), &camera());
         estimate(&filter).person.position.x - 8.2
     };
     assert!(ahead(Form::Still, false) < -0.19, "{}", ahead(Form::Still, false));
@@ -107,7 +107,7 @@ fn the_noise_of_u_makes_the_prediction_less_certain() {
     let spread = |compat_printed_u| {
         let form = Form::LastDifference;
         let mut filter = after_a_walk(Config { form, compat_printed_u, ..Config::default() });
-        filter.predict(&Motion::at_rest(1.0 / 3.0), &camera());
+        filter.predict(&EgoMotion::at_rest(1.0 / 3.0), &camera());
         estimate(&filter).covariance[(0, 0)]
     };
     assert!(spread(false) > 1.3 * spread(true), "{} {}", spread(false), spread(true));
@@ -165,19 +165,19 @@ fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
         let noisy = |at: Vector2<f64>, n: &mut dyn FnMut() -> f64| {
             at + Vector2::new(n(), n()) * 0.02_f64.sqrt()
         };
-        let mut belief = Belief::new(noisy(truth[1], &mut normal), &r, (1.6, 0.01), &config);
+        let mut state = State::new(noisy(truth[1], &mut normal), &r, (1.6, 0.01), &config);
         for step in 0..3 {
             let noise = root * Vector2::new(normal(), normal());
             // The first step of the filter knows no difference, and so has none.
             let u = if step == 0 { Vector2::zeros() } else { truth[1] - truth[0] };
             truth = [truth[1], truth[1] + u + noise];
-            belief.predict(config.step_s, &Matrix2::zeros(), &config);
+            state.predict(config.step_s, &Matrix2::zeros(), &config);
             if step < 2 {
-                belief.correct(&noisy(truth[1], &mut normal), &r, config.form);
+                state.correct(&noisy(truth[1], &mut normal), &r, config.form);
             }
         }
-        squares += (belief.position() - truth[1]).norm_squared();
-        said = belief.position_covariance().trace();
+        squares += (state.position() - truth[1]).norm_squared();
+        said = state.position_covariance().trace();
         count += 1.0;
     }
     let seen = squares / count;
@@ -194,7 +194,7 @@ proptest! {
             let config = Config { form, room_heading_deg: room, ..Config::default() };
             let mut filter = FloorKalman::new(config).unwrap();
             filter.start(ID, &sighting(x, y), &camera());
-            let motion = Motion { forward, left, turn, ..Motion::at_rest(0.3) };
+            let motion = EgoMotion { forward, left, turn, ..EgoMotion::at_rest(0.3) };
             let mut at = Point2::new(x, y);
             for _ in 0..4 {
                 filter.predict(&motion, &camera());
@@ -271,12 +271,12 @@ fn four_states_are_those_of_a_filter_written_down() {
     let mut book = Textbook { mean, covariance };
     for (x, y) in [(2.1, 1.2), (1.9, 1.3), (1.6, 1.1), (1.7, 0.8)] {
         let uncertain = Matrix3::new(0.01, 0.002, 0.0, 0.002, 0.004, 0.001, 0.0, 0.001, 0.003);
-        let motion = Motion {
+        let motion = EgoMotion {
             forward: 0.2,
             left: 0.05,
             turn: 0.3,
             covariance: uncertain,
-            ..Motion::at_rest(0.4)
+            ..EgoMotion::at_rest(0.4)
         };
         room_from_robot *= motion.isometry();
         let rotation = turn(&room_from_robot);
@@ -321,7 +321,7 @@ fn the_height_is_filtered_by_itself_and_kept_where_it_is_not_measured() {
         detection
     };
     filter.start(ID, &with_height(1.5, 0.04), &camera());
-    filter.predict(&Motion::at_rest(0.5), &camera());
+    filter.predict(&EgoMotion::at_rest(0.5), &camera());
     let height = |filter: &FloorKalman| {
         let found = estimate(filter);
         (found.person.position.z, found.covariance[(2, 2)])
@@ -372,7 +372,7 @@ fn polar_noise_lies_along_the_ray_however_the_robot_is_turned() {
 fn the_noise_of_differences_is_that_of_the_joint_covariance() {
     let config = Config { form: Form::LastDifference, ..Config::default() };
     let r = Matrix2::new(0.03, 0.01, 0.01, 0.02);
-    let mut belief = Belief::new(Vector2::new(1.0, 2.0), &r, (1.6, 0.01), &config);
+    let mut state = State::new(Vector2::new(1.0, 2.0), &r, (1.6, 0.01), &config);
     // Errors of the last posterior and of the one before.
     let mut joint = DMatrix::zeros(4, 4);
     joint.view_mut((0, 0), (2, 2)).copy_from(&r);
@@ -386,14 +386,14 @@ fn the_noise_of_differences_is_that_of_the_joint_covariance() {
             ahead[(axis + 2, axis)] = 1.0;
         }
         joint = &ahead * joint * ahead.transpose();
-        let before = belief.position();
+        let before = state.position();
         let mut prior = joint.fixed_view::<2, 2>(0, 0) + config.process(dt);
         joint.view_mut((0, 0), (2, 2)).copy_from(&prior);
-        belief.predict(dt, &Matrix2::zeros(), &config);
-        assert!((belief.position_covariance() - prior).norm() < 1e-12, "{step}");
+        state.predict(dt, &Matrix2::zeros(), &config);
+        assert!((state.position_covariance() - prior).norm() < 1e-12, "{step}");
         if step > 0 {
-            let u = belief.position() - before;
-            assert!((belief.velocity().0 - u / dt).norm() < 1e-12);
+            let u = state.position() - before;
+            assert!((state.velocity().0 - u / dt).norm() < 1e-12);
         }
         let kept = Matrix2::identity() - prior * (prior + r).try_inverse().unwrap();
         let mut corrected = DMatrix::identity(4, 4);
@@ -402,8 +402,8 @@ fn the_noise_of_differences_is_that_of_the_joint_covariance() {
         let gain = Matrix2::identity() - kept;
         prior = kept * prior * kept.transpose() + gain * r * gain.transpose();
         joint.view_mut((0, 0), (2, 2)).copy_from(&prior);
-        belief.correct(&Vector2::new(1.0 + 0.1 * f64::from(step), 2.2), &r, config.form);
-        assert!((belief.position_covariance() - prior).norm() < 1e-12, "{step}");
+        state.correct(&Vector2::new(1.0 + 0.1 * f64::from(step), 2.2), &r, config.form);
+        assert!((state.position_covariance() - prior).norm() < 1e-12, "{step}");
     }
 }
 

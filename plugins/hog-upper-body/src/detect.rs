@@ -3,7 +3,7 @@ use std::ops::RangeInclusive;
 use nalgebra::Matrix3;
 use tagalong_config::Context;
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Result, Search,
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
@@ -172,15 +172,15 @@ impl Detector for HogUpperBody {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let grey = frame.grey()?;
         let camera = &*frame.camera;
         let depth = frame.images().depth.as_deref().filter(|_| self.config.depth_proposals);
         let near = match search {
-            Search::Near(track) => Some(track.estimate.region),
-            Search::Everywhere { .. } => None,
+            Query::Track(track) => Some(track.estimate.region),
+            Query::Discover { .. } => None,
         };
         let Self { config, model, scanner, lattice, windows } = self;
         let mut proposer = Proposer::new(config, camera, depth, lattice, near);
@@ -215,7 +215,7 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{Estimate, GreyImage, Images, Motion, Person, Stamp, Track, TrackId};
+    use tagalong_core::{EgoMotion, Estimate, GreyImage, Images, Person, Stamp, Track, TrackId};
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
@@ -288,7 +288,7 @@ mod tests {
     }
 
     fn detector(config: Config) -> HogUpperBody {
-        let wheels = tagalong_core::Wheels { half_separation_m: 0.2, slip: 0.0 };
+        let wheels = tagalong_core::DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         let context = Context { seed: 1, base_dir: ".".into(), wheels };
         HogUpperBody::new(config, &context).unwrap()
     }
@@ -328,8 +328,8 @@ mod tests {
             depth: depth_m.map(|metres| Arc::new(DepthImage::filled(160, 120, metres))),
             ..Images::default()
         };
-        let frame = Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images);
-        let search = near.map_or(Search::Everywhere { occupied: &[] }, Search::Near);
+        let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
+        let search = near.map_or(Query::Discover { occupied: &[] }, Query::Track);
         let mut funnel = Funnel::default();
         let found = detector(config).detect(&frame, &search, &mut funnel).unwrap();
         let count = |test: &str| funnel.count(test);

@@ -95,7 +95,7 @@ pub struct Model {
 /// Content of a model file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Kept {
+struct ModelFile {
     format: String,
     machine: Kind,
     /// Bias of a linear machine; for trees, the sum below which a window is rejected, for each
@@ -143,7 +143,7 @@ impl Model {
             }
             Machine::Trees(all) => (all.least.clone(), trees::to_bytes(&all.trees)),
         };
-        let kept = Kept {
+        let kept = ModelFile {
             format: FORMAT.into(),
             machine: self.kind(),
             levels,
@@ -159,12 +159,12 @@ impl Model {
     /// # Errors
     /// Text that is not a model; the message is one sentence.
     pub fn from_text(text: &str) -> Result<Self, String> {
-        let kept: Kept = toml::from_str(text).map_err(|error| error.to_string())?;
+        let kept: ModelFile = toml::from_str(text).map_err(|error| error.to_string())?;
         if kept.format != FORMAT {
             return Err(format!("its format is `{}`, expected `{FORMAT}`", kept.format));
         }
         let bytes = BASE64_STANDARD.decode(&kept.numbers).map_err(|error| error.to_string())?;
-        let Kept { machine, levels, slope, offset, .. } = kept;
+        let ModelFile { machine, levels, slope, offset, .. } = kept;
         let finite =
             levels.iter().all(|level| level.is_finite()) && slope.is_finite() && offset.is_finite();
         if !finite || slope <= 0.0 {

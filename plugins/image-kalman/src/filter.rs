@@ -1,14 +1,14 @@
 use std::collections::BTreeMap;
 
-use tagalong_core::{Detection, Estimate, Evidence, Filter, Motion, Result, Support, TrackId};
+use tagalong_core::{Detection, EgoMotion, Estimate, Evidence, Filter, Result, TrackId, Update};
 use tagalong_geometry::Camera;
 
-use crate::{Belief, Config};
+use crate::{Config, State};
 
 /// Kalman filter of the box in the image, with one state for each track.
 pub struct ImageKalman {
     config: Config,
-    beliefs: BTreeMap<TrackId, Belief>,
+    states: BTreeMap<TrackId, State>,
 }
 
 impl ImageKalman {
@@ -18,28 +18,28 @@ impl ImageKalman {
     /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
-        Ok(Self { config, beliefs: BTreeMap::new() })
+        Ok(Self { config, states: BTreeMap::new() })
     }
 }
 
 impl Filter for ImageKalman {
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
-        let belief = Belief::start(&self.config, detection, camera);
-        self.beliefs.insert(id, belief);
+        let state = State::start(&self.config, detection, camera);
+        self.states.insert(id, state);
     }
 
-    fn predict(&mut self, motion: &Motion, camera: &Camera) {
-        for belief in self.beliefs.values_mut() {
-            belief.predict(&self.config, motion, camera);
+    fn predict(&mut self, motion: &EgoMotion, camera: &Camera) {
+        for state in self.states.values_mut() {
+            state.predict(&self.config, motion, camera);
         }
     }
 
-    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let camera = &evidence.frame.camera;
         let mut supported = BTreeMap::new();
         for (id, detection) in evidence.best_matches() {
-            if let Some(belief) = self.beliefs.get_mut(&id) {
-                let support = belief.correct(&self.config, detection, camera);
+            if let Some(state) = self.states.get_mut(&id) {
+                let support = state.correct(&self.config, detection, camera);
                 supported.insert(id, support);
             }
         }
@@ -47,10 +47,10 @@ impl Filter for ImageKalman {
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-        self.beliefs.iter().map(|(id, belief)| (*id, belief.estimate(camera))).collect()
+        self.states.iter().map(|(id, state)| (*id, state.estimate(camera))).collect()
     }
 
     fn stop(&mut self, id: TrackId) {
-        self.beliefs.remove(&id);
+        self.states.remove(&id);
     }
 }

@@ -19,7 +19,7 @@ mod tests;
 
 pub use config::Config;
 pub use filter::ImageKalman;
-pub use model::Belief;
+pub use model::State;
 use tagalong_config::Registry;
 
 /// Name of this plugin in configs.

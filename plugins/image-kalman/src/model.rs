@@ -1,11 +1,11 @@
 //! State of one track, its prediction over time and robot motion, and its update by a detection.
 
 use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5};
-use tagalong_core::{Detection, Estimate, Motion, Person, Support};
+use tagalong_core::{Detection, EgoMotion, Estimate, Person, Update};
 use tagalong_geometry::{Camera, Rect};
 
 use crate::Config;
-use crate::space::{Place, Seen, pixel_covariance, range};
+use crate::space::{ImagePoint, RobotPoint, pixel_covariance, range};
 
 type Matrix3x5 = SMatrix<f64, 3, 5>;
 
@@ -18,7 +18,7 @@ const MOTION_STEP: f64 = 1e-4;
 
 /// Gaussian state of one person.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Belief {
+pub struct State {
     /// (x, y, vx, vy, s): centre of the box, pixels; its velocity with the robot's motion taken
     /// out, pixels/s; its width, pixels.
     pub image: Vector5<f64>,
@@ -31,7 +31,7 @@ pub struct Belief {
     shape: Shape,
     /// Position in space of a person behind the camera, after a motion of the robot: there is no
     /// pixel, so the person is kept here until in front again.
-    behind: Option<Place>,
+    behind: Option<RobotPoint>,
     /// Time since the previous frame, s.
     step_s: f64,
 }
@@ -63,7 +63,7 @@ impl Shape {
     }
 }
 
-impl Belief {
+impl State {
     /// Initialises the state from the first detection.
     pub fn start(config: &Config, detection: &Detection, camera: &Camera) -> Self {
         let centre = detection.region.centre();
@@ -90,7 +90,7 @@ impl Belief {
     }
 
     /// Predicts forward in time (eq. 7), and into the robot's new frame.
-    pub fn predict(&mut self, config: &Config, motion: &Motion, camera: &Camera) {
+    pub fn predict(&mut self, config: &Config, motion: &EgoMotion, camera: &Camera) {
         self.step_s = motion.dt;
         // The pixel velocity is that of the old frame, so the time step comes before the change
         // of frame.
@@ -115,7 +115,7 @@ impl Belief {
     }
 
     /// Compensates the robot's own motion: the head is moved in space, and the box with it.
-    fn turn_with(&mut self, motion: &Motion, camera: &Camera) {
+    fn turn_with(&mut self, motion: &EgoMotion, camera: &Camera) {
         let before = self.seen();
         let last = before.in_space(camera);
         let place = match self.behind.take() {
@@ -130,7 +130,7 @@ impl Belief {
         };
         self.doubt_the_motion(&before, &after, motion, camera);
         // The floor keeps the ratio of the widths finite for a head beside the lens.
-        let depth = |place: &Place| camera.depth_of(&place.position).max(MIN_RANGE_M);
+        let depth = |place: &RobotPoint| camera.depth_of(&place.position).max(MIN_RANGE_M);
         self.image[4] *= depth(&last) / depth(&place);
         self.image.fixed_rows_mut::<2>(2).copy_from(&after.velocity);
         let centre = after.pixel - self.shape.head * self.image[4];
@@ -140,7 +140,13 @@ impl Belief {
 
     /// Adds the errors of the odometry, and the error of the image shift that follows from the
     /// uncertain range.
-    fn doubt_the_motion(&mut self, before: &Seen, after: &Seen, motion: &Motion, camera: &Camera) {
+    fn doubt_the_motion(
+        &mut self,
+        before: &ImagePoint,
+        after: &ImagePoint,
+        motion: &EgoMotion,
+        camera: &Camera,
+    ) {
         let mut by_motion = Matrix3::zeros();
         for (column, step) in steps(motion).into_iter().enumerate() {
             let Some(moved) = before.after(&step, camera) else { return };
@@ -152,7 +158,7 @@ impl Belief {
         self.range_covariance[(0, 0)] += noise[(2, 2)];
         // The shift at one standard deviation of the range gives that error to first order.
         let sigma = Vector2::new(self.range_covariance[(0, 0)].max(0.0).sqrt(), 0.0);
-        let farther = Seen { range: before.range + sigma, ..*before };
+        let farther = ImagePoint { range: before.range + sigma, ..*before };
         if let Some(moved) = farther.after(motion, camera) {
             let shift = moved.pixel - after.pixel;
             place = self.image_covariance.fixed_view_mut::<2, 2>(0, 0);
@@ -163,11 +169,11 @@ impl Belief {
 
     /// Updates the state with a detection (eq. 8, with a correct measurement matrix), in Joseph
     /// form.
-    pub fn correct(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Support {
+    pub fn correct(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Update {
         if self.behind.is_some() {
             // The image state means nothing behind the camera, so the track starts anew.
             *self = Self::start(config, seen, camera);
-            return Support::default();
+            return Update::default();
         }
         let by_box = self.correct_box(config, seen, camera);
         let by_range = self.correct_range(config, seen, camera);
@@ -177,7 +183,7 @@ impl Belief {
         self.stay_in_range();
         let parts = [by_box.map(|nis| (nis, 3)), by_range.map(|nis| (nis, 1))];
         let sum = |a: (f64, u32), b: (f64, u32)| (a.0 + b.0, a.1 + b.1);
-        Support { nis: parts.into_iter().flatten().reduce(sum) }
+        Update { nis: parts.into_iter().flatten().reduce(sum) }
     }
 
     /// Updates the box; returns the normalised innovation squared of centre and width.
@@ -239,9 +245,9 @@ impl Belief {
     }
 
     /// Returns the head in image coordinates and range.
-    fn seen(&self) -> Seen {
+    fn seen(&self) -> ImagePoint {
         let centre = Point2::new(self.image[0], self.image[1]);
-        Seen {
+        ImagePoint {
             pixel: centre + self.shape.head * self.image[4],
             velocity: Vector2::new(self.image[2], self.image[3]),
             range: self.range,
@@ -306,22 +312,22 @@ fn measured_range(config: &Config, detection: &Detection, camera: &Camera) -> (f
     (range, variance + config.sigma_range_m.powi(2))
 }
 
-fn is_still(motion: &Motion) -> bool {
-    let Motion { forward, left, turn, covariance, .. } = motion;
+fn is_still(motion: &EgoMotion) -> bool {
+    let EgoMotion { forward, left, turn, covariance, .. } = motion;
     *forward == 0.0 && *left == 0.0 && *turn == 0.0 && *covariance == Matrix3::zeros()
 }
 
 /// Returns the motion with a small step added to each of its three components in turn.
-fn steps(motion: &Motion) -> [Motion; 3] {
+fn steps(motion: &EgoMotion) -> [EgoMotion; 3] {
     [
-        Motion { forward: motion.forward + MOTION_STEP, ..*motion },
-        Motion { left: motion.left + MOTION_STEP, ..*motion },
-        Motion { turn: motion.turn + MOTION_STEP, ..*motion },
+        EgoMotion { forward: motion.forward + MOTION_STEP, ..*motion },
+        EgoMotion { left: motion.left + MOTION_STEP, ..*motion },
+        EgoMotion { turn: motion.turn + MOTION_STEP, ..*motion },
     ]
 }
 
 /// Returns pixel and range of `a` minus those of `b`.
-fn difference(a: &Seen, b: &Seen) -> Vector3<f64> {
+fn difference(a: &ImagePoint, b: &ImagePoint) -> Vector3<f64> {
     let pixel = a.pixel - b.pixel;
     Vector3::new(pixel.x, pixel.y, a.range.x - b.range.x)
 }

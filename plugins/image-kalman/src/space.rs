@@ -1,7 +1,7 @@
 //! Conversion between the image and the robot frame.
 
 use nalgebra::{Matrix2, Matrix3x2, Point2, Point3, SMatrix, Vector2, Vector3};
-use tagalong_core::Motion;
+use tagalong_core::EgoMotion;
 use tagalong_geometry::Camera;
 
 /// Least depth of a point that has a pixel, m.
@@ -12,7 +12,7 @@ const STEPS: [f64; 6] = [1e-2, 1e-2, 1e-2, 1e-2, 1e-5, 1e-5];
 
 /// A moving point in image coordinates and range.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct ImagePoint {
     /// Pixel of the point.
     pub(crate) pixel: Point2<f64>,
     /// Velocity of the pixel, pixels/s.
@@ -24,15 +24,15 @@ pub(crate) struct Seen {
 
 /// A moving point in the robot frame: m, m/s over ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct RobotPoint {
     pub(crate) position: Point3<f64>,
     pub(crate) velocity: Vector3<f64>,
 }
 
-impl Seen {
+impl ImagePoint {
     /// Returns the point in space: P = R u r + t and V = R (u r' + u' r), with the viewing ray u of
     /// unit length.
-    pub(crate) fn in_space(&self, camera: &Camera) -> Place {
+    pub(crate) fn in_space(&self, camera: &Camera) -> RobotPoint {
         let rotation = camera.robot_from_camera.rotation;
         let ray = camera.ray(self.pixel);
         let (length, turning) = (ray.norm(), ray_slope(camera, self.pixel) * self.velocity);
@@ -40,14 +40,14 @@ impl Seen {
         // Only the part across the ray turns the unit vector.
         let turning = (turning - unit * unit.dot(&turning)) / length;
         let velocity = unit * self.range.y + turning * self.range.x;
-        Place {
+        RobotPoint {
             position: camera.robot_from_camera * Point3::from(unit * self.range.x),
             velocity: rotation * velocity,
         }
     }
 
     /// Returns the same point after the robot's motion; `None` if that takes it behind the camera.
-    pub(crate) fn after(&self, motion: &Motion, camera: &Camera) -> Option<Self> {
+    pub(crate) fn after(&self, motion: &EgoMotion, camera: &Camera) -> Option<Self> {
         self.in_space(camera).after(motion).seen(camera)
     }
 
@@ -78,14 +78,14 @@ impl Seen {
     }
 }
 
-impl Place {
+impl RobotPoint {
     /// Returns the point after `dt` seconds, the robot standing still.
     pub(crate) fn walked(&self, dt: f64) -> Self {
         Self { position: self.position + self.velocity * dt, ..*self }
     }
 
     /// Returns the point in the robot's new frame after its motion.
-    pub(crate) fn after(&self, motion: &Motion) -> Self {
+    pub(crate) fn after(&self, motion: &EgoMotion) -> Self {
         let floor = motion.apply_to_point(self.position.xy());
         let velocity = motion.apply_to_velocity(self.velocity.xy());
         Self {
@@ -95,13 +95,13 @@ impl Place {
     }
 
     /// Projects the point into the image; `None` behind the camera.
-    pub(crate) fn seen(&self, camera: &Camera) -> Option<Seen> {
+    pub(crate) fn seen(&self, camera: &Camera) -> Option<ImagePoint> {
         let in_camera = camera.robot_from_camera.inverse_transform_point(&self.position);
         let (depth, range) = (in_camera.z, in_camera.coords.norm());
         let pixel = camera.project_from_camera(&in_camera).filter(|_| depth > NEAREST_M)?;
         let velocity = camera.robot_from_camera.rotation.inverse() * self.velocity;
         let turning = (velocity - camera.ray(pixel) * velocity.z) / depth;
-        Some(Seen {
+        Some(ImagePoint {
             pixel,
             velocity: pixels_per_ray(camera, pixel)? * turning.xy(),
             range: Vector2::new(range, velocity.dot(&in_camera.coords) / range),

@@ -3,11 +3,13 @@ use std::sync::Arc;
 use nalgebra::{Matrix2, Matrix3, Point3, Vector3};
 use proptest::prelude::*;
 use tagalong_config::Registry;
-use tagalong_core::{Detection, Evidence, Filter, Frame, Images, Matched, Motion, Stamp, TrackId};
+use tagalong_core::{
+    Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, Stamp, TrackId,
+};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
-use crate::space::{Place, pixel_covariance};
-use crate::{Belief, Config, ImageKalman};
+use crate::space::{RobotPoint, pixel_covariance};
+use crate::{Config, ImageKalman, State};
 
 const DT_S: f64 = 1.0 / 23.0;
 
@@ -27,14 +29,14 @@ fn person(head: Point3<f64>) -> Detection {
 }
 
 /// Filters the detections of one person, each after a motion of the robot.
-fn fed(config: Config, sightings: &[Detection], motion: Motion) -> Belief {
+fn fed(config: Config, sightings: &[Detection], motion: EgoMotion) -> State {
     let camera = camera();
-    let mut belief = Belief::start(&config, &sightings[0], &camera);
+    let mut state = State::start(&config, &sightings[0], &camera);
     for seen in &sightings[1..] {
-        belief.predict(&config, &motion, &camera);
-        belief.correct(&config, seen, &camera);
+        state.predict(&config, &motion, &camera);
+        state.correct(&config, seen, &camera);
     }
-    belief
+    state
 }
 
 /// Detections of a box that moves by 120 pixels a second.
@@ -57,8 +59,8 @@ fn the_printed_measurement_lags_by_one_frame_and_ours_does_not() {
     let sightings = sliding(60);
     let lag = |compat_printed_measurement| {
         let config = Config { compat_printed_measurement, ..Config::default() };
-        let belief = fed(config, &sightings, Motion::at_rest(DT_S));
-        sightings[59].region.centre().x - belief.image[0]
+        let state = fed(config, &sightings, EgoMotion::at_rest(DT_S));
+        sightings[59].region.centre().x - state.image[0]
     };
     assert!(lag(false).abs() < 0.1, "{}", lag(false));
     let step = 120.0 * DT_S;
@@ -66,7 +68,7 @@ fn the_printed_measurement_lags_by_one_frame_and_ours_does_not() {
 }
 
 /// Detections of a standing person from a robot that turns and drives.
-fn from_a_moving_robot(motion: &Motion, frames: usize) -> Vec<Detection> {
+fn from_a_moving_robot(motion: &EgoMotion, frames: usize) -> Vec<Detection> {
     let mut place = Point3::new(5.0, -0.5, 1.65);
     let mut seen = vec![person(place)];
     for _ in 1..frames {
@@ -79,7 +81,7 @@ fn from_a_moving_robot(motion: &Motion, frames: usize) -> Vec<Detection> {
 
 #[test]
 fn a_standing_person_has_no_velocity_while_the_robot_turns_in_print_they_run() {
-    let motion = Motion { forward: 0.02, turn: 0.015, ..Motion::at_rest(DT_S) };
+    let motion = EgoMotion { forward: 0.02, turn: 0.015, ..EgoMotion::at_rest(DT_S) };
     let sightings = from_a_moving_robot(&motion, 30);
     let speed = |compat_printed_ego_motion| {
         let config = Config { compat_printed_ego_motion, ..Config::default() };
@@ -91,13 +93,13 @@ fn a_standing_person_has_no_velocity_while_the_robot_turns_in_print_they_run() {
 
 #[test]
 fn the_box_coasts_with_the_picture_while_the_robot_turns() {
-    let motion = Motion { turn: 0.02, ..Motion::at_rest(DT_S) };
+    let motion = EgoMotion { turn: 0.02, ..EgoMotion::at_rest(DT_S) };
     let sightings = from_a_moving_robot(&motion, 30);
     let (seen, hidden) = sightings.split_at(20);
     let (config, camera) = (Config::default(), camera());
-    let mut belief = fed(config.clone(), seen, motion);
-    hidden.iter().for_each(|_| belief.predict(&config, &motion, &camera));
-    let iou = belief.estimate(&camera).region.iou(&hidden[9].region);
+    let mut state = fed(config.clone(), seen, motion);
+    hidden.iter().for_each(|_| state.predict(&config, &motion, &camera));
+    let iou = state.estimate(&camera).region.iou(&hidden[9].region);
     assert!(iou > 0.85, "{iou}");
 }
 
@@ -105,16 +107,16 @@ fn the_box_coasts_with_the_picture_while_the_robot_turns() {
 fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
     let (config, camera) = (Config::default(), camera());
     let place = Point3::new(3.0, 0.2, 1.6);
-    let mut belief = fed(config.clone(), &vec![person(place); 10], Motion::at_rest(DT_S));
-    let turn = |belief: &mut Belief, turn: f64| {
-        let motion = Motion { turn, ..Motion::at_rest(DT_S) };
-        (0..20).for_each(|_| belief.predict(&config, &motion, &camera));
+    let mut state = fed(config.clone(), &vec![person(place); 10], EgoMotion::at_rest(DT_S));
+    let turn = |state: &mut State, turn: f64| {
+        let motion = EgoMotion { turn, ..EgoMotion::at_rest(DT_S) };
+        (0..20).for_each(|_| state.predict(&config, &motion, &camera));
     };
-    turn(&mut belief, 0.15);
-    let gone = belief.estimate(&camera);
+    turn(&mut state, 0.15);
+    let gone = state.estimate(&camera);
     assert!(gone.person.position.x < -2.0 && gone.region.area() == 0.0, "{gone:?}");
-    turn(&mut belief, -0.15);
-    let back = belief.estimate(&camera);
+    turn(&mut state, -0.15);
+    let back = state.estimate(&camera);
     assert!((back.person.position - place).norm() < 0.05, "{back:?}");
     assert!(back.region.iou(&person(place).region) > 0.9);
 }
@@ -124,8 +126,8 @@ fn a_box_of_any_shape_keeps_its_shape() {
     let seen = person(Point3::new(4.0, 0.3, 1.6));
     let Rect { x, y, width, height } = seen.region;
     let tall = Detection { region: Rect::new(x, y, width, 2.6 * height), ..seen };
-    let belief = fed(Config::default(), &vec![tall.clone(); 5], Motion::at_rest(DT_S));
-    let estimate = belief.estimate(&camera());
+    let state = fed(Config::default(), &vec![tall.clone(); 5], EgoMotion::at_rest(DT_S));
+    let estimate = state.estimate(&camera());
     assert!(estimate.region.iou(&tall.region) > 0.999, "{:?}", estimate.region);
     assert!((estimate.person.position - tall.position).norm() < 1e-6);
 }
@@ -136,8 +138,8 @@ fn a_depth_that_is_a_guess_stays_uncertain() {
     let toward = camera().robot_from_camera.rotation * Vector3::z();
     let guess = Detection { covariance: toward * toward.transpose(), ..sure.clone() };
     let sigma = |seen: &Detection| {
-        let belief = fed(Config::default(), &vec![seen.clone(); 3], Motion::at_rest(DT_S));
-        belief.estimate(&camera()).covariance[(0, 0)].sqrt()
+        let state = fed(Config::default(), &vec![seen.clone(); 3], EgoMotion::at_rest(DT_S));
+        state.estimate(&camera()).covariance[(0, 0)].sqrt()
     };
     assert!(sigma(&sure) < 0.05 && sigma(&guess) > 0.5, "{} {}", sigma(&sure), sigma(&guess));
 }
@@ -152,7 +154,7 @@ fn sightings_that_make_no_sense_leave_finite_numbers() {
         Detection { covariance: Matrix3::identity() * 1e12, ..seen.clone() },
         Detection { region: Rect::new(-1e6, 1e6, 1e5, 1.0), ..seen.clone() },
     ];
-    let moves = Motion { forward: 3.0, turn: 2.0, ..Motion::at_rest(0.0) };
+    let moves = EgoMotion { forward: 3.0, turn: 2.0, ..EgoMotion::at_rest(0.0) };
     for odd in odd {
         let mut filter = ImageKalman::new(Config::default()).unwrap();
         filter.start(TrackId(1), &odd, &camera());
@@ -245,7 +247,7 @@ fn a_step_is_that_of_the_textbook() {
     let (_, farther) = ahead(4.2);
     let Rect { x, y, width, height } = first.region;
     let second = Detection { region: Rect::new(x + 5.0, y - 3.0, width + 4.0, height), ..farther };
-    let mut belief = Belief::start(&config, &first, &camera);
+    let mut state = State::start(&config, &first, &camera);
     let noise = |width: f64| (config.sigma_centre * width).powi(2);
     let speed = (config.initial_speed * width).powi(2);
     let centre = first.region.centre();
@@ -253,15 +255,15 @@ fn a_step_is_that_of_the_textbook() {
     let rate = config.initial_range_speed_mps.powi(2);
     let mut range = Line::start(4.0, config.sigma_range_m.powi(2), rate);
     let scale = (config.sigma_scale * width).powi(2);
-    assert_eq!((belief.image[4], belief.image_covariance[(4, 4)]), (width, scale));
+    assert_eq!((state.image[4], state.image_covariance[(4, 4)]), (width, scale));
 
-    belief.predict(&config, &Motion::at_rest(dt), &camera);
+    state.predict(&config, &EgoMotion::at_rest(dt), &camera);
     lines.iter_mut().for_each(|line| line.predict(config.acceleration_noise * width * width, dt));
     range.predict(config.range_noise, dt);
     let wandered = scale + (config.scale_noise * width).powi(2) * dt;
-    assert!((belief.image_covariance[(4, 4)] - wandered).abs() < 1e-9);
+    assert!((state.image_covariance[(4, 4)] - wandered).abs() < 1e-9);
 
-    let support = belief.correct(&config, &second, &camera);
+    let support = state.correct(&config, &second, &camera);
     let seen = second.region.centre();
     let mut nis = lines[0].correct(seen.x, noise(width)) + lines[1].correct(seen.y, noise(width));
     nis += range.correct(4.2, config.sigma_range_m.powi(2));
@@ -269,17 +271,17 @@ fn a_step_is_that_of_the_textbook() {
     let (found, freedom) = support.nis.unwrap();
     assert!((found - nis).abs() < 1e-6 && freedom == 4, "{found} {nis} {freedom}");
     for (axis, line) in lines.iter().enumerate() {
-        let p = &belief.image_covariance;
+        let p = &state.image_covariance;
         let rate = axis + 2;
         let covariance = [p[(axis, axis)], p[(axis, rate)], p[(rate, rate)]];
-        line.agrees([belief.image[axis], belief.image[rate]], covariance);
+        line.agrees([state.image[axis], state.image[rate]], covariance);
     }
-    let p = &belief.range_covariance;
-    range.agrees([belief.range.x, belief.range.y], [p[(0, 0)], p[(0, 1)], p[(1, 1)]]);
+    let p = &state.range_covariance;
+    range.agrees([state.range.x, state.range.y], [p[(0, 0)], p[(0, 1)], p[(1, 1)]]);
     let kept = wandered * scale / (wandered + scale);
-    assert!((belief.image_covariance[(4, 4)] - kept).abs() < 1e-9);
+    assert!((state.image_covariance[(4, 4)] - kept).abs() < 1e-9);
     let widened = width + 4.0 * wandered / (wandered + scale);
-    assert!((belief.image[4] - widened).abs() < 1e-9);
+    assert!((state.image[4] - widened).abs() < 1e-9);
 }
 
 /// Increase of the variances of x and y in the image and of the range, for a robot at rest with
@@ -289,10 +291,10 @@ fn doubts(range_m: f64, [forward, left, turn]: [f64; 3]) -> [f64; 3] {
     let sigmas = Vector3::new(forward, left, turn);
     let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
     let after = |covariance| {
-        let mut belief = Belief::start(&config, &seen, &camera);
-        belief.predict(&config, &Motion { covariance, ..Motion::at_rest(0.1) }, &camera);
-        let p = &belief.image_covariance;
-        [p[(0, 0)], p[(1, 1)], belief.range_covariance[(0, 0)]]
+        let mut state = State::start(&config, &seen, &camera);
+        state.predict(&config, &EgoMotion { covariance, ..EgoMotion::at_rest(0.1) }, &camera);
+        let p = &state.image_covariance;
+        [p[(0, 0)], p[(1, 1)], state.range_covariance[(0, 0)]]
     };
     let (with, without) = (after(covariance), after(Matrix3::zeros()));
     std::array::from_fn(|i| with[i] - without[i])
@@ -312,12 +314,12 @@ fn errors_of_the_odometry_add_to_what_they_move() {
 #[test]
 fn a_box_grows_as_the_robot_comes_near() {
     let ((camera, seen), config) = (ahead(4.0), Config::default());
-    let mut belief = Belief::start(&config, &seen, &camera);
-    belief.predict(&config, &Motion { forward: 1.0, ..Motion::at_rest(0.1) }, &camera);
-    assert!((belief.image[4] / seen.region.width - 4.0 / 3.0).abs() < 1e-9);
-    assert!((belief.range.x - 3.0).abs() < 1e-9);
-    let mut still = Belief::start(&config, &seen, &camera);
-    still.predict(&config, &Motion::at_rest(0.1), &camera);
+    let mut state = State::start(&config, &seen, &camera);
+    state.predict(&config, &EgoMotion { forward: 1.0, ..EgoMotion::at_rest(0.1) }, &camera);
+    assert!((state.image[4] / seen.region.width - 4.0 / 3.0).abs() < 1e-9);
+    assert!((state.range.x - 3.0).abs() < 1e-9);
+    let mut still = State::start(&config, &seen, &camera);
+    still.predict(&config, &EgoMotion::at_rest(0.1), &camera);
     assert_eq!((still.image[4], still.range.x), (seen.region.width, 4.0));
 }
 
@@ -330,12 +332,12 @@ fn a_range_that_is_a_guess_makes_the_place_after_a_step_one() {
         covariance: Matrix3::from_diagonal(&Vector3::new(1.0, 0.0, 0.0)),
         ..sure.clone()
     };
-    let step = Motion { left: 0.4, ..Motion::at_rest(1e-3) };
+    let step = EgoMotion { left: 0.4, ..EgoMotion::at_rest(1e-3) };
     let sigma = |seen: &Detection| {
-        let mut belief = Belief::start(&config, seen, &camera);
-        let before = belief.image_covariance[(0, 0)];
-        belief.predict(&config, &step, &camera);
-        (belief.image_covariance[(0, 0)] - before).max(0.0).sqrt()
+        let mut state = State::start(&config, seen, &camera);
+        let before = state.image_covariance[(0, 0)];
+        state.predict(&config, &step, &camera);
+        (state.image_covariance[(0, 0)] - before).max(0.0).sqrt()
     };
     let expected = 525.0 * 0.4 * (1.0 / 4.0 - 1.0 / 5.0);
     assert!((sigma(&guess) - expected).abs() < 0.5, "{} {expected}", sigma(&guess));
@@ -345,14 +347,14 @@ fn a_range_that_is_a_guess_makes_the_place_after_a_step_one() {
 #[test]
 fn a_range_that_cannot_be_is_left_out() {
     let ((camera, seen), config) = (ahead(4.0), Config::default());
-    let mut belief = Belief::start(&config, &seen, &camera);
+    let mut state = State::start(&config, &seen, &camera);
     let eye = Point3::from(camera.robot_from_camera.translation.vector);
     let here = Detection { position: eye + Vector3::new(0.1, 0.0, 0.0), ..seen.clone() };
-    assert_eq!(belief.correct(&config, &here, &camera).nis.unwrap().1, 3);
-    assert_eq!(belief.range.x, 4.0);
+    assert_eq!(state.correct(&config, &here, &camera).nis.unwrap().1, 3);
+    assert_eq!(state.range.x, 4.0);
     let near = Detection { position: eye + Vector3::new(0.2, 0.0, 0.0), ..seen };
-    assert_eq!(belief.correct(&config, &near, &camera).nis.unwrap().1, 4);
-    assert!(belief.range.x < 4.0);
+    assert_eq!(state.correct(&config, &near, &camera).nis.unwrap().1, 4);
+    assert!(state.range.x < 4.0);
 }
 
 #[test]
@@ -362,17 +364,17 @@ fn the_shape_follows_what_is_seen_by_its_weight() {
     let tall = Detection { region: Rect::new(x, y, width, 2.0 * height), ..seen.clone() };
     for (shape_weight, aspect) in [(0.0, 1.0), (0.25, 1.25), (1.0, 2.0)] {
         let config = Config { shape_weight, ..Config::default() };
-        let mut belief = Belief::start(&config, &seen, &camera);
-        belief.correct(&config, &tall, &camera);
-        let Rect { width, height, .. } = belief.estimate(&camera).region;
+        let mut state = State::start(&config, &seen, &camera);
+        state.correct(&config, &tall, &camera);
+        let Rect { width, height, .. } = state.estimate(&camera).region;
         assert!((height / width - aspect).abs() < 1e-9, "{shape_weight}: {}", height / width);
     }
     // A box without area has no shape, so that of an upper body is kept.
     let config = Config { shape_weight: 1.0, ..Config::default() };
     for flat in [Rect::new(x, y, width, 0.5), Rect::new(x, y, 0.5, height)] {
-        let mut belief = Belief::start(&config, &seen, &camera);
-        belief.correct(&config, &Detection { region: flat, ..seen.clone() }, &camera);
-        let Rect { width, height, .. } = belief.estimate(&camera).region;
+        let mut state = State::start(&config, &seen, &camera);
+        state.correct(&config, &Detection { region: flat, ..seen.clone() }, &camera);
+        let Rect { width, height, .. } = state.estimate(&camera).region;
         assert!((height / width - 1.0).abs() < 1e-9, "{width} {height}");
     }
 }
@@ -384,7 +386,7 @@ fn only_whoever_is_tracked_is_supported_and_a_stopped_one_is_gone() {
     filter.start(TrackId(1), &seen, &camera);
     let camera = Arc::new(camera);
     let frame = |camera: &Arc<Camera>| {
-        let motion = Motion::at_rest(0.1);
+        let motion = EgoMotion::at_rest(0.1);
         Frame::new(1, Stamp::default(), Arc::clone(camera), motion, Images::default())
     };
     let frame = frame(&camera);
@@ -402,12 +404,12 @@ proptest! {
         x in 1.5..7.0f64, y in -1.0..1.0f64, z in 0.8..1.9f64,
         vx in -2.0..2.0f64, vy in -2.0..2.0f64, vz in -0.5..0.5f64,
     ) {
-        let place = Place { position: Point3::new(x, y, z), velocity: Vector3::new(vx, vy, vz) };
+        let place = RobotPoint { position: Point3::new(x, y, z), velocity: Vector3::new(vx, vy, vz) };
         let seen = place.seen(&camera()).unwrap();
         let back = seen.in_space(&camera());
         prop_assert!((back.position - place.position).norm() < 1e-9);
         prop_assert!((back.velocity - place.velocity).norm() < 1e-6);
-        let later = Place { position: place.position + place.velocity * 1e-5, ..place };
+        let later = RobotPoint { position: place.position + place.velocity * 1e-5, ..place };
         let moved = later.seen(&camera()).unwrap();
         let speed = (moved.pixel - seen.pixel) / 1e-5;
         prop_assert!((speed - seen.velocity).norm() < 1e-2 * (1.0 + speed.norm()));
@@ -420,7 +422,7 @@ proptest! {
         let covariance = Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, 0.0, 0.0, 0.0, 0.01);
         let seen = Detection { covariance, ..person(Point3::new(x, y, z)) };
         let exact = Config { sigma_centre: 1e-6, sigma_range_m: 1e-6, ..Config::default() };
-        let estimate = Belief::start(&exact, &seen, &camera()).estimate(&camera());
+        let estimate = State::start(&exact, &seen, &camera()).estimate(&camera());
         let toward = (seen.position - camera().robot_from_camera.translation.vector).coords;
         let unit = toward.normalize();
         let found = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();

@@ -2,8 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Detection, Estimate, Evidence, Filter, Input, Inputs, Motion, Person, Result, Sketch, Support,
-    TrackId,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Input, Inputs, Person, Result, Sketch,
+    TrackId, Update,
 };
 use tagalong_geometry::Camera;
 
@@ -13,7 +13,7 @@ use crate::identity::Wardrobe;
 use crate::overlap::Overlaps;
 use crate::particle::{Particle, Transition};
 use crate::resampling::{effective_size, kld_size};
-use crate::weighing::{Look, facing, sketch, support, weigh};
+use crate::weighing::{WeighingInput, facing, sketch, support, weigh};
 
 /// Particle filter of people, single or in groups.
 pub struct JointParticle {
@@ -113,7 +113,7 @@ impl JointParticle {
 
     /// Returns the headings of all bodies: by the image, otherwise by the velocity, otherwise as
     /// before.
-    fn turn(&mut self, look: &mut Look<'_>) -> Result<BTreeMap<TrackId, Vector2<f64>>> {
+    fn turn(&mut self, look: &mut WeighingInput<'_>) -> Result<BTreeMap<TrackId, Vector2<f64>>> {
         let mut headings = self.headings.clone();
         for group in &self.groups {
             for (person, id) in group.ids.iter().enumerate() {
@@ -144,7 +144,7 @@ impl JointParticle {
     }
 
     /// Returns the head positions of seen people outside of groups.
-    fn alone(&self, seen: &BTreeMap<TrackId, Support>) -> BTreeMap<TrackId, Point3<f64>> {
+    fn alone(&self, seen: &BTreeMap<TrackId, Update>) -> BTreeMap<TrackId, Point3<f64>> {
         let single = self.groups.iter().filter(|g| g.people() == 1 && seen.contains_key(&g.ids[0]));
         single
             .map(|group| {
@@ -198,7 +198,7 @@ impl Filter for JointParticle {
         self.unfound_s.insert(id, 0.0);
     }
 
-    fn predict(&mut self, motion: &Motion, _: &Camera) {
+    fn predict(&mut self, motion: &EgoMotion, _: &Camera) {
         let transition = Transition::new(motion, &self.config);
         self.groups.iter_mut().for_each(|group| group.predict(&transition));
         for heading in self.headings.values_mut() {
@@ -209,7 +209,7 @@ impl Filter for JointParticle {
         self.dt_s = motion.dt;
     }
 
-    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let Some(likelihood) = evidence.likelihood else { return Ok(BTreeMap::new()) };
         self.renew();
         // Groups are formed before the weighing, because a scene needs all people that overlap
@@ -223,14 +223,15 @@ impl Filter for JointParticle {
         self.unfound_s.extend(sightings.keys().map(|id| (*id, 0.0)));
         let headings = self.headings.clone();
         let config = self.config.clone();
-        let mut look = Look::new(evidence.frame, likelihood, &config, &headings, &sightings);
+        let mut look =
+            WeighingInput::new(evidence.frame, likelihood, &config, &headings, &sightings);
         let mut nats = BTreeMap::new();
         for group in &mut self.groups {
             weigh(group, &mut look)?;
             nats.extend(group.ids.iter().copied().zip(support(group, &mut look)?));
         }
         let seen = nats.into_iter().filter(|(id, nats)| self.is_seen(*id, *nats));
-        let seen: BTreeMap<_, _> = seen.map(|(id, _)| (id, Support::default())).collect();
+        let seen: BTreeMap<_, _> = seen.map(|(id, _)| (id, Update::default())).collect();
         self.headings = self.turn(&mut look)?;
         let alone = self.alone(&seen);
         for pair in self.wardrobe.look(evidence.frame, &alone, config.swap_margin) {
@@ -243,7 +244,8 @@ impl Filter for JointParticle {
     fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
         let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
         let Some(likelihood) = evidence.likelihood else { return Ok(shown) };
-        let mut look = Look::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
+        let mut look =
+            WeighingInput::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
         self.groups.iter().try_for_each(|group| sketch(group, &mut look, &mut shown))?;
         Ok(shown)
     }
@@ -306,7 +308,7 @@ mod tests {
     fn frame() -> Frame {
         let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
-        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), Images::default())
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
     }
 
     fn detection() -> Detection {

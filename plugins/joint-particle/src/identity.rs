@@ -121,7 +121,7 @@ const MAX_PIXELS: usize = 2000;
 mod tests {
     use std::sync::Arc;
 
-    use tagalong_core::{Images, Motion, Stamp};
+    use tagalong_core::{EgoMotion, Images, Stamp};
     use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
@@ -135,7 +135,7 @@ mod tests {
         let pixel = |x: usize, _| if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] };
         let colour = with_colour.then(|| Arc::new(RgbImage::from_fn(100, 80, pixel)));
         let images = Images { colour, ..Images::default() };
-        Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
     }
 
     fn people() -> BTreeMap<TrackId, Point3<f64>> {

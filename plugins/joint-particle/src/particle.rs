@@ -1,5 +1,5 @@
 use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, Point3, Vector2, Vector5};
-use tagalong_core::{Detection, Motion, Person};
+use tagalong_core::{Detection, EgoMotion, Person};
 
 use crate::config::Config;
 use crate::random::Random;
@@ -17,12 +17,12 @@ pub(crate) struct Transition {
     f: Matrix5<f64>,
     shift: Vector5<f64>,
     noise: Matrix5<f64>,
-    motion: Motion,
+    motion: EgoMotion,
 }
 
 impl Transition {
     /// Creates the transition for the robot's motion.
-    pub(crate) fn new(motion: &Motion, config: &Config) -> Self {
+    pub(crate) fn new(motion: &EgoMotion, config: &Config) -> Self {
         let (sin, cos) = motion.turn.sin_cos();
         let back = Matrix2::new(cos, sin, -sin, cos);
         let mut f = Matrix5::identity();
@@ -59,7 +59,7 @@ fn process_noise(dt: f64, config: &Config) -> Matrix5<f64> {
 }
 
 /// Returns the noise that the uncertainty of the robot's own motion adds to the position.
-fn ego_noise(predicted: &Vector5<f64>, motion: &Motion) -> Matrix5<f64> {
+fn ego_noise(predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5<f64> {
     let (sin, cos) = motion.turn.sin_cos();
     let (x, y) = (predicted[0], predicted[1]);
     let by_motion = nalgebra::Matrix2x3::new(-cos, -sin, y, sin, -cos, -x);
@@ -232,7 +232,7 @@ mod tests {
     fn what_is_not_known_of_the_robots_motion_spreads_the_place() {
         let sigmas = nalgebra::Vector3::new(0.03, 0.02, 0.01);
         let covariance = Matrix3::from_diagonal(&sigmas.map(|s| s * s));
-        let motion = Motion { forward: 0.3, left: 0.1, turn: 0.4, covariance, dt: 0.1 };
+        let motion = EgoMotion { forward: 0.3, left: 0.1, turn: 0.4, covariance, dt: 0.1 };
         let standing =
             Particle { mean: Vector5::new(3.0, 0.5, 1.6, 0.0, 0.0), covariance: Matrix5::zeros() };
         let quiet = Config {
@@ -247,7 +247,7 @@ mod tests {
         let mut spread = Matrix2::zeros();
         for _ in 0..4000 {
             let mut draw = |mean: f64, sigma: f64| mean + sigma * random.normal();
-            let moved = Motion {
+            let moved = EgoMotion {
                 forward: draw(motion.forward, sigmas[0]),
                 left: draw(motion.left, sigmas[1]),
                 turn: draw(motion.turn, sigmas[2]),
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_place_fixed_in_the_world_moves_as_the_robot_sees_it() {
-        let motion = Motion { forward: 0.3, left: 0.1, turn: 0.2, ..Motion::at_rest(0.1) };
+        let motion = EgoMotion { forward: 0.3, left: 0.1, turn: 0.2, ..EgoMotion::at_rest(0.1) };
         let mut particle = gaussian([0.0; 25]);
         particle.mean[3] = 0.0;
         particle.mean[4] = 0.0;

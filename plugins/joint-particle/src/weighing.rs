@@ -14,7 +14,7 @@ use crate::particle::{Particle, across};
 use crate::resampling::{effective_size, from_logs, heaviest, normalise};
 
 /// Inputs for the weighing in one frame, and the scenes for the next query.
-pub(crate) struct Look<'a> {
+pub(crate) struct WeighingInput<'a> {
     pub(crate) frame: &'a Frame,
     pub(crate) likelihood: &'a dyn Likelihood,
     pub(crate) config: &'a Config,
@@ -27,7 +27,7 @@ pub(crate) struct Look<'a> {
     scenes: Vec<Person>,
 }
 
-impl<'a> Look<'a> {
+impl<'a> WeighingInput<'a> {
     pub(crate) fn new(
         frame: &'a Frame,
         likelihood: &'a dyn Likelihood,
@@ -129,7 +129,7 @@ impl<'a> Look<'a> {
 }
 
 /// Samples and weighs the particles.
-pub(crate) fn weigh(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+pub(crate) fn weigh(group: &mut Group, look: &mut WeighingInput<'_>) -> Result<()> {
     match look.config.method {
         Method::Partitioned => partitioned(group, look)?,
         Method::Table | Method::Kde | Method::Gp if group.people() == 2 => mapped(group, look)?,
@@ -142,7 +142,7 @@ pub(crate) fn weigh(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
 }
 
 /// Compares the whole scene of each particle with the image.
-fn all(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+fn all(group: &mut Group, look: &mut WeighingInput<'_>) -> Result<()> {
     look.draw_everybody(group);
     let everybody: Vec<usize> = (0..group.people()).collect();
     let logs = look.rows(group, &everybody)?;
@@ -152,7 +152,7 @@ fn all(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
 
 /// Weighs front to back: the nearest person without the others; each farther person is sampled for,
 /// and hidden by, the nearer ones that survived.
-fn partitioned(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+fn partitioned(group: &mut Group, look: &mut WeighingInput<'_>) -> Result<()> {
     let order = look.order(group);
     let mut before = vec![0.0; group.rows()];
     for (k, person) in order.iter().enumerate() {
@@ -199,7 +199,7 @@ struct Lateral {
 }
 
 impl Lateral {
-    fn new(group: &Group, look: &Look<'_>) -> Self {
+    fn new(group: &Group, look: &WeighingInput<'_>) -> Self {
         let order = look.order(group);
         let (near, far) = (order[0], order[1]);
         let means = [near, far].map(|person| group.moments(person).mean);
@@ -219,7 +219,7 @@ impl Lateral {
     fn map(
         &self,
         group: &Group,
-        look: &mut Look<'_>,
+        look: &mut WeighingInput<'_>,
         method: Method,
         chosen: &[Place],
     ) -> Result<LikelihoodMap> {
@@ -254,7 +254,7 @@ impl Lateral {
 
 /// Weighs by a map of the likelihood over the lateral positions (P3, section III), which is made
 /// from a table or from a few particles, and looked up by all.
-fn mapped(group: &mut Group, look: &mut Look<'_>) -> Result<()> {
+fn mapped(group: &mut Group, look: &mut WeighingInput<'_>) -> Result<()> {
     let before = group.likelihoods.clone();
     if look.config.hold_depth {
         look.hold_depth(group);
@@ -288,7 +288,7 @@ fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
 /// Updates the depth and then the height of one person in all particles: the likelihood along a
 /// line through the best particle, times the prior, has a mean and a variance, which are converted
 /// to those of a measurement.
-fn refine(group: &mut Group, look: &mut Look<'_>, person: usize) -> Result<()> {
+fn refine(group: &mut Group, look: &mut WeighingInput<'_>, person: usize) -> Result<()> {
     for line in [Line::Range, Line::Height] {
         let row = group.best();
         let best = group.row(row)[person].clone();
@@ -387,10 +387,10 @@ fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
 }
 
 /// Returns the gain in log-likelihood of the best particle's scene by each person, nats.
-pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
+pub(crate) fn support(group: &Group, look: &mut WeighingInput<'_>) -> Result<Vec<f64>> {
     let row = group.best();
     let everybody: Vec<usize> = (0..group.people()).collect();
-    let scene = |look: &mut Look<'_>, people: &[usize]| -> Result<f64> {
+    let scene = |look: &mut WeighingInput<'_>, people: &[usize]| -> Result<f64> {
         let parts = group.row(row);
         people.iter().for_each(|p| look.add(group.ids[*p], &parts[*p]));
         // Likelihoods are relative to the empty scene.
@@ -409,7 +409,11 @@ pub(crate) fn support(group: &Group, look: &mut Look<'_>) -> Result<Vec<f64>> {
 
 /// Adds a group to the sketch: its particles, the scene of the best one, and the likelihood over
 /// the lateral positions of two people.
-pub(crate) fn sketch(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Result<()> {
+pub(crate) fn sketch(
+    group: &Group,
+    look: &mut WeighingInput<'_>,
+    sketch: &mut Sketch,
+) -> Result<()> {
     let best = group.best();
     let heaviest = group.weights[best].max(f64::MIN_POSITIVE);
     for (row, weight) in group.weights.iter().enumerate() {
@@ -432,7 +436,7 @@ pub(crate) fn sketch(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) ->
 
 /// Adds the maps of P3, Figure 7: the table (b), and its approximation from a few particles (d).
 /// Their peaks are so sharp that fourth roots are shown.
-fn sketch_maps(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Result<()> {
+fn sketch_maps(group: &Group, look: &mut WeighingInput<'_>, sketch: &mut Sketch) -> Result<()> {
     let (lateral, grid) = (Lateral::new(group, look), Grid::new(look.config));
     let chosen = chosen(&lateral.places(group), &group.likelihoods, look.config);
     let approximated = matches!(look.config.method, Method::Kde | Method::Gp);
@@ -455,7 +459,7 @@ fn sketch_maps(group: &Group, look: &mut Look<'_>, sketch: &mut Sketch) -> Resul
 pub(crate) fn facing(
     group: &Group,
     person: usize,
-    look: &mut Look<'_>,
+    look: &mut WeighingInput<'_>,
 ) -> Result<Option<Vector2<f64>>> {
     let row = group.best();
     let particle = &group.row(row)[person];
@@ -511,16 +515,16 @@ mod tests {
     fn looking<T>(
         config: &Config,
         likelihood: &Formula,
-        work: impl FnOnce(&mut Group, &mut Look<'_>) -> T,
+        work: impl FnOnce(&mut Group, &mut WeighingInput<'_>) -> T,
     ) -> T {
         let single = |id, x| {
             let detection = sighting(nalgebra::Point3::new(x, 0.0, 1.6), [0.01; 3]);
             Group::single(TrackId(id), &Particle::of(&detection, config), 1, config)
         };
         let mut group = single(1, 2.0).merge(single(2, 3.0), config);
-        let frame = frame(tagalong_core::Motion::at_rest(0.1), None);
+        let frame = frame(tagalong_core::EgoMotion::at_rest(0.1), None);
         let (headings, sightings) = (BTreeMap::new(), BTreeMap::new());
-        let mut look = Look::new(&frame, likelihood, config, &headings, &sightings);
+        let mut look = WeighingInput::new(&frame, likelihood, config, &headings, &sightings);
         work(&mut group, &mut look)
     }
 

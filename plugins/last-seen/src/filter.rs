@@ -1,7 +1,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Matrix2, Matrix3, Point2, Point3, SMatrix, Vector2};
-use tagalong_core::{Detection, Estimate, Motion, Person, PersonFilter, Result, Support};
+use tagalong_core::{Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update};
 use tagalong_geometry::Camera;
 
 use crate::Config;
@@ -15,7 +15,7 @@ const MOST_SIGHTINGS: usize = 64;
 
 /// What is believed of a person, in the robot frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Belief {
+pub struct State {
     /// Centre of the head when last seen, m.
     position: Point3<f64>,
     /// Its covariance, m².
@@ -50,22 +50,22 @@ impl LastSeen {
 }
 
 impl PersonFilter for LastSeen {
-    type Belief = Belief;
+    type State = State;
 
-    fn start(&self, seen: &Detection) -> Belief {
+    fn start(&self, seen: &Detection) -> State {
         let mut sightings = VecDeque::new();
         self.remember(&mut sightings, seen.position.xy());
-        Belief { position: seen.position, covariance: seen.covariance, sightings }
+        State { position: seen.position, covariance: seen.covariance, sightings }
     }
 
-    fn predict(&self, belief: &mut Belief, motion: &Motion) {
+    fn predict(&self, state: &mut State, motion: &EgoMotion) {
         let motion = match self.config.ego_motion {
             true => *motion,
-            false => Motion::at_rest(motion.dt),
+            false => EgoMotion::at_rest(motion.dt),
         };
-        let floor = motion.apply_to_point(belief.position.xy());
-        belief.position = Point3::new(floor.x, floor.y, belief.position.z);
-        for (ago, place) in &mut belief.sightings {
+        let floor = motion.apply_to_point(state.position.xy());
+        state.position = Point3::new(floor.x, floor.y, state.position.z);
+        for (ago, place) in &mut state.sightings {
             *ago += motion.dt;
             *place = motion.apply_to_point(*place);
         }
@@ -73,24 +73,24 @@ impl PersonFilter for LastSeen {
         turn.fixed_view_mut::<2, 2>(0, 0).copy_from(&turn_back(&motion));
         let (floor, height) = (self.config.wander.powi(2), HEIGHT_WANDER.powi(2));
         let grown = Matrix3::from_diagonal(&[floor, floor, height].into()) * motion.dt;
-        let turned = turn * belief.covariance * turn.transpose();
-        belief.covariance = 0.5 * (turned + turned.transpose()) + grown;
+        let turned = turn * state.covariance * turn.transpose();
+        state.covariance = 0.5 * (turned + turned.transpose()) + grown;
     }
 
-    fn correct(&self, belief: &mut Belief, seen: &Detection, _: &Camera) -> Support {
-        belief.position = seen.position;
-        belief.covariance = seen.covariance;
-        self.remember(&mut belief.sightings, seen.position.xy());
-        Support::default()
+    fn correct(&self, state: &mut State, seen: &Detection, _: &Camera) -> Update {
+        state.position = seen.position;
+        state.covariance = seen.covariance;
+        self.remember(&mut state.sightings, seen.position.xy());
+        Update::default()
     }
 
-    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+    fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
         let mut covariance = SMatrix::<f64, 5, 5>::identity() * VELOCITY_VARIANCE;
-        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&belief.covariance);
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&state.covariance);
         Estimate {
-            person: Person { position: belief.position, velocity: velocity(&belief.sightings) },
+            person: Person { position: state.position, velocity: velocity(&state.sightings) },
             covariance,
-            region: camera.upper_body(&belief.position),
+            region: camera.upper_body(&state.position),
         }
     }
 }
@@ -104,7 +104,7 @@ fn velocity(sightings: &VecDeque<(f64, Point2<f64>)>) -> Vector2<f64> {
 }
 
 /// Turns a vector into the robot's new axes.
-fn turn_back(motion: &Motion) -> Matrix2<f64> {
+fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
     *motion.isometry().rotation.inverse().to_rotation_matrix().matrix()
 }
 
@@ -126,12 +126,12 @@ mod tests {
         }
     }
 
-    fn after_a_turn(ego_motion: bool) -> Belief {
+    fn after_a_turn(ego_motion: bool) -> State {
         let filter = LastSeen::new(Config { ego_motion, ..Config::default() }).unwrap();
-        let mut belief = filter.start(&sighting(3.0, 0.0));
+        let mut state = filter.start(&sighting(3.0, 0.0));
         let turn = FRAC_PI_2;
-        filter.predict(&mut belief, &Motion { forward: 1.0, turn, ..Motion::at_rest(0.5) });
-        belief
+        filter.predict(&mut state, &EgoMotion { forward: 1.0, turn, ..EgoMotion::at_rest(0.5) });
+        state
     }
 
     #[test]
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn nothing_is_averaged() {
         let filter = LastSeen::new(Config::default()).unwrap();
-        let mut belief = after_a_turn(true);
+        let mut state = after_a_turn(true);
         let camera = Camera::mounted(
             Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None },
             320,
@@ -152,9 +152,9 @@ mod tests {
             0.0,
             0.0,
         );
-        filter.correct(&mut belief, &sighting(2.0, 0.5), &camera);
+        filter.correct(&mut state, &sighting(2.0, 0.5), &camera);
         assert_eq!(
-            (belief.position, belief.covariance),
+            (state.position, state.covariance),
             (Point3::new(2.0, 0.5, 1.6), sighting(0.0, 0.0).covariance)
         );
     }
@@ -172,19 +172,19 @@ mod tests {
     }
 
     /// Somebody seen each half second at these places, by a robot that moves like that.
-    fn seen_at(config: Config, motion: Motion, places: &[(f64, f64)]) -> Estimate {
+    fn seen_at(config: Config, motion: EgoMotion, places: &[(f64, f64)]) -> Estimate {
         let filter = LastSeen::new(config).unwrap();
-        let mut belief = filter.start(&sighting(places[0].0, places[0].1));
+        let mut state = filter.start(&sighting(places[0].0, places[0].1));
         for (x, y) in &places[1..] {
-            filter.predict(&mut belief, &motion);
-            filter.correct(&mut belief, &sighting(*x, *y), &camera());
+            filter.predict(&mut state, &motion);
+            filter.correct(&mut state, &sighting(*x, *y), &camera());
         }
-        filter.estimate(&belief, &camera())
+        filter.estimate(&state, &camera())
     }
 
     #[test]
     fn the_velocity_is_the_way_of_the_last_second() {
-        let still = Motion::at_rest(0.5);
+        let still = EgoMotion::at_rest(0.5);
         let velocity =
             |places: &[(f64, f64)]| seen_at(Config::default(), still, places).person.velocity;
         assert_eq!(velocity(&[(3.0, 0.0)]), Vector2::zeros());
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn who_stands_does_not_walk_because_the_robot_drives() {
-        let motion = Motion { forward: 0.5, turn: 0.1, ..Motion::at_rest(0.5) };
+        let motion = EgoMotion { forward: 0.5, turn: 0.1, ..EgoMotion::at_rest(0.5) };
         let first = Point2::new(3.0, 1.0);
         let next = motion.apply_to_point(first);
         let places = [(first.x, first.y), (next.x, next.y)];
@@ -212,9 +212,9 @@ mod tests {
         let filter = LastSeen::new(Config { wander: 0.4, ..Config::default() }).unwrap();
         let mut seen = sighting(3.0, 0.0);
         seen.covariance = Matrix3::from_diagonal(&[0.04, 0.01, 0.02].into());
-        let mut belief = filter.start(&seen);
-        filter.predict(&mut belief, &Motion { turn: FRAC_PI_2, ..Motion::at_rest(0.5) });
-        let estimate = filter.estimate(&belief, &camera());
+        let mut state = filter.start(&seen);
+        filter.predict(&mut state, &EgoMotion { turn: FRAC_PI_2, ..EgoMotion::at_rest(0.5) });
+        let estimate = filter.estimate(&state, &camera());
         // What was ahead is to the right now.
         let expected = [0.01 + 0.08, 0.04 + 0.08, 0.02 + 0.005, 1.0, 1.0];
         for (found, expected) in estimate.covariance.diagonal().iter().zip(expected) {
@@ -226,11 +226,11 @@ mod tests {
     #[test]
     fn no_more_sightings_are_kept_than_needed() {
         let filter = LastSeen::new(Config { velocity_over_s: 100.0, ..Config::default() }).unwrap();
-        let mut belief = filter.start(&sighting(3.0, 0.0));
+        let mut state = filter.start(&sighting(3.0, 0.0));
         for _ in 0..99 {
-            filter.correct(&mut belief, &sighting(3.0, 0.0), &camera());
+            filter.correct(&mut state, &sighting(3.0, 0.0), &camera());
         }
-        assert_eq!(belief.sightings.len(), MOST_SIGHTINGS);
+        assert_eq!(state.sightings.len(), MOST_SIGHTINGS);
         assert!(LastSeen::new(Config { wander: 100.0, ..Config::default() }).is_ok());
         assert!(LastSeen::new(Config { wander: 100.1, ..Config::default() }).is_err());
     }

@@ -9,7 +9,7 @@ mod config;
 mod filter;
 
 pub use config::Config;
-pub use filter::{Belief, LastSeen};
+pub use filter::{LastSeen, State};
 use tagalong_config::Registry;
 use tagalong_core::PerPerson;
 

@@ -5,7 +5,7 @@
 //! those of a track do (P4, section II-C, has neither).
 
 use nalgebra::Point2;
-use tagalong_core::{Detection, Motion};
+use tagalong_core::{Detection, EgoMotion};
 
 use crate::Config;
 
@@ -15,11 +15,11 @@ const FAINT: f64 = 0.05;
 /// Where candidates were rejected, in the frame of the robot.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ClutterMap {
-    places: Vec<Place>,
+    places: Vec<ClutterCell>,
 }
 
 #[derive(Clone, Debug)]
-struct Place {
+struct ClutterCell {
     at: Point2<f64>,
     /// Sum of what was said, below zero.
     log_odds: f64,
@@ -27,7 +27,7 @@ struct Place {
 
 impl ClutterMap {
     /// The robot moves on, time passes.
-    pub(crate) fn predict(&mut self, motion: &Motion, settings: &Config) {
+    pub(crate) fn predict(&mut self, motion: &EgoMotion, settings: &Config) {
         let faded = (-motion.dt / settings.doubt_s).exp();
         for place in &mut self.places {
             place.at = motion.apply_to_point(place.at);
@@ -47,7 +47,7 @@ impl ClutterMap {
         let sum = detection.score + before;
         if sum < settings.start_score {
             let log_odds = sum.max(-settings.doubt_limit);
-            self.places.push(Place { at, log_odds });
+            self.places.push(ClutterCell { at, log_odds });
         }
         sum
     }
@@ -59,7 +59,7 @@ impl ClutterMap {
 
     /// Takes out what is remembered of the nearest place within a radius, m.
     fn take(&mut self, at: &Point2<f64>, radius_m: f64) -> f64 {
-        let off = |place: &Place| (place.at - at).norm();
+        let off = |place: &ClutterCell| (place.at - at).norm();
         let near = self.places.iter().enumerate().filter(|(_, place)| off(place) <= radius_m);
         match near.min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))) {
             Some((index, _)) => self.places.swap_remove(index).log_odds,
@@ -98,7 +98,7 @@ mod tests {
         let mut clutter = ClutterMap::default();
         clutter.add_evidence(&scored(-4.0, person(3.0, 0.0)), &settings());
         let turn = std::f64::consts::FRAC_PI_2;
-        let motion = Motion { forward: 1.0, turn, ..Motion::at_rest(0.0) };
+        let motion = EgoMotion { forward: 1.0, turn, ..EgoMotion::at_rest(0.0) };
         clutter.predict(&motion, &settings());
         assert_eq!(
             clutter.clone().add_evidence(&person(3.0, 0.0), &settings()),
@@ -112,10 +112,10 @@ mod tests {
     fn clutter_fade() {
         let mut clutter = ClutterMap::default();
         clutter.add_evidence(&scored(-4.0, person(3.0, 0.0)), &settings());
-        clutter.predict(&Motion::at_rest(2.0), &settings());
+        clutter.predict(&EgoMotion::at_rest(2.0), &settings());
         let log_odds = clutter.clone().add_evidence(&person(3.0, 0.0), &settings());
         assert!((log_odds - (1.0 - 4.0 / std::f64::consts::E)).abs() < 1e-12, "{log_odds}");
-        clutter.predict(&Motion::at_rest(20.0), &settings());
+        clutter.predict(&EgoMotion::at_rest(20.0), &settings());
         assert!(clutter.places.is_empty());
     }
 
@@ -142,9 +142,9 @@ mod tests {
     fn faint_clutter_are_forgotten() {
         let mut clutter = ClutterMap::default();
         clutter.add_evidence(&scored(-0.06, person(3.0, 0.0)), &settings());
-        clutter.predict(&Motion::at_rest(0.1), &settings());
+        clutter.predict(&EgoMotion::at_rest(0.1), &settings());
         assert_eq!(clutter.places.len(), 1);
-        clutter.predict(&Motion::at_rest(0.5), &settings());
+        clutter.predict(&EgoMotion::at_rest(0.5), &settings());
         assert!(clutter.places.is_empty());
     }
 }

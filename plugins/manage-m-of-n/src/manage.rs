@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use tagalong_core::{
-    Initiation, Motion, ObservedTrack, Result, TrackChanges, TrackHealth, TrackId, TrackManager,
+    EgoMotion, Initiation, ObservedTrack, Result, TrackChanges, TrackHealth, TrackId, TrackManager,
     Unassociated,
 };
 
@@ -66,7 +66,7 @@ impl TrackManager for MOfN {
         self.config.start_score
     }
 
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &EgoMotion) {
         self.dt_s = motion.dt;
         self.clutter.predict(motion, &self.config);
     }

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_core::{
-    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Track,
+    Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track,
     TrackChanges, TrackId, TrackManager, Unassociated,
 };
 use tagalong_geometry::Rect;
@@ -63,7 +63,7 @@ impl Rig {
 
     /// An eighth of a second passes, and each track is observed.
     fn step(&mut self, observations: &[Observation]) -> TrackChanges {
-        self.manager.predict(&Motion::at_rest(0.125));
+        self.manager.predict(&EgoMotion::at_rest(0.125));
         for (track, observation) in self.tracks.iter_mut().zip(observations) {
             track.unseen_s += 0.125;
             if observation.is_supported() {

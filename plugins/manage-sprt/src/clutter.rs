@@ -2,13 +2,13 @@
 //! world.
 
 use nalgebra::Point2;
-use tagalong_core::Motion;
+use tagalong_core::EgoMotion;
 
 /// Clutter that counts for less, log-odds, is forgotten.
 const FAINT: f64 = 0.05;
 
 #[derive(Clone, Debug)]
-struct Place {
+struct ClutterCell {
     at: Point2<f64>,
     /// How much speaks against a person at this place, log-odds above 0.
     against: f64,
@@ -17,12 +17,12 @@ struct Place {
 /// Evidence against persons, by place.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ClutterMap {
-    places: Vec<Place>,
+    places: Vec<ClutterCell>,
 }
 
 impl ClutterMap {
     /// Moves all places into the robot's new frame, and lets them fade with a time constant, s.
-    pub(crate) fn predict(&mut self, motion: &Motion, time_constant_s: f64) {
+    pub(crate) fn predict(&mut self, motion: &EgoMotion, time_constant_s: f64) {
         let faded = (-motion.dt / time_constant_s).exp();
         for place in &mut self.places {
             place.at = motion.apply_to_point(place.at);
@@ -43,7 +43,7 @@ impl ClutterMap {
         let nearest = near.min_by(|a, b| (a.at - at).norm().total_cmp(&(b.at - at).norm()));
         match nearest {
             Some(place) => place.against = (place.against + against).min(most),
-            None => self.places.push(Place { at, against: against.min(most) }),
+            None => self.places.push(ClutterCell { at, against: against.min(most) }),
         }
     }
 

@@ -1,5 +1,5 @@
 use nalgebra::Point2;
-use tagalong_core::{Motion, Observation, Track, TrackHealth};
+use tagalong_core::{EgoMotion, Observation, Track, TrackHealth};
 
 use crate::Config;
 
@@ -44,7 +44,7 @@ impl Evidence {
     }
 
     /// Moves what is remembered into the robot's new frame.
-    pub(crate) fn predict(&mut self, motion: &Motion) {
+    pub(crate) fn predict(&mut self, motion: &EgoMotion) {
         self.start = motion.apply_to_point(self.start);
         self.look = (motion.apply_to_point(self.look.0), motion.apply_to_point(self.look.1));
         self.age_s += motion.dt;

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use tagalong_core::{
-    Initiation, Motion, ObservedTrack, Result, Track, TrackChanges, TrackHealth, TrackId,
+    EgoMotion, Initiation, ObservedTrack, Result, Track, TrackChanges, TrackHealth, TrackId,
     TrackManager, Unassociated,
 };
 
@@ -47,7 +47,7 @@ impl TrackManager for Sprt {
         self.config.start_log_odds
     }
 
-    fn predict(&mut self, motion: &Motion) {
+    fn predict(&mut self, motion: &EgoMotion) {
         self.dt_s = motion.dt;
         self.clutter.predict(motion, self.config.clutter_s);
         self.evidence.values_mut().for_each(|evidence| evidence.predict(motion));

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_config::Registry;
 use tagalong_core::{
-    Detection, Estimate, Initiation, Motion, Observation, ObservedTrack, Person, Track, TrackId,
+    Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
 use tagalong_geometry::Rect;
@@ -62,7 +62,7 @@ impl Scene {
     }
 
     /// One frame, in which the robot moves and something is seen `x` ahead, or hidden.
-    fn frame(&mut self, motion: Motion, seen: Option<Detection>) {
+    fn frame(&mut self, motion: EgoMotion, seen: Option<Detection>) {
         self.now_s += DT_S;
         self.manager.predict(&motion);
         let Some(mut track) = self.track.take() else {
@@ -97,8 +97,8 @@ impl Scene {
     }
 }
 
-fn still() -> Motion {
-    Motion::at_rest(DT_S)
+fn still() -> EgoMotion {
+    EgoMotion::at_rest(DT_S)
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn looks_from_elsewhere_count_in_full() {
         for i in 0..15 {
             let forward = if drives { 0.1 } else { 0.0 };
             let x = 4.0 - forward * f64::from(i);
-            scene.frame(Motion { forward, ..still() }, Some(detection(x, 1.5)));
+            scene.frame(EgoMotion { forward, ..still() }, Some(detection(x, 1.5)));
         }
         scene.confirmed_s
     };
@@ -169,7 +169,7 @@ fn a_thing_stays_clutter_while_the_robot_drives() {
     scene.dropped.clear();
     for i in 0..20 {
         let x = 4.0 - 0.1 * f64::from(i + 1);
-        scene.frame(Motion { forward: 0.1, ..still() }, Some(detection(x, 1.0)));
+        scene.frame(EgoMotion { forward: 0.1, ..still() }, Some(detection(x, 1.0)));
     }
     assert_eq!(scene.dropped, ["clutter"; 20]);
 }
@@ -187,7 +187,7 @@ fn clutter_is_of_its_place_and_time() {
         matches!(manager.initiate(TrackId(9), &new), Initiation::Start(_))
     };
     assert!(!starts(&mut scene.manager, 4.0) && starts(&mut scene.manager, 4.5));
-    scene.manager.predict(&Motion::at_rest(120.0));
+    scene.manager.predict(&EgoMotion::at_rest(120.0));
     assert!(starts(&mut scene.manager, 4.0));
     for _ in 0..40 {
         scene.frame(still(), Some(detection(4.0, 1.0)));

@@ -1,11 +1,11 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use tagalong_config::Context;
 use tagalong_core::{
-    Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Result, Search, Track,
+    Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Query, Result, Track,
 };
 use tagalong_geometry::Camera;
 
-use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, View};
+use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, PanoramaGeometry};
 
 /// Model that is compiled into the program.
 const BUILT_IN: &str = include_str!("../../../configs/models/omni-distance.toml");
@@ -53,7 +53,7 @@ impl OmniAppearance {
     }
 
     /// Returns the detection of a blob: its position by distance and bearing.
-    fn placed(&self, blob: &Blob, camera: &Camera, view: &View<'_>) -> Detection {
+    fn placed(&self, blob: &Blob, camera: &Camera, view: &PanoramaGeometry<'_>) -> Detection {
         // Width and area of a visible part do not give the distance of the whole; the feet do.
         let how = if blob.visible < WHOLE { Distance::Analytic } else { self.config.distance };
         let head = self.model.head(&self.config.person, blob, view, how);
@@ -105,7 +105,7 @@ impl OmniAppearance {
         (SURE - 0.5 * off * off).max(-SURE)
     }
 
-    fn check_camera(&self, view: &View<'_>) -> Result<()> {
+    fn check_camera(&self, view: &PanoramaGeometry<'_>) -> Result<()> {
         if self.model.geometry.is_like(&Geometry::of(view))
             || self.config.distance == Distance::Analytic
         {
@@ -134,11 +134,11 @@ impl Detector for OmniAppearance {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let blobs = self.eyes.look(frame, funnel)?;
-        let Some(view) = View::of(&frame.camera).filter(|_| !blobs.is_empty()) else {
+        let Some(view) = PanoramaGeometry::of(&frame.camera).filter(|_| !blobs.is_empty()) else {
             return Ok(Vec::new());
         };
         self.check_camera(&view)?;
@@ -163,10 +163,10 @@ impl Detector for OmniAppearance {
 }
 
 /// Returns true if a detection lies where the search looks.
-fn fits(search: &Search<'_>, person: &Detection) -> bool {
+fn fits(search: &Query<'_>, person: &Detection) -> bool {
     match search {
-        Search::Everywhere { .. } => true,
-        Search::Near(track) => {
+        Query::Discover { .. } => true,
+        Query::Track(track) => {
             let off = (person.position - track.estimate.person.position).xy();
             let spread = track.estimate.covariance.fixed_view::<2, 2>(0, 0).trace();
             off.norm() <= NEAR_SIGMAS * (0.5 * spread).sqrt() + 0.3
@@ -258,7 +258,7 @@ mod tests {
                 score: 0.0,
                 source: "test",
             };
-            fits(&Search::Near(&track), &person)
+            fits(&Query::Track(&track), &person)
         };
         for way in [Vector2::new(0.6, 0.8), Vector2::new(-0.6, 0.8)] {
             assert!(near(way * (reach - 1e-6)) && !near(way * (reach + 1e-6)));

@@ -4,7 +4,7 @@
 use nalgebra::{Isometry2, Point3};
 use tagalong_core::{Frame, Track};
 
-use crate::View;
+use crate::PanoramaGeometry;
 use crate::circular::Run;
 
 /// Half the width of a person, arms included, m.
@@ -62,7 +62,7 @@ pub(crate) struct Part {
 }
 
 impl Expected {
-    pub(crate) fn of(known: &Known, frame: &Frame, view: &View<'_>) -> Self {
+    pub(crate) fn of(known: &Known, frame: &Frame, view: &PanoramaGeometry<'_>) -> Self {
         let head = frame.camera.robot_from_camera.inverse_transform_point(&known.position);
         let range_m = head.xy().coords.norm().max(NEAREST_M);
         let half = (HALF_WIDTH_M / range_m).atan() / std::f64::consts::TAU;

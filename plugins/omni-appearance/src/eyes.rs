@@ -3,16 +3,16 @@ use tagalong_core::{Frame, Funnel, Result, Stamp, Track};
 use crate::background::{Pace, TURNS};
 use crate::expected::{Expected, Known, divided};
 use crate::warp::{Bounds, Sweep, Warp, is_moving};
-use crate::{Background, Blob, Config, Segmenter, View};
+use crate::{Background, Blob, Config, PanoramaGeometry, Segmenter};
 
 /// Tracks the background over the images, and finds the blobs that differ from it.
 pub struct Eyes {
     config: Config,
-    scene: Option<Scene>,
+    scene: Option<ImageState>,
 }
 
 /// State that is kept between images of one size.
-struct Scene {
+struct ImageState {
     size: (usize, usize),
     background: Background,
     segmenter: Segmenter,
@@ -43,7 +43,7 @@ impl Eyes {
 
     /// Returns true once the background is known.
     pub fn is_ready(&self) -> bool {
-        let known = |scene: &Scene| scene.background.frames() >= self.config.background_frames;
+        let known = |scene: &ImageState| scene.background.frames() >= self.config.background_frames;
         self.scene.as_ref().is_some_and(known)
     }
 
@@ -68,12 +68,12 @@ impl Eyes {
             return Ok(Vec::new());
         }
         // A clock that was set back means another recording.
-        let same = |scene: &Scene| {
+        let same = |scene: &ImageState| {
             scene.size == size && scene.seen.is_none_or(|(_, stamp)| stamp <= frame.stamp)
         };
         let scene = match &mut self.scene {
             Some(scene) if same(scene) => scene,
-            scene => scene.insert(Scene::new(size, &self.config)),
+            scene => scene.insert(ImageState::new(size, &self.config)),
         };
         if scene.seen != Some((frame.index, frame.stamp)) {
             scene.seen = Some((frame.index, frame.stamp));
@@ -97,7 +97,7 @@ impl Eyes {
     }
 }
 
-impl Scene {
+impl ImageState {
     fn new(size: (usize, usize), config: &Config) -> Self {
         Self {
             size,
@@ -204,7 +204,7 @@ const MOVING_ABSORB_S: f32 = 2.0;
 
 /// Returns the expected columns of the tracks that were known after the previous image.
 fn expected(known: &[Known], frame: &Frame) -> Vec<Expected> {
-    let Some(view) = View::of(&frame.camera) else { return Vec::new() };
+    let Some(view) = PanoramaGeometry::of(&frame.camera) else { return Vec::new() };
     let (dt_s, moved) = (frame.motion.dt, frame.motion.isometry());
     known.iter().map(|known| Expected::of(&known.moved(dt_s, &moved), frame, &view)).collect()
 }

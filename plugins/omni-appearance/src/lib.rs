@@ -36,7 +36,7 @@ pub use blob::{Blob, FEATURES, Features};
 pub use config::{Config, Distance};
 pub use detector::OmniAppearance;
 pub use eyes::Eyes;
-pub use model::{Geometry, Head, Line, Model, Person, Ridge, Signature, View};
+pub use model::{Geometry, Head, Line, Model, PanoramaGeometry, Person, Ridge, Signature};
 pub use network::Network;
 pub use segment::{Counts, Segmenter};
 use tagalong_config::Registry;

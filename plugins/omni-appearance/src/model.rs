@@ -127,7 +127,12 @@ impl Ridge {
 
 impl Head {
     /// Returns the distance from the axis of the mirror, and its standard deviation, m.
-    pub fn distance(&self, features: &Features, camera: &View<'_>, how: Distance) -> (f64, f64) {
+    pub fn distance(
+        &self,
+        features: &Features,
+        camera: &PanoramaGeometry<'_>,
+        how: Distance,
+    ) -> (f64, f64) {
         let (distance, sigma) = match how {
             Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
             Distance::Printed => (self.printed.answer(&features.values()), self.printed_sigma),
@@ -164,14 +169,14 @@ const FAR_M: f64 = 15.0;
 
 /// Parts of a camera that are needed to compute distances.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct PanoramaGeometry<'a> {
     /// The panorama.
     pub panorama: &'a Panorama,
     /// Height of the pinhole above the floor, m.
     pub height_m: f64,
 }
 
-impl<'a> View<'a> {
+impl<'a> PanoramaGeometry<'a> {
     /// Returns the view of a camera, if it has a panorama.
     pub fn of(camera: &'a Camera) -> Option<Self> {
         Some(Self { panorama: camera.panorama()?, height_m: camera.height_m() })
@@ -222,7 +227,7 @@ pub struct Geometry {
 
 impl Geometry {
     /// Returns the geometry of a camera.
-    pub fn of(view: &View<'_>) -> Self {
+    pub fn of(view: &PanoramaGeometry<'_>) -> Self {
         let size = [view.panorama.columns, view.panorama.rows];
         let elevations_deg = view.panorama.elevations().map(f64::to_degrees);
         Self { size, elevations_deg, height_m: view.height_m }
@@ -256,7 +261,13 @@ const FORMAT: &str = "omni-distance 2";
 impl Model {
     /// Returns the fit for a person: by name, the fit to all people for `general`, and for
     /// `nearest` that of the person with the closest appearance, if it is close enough.
-    pub fn head(&self, person: &str, blob: &Blob, view: &View<'_>, how: Distance) -> &Head {
+    pub fn head(
+        &self,
+        person: &str,
+        blob: &Blob,
+        view: &PanoramaGeometry<'_>,
+        how: Distance,
+    ) -> &Head {
         if person != "nearest" {
             let named = self.people.iter().find(|known| known.name == person);
             return named.map_or(&self.general, |known| &known.head);

@@ -3,7 +3,9 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3};
 use tagalong_config::Registry;
 use tagalong_conformance::context;
-use tagalong_core::{Detection, Detector, Frame, Funnel, Images, Motion, RgbImage, Search, Stamp};
+use tagalong_core::{
+    Detection, Detector, EgoMotion, Frame, Funnel, Images, Query, RgbImage, Stamp,
+};
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama};
 
 use crate::{Config, Distance, Model, OmniAppearance};
@@ -57,13 +59,12 @@ fn frame(index: u64, camera: &Arc<Camera>, people: &[Point2<f64>]) -> Frame {
     assert!(panorama.mirror.is_sane());
     let images = Images { colour: Some(Arc::new(image)), ..Images::default() };
     let stamp = Stamp::from_nanos(index * 333_000_000);
-    Frame::new(index, stamp, Arc::clone(camera), Motion::at_rest(0.333), images)
+    Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.333), images)
 }
 
 fn see(detector: &mut OmniAppearance, frame: &Frame) -> Vec<Detection> {
-    let found = detector
-        .detect(frame, &Search::Everywhere { occupied: &[] }, &mut Funnel::default())
-        .unwrap();
+    let found =
+        detector.detect(frame, &Query::Discover { occupied: &[] }, &mut Funnel::default()).unwrap();
     detector.learn(frame, &[]).unwrap();
     found
 }
@@ -129,7 +130,7 @@ fn a_model_of_another_camera_is_refused_in_words() {
     let low = camera(1.1);
     let mut learned = ready(Config::default(), &low);
     let person = frame(20, &low, &[around(2.5, 0.0)]);
-    let everywhere = Search::Everywhere { occupied: &[] };
+    let everywhere = Query::Discover { occupied: &[] };
     let error = learned.detect(&person, &everywhere, &mut Funnel::default()).unwrap_err();
     assert!(error.to_string().contains("another camera"), "{error}");
     assert_eq!(see(&mut ready(analytic(), &low), &person).len(), 1);

@@ -11,8 +11,8 @@ use crate::fit::mean_and_scale;
 pub use crate::fit::{Descent, Fit};
 use crate::model::INPUTS;
 use crate::{
-    Blob, Config, Distance, Eyes, Features, Geometry, Head, Line, Model, Person, Ridge, Signature,
-    View,
+    Blob, Config, Distance, Eyes, Features, Geometry, Head, Line, Model, PanoramaGeometry, Person,
+    Ridge, Signature,
 };
 
 /// Settings of the fit of a model.
@@ -145,7 +145,8 @@ impl Collector {
         if self.last.replace(frame.index) != Some(frame.index) {
             self.eyes.adapt(frame, &[])?;
         }
-        let Some(view) = View::of(&frame.camera).filter(|_| self.eyes.is_ready()) else {
+        let Some(view) = PanoramaGeometry::of(&frame.camera).filter(|_| self.eyes.is_ready())
+        else {
             return Ok(());
         };
         self.geometry = Some(Geometry::of(&view));
@@ -167,7 +168,7 @@ impl Collector {
 /// Returns the sample of a person: the blob with the nearest bearing.
 fn sample(
     frame: &Frame,
-    view: &View<'_>,
+    view: &PanoramaGeometry<'_>,
     blobs: &[Blob],
     person: u64,
     head: &Point3<f64>,

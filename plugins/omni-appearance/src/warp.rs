@@ -1,7 +1,7 @@
 //! Motion of the background with the robot.
 
 use nalgebra::{Point2, Point3};
-use tagalong_core::Motion;
+use tagalong_core::EgoMotion;
 use tagalong_geometry::{Camera, Panorama};
 
 /// Spacing, in columns and rows, of the nodes at which places are computed; between them they are
@@ -11,7 +11,7 @@ const STEP: usize = 8;
 const STILL: [f64; 2] = [0.002, 0.001];
 
 /// Returns true if the robot moved enough to move the background.
-pub(crate) fn is_moving(motion: &Motion) -> bool {
+pub(crate) fn is_moving(motion: &EgoMotion) -> bool {
     motion.forward.hypot(motion.left) > STILL[0] || motion.turn.abs() > STILL[1]
 }
 
@@ -27,7 +27,12 @@ pub(crate) struct Warp {
 }
 
 impl Warp {
-    pub(crate) fn new(camera: &Camera, panorama: &Panorama, motion: &Motion, wall_m: f64) -> Self {
+    pub(crate) fn new(
+        camera: &Camera,
+        panorama: &Panorama,
+        motion: &EgoMotion,
+        wall_m: f64,
+    ) -> Self {
         let (columns, rows) = (panorama.columns, panorama.rows);
         let (across, down) = (columns / STEP + 2, rows / STEP + 2);
         let node = |row: usize, column: usize| {
@@ -101,7 +106,7 @@ impl Warp {
 fn before(
     camera: &Camera,
     panorama: &Panorama,
-    motion: &Motion,
+    motion: &EgoMotion,
     wall_m: f64,
     pixel: Point2<f64>,
 ) -> [f32; 2] {
@@ -297,9 +302,14 @@ mod tests {
     #[test]
     fn the_floor_is_where_the_odometry_says() {
         let camera = camera();
-        let motion =
-            Motion { dt: 0.3, forward: 0.15, left: -0.05, turn: 0.2, covariance: Matrix3::zeros() };
-        assert!(is_moving(&motion) && !is_moving(&Motion::at_rest(0.3)));
+        let motion = EgoMotion {
+            dt: 0.3,
+            forward: 0.15,
+            left: -0.05,
+            turn: 0.2,
+            covariance: Matrix3::zeros(),
+        };
+        assert!(is_moving(&motion) && !is_moving(&EgoMotion::at_rest(0.3)));
         let before = room(&camera, &nalgebra::Isometry2::identity(), 3.5);
         let after = room(&camera, &motion.isometry(), 3.5);
         let mut moved = vec![0.0; before.len()];
@@ -324,8 +334,13 @@ mod tests {
     fn a_wall_is_found_at_its_distance() {
         let camera = camera();
         let panorama = camera.panorama().unwrap();
-        let motion =
-            Motion { dt: 0.3, forward: 0.2, left: 0.0, turn: 0.05, covariance: Matrix3::zeros() };
+        let motion = EgoMotion {
+            dt: 0.3,
+            forward: 0.2,
+            left: 0.0,
+            turn: 0.05,
+            covariance: Matrix3::zeros(),
+        };
         let before = room(&camera, &nalgebra::Isometry2::identity(), 2.0);
         let warps = [1.2, 2.0, 6.0].map(|wall| Warp::new(&camera, panorama, &motion, wall));
         // The new image if the wall is at the middle distance.

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tagalong_core::{Error, Recorded, Result};
+use tagalong_core::{Error, ExternalDetection, Result};
 use tagalong_geometry::Rect;
 
 /// Boxes by frame number, from 1.
-pub(crate) type Boxes = BTreeMap<u64, Vec<Recorded>>;
+pub(crate) type Boxes = BTreeMap<u64, Vec<ExternalDetection>>;
 
 /// Reads a file of boxes.
 ///
@@ -26,7 +26,7 @@ pub(crate) fn read(path: &Path) -> Result<Boxes> {
     Ok(boxes)
 }
 
-fn parse(line: &str) -> std::result::Result<(u64, Recorded), String> {
+fn parse(line: &str) -> std::result::Result<(u64, ExternalDetection), String> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let number = |index: usize, name: &str| -> std::result::Result<f64, String> {
         let text = fields.get(index).ok_or_else(|| {
@@ -46,5 +46,5 @@ fn parse(line: &str) -> std::result::Result<(u64, Recorded), String> {
     }
     // A box without a score counts as certain.
     let score = if fields.len() > 6 { number(6, "score")? } else { 1.0 };
-    Ok((frame as u64, Recorded { region: Some(region), head: None, score }))
+    Ok((frame as u64, ExternalDetection { region: Some(region), head: None, score }))
 }

@@ -1,8 +1,8 @@
 use nalgebra::{Matrix3, Point3};
 use tagalong_config::Context;
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Recorded, Result,
-    Search, Track,
+    Capabilities, DepthImage, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs,
+    Query, Result, Track,
 };
 use tagalong_geometry::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
@@ -41,7 +41,7 @@ impl RecordedDetections {
     }
 
     /// Returns the recorded detections of a frame.
-    fn recorded<'a>(&'a self, frame: &'a Frame, funnel: &mut Funnel) -> &'a [Recorded] {
+    fn recorded<'a>(&'a self, frame: &'a Frame, funnel: &mut Funnel) -> &'a [ExternalDetection] {
         let found = match &self.boxes {
             Some(boxes) => Some(boxes.get(&frame.index).map_or(&[][..], Vec::as_slice)),
             None => frame.recorded(),
@@ -52,7 +52,7 @@ impl RecordedDetections {
         found.unwrap_or_default()
     }
 
-    fn detection(&self, frame: &Frame, recorded: &Recorded) -> Option<Detection> {
+    fn detection(&self, frame: &Frame, recorded: &ExternalDetection) -> Option<Detection> {
         let camera = &*frame.camera;
         let (region, position, covariance) = match (recorded.head, recorded.region) {
             (Some(head), region) => {
@@ -157,7 +157,7 @@ impl Detector for RecordedDetections {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let mut found = Vec::new();
@@ -172,7 +172,7 @@ impl Detector for RecordedDetections {
             }
         }
         // The best fit comes first, because the search is for one person.
-        if let Search::Near(track) = search {
+        if let Query::Track(track) = search {
             let mut near: Vec<(f64, Detection)> =
                 found.into_iter().filter_map(|d| Some((self.fit(track, &d)?, d))).collect();
             near.sort_by(|a, b| b.0.total_cmp(&a.0));

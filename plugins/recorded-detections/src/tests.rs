@@ -3,14 +3,14 @@ use std::sync::Arc;
 use nalgebra::{Matrix5, Point3, Vector2};
 use tagalong_config::{Context, Registry};
 use tagalong_core::{
-    DepthImage, Detection, Detector, Estimate, Frame, Funnel, Images, Motion, Person, Recorded,
-    Search, Stamp, Track, TrackId, Wheels,
+    DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, ExternalDetection, Frame,
+    Funnel, Images, Person, Query, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 
 use super::*;
 
-const EVERYWHERE: Search<'_> = Search::Everywhere { occupied: &[] };
+const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
 
 fn camera() -> Arc<Camera> {
     let lens = Pinhole { fx: 520.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
@@ -20,11 +20,11 @@ fn camera() -> Arc<Camera> {
 fn frame(index: u64, depth_m: Option<f32>) -> Frame {
     let depth = depth_m.map(|metres| Arc::new(DepthImage::filled(640, 480, metres)));
     let images = Images { depth, ..Images::default() };
-    Frame::new(index, Stamp::from_nanos(index * 100), camera(), Motion::at_rest(0.1), images)
+    Frame::new(index, Stamp::from_nanos(index * 100), camera(), EgoMotion::at_rest(0.1), images)
 }
 
 fn context(folder: &std::path::Path) -> Context {
-    let wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+    let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
     Context { seed: 1, base_dir: folder.to_owned(), wheels }
 }
 
@@ -111,7 +111,7 @@ fn low_scores_are_dropped_and_counted() {
 fn recorded_positions_of_the_log_are_taken_as_they_are() {
     let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
     let head = Point3::new(2.5, -0.3, 1.6);
-    let recorded = Recorded { region: None, head: Some(head), score: 0.9 };
+    let recorded = ExternalDetection { region: None, head: Some(head), score: 0.9 };
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
     let found = detect(&mut detector, &frame);
     assert_eq!(found[0].position, head);
@@ -144,7 +144,7 @@ fn a_search_near_a_track_finds_the_right_box_first() {
         unseen_s: 0.0,
         score: 2.0,
     };
-    let near = Search::Near(&track);
+    let near = Query::Track(&track);
     let found = detector.detect(&frame(2, None), &near, &mut Funnel::default()).unwrap();
     assert_eq!(found.len(), 1);
     assert!((found[0].position - right).norm() < 0.1, "{}", found[0].position);
@@ -184,10 +184,10 @@ fn track_at(head: Point3<f64>) -> Track {
 /// Returns true if a search near a track 3 m ahead finds a position from the log.
 fn finds_near(at: Point3<f64>, config: Config) -> bool {
     let mut detector = RecordedDetections::new(config, &context(".".as_ref())).unwrap();
-    let recorded = Recorded { region: None, head: Some(at), score: 0.9 };
+    let recorded = ExternalDetection { region: None, head: Some(at), score: 0.9 };
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
     let track = track_at(Point3::new(3.0, 0.0, 1.6));
-    !detector.detect(&frame, &Search::Near(&track), &mut Funnel::default()).unwrap().is_empty()
+    !detector.detect(&frame, &Query::Track(&track), &mut Funnel::default()).unwrap().is_empty()
 }
 
 #[test]
@@ -206,10 +206,11 @@ fn near_a_track_is_what_is_near_on_the_floor() {
 fn the_most_like_of_several_near_a_track_comes_first() {
     let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
     let heads = [3.5, 3.1, 3.3].map(|x| Point3::new(x, 0.0, 1.6));
-    let recorded = heads.map(|head| Recorded { region: None, head: Some(head), score: 0.9 });
+    let recorded =
+        heads.map(|head| ExternalDetection { region: None, head: Some(head), score: 0.9 });
     let frame = frame(1, None).with_recorded(Some(recorded.to_vec()));
     let track = track_at(Point3::new(3.0, 0.0, 1.6));
-    let found = detector.detect(&frame, &Search::Near(&track), &mut Funnel::default()).unwrap();
+    let found = detector.detect(&frame, &Query::Track(&track), &mut Funnel::default()).unwrap();
     assert_eq!(found.iter().map(|d| d.position.x).collect::<Vec<_>>(), [3.1, 3.3, 3.5]);
 }
 
@@ -267,7 +268,8 @@ fn the_depth_is_that_of_the_face_alone() {
             if u.abs() < half && v.abs() < half { inside } else { outside }
         });
         let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
-        let frame = Frame::new(2, Stamp::from_nanos(200), camera(), Motion::at_rest(0.1), images);
+        let frame =
+            Frame::new(2, Stamp::from_nanos(200), camera(), EgoMotion::at_rest(0.1), images);
         detect(&mut detector, &frame).remove(0).position.x
     };
     assert!((seen(0.085, 2.0, 5.0) - 2.08).abs() < 0.02, "nothing beside it is looked at");

@@ -33,7 +33,7 @@ fn the_limit_holds() {
     let config = Config { limit: 0.01, weight: 2.0, ..Config::default() };
     let mut verifier = SvmPatch::new(config, &context()).unwrap();
     for seed in 0..4 {
-        let margin = verifier.margin(&frame(picture(seed % 2 == 0, seed)), &candidate()).unwrap();
+        let margin = verifier.log_odds(&frame(picture(seed % 2 == 0, seed)), &candidate()).unwrap();
         assert!(margin.abs() <= 0.02, "{margin}");
     }
 }

@@ -1,5 +1,5 @@
 use tagalong_config::Context;
-use tagalong_core::{Detection, Frame, Input, Inputs, Result, Trust, Verifier};
+use tagalong_core::{Detection, Frame, Input, Inputs, Result, ScoreCalibration, Verifier};
 
 use crate::{Config, Model};
 
@@ -9,7 +9,7 @@ const BUILT_IN: &str = include_str!("../../../configs/models/svm-patch.toml");
 /// Verifier by a support vector machine on grey patches.
 pub struct SvmPatch {
     model: Model,
-    trust: Trust,
+    calibration: ScoreCalibration,
 }
 
 impl SvmPatch {
@@ -19,9 +19,9 @@ impl SvmPatch {
     /// [`tagalong_core::Error::Model`] for a file that cannot be read or is not a model,
     /// [`tagalong_core::Error::Settings`] for a weight or limit outside its range.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
-        let trust = Trust::new(config.weight, config.limit, 0.0)?;
+        let calibration = ScoreCalibration::new(config.weight, config.limit, 0.0)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { model, trust })
+        Ok(Self { model, calibration })
     }
 }
 
@@ -30,8 +30,8 @@ impl Verifier for SvmPatch {
         Inputs::NONE.require(Input::Colour)
     }
 
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let patch = self.model.sampler.patch(frame.grey()?, &candidate.region);
-        Ok(self.trust.margin(self.model.log_odds(&patch)))
+        Ok(self.calibration.calibrate(self.model.log_odds(&patch)))
     }
 }

@@ -2,7 +2,7 @@ use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use tagalong_config::Registry;
 use tagalong_core::{
     Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood, Person,
-    Result, Search, Track,
+    Query, Result, Track,
 };
 use tagalong_geometry::HEAD_RADIUS_M;
 
@@ -69,16 +69,16 @@ impl Heads {
         Detection { region, position, covariance, score, source: "heads" }
     }
 
-    fn places(&self, frame: &Frame, search: &Search<'_>) -> Result<Vec<Point3<f64>>> {
+    fn places(&self, frame: &Frame, search: &Query<'_>) -> Result<Vec<Point3<f64>>> {
         let mut found = heads(frame)?;
         match (search, self.fault) {
-            (Search::Everywhere { .. }, "blind") | (Search::Near(_), "short-sighted") => {
+            (Query::Discover { .. }, "blind") | (Query::Track(_), "short-sighted") => {
                 found.clear();
             }
-            (Search::Everywhere { .. }, "ghosts") => found.push(Point3::new(3.0, 0.0, 1.6)),
-            (Search::Everywhere { .. }, _) => found.extend(&self.remembered),
-            (Search::Near(_), "wanders") => {}
-            (Search::Near(track), _) => {
+            (Query::Discover { .. }, "ghosts") => found.push(Point3::new(3.0, 0.0, 1.6)),
+            (Query::Discover { .. }, _) => found.extend(&self.remembered),
+            (Query::Track(_), "wanders") => {}
+            (Query::Track(track), _) => {
                 let expected = track.estimate.person.position;
                 found.retain(|head| (head.xy() - expected.xy()).norm() < 0.6);
             }
@@ -100,7 +100,7 @@ impl Detector for Heads {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         _: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         assert!(self.fault != "panics" || frame.camera.width > 1, "cannot see");

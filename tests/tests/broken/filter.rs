@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use nalgebra::{SMatrix, SVector, Vector2};
 use tagalong_config::Registry;
 use tagalong_core::{
-    Detection, Estimate, Evidence, Filter, Matched, Motion, PerPerson, Person, PersonFilter,
-    Result, Support, TrackId,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter,
+    Result, TrackId, Update,
 };
 use tagalong_geometry::Camera;
 
@@ -28,9 +28,9 @@ type Mean = SVector<f64, 5>;
 type Covariance = SMatrix<f64, 5, 5>;
 
 impl PersonFilter for Kalman {
-    type Belief = (Mean, Covariance);
+    type State = (Mean, Covariance);
 
-    fn start(&self, detection: &Detection) -> Self::Belief {
+    fn start(&self, detection: &Detection) -> Self::State {
         let p = detection.position;
         let speed = if self.fault == "moody" { 0.01 * self.mood } else { 0.0 };
         let mut covariance = Covariance::identity() * 2.0;
@@ -38,9 +38,9 @@ impl PersonFilter for Kalman {
         (Mean::new(p.x, p.y, p.z, speed, 0.0), covariance)
     }
 
-    fn predict(&self, (mean, covariance): &mut Self::Belief, motion: &Motion) {
+    fn predict(&self, (mean, covariance): &mut Self::State, motion: &EgoMotion) {
         let ignores = matches!(self.fault, "forgets-the-robot" | "never-moves");
-        let motion = if ignores { &Motion::at_rest(motion.dt) } else { motion };
+        let motion = if ignores { &EgoMotion::at_rest(motion.dt) } else { motion };
         let mut f = Covariance::identity();
         f[(0, 3)] = motion.dt;
         f[(1, 4)] = motion.dt;
@@ -55,11 +55,11 @@ impl PersonFilter for Kalman {
         *covariance = step * *covariance * step.transpose() + Covariance::from_diagonal(&noise);
     }
 
-    fn correct(&self, belief: &mut Self::Belief, seen: &Detection, _: &Camera) -> Support {
+    fn correct(&self, state: &mut Self::State, seen: &Detection, _: &Camera) -> Update {
         if self.fault == "never-moves" {
-            return Support::default();
+            return Update::default();
         }
-        let (mean, covariance) = belief;
+        let (mean, covariance) = state;
         let h = SMatrix::<f64, 3, 5>::identity();
         let s = h * *covariance * h.transpose() + seen.covariance;
         let gain = *covariance * h.transpose() * s.try_inverse().unwrap_or_default();
@@ -69,10 +69,10 @@ impl PersonFilter for Kalman {
         let updated =
             kept * *covariance * kept.transpose() + gain * seen.covariance * gain.transpose();
         *covariance = 0.5 * (updated + updated.transpose());
-        Support::default()
+        Update::default()
     }
 
-    fn estimate(&self, (mean, covariance): &Self::Belief, camera: &Camera) -> Estimate {
+    fn estimate(&self, (mean, covariance): &Self::State, camera: &Camera) -> Estimate {
         let position = mean.fixed_rows::<3>(0).into_owned().into();
         let mut covariance = *covariance;
         match self.fault {
@@ -96,11 +96,11 @@ impl Filter for Faulty {
         self.inner.start(id, detection, camera);
     }
 
-    fn predict(&mut self, motion: &Motion, camera: &Camera) {
+    fn predict(&mut self, motion: &EgoMotion, camera: &Camera) {
         self.inner.predict(motion, camera);
     }
 
-    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+    fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         assert!(self.fault != "panics" || evidence.frame.camera.width > 1, "cannot see");
         if self.fault != "swaps" {
             return self.inner.update(evidence);

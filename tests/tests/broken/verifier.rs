@@ -24,7 +24,7 @@ impl Verifier for Brightness {
         }
     }
 
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         assert!(self.fault != "panics" || frame.camera.width > 1, "cannot see");
         if self.fault == "vague" && frame.colour().is_err() {
             return Err(Error::Other("something is missing".into()));

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point2, Point3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{
-    Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, LaserScan, Result, Search,
+    Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, LaserScan, Query, Result,
 };
 use tagalong_geometry::Rect;
 
@@ -50,7 +50,7 @@ impl Detector for Legs {
         Capabilities { inputs, discovers: true, ..Capabilities::default() }
     }
 
-    fn detect(&mut self, frame: &Frame, _: &Search<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+    fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
         let legs = self.legs(frame.scan()?);
         let [least, most] = self.0.stride_m;
         let pairs =

@@ -50,7 +50,7 @@ pub struct Task {
 }
 
 /// Config that was read, and its inputs.
-pub struct Candidate {
+pub struct PlannedConfig {
     /// The config.
     pub file: ConfigFile,
     /// Path of the config.
@@ -64,7 +64,7 @@ pub struct Candidate {
     pub tune: Vec<Tunable>,
 }
 
-impl Candidate {
+impl PlannedConfig {
     /// Opens a log with this pipeline's settings.
     ///
     /// # Errors
@@ -130,7 +130,7 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
 ///
 /// # Errors
 /// If it, or its truth, changed since the task was planned.
-pub fn reread(task: &Task, registry: &Registry) -> Result<Candidate, Failure> {
+pub fn reread(task: &Task, registry: &Registry) -> Result<PlannedConfig, Failure> {
     let candidate = candidate(&task.config, registry)?;
     let mut now = task.inputs.clone();
     // The file list is built anew: the config may name other files now.
@@ -145,7 +145,7 @@ pub fn reread(task: &Task, registry: &Registry) -> Result<Candidate, Failure> {
     Err(Failure::usage(format!("{config} or {truth} changed since it was planned; plan again")))
 }
 
-fn files(candidate: &Candidate) -> Result<BTreeMap<String, String>, Failure> {
+fn files(candidate: &PlannedConfig) -> Result<BTreeMap<String, String>, Failure> {
     file_hashes(&candidate.file)
 }
 
@@ -170,7 +170,7 @@ pub fn version() -> Result<String, Failure> {
 }
 
 fn task(
-    config: &Candidate,
+    config: &PlannedConfig,
     log: &Annotated,
     seed: u64,
     version: &str,
@@ -201,7 +201,7 @@ fn task(
 }
 
 /// Returns the hash of the resolved config: comments and order do not matter, changed defaults do.
-fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<String, Failure> {
+fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result<String, Failure> {
     let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
     let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved());
     Ok(sha256(text.as_bytes()))
@@ -211,7 +211,7 @@ fn config_hash(config: &Candidate, seed: u64, registry: &Registry) -> Result<Str
 ///
 /// # Errors
 /// A log that cannot be read at all.
-pub fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Failure> {
+pub fn why_not(config: &PlannedConfig, log: &Annotated) -> Result<Option<String>, Failure> {
     match config.open(&log.log) {
         Ok(_) => Ok(None),
         Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
@@ -225,7 +225,7 @@ pub fn why_not(config: &Candidate, log: &Annotated) -> Result<Option<String>, Fa
     }
 }
 
-fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<Candidate>, Failure> {
+fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
     if !args.configs.is_empty() {
         return args.configs.iter().map(|path| candidate(path, registry)).collect();
     }
@@ -236,7 +236,7 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<Candidate>, Failu
 ///
 /// # Errors
 /// If there is none.
-pub fn shipped(registry: &Registry) -> Result<Vec<Candidate>, Failure> {
+pub fn shipped(registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
     let mut found = Vec::new();
     for path in toml_files(Path::new("configs")) {
         match candidate(&path, registry) {
@@ -255,12 +255,12 @@ pub fn shipped(registry: &Registry) -> Result<Vec<Candidate>, Failure> {
 ///
 /// # Errors
 /// Any mistake in it.
-pub fn candidate(path: &Path, registry: &Registry) -> Result<Candidate, Failure> {
+pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Failure> {
     let file = ConfigFile::read(path)?;
     let (pipeline, settings) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
     let (first_seed, tune, inputs) = (settings.seed, settings.tune, pipeline.inputs());
-    Ok(Candidate { file, path: path.to_owned(), first_seed, outer, inputs, tune })
+    Ok(PlannedConfig { file, path: path.to_owned(), first_seed, outer, inputs, tune })
 }
 
 fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {

@@ -12,7 +12,7 @@ use tagalong_report::{Outcome, TaskResult};
 
 use super::args::RunArgs;
 use super::pictures::Wanted;
-use super::plan::{Candidate, Task, reread, version};
+use super::plan::{PlannedConfig, Task, reread, version};
 use super::store::{Store, Stored, StoredTiming};
 use super::watch::Watch;
 use crate::outcome::{Failure, say};
@@ -37,7 +37,7 @@ pub struct Tally {
 /// Task with its config.
 struct Ready {
     task: Task,
-    config: Candidate,
+    config: PlannedConfig,
 }
 
 /// Tasks that share a pass over a log.

@@ -5,7 +5,7 @@ use tagalong_pipeline::Fate;
 
 use super::canvas::{Canvas, Ink, LINE_PX};
 use super::trails::Trails;
-use super::{Scene, colour_of};
+use super::{OverlayData, colour_of};
 
 /// Depth at which the shading of depth images is darkest, m.
 const FAR_M: f32 = 8.0;
@@ -14,7 +14,7 @@ const REJECTED: Ink = Ink::solid([200, 200, 200]).faint(0.55);
 const TITLE: Ink = Ink::solid([255, 255, 255]);
 
 /// Renders the camera's image with all overlays.
-pub fn draw(scene: &Scene, trails: &Trails) -> Canvas {
+pub fn draw(scene: &OverlayData, trails: &Trails) -> Canvas {
     let (width, height) = (scene.camera.width, scene.camera.height);
     let mut canvas = Canvas::new(width, height, [0; 3]);
     if let Some(picture) = background(&scene.images) {
@@ -54,7 +54,7 @@ fn shaded(depth: &DepthImage) -> RgbImage {
     })
 }
 
-fn title(scene: &Scene) -> String {
+fn title(scene: &OverlayData) -> String {
     let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
     format!("frame {}  {} s  {people} seen", scene.report.index, scene.report.stamp)
 }
@@ -96,7 +96,7 @@ fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
 }
 
 /// Renders the dropped candidates, with the test that dropped them.
-fn draw_rejected(canvas: &mut Canvas, scene: &Scene) {
+fn draw_rejected(canvas: &mut Canvas, scene: &OverlayData) {
     for candidate in &scene.report.candidates {
         if let Fate::Dropped(test) = candidate.fate {
             label(canvas, &candidate.detection.region, test);
@@ -116,7 +116,7 @@ fn label(canvas: &mut Canvas, region: &Rect, test: &str) {
     canvas.text(Point2::new(region.x, region.bottom() - LINE_PX), test, REJECTED);
 }
 
-fn draw_trails(canvas: &mut Canvas, scene: &Scene, trails: &Trails) {
+fn draw_trails(canvas: &mut Canvas, scene: &OverlayData, trails: &Trails) {
     for (id, trail) in trails.in_robot(scene) {
         let points: Vec<_> = trail.iter().filter_map(|p| scene.camera.project(p)).collect();
         canvas.path(&points, colour_of(id.0).faint(0.8));

@@ -23,7 +23,7 @@ use tagalong_pipeline::FrameReport;
 use trails::Trails;
 
 /// Data that a picture of one frame shows.
-pub struct Scene {
+pub struct OverlayData {
     /// Camera of the frame.
     pub camera: Arc<Camera>,
     /// Images of the frame; shared, not copied.
@@ -50,7 +50,7 @@ impl Overlay {
     ///
     /// # Errors
     /// A sentence that names the file.
-    pub fn draw(&mut self, scene: &Scene) -> Result<(), String> {
+    pub fn draw(&mut self, scene: &OverlayData) -> Result<(), String> {
         self.trails.follow(scene);
         let picture = picture(scene, &self.trails);
         let path = self.folder.join(format!("{:06}.png", scene.report.index));
@@ -58,7 +58,7 @@ impl Overlay {
     }
 }
 
-fn picture(scene: &Scene, trails: &Trails) -> RgbImage {
+fn picture(scene: &OverlayData, trails: &Trails) -> RgbImage {
     let (width, height) = (scene.camera.width, scene.camera.height);
     let plan_width = plan_view::width_px(height);
     let mut canvas = Canvas::new(width + plan_width, height, [24, 24, 28]);

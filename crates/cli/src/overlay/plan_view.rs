@@ -3,7 +3,7 @@ use tagalong_core::Track;
 
 use super::canvas::{Canvas, Ink};
 use super::trails::Trails;
-use super::{Scene, colour_of};
+use super::{OverlayData, colour_of};
 
 /// Reach of the view ahead of the robot, m.
 const AHEAD_M: f64 = 8.0;
@@ -47,7 +47,7 @@ impl Plan {
 }
 
 /// Renders the people from above, to the right of column `left`.
-pub fn draw(canvas: &mut Canvas, left: usize, scene: &Scene, trails: &Trails) {
+pub fn draw(canvas: &mut Canvas, left: usize, scene: &OverlayData, trails: &Trails) {
     let plan = Plan::new(left, scene.camera.height);
     draw_grid(canvas, &plan);
     draw_field_of_view(canvas, &plan, scene);
@@ -81,7 +81,7 @@ fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
 }
 
 /// Renders the two edges of the field of view, on the floor plan.
-fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &Scene) {
+fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData) {
     let camera = &scene.camera;
     let eye = Point3::from(camera.robot_from_camera.translation.vector);
     for column in [0.0, camera.width as f64 - 1.0] {

@@ -25,11 +25,11 @@ fn track(id: u32, camera: &Camera) -> Track {
     }
 }
 
-fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> Scene {
+fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
     let lens = Pinhole { fx: 260.0, fy: 260.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
     let depth = Some(Arc::new(DepthImage::filled(320, 240, 4.0)));
-    Scene {
+    OverlayData {
         images: Images { depth, ..Images::default() },
         odom_from_robot: Isometry2::identity(),
         report: FrameReport {

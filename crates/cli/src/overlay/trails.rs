@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::Point3;
 use tagalong_core::TrackId;
 
-use super::Scene;
+use super::OverlayData;
 
 /// Points kept of a trail.
 const LENGTH: usize = 60;
@@ -16,7 +16,7 @@ pub struct Trails {
 
 impl Trails {
     /// Adds the present positions and forgets tracks that ended.
-    pub fn follow(&mut self, scene: &Scene) {
+    pub fn follow(&mut self, scene: &OverlayData) {
         let tracks = &scene.report.tracks;
         self.places.retain(|id, _| tracks.iter().any(|track| track.id == *id));
         for track in tracks.iter().filter(|track| track.confirmed) {
@@ -32,7 +32,7 @@ impl Trails {
     }
 
     /// Returns the trails in the present robot frame.
-    pub fn in_robot(&self, scene: &Scene) -> Vec<(TrackId, Vec<Point3<f64>>)> {
+    pub fn in_robot(&self, scene: &OverlayData) -> Vec<(TrackId, Vec<Point3<f64>>)> {
         let into_robot = |p: &Point3<f64>| {
             let floor = scene.odom_from_robot.inverse_transform_point(&p.xy());
             Point3::new(floor.x, floor.y, p.z)

@@ -24,7 +24,7 @@ use timings::Timings;
 use crate::args::{Format, RunArgs};
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
-use crate::overlay::{Overlay, Scene};
+use crate::overlay::{Overlay, OverlayData};
 use crate::sample;
 use crate::signals::Signals;
 use crate::suggest::check_log_path;
@@ -152,9 +152,9 @@ fn work(
     }
 }
 
-fn scene(item: &Item, report: FrameReport) -> Scene {
+fn scene(item: &Item, report: FrameReport) -> OverlayData {
     let frame = &item.frame.frame;
-    Scene {
+    OverlayData {
         camera: frame.camera.clone(),
         images: frame.images().clone(),
         odom_from_robot: item.frame.odom_from_robot,

@@ -2,7 +2,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use crate::outcome::Failure;
-use crate::overlay::{Overlay, Scene};
+use crate::overlay::{Overlay, OverlayData};
 
 /// Pictures that wait to be rendered; each holds its images.
 const WAITING: usize = 2;
@@ -14,7 +14,7 @@ pub enum Pictures {
     /// One after the other.
     Here(Overlay),
     /// In parallel with the pipeline.
-    Aside(SyncSender<Scene>, JoinHandle<Result<(), String>>),
+    Aside(SyncSender<OverlayData>, JoinHandle<Result<(), String>>),
 }
 
 impl Pictures {
@@ -25,7 +25,7 @@ impl Pictures {
             return Self::Here(overlay);
         }
         // Bounded: slow rendering holds the pipeline back instead of filling the memory.
-        let (sender, scenes) = sync_channel::<Scene>(WAITING);
+        let (sender, scenes) = sync_channel::<OverlayData>(WAITING);
         let draw_all = move || scenes.iter().try_for_each(|scene| overlay.draw(&scene));
         Self::Aside(sender, thread::spawn(draw_all))
     }
@@ -34,7 +34,7 @@ impl Pictures {
     ///
     /// # Errors
     /// If the picture cannot be written. A parallel renderer reports that in [`Pictures::finish`].
-    pub fn draw(&mut self, scene: impl FnOnce() -> Scene) -> Result<(), Failure> {
+    pub fn draw(&mut self, scene: impl FnOnce() -> OverlayData) -> Result<(), Failure> {
         match self {
             Self::None => Ok(()),
             Self::Here(overlay) => overlay.draw(&scene()).map_err(Failure::failed),

@@ -46,7 +46,7 @@ pub struct TruthOptions {
 
 /// Position of a person, as far as the file has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Place {
+enum TruthPosition {
     Unknown,
     /// Surface of the head in the colour optical frame, m.
     HeadInCamera([f64; 3]),
@@ -67,7 +67,7 @@ enum Kind {
 /// Frame as annotated; the key of the map is its number, or its stamp.
 #[derive(Clone, Debug, Default)]
 struct Annotated {
-    people: Vec<(Truth, Place)>,
+    people: Vec<(Truth, TruthPosition)>,
     ignore_regions: Vec<Region>,
 }
 
@@ -107,7 +107,7 @@ impl TruthFile {
         Self { kind, frames: BTreeMap::new(), info: None, rules: None, notes: Vec::new() }
     }
 
-    fn add(&mut self, key: u64, truth: Truth, place: Place) {
+    fn add(&mut self, key: u64, truth: Truth, place: TruthPosition) {
         self.frames.entry(key).or_default().people.push((truth, place));
     }
 
@@ -130,7 +130,7 @@ impl TruthFile {
         }
         file.notes.extend(without_area(&name, rows.iter().map(|row| (row.line, &row.region))));
         for (number, truth) in rows.iter().map(|row| row.truth(rules)) {
-            file.add(u64::from(number), truth, Place::Unknown);
+            file.add(u64::from(number), truth, TruthPosition::Unknown);
         }
         Ok(file)
     }
@@ -141,7 +141,7 @@ impl TruthFile {
         let mut file = Self::empty(Kind::People);
         for row in rows {
             let (number, truth) = row.truth(|_| None);
-            file.add(u64::from(number), truth, Place::HeadInCamera(row.head_in_camera_m));
+            file.add(u64::from(number), truth, TruthPosition::HeadInCamera(row.head_in_camera_m));
         }
         Ok(file)
     }
@@ -161,7 +161,9 @@ impl TruthFile {
             annotated.people = frame
                 .truths
                 .into_iter()
-                .map(|truth| (truth, truth.floor_m.map_or(Place::Unknown, Place::Floor)))
+                .map(|truth| {
+                    (truth, truth.floor_m.map_or(TruthPosition::Unknown, TruthPosition::Floor))
+                })
                 .collect();
         }
         Ok(file)
@@ -200,7 +202,7 @@ impl TruthFile {
     /// Returns true if floor positions need the camera's pose.
     pub fn needs_pose(&self) -> bool {
         let mut people = self.frames.values().flat_map(|frame| &frame.people);
-        people.any(|(_, place)| matches!(place, Place::HeadInCamera(_)))
+        people.any(|(_, place)| matches!(place, TruthPosition::HeadInCamera(_)))
     }
 
     /// Returns true if frames are identified by stamps: only the log knows their numbers.
@@ -248,7 +250,7 @@ impl TruthFile {
     }
 }
 
-impl Place {
+impl TruthPosition {
     /// Returns the position in the robot frame; heads are moved from their surface to their centre.
     fn on_floor(self, robot_from_camera: Option<&Isometry3<f64>>) -> Option<[f64; 2]> {
         match self {
@@ -266,14 +268,19 @@ impl Place {
     }
 }
 
-fn of_person(person: &TruthPerson) -> (Truth, Place) {
+fn of_person(person: &TruthPerson) -> (Truth, TruthPosition) {
     let truth = Truth {
         id: person.id,
         region: person.upper_body_px.map(|[x, y, width, height]| Region { x, y, width, height }),
         floor_m: None,
         role: if person.ignore { Role::Ignored } else { Role::Counts },
     };
-    (truth, person.head_in_robot_m.map_or(Place::Unknown, |[x, y, _]| Place::Floor([x, y])))
+    (
+        truth,
+        person
+            .head_in_robot_m
+            .map_or(TruthPosition::Unknown, |[x, y, _]| TruthPosition::Floor([x, y])),
+    )
 }
 
 /// Distinguishes formats by their first line.

@@ -9,7 +9,7 @@ use tagalong_core::{Detection, Track, Verifier};
 use tagalong_eval::{CONFIDENCE, wilson};
 use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 
-use super::seen::{Known, Label, Seen, label};
+use super::seen::{AnnotatedFrame, Known, Label, label};
 use crate::outcome::Failure;
 
 /// Distance on the floor within which a track is of a person, m ...
@@ -118,7 +118,7 @@ impl Comparison {
     ///
     /// # Errors
     /// A plugin that fails.
-    pub fn step(&mut self, seen: &Seen, tally: &mut Tally) -> Result<(), Failure> {
+    pub fn step(&mut self, seen: &AnnotatedFrame, tally: &mut Tally) -> Result<(), Failure> {
         let proposed = self.proposer.step(&seen.frame).map_err(Failure::failed)?;
         for Candidate { detection, .. } in &proposed.candidates {
             tally.proposal(label(detection, &seen.people), self.margin(seen, detection)? < 0.0);
@@ -136,8 +136,8 @@ impl Comparison {
         Ok(())
     }
 
-    fn margin(&mut self, seen: &Seen, candidate: &Detection) -> Result<f64, Failure> {
-        self.verifier.margin(&seen.frame, candidate).map_err(Failure::failed)
+    fn margin(&mut self, seen: &AnnotatedFrame, candidate: &Detection) -> Result<f64, Failure> {
+        self.verifier.log_odds(&seen.frame, candidate).map_err(Failure::failed)
     }
 }
 

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_config::{ConfigError, Context, Example, Kind, Registry, Trainer};
-use tagalong_core::{Detection, Frame, Verifier, Wheels};
+use tagalong_core::{Detection, DiffDrive, Frame, Verifier};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{CameraKind, Split};
 use toml::Spanned;
@@ -33,8 +33,8 @@ use self::card::{Card, Harvest};
 use self::held_out::{Comparison, Effect, Tally};
 use self::in_use::InUse;
 use self::photos::{fingerprint, photos};
-use self::rooms::Look;
-use self::seen::{Label, Seen, in_log, in_scene, label};
+use self::rooms::ImageTiming;
+use self::seen::{AnnotatedFrame, Label, in_log, in_scene, label};
 use crate::outcome::{Ended, Failure, Outcome, print, say};
 use crate::simulate::threads;
 
@@ -89,21 +89,21 @@ struct Plan {
     rounds: usize,
     test_scenes: u64,
     /// Few images per second: distant moments are more informative than neighbouring ones.
-    look: Look,
+    look: ImageTiming,
     /// Rate and duration for tests; tracks need more images.
-    test_look: Look,
+    test_look: ImageTiming,
 }
 
 impl Plan {
     fn new(args: &TrainArgs) -> Self {
         let (scenes, rounds) = (args.scenes, args.rounds.map(|rounds| rounds as usize));
-        let look = Look { rate_hz: 1.0, duration_s: 7.0 };
+        let look = ImageTiming { rate_hz: 1.0, duration_s: 7.0 };
         if args.quick {
-            let test_look = Look { rate_hz: 4.0, duration_s: 2.0 };
+            let test_look = ImageTiming { rate_hz: 4.0, duration_s: 2.0 };
             let rounds = rounds.unwrap_or(1);
             Self { scenes: [scenes.unwrap_or(6), 4], rounds, test_scenes: 4, look, test_look }
         } else {
-            let test_look = Look { rate_hz: 5.0, duration_s: 4.0 };
+            let test_look = ImageTiming { rate_hz: 5.0, duration_s: 4.0 };
             Self {
                 scenes: [scenes.unwrap_or(256), 64],
                 rounds: rounds.unwrap_or(2),
@@ -207,7 +207,7 @@ impl<'a> Session<'a> {
     }
 
     fn context(&self) -> Context {
-        let wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+        let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
         Context { seed: self.args.seed, base_dir: PathBuf::from("."), wheels }
     }
 
@@ -248,7 +248,7 @@ impl<'a> Session<'a> {
         let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
             harvest.seen += 1;
             if let Some(verifier) = &mut doubter {
-                let margin = verifier.margin(frame, candidate).map_err(Failure::failed)?;
+                let margin = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
                 let right = if example.is_person { margin } else { -margin };
                 harvest.mistakes += u64::from(right < 0.0);
                 // Only mistakes and unsure cases are added: the model is right about the rest.
@@ -349,7 +349,7 @@ impl<'a> Session<'a> {
 /// Passes on the detector's proposals that the truth can label.
 fn propose(
     pipeline: &mut Pipeline,
-    seen: &Seen,
+    seen: &AnnotatedFrame,
     group: impl Fn(Option<i64>) -> u64,
     show: photos::Take<'_>,
 ) -> Result<(), Failure> {

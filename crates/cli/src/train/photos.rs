@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_config::Example;
-use tagalong_core::{Detection, Frame, GreyImage, Images, Motion, Stamp};
+use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use super::rooms::Chance;
@@ -117,7 +117,8 @@ fn busts(folder: &Path) -> Vec<Photo> {
         .into_iter()
         .filter_map(|path| Some((path.clone(), read(&path).ok()?)))
         .collect();
-    let looks: Vec<Looks> = files.iter().map(|(_, image)| Looks::of(image)).collect();
+    let looks: Vec<PictureSignature> =
+        files.iter().map(|(_, image)| PictureSignature::of(image)).collect();
     let mut group_of: Vec<usize> = (0..files.len()).collect();
     for i in 0..files.len() {
         for j in 0..i {
@@ -139,16 +140,16 @@ fn busts(folder: &Path) -> Vec<Photo> {
 }
 
 /// Appearance of a small version of a picture, tolerant of a shift of its cut by a few pixels.
-struct Looks {
+struct PictureSignature {
     middle: Patch,
     /// All patches of that size of the picture, and of its mirror image.
     all: Vec<Patch>,
 }
 
-/// Brightness of [`Looks::PATCH`] columns and rows, of unit length and without its mean.
-type Patch = [f32; Looks::PATCH * Looks::PATCH];
+/// Brightness of [`PictureSignature::PATCH`] columns and rows, of unit length and without its mean.
+type Patch = [f32; PictureSignature::PATCH * PictureSignature::PATCH];
 
-impl Looks {
+impl PictureSignature {
     /// Columns and rows of the small version ...
     const SMALL: usize = 16;
     /// ... and of its patches.
@@ -177,7 +178,9 @@ impl Looks {
 }
 
 fn patch(brightness: impl Fn(usize, usize) -> f32) -> Patch {
-    let mut patch = std::array::from_fn(|at| brightness(at % Looks::PATCH, at / Looks::PATCH));
+    let mut patch = std::array::from_fn(|at| {
+        brightness(at % PictureSignature::PATCH, at / PictureSignature::PATCH)
+    });
     to_unit_length(&mut patch);
     patch
 }
@@ -280,7 +283,7 @@ pub fn frame(grey: GreyImage) -> Frame {
     let lens = Pinhole { fx: 500.0, fy: 500.0, cx, cy, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, width, height, 1.2, 0.0, 0.0));
     let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
-    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
+    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), images)
 }
 
 /// Returns a candidate of which only the region is known.
@@ -319,8 +322,11 @@ mod tests {
         let mirrored = GreyImage::from_fn(50, 50, |x, y| image.row(y)[49 - x]);
         let other = GreyImage::from_fn(50, 50, |x, y| ((x * 31 + y * y * 3) % 253) as u8);
         let aside = GreyImage::from_fn(46, 47, |x, y| mirrored.row(y + 3)[x + 4]);
-        let looks = Looks::of(&image);
-        assert!(looks.is_like(&Looks::of(&mirrored)) && looks.is_like(&Looks::of(&aside)));
-        assert!(!looks.is_like(&Looks::of(&other)));
+        let looks = PictureSignature::of(&image);
+        assert!(
+            looks.is_like(&PictureSignature::of(&mirrored))
+                && looks.is_like(&PictureSignature::of(&aside))
+        );
+        assert!(!looks.is_like(&PictureSignature::of(&other)));
     }
 }

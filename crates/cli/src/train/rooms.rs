@@ -32,7 +32,7 @@ const SUITES: [&str; 9] = [
 
 /// Rate and duration of a scene's images.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct ImageTiming {
     /// Images per second.
     pub rate_hz: f64,
     /// Duration, s.
@@ -44,7 +44,7 @@ pub struct Look {
 ///
 /// # Errors
 /// A number that is no seed.
-pub fn scene(split: Split, number: u64, look: Look) -> Result<Scene, ConfigError> {
+pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, ConfigError> {
     let (turn, is_room) = (number / 2, number.is_multiple_of(2));
     // The camera changes more slowly than the rest, so that every suite gets both kinds.
     let kind = if (turn / 2).is_multiple_of(2) { CameraKind::Rgbd } else { CameraKind::Stereo };
@@ -66,7 +66,7 @@ fn room(seed: u64, people: usize) -> Scene {
     let mut chance = Chance(seed);
     let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
     let start = [0.8, width * chance.between(0.3, 0.7)];
-    let view = View { start, room: [length, width] };
+    let view = RobotView { start, room: [length, width] };
     Scene {
         about: "candidates for a verifier".into(),
         seed,
@@ -105,12 +105,12 @@ fn room(seed: u64, people: usize) -> Scene {
 }
 
 /// View of the robot from its start.
-struct View {
+struct RobotView {
     start: [f64; 2],
     room: [f64; 2],
 }
 
-impl View {
+impl RobotView {
     /// Returns a random place in view, within the detector's range and inside the room.
     fn place(&self, chance: &mut Chance) -> [f64; 2] {
         let (distance, angle) = (chance.between(1.8, 5.5), chance.between(-0.5, 0.5));
@@ -122,7 +122,7 @@ impl View {
     }
 }
 
-fn piece(chance: &mut Chance, view: &View) -> Furniture {
+fn piece(chance: &mut Chance, view: &RobotView) -> Furniture {
     Furniture {
         kind: chance.pick(&LOOK_ALIKES),
         at: view.place(chance),
@@ -130,7 +130,7 @@ fn piece(chance: &mut Chance, view: &View) -> Furniture {
     }
 }
 
-fn walker(chance: &mut Chance, view: &View) -> PersonSettings {
+fn walker(chance: &mut Chance, view: &RobotView) -> PersonSettings {
     PersonSettings {
         path: (0..3).map(|_| view.place(chance)).collect(),
         speed_mps: chance.between(0.3, 1.2),
@@ -165,7 +165,7 @@ impl Chance {
 mod tests {
     use super::*;
 
-    const LOOK: Look = Look { rate_hz: 2.0, duration_s: 3.0 };
+    const LOOK: ImageTiming = ImageTiming { rate_hz: 2.0, duration_s: 3.0 };
 
     #[test]
     fn a_scene_depends_on_its_number_and_split_only() {

@@ -15,7 +15,7 @@ use crate::outcome::Failure;
 use crate::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 
 /// Frame with the people in it.
-pub struct Seen {
+pub struct AnnotatedFrame {
     /// The frame.
     pub frame: Frame,
     /// All people, also those that do not count.
@@ -74,7 +74,7 @@ pub fn label(candidate: &Detection, people: &[Known]) -> Label {
 }
 
 /// Callback for each frame.
-pub type See<'a> = &'a mut dyn FnMut(&Seen) -> Result<(), Failure>;
+pub type See<'a> = &'a mut dyn FnMut(&AnnotatedFrame) -> Result<(), Failure>;
 
 /// Goes through a simulated scene. A stereo pair is matched, as a pipeline would.
 ///
@@ -94,7 +94,7 @@ pub fn in_scene(
             Ok(_) => drawn.frame,
             Err(_) => with_depth(drawn.frame, &mut stereo)?,
         };
-        see(&Seen { frame, people })?;
+        see(&AnnotatedFrame { frame, people })?;
     }
     Ok(())
 }
@@ -127,7 +127,7 @@ pub fn in_log(log: &Path, truth: &Path, see: See<'_>) -> Result<(), Failure> {
     while let Some(item) = source.next_frame() {
         let (truths, _) = people.remove(&LogShot::of(&item).number).unwrap_or_default();
         let people = truths.iter().filter_map(annotated).collect();
-        see(&Seen { frame: item.frame, people })?;
+        see(&AnnotatedFrame { frame: item.frame, people })?;
     }
     Ok(())
 }

@@ -31,7 +31,7 @@ struct Distance {
 
 /// Result of `tagalong triangulate`.
 #[derive(Serialize)]
-pub(super) struct Found {
+pub(super) struct TriangulationResult {
     cameras: Vec<CameraFound>,
     as_guessed: Distance,
     calibrated: Distance,
@@ -43,7 +43,7 @@ pub(super) struct Found {
     pub(super) truth_frames: Option<usize>,
 }
 
-impl Found {
+impl TriangulationResult {
     /// Compares the cameras as guessed and as calibrated, at the places used for that and at those
     /// held out.
     pub(super) fn new(

@@ -15,8 +15,8 @@ use tagalong_log::{Limits, read_truth};
 use tagalong_sim::WebcamSettings;
 use tagalong_triangulate::{Cameras, HatColour, Known, Sight, calibrate};
 
-use self::found::Found;
-use self::seen::Seen;
+use self::found::TriangulationResult;
+use self::seen::CameraSightings;
 use self::truth::Standing;
 use crate::args::Format;
 use crate::outcome::{Ended, Failure, Outcome, print};
@@ -82,7 +82,7 @@ pub fn triangulate(args: &TriangulateArgs) -> Outcome {
     check_log_path(&args.log)?;
     let guess = guess(&args.cameras)?;
     let colour = HatColour { hue_deg: args.hue, ..HatColour::default() };
-    let seen = Seen::read(&args.log, guess.len(), &colour)?;
+    let seen = CameraSightings::read(&args.log, guess.len(), &colour)?;
     if seen.hats.is_empty() {
         let text = "no camera sees a hat; images are looked for on /webcam_1/image_raw/compressed \
                     and so on, and the hue is --hue";
@@ -102,7 +102,8 @@ pub fn triangulate(args: &TriangulateArgs) -> Outcome {
     if let Some(path) = &args.output {
         put(path, &found::csv(&fixes))?;
     }
-    let mut found = Found::new(&calibrated, [&guessed, &cameras], [&used, &held], fixes.len());
+    let mut found =
+        TriangulationResult::new(&calibrated, [&guessed, &cameras], [&used, &held], fixes.len());
     if let Some(path) = &args.truth {
         let frames = truth::frames(args, &seen, &fixes)?;
         put(path, &truth::lines(&frames))?;
@@ -140,7 +141,7 @@ fn moments(hats: &[(Stamp, Sight)]) -> Vec<(Stamp, Vec<Sight>)> {
 type Places = BTreeMap<u64, Point2<f64>>;
 
 /// Reads the places of a file, by stamp.
-fn known_places(path: &Path, seen: &Seen) -> Result<Places, Failure> {
+fn known_places(path: &Path, seen: &CameraSightings) -> Result<Places, Failure> {
     let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
     let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
     let first = seen.first.map_or(0, |stamp| stamp.nanos());
@@ -160,7 +161,7 @@ fn known_places(path: &Path, seen: &Seen) -> Result<Places, Failure> {
 }
 
 /// Returns the true places of a simulated log with one person.
-fn true_places(log: &Path, seen: &Seen) -> Result<Places, Failure> {
+fn true_places(log: &Path, seen: &CameraSightings) -> Result<Places, Failure> {
     let truth = read_truth(log, &Limits::default())?.unwrap_or_default();
     let mut places = Places::new();
     for frame in &truth {

@@ -20,7 +20,7 @@ const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
 
 /// Sightings of all cameras.
 #[derive(Default)]
-pub(super) struct Seen {
+pub(super) struct CameraSightings {
     /// Stamps and pixels of the hat, by camera.
     pub(super) hats: Vec<(Stamp, Sight)>,
     /// Focal lengths and centres, where the log has them.
@@ -32,7 +32,7 @@ pub(super) struct Seen {
     pub(super) first: Option<Stamp>,
 }
 
-impl Seen {
+impl CameraSightings {
     /// Searches for the hat in all images of so many cameras.
     pub(super) fn read(log: &Path, cameras: usize, colour: &HatColour) -> Result<Self, Failure> {
         let failed = |why: String| Failure::failed(format!("{}: {why}", log.display()));

@@ -8,7 +8,7 @@ use tagalong_log::{InputSettings, Limits, TruthFrame, TruthPerson};
 use tagalong_triangulate::Fix;
 
 use super::TriangulateArgs;
-use super::seen::Seen;
+use super::seen::CameraSightings;
 use crate::outcome::Failure;
 use crate::scoring::{Shot, Shots};
 
@@ -40,7 +40,7 @@ impl FromStr for Standing {
 /// no person.
 pub(super) fn frames(
     args: &TriangulateArgs,
-    seen: &Seen,
+    seen: &CameraSightings,
     fixes: &[(Stamp, Fix)],
 ) -> Result<Vec<TruthFrame>, Failure> {
     let shots = Shots::read(&args.log, &InputSettings::default(), &Limits::default())?;

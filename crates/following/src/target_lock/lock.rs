@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{Frame, Motion, Person, Track, TrackId};
+use tagalong_core::{EgoMotion, Frame, Person, Track, TrackId};
 
 use super::looks::Looks;
 use super::memory::{Differences, Memory};
@@ -106,7 +106,7 @@ pub(crate) struct LastSeen {
 }
 
 /// Target lock; see the [module](super).
-pub(crate) struct Lock {
+pub(crate) struct TargetLock {
     settings: TargetSettings,
     state: LockState,
     why: &'static str,
@@ -130,7 +130,7 @@ pub(crate) struct Lock {
     standing: Vec<(Point2<f64>, f64)>,
 }
 
-impl Lock {
+impl TargetLock {
     pub(crate) fn new(settings: TargetSettings) -> Self {
         Self {
             state: LockState::Initial,
@@ -201,7 +201,7 @@ impl Lock {
     pub(crate) fn update(
         &mut self,
         frame: &Frame,
-        motion: &Motion,
+        motion: &EgoMotion,
         tracks: &[Track],
         may_choose: bool,
     ) -> LockReport {
@@ -227,7 +227,7 @@ impl Lock {
         }
     }
 
-    fn move_along(&mut self, motion: &Motion) {
+    fn move_along(&mut self, motion: &EgoMotion) {
         self.since_s += motion.dt;
         if let Some(last) = &mut self.last {
             last.place = motion.apply_to_point(last.place);
@@ -511,7 +511,7 @@ mod tests {
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
         let stamp = Stamp::from_nanos(1_000_000_000_000).plus_seconds(t_s);
-        Frame::new(index, stamp, camera, Motion::at_rest(0.1), Images::default())
+        Frame::new(index, stamp, camera, EgoMotion::at_rest(0.1), Images::default())
     }
 
     /// There are no images: people are distinguished by their height.
@@ -532,17 +532,17 @@ mod tests {
     }
 
     /// An eighth of a second later.
-    fn step(lock: &mut Lock, tracks: &[Track]) -> LockReport {
-        lock.update(&frame(1, 0.0), &Motion::at_rest(0.125), tracks, true)
+    fn step(lock: &mut TargetLock, tracks: &[Track]) -> LockReport {
+        lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.125), tracks, true)
     }
 
-    fn steps(lock: &mut Lock, count: usize, track: &Track) -> Vec<LockState> {
+    fn steps(lock: &mut TargetLock, count: usize, track: &Track) -> Vec<LockState> {
         (0..count).map(|_| step(lock, std::slice::from_ref(track)).state).collect()
     }
 
     /// A person 1.6 m tall, seen in twenty frames and missed in `frames` after that.
-    fn missed(frames: usize) -> (Lock, Vec<LockState>) {
-        let mut lock = Lock::new(settings());
+    fn missed(frames: usize) -> (TargetLock, Vec<LockState>) {
+        let mut lock = TargetLock::new(settings());
         steps(&mut lock, 20, &tall(1.6));
         let states = steps(&mut lock, frames, &Track { seen: false, ..tall(1.6) });
         (lock, states)
@@ -550,7 +550,7 @@ mod tests {
 
     #[test]
     fn the_person_is_known_well_after_fifteen_sightings() {
-        let states = steps(&mut Lock::new(settings()), 16, &tall(1.6));
+        let states = steps(&mut TargetLock::new(settings()), 16, &tall(1.6));
         assert!(states[..14].iter().all(|state| *state == LockState::Training), "{states:?}");
         assert_eq!(states[14..], [LockState::Locked; 2]);
     }
@@ -589,7 +589,7 @@ mod tests {
     #[test]
     fn somebody_who_came_near_may_have_been_taken_for_the_person() {
         let states = |away_m: f64| {
-            let mut lock = Lock::new(settings());
+            let mut lock = TargetLock::new(settings());
             steps(&mut lock, 20, &tall(1.6));
             let other = somebody(2, 2.0, away_m);
             step(&mut lock, &[tall(1.6), other.clone()]);
@@ -604,7 +604,7 @@ mod tests {
     #[test]
     fn in_front_is_what_the_settings_say() {
         let chosen = |track: Track| {
-            let mut lock = Lock::new(settings());
+            let mut lock = TargetLock::new(settings());
             step(&mut lock, &[track]);
             lock.followed().is_some()
         };
@@ -615,14 +615,14 @@ mod tests {
         assert!(at(44.0, 2.0) && at(-44.0, 2.0) && !at(46.0, 2.0) && !at(-46.0, 2.0));
         assert!(at(30.0, 4.9) && !at(30.0, 5.1));
         assert!(!chosen(Track { confirmed: false, ..somebody(1, 2.0, 0.0) }));
-        let mut lock = Lock::new(settings());
-        lock.update(&frame(1, 0.0), &Motion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], false);
+        let mut lock = TargetLock::new(settings());
+        lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], false);
         assert_eq!(lock.state(), LockState::Initial, "not yet");
     }
 
     #[test]
     fn nobody_is_farther_than_they_can_have_walked() {
-        let mut lock = Lock::new(settings());
+        let mut lock = TargetLock::new(settings());
         assert!(lock.is_in_reach(&somebody(1, 99.0, 0.0)), "seen nowhere before");
         let (place, velocity) = (Point2::new(1.0, 1.0), Vector2::zeros());
         lock.last = Some(LastSeen { place, velocity, ago_s: 1.0 });
@@ -637,17 +637,17 @@ mod tests {
 
     #[test]
     fn what_stood_beside_the_person_is_another_for_a_minute() {
-        let mut lock = Lock::new(settings());
+        let mut lock = TargetLock::new(settings());
         lock.note_other(&somebody(7, 3.0, 0.0));
         let mut walks = somebody(8, 5.0, 0.0);
         walks.estimate.person.velocity.x = 0.5;
         lock.note_other(&walks);
-        let is_other = |lock: &Lock, x: f64| lock.is_other(&somebody(9, x, 0.0));
+        let is_other = |lock: &TargetLock, x: f64| lock.is_other(&somebody(9, x, 0.0));
         assert!(is_other(&lock, 3.39) && !is_other(&lock, 3.41) && !is_other(&lock, 5.0));
         assert!(lock.is_other(&somebody(8, 9.0, 0.0)), "by the number of the track");
-        lock.move_along(&Motion { forward: 1.0, ..Motion::at_rest(59.0) });
+        lock.move_along(&EgoMotion { forward: 1.0, ..EgoMotion::at_rest(59.0) });
         assert!(is_other(&lock, 2.0) && !is_other(&lock, 3.0), "it stays where it is");
-        lock.move_along(&Motion::at_rest(1.5));
+        lock.move_along(&EgoMotion::at_rest(1.5));
         assert!(!is_other(&lock, 2.0));
     }
 
@@ -657,7 +657,7 @@ mod tests {
         lock.reset();
         assert_eq!((lock.state(), lock.why), (LockState::Lost, "the clock jumped"));
         assert_eq!(lock.last_seen(), None);
-        let mut lock = Lock::new(TargetSettings { remember: false, ..settings() });
+        let mut lock = TargetLock::new(TargetSettings { remember: false, ..settings() });
         steps(&mut lock, 3, &tall(1.6));
         lock.reset();
         assert_eq!(lock.state(), LockState::Initial);
@@ -667,7 +667,7 @@ mod tests {
     fn where_the_person_was_moves_with_the_robot() {
         let (mut lock, _) = missed(0);
         let turn = std::f64::consts::FRAC_PI_2;
-        lock.move_along(&Motion { forward: 1.0, turn, ..Motion::at_rest(0.5) });
+        lock.move_along(&EgoMotion { forward: 1.0, turn, ..EgoMotion::at_rest(0.5) });
         let last = lock.last_seen().unwrap();
         assert!((last.place - Point2::new(0.0, -1.0)).norm() < 1e-9, "{last:?}");
         assert_eq!(last.ago_s, 0.5);

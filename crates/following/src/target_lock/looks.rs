@@ -335,7 +335,7 @@ mod tests {
 
         use nalgebra::{Point3, Vector2};
         use tagalong_conformance::target;
-        use tagalong_core::{DepthImage, Images, Motion, RgbImage, Stamp};
+        use tagalong_core::{DepthImage, EgoMotion, Images, RgbImage, Stamp};
         use tagalong_geometry::{Camera, Distortion, Pinhole};
 
         use super::*;
@@ -365,7 +365,7 @@ mod tests {
                 depth: depth.map(Arc::new),
                 ..Images::default()
             };
-            let motion = Motion::at_rest(0.1);
+            let motion = EgoMotion::at_rest(0.1);
             Frame::new(1, Stamp::default(), Arc::new(camera()), motion, images)
         }
 
@@ -448,7 +448,7 @@ mod tests {
                 1,
                 Stamp::default(),
                 Arc::new(camera()),
-                Motion::at_rest(0.1),
+                EgoMotion::at_rest(0.1),
                 Images::default(),
             );
             let looks = Looks::of(&somebody(0.0), &bare);

@@ -13,7 +13,7 @@ mod memory;
 mod search;
 mod settings;
 
-pub(crate) use lock::Lock;
+pub(crate) use lock::TargetLock;
 pub use lock::{Likeness, LockReport, LockState};
 pub use memory::Differences;
 pub(crate) use search::Search;

@@ -1,5 +1,5 @@
 use nalgebra::Point2;
-use tagalong_core::{WheelSpeeds, Wheels};
+use tagalong_core::{DiffDrive, WheelSpeeds};
 
 use super::lock::LastSeen;
 use super::settings::SearchSettings;
@@ -31,7 +31,7 @@ impl Search {
         last: &LastSeen,
         candidate: Option<Point2<f64>>,
         lost_s: f64,
-        wheels: &Wheels,
+        wheels: &DiffDrive,
     ) -> Option<WheelSpeeds> {
         if !settings.enabled || lost_s < settings.wait_s || lost_s > settings.give_up_s {
             return None;
@@ -49,8 +49,8 @@ impl Search {
         Some(WheelSpeeds { left: speed_mps - rim, right: speed_mps + rim })
     }
 
-    /// Records whether the governor blocked the wish.
-    pub(crate) fn hear(&mut self, blocked: bool, dt_s: f64) {
+    /// Records whether the command limiter blocked the wish.
+    pub(crate) fn add_block(&mut self, blocked: bool, dt_s: f64) {
         self.blocked_s = if blocked { self.blocked_s + dt_s } else { 0.0 };
     }
 
@@ -81,7 +81,7 @@ mod tests {
 
     use super::*;
 
-    const WHEELS: Wheels = Wheels { half_separation_m: 0.2, slip: 0.0 };
+    const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
 
     fn settings() -> SearchSettings {
         SearchSettings { enabled: true, ..SearchSettings::default() }
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn something_in_the_way_makes_it_look_round_instead() {
         let mut search = Search::default();
-        (0..12).for_each(|_| search.hear(true, 0.1));
+        (0..12).for_each(|_| search.add_block(true, 0.1));
         let there = search.wish(&settings(), &last(3.0, 0.0), None, 3.0, &WHEELS).unwrap();
         assert_eq!(there.left, -there.right);
     }
@@ -187,7 +187,7 @@ mod tests {
     fn a_way_that_is_free_again_is_not_blocked() {
         let drives = |blocked: &[bool]| {
             let mut search = Search::default();
-            blocked.iter().for_each(|now| search.hear(*now, 0.4));
+            blocked.iter().for_each(|now| search.add_block(*now, 0.4));
             let wheels = search.wish(&settings(), &last(3.0, 0.0), None, 3.0, &WHEELS).unwrap();
             twist(wheels).0 > 0.0
         };

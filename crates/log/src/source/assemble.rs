@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, Frame, Images, Input, LaserScan as Scan, Motion, RightImage, Stamp, planar_pose,
+    DepthImage, EgoMotion, Frame, Images, Input, LaserScan as Scan, RightImage, Stamp, planar_pose,
 };
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
@@ -361,20 +361,20 @@ impl Assembler {
         here: PoseAt,
         jumped: bool,
         tally: &mut Tally,
-    ) -> (Motion, bool) {
+    ) -> (EgoMotion, bool) {
         if here.stale {
             tally.count("odometry_gap_frames");
             tally.note("odometry is silent for more than half a second at some frames");
         }
         // After a jump of the clock there is no previous frame to measure from.
         let Some((then, before)) = self.previous.filter(|(then, _)| *then < stamp) else {
-            return (Motion::at_rest(0.0), true);
+            return (EgoMotion::at_rest(0.0), true);
         };
         let dt = stamp.seconds_since(then);
         if here.stale || before.stale || jumped {
             return (unknown_motion(dt), false);
         }
-        (Motion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
+        (EgoMotion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
     }
 }
 

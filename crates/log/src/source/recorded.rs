@@ -1,7 +1,7 @@
 //! Detections by other programs that were recorded in a log.
 
 use nalgebra::{Isometry3, Point3};
-use tagalong_core::Recorded;
+use tagalong_core::ExternalDetection;
 use tagalong_geometry::Rect;
 
 use super::intake::Intake;
@@ -22,7 +22,7 @@ pub(super) fn recorded(
     message: Option<Payload>,
     intake: &Intake,
     tally: &mut Tally,
-) -> Option<Vec<Recorded>> {
+) -> Option<Vec<ExternalDetection>> {
     let topic = plan.chosen.detections.as_ref()?;
     let Some(message) = message else {
         tally.count("frames_without_detections");
@@ -36,14 +36,14 @@ pub(super) fn recorded(
     }))
 }
 
-fn boxes(message: &Payload) -> Option<Vec<Recorded>> {
+fn boxes(message: &Payload) -> Option<Vec<ExternalDetection>> {
     let array: Detection2DArray = decode(&message.data).ok()?;
     let all = array.detections.iter().map(|detection| {
         let (centre, size) = (&detection.bbox.center.position, &detection.bbox);
         let (width, height) = (size.size_x, size.size_y);
         let (x, y) = (centre.x - 0.5 * width, centre.y - 0.5 * height);
         let region = Some(Rect { x, y, width, height });
-        Recorded { region, head: None, score: score(&detection.results) }
+        ExternalDetection { region, head: None, score: score(&detection.results) }
     });
     Some(all.filter(|recorded| recorded.region.is_some_and(|region| region.is_sane())).collect())
 }
@@ -53,7 +53,7 @@ fn space(
     message: &Payload,
     intake: &Intake,
     tally: &mut Tally,
-) -> Option<Vec<Recorded>> {
+) -> Option<Vec<ExternalDetection>> {
     let array: Detection3DArray = decode(&message.data).ok()?;
     let robot = robot_frame(&plan.scan, &plan.input);
     let pose = match message.frame_id == robot {
@@ -76,7 +76,7 @@ fn space(
     };
     let all = array.detections.iter().filter_map(|detection| {
         let score = score(&detection.results);
-        Some(Recorded { region: None, head: Some(head(detection)?), score })
+        Some(ExternalDetection { region: None, head: Some(head(detection)?), score })
     });
     Some(all.collect())
 }

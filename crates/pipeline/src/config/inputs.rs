@@ -7,7 +7,7 @@ use tagalong_core::{Input, Inputs};
 
 use super::PipelineSettings;
 
-/// Inputs of the target lock and the governor, which every controller has.
+/// Inputs of the target lock and the collision monitor, which every controller has.
 const STEERING: Inputs =
     Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
 /// Inputs of `[odometry]`.
@@ -30,7 +30,7 @@ pub(super) fn declared_inputs(
     without_span: Option<Range<usize>>,
 ) -> Result<Inputs, ConfigError> {
     let odometry = settings.odometry.is_some().then_some(("[odometry]", ODOMETRY));
-    let steering = has_controller.then_some(("[governor]", STEERING));
+    let steering = has_controller.then_some(("[collision_monitor]", STEERING));
     let users: Vec<Declared<'_>> =
         plugins.iter().copied().chain(odometry).chain(steering).collect();
     // The pipeline computes depth from the pair; that of the log is used where it is there.

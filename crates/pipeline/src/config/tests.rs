@@ -41,6 +41,8 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
             &["a.toml:1:33", "`confirm_within` must lie between 1 and 32"],
         ),
         (own("association.gate = 9.0"), &["a.toml:1:1", "now `[associator.config]`", "[merge]"]),
+        (own("governor.margin_m = 0.5"), &["a.toml:1:1", "now `[command_limiter]`"]),
+        (plain("roles = ['follow']"), &["a.toml:4:10", "role `follow` is now `track`"]),
         (own("lifecycle.confirm_hits = 2"), &["a.toml:1:1", "now `[manager.config]`"]),
         (own("manager.plugin = 'steady'"), &["a.toml:1:18", "`steady` is a filter, not a track"]),
         (
@@ -65,14 +67,14 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         (plain("every = 2\noffset = 2"), &["a.toml:5:10", "2 is not below 2"]),
         (plain("roles = []"), &["a.toml:4:9", "`script` has no role"]),
         (plain("roles = ['folow']"), &["a.toml:4:10", "did you mean `follow`?"]),
-        (plain("roles = ['follow']"), &["a.toml:2:1", "give one of [[detectors]] the role"]),
+        (plain("roles = ['track']"), &["a.toml:2:1", "give one of [[detectors]] the role"]),
         (plain("roles = ['discover', 'weigh']"), &["a.toml:4:9", "cannot weigh scenes"]),
         (
             plain("config = { how = 'track' }"),
             &["a.toml:2:1", "`script` cannot discover people: remove the role discover"],
         ),
         (
-            plain("roles = ['discover', 'follow']\nconfig = { how = 'discover' }"),
+            plain("roles = ['discover', 'track']\nconfig = { how = 'discover' }"),
             &["a.toml:4:9", "cannot find a tracked person again: remove the role follow"],
         ),
         (own("without = ['dept']"), &["a.toml:1:12", "did you mean `depth`?"]),
@@ -243,8 +245,8 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
         ("merge.max_tracks = 0", false),
         ("clock = { max_gap_s = 2.0, reset_gap_s = 2.0 }", true),
         ("clock = { max_gap_s = 2.0, reset_gap_s = 1.9 }", false),
-        ("governor.corridor.range_m = 100.0", true),
-        ("governor.corridor.range_m = 100.1", false),
+        ("collision_monitor.range_m = 100.0", true),
+        ("collision_monitor.range_m = 100.1", false),
     ] {
         assert_eq!(build(&format!("{line}\n{PLAIN}")).is_ok(), fits, "{line}");
     }
@@ -303,7 +305,7 @@ impl tagalong_core::Verifier for Still {
         tagalong_core::Inputs::NONE
     }
 
-    fn margin(
+    fn log_odds(
         &mut self,
         _: &tagalong_core::Frame,
         _: &tagalong_core::Detection,
@@ -326,7 +328,7 @@ fn each_plugin_draws_from_a_seed_of_its_own_that_the_run_decides() {
 const WHOLE: &str = "seed = 1
 [[detectors]]
 plugin = 'script'
-roles = ['discover', 'follow']
+roles = ['discover', 'track']
 every = 2
 offset = 1
 config = { script = 1, how = 'x' }

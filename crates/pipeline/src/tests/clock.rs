@@ -1,4 +1,4 @@
-use tagalong_core::{Frame, Motion};
+use tagalong_core::{EgoMotion, Frame};
 
 use super::doubles::{PLAIN, World, frame, person};
 use crate::{FrameReport, Outcome};
@@ -117,7 +117,7 @@ fn the_motion_over_a_skipped_frame_is_not_lost() {
     let world = World::of((0..4).map(|_| vec![person(3.0, 0.0)]));
     let mut pipeline = world.pipeline(PLAIN);
     let moving = |index, t_s, forward| {
-        let motion = Motion { forward, ..Motion::at_rest(0.05) };
+        let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.05) };
         let still = frame(index, t_s);
         Frame::new(index, still.stamp, still.camera.clone(), motion, still.images().clone())
     };

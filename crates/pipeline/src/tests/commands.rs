@@ -2,7 +2,7 @@
 //! without a frame, within the validity of a command.
 
 use nalgebra::Point3;
-use tagalong_core::{Command, Frame, Images, Motion, Reason, Stamp, WheelSpeeds};
+use tagalong_core::{Command, EgoMotion, Frame, Images, Reason, Stamp, WheelSpeeds};
 
 use super::doubles::{PLAIN, World, camera, frame, person, scored};
 use crate::{LockState, Pipeline};
@@ -23,7 +23,7 @@ fn is_moving(command: &Command) -> bool {
     command.wheels != WheelSpeeds::STOP
 }
 
-fn after(index: u64, t_s: f64, motion: Motion) -> Frame {
+fn after(index: u64, t_s: f64, motion: EgoMotion) -> Frame {
     let stamp = frame(index, t_s).stamp;
     Frame::new(index, stamp, std::sync::Arc::new(camera()), motion, Images::default())
 }
@@ -31,14 +31,14 @@ fn after(index: u64, t_s: f64, motion: Motion) -> Frame {
 /// The command for a frame that comes that much later.
 fn paused(pause_s: f64) -> (Pipeline, Command) {
     let (_, mut pipeline) = driving("");
-    let report = pipeline.step(&after(21, 2.0 + pause_s, Motion::at_rest(pause_s))).unwrap();
+    let report = pipeline.step(&after(21, 2.0 + pause_s, EgoMotion::at_rest(pause_s))).unwrap();
     (pipeline, report.command.unwrap())
 }
 
 #[test]
 fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
     let (_, mut pipeline) = driving("");
-    let jump = Motion { forward: 2.0, ..Motion::at_rest(0.1) };
+    let jump = EgoMotion { forward: 2.0, ..EgoMotion::at_rest(0.1) };
     let command = pipeline.step(&after(21, 2.1, jump)).unwrap().command.unwrap();
     assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
     assert_eq!(pipeline.fault(), Some("odometry jumped"));
@@ -73,7 +73,7 @@ fn t8_a_stall_halves_the_speed_then_stops_then_loses_the_person() {
     assert_eq!((stopped.wheels, stopped.reason), (WheelSpeeds::STOP, Reason::Stalled));
     let (world, mut pipeline) = driving("");
     world.show(0, 21, vec![]);
-    let lost = pipeline.step(&after(21, 4.2, Motion::at_rest(2.2))).unwrap();
+    let lost = pipeline.step(&after(21, 4.2, EgoMotion::at_rest(2.2))).unwrap();
     assert_eq!(lost.lock.unwrap().state, LockState::Lost);
 }
 

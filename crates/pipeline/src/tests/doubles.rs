@@ -9,10 +9,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
 use tagalong_core::{
-    Association, Associations, Associator, Capabilities, Controller, Detection, Detector, Error,
-    Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs, Likelihood, Motion,
-    PerPerson, Person, PersonFilter, Result, Scene, Search, Stamp, Support, Track, TrackId,
-    Verifier, WheelSpeeds,
+    Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
+    EgoMotion, Error, Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs,
+    Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track, TrackId,
+    Update, Verifier, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -35,7 +35,7 @@ pub fn camera() -> Camera {
 
 pub fn frame(index: u64, t_s: f64) -> Frame {
     let stamp = Stamp::from_nanos(1_000_000_000_000).plus_seconds(t_s);
-    let motion = Motion::at_rest(0.1);
+    let motion = EgoMotion::at_rest(0.1);
     Frame::new(index, stamp, Arc::new(camera()), motion, Images::default())
 }
 
@@ -63,7 +63,7 @@ type Question = (usize, u64, Option<TrackId>);
 pub struct World {
     seen: Arc<Mutex<Seen>>,
     pub asked: Arc<Mutex<Vec<Question>>>,
-    pub predicted: Arc<Mutex<Vec<Motion>>>,
+    pub predicted: Arc<Mutex<Vec<EgoMotion>>>,
 }
 
 impl World {
@@ -142,13 +142,13 @@ impl Detector for Script {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Search<'_>,
+        search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let script = self.config.script;
         let track = match search {
-            Search::Near(track) => Some(*track),
-            Search::Everywhere { .. } => None,
+            Query::Track(track) => Some(*track),
+            Query::Discover { .. } => None,
         };
         self.world.asked.lock().unwrap().push((script, frame.index, track.map(|t| t.id)));
         match self.config.how.as_str() {
@@ -190,7 +190,7 @@ impl Verifier for Choosy {
         Inputs::NONE
     }
 
-    fn margin(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
+    fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         match self.0.how.as_str() {
             "nan" => Ok(f64::NAN),
             "panic" => panic!("no"),
@@ -206,39 +206,39 @@ impl Verifier for Choosy {
 struct Steady(World);
 
 #[derive(Clone)]
-struct Belief {
+struct State {
     person: Person,
     age_s: f64,
 }
 
 impl PersonFilter for Steady {
-    type Belief = Belief;
+    type State = State;
 
-    fn start(&self, detection: &Detection) -> Belief {
+    fn start(&self, detection: &Detection) -> State {
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
-        Belief { person, age_s: 0.0 }
+        State { person, age_s: 0.0 }
     }
 
-    fn predict(&self, belief: &mut Belief, motion: &Motion) {
+    fn predict(&self, state: &mut State, motion: &EgoMotion) {
         self.0.predicted.lock().unwrap().push(*motion);
-        belief.age_s += motion.dt;
-        let step = belief.person.velocity * motion.dt;
-        belief.person.position += nalgebra::Vector3::new(step.x, step.y, 0.0);
+        state.age_s += motion.dt;
+        let step = state.person.velocity * motion.dt;
+        state.person.position += nalgebra::Vector3::new(step.x, step.y, 0.0);
     }
 
-    fn correct(&self, belief: &mut Belief, detection: &Detection, _: &Camera) -> Support {
-        let off = (detection.position - belief.person.position).xy();
-        belief.person.velocity += 0.5 * off / belief.age_s.max(0.01);
-        belief.person.position = detection.position;
-        belief.age_s = 0.0;
-        Support { nis: Some((off.norm_squared(), 3)) }
+    fn correct(&self, state: &mut State, detection: &Detection, _: &Camera) -> Update {
+        let off = (detection.position - state.person.position).xy();
+        state.person.velocity += 0.5 * off / state.age_s.max(0.01);
+        state.person.position = detection.position;
+        state.age_s = 0.0;
+        Update { nis: Some((off.norm_squared(), 3)) }
     }
 
-    fn estimate(&self, belief: &Belief, camera: &Camera) -> Estimate {
+    fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
         Estimate {
-            person: belief.person,
-            covariance: SMatrix::identity() * (0.02 + 0.3 * belief.age_s),
-            region: camera.upper_body(&belief.person.position),
+            person: state.person,
+            covariance: SMatrix::identity() * (0.02 + 0.3 * state.age_s),
+            region: camera.upper_body(&state.person.position),
         }
     }
 }
@@ -255,11 +255,11 @@ impl Filter for Odd {
         self.ids.insert(id);
     }
 
-    fn predict(&mut self, _: &Motion, _: &Camera) {}
+    fn predict(&mut self, _: &EgoMotion, _: &Camera) {}
 
-    fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Support>> {
+    fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let nis = Some((f64::NAN, 3));
-        Ok([(TrackId(4711), Support { nis })].into())
+        Ok([(TrackId(4711), Update { nis })].into())
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {

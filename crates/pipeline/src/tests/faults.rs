@@ -159,7 +159,7 @@ proptest! {
         let config = "
             [[detectors]]
             plugin = 'script'
-            roles = ['follow', 'discover']
+            roles = ['track', 'discover']
             [filter]
             plugin = 'steady'
             [controller]

@@ -16,7 +16,7 @@ const CONFIGS: [&str; 4] = [
 fn config(around: &str, script: &str) -> String {
     format!(
         "filter.plugin = 'steady'\n{around}\n[[detectors]]\nplugin = 'script'\n\
-         roles = ['follow', 'discover']\nconfig = {{ {script} }}"
+         roles = ['track', 'discover']\nconfig = {{ {script} }}"
     )
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{DepthImage, Frame, GreyImage, Images, Motion};
+use tagalong_core::{DepthImage, EgoMotion, Frame, GreyImage, Images};
 
 use super::doubles::{World, frame};
 
@@ -13,7 +13,7 @@ const BY_WHEELS: &str = "
 ";
 
 /// A frame of a robot that stands before a wall.
-fn wall(index: u64, motion: Motion) -> Frame {
+fn wall(index: u64, motion: EgoMotion) -> Frame {
     let plain = frame(index, 0.1 * index as f64);
     let waves = |x: usize, y: usize| {
         let (x, y) = (x as f64, y as f64);
@@ -30,9 +30,9 @@ fn wall(index: u64, motion: Motion) -> Frame {
 /// Estimated turn when the wheels report one while the robot stands, rad.
 fn believed(config: &str) -> f64 {
     let mut pipeline = World::default().pipeline(config);
-    pipeline.step(&wall(1, Motion::at_rest(0.0))).unwrap();
+    pipeline.step(&wall(1, EgoMotion::at_rest(0.0))).unwrap();
     let report =
-        pipeline.step(&wall(2, Motion { turn: 0.01, forward: 0.01, ..Motion::at_rest(0.1) }));
+        pipeline.step(&wall(2, EgoMotion { turn: 0.01, forward: 0.01, ..EgoMotion::at_rest(0.1) }));
     report.unwrap().motion.turn
 }
 

@@ -217,7 +217,7 @@ fn the_silence_of_a_detector_on_anothers_frame_is_no_miss() {
 const FOLLOWING: &str = "
     [[detectors]]
     plugin = 'script'
-    roles = ['discover', 'follow']
+    roles = ['discover', 'track']
     [filter]
     plugin = 'steady'
 ";
@@ -237,7 +237,7 @@ const TWO_SCRIPTS: &str = "
     roles = ['discover']
     [[detectors]]
     plugin = 'script'
-    roles = ['follow']
+    roles = ['track']
     config = { script = 1 }
     [filter]
     plugin = 'steady'

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::Page;
 use super::headline::figure_name;
-use crate::figures::{Figure, Place};
+use crate::figures::{ComparisonSpace, Figure};
 
 impl Page<'_> {
     pub(super) fn explain(&self) -> Markup {
@@ -34,7 +34,7 @@ impl Page<'_> {
 
 fn figures() -> Markup {
     let mut known = BTreeSet::new();
-    let all = Place::ALL
+    let all = ComparisonSpace::ALL
         .into_iter()
         .flat_map(Figure::at)
         // Figures of both spaces are explained once.

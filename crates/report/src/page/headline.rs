@@ -3,7 +3,7 @@ use maud::{Markup, html};
 use super::pairs::p_text;
 use super::{Page, amount, cell, column, no_cell, number, table};
 use crate::chart::{interval, key, series_class};
-use crate::figures::{Figure, MAIN, Place};
+use crate::figures::{ComparisonSpace, Figure, MAIN};
 use crate::summary::{Estimate, PipelineSummary, per_log};
 
 impl Page<'_> {
@@ -11,7 +11,8 @@ impl Page<'_> {
         if self.view.tasks.is_empty() {
             return html! { p { "This benchmark has no tasks yet." } };
         }
-        let shown: Vec<Place> = Place::ALL.into_iter().filter(|p| self.has(*p)).collect();
+        let shown: Vec<ComparisonSpace> =
+            ComparisonSpace::ALL.into_iter().filter(|p| self.has(*p)).collect();
         html! {
             @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
             @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
@@ -23,13 +24,13 @@ impl Page<'_> {
         }
     }
 
-    fn has(&self, place: Place) -> bool {
+    fn has(&self, place: ComparisonSpace) -> bool {
         self.view.tasks.iter().any(|task| place.scores(task).is_some())
     }
 
     /// Names the pipeline with the best main figure, and says if the difference is significant.
     fn verdict(&self) -> Option<Markup> {
-        let place = Place::ALL.into_iter().find(|p| self.ranked(*p).len() > 1)?;
+        let place = ComparisonSpace::ALL.into_iter().find(|p| self.ranked(*p).len() > 1)?;
         let ranked = self.ranked(place);
         let (first, second) = (ranked.first()?, ranked.get(1)?);
         let key = MAIN.key(place);
@@ -59,7 +60,7 @@ impl Page<'_> {
     }
 
     /// Returns the pipelines with the most logs, best first.
-    fn ranked(&self, place: Place) -> Vec<(&PipelineSummary, Estimate)> {
+    fn ranked(&self, place: ComparisonSpace) -> Vec<(&PipelineSummary, Estimate)> {
         let key = MAIN.key(place);
         let pipelines = self.summary.pipelines.iter();
         let mut all: Vec<(&PipelineSummary, Estimate)> =
@@ -71,13 +72,13 @@ impl Page<'_> {
         all
     }
 
-    fn headline_table(&self, place: Place) -> Markup {
+    fn headline_table(&self, place: ComparisonSpace) -> Markup {
         let figures: Vec<&Figure> = Figure::at(place).filter(|f| self.is_known(f, place)).collect();
         let most = self.summary.pipelines.iter().map(|p| p.done).max().unwrap_or(0);
         let head = html! {
             (column("Pipeline", None))
             (column("Done", Some("Tasks that ran to their end, of those planned")))
-            @if place == Place::Image { (column("People found", Some("Found at all, with 95 % interval"))) }
+            @if place == ComparisonSpace::Image { (column("People found", Some("Found at all, with 95 % interval"))) }
             @for figure in &figures { (figure_head(figure)) }
         };
         let body = html! {
@@ -85,7 +86,7 @@ impl Page<'_> {
                 tr.(series_class(self.series(&summary.pipeline))) data-series=(self.series(&summary.pipeline)) {
                     th scope="row" { (key(self.series(&summary.pipeline), &summary.pipeline)) }
                     (done_cell(summary, most))
-                    @if place == Place::Image { (people_cell(summary)) }
+                    @if place == ComparisonSpace::Image { (people_cell(summary)) }
                     @for figure in &figures { (self.figure_cell(summary, figure, place)) }
                 }
             }
@@ -97,12 +98,17 @@ impl Page<'_> {
         table(&format!("Results {}", place_where(place)), &caption, &head, &body)
     }
 
-    fn is_known(&self, figure: &Figure, place: Place) -> bool {
+    fn is_known(&self, figure: &Figure, place: ComparisonSpace) -> bool {
         let key = figure.key(place);
         self.summary.pipelines.iter().any(|p| p.figures.contains_key(&key))
     }
 
-    fn figure_cell(&self, summary: &PipelineSummary, figure: &Figure, place: Place) -> Markup {
+    fn figure_cell(
+        &self,
+        summary: &PipelineSummary,
+        figure: &Figure,
+        place: ComparisonSpace,
+    ) -> Markup {
         let key = figure.key(place);
         let Some(estimate) = summary.figures.get(&key) else { return no_cell() };
         let all: Vec<&Estimate> =
@@ -126,7 +132,7 @@ impl Page<'_> {
     }
 
     /// Renders the main figure of each pipeline on each log.
-    fn log_table(&self, place: Place) -> Markup {
+    fn log_table(&self, place: ComparisonSpace) -> Markup {
         let columns: Vec<_> =
             self.view.pipelines.iter().map(|p| (*p, per_log(&self.view, p, MAIN, place))).collect();
         let logs =
@@ -242,16 +248,16 @@ fn range(all: &[&Estimate]) -> [f64; 2] {
     ends.fold([0.0, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)])
 }
 
-pub(super) const fn place_name(place: Place) -> &'static str {
+pub(super) const fn place_name(place: ComparisonSpace) -> &'static str {
     match place {
-        Place::Image => "In the image (overlap of boxes)",
-        Place::Floor => "On the floor (metres)",
+        ComparisonSpace::Image => "In the image (overlap of boxes)",
+        ComparisonSpace::Floor => "On the floor (metres)",
     }
 }
 
-pub(super) const fn place_where(place: Place) -> &'static str {
+pub(super) const fn place_where(place: ComparisonSpace) -> &'static str {
     match place {
-        Place::Image => "in the image",
-        Place::Floor => "on the floor",
+        ComparisonSpace::Image => "in the image",
+        ComparisonSpace::Floor => "on the floor",
     }
 }

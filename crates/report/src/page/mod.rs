@@ -13,7 +13,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use crate::chart::minus;
 use crate::model::{Benchmark, Outcome, Timings};
 use crate::summary::Summary;
-use crate::view::View;
+use crate::view::OrderedBenchmark;
 
 // Inlined, so that the page is one file.
 const STYLE: &str = include_str!("page.css");
@@ -21,7 +21,7 @@ const SCRIPT: &str = include_str!("page.js");
 
 /// Data that the sections are made from.
 struct Page<'a> {
-    view: View<'a>,
+    view: OrderedBenchmark<'a>,
     summary: Summary,
     /// Times, if the machine was otherwise idle.
     timings: Option<&'a Timings>,
@@ -35,7 +35,7 @@ struct Page<'a> {
 /// benchmark only, and not on the order of its tasks.
 pub fn html(benchmark: &Benchmark, timings: Option<&Timings>) -> String {
     let page = Page {
-        view: View::new(benchmark),
+        view: OrderedBenchmark::new(benchmark),
         summary: Summary::new(benchmark),
         timings: timings.filter(|t| t.exclusive),
         timings_left_out: timings.is_some_and(|t| !t.exclusive),

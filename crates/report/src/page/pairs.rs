@@ -5,7 +5,7 @@ use super::headline::{ends_of, place_where};
 use super::{Page, amount, cell, column, no_cell, number, signed, table};
 use crate::chart::key;
 use crate::compare::{Difference, SAME_EVENT_S, compare_in};
-use crate::figures::{Figure, Place};
+use crate::figures::{ComparisonSpace, Figure};
 use crate::summary::PairSummary;
 
 /// Maximum number of differences listed per pair; the rest is counted.
@@ -117,7 +117,7 @@ fn gain_table(a: &str, b: &str, rows: &[&PairSummary]) -> Markup {
         (column("Better", None))
     };
     let body = html! {
-        @for place in Place::ALL {
+        @for place in ComparisonSpace::ALL {
             @for figure in Figure::at(place) {
                 @let key = figure.key(place);
                 @if let Some(row) = rows.iter().find(|r| r.figure == key) { (gain_row(row, figure, place)) }
@@ -132,7 +132,7 @@ fn gain_table(a: &str, b: &str, rows: &[&PairSummary]) -> Markup {
     )
 }
 
-fn gain_row(row: &PairSummary, figure: &Figure, place: Place) -> Markup {
+fn gain_row(row: &PairSummary, figure: &Figure, place: ComparisonSpace) -> Markup {
     // The difference is that of `b` from `a`, so a better one than 0 speaks for `b`.
     let winner = if figure.better(row.difference, 0.0) { &row.b } else { &row.a };
     let better = match (row.difference == 0.0, row.is_clear()) {

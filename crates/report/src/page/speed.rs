@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::headline::place_where;
 use super::{Page, cell, column, number, table};
 use crate::chart::{Mark, Words, bar, front, key, series_class};
-use crate::figures::{MAIN, Place};
+use crate::figures::{ComparisonSpace, MAIN};
 use crate::model::{TaskTiming, Timings};
 
 impl Page<'_> {
@@ -32,7 +32,7 @@ impl Page<'_> {
     }
 
     fn front(&self, timings: &Timings) -> Option<Markup> {
-        let place = Place::ALL.into_iter().find(|p| {
+        let place = ComparisonSpace::ALL.into_iter().find(|p| {
             self.summary.pipelines.iter().any(|s| s.figures.contains_key(&MAIN.key(*p)))
         })?;
         let of = |(series, name): (usize, &&'_ str)| {

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::headline::span_of;
 use super::{Page, cell, column, no_cell, number, optional_cell, table};
 use crate::chart::key;
-use crate::figures::Place;
+use crate::figures::ComparisonSpace;
 use crate::model::{Outcome, TaskResult};
 
 impl Page<'_> {
@@ -70,7 +70,7 @@ impl Page<'_> {
     }
 
     fn task_row(&self, task: &TaskResult) -> Markup {
-        let scores = Place::ALL.iter().find_map(|p| p.scores(task));
+        let scores = ComparisonSpace::ALL.iter().find_map(|p| p.scores(task));
         let floor = task.metres.as_ref();
         html! {
             tr data-series=(self.series(&task.pipeline)) {

@@ -23,7 +23,7 @@ const WORLDS: [(&str, &str, usize); 3] = [
 ];
 
 /// Results of one pipeline.
-struct Done {
+struct PipelineResult {
     tally: Tally,
     errors_m: Vec<f64>,
 }
@@ -49,16 +49,16 @@ fn scenes(lab: &Lab, name: &str, people: usize) -> Result<Vec<Scene>, ReproduceE
     Ok(scenes)
 }
 
-fn judged(trial: Trial) -> Result<Vec<Done>, TrialError> {
+fn judged(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
     let judge = Judge::default();
     let done = |run| {
         let judged = judge.judge(&trial, run)?;
-        Ok(Done { tally: judged.tally, errors_m: judged.errors_in_robot_m })
+        Ok(PipelineResult { tally: judged.tally, errors_m: judged.errors_in_robot_m })
     };
     trial.runs.iter().map(done).collect()
 }
 
-fn table(title: &str, trials: &[Vec<Done>]) -> Table {
+fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
     let row = |(at, name): (usize, &&str)| {
         let scores = |drawn: &[usize]| {
             Tally::combine(drawn.iter().map(|draw| &trials[*draw][at].tally)).scores()

@@ -5,7 +5,7 @@
 use std::fs;
 
 use tagalong_config::{ConfigError, Context, Example, Trainer, Value};
-use tagalong_core::{Detection, Frame, Funnel, Verifier, Wheels};
+use tagalong_core::{Detection, DiffDrive, Frame, Funnel, Verifier};
 use tagalong_pipeline::{Fate, Pipeline};
 use tagalong_sim::{Furniture, FurnitureKind, Scene, Split, Truth};
 use tagalong_stereo::StereoDepth;
@@ -111,7 +111,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
         for (judges, (things, people)) in judges.iter_mut().zip(things.iter_mut().zip(&mut people))
         {
             let mut rejects = |at: usize| -> Result<u64, ReproduceError> {
-                let margin = judges[at].margin(frame, sighting.detection).map_err(other)?;
+                let margin = judges[at].log_odds(frame, sighting.detection).map_err(other)?;
                 Ok(u64::from(sighting.detection.score + margin < 0.0))
             };
             let all = rejects(KINDS.len())?;
@@ -287,7 +287,7 @@ fn build<T>(
 ) -> Result<T, ReproduceError> {
     let table = DeTable::parse(settings).map_err(other)?;
     let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
-    let wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+    let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
     make(value, &Context { seed: 1, base_dir: ".".into(), wheels }).map_err(|e| other(e.message))
 }
 

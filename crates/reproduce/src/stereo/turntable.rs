@@ -20,7 +20,7 @@ const NEAR_M: f64 = 0.4;
 
 /// One image of the turning person.
 #[derive(Clone)]
-struct Look {
+struct TurntableImage {
     /// Index into the distances.
     distance: usize,
     /// Distance from the camera, m.
@@ -38,7 +38,7 @@ pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
     let turns = turns(lab, &SUBSETS)?;
     let row = |which: usize| {
         let share = |distance: usize| {
-            let turn = |turn: &Vec<Look>| {
+            let turn = |turn: &Vec<TurntableImage>| {
                 let at = || turn.iter().filter(move |look| look.distance == distance);
                 let hits = at().filter(|look| look.errors_m[which].is_some()).count() as u64;
                 [hits, at().count() as u64]
@@ -106,7 +106,7 @@ fn columns() -> Vec<String> {
 }
 
 /// Returns the images of each turn.
-fn turns(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Vec<Look>>, ReproduceError> {
+fn turns(lab: &Lab, subsets: &[&[&str]]) -> Result<Vec<Vec<TurntableImage>>, ReproduceError> {
     // The distances alternate from seed to seed: fewer scenes would leave some out.
     let seeds = lab.seeds(60).max(DISTANCES_M.len() as u64);
     let scenes = lab.scenes("turntable", &ONE_TURN, seeds)?;
@@ -124,12 +124,12 @@ fn detector(lab: &Lab, directions: &[&str]) -> Result<Contender, ReproduceError>
     Ok(Contender { name: directions.join(", "), config, ..whole })
 }
 
-fn of_trial(trial: Trial) -> Result<Vec<Look>, TrialError> {
+fn of_trial(trial: Trial) -> Result<Vec<TurntableImage>, TrialError> {
     let look = |at: usize| look(&trial, at);
     Ok((0..trial.moments.len()).filter_map(look).collect())
 }
 
-fn look(trial: &Trial, at: usize) -> Option<Look> {
+fn look(trial: &Trial, at: usize) -> Option<TurntableImage> {
     let moment = &trial.moments[at];
     let range_m = range_m(&moment.truth.first()?.head_in_robot, &trial.camera);
     let away = |distance: &f64| (distance - moment.truth[0].head_in_robot.x).abs();
@@ -140,7 +140,7 @@ fn look(trial: &Trial, at: usize) -> Option<Look> {
         Some(self::range_m(&found.position, &trial.camera) - range_m)
     };
     let errors_m = trial.runs.iter().map(error).collect();
-    Some(Look { distance: nearest, range_m, errors_m })
+    Some(TurntableImage { distance: nearest, range_m, errors_m })
 }
 
 fn range_m(place: &nalgebra::Point3<f64>, camera: &Camera) -> f64 {

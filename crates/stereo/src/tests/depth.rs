@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{DepthImage, Frame, Funnel, GreyImage, Images, Motion, RightImage, Stamp};
+use tagalong_core::{DepthImage, EgoMotion, Frame, Funnel, GreyImage, Images, RightImage, Stamp};
 use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
 use super::kernels::noise_pair;
@@ -20,7 +20,7 @@ fn frame(left: GreyImage, right: GreyImage) -> Frame {
         right: Some(Arc::new(RightImage { image: right, baseline_m: BASELINE_M })),
         ..Images::default()
     };
-    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.0), images)
+    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), images)
 }
 
 fn depth(settings: StereoSettings, frame: &Frame) -> (Arc<DepthImage>, Funnel) {

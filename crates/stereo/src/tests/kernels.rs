@@ -10,7 +10,7 @@ use crate::paths::{Excess, Penalties};
 use crate::refine::Refiner;
 use crate::speckle::SpeckleFilter;
 use crate::texture::TextureTest;
-use crate::winner::{Found, FromRight, Winners};
+use crate::winner::{FromRight, RowWinners, Winners};
 use crate::{Matcher, Method, StereoSettings, cost, fill, paths, window};
 
 const D: usize = 16;
@@ -213,7 +213,7 @@ proptest! {
         let second: Vec<u8> = second.iter().zip(&cost).map(|(s, c)| s + c).collect();
         let winners = Winners { disparity, cost, below, above, second };
         let (mut disparities, mut confidences) = (vec![0.0; width], vec![0; width]);
-        let mut found = Found { disparities: &mut disparities, confidences: &mut confidences };
+        let mut found = RowWinners { disparities: &mut disparities, confidences: &mut confidences };
         let refused = winners.judge(uniqueness, &mut found);
         let mut buffers = FromRight::default();
         let disagree = winners.look_from_right(tolerance, &mut buffers, &mut disparities);

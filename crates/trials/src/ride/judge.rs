@@ -108,7 +108,7 @@ enum Whom {
 
 /// One frame, judged.
 #[derive(Clone, Copy, Debug)]
-struct Look {
+struct JudgedFrame {
     at_s: f64,
     dt_s: f64,
     whom: Whom,
@@ -121,16 +121,17 @@ impl RideJudge {
     /// Judges a ride after the first person of the scene.
     pub fn judge(&self, ride: &Ride) -> Ridden {
         let looks = self.looks(ride);
-        let sum = |counts: &dyn Fn(&Look) -> bool| -> f64 {
+        let sum = |counts: &dyn Fn(&JudgedFrame) -> bool| -> f64 {
             looks.iter().filter(|look| counts(look)).fold(0.0, |sum, look| sum + look.dt_s)
         };
-        let slow =
-            |l: &Look| l.whom == Whom::Right && l.speed_mps.is_some_and(|mps| mps < self.slow_mps);
-        let near = |l: &Look| match (l.range_m, ride.stand_off_m) {
+        let slow = |l: &JudgedFrame| {
+            l.whom == Whom::Right && l.speed_mps.is_some_and(|mps| mps < self.slow_mps)
+        };
+        let near = |l: &JudgedFrame| match (l.range_m, ride.stand_off_m) {
             (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
             _ => false,
         };
-        let farther = |l: &Look| Some(l.dt_s * (l.range_m? - ride.stand_off_m?));
+        let farther = |l: &JudgedFrame| Some(l.dt_s * (l.range_m? - ride.stand_off_m?));
         let slow_s = sum(&slow);
         let farther_ms: f64 = looks.iter().filter(|l| slow(l)).filter_map(farther).sum();
         let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
@@ -165,14 +166,14 @@ impl RideJudge {
         }
     }
 
-    fn ends_well(&self, looks: &[Look], episodes: &[Episode]) -> bool {
+    fn ends_well(&self, looks: &[JudgedFrame], episodes: &[Episode]) -> bool {
         let found = looks.iter().any(|look| look.whom == Whom::Right);
         let end_s = looks.last().map_or(0.0, |look| look.at_s);
         let last = episodes.last().filter(|episode| episode.found_s.is_none());
         found && last.and_then(|episode| self.refound(episode, end_s)).unwrap_or(true)
     }
 
-    fn looks(&self, ride: &Ride) -> Vec<Look> {
+    fn looks(&self, ride: &Ride) -> Vec<JudgedFrame> {
         let mut before = Whom::Nobody;
         let places: Vec<_> = ride.moments.iter().map(place).collect();
         let seconds: Vec<f64> =
@@ -181,7 +182,7 @@ impl RideJudge {
             before = self.whom(moment, report, before);
             let truth = person(moment);
             let next_s = seconds.get(at + 1).copied().unwrap_or(seconds[at]);
-            Look {
+            JudgedFrame {
                 at_s: seconds[at],
                 dt_s: (next_s - seconds[at]).clamp(0.0, LONGEST_PAUSE_S),
                 whom: before,
@@ -254,7 +255,7 @@ fn speed(places: &[Option<Point2<f64>>], seconds: &[f64], at: usize) -> Option<f
 }
 
 /// Times without the person, from the first time with them on.
-fn episodes(looks: &[Look]) -> Vec<Episode> {
+fn episodes(looks: &[JudgedFrame]) -> Vec<Episode> {
     let mut all: Vec<Episode> = Vec::new();
     let mut followed = None;
     for look in looks {
@@ -282,7 +283,7 @@ fn episodes(looks: &[Look]) -> Vec<Episode> {
 }
 
 /// The longest time in one go, s.
-fn longest(looks: &[Look], counts: impl Fn(&Look) -> bool) -> f64 {
+fn longest(looks: &[JudgedFrame], counts: impl Fn(&JudgedFrame) -> bool) -> f64 {
     let (mut now, mut most) = (0.0_f64, 0.0_f64);
     for look in looks {
         now = if counts(look) { now + look.dt_s } else { 0.0 };
@@ -318,8 +319,8 @@ fn jerk(ticks: &[Tick]) -> f64 {
 mod tests {
     use super::*;
 
-    fn looks(whom: &[(Whom, bool)]) -> Vec<Look> {
-        let look = |(at, (whom, in_view)): (usize, &(Whom, bool))| Look {
+    fn looks(whom: &[(Whom, bool)]) -> Vec<JudgedFrame> {
+        let look = |(at, (whom, in_view)): (usize, &(Whom, bool))| JudgedFrame {
             at_s: at as f64 * 0.5,
             dt_s: 0.5,
             whom: *whom,

@@ -162,7 +162,7 @@ fn it_goes_on_turning_the_way_it_began() {
     let mut controller = ArcFollow::new(Config::default()).unwrap();
     let mut rate = |y: f64| {
         let person = target(-2.0, y, Vector2::zeros());
-        turn_rate(command(&mut controller, Motion::at_rest(0.1), Some(&person)))
+        turn_rate(command(&mut controller, EgoMotion::at_rest(0.1), Some(&person)))
     };
     assert!(rate(0.3) > 0.0);
     assert!(rate(-0.3) > 0.0 && rate(0.1) > 0.0, "hesitates");
@@ -174,8 +174,8 @@ fn turning_in_place_ends_later_than_it_begins() {
     let mut driven = |degrees: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let person = target(3.0 * cos, 3.0 * sin, Vector2::zeros());
-        let steps =
-            (0..20).map(|_| speed(command(&mut controller, Motion::at_rest(0.1), Some(&person))));
+        let steps = (0..20)
+            .map(|_| speed(command(&mut controller, EgoMotion::at_rest(0.1), Some(&person))));
         steps.last().unwrap() > 0.0
     };
     assert_eq!([55.0, 65.0, 35.0, 25.0, 55.0].map(&mut driven), [true, false, false, true, true]);

@@ -69,9 +69,9 @@ impl State {
         self.is_there.then_some(Track { unseen_s: self.unseen_s, ..person })
     }
 
-    fn motion(&self) -> Motion {
+    fn motion(&self) -> EgoMotion {
         let [forward, turn, dt] = self.motion;
-        Motion { forward, turn, ..Motion::at_rest(dt) }
+        EgoMotion { forward, turn, ..EgoMotion::at_rest(dt) }
     }
 
     fn mirrored(&self) -> Self {
@@ -140,7 +140,7 @@ proptest! {
         let velocity = Vector2::new(vx, vy);
         let first = |x, y| {
             let mut controller = ArcFollow::new(config.clone()).unwrap();
-            command(&mut controller, Motion::at_rest(0.1), Some(&target(x, y, velocity)))
+            command(&mut controller, EgoMotion::at_rest(0.1), Some(&target(x, y, velocity)))
         };
         let (here, there) = (first(x, y), first(x + 1e-7, y - 1e-7));
         // Where turning on the spot begins, the wanted speed jumps, and the

@@ -2,7 +2,7 @@
 
 use tagalong_learn::mix;
 
-use crate::View;
+use crate::NetworkInput;
 
 /// Contrast is changed by at most this part, ...
 const CONTRAST: f32 = 0.2;
@@ -25,20 +25,22 @@ impl Draws {
 }
 
 /// Perhaps mirrored, moved by two cells, of other contrast, noisier.
-pub fn changed(view: &View, draws: &mut Draws) -> View {
+pub fn changed(view: &NetworkInput, draws: &mut Draws) -> NetworkInput {
     let chance = draws.next();
     let mirrored = chance & 1 == 1;
     let moved = [(chance >> 8) % 3, (chance >> 16) % 3].map(|third| third as i64 - 1);
     let contrast = 1.0 + CONTRAST * draws.within();
-    let mut grey: Vec<u8> =
-        cells(View::GREY, moved.map(|by| 2 * by), mirrored).map(|cell| view.grey[cell]).collect();
+    let mut grey: Vec<u8> = cells(NetworkInput::GREY, moved.map(|by| 2 * by), mirrored)
+        .map(|cell| view.grey[cell])
+        .collect();
     for value in &mut grey {
         let around = f32::from(*value) - 128.0;
         // A float that is cast stays within 0 to 255.
         *value = (128.0 + contrast * around + NOISE * draws.within()).round() as u8;
     }
-    let behind = cells(View::DEPTH, moved, mirrored).map(|cell| view.behind[cell]).collect();
-    View { grey, behind }
+    let behind =
+        cells(NetworkInput::DEPTH, moved, mirrored).map(|cell| view.behind[cell]).collect();
+    NetworkInput { grey, behind }
 }
 
 /// Where the cells of a moved and mirrored image come from; the border is continued.
@@ -71,7 +73,7 @@ mod tests {
 
     #[test]
     fn intensity_and_depth_move_together() {
-        let mut view = View { grey: vec![0; 80 * 36], behind: vec![0; 40 * 18] };
+        let mut view = NetworkInput { grey: vec![0; 80 * 36], behind: vec![0; 40 * 18] };
         let (row, column) = (30, 8);
         view.behind[row * 18 + column] = 90;
         view.grey[2 * row * 36 + 2 * column] = 255;

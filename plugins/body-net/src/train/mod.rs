@@ -11,7 +11,7 @@ use tagalong_learn::{Line, accepted, area, mix, parts, platt, side_by_side};
 
 use self::adam::Adam;
 use self::changes::{Draws, changed};
-use crate::{Model, Net, Pass, Training, View};
+use crate::{Model, Net, NetworkInput, Pass, Training};
 
 /// A batch is always summed in so many parts, however many cores there are: the same
 /// bytes on all machines.
@@ -25,7 +25,7 @@ const STEPS: f32 = 1e4;
 pub struct NetTrainer {
     training: Training,
     seed: u64,
-    views: Vec<View>,
+    views: Vec<NetworkInput>,
     examples: Vec<Example>,
     /// Candidates that were not seen whole, or without depth.
     unseen: usize,
@@ -137,7 +137,7 @@ impl NetTrainer {
 
 impl Trainer for NetTrainer {
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
-        match View::new(frame, candidate)? {
+        match NetworkInput::new(frame, candidate)? {
             Some(view) => {
                 self.views.push(view);
                 self.examples.push(example);

@@ -1,6 +1,6 @@
 use nalgebra::{Point3, Vector2};
 use proptest::prelude::*;
-use tagalong_core::{DepthImage, Images, Motion, Stamp};
+use tagalong_core::{DepthImage, EgoMotion, Images, Stamp};
 use tagalong_geometry::{Distortion, Pinhole};
 
 use super::*;
@@ -10,7 +10,7 @@ fn frame(pixels: Vec<f32>) -> Frame {
     let camera = Arc::new(Camera::mounted(lens, 80, 60, 1.4, 0.1, 0.1));
     let depth = DepthImage::from_pixels(80, 60, pixels).map(Arc::new);
     let images = Images { depth, ..Images::default() };
-    Frame::new(1, Stamp::default(), camera, Motion::at_rest(0.1), images)
+    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
 }
 
 /// The weight of a scene pixel by pixel: who is in front at each one?

@@ -3,24 +3,24 @@
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, SMatrix, Vector2, Vector3, Vector5};
 use proptest::prelude::*;
 use tagalong_config::{Context, Registry};
-use tagalong_core::{Motion, PersonFilter, Wheels};
+use tagalong_core::{DiffDrive, EgoMotion, PersonFilter};
 
 use super::world::{DT_S, Random, World, camera, detection};
 use crate::filter::{motion_jacobian, state_jacobian};
-use crate::{Belief, Config, Ekf};
+use crate::{Config, Ekf, State};
 
 fn filter(config: Config) -> Ekf {
     Ekf::new(config).unwrap()
 }
 
-fn belief_at(position: Point3<f64>) -> Belief {
+fn belief_at(position: Point3<f64>) -> State {
     filter(Config::default()).start(&detection(position, 0.1))
 }
 
 prop_compose! {
     fn motions()(dt in 0.0..1.0f64, forward in -1.0..1.0f64, left in -0.5..0.5f64,
-                 turn in -2.0..2.0f64) -> Motion {
-        Motion { forward, left, turn, ..Motion::at_rest(dt) }
+                 turn in -2.0..2.0f64) -> EgoMotion {
+        EgoMotion { forward, left, turn, ..EgoMotion::at_rest(dt) }
     }
 }
 
@@ -31,7 +31,7 @@ prop_compose! {
     }
 }
 
-fn with(motion: &Motion, index: usize, by: f64) -> Motion {
+fn with(motion: &EgoMotion, index: usize, by: f64) -> EgoMotion {
     let mut motion = *motion;
     *[&mut motion.forward, &mut motion.left, &mut motion.turn][index] += by;
     motion
@@ -70,13 +70,13 @@ proptest! {
     ) {
         let filter = filter(Config::default());
         let mut random = Random(seed);
-        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         for _ in 0..30 {
-            filter.predict(&mut belief, &motion);
+            filter.predict(&mut state, &motion);
             let seen = detection(Point3::from(random.normal3()), sigma);
-            filter.correct(&mut belief, &seen, &camera());
-            prop_assert_eq!(belief.covariance, belief.covariance.transpose());
-            prop_assert!(belief.covariance.cholesky().is_some());
+            filter.correct(&mut state, &seen, &camera());
+            prop_assert_eq!(state.covariance, state.covariance.transpose());
+            prop_assert!(state.covariance.cholesky().is_some());
         }
     }
 }
@@ -116,33 +116,33 @@ fn tracking_in_the_robot_frame_equals_tracking_in_the_odometry_frame() {
     let filter = filter(config.clone());
     let mut world = World::new(3);
     let seen = world.look();
-    let mut belief = filter.start(&seen);
-    let mut reference = InOdometry { mean: belief.mean, covariance: belief.covariance };
+    let mut state = filter.start(&seen);
+    let mut reference = InOdometry { mean: state.mean, covariance: state.covariance };
     for _ in 0..60 {
         world.walk(0.5, 0.05);
         let motion = world.drive(0.5, 0.4);
-        filter.predict(&mut belief, &motion);
+        filter.predict(&mut state, &motion);
         let seen = world.look();
-        filter.correct(&mut belief, &seen, &camera());
+        filter.correct(&mut state, &seen, &camera());
         let floor = world.robot * seen.position.xy();
         let measured = Vector3::new(floor.x, floor.y, seen.position.z);
         reference.step(measured, seen.covariance, &config);
-        let (position, velocity) = world.of_belief(&belief);
+        let (position, velocity) = world.of_belief(&state);
         let (x, v) = (reference.mean.fixed_rows::<2>(0), reference.mean.fixed_rows::<2>(3));
         assert!((position.coords - x).norm() < 1e-9);
         assert!((velocity - v).norm() < 1e-9);
-        assert!((belief.covariance.trace() - reference.covariance.trace()).abs() < 1e-9);
+        assert!((state.covariance.trace() - reference.covariance.trace()).abs() < 1e-9);
     }
 }
 
 /// Variance of the velocity after one second of steps.
 fn velocity_variance_after_1s(config: &Config, steps: u32) -> f64 {
     let filter = filter(config.clone());
-    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
-    let before = belief.covariance[(3, 3)];
-    let motion = Motion::at_rest(1.0 / f64::from(steps));
-    (0..steps).for_each(|_| filter.predict(&mut belief, &motion));
-    belief.covariance[(3, 3)] - before
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let before = state.covariance[(3, 3)];
+    let motion = EgoMotion::at_rest(1.0 / f64::from(steps));
+    (0..steps).for_each(|_| filter.predict(&mut state, &motion));
+    state.covariance[(3, 3)] - before
 }
 
 #[test]
@@ -159,13 +159,13 @@ fn the_process_noise_does_not_depend_on_the_frame_rate_as_the_printed_one_does()
 /// The believed height of somebody who stands for 20 s and has sat for 1 s.
 fn height_after_sitting_down(config: Config) -> f64 {
     let filter = filter(config);
-    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
     for i in 0..231 {
-        filter.predict(&mut belief, &Motion::at_rest(DT_S));
+        filter.predict(&mut state, &EgoMotion::at_rest(DT_S));
         let height = if i < 220 { 1.6 } else { 1.2 };
-        filter.correct(&mut belief, &detection(Point3::new(3.0, 0.0, height), 0.05), &camera());
+        filter.correct(&mut state, &detection(Point3::new(3.0, 0.0, height), 0.05), &camera());
     }
-    belief.mean[2]
+    state.mean[2]
 }
 
 #[test]
@@ -178,12 +178,12 @@ fn the_height_follows_a_person_who_sits_down_the_printed_one_freezes() {
 #[test]
 fn a_heading_error_moves_far_people_sideways() {
     let filter = filter(Config::default());
-    let mut motion = Motion::at_rest(0.0);
+    let mut motion = EgoMotion::at_rest(0.0);
     motion.covariance[(2, 2)] = 0.5_f64.to_radians().powi(2);
-    let mut belief = belief_at(Point3::new(5.0, 0.0, 1.6));
-    let before = belief.covariance;
-    filter.predict(&mut belief, &motion);
-    let added = belief.covariance - before;
+    let mut state = belief_at(Point3::new(5.0, 0.0, 1.6));
+    let before = state.covariance;
+    filter.predict(&mut state, &motion);
+    let added = state.covariance - before;
     assert!((added[(1, 1)].sqrt() - 0.0436).abs() < 1e-4, "4 cm at 5 m");
     assert!(added[(0, 0)].abs() < 1e-12);
 }
@@ -192,16 +192,16 @@ fn a_heading_error_moves_far_people_sideways() {
 fn the_printed_update_loses_symmetry_the_joseph_form_does_not() {
     let asymmetry = |printed: bool| {
         let filter = filter(Config { compat_printed_update: printed, ..Config::default() });
-        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         let mut world = World::new(1);
         let mut worst: f64 = 0.0;
         for _ in 0..50 {
-            filter.predict(&mut belief, &world.drive(0.5, 0.7));
+            filter.predict(&mut state, &world.drive(0.5, 0.7));
             let mut seen = world.look();
             seen.covariance[(0, 1)] = 1e-3;
             seen.covariance[(1, 0)] = 1e-3;
-            filter.correct(&mut belief, &seen, &camera());
-            worst = worst.max((belief.covariance - belief.covariance.transpose()).norm());
+            filter.correct(&mut state, &seen, &camera());
+            worst = worst.max((state.covariance - state.covariance.transpose()).norm());
         }
         worst
     };
@@ -213,10 +213,10 @@ fn the_printed_update_loses_symmetry_the_joseph_form_does_not() {
 fn a_detections_own_covariance_decides_how_far_it_is_believed() {
     let move_by = |config: Config, far_sigma_m: f64| {
         let filter = filter(config);
-        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         let seen = detection(Point3::new(3.5, 0.0, 1.6), far_sigma_m);
-        filter.correct(&mut belief, &seen, &camera());
-        belief.mean[0] - 3.0
+        filter.correct(&mut state, &seen, &camera());
+        state.mean[0] - 3.0
     };
     assert!(move_by(Config::default(), 0.5) < 0.1 * move_by(Config::default(), 0.01));
     let printed = || Config { compat_printed_measurement: true, ..Config::default() };
@@ -226,22 +226,22 @@ fn a_detections_own_covariance_decides_how_far_it_is_believed() {
 #[test]
 fn an_unmeasured_height_is_not_touched_and_not_counted() {
     let filter = filter(Config::default());
-    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
     let mut seen = detection(Point3::new(3.1, 0.0, 0.0), 0.05);
     seen.covariance[(2, 2)] = 1e6;
-    let support = filter.correct(&mut belief, &seen, &camera());
-    assert!((belief.mean[2] - 1.6).abs() < 1e-6);
+    let support = filter.correct(&mut state, &seen, &camera());
+    assert!((state.mean[2] - 1.6).abs() < 1e-6);
     assert_eq!(support.nis.map(|(_, dof)| dof), Some(2));
 }
 
 #[test]
 fn uncertainty_grows_without_evidence() {
     let filter = filter(Config::default());
-    let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
     for _ in 0..20 {
-        let before = belief.covariance.trace();
-        filter.predict(&mut belief, &Motion::at_rest(DT_S));
-        assert!(belief.covariance.trace() > before);
+        let before = state.covariance.trace();
+        filter.predict(&mut state, &EgoMotion::at_rest(DT_S));
+        assert!(state.covariance.trace() > before);
     }
 }
 
@@ -256,8 +256,8 @@ fn the_region_is_that_of_the_estimated_place() {
 #[test]
 fn the_printed_velocity_is_that_of_the_paper() {
     let filter = filter(Config { compat_printed_velocity: true, ..Config::default() });
-    let wheels = Wheels { half_separation_m: 0.167, slip: 0.0 };
-    let motion = Motion::from_wheels(0.4, 0.6, &wheels, DT_S);
+    let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
+    let motion = EgoMotion::from_wheels(0.4, 0.6, &wheels, DT_S);
     let got = filter.transition(&Vector5::new(3.0, 1.0, 1.6, 0.2, -0.1), &motion);
     let turned = Isometry2::rotation(-motion.turn) * Vector2::new(0.2, -0.1);
     assert!((got[3] - (turned.x - 0.5)).abs() < 1e-3 && (got[4] - turned.y).abs() < 1e-12);
@@ -272,7 +272,7 @@ fn settings_that_cannot_work_are_refused() {
     let context = Context {
         seed: 0,
         base_dir: ".".into(),
-        wheels: Wheels { half_separation_m: 0.2, slip: 0.0 },
+        wheels: DiffDrive { half_separation_m: 0.2, slip: 0.0 },
     };
     assert!(registry.build_filter("ekf", None, &context).is_ok());
     for line in ["acceleration_noise = 0.0", "height_noise = -1.0", "printed_sigma_v_m = nan"] {
@@ -288,10 +288,10 @@ fn settings_that_cannot_work_are_refused() {
 fn by_students_t_an_outlier_pulls_less_and_a_good_detection_as_much() {
     let pull = |student_dof: f64, off_m: f64| {
         let filter = filter(Config { student_dof, ..Config::default() });
-        let mut belief = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
+        let mut state = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
         let seen = detection(Point3::new(3.0 + off_m, 0.0, 1.6), 0.1);
-        filter.correct(&mut belief, &seen, &camera());
-        belief.mean[0] - 3.0
+        filter.correct(&mut state, &seen, &camera());
+        state.mean[0] - 3.0
     };
     assert!((pull(4.0, 0.05) - pull(0.0, 0.05)).abs() < 1e-12);
     // By hand: prior and noise have the same variance on each axis.
@@ -308,20 +308,21 @@ fn by_students_t_an_outlier_pulls_less_and_a_good_detection_as_much() {
 #[test]
 fn a_newcomer_is_where_the_detection_is_and_may_go_anywhere() {
     let filter = filter(Config { initial_velocity_variance: 3.0, ..Config::default() });
-    let belief = filter.start(&detection(Point3::new(3.0, 0.4, 1.6), 0.1));
-    assert_eq!(belief.mean, Vector5::new(3.0, 0.4, 1.6, 0.0, 0.0));
+    let state = filter.start(&detection(Point3::new(3.0, 0.4, 1.6), 0.1));
+    assert_eq!(state.mean, Vector5::new(3.0, 0.4, 1.6, 0.0, 0.0));
     let place = 0.1f64.powi(2) + Config::default().extra_sigma_m.powi(2);
     let expected = SMatrix::from_diagonal(&Vector5::new(place, place, place, 3.0, 3.0));
-    assert!((belief.covariance - expected).norm() < 1e-12, "{}", belief.covariance);
+    assert!((state.covariance - expected).norm() < 1e-12, "{}", state.covariance);
 }
 
 #[test]
 fn who_backs_up_is_subtracted_the_other_way_and_who_waits_not_at_all() {
     let filter = filter(Config { compat_printed_velocity: true, ..Config::default() });
     let still = Vector5::new(3.0, 0.0, 1.6, 0.0, 0.0);
-    let of = |forward: f64| filter.transition(&still, &Motion { forward, ..Motion::at_rest(0.1) });
+    let of =
+        |forward: f64| filter.transition(&still, &EgoMotion { forward, ..EgoMotion::at_rest(0.1) });
     assert!((of(-0.05)[3] - 0.5).abs() < 1e-12 && (of(0.05)[3] + 0.5).abs() < 1e-12);
-    let no_time = Motion { forward: 0.05, ..Motion::at_rest(0.0) };
+    let no_time = EgoMotion { forward: 0.05, ..EgoMotion::at_rest(0.0) };
     assert_eq!(filter.transition(&still, &no_time)[3], 0.0);
 }
 
@@ -329,19 +330,19 @@ fn who_backs_up_is_subtracted_the_other_way_and_who_waits_not_at_all() {
 fn the_printed_noise_knows_neither_height_nor_ego_motion() {
     let filter =
         filter(Config { compat_printed_noise: true, printed_sigma_w: 4.0, ..Config::default() });
-    let mut belief = belief_at(Point3::new(5.0, 0.0, 1.6));
-    let before = belief.covariance;
-    let mut motion = Motion::at_rest(0.1);
+    let mut state = belief_at(Point3::new(5.0, 0.0, 1.6));
+    let before = state.covariance;
+    let mut motion = EgoMotion::at_rest(0.1);
     motion.covariance = Matrix3::identity() * 0.01;
-    filter.predict(&mut belief, &motion);
-    let added = belief.covariance - before;
+    filter.predict(&mut state, &motion);
+    let added = state.covariance - before;
     assert!((added[(3, 3)] - 0.16).abs() < 1e-12 && (added[(4, 4)] - 0.16).abs() < 1e-12);
     assert_eq!(added[(2, 2)], 0.0);
     let moved = before[(3, 3)] * 0.01;
     assert!((added[(0, 0)] - moved).abs() < 1e-12 && (added[(1, 1)] - moved).abs() < 1e-12);
 }
 
-/// The belief after a sighting half a metre away, by hand where all is diagonal.
+/// The state after a sighting half a metre away, by hand where all is diagonal.
 #[test]
 fn both_updates_are_those_of_the_textbook() {
     for printed in [false, true] {
@@ -351,13 +352,13 @@ fn both_updates_are_those_of_the_textbook() {
             printed_sigma_v_m: 0.3,
             ..Config::default()
         });
-        let mut belief = belief_at(Point3::new(3.0, 0.0, 1.6));
-        let p = belief.covariance[(0, 0)];
+        let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
+        let p = state.covariance[(0, 0)];
         let seen = detection(Point3::new(3.5, 0.0, 1.6), 0.01);
-        let support = filter.correct(&mut belief, &seen, &camera());
+        let support = filter.correct(&mut state, &seen, &camera());
         let gain = p / (p + 0.09);
-        assert!((belief.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12, "{printed}");
-        assert!((belief.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12, "{printed}");
+        assert!((state.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12, "{printed}");
+        assert!((state.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12, "{printed}");
         let (nis, measured) = support.nis.unwrap();
         assert!((nis - 0.25 / (p + 0.09)).abs() < 1e-12 && measured == 3);
     }
@@ -398,11 +399,11 @@ fn every_number_has_its_bound_and_zero_is_allowed_where_it_means_none() {
 fn the_weight_of_an_outlier_depends_on_how_much_was_measured() {
     let pull = |covariance_of_height: f64| {
         let filter = filter(Config { student_dof: 4.0, ..Config::default() });
-        let mut belief = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
+        let mut state = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
         let mut seen = detection(Point3::new(3.6, 0.0, 1.6), 0.1);
         seen.covariance[(2, 2)] = covariance_of_height;
-        filter.correct(&mut belief, &seen, &camera());
-        belief.mean[0] - 3.0
+        filter.correct(&mut state, &seen, &camera());
+        state.mean[0] - 3.0
     };
     // With three coordinates right, an error in one of them says less of the detection.
     assert!(pull(0.01) > pull(1e6) + 1e-3, "{} {}", pull(0.01), pull(1e6));

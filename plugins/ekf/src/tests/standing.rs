@@ -1,10 +1,10 @@
 //! A person at rest who is seen from a moving robot stays at rest in the world.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use tagalong_core::{Motion, PersonFilter};
+use tagalong_core::{EgoMotion, PersonFilter};
 
 use super::world::{DT_S, World, mean, track};
-use crate::{Belief, Config, Ekf};
+use crate::{Config, Ekf, State};
 
 const SEEDS: u64 = 40;
 const SPEED_MPS: f64 = 0.5;
@@ -40,16 +40,16 @@ fn run(filter: &Ekf, turn_radps: f64) -> Outcome {
     for seed in 0..SEEDS {
         let mut world = World::new(seed);
         let seen = world.look();
-        let mut belief = filter.start(&seen);
+        let mut state = filter.start(&seen);
         let drive = |world: &mut World| world.drive(SPEED_MPS, turn_radps);
-        track(filter, &mut belief, &mut world, 22, drive);
+        track(filter, &mut state, &mut world, 22, drive);
         for _ in 0..20 {
-            nis.extend(track(filter, &mut belief, &mut world, 1, drive));
-            let off = belief.mean.fixed_rows::<3>(0) - world.person_in_robot().coords;
-            velocities.push(belief.mean[3]);
+            nis.extend(track(filter, &mut state, &mut world, 1, drive));
+            let off = state.mean.fixed_rows::<3>(0) - world.person_in_robot().coords;
+            velocities.push(state.mean[3]);
             positions.push(off[0]);
         }
-        coasted.push(coast(filter, belief, &mut world, turn_radps));
+        coasted.push(coast(filter, state, &mut world, turn_radps));
     }
     Outcome {
         velocity_bias_mps: mean(&velocities),
@@ -59,12 +59,12 @@ fn run(filter: &Ekf, turn_radps: f64) -> Outcome {
     }
 }
 
-fn coast(filter: &Ekf, mut belief: Belief, world: &mut World, turn_radps: f64) -> f64 {
+fn coast(filter: &Ekf, mut state: State, world: &mut World, turn_radps: f64) -> f64 {
     for _ in 0..(1.0 / DT_S) as usize {
         let motion = world.drive(SPEED_MPS, turn_radps);
-        filter.predict(&mut belief, &motion);
+        filter.predict(&mut state, &motion);
     }
-    let (position, _) = world.of_belief(&belief);
+    let (position, _) = world.of_belief(&state);
     (position - world.person.xy()).norm()
 }
 
@@ -105,12 +105,12 @@ fn the_velocity_of_a_walker_is_over_ground() {
     let filter = corrected();
     let mut world = World::new(7);
     world.velocity = Vector2::new(0.4, -0.6);
-    let mut belief = filter.start(&world.look());
-    track(&filter, &mut belief, &mut world, 60, |world| {
+    let mut state = filter.start(&world.look());
+    track(&filter, &mut state, &mut world, 60, |world| {
         world.walk(0.0, 0.0);
         world.drive(SPEED_MPS, 0.3)
     });
-    let (position, velocity) = world.of_belief(&belief);
+    let (position, velocity) = world.of_belief(&state);
     assert!((velocity - world.velocity).norm() < 0.25, "{velocity}");
     assert!((position - world.person.xy()).norm() < 0.1);
 }
@@ -124,9 +124,9 @@ fn the_filter_is_consistent() {
     let mut all = Vec::new();
     for seed in 100..100 + SEEDS {
         let mut world = World::new(seed);
-        let mut belief = filter.start(&world.look());
+        let mut state = filter.start(&world.look());
         world.velocity = config.initial_velocity_variance.sqrt() * world.random.normal3().xy();
-        all.extend(track(&filter, &mut belief, &mut world, 40, |world| {
+        all.extend(track(&filter, &mut state, &mut world, 40, |world| {
             world.walk(config.acceleration_noise, config.height_noise);
             world.drive(SPEED_MPS, 0.3)
         }));
@@ -145,13 +145,13 @@ fn errors_of_the_odometry_are_accounted_for() {
         let mut all = Vec::new();
         for seed in 200..200 + SEEDS {
             let mut world = World::new(seed);
-            let mut belief = filter.start(&world.look());
-            all.extend(track(&filter, &mut belief, &mut world, 40, |world| {
+            let mut state = filter.start(&world.look());
+            all.extend(track(&filter, &mut state, &mut world, 40, |world| {
                 world.walk(0.5, 0.07);
                 let error = sigma.component_mul(&world.random.normal3());
                 let true_motion = world.drive(SPEED_MPS, 0.1);
                 let covariance = Matrix3::from_diagonal(&sigma.component_mul(&sigma));
-                Motion {
+                EgoMotion {
                     forward: true_motion.forward + error.x,
                     left: true_motion.left + error.y,
                     turn: true_motion.turn + error.z,

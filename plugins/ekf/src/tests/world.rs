@@ -2,10 +2,10 @@
 //! that the numbers are the same everywhere.
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
-use tagalong_core::{Detection, Motion, PersonFilter};
+use tagalong_core::{Detection, EgoMotion, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
-use crate::{Belief, Ekf};
+use crate::{Ekf, State};
 
 pub const DT_S: f64 = 0.09;
 pub const SIGMA_M: f64 = 0.05;
@@ -65,10 +65,10 @@ impl World {
     }
 
     /// Drives for one frame; the odometry is exact.
-    pub fn drive(&mut self, speed_mps: f64, turn_radps: f64) -> Motion {
+    pub fn drive(&mut self, speed_mps: f64, turn_radps: f64) -> EgoMotion {
         let turn = turn_radps * DT_S;
         let step = Rotation2::new(0.5 * turn) * Vector2::new(speed_mps * DT_S, 0.0);
-        let motion = Motion { forward: step.x, left: step.y, turn, ..Motion::at_rest(DT_S) };
+        let motion = EgoMotion { forward: step.x, left: step.y, turn, ..EgoMotion::at_rest(DT_S) };
         self.robot *= motion.isometry();
         motion
     }
@@ -95,9 +95,9 @@ impl World {
         detection(self.person_in_robot() + SIGMA_M * self.random.normal3(), SIGMA_M)
     }
 
-    /// Where the belief is in the world, and how fast it moves there.
-    pub fn of_belief(&self, belief: &Belief) -> (Point2<f64>, Vector2<f64>) {
-        let m = &belief.mean;
+    /// Where the state is in the world, and how fast it moves there.
+    pub fn of_belief(&self, state: &State) -> (Point2<f64>, Vector2<f64>) {
+        let m = &state.mean;
         (self.robot * Point2::new(m[0], m[1]), self.robot * Vector2::new(m[3], m[4]))
     }
 }
@@ -105,18 +105,18 @@ impl World {
 /// Sees the person once per frame; returns the normalised innovations squared.
 pub fn track(
     filter: &Ekf,
-    belief: &mut Belief,
+    state: &mut State,
     world: &mut World,
     frames: usize,
-    mut next: impl FnMut(&mut World) -> Motion,
+    mut next: impl FnMut(&mut World) -> EgoMotion,
 ) -> Vec<f64> {
     let camera = camera();
     let mut all = Vec::new();
     for _ in 0..frames {
         let motion = next(world);
-        filter.predict(belief, &motion);
+        filter.predict(state, &motion);
         let seen = world.look();
-        all.extend(filter.correct(belief, &seen, &camera).nis.map(|(nis, _)| nis));
+        all.extend(filter.correct(state, &seen, &camera).nis.map(|(nis, _)| nis));
     }
     all
 }

@@ -15,7 +15,7 @@ const FALSE_ALARMS: [f64; 3] = [1.0, 0.3, 0.1];
 
 /// Groups found in the pictures for one purpose.
 #[derive(Default)]
-struct Found {
+struct GroupCounts {
     /// Logarithm of the strength, and true for a face. Groups of small faces are left out.
     groups: Vec<(f64, bool)>,
     faces: usize,
@@ -23,7 +23,7 @@ struct Found {
     pictures: usize,
 }
 
-impl Found {
+impl GroupCounts {
     fn add(
         &mut self,
         scanner: &mut Scanner,
@@ -76,8 +76,8 @@ fn search(
     config: &Config,
     pictures: &[Picture],
     wanted: impl Fn(&Picture) -> bool,
-) -> Found {
-    let (mut found, mut scanner) = (Found::default(), Scanner::default());
+) -> GroupCounts {
+    let (mut found, mut scanner) = (GroupCounts::default(), Scanner::default());
     let least = cascade.width.min(cascade.height);
     let is_large = |p: &&Picture| p.grey.width() > least && p.grey.height() > least;
     for picture in pictures.iter().filter(|p| wanted(p)).filter(is_large) {
@@ -100,7 +100,7 @@ fn found_in(
     pictures: &[Picture],
     use_: Use,
     with_faces: bool,
-) -> Found {
+) -> GroupCounts {
     search(cascade, config, pictures, |p| p.use_ == use_ && p.faces.is_empty() != with_faces)
 }
 

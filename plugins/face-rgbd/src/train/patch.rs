@@ -4,7 +4,7 @@ use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 
 use crate::compiled::Compiled;
-use crate::{Cascade, Level, Seen};
+use crate::{Cascade, Level, PassedWindow};
 
 /// A window as its sums, and the reciprocal of its contrast.
 #[derive(Clone)]
@@ -27,7 +27,7 @@ impl Patch {
     }
 
     /// Cuts out a window that a scan took for a face.
-    pub(super) fn of(seen: &Seen<'_>, side: usize) -> Option<Self> {
+    pub(super) fn of(seen: &PassedWindow<'_>, side: usize) -> Option<Self> {
         let (pixels, width) = (seen.level.pixels(), seen.level.width());
         let cut = GreyImage::from_fn(side, side, |x, y| pixels[(seen.y + y) * width + seen.x + x]);
         Self::new(&cut, side)

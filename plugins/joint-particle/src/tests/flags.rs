@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector2};
 use proptest::prelude::*;
-use tagalong_core::{Motion, Person, RgbImage};
+use tagalong_core::{EgoMotion, Person, RgbImage};
 
 use super::rig::{EXACT, Formula, Rig, sighting};
 use crate::{Chosen, Config, Method};
@@ -176,7 +176,7 @@ fn a_heading_turns_against_the_robot() {
         Formula::new(|scene| 5.0 * scene.iter().filter(|p| p.velocity.y > 0.3).count() as f64);
     rig.look(&left);
     let likelihood = Formula::flat(3.0);
-    rig.look_after(Motion { turn: 0.5, ..Motion::at_rest(0.1) }, &likelihood, &[], None);
+    rig.look_after(EgoMotion { turn: 0.5, ..EgoMotion::at_rest(0.1) }, &likelihood, &[], None);
     let faces = likelihood.asked()[0][0].velocity;
     assert!((faces - Vector2::new(0.5f64.sin(), 0.5f64.cos())).norm() < 0.05, "{faces}");
 }
@@ -187,7 +187,7 @@ fn a_part_of_the_particles_starts_again_at_a_sighting() {
         let mut rig = Rig::new(Config { from_detection, marginalise, ..Config::default() }, 4);
         rig.start(1, [2.0, 0.0, 1.6], [0.01; 3]);
         let seen = [(1, sighting(Point3::new(2.0, 0.5, 1.6), [0.01; 3]))];
-        rig.look_after(Motion::at_rest(0.1), &Formula::flat(3.0), &seen, None);
+        rig.look_after(EgoMotion::at_rest(0.1), &Formula::flat(3.0), &seen, None);
         rig.columns(1).iter().filter(|x| **x < 49.5 - 12.0).count()
     };
     for marginalise in [true, false] {
@@ -204,7 +204,7 @@ fn frames_seen(config: &Config, nats: f64, sighted: bool) -> usize {
     let seen = [(1, sighting(Point3::new(2.0, 0.0, 1.6), [0.02; 3]))];
     let sightings = if sighted { &seen[..] } else { &[] };
     let look = |_: &usize| {
-        !rig.look_after(Motion::at_rest(0.1), &Formula::flat(nats), sightings, None).is_empty()
+        !rig.look_after(EgoMotion::at_rest(0.1), &Formula::flat(nats), sightings, None).is_empty()
     };
     (0..10).filter(look).count()
 }
@@ -376,7 +376,7 @@ fn walked(swap_margin: f64, mirrored: bool) -> Rig {
     };
     let mut look = |y: f64, mirrored| {
         let sightings = [(1, at(y)), (2, at(-y))];
-        rig.look_after(Motion::at_rest(0.1), &Formula::new(facing), &sightings, image(mirrored));
+        rig.look_after(EgoMotion::at_rest(0.1), &Formula::new(facing), &sightings, image(mirrored));
     };
     look(0.7, false);
     look(0.1, false);

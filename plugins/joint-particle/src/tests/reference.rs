@@ -2,7 +2,7 @@
 //! person, a Bayes filter on a grid for two people that hide each other.
 
 use nalgebra::{Matrix2, Rotation2, Vector2};
-use tagalong_core::{Motion, Person};
+use tagalong_core::{EgoMotion, Person};
 
 use super::rig::{EXACT, Formula, Rig};
 use crate::{Chosen, Config, Method};
@@ -53,7 +53,7 @@ fn follows_kalman(config: Config, tolerance: f64) {
     axes[2].covariance[(1, 1)] = 0.0;
     let mut rig = Rig::new(config, 3);
     rig.start(1, [2.4, 0.1, 1.62], [0.15; 3]);
-    let motion = Motion { forward: 0.03, left: 0.005, turn: 0.03, ..Motion::at_rest(DT_S) };
+    let motion = EgoMotion { forward: 0.03, left: 0.005, turn: 0.03, ..EgoMotion::at_rest(DT_S) };
     let (mut robot, mut heading) = (Vector2::zeros(), 0.0);
     let wrong = [0.05, -0.06, 0.02, 0.07, -0.03, -0.05, 0.06, 0.01];
     for (frame, wrong) in (1..).zip(wrong) {
@@ -185,12 +185,12 @@ const FAR_M: f64 = 3.0;
 
 /// Apparent positions of the two people in a frame: the far one explains nothing while hidden.
 #[derive(Clone, Copy)]
-struct Seen {
+struct ApparentPositions {
     near: f64,
     far: f64,
 }
 
-impl Seen {
+impl ApparentPositions {
     fn near_log(self, near: f64) -> f64 {
         4.0 * normal(near - self.near, 0.15)
     }
@@ -212,11 +212,11 @@ impl Seen {
 }
 
 /// The near person stands while the far one comes out from behind, a little off the prediction.
-const WALK: [Seen; 4] = [
-    Seen { near: 0.06, far: 0.0 },
-    Seen { near: 0.02, far: 0.15 },
-    Seen { near: 0.04, far: 0.3 },
-    Seen { near: 0.0, far: 0.36 },
+const WALK: [ApparentPositions; 4] = [
+    ApparentPositions { near: 0.06, far: 0.0 },
+    ApparentPositions { near: 0.02, far: 0.15 },
+    ApparentPositions { near: 0.04, far: 0.3 },
+    ApparentPositions { near: 0.0, far: 0.36 },
 ];
 const PRIOR_M: [f64; 2] = [0.1, 0.15];
 const STEP_NOISE: f64 = 0.2;

@@ -2,8 +2,8 @@ use std::sync::{Arc, Mutex};
 
 use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 use tagalong_core::{
-    Detection, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Motion, Person,
-    Result, RgbImage, Sketch, Stamp, Support, TrackId,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
+    Result, RgbImage, Sketch, Stamp, TrackId, Update,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
@@ -41,7 +41,7 @@ impl Likelihood for Formula {
 }
 
 /// A frame of a level camera 1.5 m above the robot's origin.
-pub fn frame(motion: Motion, colour: Option<RgbImage>) -> Frame {
+pub fn frame(motion: EgoMotion, colour: Option<RgbImage>) -> Frame {
     let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
     let images = Images { colour: colour.map(Arc::new), ..Images::default() };
@@ -66,19 +66,19 @@ impl Rig {
     }
 
     pub fn start(&mut self, id: u32, position: [f64; 3], sigmas: [f64; 3]) {
-        let camera = frame(Motion::at_rest(0.1), None).camera;
+        let camera = frame(EgoMotion::at_rest(0.1), None).camera;
         self.filter.start(TrackId(id), &sighting(Point3::from(position), sigmas), &camera);
     }
 
     /// Runs one frame without detections, the robot at rest, a tenth of a second later.
     pub fn look(&mut self, likelihood: &Formula) -> Vec<u32> {
-        self.look_after(Motion::at_rest(0.1), likelihood, &[], None)
+        self.look_after(EgoMotion::at_rest(0.1), likelihood, &[], None)
     }
 
     /// Runs one frame; returns the seen people.
     pub fn look_after(
         &mut self,
-        motion: Motion,
+        motion: EgoMotion,
         likelihood: &Formula,
         sightings: &[(u32, Detection)],
         colour: Option<RgbImage>,
@@ -91,13 +91,13 @@ impl Rig {
         self.filter.predict(&motion, &frame.camera);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
         let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood };
-        let seen: std::collections::BTreeMap<TrackId, Support> =
+        let seen: std::collections::BTreeMap<TrackId, Update> =
             self.filter.update(&evidence).unwrap();
         seen.into_keys().map(|id| id.0).collect()
     }
 
     pub fn estimate(&self, id: u32) -> Estimate {
-        let frame = frame(Motion::at_rest(0.1), None);
+        let frame = frame(EgoMotion::at_rest(0.1), None);
         self.filter.estimates(&frame.camera).remove(&TrackId(id)).unwrap()
     }
 
@@ -110,7 +110,7 @@ impl Rig {
     }
 
     pub fn sketch(&self, likelihood: &Formula) -> Sketch {
-        let frame = frame(Motion::at_rest(0.1), None);
+        let frame = frame(EgoMotion::at_rest(0.1), None);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
         let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
         self.filter.sketch(&evidence).unwrap()

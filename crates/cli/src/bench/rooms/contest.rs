@@ -3,7 +3,7 @@ use tagalong_pipeline::{Tunable, with_values};
 use tagalong_tuning::candidates;
 
 use super::RoomsArgs;
-use crate::bench::plan::{self, Annotated, Candidate, sha256};
+use crate::bench::plan::{self, Annotated, PlannedConfig, sha256};
 use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
 
@@ -17,7 +17,7 @@ pub struct Location {
 /// Pipeline with all settings that are tried.
 pub struct Contestant {
     /// Config as it is shipped.
-    pub config: Candidate,
+    pub config: PlannedConfig,
     /// Tried settings, the shipped ones first.
     pub settings: Vec<Setting>,
     /// Number of combinations that contradict themselves.
@@ -39,7 +39,11 @@ impl Contestant {
     ///
     /// # Errors
     /// Values that a setting does not allow, with their line.
-    pub fn new(config: Candidate, args: &RoomsArgs, registry: &Registry) -> Result<Self, Failure> {
+    pub fn new(
+        config: PlannedConfig,
+        args: &RoomsArgs,
+        registry: &Registry,
+    ) -> Result<Self, Failure> {
         config.file.check_tuning(registry)?;
         let (pipeline, _) = config.file.pipeline(registry, None)?;
         let (resolved, budget) = (pipeline.resolved(), usize::from(args.budget));
@@ -80,7 +84,7 @@ pub fn shown(value: &toml::Value) -> String {
 impl Setting {
     /// Returns `None` if each value is allowed, but not all of them together.
     fn new(
-        config: &Candidate,
+        config: &PlannedConfig,
         resolved: &str,
         values: Vec<toml::Value>,
         registry: &Registry,

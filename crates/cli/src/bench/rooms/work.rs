@@ -41,7 +41,7 @@ pub struct RoomResult {
 
 /// Summary of the runs.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Done {
+pub struct RunSummary {
     pub asked: usize,
     pub ran: usize,
     pub lost: bool,
@@ -104,7 +104,7 @@ impl<'a> Desk<'a> {
     ///
     /// # Errors
     /// Runs that fail, after all others are done; a disk that fails, at once.
-    pub fn work(&self, jobs: usize) -> Result<Done, Failure> {
+    pub fn work(&self, jobs: usize) -> Result<RunSummary, Failure> {
         let signals = Signals::listen()?;
         let asked = self.runs();
         let due: Vec<Run> =
@@ -123,7 +123,7 @@ impl<'a> Desk<'a> {
         shift.verdict()?;
         let lost = |run: &Run| self.result(*run).is_some_and(|result| result.data_lost);
         let lost = asked.iter().any(lost);
-        Ok(Done { asked: asked.len(), ran, lost, signal: signals.received() })
+        Ok(RunSummary { asked: asked.len(), ran, lost, signal: signals.received() })
     }
 
     fn runs(&self) -> Vec<Run> {

@@ -5,15 +5,15 @@
 //! rate and keeps the curvature; each command carries its reason and the time until which it is
 //! valid.
 
-mod corridor;
+mod collision_monitor;
+mod obstacle_memory;
 mod settings;
-mod surroundings;
 
-pub(crate) use corridor::Ahead;
-pub use settings::{CorridorSettings, GovernorSettings};
-pub(crate) use surroundings::Surroundings;
+pub(crate) use collision_monitor::Ahead;
+pub(crate) use obstacle_memory::ObstacleMemory;
+pub use settings::{CollisionMonitorSettings, CommandLimiterSettings};
 
-use tagalong_core::{Command, Motion, Reason, Stamp, WheelSpeeds, Wheels};
+use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, WheelSpeeds};
 
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
@@ -21,7 +21,7 @@ const LONGEST_STEP_S: f64 = 0.2;
 /// Speeds below this are standing still, m/s.
 const STILL_MPS: f64 = 1e-6;
 
-/// Wish of a controller, with the facts that the governor needs about the frame.
+/// Wish of a controller, with the facts that the command limiter needs about the frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Wish {
     /// Wheel speeds of the controller; any numbers, also NaN and infinite ones.
@@ -98,9 +98,10 @@ impl Orders {
 }
 
 /// Governor of the commands; see the [module](self).
-pub(crate) struct Governor {
-    settings: GovernorSettings,
-    wheels: Wheels,
+pub(crate) struct CommandLimiter {
+    settings: CommandLimiterSettings,
+    monitor: CollisionMonitorSettings,
+    wheels: DiffDrive,
     max_speed_mps: f64,
     last: Option<Command>,
     fault: Option<&'static str>,
@@ -114,13 +115,13 @@ struct Twist {
 }
 
 impl Twist {
-    fn of(wheels: WheelSpeeds, drive: &Wheels) -> Self {
+    fn of(wheels: WheelSpeeds, drive: &DiffDrive) -> Self {
         let WheelSpeeds { left, right } = wheels;
         let turn = 0.5 * (right - left) / drive.half_separation_m;
         Self { forward: 0.5 * (left + right), turn }
     }
 
-    fn wheels(self, drive: &Wheels) -> WheelSpeeds {
+    fn wheels(self, drive: &DiffDrive) -> WheelSpeeds {
         let by_turn = self.turn * drive.half_separation_m;
         WheelSpeeds { left: self.forward - by_turn, right: self.forward + by_turn }
     }
@@ -135,18 +136,23 @@ impl Twist {
     }
 }
 
-impl Governor {
-    pub(crate) fn new(settings: GovernorSettings, wheels: Wheels, max_speed_mps: f64) -> Self {
-        Self { settings, wheels, max_speed_mps, last: None, fault: None }
+impl CommandLimiter {
+    pub(crate) fn new(
+        settings: CommandLimiterSettings,
+        monitor: CollisionMonitorSettings,
+        wheels: DiffDrive,
+        max_speed_mps: f64,
+    ) -> Self {
+        Self { settings, monitor, wheels, max_speed_mps, last: None, fault: None }
     }
 
     /// Returns the command for a frame. `look` returns the nearest obstacle in the corridor along
     /// an arc of a given curvature, and is called only where the robot may move; it returns `None`
     /// for a robot with neither depth nor laser.
-    pub(crate) fn govern(
+    pub(crate) fn limit(
         &mut self,
         wish: &Wish,
-        look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
+        look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
     ) -> Command {
         let (wheels, reason) = match self.must_stop(wish) {
             Some(reason) => (WheelSpeeds::STOP, reason),
@@ -165,7 +171,7 @@ impl Governor {
     }
 
     /// Latches a fault if the odometry moved faster than the robot can.
-    pub(crate) fn check_odometry(&mut self, motion: &Motion) {
+    pub(crate) fn check_odometry(&mut self, motion: &EgoMotion) {
         let travel = motion.forward.hypot(motion.left);
         // At least 50 ms: over a shorter time, small odometry errors would look like high speeds.
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
@@ -174,8 +180,8 @@ impl Governor {
     }
 
     /// Returns the settings of the obstacle corridor.
-    pub(crate) fn corridor(&self) -> &CorridorSettings {
-        &self.settings.corridor
+    pub(crate) fn monitor(&self) -> &CollisionMonitorSettings {
+        &self.monitor
     }
 
     /// Stops the robot until it is armed again.
@@ -217,7 +223,7 @@ impl Governor {
     fn limited(
         &self,
         wish: &Wish,
-        look: impl FnOnce(&CorridorSettings, f64) -> Option<Ahead>,
+        look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
     ) -> (WheelSpeeds, Reason) {
         let (wanted, as_wished) = self.within_drive(wish.wheels);
         let (mut cap, mut why) = (self.max_speed_mps, Reason::Limited);
@@ -229,7 +235,7 @@ impl Governor {
         }
         // A turn in place stays in place, and the corridor shows nothing behind the robot.
         if wanted.forward > STILL_MPS {
-            match look(&self.settings.corridor, wanted.curvature()) {
+            match look(&self.monitor, wanted.curvature()) {
                 Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
                 Some(Ahead::Something(at_m)) if self.speed_before(at_m) < cap => {
                     (cap, why) = (self.speed_before(at_m), Reason::Obstacle);
@@ -270,7 +276,7 @@ impl Governor {
 
     /// Returns the speed from which the robot still stops in time, m/s.
     fn speed_before(&self, at_m: f64) -> f64 {
-        let left = at_m - self.settings.corridor.stop_m;
+        let left = at_m - self.monitor.stop_m;
         // From v² = 2 a s, with the distance that is left before `stop_m`.
         (2.0 * self.settings.max_decel_mps2 * left.max(0.0)).sqrt()
     }
@@ -281,7 +287,7 @@ impl Governor {
         let dt = self.last.map_or(LONGEST_STEP_S, |c| now.seconds_since(c.stamp));
         // Stamps may stand still or step back; both allow no change of speed.
         let dt = dt.clamp(0.0, LONGEST_STEP_S);
-        let GovernorSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
+        let CommandLimiterSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
         // Away from standstill is acceleration, towards it is deceleration.
         let up = if before.forward < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
         let down = if before.forward > 0.0 { max_decel_mps2 } else { max_accel_mps2 };

@@ -4,7 +4,7 @@ use tagalong_geometry::Rect;
 
 /// A detection by a detector outside of Tagalong, as recorded in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Recorded {
+pub struct ExternalDetection {
     /// Box in the image, pixels; absent for 3-D detections.
     pub region: Option<Rect>,
     /// Centre of the head in the robot frame, m; absent for boxes.

@@ -2,12 +2,17 @@ use proptest::prelude::*;
 
 use super::*;
 
-const DRIVE: Wheels = Wheels { half_separation_m: 0.167, slip: 0.02 };
+const DRIVE: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
 const MAX_MPS: f64 = 0.9;
 const PERIOD_S: f64 = 0.1;
 
-fn governor() -> Governor {
-    Governor::new(GovernorSettings::default(), DRIVE, MAX_MPS)
+fn limiter() -> CommandLimiter {
+    CommandLimiter::new(
+        CommandLimiterSettings::default(),
+        CollisionMonitorSettings::default(),
+        DRIVE,
+        MAX_MPS,
+    )
 }
 
 fn wish(frame: u64, left: f64, right: f64) -> Wish {
@@ -20,16 +25,16 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
     }
 }
 
-fn free(_: &CorridorSettings, _: f64) -> Option<Ahead> {
+fn free(_: &CollisionMonitorSettings, _: f64) -> Option<Ahead> {
     Some(Ahead::Free)
 }
 
-/// A governor after enough frames to reach the wished speed.
-fn at_speed(left: f64, right: f64) -> (Governor, Command) {
-    let mut governor = governor();
+/// A command limiter after enough frames to reach the wished speed.
+fn at_speed(left: f64, right: f64) -> (CommandLimiter, Command) {
+    let mut limiter = limiter();
     let commands: Vec<Command> =
-        (1..40).map(|frame| governor.govern(&wish(frame, left, right), free)).collect();
-    (governor, commands[38])
+        (1..40).map(|frame| limiter.limit(&wish(frame, left, right), free)).collect();
+    (limiter, commands[38])
 }
 
 #[test]
@@ -49,12 +54,12 @@ fn too_fast_a_wish_keeps_its_curvature() {
 
 #[test]
 fn speed_grows_no_faster_than_it_may() {
-    let mut governor = governor();
-    let first = governor.govern(&wish(1, 0.9, 0.9), free).wheels.left;
-    let second = governor.govern(&wish(2, 0.9, 0.9), free).wheels.left;
+    let mut limiter = limiter();
+    let first = limiter.limit(&wish(1, 0.9, 0.9), free).wheels.left;
+    let second = limiter.limit(&wish(2, 0.9, 0.9), free).wheels.left;
     assert!((second - first - 0.5 * PERIOD_S).abs() < 1e-9, "{first} {second}");
-    let (mut governor, _) = at_speed(0.8, 0.8);
-    let slower = governor.govern(&wish(40, 0.1, 0.1), free).wheels.left;
+    let (mut limiter, _) = at_speed(0.8, 0.8);
+    let slower = limiter.limit(&wish(40, 0.1, 0.1), free).wheels.left;
     assert!((slower - (0.8 - 1.0 * PERIOD_S)).abs() < 1e-9, "{slower}");
 }
 
@@ -71,17 +76,17 @@ fn each_reason_to_stop_stops_at_once() {
         }),
     ];
     for (reason, change) in stops {
-        let (mut governor, _) = at_speed(0.8, 0.8);
-        let command = governor.govern(&change(wish(40, 0.8, 0.8)), free);
+        let (mut limiter, _) = at_speed(0.8, 0.8);
+        let command = limiter.limit(&change(wish(40, 0.8, 0.8)), free);
         assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, reason));
     }
 }
 
 #[test]
 fn late_frames_halve_the_speed_and_later_ones_stop() {
-    let (mut governor, _) = at_speed(0.8, 0.8);
+    let (mut limiter, _) = at_speed(0.8, 0.8);
     let late = Wish { pause_s: 0.3, ..wish(42, 0.8, 0.8) };
-    let command = governor.govern(&late, free);
+    let command = limiter.limit(&late, free);
     assert_eq!(command.reason, Reason::Slow);
     assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
 }
@@ -89,23 +94,23 @@ fn late_frames_halve_the_speed_and_later_ones_stop() {
 #[test]
 fn whoever_may_be_the_wrong_one_is_followed_at_half_speed() {
     for (aim, reason) in [(Aim::Perhaps, Reason::Unsure), (Aim::Search, Reason::Search)] {
-        let (mut governor, _) = at_speed(0.8, 0.8);
+        let (mut limiter, _) = at_speed(0.8, 0.8);
         let unsure = |frame| Wish { aim, ..wish(frame, 0.8, 0.8) };
-        let command = governor.govern(&unsure(40), free);
+        let command = limiter.limit(&unsure(40), free);
         assert_eq!(command.reason, reason);
         assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
         let slow = Wish { wheels: WheelSpeeds { left: 0.3, right: 0.3 }, ..unsure(41) };
-        assert_eq!(governor.govern(&slow, free).reason, Reason::Limited);
+        assert_eq!(limiter.limit(&slow, free).reason, Reason::Limited);
         let slow = Wish { stamp: Stamp::from_nanos(4_300_000_000), ..slow };
-        assert_eq!(governor.govern(&slow, free).reason, reason);
+        assert_eq!(limiter.limit(&slow, free).reason, reason);
     }
 }
 
 #[test]
 fn an_obstacle_slows_and_then_stops() {
     let speed = |at_m| {
-        let (mut governor, _) = at_speed(0.8, 0.8);
-        governor.govern(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Something(at_m)))
+        let (mut limiter, _) = at_speed(0.8, 0.8);
+        limiter.limit(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Something(at_m)))
     };
     assert_eq!(speed(2.5).reason, Reason::Follow);
     let near = speed(0.6);
@@ -116,16 +121,16 @@ fn an_obstacle_slows_and_then_stops() {
 
 #[test]
 fn before_an_obstacle_the_robot_may_still_turn_in_place() {
-    let mut governor = governor();
-    let command = governor.govern(&wish(1, 0.1, 0.3), |_, _| Some(Ahead::Something(0.1)));
+    let mut limiter = limiter();
+    let command = limiter.limit(&wish(1, 0.1, 0.3), |_, _| Some(Ahead::Something(0.1)));
     assert_eq!(command.reason, Reason::Blocked);
     assert!(command.wheels.left < 0.0 && command.wheels.left == -command.wheels.right);
 }
 
 #[test]
 fn a_blind_camera_stops() {
-    let (mut governor, _) = at_speed(0.8, 0.8);
-    let command = governor.govern(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Blind));
+    let (mut limiter, _) = at_speed(0.8, 0.8);
+    let command = limiter.limit(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Blind));
     assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Blind));
 }
 
@@ -133,9 +138,10 @@ fn a_blind_camera_stops() {
 fn backwards_only_where_it_is_allowed() {
     let (_, command) = at_speed(-0.4, -0.2);
     assert!((command.wheels.left + command.wheels.right).abs() < 1e-9, "{command:?}");
-    let settings = GovernorSettings { reverse: true, ..GovernorSettings::default() };
-    let mut governor = Governor::new(settings, DRIVE, MAX_MPS);
-    let back = (1..40).map(|frame| governor.govern(&wish(frame, -0.4, -0.2), free)).last();
+    let settings = CommandLimiterSettings { reverse: true, ..CommandLimiterSettings::default() };
+    let mut limiter =
+        CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS);
+    let back = (1..40).map(|frame| limiter.limit(&wish(frame, -0.4, -0.2), free)).last();
     assert!((back.unwrap().wheels.left + 0.4).abs() < 1e-9);
 }
 
@@ -146,27 +152,27 @@ fn commands_expire() {
     assert_eq!(later(0.2), command);
     assert_eq!((later(0.3).wheels, later(0.3).reason), (WheelSpeeds::STOP, Reason::Expired));
     assert_eq!((later(-0.2), later(-0.3).reason), (command, Reason::Expired));
-    let nothing_yet = governor().orders().at(Stamp::from_nanos(5));
+    let nothing_yet = limiter().orders().at(Stamp::from_nanos(5));
     assert_eq!(nothing_yet.wheels, WheelSpeeds::STOP);
 }
 
 #[test]
 fn a_jump_of_odometry_lasts_until_armed() {
-    let (mut governor, command) = at_speed(0.5, 0.5);
-    governor.check_odometry(&Motion { forward: 2.0, ..Motion::at_rest(0.1) });
-    assert_eq!(governor.orders().at(command.stamp).reason, Reason::Fault);
+    let (mut limiter, command) = at_speed(0.5, 0.5);
+    limiter.check_odometry(&EgoMotion { forward: 2.0, ..EgoMotion::at_rest(0.1) });
+    assert_eq!(limiter.orders().at(command.stamp).reason, Reason::Fault);
     for frame in 40..60 {
-        let command = governor.govern(&wish(frame, 0.5, 0.5), free);
+        let command = limiter.limit(&wish(frame, 0.5, 0.5), free);
         assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
     }
-    assert_eq!(governor.fault(), Some("odometry jumped"));
-    governor.arm();
-    assert!(governor.govern(&wish(60, 0.5, 0.5), free).wheels.left > 0.0);
+    assert_eq!(limiter.fault(), Some("odometry jumped"));
+    limiter.arm();
+    assert!(limiter.limit(&wish(60, 0.5, 0.5), free).wheels.left > 0.0);
 }
 
 #[test]
 fn stopping_takes_what_physics_says() {
-    let settings = GovernorSettings { margin_m: 0.0, ..GovernorSettings::default() };
+    let settings = CommandLimiterSettings { margin_m: 0.0, ..CommandLimiterSettings::default() };
     assert!((settings.stopping_m(0.9) - 0.855).abs() < 1e-9);
 }
 
@@ -185,9 +191,9 @@ fn who_turns_too_fast_turns_slower_on_the_same_arc() {
 
 #[test]
 fn while_it_speeds_up_the_robot_is_on_the_arc_that_was_wished_for() {
-    let mut governor = governor();
+    let mut limiter = limiter();
     for frame in 1..6 {
-        let command = governor.govern(&wish(frame, 0.4, 0.8), free);
+        let command = limiter.limit(&wish(frame, 0.4, 0.8), free);
         let WheelSpeeds { left, right } = command.wheels;
         assert!((right / left - 2.0).abs() < 1e-9, "{command:?}");
         assert_eq!(command.reason, Reason::Limited);
@@ -197,25 +203,26 @@ fn while_it_speeds_up_the_robot_is_on_the_arc_that_was_wished_for() {
 #[test]
 fn what_is_ahead_is_looked_for_on_the_arc_and_only_if_the_robot_drives_ahead() {
     let mut asked = None;
-    governor().govern(&wish(1, 0.3, 0.4), |corridor, curvature| {
+    limiter().limit(&wish(1, 0.3, 0.4), |corridor, curvature| {
         asked = Some((corridor.clone(), curvature));
         None
     });
     let (corridor, curvature) = asked.unwrap();
-    assert_eq!(corridor, CorridorSettings::default());
+    assert_eq!(corridor, CollisionMonitorSettings::default());
     assert!((curvature - 0.05 / DRIVE.half_separation_m / 0.35).abs() < 1e-9, "{curvature}");
-    let nobody_asks = |_: &CorridorSettings, _: f64| -> Option<Ahead> { panic!("asked") };
-    governor().govern(&wish(1, -0.2, 0.2), nobody_asks);
-    let settings = GovernorSettings { reverse: true, ..GovernorSettings::default() };
-    Governor::new(settings, DRIVE, MAX_MPS).govern(&wish(1, -0.2, -0.2), nobody_asks);
+    let nobody_asks = |_: &CollisionMonitorSettings, _: f64| -> Option<Ahead> { panic!("asked") };
+    limiter().limit(&wish(1, -0.2, 0.2), nobody_asks);
+    let settings = CommandLimiterSettings { reverse: true, ..CommandLimiterSettings::default() };
+    CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS)
+        .limit(&wish(1, -0.2, -0.2), nobody_asks);
 }
 
 #[test]
 fn of_several_limits_the_lowest_holds_and_is_named() {
     let command = |aim, pause_s, at_m| {
-        let (mut governor, _) = at_speed(0.8, 0.8);
+        let (mut limiter, _) = at_speed(0.8, 0.8);
         let wish = Wish { aim, pause_s, ..wish(40, 0.8, 0.8) };
-        let command = governor.govern(&wish, |_, _| Some(Ahead::Something(at_m)));
+        let command = limiter.limit(&wish, |_, _| Some(Ahead::Something(at_m)));
         (command.reason, (command.wheels.left * 100.0).round())
     };
     assert_eq!(command(Aim::Perhaps, 0.1, 2.0), (Reason::Unsure, 45.0));
@@ -228,17 +235,18 @@ fn of_several_limits_the_lowest_holds_and_is_named() {
 
 #[test]
 fn a_pause_gives_no_licence_for_a_leap() {
-    let (mut governor, _) = at_speed(0.1, 0.1);
+    let (mut limiter, _) = at_speed(0.1, 0.1);
     let late = Wish { stamp: Stamp::from_nanos(4_900_000_000), ..wish(0, 0.9, 0.9) };
-    let command = governor.govern(&late, free);
+    let command = limiter.limit(&late, free);
     assert!((command.wheels.left - (0.1 + 0.5 * LONGEST_STEP_S)).abs() < 1e-9, "{command:?}");
 }
 
 #[test]
 fn backwards_it_speeds_up_and_slows_down_as_it_does_ahead() {
-    let settings = GovernorSettings { reverse: true, ..GovernorSettings::default() };
-    let mut governor = Governor::new(settings, DRIVE, MAX_MPS);
-    let mut speed = |frame, wished| governor.govern(&wish(frame, wished, wished), free).wheels.left;
+    let settings = CommandLimiterSettings { reverse: true, ..CommandLimiterSettings::default() };
+    let mut limiter =
+        CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS);
+    let mut speed = |frame, wished| limiter.limit(&wish(frame, wished, wished), free).wheels.left;
     let faster: Vec<f64> = (1..4).map(|frame| speed(frame, -0.9)).collect();
     for (found, expected) in faster.iter().zip([-0.1, -0.15, -0.2]) {
         assert!((found - expected).abs() < 1e-9, "{faster:?}");
@@ -257,9 +265,9 @@ fn commands_say_until_when_they_hold_and_what_they_answer_to() {
 #[test]
 fn odometry_may_be_as_fast_as_the_setting_says_in_all_directions() {
     let is_fault = |forward: f64, left: f64, dt: f64| {
-        let mut governor = governor();
-        governor.check_odometry(&Motion { forward, left, ..Motion::at_rest(dt) });
-        governor.fault().is_some()
+        let mut limiter = limiter();
+        limiter.check_odometry(&EgoMotion { forward, left, ..EgoMotion::at_rest(dt) });
+        limiter.fault().is_some()
     };
     assert!(!is_fault(0.29, 0.0, 0.1) && is_fault(0.31, 0.0, 0.1), "3 m/s");
     assert!(!is_fault(0.0, -0.29, 0.1) && is_fault(0.0, -0.31, 0.1) && is_fault(-0.31, 0.0, 0.1));
@@ -269,32 +277,32 @@ fn odometry_may_be_as_fast_as_the_setting_says_in_all_directions() {
 
 #[test]
 fn the_first_fault_is_told_and_after_it_the_robot_starts_anew() {
-    let (mut governor, _) = at_speed(0.8, 0.8);
-    governor.latch("a button");
-    governor.latch("odometry jumped");
-    assert_eq!(governor.fault(), Some("a button"));
-    governor.arm();
-    assert_eq!((governor.fault(), governor.orders().last), (None, None));
-    let command = governor.govern(&wish(41, 0.8, 0.8), free);
+    let (mut limiter, _) = at_speed(0.8, 0.8);
+    limiter.latch("a button");
+    limiter.latch("odometry jumped");
+    assert_eq!(limiter.fault(), Some("a button"));
+    limiter.arm();
+    assert_eq!((limiter.fault(), limiter.orders().last), (None, None));
+    let command = limiter.limit(&wish(41, 0.8, 0.8), free);
     assert!((command.wheels.left - 0.5 * LONGEST_STEP_S).abs() < 1e-9, "{command:?}");
 }
 
 #[test]
 fn a_wish_of_either_wheel_that_is_no_number_stops() {
     for (left, right) in [(0.1, f64::NAN), (f64::INFINITY, 0.1), (0.1, f64::NEG_INFINITY)] {
-        let (mut governor, _) = at_speed(0.5, 0.5);
-        let command = governor.govern(&wish(40, left, right), free);
+        let (mut limiter, _) = at_speed(0.5, 0.5);
+        let command = limiter.limit(&wish(40, left, right), free);
         assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::NotFinite));
     }
 }
 
 #[test]
 fn stopping_takes_reaction_braking_and_a_margin() {
-    let settings = GovernorSettings {
+    let settings = CommandLimiterSettings {
         reaction_s: 0.4,
         max_decel_mps2: 2.0,
         margin_m: 0.25,
-        ..GovernorSettings::default()
+        ..CommandLimiterSettings::default()
     };
     assert!((settings.stopping_m(2.0) - (0.8 + 1.0 + 0.25)).abs() < 1e-12);
 }
@@ -342,12 +350,12 @@ proptest! {
     fn commands_are_finite_limited_and_gentle(
         wishes in prop::collection::vec(any_wish(), 50)
     ) {
-        let mut governor = governor();
+        let mut limiter = limiter();
         let mut before = 0.0_f64;
         for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
             let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
             let wish = Wish { stamp, ..wish };
-            let command = governor.govern(&wish, |_, _| ahead);
+            let command = limiter.limit(&wish, |_, _| ahead);
             let WheelSpeeds { left, right } = command.wheels;
             prop_assert!(left.abs() <= MAX_MPS && right.abs() <= MAX_MPS, "{command:?}");
             if !command.reason.moves() && command.reason != Reason::Blocked {
@@ -364,10 +372,10 @@ proptest! {
 
     #[test]
     fn a_mirrored_wish_gives_mirrored_wheels(wishes in prop::collection::vec((any_number(), any_number()), 20)) {
-        let (mut one, mut other) = (governor(), governor());
+        let (mut one, mut other) = (limiter(), limiter());
         for (frame, (left, right)) in wishes.into_iter().enumerate() {
-            let a = one.govern(&wish(frame as u64, left, right), free).wheels;
-            let b = other.govern(&wish(frame as u64, right, left), free).wheels;
+            let a = one.limit(&wish(frame as u64, left, right), free).wheels;
+            let b = other.limit(&wish(frame as u64, right, left), free).wheels;
             prop_assert_eq!(a.left, b.right);
             prop_assert_eq!(a.right, b.left);
         }

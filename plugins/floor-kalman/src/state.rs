@@ -5,7 +5,7 @@ use crate::{Config, Form};
 /// What is believed of a person, in the room. The forms without velocity use
 /// the position's part of mean and covariance only.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Belief {
+pub(crate) struct State {
     /// (x, y, vx, vy): m, m/s.
     pub(crate) mean: Vector4<f64>,
     /// Its covariance.
@@ -24,7 +24,7 @@ struct Before {
     cross: Matrix2<f64>,
 }
 
-impl Belief {
+impl State {
     /// After the first sighting at `position` with covariance `r`.
     pub(crate) fn new(
         position: Vector2<f64>,

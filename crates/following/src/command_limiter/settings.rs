@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// and users of mobile robots work with; this is no safety function in the sense of the standards.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct GovernorSettings {
+pub struct CommandLimiterSettings {
     /// Largest acceleration, m/s².
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_mps2: f64,
@@ -36,11 +36,9 @@ pub struct GovernorSettings {
     /// again.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_odometry_mps: f64,
-    /// Corridor in which obstacles are looked for.
-    pub corridor: CorridorSettings,
 }
 
-impl Default for GovernorSettings {
+impl Default for CommandLimiterSettings {
     fn default() -> Self {
         Self {
             max_accel_mps2: 0.5,
@@ -53,12 +51,11 @@ impl Default for GovernorSettings {
             slow_after_s: 0.25,
             stop_after_s: 0.5,
             max_odometry_mps: 3.0,
-            corridor: CorridorSettings::default(),
         }
     }
 }
 
-impl GovernorSettings {
+impl CommandLimiterSettings {
     /// Returns the distance in which a robot of this speed stops, m: reaction, braking and margin.
     pub fn stopping_m(&self, speed_mps: f64) -> f64 {
         let braking = speed_mps * speed_mps / (2.0 * self.max_decel_mps2);
@@ -69,7 +66,7 @@ impl GovernorSettings {
 /// Corridor before the robot in which a point counts as an obstacle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct CorridorSettings {
+pub struct CollisionMonitorSettings {
     /// Half the width of the area that the robot sweeps, m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub half_width_m: f64,
@@ -107,7 +104,7 @@ pub struct CorridorSettings {
     pub memory_s: f64,
 }
 
-impl Default for CorridorSettings {
+impl Default for CollisionMonitorSettings {
     fn default() -> Self {
         Self {
             half_width_m: 0.34,
@@ -125,7 +122,7 @@ impl Default for CorridorSettings {
     }
 }
 
-impl CorridorSettings {
+impl CollisionMonitorSettings {
     /// Returns the number of image points that one ray of a laser scanner counts for: two rays make
     /// an obstacle, one may be dust.
     pub(super) fn ray_points(&self) -> u32 {

@@ -1,6 +1,6 @@
 use nalgebra::{Point2, Point3};
 
-use super::CorridorSettings;
+use super::CollisionMonitorSettings;
 
 /// Resolution of obstacle distances, m.
 const BIN_M: f64 = 0.05;
@@ -35,7 +35,7 @@ pub(super) struct Sign {
 /// Returns the nearest obstacle in the corridor that the robot sweeps on an arc of this curvature,
 /// 1/m, positive to the left; signs around `target` belong to the followed person.
 pub(super) fn ahead(
-    settings: &CorridorSettings,
+    settings: &CollisionMonitorSettings,
     signs: impl Iterator<Item = Sign>,
     curvature: f64,
     target: Option<Point2<f64>>,
@@ -51,14 +51,14 @@ pub(super) fn ahead(
 
 /// Returns true for a point of an obstacle: above the floor, and low enough for the robot to hit
 /// it.
-pub(super) fn is_thing(settings: &CorridorSettings, point: &Point3<f64>) -> bool {
+pub(super) fn is_thing(settings: &CollisionMonitorSettings, point: &Point3<f64>) -> bool {
     // Depth noise and errors of the mount's pitch lift far floor points.
     let floor = settings.floor_m + FLOOR_SLOPE * point.xy().coords.norm();
     floor < point.z && point.z < settings.top_m
 }
 
 /// Returns the first bin up to which enough points lie.
-fn nearest(settings: &CorridorSettings, bins: &[u32]) -> Ahead {
+fn nearest(settings: &CollisionMonitorSettings, bins: &[u32]) -> Ahead {
     let mut points = 0_u32;
     // Points accumulate over the bins: few of them per bin may still be one slanted obstacle.
     let first = bins.iter().position(|bin| {
@@ -70,7 +70,7 @@ fn nearest(settings: &CorridorSettings, bins: &[u32]) -> Ahead {
 
 /// Returns the distance from the front along the path, m, of a point that the robot would hit.
 fn in_the_way(
-    settings: &CorridorSettings,
+    settings: &CollisionMonitorSettings,
     sign: &Sign,
     curvature: f64,
     target: Option<Point2<f64>>,
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn floor_target_and_what_is_aside_or_overhead_are_not_in_the_way() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         let way = |x: f64, y: f64, z: f64, target: Option<Point2<f64>>| {
             let (point, at) = (Point3::new(x, y, z), Point2::new(x, y));
             let sign = Sign { at, points: 1, steps_in_m: 0.0 };
@@ -142,14 +142,15 @@ mod tests {
 
     #[test]
     fn single_points_are_noise() {
-        let settings = CorridorSettings { min_points: 3, ..CorridorSettings::default() };
+        let settings =
+            CollisionMonitorSettings { min_points: 3, ..CollisionMonitorSettings::default() };
         assert_eq!(nearest(&settings, &[0, 1, 0, 1]), Ahead::Free);
         assert_eq!(nearest(&settings, &[0, 1, 0, 2]), Ahead::Something(3.0 * BIN_M));
     }
 
     #[test]
     fn the_floor_grows_rougher_with_the_distance_and_hanging_lamps_are_passed_below() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         let is = |x: f64, z: f64| is_thing(&settings, &Point3::new(x, 0.0, z));
         assert!(!is(0.0, 0.07) && is(0.0, 0.09), "8 cm");
         assert!(!is(2.0, 0.13) && is(2.0, 0.15) && is(-2.0, 0.15), "and 3 cm a metre");
@@ -158,7 +159,7 @@ mod tests {
 
     #[test]
     fn what_is_beside_the_front_is_reached_at_once_and_what_is_behind_never() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         let at = |x: f64, y: f64, steps_in_m: f64| {
             let sign = Sign { at: Point2::new(x, y), points: 1, steps_in_m };
             in_the_way(&settings, &sign, 0.0, None)
@@ -171,7 +172,7 @@ mod tests {
 
     #[test]
     fn what_is_near_the_person_is_the_person() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         let at = |x: f64| {
             let sign = Sign { at: Point2::new(x, 0.0), points: 1, steps_in_m: 0.0 };
             in_the_way(&settings, &sign, 0.0, Some(Point2::new(2.0, 0.0))).is_some()
@@ -181,7 +182,7 @@ mod tests {
 
     #[test]
     fn the_nearest_place_with_enough_points_before_it_is_told() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         let seen = |signs: &[(f64, u32)]| {
             let at = |(x, points): &(f64, u32)| Sign {
                 at: Point2::new(*x, 0.0),
@@ -200,7 +201,8 @@ mod tests {
     #[test]
     fn two_rays_are_something_and_one_may_be_dust() {
         for (min_points, rays) in [(6, 3), (5, 3), (1, 1)] {
-            let settings = CorridorSettings { min_points, ..CorridorSettings::default() };
+            let settings =
+                CollisionMonitorSettings { min_points, ..CollisionMonitorSettings::default() };
             assert_eq!(settings.ray_points(), rays);
         }
     }

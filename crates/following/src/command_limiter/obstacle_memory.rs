@@ -1,9 +1,9 @@
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{DepthImage, Motion, Person, Track, TrackId};
+use tagalong_core::{DepthImage, EgoMotion, Person, Track, TrackId};
 use tagalong_geometry::Camera;
 
-use super::CorridorSettings;
-use super::corridor::{Ahead, Sign, ahead, is_thing};
+use super::CollisionMonitorSettings;
+use super::collision_monitor::{Ahead, Sign, ahead, is_thing};
 
 /// Sampled columns of the image.
 const COLUMNS: usize = 160;
@@ -36,7 +36,7 @@ const HIDES_M: f64 = 0.4;
 /// Memory of the obstacles around the robot: those in the depth image, and those seen lately that
 /// are now beside the robot, below the image, too near for the camera, or hidden.
 #[derive(Default)]
-pub(crate) struct Surroundings {
+pub(crate) struct ObstacleMemory {
     seen: Vec<Point3<f64>>,
     /// Hits of the laser scanner; `None` without one.
     felt: Option<Vec<Point2<f64>>>,
@@ -44,7 +44,7 @@ pub(crate) struct Surroundings {
     with_depth: Option<f64>,
     /// Sampled columns of the image.
     columns: Vec<Column>,
-    things: Vec<Thing>,
+    things: Vec<Obstacle>,
     grid: Grid,
 }
 
@@ -65,7 +65,7 @@ struct Column {
 }
 
 /// Static obstacle.
-struct Thing {
+struct Obstacle {
     /// Position in the robot frame, m.
     at: Point2<f64>,
     /// Heights at which it was seen above that.
@@ -79,28 +79,32 @@ struct Thing {
     who: Option<TrackId>,
 }
 
-impl Surroundings {
+impl ObstacleMemory {
     /// Takes in an image; the robot moved by `motion` since the last one. Points near the followed
     /// person are not remembered, nor are moving ones.
-    pub(crate) fn look(
+    pub(crate) fn update(
         &mut self,
-        settings: &CorridorSettings,
+        settings: &CollisionMonitorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
-        motion: &Motion,
+        motion: &EgoMotion,
         target: Option<&Person>,
     ) {
-        self.see(settings, camera, depth, motion.dt);
+        self.add_depth(settings, camera, depth, motion.dt);
         // The order matters: old obstacles are matched with the new points before the rest of these
         // become new obstacles.
         self.grid.count(settings, &self.seen);
-        self.meet_again(settings, camera, depth, motion, target);
+        self.propagate(settings, camera, depth, motion, target);
         self.remember(settings, target);
     }
 
     /// Takes in a laser scan. It needs no memory: a scanner also sees to the sides and close to the
     /// robot.
-    pub(crate) fn feel(&mut self, settings: &CorridorSettings, laser: Option<&[Point3<f64>]>) {
+    pub(crate) fn add_scan(
+        &mut self,
+        settings: &CollisionMonitorSettings,
+        laser: Option<&[Point3<f64>]>,
+    ) {
         let heights = settings.floor_m..settings.top_m;
         self.felt = laser.map(|points| {
             let met = points.iter().filter(|point| heights.contains(&point.z)).map(Point3::xy);
@@ -110,7 +114,7 @@ impl Surroundings {
 
     /// Remembers other people where they were seen last, until the camera sees past that place or
     /// sees them elsewhere: a person in the robot's way is soon too near to be seen.
-    pub(crate) fn meet(&mut self, tracks: &[Track], followed: Option<TrackId>) {
+    pub(crate) fn add_tracks(&mut self, tracks: &[Track], followed: Option<TrackId>) {
         for track in tracks.iter().filter(|track| track.seen) {
             // An older place of the same person is outdated, also that of the target.
             self.things.retain(|thing| thing.who != Some(track.id));
@@ -120,7 +124,7 @@ impl Surroundings {
                 let who = Some(track.id);
                 // `STANDS_S` at once: the tracker vouches for a person, so no second of standing is
                 // needed.
-                self.things.push(Thing { at, heights, seen_s: STANDS_S, unseen_s: 0.0, who });
+                self.things.push(Obstacle { at, heights, seen_s: STANDS_S, unseen_s: 0.0, who });
             }
         }
     }
@@ -133,7 +137,7 @@ impl Surroundings {
     /// Returns the nearest obstacle on an arc, as [`ahead`]; `None` with neither depth nor laser.
     pub(crate) fn ahead(
         &self,
-        settings: &CorridorSettings,
+        settings: &CollisionMonitorSettings,
         curvature: f64,
         target: Option<Point2<f64>>,
     ) -> Option<Ahead> {
@@ -160,16 +164,16 @@ impl Surroundings {
 
     /// Moves the obstacles into the robot's new frame. Forgets those that the camera sees past,
     /// those that were seen too briefly, and those out of view for too long.
-    fn meet_again(
+    fn propagate(
         &mut self,
-        settings: &CorridorSettings,
+        settings: &CollisionMonitorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
-        motion: &Motion,
+        motion: &EgoMotion,
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
-        self.things.retain_mut(|Thing { at, heights, seen_s, unseen_s, .. }| {
+        self.things.retain_mut(|Obstacle { at, heights, seen_s, unseen_s, .. }| {
             *at = motion.apply_to_point(*at);
             if !is_near(settings, at) {
                 return false;
@@ -194,9 +198,9 @@ impl Surroundings {
         });
     }
 
-    fn see(
+    fn add_depth(
         &mut self,
-        settings: &CorridorSettings,
+        settings: &CollisionMonitorSettings,
         camera: &Camera,
         depth: Option<&DepthImage>,
         dt_s: f64,
@@ -233,7 +237,7 @@ impl Surroundings {
         });
     }
 
-    fn remember(&mut self, settings: &CorridorSettings, target: Option<&Person>) {
+    fn remember(&mut self, settings: &CollisionMonitorSettings, target: Option<&Person>) {
         for thing in &self.things {
             // Points of a known obstacle must not become a second one below.
             self.grid.clear_around(&thing.at);
@@ -247,7 +251,7 @@ impl Surroundings {
             if self.grid.is_full(&at) && !target.is_some_and(is_of) {
                 self.grid.clear_around(&at);
                 let heights = self.grid.heights_around(&at);
-                self.things.push(Thing { at, heights, seen_s: 0.0, unseen_s: 0.0, who: None });
+                self.things.push(Obstacle { at, heights, seen_s: 0.0, unseen_s: 0.0, who: None });
             }
         }
     }
@@ -271,7 +275,7 @@ impl Column {
 
     /// Returns true if an object nearer than the camera measures hides the column: it had readings
     /// a while ago and has none now, from the floor to the top of the image.
-    fn is_hidden(&self, settings: &CorridorSettings) -> bool {
+    fn is_hidden(&self, settings: &CollisionMonitorSettings) -> bool {
         0.0 < self.dark_s && self.dark_s <= settings.memory_s
     }
 
@@ -295,7 +299,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn count(&mut self, settings: &CorridorSettings, seen: &[Point3<f64>]) {
+    fn count(&mut self, settings: &CollisionMonitorSettings, seen: &[Point3<f64>]) {
         // One cell for the middle and one of border on each side, so that neighbours always exist.
         self.side = 2 * (reach_m(settings) / CELL_M).ceil() as usize + 3;
         self.points.clear();
@@ -367,7 +371,7 @@ fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: He
 }
 
 /// Returns true for a place close before the robot, straight ahead.
-fn is_close(settings: &CorridorSettings, at: &Point2<f64>) -> bool {
+fn is_close(settings: &CollisionMonitorSettings, at: &Point2<f64>) -> bool {
     let before_m = at.x - settings.front_m;
     at.y.abs() < settings.half_width_m && 0.0 < before_m && before_m < CLOSE_M
 }
@@ -380,11 +384,11 @@ fn may_carry(person: &Person, at: &Point2<f64>) -> bool {
     far_m(person, at) < CARRIED_M && person.velocity.norm() < STAYS_MPS
 }
 
-fn is_near(settings: &CorridorSettings, at: &Point2<f64>) -> bool {
+fn is_near(settings: &CollisionMonitorSettings, at: &Point2<f64>) -> bool {
     at.coords.norm() < reach_m(settings)
 }
 
-fn reach_m(settings: &CorridorSettings) -> f64 {
+fn reach_m(settings: &CollisionMonitorSettings) -> f64 {
     settings.range_m + settings.front_m
 }
 
@@ -423,16 +427,16 @@ mod tests {
 
     /// Waits before a box at `from_m`, then drives straight towards it, until it is `to_m` away.
     fn approach(y: f64, from_m: f64, to_m: f64, memory_s: f64, someone: bool) -> Option<Ahead> {
-        let settings = CorridorSettings { memory_s, ..CorridorSettings::default() };
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings { memory_s, ..CollisionMonitorSettings::default() };
+        let mut surroundings = ObstacleMemory::default();
         let steps = ((from_m - to_m) / 0.05).round() as usize;
         for step in (0..WAIT).map(|_| 0).chain(1..=steps) {
             let x = from_m - 0.05 * step as f64;
             let forward = if step == 0 { 0.0 } else { 0.05 };
-            let motion = Motion { forward, ..Motion::at_rest(0.1) };
+            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
             let people = someone.then(|| person(x, y, 0.0));
             let depth = with_box(x, y);
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, people.as_ref());
+            surroundings.update(&settings, &camera(), Some(&depth), &motion, people.as_ref());
         }
         surroundings.ahead(&settings, 0.0, None)
     }
@@ -451,15 +455,15 @@ mod tests {
 
     #[test]
     fn a_thing_beside_the_robot_is_in_the_way_of_a_bend() {
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
         let depth = with_box(1.0, 0.7);
-        let still = Motion::at_rest(0.1);
+        let still = EgoMotion::at_rest(0.1);
         for _ in 0..WAIT {
-            surroundings.look(&settings, &camera(), Some(&depth), &still, None);
+            surroundings.update(&settings, &camera(), Some(&depth), &still, None);
         }
-        let on = Motion { forward: 0.6, ..still };
-        surroundings.look(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, None);
+        let on = EgoMotion { forward: 0.6, ..still };
+        surroundings.update(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
         let bend = surroundings.ahead(&settings, 1.2, None);
         assert!(matches!(bend, Some(Ahead::Something(at)) if at < 0.6), "{bend:?}");
@@ -468,11 +472,11 @@ mod tests {
     #[test]
     fn people_are_not_remembered_and_what_is_gone_is_forgotten() {
         assert_eq!(approach(0.0, 1.5, 0.5, 8.0, true), Some(Ahead::Free));
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
         let mut look = |x| {
-            let (depth, still) = (with_box(x, 0.0), Motion::at_rest(0.1));
-            surroundings.look(&settings, &camera(), Some(&depth), &still, None);
+            let (depth, still) = (with_box(x, 0.0), EgoMotion::at_rest(0.1));
+            surroundings.update(&settings, &camera(), Some(&depth), &still, None);
             surroundings.ahead(&settings, 0.0, None)
         };
         assert!(is_at(look(1.5), 1.3));
@@ -483,15 +487,15 @@ mod tests {
     /// legs were seen, and they are not remembered.
     #[test]
     fn who_walks_by_is_not_remembered() {
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
         let mut seen = 0;
         for step in 0..=30 {
             let y = -1.5 + 0.1 * f64::from(step);
             let depth = if step < 15 { with_box(1.2, y) } else { with_box(9.0, 0.0) };
             let forward = if step < 15 { 0.0 } else { 0.05 };
-            let motion = Motion { forward, ..Motion::at_rest(0.1) };
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
+            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+            surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
             let ahead = surroundings.ahead(&settings, 0.0, None);
             seen += u32::from(matches!(ahead, Some(Ahead::Something(_))));
         }
@@ -502,13 +506,19 @@ mod tests {
     /// A box half a metre beside the path stands, or moves towards it.
     #[test]
     fn what_moves_has_a_wider_way_than_what_stands() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         for (step_m, is_in_the_way) in [(0.0, false), (-0.06, true)] {
-            let mut surroundings = Surroundings::default();
+            let mut surroundings = ObstacleMemory::default();
             for step in 0..=WAIT {
                 let y = 0.7 + step_m * (step as f64 - WAIT as f64);
                 let depth = with_box(1.0, y);
-                surroundings.look(&settings, &camera(), Some(&depth), &Motion::at_rest(0.1), None);
+                surroundings.update(
+                    &settings,
+                    &camera(),
+                    Some(&depth),
+                    &EgoMotion::at_rest(0.1),
+                    None,
+                );
             }
             let ahead = surroundings.ahead(&settings, 0.0, None);
             assert_eq!(is_at(ahead, 0.8), is_in_the_way, "{step_m}: {ahead:?}");
@@ -518,11 +528,11 @@ mod tests {
     /// A person steps close before the robot, and is out of the image at once.
     #[test]
     fn who_left_the_image_close_before_the_robot_is_believed_there_for_a_while() {
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
         let mut look = |x, y, forward| {
-            let motion = Motion { forward, ..Motion::at_rest(0.1) };
-            surroundings.look(&settings, &camera(), Some(&with_box(x, y)), &motion, None);
+            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+            surroundings.update(&settings, &camera(), Some(&with_box(x, y)), &motion, None);
             surroundings.ahead(&settings, 0.0, None)
         };
         look(0.75, 0.3, 0.0);
@@ -536,13 +546,13 @@ mod tests {
     /// would be below the image; a box that a person walks past is not.
     #[test]
     fn what_stands_beside_whoever_stands_may_be_carried_away() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         for (speed_mps, expected_m) in [(0.0, None), (0.6, Some(0.3))] {
-            let mut surroundings = Surroundings::default();
+            let mut surroundings = ObstacleMemory::default();
             let person = person(1.7, 0.3, speed_mps);
             let mut look = |x: f64, forward, target: Option<&Person>| {
-                let motion = Motion { forward, ..Motion::at_rest(0.1) };
-                surroundings.look(&settings, &camera(), Some(&with_box(x, 0.0)), &motion, target);
+                let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+                surroundings.update(&settings, &camera(), Some(&with_box(x, 0.0)), &motion, target);
                 surroundings.ahead(&settings, 0.0, None)
             };
             (0..WAIT).for_each(|_| _ = look(1.2, 0.0, Some(&person)));
@@ -559,7 +569,7 @@ mod tests {
     /// that the legs are gone too. A low box may still be there.
     #[test]
     fn who_stood_and_left_is_gone_down_to_the_feet() {
-        let settings = CorridorSettings::default();
+        let settings = CollisionMonitorSettings::default();
         for (top_m, is_gone) in [(1.4, true), (0.5, false)] {
             let camera = camera();
             let seen = |x: f64, stands: bool| {
@@ -569,11 +579,11 @@ mod tests {
                     if hit { x as f32 } else { 6.0 }
                 })
             };
-            let mut surroundings = Surroundings::default();
+            let mut surroundings = ObstacleMemory::default();
             let mut look = |x, forward, stands| {
-                let motion = Motion { forward, ..Motion::at_rest(0.1) };
+                let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
                 let depth = seen(x, stands);
-                surroundings.look(&settings, &camera, Some(&depth), &motion, None);
+                surroundings.update(&settings, &camera, Some(&depth), &motion, None);
                 surroundings.ahead(&settings, 0.0, None)
             };
             (0..WAIT).for_each(|_| _ = look(1.6, 0.0, true));
@@ -589,13 +599,13 @@ mod tests {
 
     #[test]
     fn whoever_stepped_before_the_robot_is_there_until_they_are_seen_elsewhere() {
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
         let mut look = |forward, seen: Option<Track>, followed| {
-            let motion = Motion { forward, ..Motion::at_rest(0.1) };
+            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
             let depth = with_box(9.0, 0.0);
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
-            surroundings.meet(seen.as_slice(), followed);
+            surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
+            surroundings.add_tracks(seen.as_slice(), followed);
             surroundings.ahead(&settings, 0.0, None)
         };
         look(0.0, Some(there(0.6, 0.1)), None);
@@ -609,15 +619,15 @@ mod tests {
     /// A person steps in from the side, nearer than the camera measures.
     #[test]
     fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
         let mut look = |dark: std::ops::Range<usize>| {
             let seen = with_box(9.0, 0.0);
             let depth = DepthImage::from_fn(80, 60, |u, v| {
                 if dark.contains(&u) { f32::NAN } else { seen.row(v)[u] }
             });
-            let motion = Motion::at_rest(0.1);
-            surroundings.look(&settings, &camera(), Some(&depth), &motion, None);
+            let motion = EgoMotion::at_rest(0.1);
+            surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
             surroundings.ahead(&settings, 0.0, None)
         };
         assert_eq!(look(0..20), Some(Ahead::Free), "a border that was always empty");
@@ -631,16 +641,16 @@ mod tests {
     /// person; one ray may be dust.
     #[test]
     fn what_a_laser_met_is_in_the_way_for_as_long_as_it_meets_it() {
-        let settings = CorridorSettings::default();
-        let still = Motion::at_rest(0.1);
+        let settings = CollisionMonitorSettings::default();
+        let still = EgoMotion::at_rest(0.1);
         let leg = [Point3::new(0.45, 0.4, 0.2), Point3::new(0.45, 0.42, 0.2)];
         let shelf = leg.map(|point| point + Vector3::z() * 1.5);
         let is_near = |ahead| matches!(ahead, Some(Ahead::Something(at)) if at < 0.6);
         for depth in [Some(with_box(9.0, 0.0)), None] {
-            let mut surroundings = Surroundings::default();
+            let mut surroundings = ObstacleMemory::default();
             let mut feel = |laser: &[Point3<f64>], curvature, target| {
-                surroundings.look(&settings, &camera(), depth.as_ref(), &still, None);
-                surroundings.feel(&settings, Some(laser));
+                surroundings.update(&settings, &camera(), depth.as_ref(), &still, None);
+                surroundings.add_scan(&settings, Some(laser));
                 surroundings.ahead(&settings, curvature, target)
             };
             assert_eq!(feel(&leg, 0.0, None), Some(Ahead::Free), "beside the way");
@@ -654,13 +664,13 @@ mod tests {
 
     #[test]
     fn without_depth_there_is_nothing_to_say_and_an_empty_image_is_blind() {
-        let settings = CorridorSettings::default();
-        let mut surroundings = Surroundings::default();
-        let still = Motion::at_rest(0.1);
-        surroundings.look(&settings, &camera(), None, &still, None);
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
+        let still = EgoMotion::at_rest(0.1);
+        surroundings.update(&settings, &camera(), None, &still, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), None);
         let empty = DepthImage::from_fn(80, 60, |_, _| f32::NAN);
-        surroundings.look(&settings, &camera(), Some(&empty), &still, None);
+        surroundings.update(&settings, &camera(), Some(&empty), &still, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Blind));
     }
 }
