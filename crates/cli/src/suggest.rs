@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use tagalong_config::nearest;
+use tagalong_log::LogFiles;
 
 use crate::outcome::Failure;
 
@@ -41,7 +42,7 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
 /// Refuses a path that cannot be a log, with a remedy.
 ///
 /// # Errors
-/// A missing file, a directory, or a bag of another format.
+/// A missing file, a directory that is not one log, or a bag of another format.
 pub fn check_log_path(path: &Path) -> Result<(), Failure> {
     let shown = path.display();
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
@@ -49,9 +50,11 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
         return Err(Failure::failed(format!("{shown}: no such file{}", log_hint(path))));
     }
     if path.is_dir() {
+        // Accepts a folder whose files are the parts of one log.
+        let Err(error) = LogFiles::of(path) else { return Ok(()) };
         let hint = match mcap_files(path).unwrap_or_default().first() {
             Some(file) => format!("give a file in it, for example {}", file.display()),
-            None => "and it contains no .mcap file".to_owned(),
+            None => format!("and {error}"),
         };
         return Err(Failure::failed(format!("{shown} is a directory; {hint}")));
     }
@@ -143,8 +146,10 @@ mod tests {
     fn a_directory_and_a_missing_log_are_answered_with_what_is_there() {
         let home = tempfile::tempdir().unwrap();
         fs::write(home.path().join("robot.mcap"), "x").unwrap();
+        assert!(check_log_path(home.path()).is_ok(), "a folder of one file is one log");
+        fs::write(home.path().join("other.mcap"), "x").unwrap();
         let failure = check_log_path(home.path()).unwrap_err();
-        assert!(failure.message.contains("robot.mcap"), "{}", failure.message);
+        assert!(failure.message.contains("other.mcap"), "{}", failure.message);
         let failure = check_log_path(&home.path().join("robto.mcap")).unwrap_err();
         assert!(failure.message.contains("did you mean"), "{}", failure.message);
         assert_eq!(failure.code, 1);

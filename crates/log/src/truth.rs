@@ -13,9 +13,9 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::log_files::{LogFiles, open_file};
 use crate::mcap_walk::Walker;
 use crate::msgs::{StringMsg, decode};
-use crate::scan::open_file;
 use crate::{Limits, LogError};
 
 /// Topic of the truth.
@@ -85,22 +85,24 @@ impl TruthFrame {
 /// A log that cannot be opened, or a message of the channel that is no [`TruthFrame`], because an
 /// incomplete truth would give wrong figures.
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
-    let mut walker = Walker::new(open_file(path)?, limits)
-        .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
-    let mut frames: Vec<TruthFrame> = Vec::new();
-    while let Some(message) = walker.next() {
-        if message.channel.topic == TRUTH_TOPIC {
-            let plain = message.channel.encoding == "json";
-            let frame = parse(message.data, plain).map_err(|why| LogError::Truth {
-                path: path.to_owned(),
-                number: frames.len() + 1,
-                why,
-            })?;
-            frames.push(frame);
+    let (mut frames, mut present) = (Vec::new(), false);
+    for part in LogFiles::of(path)?.parts() {
+        let mut walker = Walker::new(open_file(part)?, limits)
+            .map_err(|source| LogError::NotMcap { path: part.clone(), source })?;
+        while let Some(message) = walker.next() {
+            if message.channel.topic == TRUTH_TOPIC {
+                let plain = message.channel.encoding == "json";
+                let frame = parse(message.data, plain).map_err(|why| LogError::Truth {
+                    path: part.clone(),
+                    number: frames.len() + 1,
+                    why,
+                })?;
+                frames.push(frame);
+            }
         }
+        present |= walker.channels().any(|channel| channel.topic == TRUTH_TOPIC);
     }
-    let present = walker.channels().any(|channel| channel.topic == TRUTH_TOPIC);
-    frames.sort_by_key(|frame| frame.stamp_ns);
+    frames.sort_by_key(|frame: &TruthFrame| frame.stamp_ns);
     Ok(present.then_some(frames))
 }
 
