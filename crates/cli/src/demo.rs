@@ -4,15 +4,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_sim::{Scene, Simulation};
 
-use crate::args::{Format, RunArgs};
 use crate::bench::{self, BenchArgs};
-use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
-use crate::simulate::{record, threads};
-use crate::{run, signals::Signals};
+use crate::run::{self, RunArgs};
+use crate::simulate::record;
 
 const SCENE: &str = include_str!("../../../configs/scenes/demo.toml");
 

@@ -16,22 +16,19 @@
 mod args;
 mod bench;
 mod commands;
-mod config_file;
+mod contender;
 mod demo;
 mod doctor;
 mod follow;
 mod import;
 mod keys;
-mod outcome;
 mod overlay;
 mod realism;
 mod reproduce;
 mod run;
 mod sample;
 mod scoring;
-mod signals;
 mod simulate;
-mod suggest;
 mod train;
 mod trials;
 mod triangulate;
@@ -39,8 +36,8 @@ mod triangulate;
 use std::process::ExitCode;
 
 use args::{Cli, Command};
-use clap::Parser;
-use outcome::{Outcome, say};
+use clap::{CommandFactory as _, Parser};
+use tagalong_app::outcome::{Outcome, say};
 use tagalong_config::Registry;
 
 /// Runs the whole program: registers the plugins, parses the command line, dispatches the command.
@@ -75,8 +72,8 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin, format } => commands::config(registry, plugin, *format),
         Command::Schema => commands::schema(registry),
-        Command::Completions { shell } => commands::completions(*shell),
-        Command::Man { output } => commands::man(output),
+        Command::Completions { shell } => commands::completions(Cli::command(), *shell),
+        Command::Man { output } => commands::man(Cli::command(), output),
         Command::Check { config, log, format } => {
             commands::check(registry, config, log.as_deref(), *format)
         }

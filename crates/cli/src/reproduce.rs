@@ -3,16 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_reproduce::{
     DrawnScenes, Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, System, Table, system,
 };
 use tagalong_sim::Split;
-
-use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
-use crate::simulate;
 
 /// Arguments of `tagalong reproduce`.
 #[derive(Args, Debug)]
@@ -49,18 +49,6 @@ pub struct ReproduceArgs {
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
-}
-
-/// Output format of tables.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum TableFormat {
-    /// For people.
-    #[default]
-    Text,
-    /// For pages.
-    Markdown,
-    /// For programs.
-    Json,
 }
 
 /// Runs the experiments and prints their tables.
@@ -102,7 +90,7 @@ fn lab<'a>(args: &ReproduceArgs, registry: &'a Registry, progress: &'a Bar) -> L
         seeds: args.seeds,
         first_seed: args.first_seed,
         drawn: DrawnScenes::default(),
-        jobs: simulate::threads(args.jobs),
+        jobs: threads(args.jobs),
         progress,
     }
 }

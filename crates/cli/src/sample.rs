@@ -3,10 +3,11 @@
 
 use std::path::Path;
 
+use tagalong_app::threads::threads;
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Scene, Simulation};
 
-use crate::simulate::{record, threads};
+use crate::simulate::record;
 
 const SCENE: &str = include_str!("../../../configs/scenes/sample.toml");
 

@@ -1,9 +1,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use tagalong_app::format::Format;
 
 pub use super::rooms::RoomsArgs;
-use crate::args::Format;
 
 /// Arguments of `tagalong bench`.
 #[derive(Args, Debug)]

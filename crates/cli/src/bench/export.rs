@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::mot::SequenceInfo;
 use tagalong_eval::formats::trackeval;
 use tagalong_eval::{Frame, Sequence};
 
 use super::store::{Recording, Store, put};
-use crate::outcome::Failure;
 
 /// Name of the benchmark in the tree.
 const BENCHMARK: &str = "Tagalong";

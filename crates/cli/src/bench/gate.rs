@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde_json::{Map, Value};
+use tagalong_app::outcome::Failure;
 use tagalong_config::nearest;
 use tagalong_eval::Scores;
 use tagalong_report::{Benchmark, Outcome, TaskResult};
 
 use super::args::GateArgs;
-use crate::outcome::Failure;
 use crate::scoring::read_text;
 
 /// Change of a figure that is not accepted.

@@ -21,11 +21,10 @@ use args::{FolderArgs, PlanArgs, Step};
 use gate::Gate;
 use plan::Task;
 use store::Store;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_config::Registry;
 use work::Tally;
-
-use crate::args::Format;
-use crate::outcome::{Ended, Failure, Outcome, print, say};
 
 /// Runs `tagalong bench`.
 ///

@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::outcome::{Failure, say};
+use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Limits, LogError, read_truth};
 use tagalong_pipeline::Tunable;
 
 use super::args::PlanArgs;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Failure, say};
-use crate::suggest::{self, check_log_path, toml_files};
 
 /// Prefix of the inputs that are files named by a config.
 const FILE: &str = "file ";

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use tagalong_app::outcome::Failure;
 use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
 
 use super::plan::Task;
 use super::store::{Store, StoredTiming};
 use super::work::blank;
-use crate::outcome::Failure;
 
 /// Gathers the results of a plan.
 ///

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use tagalong_app::outcome::{Failure, make_room_for};
 use tagalong_eval::Sequence;
 use tagalong_report::{TaskResult, TaskTiming};
 
 use super::plan::Task;
-use crate::outcome::{Failure, make_room_for};
 
 /// Folder of a benchmark.
 #[derive(Clone, Debug)]

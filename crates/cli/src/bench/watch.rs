@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use tagalong_app::timings::Timings;
 use tagalong_core::{Funnel, Track};
 use tagalong_eval::{
     Clear, Consistency, Event, Prepared, Role, Scores, Sequence, SetDistance, Similarity, Tally,
@@ -12,7 +13,6 @@ use tagalong_pipeline::FrameReport;
 use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
 
 use super::store::Recording;
-use crate::run::timings::Timings;
 use crate::scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region};
 
 /// Confidence of the bounds on the normalised innovation squared.

@@ -5,6 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::outcome::{Failure, say};
+use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
 use tagalong_pipeline::Pipeline;
@@ -15,9 +17,7 @@ use super::pictures::Wanted;
 use super::plan::{PlannedConfig, Task, reread, version};
 use super::store::{Store, Stored, StoredTiming};
 use super::watch::Watch;
-use crate::outcome::{Failure, say};
 use crate::scoring::{Shot, Shots, TruthFile, TruthOptions};
-use crate::signals::Signals;
 
 /// Summary of the tasks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,11 +1,11 @@
+use tagalong_app::config_file::OuterSettings;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_config::{PluginInfo, Registry, commented_defaults};
 use tagalong_pipeline::PipelineSettings;
 
-use crate::config_file::OuterSettings;
 use crate::doctor::remedies;
 use crate::keys;
-use crate::outcome::{Ended, Failure, Outcome, print};
-use crate::reproduce::TableFormat;
 
 /// Name under which the keys around the plugins are printed.
 const PIPELINE: &str = "pipeline";

@@ -3,16 +3,16 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::suggest::check_log_path;
 use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{Scores, Sequence, Similarity};
 
-use crate::args::Format;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, print};
 use crate::scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
 };
-use crate::suggest::check_log_path;
 
 /// Arguments of `tagalong eval`.
 #[derive(Args, Debug)]

@@ -1,9 +1,9 @@
 use std::path::Path;
 
-use crate::args::Format;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Outcome, print};
-use crate::suggest::check_log_path;
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Outcome, print};
+use tagalong_app::suggest::check_log_path;
 
 /// Runs `tagalong inspect LOG`.
 ///

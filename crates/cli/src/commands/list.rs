@@ -1,9 +1,8 @@
 use std::fmt::Write as _;
 
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Outcome, print};
 use tagalong_config::Registry;
-
-use crate::args::Format;
-use crate::outcome::{Ended, Outcome, print};
 
 /// Runs `tagalong list`.
 ///

@@ -12,6 +12,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print};
+use tagalong_app::progress::Progress;
+use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_log::{FrameSource, Input, examine};
@@ -20,11 +25,6 @@ use tagalong_pipeline::Pipeline;
 use self::evidence::{Evidence, Samples};
 use self::finding::{Finding, Severity};
 use self::trial::Trial;
-use crate::args::Format;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, make_folder, print};
-use crate::run::progress::Progress;
-use crate::suggest::check_log_path;
 
 /// Arguments of `tagalong doctor`.
 #[derive(Args, Debug)]

@@ -1,12 +1,12 @@
 use std::path::Path;
 
 use serde::Serialize;
+use tagalong_app::signals::Signals;
 use tagalong_log::write::WriteError;
 use tagalong_pipeline::FrameReport;
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_trials::{Drawn, TrialError, Witness};
 
-use crate::signals::Signals;
 use crate::simulate::Recorder;
 
 /// Writer of a ride's log, if one is requested; it ends early at a stop signal.

@@ -12,16 +12,18 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use log::RideLog;
 use serde::Serialize;
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
-use crate::config_file::ConfigFile;
-use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
-use crate::reproduce::TableFormat;
-use crate::signals::Signals;
+use crate::contender::contender;
 use crate::simulate;
 
 /// Folder and name prefix of the default scenes.
@@ -127,7 +129,7 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
         make_folder(folder)?;
     }
     let bar = bar(jobs.len());
-    let threads = simulate::threads(args.jobs);
+    let threads = threads(args.jobs);
     let ride = |job: &Job| ride(job, args, registry, &signals);
     let results = in_order(&jobs, threads, ride, |_| bar.inc(1)).map_err(failure)?;
     bar.finish_and_clear();
@@ -167,7 +169,7 @@ fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, 
         let file = ConfigFile::read(path)?;
         let (pipeline, _) = file.pipeline(registry, None)?;
         if pipeline.has_controller() {
-            return Ok(file.contender());
+            return Ok(contender(&file));
         }
         let shown = path.display();
         Err(Failure::usage(format!("{shown} has no [controller]: it steers no robot")))

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::PathBuf;
 
+use tagalong_app::outcome::Failure;
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use super::ImportArgs;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
-use crate::outcome::Failure;
 
 /// Reads a folder of images, with one of depth if the options say so.
 ///

@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use tagalong_app::outcome::Failure;
 
 use super::ImportArgs;
 use super::folders::level;
 use super::sequence::{Calibration, EPOCH, Eye, Placed, Sequence, numbers, pictures, steady, text};
-use crate::outcome::Failure;
 
 const LAYOUT: &str =
     "the `training` or `testing` folder of KITTI tracking, and that a sequence of it";

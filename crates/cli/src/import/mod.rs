@@ -12,12 +12,12 @@ mod writer;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
+use tagalong_app::signals::Signals;
+use tagalong_app::suggest::converter;
 
 use self::sequence::Sequence;
-use crate::args::Format;
-use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
-use crate::signals::Signals;
-use crate::suggest::converter;
 
 /// Layout of the imported data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

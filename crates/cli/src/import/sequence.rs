@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
+use tagalong_app::outcome::Failure;
 use tagalong_core::Stamp;
 
 use super::ImportArgs;
-use crate::outcome::Failure;
 
 /// Start time of a sequence without a clock.
 pub const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);

@@ -5,12 +5,12 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use tagalong_app::outcome::Failure;
 use tagalong_core::Stamp;
 
 use super::ImportArgs;
 use super::folders::level;
 use super::sequence::{Calibration, Eye, Moment, Placed, Sequence, numbers, text};
-use crate::outcome::Failure;
 
 const LAYOUT: &str = "a folder of the TUM RGB-D benchmark";
 const DEPTH_UNIT_M: f64 = 1.0 / 5000.0;

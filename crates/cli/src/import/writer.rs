@@ -4,6 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::Isometry3;
+use tagalong_app::outcome::Failure;
+use tagalong_app::signals::Signals;
 use tagalong_core::Stamp;
 use tagalong_geometry::{Distortion, Pinhole};
 use tagalong_log::msgs::{
@@ -12,8 +14,6 @@ use tagalong_log::msgs::{
 use tagalong_log::write::{MessageLog, WriteError};
 
 use super::sequence::{Eye, Moment, Placed, Sequence, size};
-use crate::outcome::Failure;
-use crate::signals::Signals;
 
 const CAMERA_FRAME: &str = "camera_optical_frame";
 const RIGHT_FRAME: &str = "camera_right_optical_frame";

@@ -3,13 +3,13 @@
 //! robot.
 
 use nalgebra::Point2;
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::{Candidate, Fate};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Run, Trial, TrialError, each};
 
 use super::{Check, mean, scene, scenes};
-use crate::simulate::threads;
 
 const GROUP: &str = "failures that must show";
 const EMPTY: &str = include_str!("../../../../configs/scenes/empty-clutter.toml");

@@ -12,14 +12,14 @@ use std::fmt::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_core::{DepthImage, Frame, Funnel};
 use tagalong_sim::{CameraKind, Scene, Variant};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::{Draw, Drawn, TrialError};
-
-use crate::args::Format;
-use crate::outcome::{Ended, Failure, Outcome, print};
 
 /// Figure with its limits.
 #[derive(Clone, Debug, Serialize)]
@@ -163,7 +163,7 @@ fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn> + use<> {
 
 /// Returns the same with depth by other settings of the stage.
 fn drawn_with(scene: &Scene, settings: StereoSettings) -> impl Iterator<Item = Drawn> + use<> {
-    let mut draw = Draw::new(scene, crate::simulate::threads(None));
+    let mut draw = Draw::new(scene, threads(None));
     let is_pair = scene.camera.kind == CameraKind::Stereo;
     let mut stereo = StereoDepth::new(settings).ok().filter(|_| is_pair);
     std::iter::from_fn(move || {

@@ -1,7 +1,8 @@
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use crate::outcome::Failure;
+use tagalong_app::outcome::Failure;
+
 use crate::overlay::{Overlay, OverlayData};
 
 /// Pictures that wait to be rendered; each holds its images.

@@ -9,12 +9,11 @@ use std::fs;
 use std::path::Path;
 
 pub use shots::{Shot, Shots};
+use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::{OddLines, kitti};
 use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
 pub use truth::{RulesChoice, TruthFile, TruthOptions};
-
-use crate::outcome::Failure;
 
 /// Reports by the number of their frame, from 1.
 pub type Reports = BTreeMap<u32, Vec<Report>>;

@@ -1,10 +1,10 @@
 use std::path::Path;
 
 use nalgebra::{Isometry2, Isometry3};
+use tagalong_app::outcome::Failure;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 
 use super::Rate;
-use crate::outcome::Failure;
 
 /// Time and pose of a frame of a log.
 #[derive(Clone, Debug, PartialEq)]

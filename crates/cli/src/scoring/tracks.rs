@@ -2,11 +2,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use tagalong_app::outcome::Failure;
 use tagalong_eval::Report;
 use tagalong_eval::formats::{Timeline, kitti, metres, mot};
 
 use super::{Reports, odd_labels, read_text, without_area};
-use crate::outcome::Failure;
 
 /// Tracks as a tracker wrote them.
 #[derive(Clone, Debug, Default)]

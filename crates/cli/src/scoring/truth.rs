@@ -3,6 +3,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
+use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::mot::{self, SequenceInfo};
 use tagalong_eval::formats::{Timeline, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
@@ -10,7 +11,6 @@ use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
 
 use super::{Shots, odd_labels, read_text, region, without_area};
-use crate::outcome::Failure;
 
 /// Largest difference between the stamps of an image and its truth in a log, ns.
 const SAME_MOMENT_NS: u64 = 5_000_000;

@@ -2,12 +2,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Point2;
+use tagalong_app::outcome::{Failure, make_folder, say};
 use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Rect;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapper;
 
-use crate::outcome::{Failure, make_folder, say};
 use crate::overlay::canvas::{Canvas, Ink};
 use crate::overlay::write_png;
 

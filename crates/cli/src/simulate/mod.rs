@@ -5,19 +5,19 @@ mod record;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::thread::available_parallelism;
 
 use clap::Args;
 use indicatif::ProgressBar;
 pub use record::Recorder;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
-use crate::args::Format;
-use crate::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use crate::realism::realism;
-use crate::signals::Signals;
 
 /// Arguments of `tagalong simulate`.
 #[derive(Args, Debug)]
@@ -117,11 +117,6 @@ pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
         .map_err(|error| Failure::usage(format!("cannot read scene {shown}: {error}")))?;
     Scene::parse_with(&text, variant)
         .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))
-}
-
-/// Returns the requested number of threads, or else the number of cores.
-pub fn threads(asked: Option<u8>) -> usize {
-    asked.map_or_else(|| available_parallelism().map_or(1, usize::from), usize::from)
 }
 
 fn default_log(scene: &Path) -> PathBuf {

@@ -6,12 +6,12 @@ use std::io::Read as _;
 use std::path::Path;
 
 use flate2::read::GzDecoder;
+use tagalong_app::outcome::Failure;
 use tagalong_config::Example;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 
 use super::photos::{Take, candidate, fingerprint, frame, photos, read};
-use crate::outcome::Failure;
 
 /// Name of the trainer of cascades.
 pub const NAME: &str = "cascade";

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point2;
 use serde::Serialize;
+use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
 use tagalong_core::{Detection, Track, Verifier};
 use tagalong_eval::{CONFIDENCE, wilson};
 use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 
 use super::seen::{AnnotatedFrame, Known, Label, label};
-use crate::outcome::Failure;
 
 /// Distance on the floor within which a track is of a person, m ...
 const TRACKED_M: f64 = 0.5;

@@ -3,11 +3,10 @@
 use std::fs;
 use std::path::Path;
 
+use tagalong_app::outcome::Failure;
 use tagalong_sim::CameraKind;
 use tagalong_stereo::StereoSettings;
 use toml::{Table, Value};
-
-use crate::outcome::Failure;
 
 const RGBD: &str = include_str!("../../../../configs/depth-ekf.toml");
 const STEREO: &str = include_str!("../../../../configs/stereo-best.toml");

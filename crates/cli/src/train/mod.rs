@@ -22,6 +22,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::threads::threads;
 use tagalong_config::{ConfigError, Context, Example, Kind, Registry, Trainer};
 use tagalong_core::{Detection, DiffDrive, Frame, Verifier};
 use tagalong_pipeline::Pipeline;
@@ -35,8 +37,6 @@ use self::in_use::InUse;
 use self::photos::{fingerprint, photos};
 use self::rooms::ImageTiming;
 use self::seen::{AnnotatedFrame, Label, in_log, in_scene, label};
-use crate::outcome::{Ended, Failure, Outcome, print, say};
-use crate::simulate::threads;
 
 /// Margin below which a judgement is unsure: log-odds.
 const UNSURE: f64 = 1.0;

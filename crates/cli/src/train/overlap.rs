@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use tagalong_app::outcome::Failure;
 use tagalong_config::Example;
 use tagalong_core::{Detection, Frame, GreyImage};
 use tagalong_learn::{CALIBRATION, Use, use_of};
@@ -9,7 +10,6 @@ use tagalong_testdata::find;
 
 use super::faces;
 use super::photos::{Photo, Take, mean_cells, photos, to_unit_length};
-use crate::outcome::Failure;
 
 /// Columns and rows of a small picture.
 const SMALL: (usize, usize) = (10, 20);

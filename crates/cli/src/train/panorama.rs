@@ -2,6 +2,8 @@
 //! simulated rooms with known positions.
 
 use nalgebra::Matrix3;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::threads::threads;
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
 use tagalong_geometry::Rect;
@@ -9,8 +11,6 @@ use tagalong_sim::{Scene, Split, Truth, Variant};
 use tagalong_trials::Draw;
 
 use super::{Session, TrainArgs, write};
-use crate::outcome::{Ended, Failure, Outcome, print, say};
-use crate::simulate::threads;
 
 /// Name of the model on the command line.
 pub const NAME: &str = "omni-distance";

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
+use tagalong_app::outcome::Failure;
 use tagalong_config::Example;
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
 use super::rooms::Chance;
-use crate::outcome::Failure;
 
 /// Squares cut from a photograph without people.
 const SQUARES: usize = 2;

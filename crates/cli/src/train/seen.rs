@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Point2;
+use tagalong_app::outcome::Failure;
 use tagalong_core::{Detection, Frame, Funnel};
 use tagalong_eval::{Role, Truth};
 use tagalong_geometry::Rect;
@@ -11,7 +12,6 @@ use tagalong_sim::Scene;
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::Draw;
 
-use crate::outcome::Failure;
 use crate::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 
 /// Frame with the people in it.

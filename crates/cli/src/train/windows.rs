@@ -6,7 +6,7 @@ use std::path::Path;
 use super::card::WindowCard;
 use super::photos::{Take, photos};
 use super::{Session, faces, write};
-use crate::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
 

@@ -7,13 +7,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::Contender;
 
-use crate::args::Format;
-use crate::config_file::ConfigFile;
-use crate::outcome::{Ended, Failure, Outcome, print};
+use crate::contender::contender;
 use crate::simulate;
 
 /// Scenes on which no pipeline should be perfect.
@@ -80,7 +82,7 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     tell(table.header())?;
     for (name, scenes) in &suites {
         bar.set_message(name.clone());
-        let jobs = simulate::threads(args.jobs);
+        let jobs = threads(args.jobs);
         let results = contest::run(scenes, &contenders, registry, jobs, || bar.inc(1))
             .map_err(Failure::failed)?;
         table.add(name, &contenders, &results);
@@ -111,7 +113,7 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
         let file = ConfigFile::read(path)?;
         // Built once now, so that a mistake shows before the first trial.
         file.pipeline(registry, None)?;
-        Ok(file.contender())
+        Ok(contender(&file))
     };
     paths.iter().map(read).collect()
 }

@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use tagalong_app::format::Format;
 use tagalong_core::Stamp;
 use tagalong_triangulate::{Calibrated, Cameras, Fix, Known};
-
-use crate::args::Format;
 
 /// Camera as it was calibrated.
 #[derive(Serialize)]

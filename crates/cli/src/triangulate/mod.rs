@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nalgebra::{Point2, Point3};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::suggest::check_log_path;
 use tagalong_core::Stamp;
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::WebcamSettings;
@@ -18,9 +21,6 @@ use tagalong_triangulate::{Cameras, HatColour, Known, Sight, calibrate};
 use self::found::TriangulationResult;
 use self::seen::CameraSightings;
 use self::truth::Standing;
-use crate::args::Format;
-use crate::outcome::{Ended, Failure, Outcome, print};
-use crate::suggest::check_log_path;
 
 /// Largest difference of the stamps of one moment, s.
 const TOGETHER_S: f64 = 0.05;

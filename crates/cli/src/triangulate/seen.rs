@@ -5,6 +5,7 @@ use std::fs::File;
 use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
+use tagalong_app::outcome::Failure;
 use tagalong_core::{Stamp, planar_pose};
 use tagalong_log::Limits;
 use tagalong_log::images::{Pixels, decode_compressed, decode_raw};
@@ -12,8 +13,6 @@ use tagalong_log::mcap_walk::{Message, Walker};
 use tagalong_log::msgs::{CameraInfo, CompressedImage, Image, PoseStamped, decode};
 use tagalong_sim::WebcamSettings;
 use tagalong_triangulate::{HatColour, Sight, Station, find_hat};
-
-use crate::outcome::Failure;
 
 /// Topic of the robot's true pose in a simulated log.
 const TRUE_ROBOT_TOPIC: &str = "/truth/robot";

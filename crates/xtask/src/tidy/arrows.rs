@@ -45,9 +45,11 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
     ("conformance", &[]),
     ("catalog", &["plugins"]),
+    ("app", &["pipeline", "log"]),
     (
         "cli",
         &[
+            "app",
             "vision",
             "stereo",
             "pipeline",

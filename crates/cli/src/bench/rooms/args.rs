@@ -1,10 +1,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use tagalong_app::format::TableFormat;
 use tagalong_tuning::Objective;
 
 use crate::bench::args::FolderArgs;
-use crate::reproduce::TableFormat;
 
 /// Text of `--help` after the arguments.
 pub const HELP: &str = "\

@@ -1,11 +1,11 @@
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
 use tagalong_pipeline::{Tunable, with_values};
 use tagalong_tuning::candidates;
 
 use super::RoomsArgs;
 use crate::bench::plan::{self, Annotated, PlannedConfig, sha256};
-use crate::config_file::ConfigFile;
-use crate::outcome::Failure;
 
 /// Room with its logs.
 pub struct Location {

@@ -11,16 +11,16 @@ use std::path::Path;
 pub use args::{HELP, RoomsArgs};
 use contest::{Contestant, Location};
 use report::Report;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_tuning::Rooms;
 use work::Desk;
 
 use super::plan;
 use super::store::Store;
-use crate::outcome::{Ended, Failure, Outcome, print, say};
-use crate::reproduce::TableFormat;
 use crate::scoring::read_text;
-use crate::suggest::check_log_path;
 
 /// Runs the whole procedure and prints the tables.
 ///

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use tagalong_app::outcome::Failure;
 use tagalong_reproduce::{Cell, Row, Table};
 use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
 
 use super::RoomsArgs;
 use super::contest::{Contestant, Location};
 use super::work::{Desk, Run};
-use crate::outcome::Failure;
 
 /// Everything that the tables show.
 #[derive(Serialize)]

@@ -7,6 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
+use tagalong_app::outcome::Failure;
+use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_report::TaskResult;
 use tagalong_tuning::Figures;
@@ -15,9 +17,7 @@ use super::contest::Contestant;
 use crate::bench::plan::{self, Annotated, version};
 use crate::bench::store::Store;
 use crate::bench::work::{Lane, bar, spread};
-use crate::outcome::Failure;
 use crate::scoring::{Shot, Shots, TruthFile, TruthOptions};
-use crate::signals::Signals;
 
 /// Most pipelines side by side; a signal loses at most one pass of these per job.
 const LANES: usize = 48;

@@ -1,3 +1,5 @@
+//! Progress of a pass over a log.
+
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Steps of the bar.
@@ -6,6 +8,12 @@ const STEPS: u64 = 1000;
 /// Progress bar, visible only where stderr is a terminal.
 pub struct Progress {
     bar: ProgressBar,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Progress {

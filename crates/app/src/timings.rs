@@ -1,3 +1,5 @@
+//! Times of the stages of a pipeline.
+
 use std::collections::BTreeMap;
 
 use serde::Serialize;

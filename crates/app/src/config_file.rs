@@ -1,3 +1,5 @@
+//! Config files, with the tables that are not the pipeline's.
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +10,6 @@ use tagalong_config::{ConfigError, Registry, Settings, parse_settings};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
-use tagalong_trials::Contender;
 
 use crate::outcome::Failure;
 use crate::suggest::config_hint;
@@ -97,7 +98,7 @@ impl ConfigFile {
     }
 
     /// Returns the folder against which relative paths are resolved.
-    fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
@@ -136,12 +137,10 @@ impl ConfigFile {
             .map_err(|error| self.mistake(&error))
     }
 
-    /// Returns the config as a contender of trials.
-    pub fn contender(&self) -> Contender {
-        let folder = self.folder().to_owned();
+    /// Returns its text with those of the configs that it extends.
+    pub fn whole_text(&self) -> String {
         // A mistake shows its line when the pipeline is built from the text as it is.
-        let config = flattened(&self.text, &folder).unwrap_or_else(|_| self.text.clone());
-        Contender { folder, ..Contender::new(self.stem(), config) }
+        flattened(&self.text, self.folder()).unwrap_or_else(|_| self.text.clone())
     }
 
     /// Returns the tables that are not the pipeline's.

@@ -1,3 +1,5 @@
+//! Ends of a command: exit codes, failures, and printing.
+
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -105,6 +107,9 @@ pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
 pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
 
 /// Prints to stdout. A closed pipe is a quiet end.
+///
+/// # Errors
+/// A stdout that cannot be written: exit code 1.
 pub fn print(text: &str) -> Result<(), Failure> {
     // Flushed here, so that a full disk or a closed pipe is noticed before the exit code is chosen.
     let mut out = io::stdout().lock();

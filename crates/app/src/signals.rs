@@ -1,3 +1,5 @@
+//! Signals that ask a command to stop.
+
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
