@@ -22,7 +22,6 @@ mod doctor;
 mod follow;
 mod import;
 mod keys;
-mod overlay;
 mod realism;
 mod reproduce;
 mod run;

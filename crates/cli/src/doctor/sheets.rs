@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point2;
+use tagalong_render::canvas::{Canvas, Ink, LINE_PX};
+use tagalong_render::write_png;
 
 use super::trial::{Example, Trial};
-use crate::overlay::canvas::{Canvas, Ink, LINE_PX};
-use crate::overlay::write_png;
 
 /// Pictures beside each other.
 const COLUMNS: usize = 4;

@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use tagalong_core::{Frame, Funnel, RgbImage};
 use tagalong_geometry::Rect;
 use tagalong_pipeline::{Fate, FrameReport, Pipeline};
-
-use crate::overlay::background;
+use tagalong_render::background;
 
 /// Most pictures of one test.
 const EXAMPLES: usize = 16;

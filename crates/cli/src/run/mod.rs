@@ -26,8 +26,8 @@ use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
+use tagalong_render::{Overlay, OverlayData};
 
-use crate::overlay::{Overlay, OverlayData};
 use crate::sample;
 
 /// Runs a pipeline over a log.

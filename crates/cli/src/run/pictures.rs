@@ -2,8 +2,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use tagalong_app::outcome::Failure;
-
-use crate::overlay::{Overlay, OverlayData};
+use tagalong_render::{Overlay, OverlayData};
 
 /// Pictures that wait to be rendered; each holds its images.
 const WAITING: usize = 2;

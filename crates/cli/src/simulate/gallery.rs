@@ -5,11 +5,10 @@ use nalgebra::Point2;
 use tagalong_app::outcome::{Failure, make_folder, say};
 use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Rect;
+use tagalong_render::canvas::{Canvas, Ink};
+use tagalong_render::write_png;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapper;
-
-use crate::overlay::canvas::{Canvas, Ink};
-use crate::overlay::write_png;
 
 /// Pictures of one scene.
 const PICTURES: u64 = 6;

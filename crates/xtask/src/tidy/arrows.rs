@@ -46,9 +46,11 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("conformance", &[]),
     ("catalog", &["plugins"]),
     ("app", &["pipeline", "log"]),
+    ("render", &["pipeline"]),
     (
         "cli",
         &[
+            "render",
             "app",
             "vision",
             "stereo",
