@@ -26,7 +26,6 @@ mod realism;
 mod reproduce;
 mod run;
 mod sample;
-mod scoring;
 mod simulate;
 mod train;
 mod trials;

@@ -9,9 +9,9 @@ use tagalong_app::outcome::Failure;
 use tagalong_config::nearest;
 use tagalong_eval::Scores;
 use tagalong_report::{Benchmark, Outcome, TaskResult};
+use tagalong_scoring::read_text;
 
 use super::args::GateArgs;
-use crate::scoring::read_text;
 
 /// Change of a figure that is not accepted.
 #[derive(Clone, Debug, PartialEq)]

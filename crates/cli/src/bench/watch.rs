@@ -11,9 +11,9 @@ use tagalong_eval::{
 use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
 use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
+use tagalong_scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region};
 
 use super::store::Recording;
-use crate::scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region};
 
 /// Confidence of the bounds on the normalised innovation squared.
 const CONFIDENCE: f64 = 0.95;

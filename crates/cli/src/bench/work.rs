@@ -11,13 +11,13 @@ use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
 use tagalong_pipeline::Pipeline;
 use tagalong_report::{Outcome, TaskResult};
+use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 
 use super::args::RunArgs;
 use super::pictures::Wanted;
 use super::plan::{PlannedConfig, Task, reread, version};
 use super::store::{Store, Stored, StoredTiming};
 use super::watch::Watch;
-use crate::scoring::{Shot, Shots, TruthFile, TruthOptions};
 
 /// Summary of the tasks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

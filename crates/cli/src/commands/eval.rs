@@ -9,8 +9,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{Scores, Sequence, Similarity};
-
-use crate::scoring::{
+use tagalong_scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
 };
 

@@ -8,11 +8,10 @@ use tagalong_core::{Detection, Frame, Funnel};
 use tagalong_eval::{Role, Truth};
 use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
+use tagalong_scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 use tagalong_sim::Scene;
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::Draw;
-
-use crate::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 
 /// Frame with the people in it.
 pub struct AnnotatedFrame {

@@ -6,11 +6,11 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_app::outcome::Failure;
 use tagalong_core::Stamp;
 use tagalong_log::{InputSettings, Limits, TruthFrame, TruthPerson};
+use tagalong_scoring::{Shot, Shots};
 use tagalong_triangulate::Fix;
 
 use super::TriangulateArgs;
 use super::seen::CameraSightings;
-use crate::scoring::{Shot, Shots};
 
 /// Longest time between two places, s; in a longer one the person may have been anywhere, and
 /// counts neither as missed nor as a false alarm.

@@ -47,9 +47,11 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("catalog", &["plugins"]),
     ("app", &["pipeline", "log"]),
     ("render", &["pipeline"]),
+    ("scoring", &["app", "log", "eval"]),
     (
         "cli",
         &[
+            "scoring",
             "render",
             "app",
             "vision",

@@ -15,12 +15,12 @@ use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
+use tagalong_scoring::read_text;
 use tagalong_tuning::Rooms;
 use work::Desk;
 
 use super::plan;
 use super::store::Store;
-use crate::scoring::read_text;
 
 /// Runs the whole procedure and prints the tables.
 ///

@@ -11,13 +11,13 @@ use tagalong_app::outcome::Failure;
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_report::TaskResult;
+use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_tuning::Figures;
 
 use super::contest::Contestant;
 use crate::bench::plan::{self, Annotated, version};
 use crate::bench::store::Store;
 use crate::bench::work::{Lane, bar, spread};
-use crate::scoring::{Shot, Shots, TruthFile, TruthOptions};
 
 /// Most pipelines side by side; a signal loses at most one pass of these per job.
 const LANES: usize = 48;
