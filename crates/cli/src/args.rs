@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
+use tagalong_simulate::SimulateArgs;
 
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
@@ -12,7 +13,6 @@ use crate::follow::FollowArgs;
 use crate::import::ImportArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::run::RunArgs;
-use crate::simulate::SimulateArgs;
 use crate::train::TrainArgs;
 use crate::trials::TrialsArgs;
 use crate::triangulate::TriangulateArgs;

@@ -11,10 +11,10 @@ use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_sim::{Scene, Simulation};
+use tagalong_simulate::record;
 
 use crate::bench::{self, BenchArgs};
 use crate::run::{self, RunArgs};
-use crate::simulate::record;
 
 const SCENE: &str = include_str!("../../../configs/scenes/demo.toml");
 

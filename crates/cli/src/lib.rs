@@ -22,11 +22,8 @@ mod doctor;
 mod follow;
 mod import;
 mod keys;
-mod realism;
 mod reproduce;
 mod run;
-mod sample;
-mod simulate;
 mod train;
 mod trials;
 mod triangulate;
@@ -81,7 +78,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Import(args) => import::import(args),
         Command::Follow(args) => follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
-        Command::Simulate(args) => simulate::simulate(args, registry),
+        Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
         Command::Triangulate(args) => triangulate::triangulate(args),
         Command::Reproduce(args) => reproduce::reproduce(args, registry),
         Command::Trials(args) => trials::trials(args, registry),

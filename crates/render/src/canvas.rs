@@ -1,3 +1,5 @@
+//! Canvas with lines, boxes and text.
+
 use font8x8::legacy::BASIC_LEGACY;
 use nalgebra::Point2;
 use tagalong_core::RgbImage;

@@ -5,9 +5,8 @@ use tagalong_app::signals::Signals;
 use tagalong_log::write::WriteError;
 use tagalong_pipeline::FrameReport;
 use tagalong_sim::{Event, Scene, Simulation};
+use tagalong_simulate::Recorder;
 use tagalong_trials::{Drawn, TrialError, Witness};
-
-use crate::simulate::Recorder;
 
 /// Writer of a ride's log, if one is requested; it ends early at a stop signal.
 pub struct RideLog {

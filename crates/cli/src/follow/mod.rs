@@ -24,7 +24,6 @@ use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
 use crate::contender::contender;
-use crate::simulate;
 
 /// Folder and name prefix of the default scenes.
 const SCENES: (&str, &str) = ("configs/scenes", "follow-");
@@ -58,7 +57,7 @@ pub struct FollowArgs {
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     pub drop: Option<f64>,
     /// Replace a value in each scene: a dotted key, like `crowd=5`.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = simulate::key_and_value)]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
     pub set: Vec<(String, String)>,
     /// Rides at once; the results are the same [default: as many as there are
     /// cores].
@@ -156,7 +155,7 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
         let suite = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for contender in &contenders {
             for seed in seeds.numbers() {
-                let scene = simulate::read(&path, &variant(args, seed))?;
+                let scene = tagalong_simulate::read(&path, &variant(args, seed))?;
                 jobs.push(Job { suite: suite.clone(), scene, contender: contender.clone() });
             }
         }

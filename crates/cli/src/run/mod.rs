@@ -27,8 +27,7 @@ use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError}
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_render::{Overlay, OverlayData};
-
-use crate::sample;
+use tagalong_simulate::sample;
 
 /// Runs a pipeline over a log.
 ///

@@ -16,7 +16,6 @@ use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::Contender;
 
 use crate::contender::contender;
-use crate::simulate;
 
 /// Scenes on which no pipeline should be perfect.
 const HARD: [&str; 6] = [
@@ -44,7 +43,7 @@ pub struct TrialsArgs {
     #[arg(long, value_name = "SPLIT", default_value = "test")]
     pub split: Split,
     /// Replaces a value in each scene: a dotted key, like `crowd=5`.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = simulate::key_and_value)]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
     pub set: Vec<(String, String)>,
     /// Simulates each scene with this many seeds of the split.
     #[arg(long, value_name = "N", default_value_t = 10,
@@ -123,7 +122,7 @@ fn suite(path: &Path, args: &TrialsArgs, seeds: Seeds) -> Result<(String, Vec<Sc
     let variant =
         |seed| Variant { seed: Some(seed), split: Some(args.split), set: args.set.clone() };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let scenes = seeds.numbers().map(|seed| simulate::read(path, &variant(seed)));
+    let scenes = seeds.numbers().map(|seed| tagalong_simulate::read(path, &variant(seed)));
     Ok((name, scenes.collect::<Result<_, _>>()?))
 }
 

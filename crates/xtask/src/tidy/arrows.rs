@@ -49,8 +49,13 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("render", &["pipeline"]),
     ("scoring", &["app", "log", "eval"]),
     (
+        "simulate",
+        &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
+    ),
+    (
         "cli",
         &[
+            "simulate",
             "scoring",
             "render",
             "app",

@@ -7,7 +7,7 @@ use tagalong_app::threads::threads;
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Scene, Simulation};
 
-use crate::simulate::record;
+use crate::record;
 
 const SCENE: &str = include_str!("../../../configs/scenes/sample.toml");
 

@@ -1,7 +1,9 @@
 //! `tagalong simulate`: renders a scene to a log or to pictures.
 
 mod gallery;
+mod realism;
 mod record;
+pub mod sample;
 
 use std::fs;
 use std::path::{Path, PathBuf};
