@@ -3,12 +3,12 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
+use tagalong_doctor::DoctorArgs;
 use tagalong_simulate::SimulateArgs;
 
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
-use crate::doctor::DoctorArgs;
 use crate::follow::FollowArgs;
 use crate::import::ImportArgs;
 use crate::reproduce::ReproduceArgs;

@@ -18,7 +18,6 @@ mod bench;
 mod commands;
 mod contender;
 mod demo;
-mod doctor;
 mod follow;
 mod import;
 mod keys;
@@ -74,7 +73,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         }
         Command::Bench(args) => bench::bench(args, registry),
         Command::Demo(args) => demo::demo(args, registry),
-        Command::Doctor(args) => doctor::doctor(args, registry),
+        Command::Doctor(args) => tagalong_doctor::doctor(args, registry),
         Command::Import(args) => import::import(args),
         Command::Follow(args) => follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),

@@ -2,9 +2,9 @@ use tagalong_app::config_file::OuterSettings;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_config::{PluginInfo, Registry, commented_defaults};
+use tagalong_doctor::remedies;
 use tagalong_pipeline::PipelineSettings;
 
-use crate::doctor::remedies;
 use crate::keys;
 
 /// Name under which the keys around the plugins are printed.
@@ -34,7 +34,7 @@ const PLUGIN_SECTIONS: &str = "\
 ";
 
 /// Returns everything around the plugins, with its defaults.
-pub fn pipeline_defaults() -> String {
+fn pipeline_defaults() -> String {
     let own = commented_defaults::<PipelineSettings>();
     let outer = commented_defaults::<OuterSettings>();
     format!("{own}\n{PLUGIN_SECTIONS}{outer}")

@@ -52,9 +52,11 @@ const ARROWS: &[(&str, &[&str])] = &[
         "simulate",
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
     ),
+    ("doctor", &["app", "render", "vision", "pipeline", "log"]),
     (
         "cli",
         &[
+            "doctor",
             "simulate",
             "scoring",
             "render",
@@ -87,7 +89,8 @@ const WORDS: &[&str] = &["geometry", "core", "config"];
 const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment"];
 
 /// What the tests of any crate may lean on in addition.
-const FOR_TESTS: &[&str] = &["vision", "learn", "sim", "conformance", "testdata", "plugins"];
+const FOR_TESTS: &[&str] =
+    &["vision", "learn", "sim", "conformance", "testdata", "catalog", "plugins"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {

@@ -94,6 +94,10 @@ impl Remedy {
 mod tests {
     use std::collections::BTreeSet;
 
+    use tagalong_app::config_file::OuterSettings;
+    use tagalong_config::commented_defaults;
+    use tagalong_pipeline::PipelineSettings;
+
     use super::*;
 
     #[test]
@@ -107,7 +111,8 @@ mod tests {
             known.extend(text.lines().filter_map(bare));
         };
         registry.plugins().for_each(|plugin| keys(&plugin.defaults()));
-        keys(&crate::commands::pipeline_defaults());
+        keys(&commented_defaults::<PipelineSettings>());
+        keys(&commented_defaults::<OuterSettings>());
         for remedy in all() {
             for setting in &remedy.settings {
                 assert!(known.contains(setting), "{}: there is no `{setting}`", remedy.test);
