@@ -5,6 +5,7 @@ use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_doctor::DoctorArgs;
 use tagalong_simulate::SimulateArgs;
+use tagalong_training::TrainArgs;
 
 use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
@@ -13,7 +14,6 @@ use crate::follow::FollowArgs;
 use crate::import::ImportArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::run::RunArgs;
-use crate::train::TrainArgs;
 use crate::trials::TrialsArgs;
 use crate::triangulate::TriangulateArgs;
 

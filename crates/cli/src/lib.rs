@@ -23,7 +23,6 @@ mod import;
 mod keys;
 mod reproduce;
 mod run;
-mod train;
 mod trials;
 mod triangulate;
 
@@ -81,7 +80,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Triangulate(args) => triangulate::triangulate(args),
         Command::Reproduce(args) => reproduce::reproduce(args, registry),
         Command::Trials(args) => trials::trials(args, registry),
-        Command::Train(args) => train::train(args, registry),
+        Command::Train(args) => tagalong_training::train(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }

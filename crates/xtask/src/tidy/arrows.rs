@@ -54,8 +54,16 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
     ("doctor", &["app", "render", "vision", "pipeline", "log"]),
     (
+        "training",
+        &[
+            "app", "scoring", "vision", "stereo", "pipeline", "log", "sim", "eval", "trials",
+            "learn",
+        ],
+    ),
+    (
         "cli",
         &[
+            "training",
             "doctor",
             "simulate",
             "scoring",

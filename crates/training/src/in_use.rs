@@ -8,8 +8,8 @@ use tagalong_sim::CameraKind;
 use tagalong_stereo::StereoSettings;
 use toml::{Table, Value};
 
-const RGBD: &str = include_str!("../../../../configs/depth-ekf.toml");
-const STEREO: &str = include_str!("../../../../configs/stereo-best.toml");
+const RGBD: &str = include_str!("../../../configs/depth-ekf.toml");
+const STEREO: &str = include_str!("../../../configs/stereo-best.toml");
 /// Changes of the config for collecting candidates.
 const HARVEST: &str = include_str!("harvest.toml");
 
