@@ -3,11 +3,11 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
+use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 
-use crate::bench::BenchArgs;
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
 use crate::follow::FollowArgs;

@@ -14,7 +14,6 @@
 //! config, 3 finished but part of the log was lost, 130 and 143 after SIGINT and SIGTERM.
 
 mod args;
-mod bench;
 mod commands;
 mod contender;
 mod demo;
@@ -70,7 +69,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Check { config, log, format } => {
             commands::check(registry, config, log.as_deref(), *format)
         }
-        Command::Bench(args) => bench::bench(args, registry),
+        Command::Bench(args) => tagalong_benchmark::bench(args, registry),
         Command::Demo(args) => demo::demo(args, registry),
         Command::Doctor(args) => tagalong_doctor::doctor(args, registry),
         Command::Import(args) => import::import(args),

@@ -53,16 +53,12 @@ const ARROWS: &[(&str, &[&str])] = &[
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
     ),
     ("doctor", &["app", "render", "vision", "pipeline", "log"]),
-    (
-        "training",
-        &[
-            "app", "scoring", "vision", "stereo", "pipeline", "log", "sim", "eval", "trials",
-            "learn",
-        ],
-    ),
+    ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
+    ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
     (
         "cli",
         &[
+            "benchmark",
             "training",
             "doctor",
             "simulate",

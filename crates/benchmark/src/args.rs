@@ -11,15 +11,15 @@ pub use super::rooms::RoomsArgs;
 pub struct BenchArgs {
     /// One step; all three without one.
     #[command(subcommand)]
-    pub step: Option<Step>,
+    pub(crate) step: Option<Step>,
     #[command(flatten)]
-    pub plan: PlanArgs,
+    pub(crate) plan: PlanArgs,
     #[command(flatten)]
-    pub run: RunArgs,
+    pub(crate) run: RunArgs,
     #[command(flatten)]
-    pub report: ReportArgs,
+    pub(crate) report: ReportArgs,
     #[command(flatten)]
-    pub folder: FolderArgs,
+    pub(crate) folder: FolderArgs,
 }
 
 /// Steps of a benchmark.

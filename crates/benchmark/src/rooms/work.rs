@@ -15,9 +15,9 @@ use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_tuning::Figures;
 
 use super::contest::Contestant;
-use crate::bench::plan::{self, Annotated, version};
-use crate::bench::store::Store;
-use crate::bench::work::{Lane, bar, spread};
+use crate::plan::{self, Annotated, version};
+use crate::store::Store;
+use crate::work::{Lane, bar, spread};
 
 /// Most pipelines side by side; a signal loses at most one pass of these per job.
 const LANES: usize = 48;

@@ -5,7 +5,7 @@ use tagalong_pipeline::{Tunable, with_values};
 use tagalong_tuning::candidates;
 
 use super::RoomsArgs;
-use crate::bench::plan::{self, Annotated, PlannedConfig, sha256};
+use crate::plan::{self, Annotated, PlannedConfig, sha256};
 
 /// Room with its logs.
 pub struct Location {
