@@ -5,13 +5,13 @@ use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
+use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
 use crate::follow::FollowArgs;
-use crate::import::ImportArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::run::RunArgs;
 use crate::trials::TrialsArgs;

@@ -18,7 +18,6 @@ mod commands;
 mod contender;
 mod demo;
 mod follow;
-mod import;
 mod keys;
 mod reproduce;
 mod run;
@@ -72,7 +71,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Bench(args) => tagalong_benchmark::bench(args, registry),
         Command::Demo(args) => demo::demo(args, registry),
         Command::Doctor(args) => tagalong_doctor::doctor(args, registry),
-        Command::Import(args) => import::import(args),
+        Command::Import(args) => tagalong_import::import(args),
         Command::Follow(args) => follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),

@@ -55,9 +55,11 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("doctor", &["app", "render", "vision", "pipeline", "log"]),
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
+    ("import", &["app", "log"]),
     (
         "cli",
         &[
+            "import",
             "benchmark",
             "training",
             "doctor",
