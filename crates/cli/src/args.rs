@@ -8,6 +8,7 @@ use tagalong_doctor::DoctorArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
+use tagalong_webcams::TriangulateArgs;
 
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
@@ -15,7 +16,6 @@ use crate::follow::FollowArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::run::RunArgs;
 use crate::trials::TrialsArgs;
-use crate::triangulate::TriangulateArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.

@@ -22,7 +22,6 @@ mod keys;
 mod reproduce;
 mod run;
 mod trials;
-mod triangulate;
 
 use std::process::ExitCode;
 
@@ -75,7 +74,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Follow(args) => follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
-        Command::Triangulate(args) => triangulate::triangulate(args),
+        Command::Triangulate(args) => tagalong_webcams::triangulate(args),
         Command::Reproduce(args) => reproduce::reproduce(args, registry),
         Command::Trials(args) => trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),

@@ -56,9 +56,11 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
     ("import", &["app", "log"]),
+    ("webcams", &["app", "scoring", "log", "sim", "triangulate", "eval"]),
     (
         "cli",
         &[
+            "webcams",
             "import",
             "benchmark",
             "training",
