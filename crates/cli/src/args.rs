@@ -5,6 +5,9 @@ use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
+use tagalong_experiments::follow::FollowArgs;
+use tagalong_experiments::reproduce::ReproduceArgs;
+use tagalong_experiments::trials::TrialsArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
@@ -12,10 +15,7 @@ use tagalong_webcams::TriangulateArgs;
 
 use crate::commands::EvalArgs;
 use crate::demo::DemoArgs;
-use crate::follow::FollowArgs;
-use crate::reproduce::ReproduceArgs;
 use crate::run::RunArgs;
-use crate::trials::TrialsArgs;
 
 /// Finds people in the log of a mobile robot, keeps track of them, and follows
 /// one of them.

@@ -15,13 +15,9 @@
 
 mod args;
 mod commands;
-mod contender;
 mod demo;
-mod follow;
 mod keys;
-mod reproduce;
 mod run;
-mod trials;
 
 use std::process::ExitCode;
 
@@ -71,12 +67,12 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Demo(args) => demo::demo(args, registry),
         Command::Doctor(args) => tagalong_doctor::doctor(args, registry),
         Command::Import(args) => tagalong_import::import(args),
-        Command::Follow(args) => follow::follow(args, registry),
+        Command::Follow(args) => tagalong_experiments::follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
         Command::Triangulate(args) => tagalong_webcams::triangulate(args),
-        Command::Reproduce(args) => reproduce::reproduce(args, registry),
-        Command::Trials(args) => trials::trials(args, registry),
+        Command::Reproduce(args) => tagalong_experiments::reproduce::reproduce(args, registry),
+        Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)

@@ -6,7 +6,7 @@ use crate::metadata::{Metadata, Package};
 use crate::workspace::Workspace;
 
 /// Who may lean on whom in `crates/`, apart from dev-dependencies. The map of
-/// the house in `crates/README.md` says why.
+/// crates in `crates/README.md` says why.
 const ARROWS: &[(&str, &[&str])] = &[
     ("geometry", &[]),
     ("core", &[]),
@@ -56,33 +56,29 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
     ("import", &["app", "log"]),
-    ("webcams", &["app", "scoring", "log", "sim", "triangulate", "eval"]),
+    ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
+    (
+        "experiments",
+        &["app", "simulate", "pipeline", "log", "sim", "eval", "trials", "reproduce", "learn"],
+    ),
     (
         "cli",
         &[
-            "webcams",
-            "import",
-            "benchmark",
-            "training",
-            "doctor",
-            "simulate",
-            "scoring",
-            "render",
             "app",
-            "vision",
-            "stereo",
-            "pipeline",
-            "log",
-            "sim",
-            "eval",
-            "report",
-            "trials",
-            "reproduce",
-            "triangulate",
-            "tuning",
+            "benchmark",
             "catalog",
-            // `follow --fit`: weights of the lock, fitted to rides.
-            "learn",
+            "doctor",
+            "eval",
+            "experiments",
+            "import",
+            "log",
+            "pipeline",
+            "render",
+            "scoring",
+            "sim",
+            "simulate",
+            "training",
+            "webcams",
         ],
     ),
     ("testdata", &[]),
