@@ -12,6 +12,7 @@ use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
 
 use crate::outcome::Failure;
+use crate::serialize::to_toml;
 use crate::suggest::config_hint;
 
 /// Longest config that is read, bytes.
@@ -193,7 +194,10 @@ impl OuterSettings {
     const TABLES: [&str; 3] = ["input", "limits", "output"];
 
     /// Returns the tables as TOML, to be appended to the pipeline's resolved config.
-    pub fn resolved(&self) -> String {
-        toml::to_string(self).unwrap_or_default()
+    ///
+    /// # Errors
+    /// As for [`to_toml`].
+    pub fn resolved(&self) -> Result<String, Failure> {
+        to_toml("the tables [input], [limits] and [output]", self)
     }
 }

@@ -8,6 +8,7 @@ pub mod config_file;
 pub mod format;
 pub mod outcome;
 pub mod progress;
+pub mod serialize;
 pub mod signals;
 pub mod suggest;
 pub mod threads;

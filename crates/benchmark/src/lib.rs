@@ -23,6 +23,7 @@ use plan::Task;
 use store::Store;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::serialize::to_json_line;
 use tagalong_config::Registry;
 use work::Tally;
 
@@ -81,8 +82,8 @@ fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
 /// Writes the plan, and returns it as text.
 fn make_plan(args: &PlanArgs, folder: &FolderArgs, registry: &Registry) -> Result<String, Failure> {
     let tasks = plan::plan(args, registry)?;
-    let line = |task: &Task| serde_json::to_string(task).unwrap_or_default() + "\n";
-    let text: String = tasks.iter().map(line).collect();
+    let line = |task: &Task| to_json_line("a task of the plan", task);
+    let text: String = tasks.iter().map(line).collect::<Result<_, _>>()?;
     store(folder).put("plan.jsonl", text.as_bytes())?;
     Ok(text)
 }

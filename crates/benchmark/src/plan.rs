@@ -203,7 +203,7 @@ fn task(
 /// Returns the hash of the resolved config: comments and order do not matter, changed defaults do.
 fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result<String, Failure> {
     let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
-    let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved());
+    let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved()?);
     Ok(sha256(text.as_bytes()))
 }
 

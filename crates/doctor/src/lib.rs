@@ -16,6 +16,7 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print};
 use tagalong_app::progress::Progress;
+use tagalong_app::serialize::to_json;
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
@@ -108,7 +109,7 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     };
     print(&match args.format {
         Format::Text => print::text(&diagnosis),
-        Format::Json => serde_json::to_string_pretty(&diagnosis).unwrap_or_default() + "\n",
+        Format::Json => to_json("the diagnosis", &diagnosis)?,
     })?;
     let is_bad = diagnosis.findings.iter().any(|finding| finding.severity == Severity::Bad);
     Ok(if is_bad { Ended::WithFindings } else { Ended::Well })
@@ -152,7 +153,7 @@ fn funnel(
             sheets::write(trial, folder).map_err(Failure::failed)?
         }
     };
-    let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
+    let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
     let resolved: toml::Table = toml::from_str(&resolved).unwrap_or_default();
     let mut drops: Vec<Drop> = trial
         .funnel

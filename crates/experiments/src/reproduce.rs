@@ -7,6 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_reproduce::{
@@ -76,7 +77,7 @@ pub fn reproduce(args: &ReproduceArgs, registry: &Registry) -> Outcome {
         write(folder, &all)?;
     }
     if args.format == TableFormat::Json {
-        print(&json(&all))?;
+        print(&json(&all)?)?;
     }
     Ok(Ended::Well)
 }
@@ -101,7 +102,7 @@ fn list(format: TableFormat) -> Outcome {
             system.experiments.iter().map(|experiment| experiment.name).collect()
         };
         let all: Vec<_> = SYSTEMS.iter().map(|system| (system.name, names(system))).collect();
-        print(&(serde_json::to_string_pretty(&all).unwrap_or_default() + "\n"))?;
+        print(&to_json("the list of systems", &all)?)?;
         return Ok(Ended::Well);
     }
     for system in SYSTEMS {
@@ -137,8 +138,8 @@ fn show(tables: &[Table], format: TableFormat) -> Result<(), Failure> {
     })
 }
 
-fn json(all: &[ExperimentFindings]) -> String {
-    serde_json::to_string_pretty(all).unwrap_or_default() + "\n"
+fn json(all: &[ExperimentFindings]) -> Result<String, Failure> {
+    to_json("the tables", all)
 }
 
 fn write(folder: &Path, all: &[ExperimentFindings]) -> Result<(), Failure> {
@@ -149,7 +150,7 @@ fn write(folder: &Path, all: &[ExperimentFindings]) -> Result<(), Failure> {
     };
     let tables = all.iter().flat_map(|found| &found.findings.tables);
     let pages: Vec<String> = tables.map(Table::markdown).collect();
-    save("tables.json", &json(all))?;
+    save("tables.json", &json(all)?)?;
     save("tables.md", &pages.join("\n"))?;
     for picture in all.iter().flat_map(|found| &found.findings.pictures) {
         save(&format!("{}.svg", picture.name), &picture.svg)?;

@@ -1,8 +1,10 @@
+use std::io;
 use std::path::Path;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::Serialize;
 use tagalong_core::{DepthImage, GreyImage, RgbImage, Stamp};
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 use tagalong_log::msgs::{
@@ -50,7 +52,10 @@ impl Recorder {
     /// [`WriteError`] if the file cannot be written.
     pub fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, WriteError> {
         let mut log = MessageLog::create(path)?;
-        let text = toml::to_string(scene).unwrap_or_default();
+        let text = toml::to_string(scene).map_err(|why| WriteError::Io {
+            path: path.to_owned(),
+            source: io::Error::other(format!("the scene as TOML: {why}")),
+        })?;
         log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
         let camera = simulation.camera().clone();
         log.send(
@@ -89,8 +94,12 @@ impl Recorder {
     ///
     /// # Errors
     /// [`WriteError`] if the file cannot be written.
-    pub fn pursuit(&mut self, captured_ns: u64, json: String) -> Result<(), WriteError> {
-        self.log.send(PURSUIT_TOPIC, after(captured_ns), &StringMsg { data: json })
+    pub fn pursuit<T: Serialize>(
+        &mut self,
+        captured_ns: u64,
+        report: &T,
+    ) -> Result<(), WriteError> {
+        self.log.send_json(PURSUIT_TOPIC, after(captured_ns), report)
     }
 
     /// Completes the file.

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_toml;
 
 use super::TrainArgs;
 use super::held_out::{Effect, Share};
@@ -61,11 +63,14 @@ impl Card {
     }
 
     /// Returns the card as TOML.
-    pub fn to_text(&self) -> String {
-        let text = toml::to_string(self).unwrap_or_default();
-        format!(
+    ///
+    /// # Errors
+    /// As for [`to_toml`].
+    pub fn to_text(&self) -> Result<String, Failure> {
+        let text = to_toml("the card", self)?;
+        Ok(format!(
             "# Shares come with 95 % intervals (Wilson), too narrow for sightings, which are not independent.\n{text}"
-        )
+        ))
     }
 
     /// Returns the main figures, for a terminal.
@@ -124,8 +129,11 @@ impl WindowCard {
     }
 
     /// Returns the card as TOML.
-    pub fn to_text(&self) -> String {
-        toml::to_string(self).unwrap_or_default()
+    ///
+    /// # Errors
+    /// As for [`to_toml`].
+    pub fn to_text(&self) -> Result<String, Failure> {
+        to_toml("the card", self)
     }
 }
 

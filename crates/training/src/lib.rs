@@ -169,7 +169,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     card.held_out_logs = session.try_logs()?;
     session.bar.finish_and_clear();
     let path = session.model.with_extension("card.toml");
-    write(&path, &card.to_text())?;
+    write(&path, &card.to_text()?)?;
     print(&card.summary())?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)

@@ -37,8 +37,9 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     write(&session.model, &fitted.model)?;
     let path = session.model.with_extension("card.toml");
     let card = WindowCard::new(session.args, folders, shown, fitted.figures);
-    write(&path, &card.to_text())?;
-    print(&card.to_text())?;
+    let text = card.to_text()?;
+    write(&path, &text)?;
+    print(&text)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)
 }

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use tagalong_app::format::Format;
+use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_json;
 use tagalong_core::Stamp;
 use tagalong_triangulate::{Calibrated, Cameras, Fix, Known};
 
@@ -74,11 +76,11 @@ impl TriangulationResult {
     }
 
     /// Formats the result.
-    pub(super) fn show(&self, format: Format) -> String {
-        match format {
+    pub(super) fn show(&self, format: Format) -> Result<String, Failure> {
+        Ok(match format {
             Format::Text => self.text(),
-            Format::Json => serde_json::to_string_pretty(self).unwrap_or_default() + "\n",
-        }
+            Format::Json => to_json("the positions", self)?,
+        })
     }
 
     fn text(&self) -> String {

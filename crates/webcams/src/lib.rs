@@ -106,10 +106,10 @@ pub fn triangulate(args: &TriangulateArgs) -> Outcome {
         TriangulationResult::new(&calibrated, [&guessed, &cameras], [&used, &held], fixes.len());
     if let Some(path) = &args.truth {
         let frames = truth::frames(args, &seen, &fixes)?;
-        put(path, &truth::lines(&frames))?;
+        put(path, &truth::lines(&frames)?)?;
         found.truth_frames = Some(frames.len());
     }
-    print(&found.show(args.format))?;
+    print(&found.show(args.format)?)?;
     Ok(Ended::Well)
 }
 

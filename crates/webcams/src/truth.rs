@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_json_line;
 use tagalong_core::Stamp;
 use tagalong_log::{InputSettings, Limits, TruthFrame, TruthPerson};
 use tagalong_scoring::{Shot, Shots};
@@ -87,8 +88,8 @@ fn at(stamp: Stamp, fixes: &[(Stamp, Fix)]) -> Option<(Point2<f64>, bool)> {
 }
 
 /// Returns one line of JSON for each image.
-pub(super) fn lines(frames: &[TruthFrame]) -> String {
-    let line = |frame: &TruthFrame| String::from_utf8(frame.encode()).unwrap_or_default() + "\n";
+pub(super) fn lines(frames: &[TruthFrame]) -> Result<String, Failure> {
+    let line = |frame: &TruthFrame| to_json_line("the truth of an image", frame);
     frames.iter().map(line).collect()
 }
 

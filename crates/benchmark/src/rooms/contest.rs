@@ -95,7 +95,7 @@ impl Setting {
         let file = config.file.with_text(text);
         // `check_tuning` has accepted each value alone, so the combination is at fault.
         let Ok((pipeline, _)) = file.pipeline(registry, None) else { return Ok(None) };
-        let outer = config.outer.resolved();
+        let outer = config.outer.resolved()?;
         let files = plan::file_hashes(&file)?;
         let everything = format!("{}\n{outer}\n{files:?}", pipeline.resolved());
         let hash = sha256(everything.as_bytes());

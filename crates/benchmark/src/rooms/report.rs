@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_json;
 use tagalong_reproduce::{Cell, Row, Table};
 use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
 
@@ -103,9 +104,9 @@ impl Report {
     /// Returns everything as JSON.
     ///
     /// # Errors
-    /// None that is known.
+    /// As for [`to_json`].
     pub fn json(&self) -> Result<String, Failure> {
-        Ok(serde_json::to_string_pretty(self).map_err(Failure::failed)? + "\n")
+        to_json("the report on the rooms", self)
     }
 
     /// Returns the tables for a terminal.

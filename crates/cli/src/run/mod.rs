@@ -18,6 +18,7 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::progress::Progress;
+use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
@@ -78,7 +79,7 @@ impl Job {
         // A picture shows colour, whether or not the pipeline uses it.
         let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
-        let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
+        let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);
         Ok(Self { pipeline, outer, source, resolved, folder, report })
@@ -223,10 +224,9 @@ impl Desk {
             self.log.discard().map_err(Failure::failed)?;
             return verdict(args, &report, stopped, signals);
         }
-        let times = serde_json::to_string_pretty(&self.timings.summary()).unwrap_or_default();
-        let json = report.to_json();
-        let folder =
-            self.log.finish(about(&report), &json, &(times + "\n")).map_err(Failure::failed)?;
+        let times = to_json("timings.json", &self.timings.summary())?;
+        let json = to_json("report.json", &report)?;
+        let folder = self.log.finish(about(&report), &json, &times).map_err(Failure::failed)?;
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,

@@ -1,3 +1,5 @@
+use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_toml;
 use tagalong_learn::{Example, logistic};
 use tagalong_pipeline::{Differences, LooksSettings};
 
@@ -54,9 +56,12 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// Returns the settings as lines for a config.
-pub fn toml(looks: &LooksSettings) -> String {
-    let body = toml::to_string(looks).unwrap_or_default();
-    format!("\n# Fitted to these rides:\n[target.looks]\n{body}")
+///
+/// # Errors
+/// As for [`to_toml`].
+pub fn toml(looks: &LooksSettings) -> Result<String, Failure> {
+    let body = to_toml("the settings [target.looks]", looks)?;
+    Ok(format!("\n# Fitted to these rides:\n[target.looks]\n{body}"))
 }
 
 #[cfg(test)]
@@ -96,7 +101,7 @@ mod tests {
         let [even, weight] = found.torso;
         assert!((even - 0.25).abs() < 0.03 && (weight - 10.0).abs() < 0.5, "{found:?}");
         assert!(found.legs[1].abs() < 0.3 && found.rivals == 0.0, "{found:?}");
-        let text = toml(&found);
+        let text = toml(&found).unwrap();
         let read: toml::Table = toml::from_str(&text).unwrap();
         assert!(read["target"]["looks"]["torso"].is_array(), "{text}");
     }

@@ -67,7 +67,7 @@ impl Witness for RideLog {
 
     fn frame(&mut self, drawn: &Drawn, report: &FrameReport) {
         let at_ns = drawn.frame.stamp.nanos();
-        self.note(|recorder| recorder.pursuit(at_ns, json(report)));
+        self.note(|recorder| recorder.pursuit(at_ns, &frame_json(report)));
     }
 
     fn goes_on(&self) -> bool {
@@ -76,11 +76,11 @@ impl Witness for RideLog {
     }
 }
 
-fn json(report: &FrameReport) -> String {
+fn frame_json(report: &FrameReport) -> FrameJson {
     let command = report.command.as_ref();
     let lock = report.lock.as_ref();
     let likeness = lock.iter().flat_map(|lock| &lock.likeness);
-    let frame = FrameJson {
+    FrameJson {
         stamp_ns: report.stamp.nanos(),
         frame: report.index,
         target: report.target.map(|id| id.0),
@@ -91,6 +91,5 @@ fn json(report: &FrameReport) -> String {
         wheels_mps: command.map(|command| [command.wheels.left, command.wheels.right]),
         reason: command.map(|command| command.reason.name()),
         valid_until_ns: command.map(|command| command.valid_until.nanos()),
-    };
-    serde_json::to_string(&frame).unwrap_or_default()
+    }
 }

@@ -15,6 +15,7 @@ use serde::Serialize;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
@@ -240,7 +241,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     let tables = table::tables(results, seeds);
     let looks = args.fit.then(|| fit::looks(results));
     let findings = Findings { seeds, tables: &tables, looks: looks.as_ref(), rides: results };
-    let json = serde_json::to_string_pretty(&findings).unwrap_or_default() + "\n";
+    let json = to_json("the scores of the rides", &findings)?;
     let joined = |show: fn(&Table) -> String| -> String {
         tables.iter().map(show).collect::<Vec<_>>().join("\n")
     };
@@ -256,7 +257,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
         }
     }
     if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
-        print(&fit::toml(&looks))?;
+        print(&fit::toml(&looks)?)?;
     }
     let Some(folder) = &args.output else { return Ok(()) };
     let markdown = joined(Table::markdown);

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
@@ -90,7 +91,7 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     bar.finish_and_clear();
     tell(table.summary())?;
     if args.format == Format::Json {
-        print(&table.json())?;
+        print(&to_json("the table", &table)?)?;
     }
     Ok(Ended::Well)
 }

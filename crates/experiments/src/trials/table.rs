@@ -103,11 +103,6 @@ impl Table {
         }
     }
 
-    /// Returns the table as JSON.
-    pub fn json(&self) -> String {
-        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
-    }
-
     /// Returns the names of the columns, for a terminal.
     pub fn header(&self) -> String {
         let [first, second] = self.widths;

@@ -14,6 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_core::{DepthImage, Frame, Funnel};
@@ -106,7 +107,7 @@ pub fn realism(registry: &Registry, seeds: u64, format: Format) -> Outcome {
     bar.finish_and_clear();
     match format {
         Format::Text => print(&text(&checks))?,
-        Format::Json => print(&(serde_json::to_string_pretty(&checks).unwrap_or_default() + "\n"))?,
+        Format::Json => print(&to_json("the checks", &checks)?)?,
     }
     Ok(Ended::Well)
 }
