@@ -11,7 +11,7 @@ use super::held_out::{Effect, Share};
 
 /// Counts of the candidates of one round.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Harvest {
+pub struct CandidateCounts {
     /// Candidates with a label.
     pub seen: u64,
     /// Candidates that the model of the round before judged wrongly.
@@ -36,7 +36,7 @@ pub struct Card {
     /// Training data.
     pub trained_on: Vec<String>,
     /// Added candidates of each round.
-    pub rounds: Vec<Harvest>,
+    pub rounds: Vec<CandidateCounts>,
     /// Figures of the trainer.
     pub fit: toml::Table,
     /// Scores in held-out rooms.

@@ -11,7 +11,7 @@ use toml::{Table, Value};
 const RGBD: &str = include_str!("../../../configs/depth-ekf.toml");
 const STEREO: &str = include_str!("../../../configs/stereo-best.toml");
 /// Changes of the config for collecting candidates.
-const HARVEST: &str = include_str!("harvest.toml");
+const PROPOSING: &str = include_str!("proposing.toml");
 
 /// Config in use, without verifiers and controller.
 pub struct InUse {
@@ -72,10 +72,10 @@ impl InUse {
     /// # Errors
     /// A config without a detector.
     pub fn proposing(&self) -> Result<String, Failure> {
-        let mut harvest: Table = HARVEST.parse().map_err(Failure::failed)?;
+        let mut low: Table = PROPOSING.parse().map_err(Failure::failed)?;
         let mut config = self.config.clone();
         if !self.is_lowered {
-            harvest.remove("detector");
+            low.remove("detector");
         }
         let detector = config
             .get_mut("detectors")
@@ -84,11 +84,11 @@ impl InUse {
             .ok_or_else(|| Failure::failed("the config in use has no detector"))?;
         let settings = detector.entry("config").or_insert_with(|| Table::new().into());
         if let (Some(settings), Some(Value::Table(low))) =
-            (settings.as_table_mut(), harvest.remove("detector"))
+            (settings.as_table_mut(), low.remove("detector"))
         {
             settings.extend(low);
         }
-        config.extend(harvest);
+        config.extend(low);
         Ok(config.to_string())
     }
 }

@@ -31,7 +31,7 @@ use tagalong_sim::{CameraKind, Split};
 use toml::Spanned;
 use toml::de::DeTable;
 
-use self::card::{Card, Harvest};
+use self::card::{CandidateCounts, Card};
 use self::held_out::{Comparison, Effect, Tally};
 use self::in_use::InUse;
 use self::photos::{fingerprint, photos};
@@ -153,7 +153,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let mut card = Card::new(args, session.plan.scenes[0], session.sources());
     let mut doubter: Option<Box<dyn Verifier>> = None;
     for round in 0..=session.plan.rounds {
-        let harvest = session.harvest(round, trainer.as_mut(), doubter)?;
+        let counts = session.collect_hard_negatives(round, trainer.as_mut(), doubter)?;
         session.tell(round, "fitting");
         session.bar.set_length(1000);
         let fitted = trainer
@@ -162,7 +162,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
         // Written first: the verifier loads the model from its file.
         write(&session.model, &fitted.model)?;
         doubter = Some(session.verifier()?);
-        card.rounds.push(harvest);
+        card.rounds.push(counts);
         card.fit = fitted.figures;
     }
     card.held_out_rooms = session.try_rooms()?;
@@ -238,25 +238,25 @@ impl<'a> Session<'a> {
 
     /// Passes candidates to the trainer: all of them in the first round, after that those that the
     /// verifier judges wrongly or is unsure of.
-    fn harvest(
+    fn collect_hard_negatives(
         &self,
         round: usize,
         trainer: &mut dyn Trainer,
         mut doubter: Option<Box<dyn Verifier>>,
-    ) -> Result<Harvest, Failure> {
-        let mut harvest = Harvest::default();
+    ) -> Result<CandidateCounts, Failure> {
+        let mut counts = CandidateCounts::default();
         let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
-            harvest.seen += 1;
+            counts.seen += 1;
             if let Some(verifier) = &mut doubter {
                 let margin = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
                 let right = if example.is_person { margin } else { -margin };
-                harvest.mistakes += u64::from(right < 0.0);
+                counts.mistakes += u64::from(right < 0.0);
                 // Only mistakes and unsure cases are added: the model is right about the rest.
                 if right >= UNSURE {
                     return Ok(());
                 }
             }
-            let count = if example.is_person { &mut harvest.people } else { &mut harvest.others };
+            let count = if example.is_person { &mut counts.people } else { &mut counts.others };
             *count += 1;
             trainer.add(frame, candidate, example).map_err(Failure::failed)
         };
@@ -273,7 +273,7 @@ impl<'a> Session<'a> {
             })?;
             self.bar.inc(1);
         }
-        let Some(data) = &self.args.data else { return Ok(harvest) };
+        let Some(data) = &self.args.data else { return Ok(counts) };
         self.tell(round, "reading logs and photographs");
         // The logs do not change, so later rounds would repeat their candidates.
         if round == 0 {
@@ -292,7 +292,7 @@ impl<'a> Session<'a> {
             photo.visit(round as u64, &mut show)?;
             self.bar.inc(1);
         }
-        Ok(harvest)
+        Ok(counts)
     }
 
     /// Returns the pipeline that a verifier is trained for.
