@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use tagalong_app::format::Format;
 
+use super::folder::FolderArgs;
 pub use super::rooms::RoomsArgs;
 
 /// Arguments of `tagalong bench`.
@@ -63,14 +64,6 @@ pub enum Step {
         #[command(flatten)]
         folder: FolderArgs,
     },
-}
-
-/// Folder of a benchmark.
-#[derive(Args, Clone, Debug)]
-pub struct FolderArgs {
-    /// The folder of the benchmark: plan.jsonl, results, report.
-    #[arg(short, long, value_name = "DIR", default_value = "bench")]
-    pub output: PathBuf,
 }
 
 /// Compared pipelines and logs.

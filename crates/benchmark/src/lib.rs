@@ -7,6 +7,7 @@
 
 mod args;
 mod export;
+mod folder;
 mod gate;
 mod pictures;
 mod plan;
@@ -17,7 +18,8 @@ mod watch;
 mod work;
 
 pub use args::BenchArgs;
-use args::{FolderArgs, PlanArgs, Step};
+use args::{PlanArgs, Step};
+use folder::FolderArgs;
 use gate::Gate;
 use plan::Task;
 use store::Store;

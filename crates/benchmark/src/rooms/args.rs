@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use tagalong_app::format::TableFormat;
 use tagalong_tuning::Objective;
 
-use crate::args::FolderArgs;
+use crate::folder::FolderArgs;
 
 /// Text of `--help` after the arguments.
 pub const HELP: &str = "\
