@@ -6,7 +6,7 @@ use serde::Serialize;
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_toml;
 
-use super::TrainArgs;
+use super::args::TrainArgs;
 use super::held_out::{Effect, Share};
 
 /// Counts of the candidates of one round.

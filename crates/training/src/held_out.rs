@@ -10,6 +10,7 @@ use tagalong_core::{Detection, Track, Verifier};
 use tagalong_eval::{CONFIDENCE, wilson};
 use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 
+use super::in_use::pipeline;
 use super::seen::{AnnotatedFrame, Known, Label, label};
 
 /// Distance on the floor within which a track is of a person, m ...
@@ -106,9 +107,9 @@ impl Comparison {
         registry: &Registry,
     ) -> Result<Self, Failure> {
         Ok(Self {
-            proposer: super::pipeline(proposer, registry)?,
-            plain: super::pipeline(plain, registry)?,
-            verified: super::pipeline(verified, registry)?,
+            proposer: pipeline(proposer, registry)?,
+            plain: pipeline(plain, registry)?,
+            verified: pipeline(verified, registry)?,
             verifier,
             start_score: 0.0,
         })

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use tagalong_app::outcome::Failure;
+use tagalong_config::Registry;
+use tagalong_pipeline::Pipeline;
 use tagalong_sim::CameraKind;
 use tagalong_stereo::StereoSettings;
 use toml::{Table, Value};
@@ -91,6 +93,15 @@ impl InUse {
         config.extend(low);
         Ok(config.to_string())
     }
+}
+
+/// Builds a pipeline from the text of its config.
+///
+/// # Errors
+/// A mistake in the config: exit code 2.
+pub fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
+    let built = Pipeline::from_toml(text, Path::new("."), registry);
+    built.map(|(pipeline, _)| pipeline).map_err(Failure::usage)
 }
 
 fn without_verifiers(mut config: Table) -> Table {

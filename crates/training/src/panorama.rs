@@ -10,7 +10,8 @@ use tagalong_geometry::Rect;
 use tagalong_sim::{Scene, Split, Truth, Variant};
 use tagalong_trials::Draw;
 
-use super::{Session, TrainArgs, write};
+use super::args::TrainArgs;
+use super::session::{Session, write};
 
 /// Name of the model on the command line.
 pub const NAME: &str = "omni-distance";

@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use super::card::WindowCard;
+use super::faces;
 use super::photos::{Take, photos};
-use super::{Session, faces, write};
+use super::session::{Session, write};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};

@@ -190,6 +190,9 @@ mod tests {
         assert!(wrong("crates/geometry", "crates/core", false));
         assert!(wrong("crates/pipeline", "plugins/ekf", false));
         assert!(wrong("crates/cli", "plugins/ekf", false));
+        assert!(!wrong("crates/cli", "crates/doctor", false));
+        assert!(wrong("crates/app", "crates/doctor", false));
+        assert!(wrong("crates/doctor", "crates/training", false));
         assert!(allowed("crates/attic").is_none());
     }
 }
