@@ -68,11 +68,6 @@ fn whole() -> f64 {
 }
 
 impl TruthFrame {
-    /// Returns the message as bytes.
-    pub fn encode(&self) -> Vec<u8> {
-        serde_json::to_vec(self).unwrap_or_default()
-    }
-
     /// Returns the JSON schema of the message, for the log's schema record.
     pub fn schema() -> String {
         schemars::schema_for!(TruthFrame).to_value().to_string()
@@ -140,9 +135,8 @@ mod tests {
     fn truth_is_read_from_lines_and_a_wrong_one_is_named() {
         let path =
             std::env::temp_dir().join(format!("tagalong-lines-{}.jsonl", std::process::id()));
-        let line = |stamp_ns| {
-            String::from_utf8(TruthFrame { stamp_ns, people: Vec::new() }.encode()).unwrap()
-        };
+        let line =
+            |stamp_ns| serde_json::to_string(&TruthFrame { stamp_ns, people: Vec::new() }).unwrap();
         std::fs::write(&path, format!("{}\n\n{}\n", line(7), line(5))).unwrap();
         let stamps: Vec<u64> =
             read_truth_lines(&path).unwrap().iter().map(|frame| frame.stamp_ns).collect();
@@ -160,7 +154,8 @@ mod tests {
         let frame: TruthFrame = serde_json::from_str(text).unwrap();
         let person = &frame.people[0];
         assert_eq!((person.visible, person.ignore, person.upper_body_px), (1.0, false, None));
-        assert_eq!(serde_json::from_slice::<TruthFrame>(&frame.encode()).unwrap(), frame);
+        let text = serde_json::to_string(&frame).unwrap();
+        assert_eq!(serde_json::from_str::<TruthFrame>(&text).unwrap(), frame);
         assert!(TruthFrame::schema().contains("head_in_robot_m"));
     }
 }

@@ -6,7 +6,7 @@ use crate::metadata::{Metadata, Package};
 use crate::workspace::Workspace;
 
 /// Who may lean on whom in `crates/`, apart from dev-dependencies. The map of
-/// the house in `crates/README.md` says why.
+/// crates in `crates/README.md` says why.
 const ARROWS: &[(&str, &[&str])] = &[
     ("geometry", &[]),
     ("core", &[]),
@@ -45,23 +45,40 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
     ("conformance", &[]),
     ("catalog", &["plugins"]),
+    ("app", &["pipeline", "log"]),
+    ("render", &["pipeline"]),
+    ("scoring", &["app", "log", "eval"]),
+    (
+        "simulate",
+        &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
+    ),
+    ("doctor", &["app", "render", "vision", "pipeline", "log"]),
+    ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
+    ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
+    ("import", &["app", "log"]),
+    ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
+    (
+        "experiments",
+        &["app", "simulate", "pipeline", "log", "sim", "eval", "trials", "reproduce", "learn"],
+    ),
     (
         "cli",
         &[
-            "vision",
-            "stereo",
-            "pipeline",
-            "log",
-            "sim",
-            "eval",
-            "report",
-            "trials",
-            "reproduce",
-            "triangulate",
-            "tuning",
+            "app",
+            "benchmark",
             "catalog",
-            // `follow --fit`: weights of the lock, fitted to rides.
-            "learn",
+            "doctor",
+            "eval",
+            "experiments",
+            "import",
+            "log",
+            "pipeline",
+            "render",
+            "scoring",
+            "sim",
+            "simulate",
+            "training",
+            "webcams",
         ],
     ),
     ("testdata", &[]),
@@ -76,7 +93,8 @@ const WORDS: &[&str] = &["geometry", "core", "config"];
 const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment"];
 
 /// What the tests of any crate may lean on in addition.
-const FOR_TESTS: &[&str] = &["vision", "learn", "sim", "conformance", "testdata", "plugins"];
+const FOR_TESTS: &[&str] =
+    &["vision", "learn", "sim", "conformance", "testdata", "catalog", "plugins"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {
@@ -172,6 +190,9 @@ mod tests {
         assert!(wrong("crates/geometry", "crates/core", false));
         assert!(wrong("crates/pipeline", "plugins/ekf", false));
         assert!(wrong("crates/cli", "plugins/ekf", false));
+        assert!(!wrong("crates/cli", "crates/doctor", false));
+        assert!(wrong("crates/app", "crates/doctor", false));
+        assert!(wrong("crates/doctor", "crates/training", false));
         assert!(allowed("crates/attic").is_none());
     }
 }
