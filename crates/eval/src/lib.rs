@@ -50,11 +50,8 @@ mod missrate;
 mod pairs;
 mod position;
 mod prepare;
-mod random;
 mod scores;
 mod sets;
-mod significance;
-mod statistics;
 mod times;
 mod types;
 
@@ -71,11 +68,11 @@ pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};
 pub use scores::{Scores, Tally};
 pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
-pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
-pub use statistics::{
-    CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, percentile, wilson,
-};
 pub use times::{Following, Times};
+pub use tagalong_stats::{
+    CONFIDENCE, Gain, Interval, clustered_share, draws_interval, holm, is_significant, mean_interval,
+    paired_gain, percentile, sign_flip, wilson,
+};
 pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};
 
 /// A ratio of counts, with a denominator of at least one.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use tagalong_core::LaserScan;
 
-use crate::random::{mix, normal_at};
+use crate::random::normal_at;
 use crate::world::World;
 
 /// A laser scanner on the robot, above the point between its wheels. It looks
@@ -90,7 +90,7 @@ impl LaserSettings {
         seed: u64,
     ) -> Vec<f32> {
         let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
-        let seed = mix(seed, self.rays as u64);
+        let seed = tagalong_stats::number_at(seed, self.rays as u64);
         let range = |(ray, direction): (u64, f64)| {
             let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
             let metres = world.distance(&eye, &(world_from_robot.rotation * ahead));

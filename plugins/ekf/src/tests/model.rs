@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use tagalong_config::{Context, Registry};
 use tagalong_core::{DiffDrive, EgoMotion, PersonFilter};
 
-use super::world::{DT_S, Random, World, camera, detection};
+use super::world::{DT_S, World, camera, detection, normal3};
 use crate::filter::{motion_jacobian, state_jacobian};
 use crate::{Config, Ekf, State};
 
@@ -69,11 +69,11 @@ proptest! {
         seed in any::<u64>(), sigma in 1e-4..1.0f64, motion in motions(),
     ) {
         let filter = filter(Config::default());
-        let mut random = Random(seed);
+        let mut random = tagalong_stats::SplitMix64::new(seed);
         let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         for _ in 0..30 {
             filter.predict(&mut state, &motion);
-            let seen = detection(Point3::from(random.normal3()), sigma);
+            let seen = detection(Point3::from(normal3(&mut random)), sigma);
             filter.correct(&mut state, &seen, &camera());
             prop_assert_eq!(state.covariance, state.covariance.transpose());
             prop_assert!(state.covariance.cholesky().is_some());

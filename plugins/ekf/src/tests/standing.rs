@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tagalong_core::{EgoMotion, PersonFilter};
 
-use super::world::{DT_S, World, mean, track};
+use super::world::{DT_S, World, mean, track, normal3};
 use crate::{Config, Ekf, State};
 
 const SEEDS: u64 = 40;
@@ -125,7 +125,7 @@ fn the_filter_is_consistent() {
     for seed in 100..100 + SEEDS {
         let mut world = World::new(seed);
         let mut state = filter.start(&world.look());
-        world.velocity = config.initial_velocity_variance.sqrt() * world.random.normal3().xy();
+        world.velocity = config.initial_velocity_variance.sqrt() * normal3(&mut world.random).xy();
         all.extend(track(&filter, &mut state, &mut world, 40, |world| {
             world.walk(config.acceleration_noise, config.height_noise);
             world.drive(SPEED_MPS, 0.3)
@@ -148,7 +148,7 @@ fn errors_of_the_odometry_are_accounted_for() {
             let mut state = filter.start(&world.look());
             all.extend(track(&filter, &mut state, &mut world, 40, |world| {
                 world.walk(0.5, 0.07);
-                let error = sigma.component_mul(&world.random.normal3());
+                let error = sigma.component_mul(&normal3(&mut world.random));
                 let true_motion = world.drive(SPEED_MPS, 0.1);
                 let covariance = Matrix3::from_diagonal(&sigma.component_mul(&sigma));
                 EgoMotion {
