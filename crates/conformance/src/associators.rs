@@ -44,7 +44,8 @@ fn track(id: u32, x: f64, y: f64) -> Track {
 
 /// Returns tracks and detections at random positions, some detections with low scores.
 fn crowd(random: &mut SplitMix64, tracks: u32, detections: usize) -> (Vec<Track>, Vec<Detection>) {
-    let mut place = || (2.0 + 4.0 * random.positive_uniform(), 3.0 * random.positive_uniform() - 1.5);
+    let mut place =
+        || (2.0 + 4.0 * random.positive_uniform(), 3.0 * random.positive_uniform() - 1.5);
     let places: Vec<(f64, f64)> = (0..tracks as usize + detections).map(|_| place()).collect();
     let (of_tracks, of_detections) = places.split_at(tracks as usize);
     let tracks = (1..).zip(of_tracks).map(|(id, (x, y))| track(id, *x, *y)).collect();

@@ -11,7 +11,6 @@ use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Camera;
 use tagalong_stats::{RandomSource, SplitMix64};
 
-
 /// A person standing on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figure {

@@ -12,7 +12,7 @@ use statrs::function::gamma::checked_gamma_lr;
 pub struct Consistency {
     /// Mean of the values.
     pub mean: f64,
-    /// What the mean should be: the degrees of freedom of a single value.
+    /// Expected mean: the degrees of freedom of a single value.
     pub expected: f64,
     /// Lower bound of the mean.
     pub lower: f64,

@@ -5,7 +5,7 @@ use crate::clear::Match;
 use crate::prepare::Prepared;
 use crate::types::{Sequence, distance_m};
 
-/// How far the reported places of matched people were off, in metres on the floor.
+/// Errors of the reported places of matched people, in metres on the floor.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct PositionError {
     /// Mean.

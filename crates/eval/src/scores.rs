@@ -166,8 +166,8 @@ impl Tally {
 
 /// All figures of a run under the names that the field uses, as one flat object.
 ///
-/// Rates lie between 0 and 1 (MOTA may be negative). A figure that makes no
-/// sense on the input, such as an accuracy where nobody was there, is absent.
+/// Rates lie between 0 and 1 (MOTA may be negative). A figure that makes no sense on the input,
+/// such as an accuracy without people, is absent.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Scores {
     /// Higher order tracking accuracy, mean over the thresholds.

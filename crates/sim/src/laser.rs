@@ -44,7 +44,7 @@ impl Default for LaserSettings {
 }
 
 impl LaserSettings {
-    /// What must hold, and what to say where it does not.
+    /// Returns the conditions on the settings, each with the message for a violation.
     pub(crate) fn rules(&self) -> [(bool, &'static str); 4] {
         let ranges = 0.0 <= self.min_range_m
             && self.min_range_m < self.max_range_m
@@ -81,8 +81,8 @@ impl LaserSettings {
         (0..self.rays).map(move |ray| first + ray as f64 * step)
     }
 
-    /// What the rays measure, m; infinite where nothing is near enough, NaN where
-    /// something is too near. The noise depends on the seed.
+    /// Measures the ranges of the rays, m; infinite where nothing is near enough, NaN where an
+    /// object is too near. The noise depends on the seed.
     pub(crate) fn measure(
         &self,
         world: &World,

@@ -10,9 +10,9 @@ pub const CONFIDENCE: f64 = 0.95;
 /// Draws that differ by less than this part of the figure do not differ.
 const ROUNDING: f64 = 1e-9;
 
-/// A figure and the interval in which it lies with some confidence. What a single
-/// draw, or draws that all say the same, tell of the spread is nothing: such an
-/// interval has no ends (minus and plus infinity; `null` in JSON).
+/// A figure and the interval in which it lies with some confidence. A single draw, and draws that
+/// all have the same value, contain no information about the spread: such an interval has no ends
+/// (minus and plus infinity; `null` in JSON).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Interval {
     /// The figure itself.
@@ -98,7 +98,7 @@ fn score_interval(estimate: f64, trials: f64, confidence: f64) -> Interval {
     }
 }
 
-/// How many standard errors lie on either side with so much confidence.
+/// Returns the number of standard errors on either side with so much confidence.
 fn normal_quantile(confidence: f64) -> f64 {
     std::f64::consts::SQRT_2 * erf_inv(confidence)
 }
@@ -140,7 +140,7 @@ pub fn clustered_share(clusters: &[[u64; 2]]) -> Option<Interval> {
     Some(score_interval(rate, worth, CONFIDENCE))
 }
 
-/// As many independent trials as say what these clusters do.
+/// Returns the number of independent trials with the same information as these clusters.
 fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
     let count = clusters.len() as f64;
     if rate <= 0.0 || rate >= 1.0 {
@@ -152,21 +152,19 @@ fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
     alike * (normal_quantile(CONFIDENCE) / student_quantile(clusters.len() - 1)).powi(2)
 }
 
-/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides,
-/// blocks: not frames, because frames of one recording are not independent).
-/// `figure` is called with the indices of those that enter: first of all, then of
-/// all but one. What leaving one out changes tells the spread (the jackknife: Tukey,
-/// Ann. Math. Stat. 1958), and Student's quantile allows for how badly few draws
-/// tell it. Of a mean this is Student's interval.
+/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides, blocks:
+/// not frames, because frames of one recording are not independent). `figure` is called with the
+/// indices of those that enter: first of all, then of all but one. The changes from leaving one out
+/// give the spread (the jackknife: Tukey, Ann. Math. Stat. 1958), and Student's quantile allows for
+/// its own uncertainty with few draws. Of a mean this is Student's interval.
 ///
-/// Simulated, its 95 % cover 95 % of normal and of symmetric bounded differences from
-/// 3 draws on; of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A
-/// percentile bootstrap covers 75 % of normal ones with 3 draws, and a studentised
-/// one has ends without bounds there. Losses so rare that most handfuls of draws
-/// have none are beyond all of them.
+/// Simulated, its 95 % cover 95 % of normal and of symmetric bounded differences from 3 draws on;
+/// of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A percentile bootstrap covers 75 %
+/// of normal ones with 3 draws, and a studentised one has ends without bounds there. Losses so rare
+/// that most handfuls of draws have none are beyond all of them.
 ///
-/// Nothing without draws or a finite figure; an interval without ends from one draw,
-/// and from draws that say the same.
+/// `None` without draws or a finite figure; an interval without ends from one draw, and from draws
+/// that say the same.
 ///
 /// For a figure of all draws together combine their own tallies:
 ///

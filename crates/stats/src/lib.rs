@@ -14,9 +14,7 @@ mod random;
 mod significance;
 mod summary;
 
-pub use intervals::{
-    CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, wilson,
-};
+pub use intervals::{CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, wilson};
 pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, mix, number_at};
 pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
 pub use summary::{mean, mean_and_deviation, median, percentile};

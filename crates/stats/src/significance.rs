@@ -21,10 +21,10 @@ pub struct Gain {
     pub p_value: f64,
 }
 
-/// Returns how much better `b` is than `a`, both scored on the same draws: the mean
-/// difference with its interval ([`mean_interval`]), and how probable it is that there
-/// is none ([`sign_flip`]). Pairs remove what the draws themselves differ in.
-/// Nothing if the lists are empty or of different length, or hold what is no number.
+/// Returns how much better `b` is than `a`, both scored on the same draws: the mean difference with
+/// its interval ([`mean_interval`]), and how probable it is that there is none ([`sign_flip`]).
+/// Pairs remove the differences between the draws themselves. `None` if the lists are empty or of
+/// different length, or hold a value that is no number.
 ///
 /// ```
 /// let gain = tagalong_stats::paired_gain(&[0.5, 0.2, 0.7], &[0.6, 0.4, 0.8]).unwrap();
@@ -37,8 +37,8 @@ pub fn paired_gain(a: &[f64], b: &[f64]) -> Option<Gain> {
     Some(Gain { difference, p_value: sign_flip(&differences)? })
 }
 
-/// Returns true if a p-value is below what chance alone may do with the confidence of
-/// the intervals. That of fewer than six draws never is: 2 of 2^5 patterns are 6 %.
+/// Returns true if a p-value is significant at the confidence of the intervals. That of fewer than
+/// six draws never is: 2 of 2^5 patterns are 6 %.
 pub fn is_significant(p_value: f64) -> bool {
     p_value < 1.0 - CONFIDENCE
 }
@@ -60,7 +60,7 @@ pub fn sign_flip(differences: &[f64]) -> Option<f64> {
         return None;
     }
     let bar = differences.iter().sum::<f64>().abs() - ROUNDING * all;
-    // The largest first: what is left then decides nothing any more early on.
+    // The largest first: the sum of the rest then soon decides nothing any more.
     sizes.sort_by(|a, b| b.total_cmp(a));
     if sizes.len() <= EXACT_UP_TO {
         return Some(patterns_beyond(&sizes, 0.0, bar) / (1u64 << sizes.len()) as f64);
@@ -70,7 +70,7 @@ pub fn sign_flip(differences: &[f64]) -> Option<f64> {
     Some((beyond + 1) as f64 / (PATTERNS + 1) as f64)
 }
 
-/// How many patterns of signs of `rest` take `sum` at least to the bar.
+/// Returns the number of patterns of signs of `rest` that take `sum` at least to the bar.
 fn patterns_beyond(rest: &[f64], sum: f64, bar: f64) -> f64 {
     let left = rest.iter().sum::<f64>();
     match rest.split_first() {

@@ -11,7 +11,7 @@ use crate::{Moment, Run, Trial};
 /// Frames per second.
 pub const RATE_HZ: f64 = 10.0;
 
-/// Where somebody is, and how much is seen of them.
+/// Place of a person, and their visible fraction.
 pub type Place = (f64, f64, f64);
 
 /// Where a track is on the floor in a frame, if it is there, m.

@@ -1,12 +1,12 @@
 use std::collections::BTreeSet;
 
-use tagalong_stats::{ChaCha, RandomSource};
 use tagalong_pipeline::Tunable;
+use tagalong_stats::{ChaCha, RandomSource};
 
 /// One value for each tunable setting, in their order.
 pub type Candidate = Vec<toml::Value>;
 
-/// How often the settings are dealt anew for a candidate that is not there yet.
+/// Largest number of new deals for a candidate that is not there yet.
 const ROUNDS: usize = 64;
 
 /// Returns the settings to be tried, at most `budget`, as they are in the config first. All
@@ -41,7 +41,7 @@ fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Ca
     (all.len() <= most).then_some(all)
 }
 
-/// Settings are dealt in blocks, so that a larger budget adds to what a smaller one tries.
+/// Returns settings dealt in blocks, so that a larger budget adds to those of a smaller one.
 fn sample(tunables: &[Tunable], shipped: &Candidate, count: usize, seed: u64) -> Vec<Candidate> {
     let mut random = ChaCha::new(seed, 0);
     let mut seen = BTreeSet::from([shown(shipped)]);

@@ -103,7 +103,8 @@ pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Op
     let thinned: Vec<_> = points.iter().step_by(points.len() / 1000 + 1).copied().collect();
     let mut best: Option<(f64, Ground)> = None;
     for _ in 0..settings.trials {
-        let Some(plane) = random_plane(&mut random, &thinned).filter(|p| plausible(p, settings)) else {
+        let Some(plane) = random_plane(&mut random, &thinned).filter(|p| plausible(p, settings))
+        else {
             continue;
         };
         let score = score(&plane, &thinned, settings);

@@ -19,7 +19,7 @@ const CELL_M: f64 = UPPER_BODY_SIDE_M / SIDE as f64;
 /// Something, or the test that it failed.
 type Found<T> = std::result::Result<T, &'static str>;
 
-/// Remembers what people look like, and finds them by that.
+/// Remembers the appearance of people, and finds them by it.
 pub struct Correlation {
     config: Config,
     pictures: BTreeMap<TrackId, (Stamp, Picture)>,
@@ -81,7 +81,7 @@ impl Correlation {
         Ok(sighting(config, view.camera, track, &square, best))
     }
 
-    /// Remembers what a person looks like who is in plain view.
+    /// Remembers the appearance of a person in plain view.
     fn remember(&mut self, view: &FrameImages<'_>, track: &Track) {
         let Some(square) = square(track).filter(|_| track.seen && !track.occluded) else { return };
         let (distance, least) = (distance(&self.config, view.camera, track), self.config.min_body);
@@ -101,7 +101,7 @@ fn distance(config: &Config, camera: &Camera, track: &Track) -> Distance {
     Distance { ahead_m, tolerance_m: config.depth_tolerance_m }
 }
 
-/// How far around the expected place people are searched, in cells aside and down.
+/// Returns the extent of the search around the expected place, in cells aside and down.
 pub(crate) fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i64) {
     let estimate = &track.estimate;
     let ray = estimate.person.position.coords - camera.robot_from_camera.translation.vector;

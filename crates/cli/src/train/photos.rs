@@ -10,8 +10,8 @@ use tagalong_config::Example;
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
-use tagalong_stats::{RandomSource, SplitMix64};
 use crate::outcome::Failure;
+use tagalong_stats::{RandomSource, SplitMix64};
 
 /// Squares cut from a photograph without people.
 const SQUARES: usize = 2;

@@ -6,13 +6,17 @@ const REPEATS: usize = 4000;
 
 type Draw = fn(&mut SplitMix64) -> f64;
 
-/// Differences with a mean of 0: what they are like, and the least coverage that is
-/// promised for 3 to 20 of them.
+/// Distributions of differences with a mean of 0, and the least coverage that is promised for 3 to
+/// 20 of them.
 const DIFFERENCES: [(&str, Draw, f64); 5] = [
     ("normal", |random| random.normal(), 0.94),
     ("bounded, even", |random| random.positive_uniform() - random.positive_uniform(), 0.93),
     ("skewed, exponential", |random| -random.positive_uniform().ln() - 1.0, 0.86),
-    ("bounded near one end, as rates near 1", |random| random.positive_uniform().powf(0.25) - 0.8, 0.89),
+    (
+        "bounded near one end, as rates near 1",
+        |random| random.positive_uniform().powf(0.25) - 0.8,
+        0.89,
+    ),
     ("bounded, most of it at one end", |random| random.positive_uniform().powi(3) - 0.25, 0.82),
 ];
 
@@ -134,8 +138,8 @@ fn clusters_that_all_succeed_count_once_each() {
 
 #[test]
 fn clusters_are_worth_as_many_trials_as_have_their_spread() {
-    // Squares off half of 4: 1 and 1, doubled for the one degree of freedom: 4. Of 8
-    // independent trials they would be 2, so that 4 are what these 8 are worth.
+    // Squares off half of 4: 1 and 1, doubled for the one degree of freedom: 4. Of 8 independent
+    // trials they would be 2, so these 8 count as 4.
     let two = [[1, 4], [3, 4]];
     let few = 4.0 * (normal_quantile(CONFIDENCE) / student_quantile(1)).powi(2);
     assert!((independent_trials(&two, 0.5, 8.0) - few).abs() < 1e-12);

@@ -156,7 +156,7 @@ fn the_process_noise_does_not_depend_on_the_frame_rate_as_the_printed_one_does()
     assert!((ratio - 10.0).abs() < 1e-6);
 }
 
-/// The believed height of somebody who stands for 20 s and has sat for 1 s.
+/// Returns the estimated height of a person that stands for 20 s and has sat for 1 s.
 fn height_after_sitting_down(config: Config) -> f64 {
     let filter = filter(config);
     let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));

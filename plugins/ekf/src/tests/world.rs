@@ -30,7 +30,7 @@ pub fn detection(position: Point3<f64>, sigma_m: f64) -> Detection {
     }
 }
 
-/// A robot at constant speed, and a person who starts at rest.
+/// A robot at constant speed, and a person that starts at rest.
 pub struct World {
     pub robot: Isometry2<f64>,
     pub person: Point3<f64>,
