@@ -27,7 +27,7 @@ pub fn walk(workspace: &Workspace) -> Result<()> {
         Some(text.replace("bias: 0.0", default))
     })?;
     edit(workspace, "verify.rs", |text| {
-        replace_between(text, "    fn margin(", "\n    }\n", &method)
+        replace_between(text, "    fn log_odds(", "\n    }\n", &method)
     })
 }
 
