@@ -186,7 +186,7 @@ impl Scene {
             ),
             (
                 self.people.iter().all(|p| p.posture != Posture::Seated || !p.path.is_empty()),
-                "who sits needs a path of one point: the place of the chair",
+                "a seated person needs a path of one point: the place of the chair",
             ),
             (self.people.iter().all(|p| p.wander <= 1000), "wander must be at most 1000"),
             (

@@ -148,7 +148,7 @@ fn truth(trial: &Trial, index: usize, person: u16) -> Option<&Truth> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Path, Seen, trial};
+    use crate::testing::{FloorPosition, Path, trial};
 
     /// Person 2 walks behind person 1 and is hidden from frame 10 to 19.
     fn after(places: Option<(f64, f64)>, id: u32) -> Outcome {
@@ -158,8 +158,8 @@ mod tests {
         before[10..].fill(None);
         let mut later = [None; 40];
         later[22..].fill(places);
-        let mut one: Vec<Seen> = vec![Some((3.0, 0.0)); 40];
-        let mut tracks: Vec<(u32, Vec<Seen>)> = vec![(2, before.to_vec())];
+        let mut one: Vec<FloorPosition> = vec![Some((3.0, 0.0)); 40];
+        let mut tracks: Vec<(u32, Vec<FloorPosition>)> = vec![(2, before.to_vec())];
         match id {
             1 => one[22..].fill(places),
             2 => tracks[0].1[22..].copy_from_slice(&later[22..]),

@@ -17,7 +17,7 @@ const SIDES_PX: std::ops::RangeInclusive<f64> = 12.0..=1000.0;
 const CELL_M: f64 = UPPER_BODY_SIDE_M / SIDE as f64;
 
 /// Something, or the test that it failed.
-type Found<T> = std::result::Result<T, &'static str>;
+type TestResult<T> = std::result::Result<T, &'static str>;
 
 /// Remembers the appearance of people, and finds them by it.
 pub struct Correlation {
@@ -62,7 +62,7 @@ impl Correlation {
     }
 
     /// Where a person is, or the test that failed.
-    fn near(&mut self, view: &FrameImages<'_>, track: &Track) -> Found<Detection> {
+    fn near(&mut self, view: &FrameImages<'_>, track: &Track) -> TestResult<Detection> {
         let Self { config, pictures, strip, fits } = self;
         let (taken, picture) = pictures.get(&track.id).ok_or("correlation: not seen well yet")?;
         if view.stamp.seconds_since(*taken) > config.memory_s {
@@ -127,7 +127,7 @@ fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut
 }
 
 /// The best place, or the test that it failed.
-pub(crate) fn choose(config: &Config, fits: &[Placed]) -> Found<Placed> {
+pub(crate) fn choose(config: &Config, fits: &[Placed]) -> TestResult<Placed> {
     let shown = || fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown);
     let by_correlation = |a: &Placed, b: &Placed| a.fit.correlation.total_cmp(&b.fit.correlation);
     let best = shown().max_by(by_correlation).ok_or("correlation: hidden")?;

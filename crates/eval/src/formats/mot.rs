@@ -189,7 +189,7 @@ pub fn check_length(rows: &[Row], file: &str, length: u32) -> Result<(), FormatE
 impl Row {
     /// Refuses rows without an id: one id for all of them would be one person in many places.
     fn check_id(&self, file: &str) -> Result<(), FormatError> {
-        let why = || format!("id {}; who is told apart has an id from 0 on", self.id);
+        let why = || format!("id {}; rows with an identity have an id from 0 on", self.id);
         if self.id >= 0 { Ok(()) } else { Err(self.error(file, why())) }
     }
 }
