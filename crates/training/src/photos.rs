@@ -11,7 +11,7 @@ use tagalong_config::Example;
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
-use super::rooms::Chance;
+use tagalong_stats::{RandomSource, SplitMix64};
 
 /// Squares cut from a photograph without people.
 const SQUARES: usize = 2;
@@ -260,7 +260,7 @@ impl Photo {
             Kind::Bust => vec![Rect::new(0.0, 0.0, width, height).inflated(-0.08)],
             Kind::Nobody => {
                 // Other squares in each round, but the same ones in each run.
-                let mut chance = Chance(self.group ^ round);
+                let mut chance = SplitMix64::new(self.group ^ round);
                 let least = width.min(height).min(40.0);
                 let most = (0.6 * width.min(height)).max(least);
                 let count = if width < 200.0 { 1 } else { SQUARES };

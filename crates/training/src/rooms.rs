@@ -6,6 +6,7 @@ use tagalong_sim::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Split, Variant,
 };
+use tagalong_stats::{RandomSource, SplitMix64};
 
 /// Furniture with the silhouette of a person.
 const LOOK_ALIKES: [FurnitureKind; 6] = [
@@ -63,7 +64,7 @@ pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, Conf
 /// Returns a room with so many people, all of it in view. Size, light, camera, furniture and the
 /// paths and appearance of the people depend on the seed.
 fn room(seed: u64, people: usize) -> Scene {
-    let mut chance = Chance(seed);
+    let mut chance = SplitMix64::new(seed);
     let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
     let start = [0.8, width * chance.between(0.3, 0.7)];
     let view = RobotView { start, room: [length, width] };
@@ -112,7 +113,7 @@ struct RobotView {
 
 impl RobotView {
     /// Returns a random place in view, within the detector's range and inside the room.
-    fn place(&self, chance: &mut Chance) -> [f64; 2] {
+    fn place(&self, chance: &mut SplitMix64) -> [f64; 2] {
         let (distance, angle) = (chance.between(1.8, 5.5), chance.between(-0.5, 0.5));
         let inside = |at: f64, size: f64| at.clamp(0.5, size - 0.5);
         [
@@ -122,7 +123,7 @@ impl RobotView {
     }
 }
 
-fn piece(chance: &mut Chance, view: &RobotView) -> Furniture {
+fn piece(chance: &mut SplitMix64, view: &RobotView) -> Furniture {
     Furniture {
         kind: chance.pick(&LOOK_ALIKES),
         at: view.place(chance),
@@ -130,34 +131,12 @@ fn piece(chance: &mut Chance, view: &RobotView) -> Furniture {
     }
 }
 
-fn walker(chance: &mut Chance, view: &RobotView) -> PersonSettings {
+fn walker(chance: &mut SplitMix64, view: &RobotView) -> PersonSettings {
     PersonSettings {
         path: (0..3).map(|_| view.place(chance)).collect(),
         speed_mps: chance.between(0.3, 1.2),
         at_end: AtEnd::Loop,
         ..PersonSettings::default()
-    }
-}
-
-/// Random numbers that depend on a seed only (SplitMix64: Steele, Lea and Flood, OOPSLA 2014).
-pub struct Chance(pub u64);
-
-impl Chance {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Returns a number between two others.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        // The upper 53 bits: as many as a double has.
-        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn pick<T: Copy>(&mut self, all: &[T]) -> T {
-        all[(self.next() % all.len() as u64) as usize]
     }
 }
 

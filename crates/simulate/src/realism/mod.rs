@@ -181,13 +181,11 @@ fn depth(frame: &Frame) -> Option<&DepthImage> {
 }
 
 fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    tagalong_stats::mean(values).unwrap_or(0.0)
 }
 
 fn deviation(values: &[f64]) -> f64 {
-    let centre = mean(values);
-    let squares: Vec<f64> = values.iter().map(|v| (v - centre).powi(2)).collect();
-    mean(&squares).sqrt()
+    tagalong_stats::mean_and_deviation(values).map_or(0.0, |(_, deviation)| deviation)
 }
 
 #[cfg(test)]

@@ -5,9 +5,10 @@ use anyhow::Result;
 use crate::metadata::{Metadata, Package};
 use crate::workspace::Workspace;
 
-/// Who may lean on whom in `crates/`, apart from dev-dependencies. The map of
-/// crates in `crates/README.md` says why.
+/// Allowed dependencies between the folders of `crates/`, apart from dev-dependencies. The table in
+/// `crates/README.md` says why.
 const ARROWS: &[(&str, &[&str])] = &[
+    ("stats", &[]),
     ("geometry", &[]),
     ("core", &[]),
     ("config", &[]),
@@ -26,7 +27,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("report", &["eval"]),
     ("trials", &["vision", "stereo", "pipeline", "sim", "eval"]),
     ("tuning", &["pipeline", "eval"]),
-    // What is reproduced may be the learning of a plugin.
+    // A reproduced result may be the training of a plugin.
     (
         "reproduce",
         &[
@@ -87,12 +88,12 @@ const ARROWS: &[(&str, &[&str])] = &[
 
 /// The words of the project, from the ground up: each may use those before it, and every other
 /// crate may use all of them.
-const WORDS: &[&str] = &["geometry", "core", "config"];
+const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
 
-/// What a plugin may lean on.
+/// Crates that a plugin may depend on.
 const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment"];
 
-/// What the tests of any crate may lean on in addition.
+/// Crates that the tests of any crate may depend on in addition.
 const FOR_TESTS: &[&str] =
     &["vision", "learn", "sim", "conformance", "testdata", "catalog", "plugins"];
 

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::random::SplitMix;
-use crate::statistics::{CONFIDENCE, Interval, mean_interval};
+use crate::intervals::{CONFIDENCE, Interval, mean_interval};
+use crate::random::{RandomSource, SplitMix64};
 
 /// Up to so many differences all patterns of signs are counted, ...
 const EXACT_UP_TO: usize = 20;
@@ -21,13 +21,13 @@ pub struct Gain {
     pub p_value: f64,
 }
 
-/// Returns how much better `b` is than `a`, both scored on the same draws: the mean
-/// difference with its interval ([`mean_interval`]), and how probable it is that there
-/// is none ([`sign_flip`]). Pairs remove what the draws themselves differ in.
-/// Nothing if the lists are empty or of different length, or hold what is no number.
+/// Returns how much better `b` is than `a`, both scored on the same draws: the mean difference with
+/// its interval ([`mean_interval`]), and how probable it is that there is none ([`sign_flip`]).
+/// Pairs remove the differences between the draws themselves. `None` if the lists are empty or of
+/// different length, or hold a value that is no number.
 ///
 /// ```
-/// let gain = tagalong_eval::paired_gain(&[0.5, 0.2, 0.7], &[0.6, 0.4, 0.8]).unwrap();
+/// let gain = tagalong_stats::paired_gain(&[0.5, 0.2, 0.7], &[0.6, 0.4, 0.8]).unwrap();
 /// assert!((gain.difference.estimate - 0.4 / 3.0).abs() < 1e-12);
 /// assert_eq!(gain.p_value, 0.25, "three draws cannot say more");
 /// ```
@@ -37,8 +37,8 @@ pub fn paired_gain(a: &[f64], b: &[f64]) -> Option<Gain> {
     Some(Gain { difference, p_value: sign_flip(&differences)? })
 }
 
-/// Returns true if a p-value is below what chance alone may do with the confidence of
-/// the intervals. That of fewer than six draws never is: 2 of 2^5 patterns are 6 %.
+/// Returns true if a p-value is significant at the confidence of the intervals. That of fewer than
+/// six draws never is: 2 of 2^5 patterns are 6 %.
 pub fn is_significant(p_value: f64) -> bool {
     p_value < 1.0 - CONFIDENCE
 }
@@ -50,8 +50,8 @@ pub fn is_significant(p_value: f64) -> bool {
 /// Smyth, 2010). Nothing without differences, or with one that is no number.
 ///
 /// ```
-/// assert_eq!(tagalong_eval::sign_flip(&[0.1, 0.2]), Some(0.5));
-/// assert_eq!(tagalong_eval::sign_flip(&[0.1; 6]), Some(2.0 / 64.0));
+/// assert_eq!(tagalong_stats::sign_flip(&[0.1, 0.2]), Some(0.5));
+/// assert_eq!(tagalong_stats::sign_flip(&[0.1; 6]), Some(2.0 / 64.0));
 /// ```
 pub fn sign_flip(differences: &[f64]) -> Option<f64> {
     let mut sizes: Vec<f64> = differences.iter().map(|d| d.abs()).collect();
@@ -60,17 +60,17 @@ pub fn sign_flip(differences: &[f64]) -> Option<f64> {
         return None;
     }
     let bar = differences.iter().sum::<f64>().abs() - ROUNDING * all;
-    // The largest first: what is left then decides nothing any more early on.
+    // The largest first: the sum of the rest then soon decides nothing any more.
     sizes.sort_by(|a, b| b.total_cmp(a));
     if sizes.len() <= EXACT_UP_TO {
         return Some(patterns_beyond(&sizes, 0.0, bar) / (1u64 << sizes.len()) as f64);
     }
-    let mut random = SplitMix(1);
+    let mut random = SplitMix64::new(1);
     let beyond = (0..PATTERNS).filter(|_| drawn_sum(&sizes, &mut random).abs() >= bar).count();
     Some((beyond + 1) as f64 / (PATTERNS + 1) as f64)
 }
 
-/// How many patterns of signs of `rest` take `sum` at least to the bar.
+/// Returns the number of patterns of signs of `rest` that take `sum` at least to the bar.
 fn patterns_beyond(rest: &[f64], sum: f64, bar: f64) -> f64 {
     let left = rest.iter().sum::<f64>();
     match rest.split_first() {
@@ -82,9 +82,9 @@ fn patterns_beyond(rest: &[f64], sum: f64, bar: f64) -> f64 {
     }
 }
 
-fn drawn_sum(sizes: &[f64], random: &mut SplitMix) -> f64 {
+fn drawn_sum(sizes: &[f64], random: &mut SplitMix64) -> f64 {
     let of_word = |sizes: &[f64]| {
-        let signs = random.next();
+        let signs = random.next_u64();
         let signed = |(bit, size): (usize, &f64)| if signs >> bit & 1 == 0 { *size } else { -size };
         sizes.iter().enumerate().map(signed).sum::<f64>()
     };
@@ -96,7 +96,7 @@ fn drawn_sum(sizes: &[f64], random: &mut SplitMix) -> f64 {
 /// in twenty is below 0.05 by chance. One alone stays as it is.
 ///
 /// ```
-/// assert_eq!(tagalong_eval::holm(&[0.03, 0.01, 0.2]), [0.06, 0.03, 0.2]);
+/// assert_eq!(tagalong_stats::holm(&[0.03, 0.01, 0.2]), [0.06, 0.03, 0.2]);
 /// ```
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
@@ -149,8 +149,8 @@ mod tests {
 
     #[test]
     fn drawn_patterns_agree_with_all_of_them_and_never_say_zero() {
-        let mut random = SplitMix(5);
-        let uniform = |random: &mut SplitMix| random.unit() - 0.3;
+        let mut random = SplitMix64::new(5);
+        let uniform = |random: &mut SplitMix64| random.positive_uniform() - 0.3;
         let many: Vec<f64> = (0..20).map(|_| uniform(&mut random)).collect();
         let exact = sign_flip(&many).unwrap();
         let one_more: Vec<f64> = many.iter().copied().chain([0.0]).collect();
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_test_is_wrong_no_more_often_than_it_says() {
-        let mut random = SplitMix(11);
+        let mut random = SplitMix64::new(11);
         let mut rejects = |draws: usize| {
             let differences: Vec<f64> = (0..draws).map(|_| random.normal()).collect();
             is_significant(sign_flip(&differences).unwrap())

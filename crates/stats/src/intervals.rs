@@ -10,9 +10,9 @@ pub const CONFIDENCE: f64 = 0.95;
 /// Draws that differ by less than this part of the figure do not differ.
 const ROUNDING: f64 = 1e-9;
 
-/// A figure and the interval in which it lies with some confidence. What a single
-/// draw, or draws that all say the same, tell of the spread is nothing: such an
-/// interval has no ends (minus and plus infinity; `null` in JSON).
+/// A figure and the interval in which it lies with some confidence. A single draw, and draws that
+/// all have the same value, contain no information about the spread: such an interval has no ends
+/// (minus and plus infinity; `null` in JSON).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Interval {
     /// The figure itself.
@@ -40,7 +40,7 @@ impl Interval {
     /// without ends stays so.
     ///
     /// ```
-    /// let interval = tagalong_eval::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
+    /// let interval = tagalong_stats::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
     /// assert!(interval.upper > 1.0 && interval.within(0.0, 1.0).upper == 1.0);
     /// ```
     #[must_use]
@@ -76,7 +76,7 @@ fn open_above<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
 /// `confidence` lies between 0 and 1, both excluded, for example 0.95.
 ///
 /// ```
-/// let rate = tagalong_eval::wilson(10, 10, 0.95).unwrap();
+/// let rate = tagalong_stats::wilson(10, 10, 0.95).unwrap();
 /// assert_eq!(rate.estimate, 1.0);
 /// assert!((rate.lower - 0.7225).abs() < 1e-4);
 /// ```
@@ -98,7 +98,7 @@ fn score_interval(estimate: f64, trials: f64, confidence: f64) -> Interval {
     }
 }
 
-/// How many standard errors lie on either side with so much confidence.
+/// Returns the number of standard errors on either side with so much confidence.
 fn normal_quantile(confidence: f64) -> f64 {
     std::f64::consts::SQRT_2 * erf_inv(confidence)
 }
@@ -120,7 +120,7 @@ fn student_quantile(freedom: usize) -> f64 {
 /// Nothing without trials; an interval without ends from one cluster of several.
 ///
 /// ```
-/// use tagalong_eval::{clustered_share, wilson};
+/// use tagalong_stats::{clustered_share, wilson};
 /// let alone = clustered_share(&[[1, 1], [0, 1], [1, 1]]).unwrap();
 /// assert_eq!(Some(alone), wilson(2, 3, 0.95), "one trial each: independent");
 /// let rides = clustered_share(&[[90, 100], [95, 100], [40, 100]]).unwrap();
@@ -140,7 +140,7 @@ pub fn clustered_share(clusters: &[[u64; 2]]) -> Option<Interval> {
     Some(score_interval(rate, worth, CONFIDENCE))
 }
 
-/// As many independent trials as say what these clusters do.
+/// Returns the number of independent trials with the same information as these clusters.
 fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
     let count = clusters.len() as f64;
     if rate <= 0.0 || rate >= 1.0 {
@@ -152,41 +152,31 @@ fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
     alike * (normal_quantile(CONFIDENCE) / student_quantile(clusters.len() - 1)).powi(2)
 }
 
-/// The value below which a fraction of the values lies, interpolated between
-/// neighbours (as numpy's default); nothing without values.
-pub fn percentile(values: &[f64], fraction: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().checked_sub(1)?;
-    let at = fraction.clamp(0.0, 1.0) * last as f64;
-    let below = at.floor() as usize;
-    let above = (below + 1).min(last);
-    Some(sorted[below] + (at - below as f64) * (sorted[above] - sorted[below]))
-}
-
-/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides,
-/// blocks: not frames, because frames of one recording are not independent).
-/// `figure` is called with the indices of those that enter: first of all, then of
-/// all but one. What leaving one out changes tells the spread (the jackknife: Tukey,
-/// Ann. Math. Stat. 1958), and Student's quantile allows for how badly few draws
-/// tell it. Of a mean this is Student's interval.
+/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides, blocks:
+/// not frames, because frames of one recording are not independent). `figure` is called with the
+/// indices of those that enter: first of all, then of all but one. The changes from leaving one out
+/// give the spread (the jackknife: Tukey, Ann. Math. Stat. 1958), and Student's quantile allows for
+/// its own uncertainty with few draws. Of a mean this is Student's interval.
 ///
-/// Simulated, its 95 % cover 95 % of normal and of symmetric bounded differences from
-/// 3 draws on; of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A
-/// percentile bootstrap covers 75 % of normal ones with 3 draws, and a studentised
-/// one has ends without bounds there. Losses so rare that most handfuls of draws
-/// have none are beyond all of them.
+/// Simulated, its 95 % cover 95 % of normal and of symmetric bounded differences from 3 draws on;
+/// of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A percentile bootstrap covers 75 %
+/// of normal ones with 3 draws, and a studentised one has ends without bounds there. Losses so rare
+/// that most handfuls of draws have none are beyond all of them.
 ///
-/// Nothing without draws or a finite figure; an interval without ends from one draw,
-/// and from draws that say the same.
+/// `None` without draws or a finite figure; an interval without ends from one draw, and from draws
+/// that say the same.
 ///
 /// For a figure of all draws together combine their own tallies:
 ///
 /// ```
-/// use tagalong_eval::{Clear, draws_interval};
-/// let runs = [Clear { tp: 8, fn_: 2, ..Clear::default() }, Clear { tp: 5, ..Clear::default() }];
-/// let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &runs[i])).mota();
-/// let interval = draws_interval(runs.len(), mota).unwrap();
+/// use tagalong_stats::draws_interval;
+/// // Found and missed people of two runs.
+/// let runs = [[8.0, 2.0], [5.0, 0.0]];
+/// let recall = |drawn: &[usize]| {
+///     let [found, missed] = [0, 1].map(|k| drawn.iter().map(|&i| runs[i][k]).sum::<f64>());
+///     found / (found + missed)
+/// };
+/// let interval = draws_interval(runs.len(), recall).unwrap();
 /// assert!((interval.estimate - 13.0 / 15.0).abs() < 1e-12);
 /// assert!(interval.lower < 0.0, "two draws say next to nothing");
 /// ```

@@ -1,19 +1,23 @@
 use super::*;
-use crate::random::SplitMix;
+use crate::random::{RandomSource, SplitMix64};
 
 /// Repetitions of a simulation: its shares are off by 1 % at most, most of the time.
 const REPEATS: usize = 4000;
 
-type Draw = fn(&mut SplitMix) -> f64;
+type Draw = fn(&mut SplitMix64) -> f64;
 
-/// Differences with a mean of 0: what they are like, and the least coverage that is
-/// promised for 3 to 20 of them.
+/// Distributions of differences with a mean of 0, and the least coverage that is promised for 3 to
+/// 20 of them.
 const DIFFERENCES: [(&str, Draw, f64); 5] = [
     ("normal", |random| random.normal(), 0.94),
-    ("bounded, even", |random| random.unit() - random.unit(), 0.93),
-    ("skewed, exponential", |random| -random.unit().ln() - 1.0, 0.86),
-    ("bounded near one end, as rates near 1", |random| random.unit().powf(0.25) - 0.8, 0.89),
-    ("bounded, most of it at one end", |random| random.unit().powi(3) - 0.25, 0.82),
+    ("bounded, even", |random| random.positive_uniform() - random.positive_uniform(), 0.93),
+    ("skewed, exponential", |random| -random.positive_uniform().ln() - 1.0, 0.86),
+    (
+        "bounded near one end, as rates near 1",
+        |random| random.positive_uniform().powf(0.25) - 0.8,
+        0.89,
+    ),
+    ("bounded, most of it at one end", |random| random.positive_uniform().powi(3) - 0.25, 0.82),
 ];
 
 fn covers(interval: Option<Interval>, truth: f64) -> bool {
@@ -24,7 +28,7 @@ fn covers(interval: Option<Interval>, truth: f64) -> bool {
 fn intervals_of_a_mean_cover_it_as_often_as_promised() {
     for (name, draw, promised) in DIFFERENCES {
         for draws in [3, 4, 5, 6, 7, 10, 14, 20] {
-            let mut random = SplitMix(draws as u64);
+            let mut random = SplitMix64::new(draws as u64);
             let mut once = || {
                 let values: Vec<f64> = (0..draws).map(|_| draw(&mut random)).collect();
                 covers(mean_interval(&values), 0.0)
@@ -36,11 +40,11 @@ fn intervals_of_a_mean_cover_it_as_often_as_promised() {
 }
 
 /// Rides of which each has its own rate, about 80 % on the mean, and 1 to 12 trials.
-fn rides(count: usize, random: &mut SplitMix) -> Vec<[u64; 2]> {
-    let ride = |random: &mut SplitMix| {
-        let rate = random.unit().powf(0.25);
-        let trials = 1 + random.next() % 12;
-        [(0..trials).filter(|_| random.unit() < rate).count() as u64, trials]
+fn rides(count: usize, random: &mut SplitMix64) -> Vec<[u64; 2]> {
+    let ride = |random: &mut SplitMix64| {
+        let rate = random.positive_uniform().powf(0.25);
+        let trials = 1 + random.next_u64() % 12;
+        [(0..trials).filter(|_| random.positive_uniform() < rate).count() as u64, trials]
     };
     (0..count).map(|_| ride(random)).collect()
 }
@@ -49,7 +53,7 @@ fn rides(count: usize, random: &mut SplitMix) -> Vec<[u64; 2]> {
 fn intervals_of_clustered_counts_cover_where_wilson_does_not() {
     let mut wilson_at_20 = 0;
     for count in [3, 5, 8, 20] {
-        let mut random = SplitMix(count as u64);
+        let mut random = SplitMix64::new(count as u64);
         let mut held = 0;
         for _ in 0..REPEATS {
             let clusters = rides(count, &mut random);
@@ -134,8 +138,8 @@ fn clusters_that_all_succeed_count_once_each() {
 
 #[test]
 fn clusters_are_worth_as_many_trials_as_have_their_spread() {
-    // Squares off half of 4: 1 and 1, doubled for the one degree of freedom: 4. Of 8
-    // independent trials they would be 2, so that 4 are what these 8 are worth.
+    // Squares off half of 4: 1 and 1, doubled for the one degree of freedom: 4. Of 8 independent
+    // trials they would be 2, so these 8 count as 4.
     let two = [[1, 4], [3, 4]];
     let few = 4.0 * (normal_quantile(CONFIDENCE) / student_quantile(1)).powi(2);
     assert!((independent_trials(&two, 0.5, 8.0) - few).abs() < 1e-12);
@@ -157,13 +161,6 @@ fn intervals_without_ends_survive_json() {
         assert_eq!(serde_json::from_str::<Interval>(&text).unwrap(), interval, "{text}");
     }
     assert!(serde_json::to_string(&Interval::open(1.0)).unwrap().contains("\"lower\":null"));
-}
-
-#[test]
-fn percentiles_interpolate() {
-    assert_eq!(percentile(&[3.0, 1.0, 2.0], 0.5), Some(2.0));
-    assert_eq!(percentile(&[0.0, 10.0], 0.95), Some(9.5));
-    assert_eq!(percentile(&[], 0.5), None);
 }
 
 #[test]
