@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{HEAD_RADIUS_M, ImageBox, Rect};
 
 fn main() -> ExitCode {
     tagalong_cli::main_with(|registry| {
@@ -74,7 +74,13 @@ impl Detector for NearestThing {
         let position = frame.camera.head_of(&region, depth_m);
         let covariance =
             frame.camera.covariance(region.centre(), depth_m + HEAD_RADIUS_M, 3.0, 0.05);
-        Ok(vec![Detection { region, position, covariance, score: 2.0, source: "nearest-thing" }])
+        Ok(vec![Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position,
+            covariance,
+            score: 2.0,
+            source: "nearest-thing",
+        }])
     }
 }
 

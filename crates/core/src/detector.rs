@@ -184,7 +184,7 @@ mod tests {
 
     fn seen(x: f64, y: f64, z: f64) -> Detection {
         Detection {
-            region: Rect::default(),
+            image: None,
             position: Point3::new(x, y, z),
             covariance: nalgebra::Matrix3::identity(),
             score: 1.0,

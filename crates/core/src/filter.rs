@@ -97,6 +97,12 @@ pub trait Filter: Send {
         Inputs::NONE
     }
 
+    /// Returns true if the filter uses detections with a box in the image alone. The tracker then
+    /// drops the others, as "no image box".
+    fn requires_image_box(&self) -> bool {
+        false
+    }
+
     /// Starts the state of a new track. `id` is new.
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera);
 
@@ -295,8 +301,8 @@ mod tests {
 
     fn seen(x: f64) -> Detection {
         let position = Point3::new(x, 0.0, 1.6);
-        let (region, covariance) = (Rect::default(), Matrix3::identity());
-        Detection { region, position, covariance, score: 1.0, source: "test" }
+        let covariance = Matrix3::identity();
+        Detection { image: None, position, covariance, score: 1.0, source: "test" }
     }
 
     #[test]

@@ -5,12 +5,12 @@
 //! [`Associator`] assigns them to [`Track`]s, a [`Filter`] estimates their states, a
 //! [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of them.
 //!
-//! # Why a detection has a region and a position
+//! # Why a detection has a position, and a box if a camera made it
 //!
-//! A detection is an image region *and* a position in the robot frame. Stereo, RGB-D and panorama
-//! cameras therefore share one interface, and a filter may work in pixels or in metres. The
-//! [`Camera`] converts between them. An unknown coordinate (the height of a person in a panorama)
-//! has a large variance; no field is ever missing.
+//! A detection is a position in the robot frame, with a box in the image if a camera made it.
+//! Stereo, RGB-D and panorama cameras and laser scanners therefore share one interface, and a
+//! filter may work in pixels or in metres. The [`tagalong_geometry::Camera`] converts between
+//! them. An unknown coordinate (the height of a person in a panorama) has a large variance.
 //!
 //! # Conventions
 //!

@@ -34,7 +34,7 @@ pub(crate) enum Visibility {
 impl Occluder {
     /// Creates the occluder of a detection.
     pub(crate) fn of(seen: &Detection, camera: &Camera) -> Self {
-        Self::new(seen.region, &seen.position, &seen.covariance, camera)
+        Self::new(seen.rect_in(camera), &seen.position, &seen.covariance, camera)
     }
 
     /// Returns the occluder at the expected position instead, if the detector gave the direction

@@ -81,11 +81,12 @@ impl Tracker {
     /// Creates a tracker without tracks.
     pub fn new(parts: Parts, settings: TrackerSettings) -> Self {
         let Parts { preprocessors, detectors, verifiers, associator, filter, manager } = parts;
+        let requires_box = filter.plugin().requires_image_box();
         Self {
             clock: Clock::new(settings.clock.clone()),
             settings,
             preprocessors,
-            search: SearchStage { detectors, verifiers, shared: None },
+            search: SearchStage { detectors, verifiers, requires_box, shared: None },
             associator,
             filter,
             manager,

@@ -6,7 +6,7 @@ use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
     Track, TrackId,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, ImageBox, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
@@ -416,7 +416,13 @@ fn sighting(
     };
     let unknown = (expected, Matrix3::identity() * 100.0);
     let (position, covariance) = place(head_m).unwrap_or(unknown);
-    Detection { region, position, covariance, score: config.score, source: NAME }
+    Detection {
+        image: Some(ImageBox::upper_body(region)),
+        position,
+        covariance,
+        score: config.score,
+        source: NAME,
+    }
 }
 
 impl Detector for Compressive {
@@ -531,7 +537,7 @@ mod tests {
         let face_m = camera.depth_of(&expected) - HEAD_RADIUS_M;
         let there = sighting(&config, &camera, &track, before, Some(face_m));
         assert!((there.position - expected).norm() < 1e-9, "{}", there.position);
-        assert_eq!((there.region, there.score), (before, config.score));
+        assert_eq!((there.rect().unwrap(), there.score), (before, config.score));
         // Half a width to the right in the image, and 0.3 m farther away.
         let aside = Rect { x: before.x + 0.5 * before.width, ..before };
         let moved = sighting(&config, &camera, &track, aside, Some(face_m + 0.3));

@@ -3,7 +3,7 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, ImageBox, Rect};
 
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
@@ -92,7 +92,7 @@ impl FaceRgbd {
         let position = camera.back_project(head_px, depth_m);
         let (slope, offset) = self.line;
         let detection = Detection {
-            region: camera.upper_body(&position),
+            image: Some(ImageBox::upper_body(camera.upper_body(&position))),
             position,
             covariance: camera.covariance(head_px, depth_m, config.sigma_place * side, sigma_m),
             // The logarithm needs a positive strength.
@@ -240,7 +240,7 @@ mod tests {
             assert!((found.covariance[(0, 0)].sqrt() / sigma_m - 1.0).abs() < 0.05);
             let aside = config.sigma_place * 20.0 / FOCAL_PX * (face_m + HEAD_RADIUS_M);
             assert!((found.covariance[(2, 2)].sqrt() / aside - 1.0).abs() < 0.05);
-            assert_eq!(found.region, camera.upper_body(&found.position));
+            assert_eq!(found.rect().unwrap(), camera.upper_body(&found.position));
             assert!((found.score - (1.5 * 3.0_f64.ln() - 2.0)).abs() < 1e-9);
         }
         let sure = Group { strength: 1e9, ..group };

@@ -5,7 +5,7 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, ImageBox, Rect, UPPER_BODY_SIDE_M};
 
 use crate::lattice::Lattice;
 use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
@@ -57,7 +57,7 @@ impl HogUpperBody {
         let covariance: Matrix3<f64> =
             camera.covariance(window.region.centre(), depth_m, sigma_px, sigma_m);
         let detection = Detection {
-            region: window.region,
+            image: Some(ImageBox::upper_body(window.region)),
             position: camera.head_of(&window.region, face_m),
             covariance,
             score: self.model.log_odds(window.sum).min(config.max_score),
@@ -310,7 +310,7 @@ mod tests {
             assert!((found.covariance[(0, 0)].sqrt() / sigma_m - 1.0).abs() < 0.02);
             let aside = config.sigma_place * side / 525.0 * (face_m + HEAD_RADIUS_M);
             assert!((found.covariance[(1, 1)].sqrt() / aside - 1.0).abs() < 0.02);
-            assert!((found.score - 1.0).abs() < 1e-4 && found.region == region);
+            assert!((found.score - 1.0).abs() < 1e-4 && found.rect().unwrap() == region);
         }
         let sure = Window { sum: detector.model.sum_at(99.0), ..window(None) };
         assert_eq!(detector.detection(&camera, &sure).unwrap().score, config.max_score);

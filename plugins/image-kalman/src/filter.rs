@@ -23,6 +23,12 @@ impl ImageKalman {
 }
 
 impl Filter for ImageKalman {
+    /// The state is that of a box; a box invented from a position would be counted as evidence
+    /// beside the position.
+    fn requires_image_box(&self) -> bool {
+        true
+    }
+
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
         let state = State::start(&self.config, detection, camera);
         self.states.insert(id, state);

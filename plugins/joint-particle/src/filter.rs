@@ -291,7 +291,7 @@ mod tests {
 
     use nalgebra::Matrix3;
     use tagalong_core::{Frame, Images, Likelihood, Matched, Stamp};
-    use tagalong_geometry::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -315,7 +315,13 @@ mod tests {
         let position = Point3::new(2.0, 0.0, 1.6);
         let region = Rect::new(40.0, 30.0, 20.0, 20.0);
         let covariance = Matrix3::identity() * 0.01;
-        Detection { region, position, covariance, score: 3.0, source: "drawn" }
+        Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position,
+            covariance,
+            score: 3.0,
+            source: "drawn",
+        }
     }
 
     /// Returns for twelve frames without a detection if a person that explains this many nats is

@@ -4,7 +4,7 @@ use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs,
     Query, Result, Track,
 };
-use tagalong_geometry::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, ImageBox, Rect, UPPER_BODY_SIDE_M};
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};
@@ -54,23 +54,26 @@ impl RecordedDetections {
 
     fn detection(&self, frame: &Frame, recorded: &ExternalDetection) -> Option<Detection> {
         let camera = &*frame.camera;
-        let (region, position, covariance) = match (recorded.head, recorded.region) {
+        let (image, position, covariance) = match (recorded.head, recorded.region) {
             (Some(head), region) => {
                 let variance = self.config.sigma_position_m.powi(2);
                 let region = region.unwrap_or_else(|| camera.upper_body(&head));
-                (region, head, Matrix3::identity() * variance)
+                (ImageBox::upper_body(region), head, Matrix3::identity() * variance)
             }
             (None, Some(region)) => {
                 let upper_body = self.upper_body(&region);
                 let (position, covariance) = self.placed(frame, &upper_body)?;
-                let keeps_box = self.config.body == Body::FullBox;
-                (if keeps_box { region } else { upper_body }, position, covariance)
+                let image = match self.config.body {
+                    Body::FullBox => ImageBox::full_body(region),
+                    Body::Full | Body::Upper => ImageBox::upper_body(upper_body),
+                };
+                (image, position, covariance)
             }
             (None, None) => return None,
         };
-        let inside = region.clipped(camera.width, camera.height).area() > 0.0;
+        let inside = image.rect.clipped(camera.width, camera.height).area() > 0.0;
         let score = self.log_odds(recorded.score);
-        let detection = Detection { region, position, covariance, score, source: NAME };
+        let detection = Detection { image: Some(image), position, covariance, score, source: NAME };
         (inside && detection.is_sane()).then_some(detection)
     }
 
@@ -114,7 +117,7 @@ impl RecordedDetections {
 
     /// Returns a score of the fit of a detection to a track; `None` if it is not near.
     fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        let overlap = track.estimate.region.iou(&detection.region);
+        let overlap = detection.rect().map_or(0.0, |seen| track.estimate.region.iou(&seen));
         let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
         // The distance by size alone may be far off on the floor, so overlap is enough for such a
         // box.

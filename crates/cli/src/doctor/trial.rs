@@ -72,7 +72,7 @@ impl Trial {
 fn dropped(report: &FrameReport) -> BTreeMap<&'static str, Rect> {
     let examples = report.funnel.entries().iter().filter_map(|e| Some((e.test, e.example?)));
     let candidates = report.candidates.iter().filter_map(|candidate| match candidate.fate {
-        Fate::Dropped(test) => Some((test, candidate.detection.region)),
+        Fate::Dropped(test) => Some((test, candidate.detection.rect()?)),
         _ => None,
     });
     // Candidates come last and replace the funnel's example of the same test.

@@ -4,7 +4,6 @@
 use nalgebra::Matrix3;
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
-use tagalong_geometry::Rect;
 use tagalong_sim::{Scene, Split, Truth, Variant};
 use tagalong_trials::Draw;
 
@@ -115,7 +114,7 @@ fn take(
 ) -> Result<(), Failure> {
     let mut add = |at, example| {
         let candidate = Detection {
-            region: Rect::default(),
+            image: None,
             position: at,
             covariance: Matrix3::zeros(),
             score: 0.0,

@@ -14,7 +14,7 @@ use tagalong_core::{
     Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track, TrackId,
     Update, Verifier, WheelSpeeds,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
 use crate::{FrameReport, Pipeline};
 
@@ -43,7 +43,7 @@ pub fn frame(index: u64, t_s: f64) -> Frame {
 pub fn person(x: f64, y: f64) -> Detection {
     let position = Point3::new(x, y, 1.6);
     Detection {
-        region: camera().upper_body(&position),
+        image: Some(ImageBox::upper_body(camera().upper_body(&position))),
         position,
         covariance: Matrix3::identity() * 0.01,
         score: 1.0,
@@ -250,6 +250,10 @@ struct Odd {
 }
 
 impl Filter for Odd {
+    fn requires_image_box(&self) -> bool {
+        self.config.how == "boxes"
+    }
+
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
         assert!(self.config.how != "panic", "cannot start {id}");
         self.ids.insert(id);
