@@ -46,7 +46,7 @@ mod track;
 
 pub use associator::{Association, Associations, Associator, Gate};
 pub use command_history::CommandHistory;
-pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
+pub use control::{Command, Controller, Reason, Scene, Twist, WheelSpeeds};
 pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Query, ScoreCalibration, Verifier};
 pub use error::{Error, Result};

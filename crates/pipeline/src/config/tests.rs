@@ -295,8 +295,8 @@ fn seeds(run: u64) -> Vec<u64> {
 struct Still;
 
 impl tagalong_core::Controller for Still {
-    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::WheelSpeeds {
-        tagalong_core::WheelSpeeds::STOP
+    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::Twist {
+        tagalong_core::Twist::STOP
     }
 }
 

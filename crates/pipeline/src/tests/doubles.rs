@@ -12,7 +12,7 @@ use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
     EgoMotion, Error, Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs,
     Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track, TrackId,
-    Update, Verifier, WheelSpeeds,
+    Twist, Update, Verifier, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
@@ -314,12 +314,13 @@ impl Associator for Weighs {
 struct Drive(Config);
 
 impl Controller for Drive {
-    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
+    fn command(&mut self, scene: &Scene<'_>) -> Twist {
+        let wheels = |left, right| scene.wheels.twist(WheelSpeeds { left, right });
         match self.0.how.as_str() {
             "panic at 21" if scene.frame.index == 21 => panic!("which way?"),
-            "nan" => WheelSpeeds { left: f64::NAN, right: 0.0 },
+            "nan" => wheels(f64::NAN, 0.0),
             "panic" => panic!("which way?"),
-            _ => WheelSpeeds { left: 2.0, right: 4.0 },
+            _ => wheels(2.0, 4.0),
         }
     }
 
