@@ -104,8 +104,8 @@ fn speeds_are_bounded(subject: &Subject<'_>) -> Verdict {
 fn mirrored_target(subject: &Subject<'_>) -> Verdict {
     for (x, y) in [(1.0, 0.2), (2.0, 0.4), (3.5, -1.0), (0.8, 1.5), (-1.0, 0.5), (2.0, 0.0)] {
         let drawn = open_space(1, &[Figure::at(x, y)]);
-        let there = steady(subject, drawn.images().clone(), (x, y), 0.3)?;
-        let mirror = steady(subject, mirrored(drawn.images()), (x, -y), -0.3)?;
+        let there = steady(subject, drawn.images(), (x, y), 0.3)?;
+        let mirror = steady(subject, mirrored(&drawn.images()), (x, -y), -0.3)?;
         let error = (there.left - mirror.right).abs().max((there.right - mirror.left).abs());
         demand(error < 1e-6, || {
             format!("target ({x}, {y}): {there:?}, its mirror image: {mirror:?}")

@@ -79,7 +79,7 @@ struct Dropped {
 impl<'a> FrameImages<'a> {
     fn of(frame: &'a Frame) -> Result<Self> {
         let integral = frame.derived::<Integral>()?;
-        Ok(Self { integral, depth: frame.images().depth.as_deref(), camera: &frame.camera })
+        Ok(Self { integral, depth: frame.depth().ok(), camera: &frame.camera })
     }
 
     /// Expected depth of a track's face, m, where there are depths to compare.

@@ -46,7 +46,7 @@ impl FaceRgbd {
     fn search(&mut self, frame: &Frame, near: Option<Rect>, funnel: &mut Funnel) -> Result<()> {
         let Self { config, cascade, scanner, proposals, hits, .. } = self;
         let camera = &*frame.camera;
-        let depth = frame.images().depth.as_deref().filter(|_| config.depth_proposals);
+        let depth = frame.depth().ok().filter(|_| config.depth_proposals);
         let image = frame.grey()?;
         if let Some(depth) = depth {
             let [points, possible, searched] = proposals.sample(frame, depth, config);
@@ -125,7 +125,7 @@ impl Detector for FaceRgbd {
         };
         self.search(frame, near, funnel)?;
         self.grouping.group(&self.hits, self.config.min_neighbours);
-        let depth = frame.images().depth.as_deref();
+        let depth = frame.depth().ok();
         let of = |group| self.detection(&frame.camera, depth, group);
         let mut found: Vec<Detection> = self.grouping.kept().iter().filter_map(of).collect();
         let all = found.len();

@@ -177,7 +177,7 @@ impl Detector for HogUpperBody {
     ) -> Result<Vec<Detection>> {
         let grey = frame.grey()?;
         let camera = &*frame.camera;
-        let depth = frame.images().depth.as_deref().filter(|_| self.config.depth_proposals);
+        let depth = frame.depth().ok().filter(|_| self.config.depth_proposals);
         let near = match search {
             Query::Track(track) => Some(track.estimate.region),
             Query::Discover { .. } => None,

@@ -88,7 +88,7 @@ impl RecordedDetections {
     /// image where that shows the face, otherwise from the size of the square.
     fn placed(&self, frame: &Frame, region: &Rect) -> Option<(Point3<f64>, Matrix3<f64>)> {
         let camera = &*frame.camera;
-        let measured = frame.images().depth.as_deref().and_then(|depth| face_depth(depth, region));
+        let measured = frame.depth().ok().and_then(|depth| face_depth(depth, region));
         let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / region.width;
         let (face_m, sigma_m) = match measured {
             Some(depth_m) => (depth_m, self.config.sigma_depth_m),

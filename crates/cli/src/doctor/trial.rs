@@ -85,7 +85,7 @@ const PART: f64 = 0.6;
 
 /// Returns the region of the image, enlarged or reduced to one size.
 fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
-    let image = background(frame.images())?;
+    let image = background(&frame.images())?;
     let scale = place.width.max(place.height) / (PART * SIDE_PX as f64);
     let centre = place.centre();
     let half = 0.5 * SIDE_PX as f64;

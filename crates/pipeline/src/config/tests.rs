@@ -66,7 +66,7 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         (plain("every = 0"), &["a.toml:4:9", "`every` must be at least 1"]),
         (plain("every = 2\noffset = 2"), &["a.toml:5:10", "2 is not below 2"]),
         (plain("roles = []"), &["a.toml:4:9", "`script` has no role"]),
-        (plain("roles = ['folow']"), &["a.toml:4:10", "did you mean `follow`?"]),
+        (plain("roles = ['trak']"), &["a.toml:4:10", "did you mean `track`?"]),
         (plain("roles = ['track']"), &["a.toml:2:1", "give one of [[detectors]] the role"]),
         (plain("roles = ['discover', 'weigh']"), &["a.toml:4:9", "cannot weigh scenes"]),
         (

@@ -48,7 +48,7 @@ fn a_detection_without_a_box_is_tracked_all_the_same() {
 
 #[test]
 fn a_filter_of_boxes_receives_no_detection_without_one() {
-    let config = PLAIN.replace("'steady'", "'odd'\nhow = 'boxes'");
+    let config = PLAIN.replace("'steady'", "'odd'\nconfig = { how = 'boxes' }");
     let boxless = Detection { image: None, ..person(5.0, 0.0) };
     let reports = World::of([vec![person(3.0, 0.0), boxless]]).run(&config, 1, 0.1);
     assert_eq!(ids(&reports[0]), [1]);
@@ -317,7 +317,7 @@ fn nobody_looks_for_a_person_behind_one_who_was_found() {
 
 #[test]
 fn a_follower_that_looks_elsewhere_is_gated() {
-    let config = FOLLOWING.replace("'follow']", "'follow']\nconfig = { how = 'far' }");
+    let config = FOLLOWING.replace("'track']", "'track']\nconfig = { how = 'far' }");
     let world = World::of([vec![person(3.0, 0.0)], vec![person(3.0, 0.0), person(4.5, 1.0)]]);
     let report = world.run(&config, 2, 0.1).remove(1);
     assert_eq!(report.funnel.count("gate"), 1);
