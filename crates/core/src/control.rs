@@ -152,6 +152,20 @@ pub struct Scene<'a> {
 }
 
 /// Steers the robot after the target. It cannot fail: when unsure, it stops.
+///
+/// ```
+/// # use tagalong_core::{Controller, Scene, Twist};
+/// /// Turns to face the target and never drives.
+/// struct Facing;
+///
+/// impl Controller for Facing {
+///     fn command(&mut self, scene: &Scene<'_>) -> Twist {
+///         let Some(target) = scene.target else { return Twist::STOP };
+///         let place = target.estimate.person.position;
+///         Twist::new(0.0, 0.5 * place.y.atan2(place.x))
+///     }
+/// }
+/// ```
 pub trait Controller: Send {
     /// Returns the inputs that the controller itself uses. The command limiter, which checks obstacles for
     /// all controllers, declares its own.

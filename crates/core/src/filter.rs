@@ -91,6 +91,58 @@ pub struct Update {
 
 /// Estimates the states of **all** people at once, so that a joint filter needs no special
 /// interface. Filters of one person are adapted by [`PerPerson`].
+///
+/// ```
+/// # use std::collections::BTreeMap;
+/// # use nalgebra::{Point3, SMatrix, Vector2};
+/// # use tagalong_core::*;
+/// # use tagalong_geometry::Camera;
+/// /// Keeps each person where the last detection was.
+/// #[derive(Default)]
+/// struct LastSeen(BTreeMap<TrackId, Point3<f64>>);
+///
+/// impl Filter for LastSeen {
+///     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
+///         self.0.insert(id, detection.position);
+///     }
+///
+///     fn predict(&mut self, motion: &EgoMotion, _: &Camera) {
+///         for position in self.0.values_mut() {
+///             let floor = motion.apply_to_point(position.xy());
+///             *position = Point3::new(floor.x, floor.y, position.z);
+///         }
+///     }
+///
+///     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
+///         let seen = evidence.best_matches().into_iter();
+///         let update = |(id, detection): (TrackId, &Detection)| {
+///             self.0.insert(id, detection.position);
+///             (id, Update::default())
+///         };
+///         Ok(seen.map(update).collect())
+///     }
+///
+///     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
+///         let estimate = |position: &Point3<f64>| Estimate {
+///             person: Person { position: *position, velocity: Vector2::zeros() },
+///             covariance: SMatrix::identity(),
+///             region: camera.upper_body(position),
+///         };
+///         self.0.iter().map(|(id, position)| (*id, estimate(position))).collect()
+///     }
+///
+///     fn stop(&mut self, id: TrackId) {
+///         self.0.remove(&id);
+///     }
+/// }
+///
+/// # let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), nalgebra::Matrix3::identity());
+/// # let seen = Detection { image: None, position, covariance, score: 1.0, source: "example" };
+/// let (mut filter, camera) = (LastSeen::default(), Camera::blind());
+/// filter.start(TrackId(1), &seen, &camera);
+/// filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) }, &camera);
+/// assert_eq!(filter.estimates(&camera)[&TrackId(1)].person.position.x, 1.5);
+/// ```
 pub trait Filter: Send {
     /// Returns the inputs that the filter itself uses; most leave images to detectors.
     fn inputs(&self) -> Inputs {

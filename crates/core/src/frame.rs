@@ -56,6 +56,26 @@ fn beside(left: &Camera, image: &RightImage) -> Arc<Camera> {
 }
 
 /// Data computed from a frame and shared by several plugins; see [`Frame::derived`].
+///
+/// ```
+/// # use tagalong_core::*;
+/// # use tagalong_geometry::Camera;
+/// /// Distance of the nearest point of the laser scan, m.
+/// struct Clearance(f64);
+///
+/// impl Derived for Clearance {
+///     fn derive(frame: &Frame) -> Result<Self> {
+///         let ranges = frame.scan()?.points.iter().map(|point| point.coords.norm());
+///         Ok(Self(ranges.fold(f64::INFINITY, f64::min)))
+///     }
+/// }
+///
+/// let sensors = Sensors::default().with(LaserScan::of_points([[3.0, 4.0, 0.0].into()]));
+/// let (blind, motion) = (Camera::blind().into(), EgoMotion::at_rest(0.1));
+/// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
+/// assert_eq!(frame.derived::<Clearance>()?.0, 5.0);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Derived: Send + Sync + Sized + 'static {
     /// Computes the data.
     ///
