@@ -89,6 +89,19 @@ pub struct Update {
     pub nis: Option<(f64, u32)>,
 }
 
+/// The declaration of a filter: the data that it uses. A pipeline that lacks them is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct FilterRequirements {
+    /// The inputs that the filter itself uses; most filters leave images to detectors.
+    pub inputs: Inputs,
+    /// True if it uses detections with a box in the image alone. The tracker drops the others, as
+    /// "no image box".
+    pub image_box: bool,
+    /// True if it requires a [`Likelihood`]. It then weighs each frame itself: a track that it does
+    /// not support was searched for, whether or not a detector ran.
+    pub likelihood: bool,
+}
+
 /// Estimates the states of **all** people at once, so that a joint filter needs no special
 /// interface. Filters of one person are adapted by [`PerPerson`].
 ///
@@ -144,15 +157,9 @@ pub struct Update {
 /// assert_eq!(filter.estimates(&camera)[&TrackId(1)].person.position.x, 1.5);
 /// ```
 pub trait Filter: Send {
-    /// Returns the inputs that the filter itself uses; most leave images to detectors.
-    fn inputs(&self) -> Inputs {
-        Inputs::NONE
-    }
-
-    /// Returns true if the filter uses detections with a box in the image alone. The tracker then
-    /// drops the others, as "no image box".
-    fn requires_image_box(&self) -> bool {
-        false
+    /// Returns the requirements of the filter with its settings; most filters have none.
+    fn requirements(&self) -> FilterRequirements {
+        FilterRequirements::default()
     }
 
     /// Starts the state of a new track. `id` is new.
@@ -182,11 +189,6 @@ pub trait Filter: Send {
     fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
         let _ = evidence;
         Ok(Sketch::default())
-    }
-
-    /// Returns true if the filter requires a [`Likelihood`]; checked when the pipeline is built.
-    fn weighs_scenes(&self) -> bool {
-        false
     }
 }
 
@@ -379,7 +381,7 @@ mod tests {
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.0)]);
         filter.stop(TrackId(1));
         assert_eq!(places(&filter), [(2, 4.0)]);
-        assert!(!filter.weighs_scenes());
+        assert_eq!(filter.requirements(), FilterRequirements::default());
         assert_eq!(filter.sketch(&evidence), Ok(Sketch::default()));
     }
 

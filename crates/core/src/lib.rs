@@ -52,7 +52,10 @@ pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Query, ScoreCalibration, Verifier};
 pub use error::{Error, Result};
 pub use external::ExternalDetection;
-pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Update};
+pub use filter::{
+    Estimate, Evidence, Filter, FilterRequirements, Matched, PerPerson, Person, PersonFilter,
+    Update,
+};
 pub use frame::{Derived, Frame, Images};
 pub use funnel::{Dropped, Funnel};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};

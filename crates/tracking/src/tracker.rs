@@ -81,7 +81,7 @@ impl Tracker {
     /// Creates a tracker without tracks.
     pub fn new(parts: Parts, settings: TrackerSettings) -> Self {
         let Parts { preprocessors, detectors, verifiers, associator, filter, manager } = parts;
-        let requires_box = filter.plugin().requires_image_box();
+        let requires_box = filter.plugin().requirements().image_box;
         Self {
             clock: Clock::new(settings.clock.clone()),
             settings,
@@ -501,7 +501,7 @@ impl Tracker {
     /// Returns true if the detector that found the track last, or the filter itself, processed this
     /// frame. A frame on which a detector does not run is no miss for its tracks.
     fn was_searched(&self, due: &[usize], id: TrackId) -> bool {
-        let by_filter = self.filter.plugin().weighs_scenes();
+        let by_filter = self.filter.plugin().requirements().likelihood;
         by_filter || self.table.detector(id).is_none_or(|detector| due.contains(&detector))
     }
 

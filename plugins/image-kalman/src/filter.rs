@@ -1,6 +1,8 @@
 use std::collections::BTreeMap;
 
-use tagalong_core::{Detection, EgoMotion, Estimate, Evidence, Filter, Result, TrackId, Update};
+use tagalong_core::{
+    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Result, TrackId, Update,
+};
 use tagalong_geometry::Camera;
 
 use crate::{Config, State};
@@ -25,8 +27,8 @@ impl ImageKalman {
 impl Filter for ImageKalman {
     /// The state is that of a box; a box invented from a position would be counted as evidence
     /// beside the position.
-    fn requires_image_box(&self) -> bool {
-        true
+    fn requirements(&self) -> FilterRequirements {
+        FilterRequirements { image_box: true, ..FilterRequirements::default() }
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {

@@ -2,8 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Detection, EgoMotion, Estimate, Evidence, Filter, Input, Inputs, Person, Result, Sketch,
-    TrackId, Update,
+    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Input, Inputs, Person,
+    Result, Sketch, TrackId, Update,
 };
 use tagalong_geometry::Camera;
 
@@ -188,8 +188,9 @@ fn ids(group: &Group) -> BTreeSet<TrackId> {
 }
 
 impl Filter for JointParticle {
-    fn inputs(&self) -> Inputs {
-        Inputs::NONE.accept(Input::Colour)
+    fn requirements(&self) -> FilterRequirements {
+        let inputs = Inputs::NONE.accept(Input::Colour);
+        FilterRequirements { inputs, likelihood: true, image_box: false }
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
@@ -267,10 +268,6 @@ impl Filter for JointParticle {
         self.headings.remove(&id);
         self.unfound_s.remove(&id);
         self.wardrobe.forget(id);
-    }
-
-    fn weighs_scenes(&self) -> bool {
-        true
     }
 }
 

@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
 use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
-    EgoMotion, Error, Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs,
-    Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track, TrackId,
-    Twist, Update, Verifier, WheelSpeeds,
+    EgoMotion, Error, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images,
+    Input, Inputs, Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track,
+    TrackId, Twist, Update, Verifier, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
@@ -250,8 +250,10 @@ struct Odd {
 }
 
 impl Filter for Odd {
-    fn requires_image_box(&self) -> bool {
-        self.config.how == "boxes"
+    fn requirements(&self) -> FilterRequirements {
+        let how = self.config.how.as_str();
+        let (image_box, likelihood) = (how == "boxes", how == "weighs");
+        FilterRequirements { inputs: Inputs::NONE, image_box, likelihood }
     }
 
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
@@ -284,10 +286,6 @@ impl Filter for Odd {
 
     fn stop(&mut self, id: TrackId) {
         self.ids.remove(&id);
-    }
-
-    fn weighs_scenes(&self) -> bool {
-        self.config.how == "weighs"
     }
 }
 
