@@ -22,6 +22,7 @@ pub enum Query<'a> {
 ///
 /// ```
 /// # use tagalong_core::*;
+/// # use nalgebra::Isometry3;
 /// # use tagalong_geometry::Camera;
 /// /// Takes the nearest point of the laser scan for a person.
 /// struct Nearest;
@@ -43,7 +44,7 @@ pub enum Query<'a> {
 /// }
 ///
 /// let scan = LaserScan::of_points([[2.0, 0.0, 0.3].into(), [1.0, 0.5, 0.3].into()]);
-/// let (blind, motion) = (Camera::blind().into(), EgoMotion::at_rest(0.1));
+/// let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
 /// let sensors = Sensors::default().with(scan);
 /// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
 /// let query = Query::Discover { occupied: &[] };
@@ -97,6 +98,7 @@ pub trait Detector: Send {
 ///
 /// ```
 /// # use tagalong_core::*;
+/// # use nalgebra::Isometry3;
 /// # use tagalong_geometry::Camera;
 /// /// Prefers scenes whose people stand where the laser scan has points.
 /// struct AtPoints;
@@ -113,7 +115,7 @@ pub trait Detector: Send {
 /// }
 ///
 /// let sensors = Sensors::default().with(LaserScan::of_points([[2.0, 0.1, 0.3].into()]));
-/// let (blind, motion) = (Camera::blind().into(), EgoMotion::at_rest(0.1));
+/// let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
 /// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
 /// let person = |x| Person { position: [x, 0.0, 1.6].into(), velocity: nalgebra::zero() };
 /// let mut weights = Vec::new();

@@ -107,7 +107,7 @@ pub struct FilterRequirements {
 ///
 /// ```
 /// # use std::collections::BTreeMap;
-/// # use nalgebra::{Point3, SMatrix, Vector2};
+/// # use nalgebra::{Isometry3, Point3, SMatrix, Vector2};
 /// # use tagalong_core::*;
 /// # use tagalong_geometry::Camera;
 /// /// Keeps each person where the last detection was.
@@ -151,7 +151,7 @@ pub struct FilterRequirements {
 ///
 /// # let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), nalgebra::Matrix3::identity());
 /// # let seen = Detection { image: None, position, covariance, score: 1.0, source: "example" };
-/// let (mut filter, camera) = (LastSeen::default(), Camera::blind());
+/// let (mut filter, camera) = (LastSeen::default(), Camera::blind(Isometry3::identity()));
 /// filter.start(TrackId(1), &seen, &camera);
 /// filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) }, &camera);
 /// assert_eq!(filter.estimates(&camera)[&TrackId(1)].person.position.x, 1.5);

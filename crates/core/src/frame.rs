@@ -59,6 +59,7 @@ fn beside(left: &Camera, image: &RightImage) -> Arc<Camera> {
 ///
 /// ```
 /// # use tagalong_core::*;
+/// # use nalgebra::Isometry3;
 /// # use tagalong_geometry::Camera;
 /// /// Distance of the nearest point of the laser scan, m.
 /// struct Clearance(f64);
@@ -71,7 +72,7 @@ fn beside(left: &Camera, image: &RightImage) -> Arc<Camera> {
 /// }
 ///
 /// let sensors = Sensors::default().with(LaserScan::of_points([[3.0, 4.0, 0.0].into()]));
-/// let (blind, motion) = (Camera::blind().into(), EgoMotion::at_rest(0.1));
+/// let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
 /// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
 /// assert_eq!(frame.derived::<Clearance>()?.0, 5.0);
 /// # Ok::<(), Error>(())

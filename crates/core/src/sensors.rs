@@ -13,6 +13,7 @@ use crate::{DepthImage, ExternalDetection, GreyImage, Input, Inputs, LaserScan, 
 ///
 /// ```
 /// # use tagalong_core::{EgoMotion, Frame, Input, Inputs, Sensor, Sensors, Stamp};
+/// # use nalgebra::Isometry3;
 /// # use tagalong_geometry::Camera;
 /// /// Distances by a radar, m.
 /// struct Radar(Vec<f64>);
@@ -22,7 +23,7 @@ use crate::{DepthImage, ExternalDetection, GreyImage, Input, Inputs, LaserScan, 
 /// }
 ///
 /// let sensors = Sensors::default().with(Radar(vec![2.5]));
-/// let blind = Camera::blind().into();
+/// let blind = Camera::blind(Isometry3::identity()).into();
 /// let frame = Frame::of_sensors(1, Stamp::default(), blind, EgoMotion::at_rest(0.0), sensors);
 /// assert_eq!(frame.sensor::<Radar>()?.0, [2.5]);
 /// // A pipeline whose plugins do not declare the input works on a frame without it.

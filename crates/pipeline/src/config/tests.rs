@@ -75,7 +75,7 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         ),
         (
             plain("roles = ['discover', 'track']\nconfig = { how = 'discover' }"),
-            &["a.toml:4:9", "cannot find a tracked person again: remove the role follow"],
+            &["a.toml:4:9", "cannot find a tracked person again: remove the role track"],
         ),
         (own("without = ['dept']"), &["a.toml:1:12", "did you mean `depth`?"]),
         (
