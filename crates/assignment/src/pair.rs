@@ -62,7 +62,8 @@ impl PairCost {
         match self.cost {
             Cost::Mahalanobis => self.mahalanobis(track, detection, dt_s),
             Cost::Overlap => {
-                let overlap = overlap(&track.estimate.region, &detection.region, self.overlap);
+                let seen = detection.rect()?;
+                let overlap = overlap(&track.estimate.region, &seen, self.overlap);
                 let fits = overlap >= self.min_overlap;
                 fits.then(|| Fit { cost: -overlap.ln(), log_volume: 0.0 })
             }
@@ -130,7 +131,7 @@ mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
     use proptest::prelude::*;
     use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
     use super::*;
 
@@ -164,7 +165,9 @@ mod tests {
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let position = Point3::new(x, y, 1.6);
         Detection {
-            region: Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            image: Some(ImageBox::upper_body(
+                Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            )),
             position,
             covariance: Matrix3::identity() * 0.01,
             score: 1.0,
@@ -285,13 +288,22 @@ mod tests {
         track.estimate.region = Rect::new(0.0, 0.0, 10.0, 10.0);
         let cost = |x: f64| {
             let region = Rect::new(x, 0.0, 10.0, 10.0);
-            fit(&track, &Detection { region, ..person(9.0, 9.0) }, 0.1, &settings).map(|f| f.cost)
+            fit(
+                &track,
+                &Detection { image: Some(ImageBox::upper_body(region)), ..person(9.0, 9.0) },
+                0.1,
+                &settings,
+            )
+            .map(|f| f.cost)
         };
         assert_eq!(cost(0.0), Some(0.0));
         assert!((cost(5.0).unwrap() - 3.0_f64.ln()).abs() < 1e-12, "a third");
         assert_eq!(cost(5.5), None, "less than 0.3");
         let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
-        let detection = Detection { region: Rect::new(5.0, 0.0, 10.0, 10.0), ..person(3.0, 0.0) };
+        let detection = Detection {
+            image: Some(ImageBox::upper_body(Rect::new(5.0, 0.0, 10.0, 10.0))),
+            ..person(3.0, 0.0)
+        };
         let given = |miss_factor: f64| {
             let (tracks, seen) = (std::slice::from_ref(&track), std::slice::from_ref(&detection));
             associate(tracks, seen, fit, (&settings, miss_factor))

@@ -322,7 +322,7 @@ fn illustrate(ready: &Ready, stored: &mut [Stored]) -> Result<(), String> {
         if item.frame.index > last {
             break;
         }
-        wanted.cut(item.frame.index, item.frame.images(), stored);
+        wanted.cut(item.frame.index, &item.frame.images(), stored);
     }
     Ok(())
 }

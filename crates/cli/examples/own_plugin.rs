@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{FaceDepth, PointEstimate, Rect};
+use tagalong_geometry::{FaceDepth, ImageBox, PointEstimate, Rect};
 
 fn main() -> ExitCode {
     tagalong_cli::main_with(|registry| {
@@ -73,7 +73,13 @@ impl Detector for NearestThing {
         let region = Rect::new(left, bounds.y - 0.025 * scale, side, side);
         let face = FaceDepth { depth_m, sigma_m: 0.05 };
         let PointEstimate { position, covariance } = frame.camera.locate_head(&region, face, 3.0);
-        Ok(vec![Detection { region, position, covariance, score: 2.0, source: "nearest-thing" }])
+        Ok(vec![Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position,
+            covariance,
+            score: 2.0,
+            source: "nearest-thing",
+        }])
     }
 }
 

@@ -594,8 +594,8 @@ mod tests {
     }
 
     impl Controller for Idle {
-        fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::WheelSpeeds {
-            tagalong_core::WheelSpeeds::STOP
+        fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::Twist {
+            tagalong_core::Twist::STOP
         }
     }
 

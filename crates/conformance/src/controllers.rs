@@ -1,7 +1,7 @@
 //! Checks of controllers.
 
 use nalgebra::{Point3, Vector2};
-use tagalong_core::{Controller, Frame, Images, Scene, Track, WheelSpeeds};
+use tagalong_core::{Controller, Frame, Images, Scene, Track, Twist, WheelSpeeds};
 
 use crate::figure::{Figure, World};
 use crate::scenes::{bare_frame, frame, level, mirrored, odd_frames, track};
@@ -18,16 +18,17 @@ pub(crate) const CHECKS: &[Check] = &[
 
 const MAX_SPEED_MPS: f64 = 0.9;
 
-fn command(controller: &mut dyn Controller, frame: &Frame, target: Option<&Track>) -> WheelSpeeds {
+fn command(controller: &mut dyn Controller, frame: &Frame, target: Option<&Track>) -> Twist {
     let tracks = target.map_or(&[][..], std::slice::from_ref);
     let scene = Scene { frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_SPEED_MPS };
     controller.command(&scene)
 }
 
-fn bounded(speeds: WheelSpeeds, scene: &str) -> Verdict {
+fn bounded(twist: Twist, scene: &str) -> Verdict {
     let fits = |speed: f64| speed.is_finite() && speed.abs() <= MAX_SPEED_MPS * (1.0 + 1e-9);
-    demand(fits(speeds.left) && fits(speeds.right), || {
-        format!("{speeds:?} with a limit of {MAX_SPEED_MPS} m/s, {scene}")
+    let rim = twist.angular_rps * WHEELS.half_separation_m;
+    demand(fits(twist.linear_mps) && fits(twist.lateral_mps) && fits(rim), || {
+        format!("{twist:?} with a limit of {MAX_SPEED_MPS} m/s, {scene}")
     })
 }
 
@@ -58,7 +59,7 @@ fn open_space(index: u64, people: &[Figure]) -> Frame {
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {
     let frame = open_space(1, &[Figure::at(2.0, 0.4)]);
-    let drive = |from| -> Result<Vec<WheelSpeeds>, String> {
+    let drive = |from| -> Result<Vec<Twist>, String> {
         let controller = &mut *subject.controller(from)?;
         let steps = (0..10).map(|i| target(2.0 + 0.1 * f64::from(i), 0.4, Vector2::new(1.0, 0.0)));
         Ok(steps.map(|t| command(controller, &frame, Some(&t))).collect())
@@ -77,8 +78,8 @@ fn no_target_means_stop(subject: &Subject<'_>) -> Verdict {
         if lead.is_some() {
             command(controller, &frame, lead);
         }
-        let speeds = command(controller, &frame, None);
-        demand(speeds == WheelSpeeds::STOP, || format!("without a target it drives {speeds:?}"))?;
+        let twist = command(controller, &frame, None);
+        demand(twist == Twist::STOP, || format!("without a target it drives {twist:?}"))?;
     }
     Ok(())
 }
@@ -103,8 +104,8 @@ fn speeds_are_bounded(subject: &Subject<'_>) -> Verdict {
 fn mirrored_target(subject: &Subject<'_>) -> Verdict {
     for (x, y) in [(1.0, 0.2), (2.0, 0.4), (3.5, -1.0), (0.8, 1.5), (-1.0, 0.5), (2.0, 0.0)] {
         let drawn = open_space(1, &[Figure::at(x, y)]);
-        let there = steady(subject, drawn.images().clone(), (x, y), 0.3)?;
-        let mirror = steady(subject, mirrored(drawn.images()), (x, -y), -0.3)?;
+        let there = steady(subject, drawn.images(), (x, y), 0.3)?;
+        let mirror = steady(subject, mirrored(&drawn.images()), (x, -y), -0.3)?;
         let error = (there.left - mirror.right).abs().max((there.right - mirror.left).abs());
         demand(error < 1e-6, || {
             format!("target ({x}, {y}): {there:?}, its mirror image: {mirror:?}")
@@ -125,7 +126,8 @@ fn steady(
     let mut speeds = WheelSpeeds::STOP;
     for index in 1..=5 {
         let frame = frame(index, &level(), images.clone());
-        speeds = command(controller, &frame, Some(&ahead));
+        let twist = command(controller, &frame, Some(&ahead));
+        speeds = WHEELS.wheels_within(twist, MAX_SPEED_MPS);
     }
     Ok(speeds)
 }

@@ -227,7 +227,8 @@ fn all_detections(subject: &Subject<'_>) -> Result<Vec<(Arc<Camera>, Detection)>
 
 fn regions_are_in_the_image(subject: &Subject<'_>) -> Verdict {
     for (camera, detection) in all_detections(subject)? {
-        let region = detection.region;
+        // A detection without a box, like that of a laser scan, says nothing about the image.
+        let Some(region) = detection.rect() else { continue };
         let inside = region.clipped(camera.width, camera.height).area();
         // Upper-body squares are amodal and may exceed the image, but not without limit.
         let amodal = 4.0 * (camera.width * camera.height) as f64;
@@ -319,7 +320,7 @@ fn is_at(found: &Detection, figure: &Figure, camera: &Camera) -> Verdict {
         format!("the head is at {:.2}, found at {:.2}", figure.head, found.position)
     })?;
     let truth = camera.upper_body(&figure.head).clipped(camera.width, camera.height);
-    let iou = found.region.clipped(camera.width, camera.height).iou(&truth);
+    let iou = found.rect_in(camera).clipped(camera.width, camera.height).iou(&truth);
     demand(iou >= 0.5, || format!("the region overlaps the upper body by {iou:.2} only"))
 }
 

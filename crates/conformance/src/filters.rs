@@ -104,7 +104,7 @@ impl Run {
             frame: &frame,
             matched: &matched,
             unmatched: &[],
-            likelihood: self.filter.weighs_scenes().then_some(&oracle as &dyn Likelihood),
+            likelihood: self.filter.requirements().likelihood.then_some(&oracle as &dyn Likelihood),
         };
         let supported = self.filter.update(&evidence).map_err(|e| format!("update fails: {e}"))?;
         self.only_known_ids(&supported)?;
@@ -154,7 +154,7 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
             frame: &frame,
             matched: &[],
             unmatched: &[],
-            likelihood: run.filter.weighs_scenes().then_some(&oracle as &dyn Likelihood),
+            likelihood: run.filter.requirements().likelihood.then_some(&oracle as &dyn Likelihood),
         };
         run.filter.update(&evidence).map_err(|e| format!("the {name} frame is an error: {e}"))?;
         for (id, estimate) in run.filter.estimates(&frame.camera) {
@@ -298,7 +298,7 @@ fn ids_never_mix(subject: &Subject<'_>) -> Verdict {
         let supported = run.step(seen)?;
         let missing = seen.iter().find(|(id, _)| !supported.contains_key(&TrackId(*id)));
         // A filter that weighs scenes finds its evidence in the image, not in the detections.
-        demand(missing.is_none() || run.filter.weighs_scenes(), || {
+        demand(missing.is_none() || run.filter.requirements().likelihood, || {
             format!("its own sighting does not support track {:?}", missing.map(|(id, _)| id))
         })?;
         let ids: Vec<TrackId> = run.estimates().into_keys().collect();

@@ -56,7 +56,7 @@ impl Run {
         let covariance = SMatrix::<f64, 5, 5>::identity() * 0.01;
         let track = Track {
             id,
-            estimate: Estimate { person, covariance, region: detection.region },
+            estimate: Estimate { person, covariance, region: detection.rect_in(&level()) },
             seen: true,
             occluded: false,
             confirmed: health.confirmed,

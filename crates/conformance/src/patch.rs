@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
 /// Renders a dark head above dark shoulders before a bright wall, or bars: 64x64, with noise from a
 /// seed.
@@ -36,7 +36,7 @@ pub fn frame(grey: GreyImage) -> Frame {
 /// Returns the candidate of that picture: 2 m ahead, of score 1.
 pub fn candidate() -> Detection {
     Detection {
-        region: Rect::new(8.0, 8.0, 48.0, 48.0),
+        image: Some(ImageBox::upper_body(Rect::new(8.0, 8.0, 48.0, 48.0))),
         position: Point3::new(2.0, 0.0, 1.6),
         covariance: Matrix3::identity(),
         score: 1.0,

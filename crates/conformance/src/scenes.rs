@@ -7,7 +7,7 @@ use tagalong_core::{
     DepthImage, Detection, EgoMotion, Estimate, Frame, Image, Images, Inputs, Person, RgbImage,
     RightImage, Stamp, Track, TrackId, Usage,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 use tagalong_stats::{RandomSource, SplitMix64};
 
 use crate::figure::{Figure, World};
@@ -134,7 +134,7 @@ pub(crate) fn sighting(
     let error = nalgebra::Vector3::from_fn(|_, _| sigma_m * random.normal());
     let position = head + error;
     Detection {
-        region: camera.upper_body(&position),
+        image: Some(ImageBox::upper_body(camera.upper_body(&position))),
         position,
         // Not less than 1 cm of standard deviation: filters invert the covariance.
         covariance: nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4),

@@ -1,7 +1,7 @@
 //! Checks of verifiers.
 
 use tagalong_core::{Detection, Error, Frame, Verifier};
-use tagalong_geometry::Rect;
+use tagalong_geometry::{ImageBox, Rect};
 use tagalong_stats::SplitMix64;
 
 use crate::figure::Figure;
@@ -24,16 +24,16 @@ fn margin(
     candidate: &Detection,
 ) -> Result<f64, String> {
     let outcome = verifier.log_odds(frame, candidate);
-    let margin = outcome.map_err(|error| format!("it fails on {:?}: {error}", candidate.region))?;
-    demand(margin.is_finite(), || format!("margin {margin} for {:?}", candidate.region))?;
+    let margin = outcome.map_err(|error| format!("it fails on {:?}: {error}", candidate.image))?;
+    demand(margin.is_finite(), || format!("margin {margin} for {:?}", candidate.image))?;
     Ok(margin)
 }
 
-/// Returns candidates on, beside and outside the person, and of odd sizes.
+/// Returns candidates on, beside and outside the person, of odd sizes, and without a box.
 fn candidates() -> Vec<Detection> {
     let figure = Figure::at(2.0, 0.1);
     let good = sighting(&figure.head, &level(), 0.02, &mut SplitMix64::new(1));
-    let r = good.region;
+    let r = good.rect_in(&level());
     let regions = [
         r,
         Rect::new(r.x + 90.0, r.y, r.width, r.height),
@@ -43,7 +43,8 @@ fn candidates() -> Vec<Detection> {
         Rect::new(-1e6, -1e6, 2e6, 2e6),
         Rect::new(600.0, 440.0, 200.0, 200.0),
     ];
-    regions.into_iter().map(|region| Detection { region, ..good.clone() }).collect()
+    let boxes = regions.into_iter().map(ImageBox::upper_body).map(Some).chain([None]);
+    boxes.map(|image| Detection { image, ..good.clone() }).collect()
 }
 
 fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {

@@ -16,10 +16,42 @@ impl WheelSpeeds {
     pub const STOP: Self = Self { left: 0.0, right: 0.0 };
 }
 
-/// Wheel speeds with a period of validity and a reason.
+/// Velocity of the robot over ground, in the robot frame.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Twist {
+    /// Speed forward, m/s.
+    pub linear_mps: f64,
+    /// Speed to the left, m/s; 0 for a differential drive, which cannot move sideways.
+    pub lateral_mps: f64,
+    /// Turn rate, rad/s, positive to the left.
+    pub angular_rps: f64,
+}
+
+impl Twist {
+    /// Robot at rest.
+    pub const STOP: Self = Self { linear_mps: 0.0, lateral_mps: 0.0, angular_rps: 0.0 };
+
+    /// Creates the twist of a robot that drives forward and turns.
+    pub const fn new(linear_mps: f64, angular_rps: f64) -> Self {
+        Self { linear_mps, lateral_mps: 0.0, angular_rps }
+    }
+
+    /// Returns the twist on the same arc at `by` times the speed.
+    pub fn scaled(self, by: f64) -> Self {
+        Self {
+            linear_mps: self.linear_mps * by,
+            lateral_mps: self.lateral_mps * by,
+            angular_rps: self.angular_rps * by,
+        }
+    }
+}
+
+/// Velocity to drive, with a period of validity and a reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
-    /// The speeds: finite and within the robot's limits.
+    /// The velocity: finite and within the robot's limits.
+    pub twist: Twist,
+    /// The wheel speeds of a differential drive with this velocity.
     pub wheels: WheelSpeeds,
     /// Capture time of the frame to which the command responds.
     pub stamp: Stamp,
@@ -120,6 +152,20 @@ pub struct Scene<'a> {
 }
 
 /// Steers the robot after the target. It cannot fail: when unsure, it stops.
+///
+/// ```
+/// # use tagalong_core::{Controller, Scene, Twist};
+/// /// Turns to face the target and never drives.
+/// struct Facing;
+///
+/// impl Controller for Facing {
+///     fn command(&mut self, scene: &Scene<'_>) -> Twist {
+///         let Some(target) = scene.target else { return Twist::STOP };
+///         let place = target.estimate.person.position;
+///         Twist::new(0.0, 0.5 * place.y.atan2(place.x))
+///     }
+/// }
+/// ```
 pub trait Controller: Send {
     /// Returns the inputs that the controller itself uses. The command limiter, which checks obstacles for
     /// all controllers, declares its own.
@@ -127,8 +173,10 @@ pub trait Controller: Send {
         Inputs::NONE
     }
 
-    /// Returns the wheel speeds to command now.
-    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds;
+    /// Returns the velocity to command now: neither the speed nor the speed of the wheels by the
+    /// turn alone is above the limit of the scene. What the wheels cannot drive of the two together
+    /// is scaled down later, on the same arc.
+    fn command(&mut self, scene: &Scene<'_>) -> Twist;
 
     /// Returns the distance at which the controller stops before the person, m, if it keeps one. A
     /// config is refused if the robot cannot stop within it.
@@ -178,8 +226,8 @@ mod tests {
     fn a_controller_keeps_no_distance_unless_it_says_so() {
         struct Still;
         impl Controller for Still {
-            fn command(&mut self, _: &Scene<'_>) -> WheelSpeeds {
-                WheelSpeeds::STOP
+            fn command(&mut self, _: &Scene<'_>) -> Twist {
+                Twist::STOP
             }
         }
         assert_eq!(Still.stand_off_m(), None);

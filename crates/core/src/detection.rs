@@ -1,12 +1,12 @@
 use nalgebra::{Matrix3, Point3};
 
-use tagalong_geometry::Rect;
+use tagalong_geometry::{Camera, ImageBox, Rect};
 
-/// One detection of a person: an image region and a position.
+/// One detection of a person: a position, and a box in the image if a camera made it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// Upper-body square in the image (see [`tagalong_geometry::Camera::upper_body`]).
-    pub region: Rect,
+    /// Box in the image; none from a detector that sees no image, like that of a laser scan.
+    pub image: Option<ImageBox>,
     /// Centre of the head in the robot frame, m.
     pub position: Point3<f64>,
     /// Covariance of the position, m². An unknown coordinate has a large variance.
@@ -19,9 +19,20 @@ pub struct Detection {
 }
 
 impl Detection {
+    /// Returns the rectangle of the box in the image, if there is one.
+    pub fn rect(&self) -> Option<Rect> {
+        self.image.map(|image| image.rect)
+    }
+
+    /// Returns the rectangle of the box in the image; without a box, the upper-body square at the
+    /// projection of the position.
+    pub fn rect_in(&self, camera: &Camera) -> Rect {
+        self.rect().unwrap_or_else(|| camera.upper_body(&self.position))
+    }
+
     /// Returns true if every number is finite and the covariance has no negative variance.
     pub fn is_sane(&self) -> bool {
-        self.region.is_sane()
+        self.image.is_none_or(|image| image.rect.is_sane())
             && self.position.iter().all(|v| v.is_finite())
             && self.covariance.iter().all(|v| v.is_finite())
             && self.covariance.diagonal().iter().all(|v| *v >= 0.0)
@@ -31,12 +42,33 @@ impl Detection {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_geometry::{Distortion, Pinhole};
+
     use super::*;
+
+    #[test]
+    fn without_a_box_the_position_is_projected() {
+        let lens = Pinhole { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 64, 48, 1.2, 0.0, 0.0);
+        let rect = Rect::new(1.0, 2.0, 3.0, 3.0);
+        let boxed = Detection {
+            image: Some(ImageBox::full_body(rect)),
+            position: Point3::new(3.0, 0.0, 1.6),
+            covariance: Matrix3::zeros(),
+            score: 0.5,
+            source: "test",
+        };
+        assert_eq!((boxed.rect(), boxed.rect_in(&camera)), (Some(rect), rect));
+        let scanned = Detection { image: None, ..boxed };
+        assert!(scanned.is_sane());
+        assert_eq!(scanned.rect(), None);
+        assert_eq!(scanned.rect_in(&camera), camera.upper_body(&scanned.position));
+    }
 
     #[test]
     fn every_number_of_a_detection_is_looked_at() {
         let fine = Detection {
-            region: Rect::new(1.0, 2.0, 3.0, 3.0),
+            image: Some(ImageBox::upper_body(Rect::new(1.0, 2.0, 3.0, 3.0))),
             position: Point3::new(3.0, 0.0, 1.6),
             covariance: Matrix3::zeros(),
             score: 0.5,
@@ -49,7 +81,10 @@ mod tests {
         let mut endless = Matrix3::identity();
         endless[(0, 1)] = f64::INFINITY;
         for broken in [
-            Detection { region: Rect::new(odd, 0.0, 1.0, 1.0), ..fine.clone() },
+            Detection {
+                image: Some(ImageBox::upper_body(Rect::new(odd, 0.0, 1.0, 1.0))),
+                ..fine.clone()
+            },
             Detection { position: Point3::new(0.0, odd, 0.0), ..fine.clone() },
             Detection { covariance: negative, ..fine.clone() },
             Detection { covariance: endless, ..fine.clone() },

@@ -19,6 +19,39 @@ pub enum Query<'a> {
 /// Performs one or more of three tasks on an image: finding new people (*discover*), finding a
 /// tracked person again (*follow*), and, through its [`Likelihood`], weighing a hypothetical scene
 /// against the image (*weigh*).
+///
+/// ```
+/// # use tagalong_core::*;
+/// # use nalgebra::Isometry3;
+/// # use tagalong_geometry::Camera;
+/// /// Takes the nearest point of the laser scan for a person.
+/// struct Nearest;
+///
+/// impl Detector for Nearest {
+///     fn capabilities(&self) -> Capabilities {
+///         let inputs = Inputs::NONE.require(Input::Laser);
+///         Capabilities { inputs, discovers: true, ..Capabilities::default() }
+///     }
+///
+///     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+///         let points = frame.scan()?.points.iter();
+///         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
+///         let covariance = nalgebra::Matrix3::identity() * 0.04;
+///         let (image, score, source) = (None, 1.0, "nearest");
+///         let found = nearest.map(|at| Detection { image, position: *at, covariance, score, source });
+///         Ok(found.into_iter().collect())
+///     }
+/// }
+///
+/// let scan = LaserScan::of_points([[2.0, 0.0, 0.3].into(), [1.0, 0.5, 0.3].into()]);
+/// let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
+/// let sensors = Sensors::default().with(scan);
+/// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
+/// let query = Query::Discover { occupied: &[] };
+/// let found = Nearest.detect(&frame, &query, &mut Funnel::default())?;
+/// assert_eq!(found[0].position.x, 1.0);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Detector: Send {
     /// Returns the inputs and the roles that the detector has with its settings. A frame holds no
     /// image that no plugin of the pipeline declares, and a config that gives a detector another
@@ -62,6 +95,34 @@ pub trait Detector: Send {
 }
 
 /// Weighs hypothetical scenes against an image (P3: overlapping silhouettes).
+///
+/// ```
+/// # use tagalong_core::*;
+/// # use nalgebra::Isometry3;
+/// # use tagalong_geometry::Camera;
+/// /// Prefers scenes whose people stand where the laser scan has points.
+/// struct AtPoints;
+///
+/// impl Likelihood for AtPoints {
+///     fn log_likelihood(&self, frame: &Frame, scene: &[Person]) -> Result<f64> {
+///         let points = &frame.scan()?.points;
+///         let is_hit = |person: &&Person| {
+///             points.iter().any(|point| (point - person.position).xy().norm() < 0.3)
+///         };
+///         let hits = scene.iter().filter(is_hit).count();
+///         Ok(2.0 * hits as f64 - scene.len() as f64)
+///     }
+/// }
+///
+/// let sensors = Sensors::default().with(LaserScan::of_points([[2.0, 0.1, 0.3].into()]));
+/// let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
+/// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
+/// let person = |x| Person { position: [x, 0.0, 1.6].into(), velocity: nalgebra::zero() };
+/// let mut weights = Vec::new();
+/// AtPoints.log_likelihoods(&frame, &[person(2.0), person(5.0)], 1, &mut weights)?;
+/// assert_eq!(weights, [1.0, -1.0]);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Likelihood: Send + Sync {
     /// Returns the log-likelihood ratio of the scene against the empty background. Nearer people
     /// occlude farther ones; the order of `scene` does not matter. The body of a person faces in
@@ -105,6 +166,23 @@ pub trait Likelihood: Send + Sync {
 }
 
 /// Verifies detections (P4, II-C: an SVM on the intensity patch).
+///
+/// ```
+/// # use tagalong_core::*;
+/// /// Doubts heads that are lower or higher than those of people who stand.
+/// struct Upright;
+///
+/// impl Verifier for Upright {
+///     fn inputs(&self) -> Inputs {
+///         Inputs::NONE
+///     }
+///
+///     fn log_odds(&mut self, _: &Frame, candidate: &Detection) -> Result<f64> {
+///         let is_upright = (1.2..2.0).contains(&candidate.position.z);
+///         Ok(if is_upright { 0.5 } else { -2.0 })
+///     }
+/// }
+/// ```
 pub trait Verifier: Send {
     /// Returns the inputs that the verifier uses with its settings; see [`Detector::capabilities`].
     fn inputs(&self) -> Inputs;
@@ -184,7 +262,7 @@ mod tests {
 
     fn seen(x: f64, y: f64, z: f64) -> Detection {
         Detection {
-            region: Rect::default(),
+            image: None,
             position: Point3::new(x, y, z),
             covariance: nalgebra::Matrix3::identity(),
             score: 1.0,

@@ -89,12 +89,77 @@ pub struct Update {
     pub nis: Option<(f64, u32)>,
 }
 
+/// The declaration of a filter: the data that it uses. A pipeline that lacks them is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct FilterRequirements {
+    /// The inputs that the filter itself uses; most filters leave images to detectors.
+    pub inputs: Inputs,
+    /// True if it uses detections with a box in the image alone. The tracker drops the others, as
+    /// "no image box".
+    pub image_box: bool,
+    /// True if it requires a [`Likelihood`]. It then weighs each frame itself: a track that it does
+    /// not support was searched for, whether or not a detector ran.
+    pub likelihood: bool,
+}
+
 /// Estimates the states of **all** people at once, so that a joint filter needs no special
 /// interface. Filters of one person are adapted by [`PerPerson`].
+///
+/// ```
+/// # use std::collections::BTreeMap;
+/// # use nalgebra::{Isometry3, Point3, SMatrix, Vector2};
+/// # use tagalong_core::*;
+/// # use tagalong_geometry::Camera;
+/// /// Keeps each person where the last detection was.
+/// #[derive(Default)]
+/// struct LastSeen(BTreeMap<TrackId, Point3<f64>>);
+///
+/// impl Filter for LastSeen {
+///     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
+///         self.0.insert(id, detection.position);
+///     }
+///
+///     fn predict(&mut self, motion: &EgoMotion, _: &Camera) {
+///         for position in self.0.values_mut() {
+///             let floor = motion.apply_to_point(position.xy());
+///             *position = Point3::new(floor.x, floor.y, position.z);
+///         }
+///     }
+///
+///     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
+///         let seen = evidence.best_matches().into_iter();
+///         let update = |(id, detection): (TrackId, &Detection)| {
+///             self.0.insert(id, detection.position);
+///             (id, Update::default())
+///         };
+///         Ok(seen.map(update).collect())
+///     }
+///
+///     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
+///         let estimate = |position: &Point3<f64>| Estimate {
+///             person: Person { position: *position, velocity: Vector2::zeros() },
+///             covariance: SMatrix::identity(),
+///             region: camera.upper_body(position),
+///         };
+///         self.0.iter().map(|(id, position)| (*id, estimate(position))).collect()
+///     }
+///
+///     fn stop(&mut self, id: TrackId) {
+///         self.0.remove(&id);
+///     }
+/// }
+///
+/// # let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), nalgebra::Matrix3::identity());
+/// # let seen = Detection { image: None, position, covariance, score: 1.0, source: "example" };
+/// let (mut filter, camera) = (LastSeen::default(), Camera::blind(Isometry3::identity()));
+/// filter.start(TrackId(1), &seen, &camera);
+/// filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) }, &camera);
+/// assert_eq!(filter.estimates(&camera)[&TrackId(1)].person.position.x, 1.5);
+/// ```
 pub trait Filter: Send {
-    /// Returns the inputs that the filter itself uses; most leave images to detectors.
-    fn inputs(&self) -> Inputs {
-        Inputs::NONE
+    /// Returns the requirements of the filter with its settings; most filters have none.
+    fn requirements(&self) -> FilterRequirements {
+        FilterRequirements::default()
     }
 
     /// Starts the state of a new track. `id` is new.
@@ -124,11 +189,6 @@ pub trait Filter: Send {
     fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
         let _ = evidence;
         Ok(Sketch::default())
-    }
-
-    /// Returns true if the filter requires a [`Likelihood`]; checked when the pipeline is built.
-    fn weighs_scenes(&self) -> bool {
-        false
     }
 }
 
@@ -295,8 +355,8 @@ mod tests {
 
     fn seen(x: f64) -> Detection {
         let position = Point3::new(x, 0.0, 1.6);
-        let (region, covariance) = (Rect::default(), Matrix3::identity());
-        Detection { region, position, covariance, score: 1.0, source: "test" }
+        let covariance = Matrix3::identity();
+        Detection { image: None, position, covariance, score: 1.0, source: "test" }
     }
 
     #[test]
@@ -321,7 +381,7 @@ mod tests {
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.0)]);
         filter.stop(TrackId(1));
         assert_eq!(places(&filter), [(2, 4.0)]);
-        assert!(!filter.weighs_scenes());
+        assert_eq!(filter.requirements(), FilterRequirements::default());
         assert_eq!(filter.sketch(&evidence), Ok(Sketch::default()));
     }
 

@@ -2,13 +2,15 @@ use std::any::{Any, TypeId};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::{
-    DepthImage, EgoMotion, Error, ExternalDetection, GreyImage, Input, Inputs, LaserScan, Result,
-    RgbImage, Stamp,
-};
+use nalgebra::Translation3;
 use tagalong_geometry::Camera;
 
-/// Images of one moment. All have the size of the camera's image, and show the same view unless the
+use crate::{
+    CameraImage, DepthImage, EgoMotion, Error, ExternalDetection, ExternalDetections, GreyImage,
+    Input, Inputs, LaserScan, Result, RgbImage, RightImage, Sensor, Sensors, Stamp,
+};
+
+/// Images of one moment and one camera. All have the size of the camera's image, and show the same view unless the
 /// name says otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct Images {
@@ -22,16 +24,59 @@ pub struct Images {
     pub right: Option<Arc<RightImage>>,
 }
 
-/// The right-hand image of a rectified stereo pair.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RightImage {
-    /// The image.
-    pub image: GreyImage,
-    /// Distance between the two cameras, m.
-    pub baseline_m: f64,
+impl Images {
+    /// Returns the images as data of sensors, with the camera that took them; the right camera of a
+    /// stereo pair is its copy beside it.
+    fn taken_by(self, camera: &Arc<Camera>) -> Sensors {
+        let Self { colour, grey, depth, right } = self;
+        let taken = |sensors: Sensors| match right {
+            Some(image) => sensors.with(CameraImage { camera: beside(camera, &image), image }),
+            None => sensors,
+        };
+        let sensors = with_image(Sensors::default(), colour, camera);
+        taken(with_image(with_image(sensors, grey, camera), depth, camera))
+    }
+}
+
+/// Adds an image to the sensors, if there is one.
+fn with_image<T>(sensors: Sensors, image: Option<Arc<T>>, camera: &Arc<Camera>) -> Sensors
+where
+    CameraImage<T>: Sensor,
+{
+    match image {
+        Some(image) => sensors.with(CameraImage { image, camera: Arc::clone(camera) }),
+        None => sensors,
+    }
+}
+
+/// Returns the right camera of a rectified stereo pair: the left one, moved along its image rows.
+fn beside(left: &Camera, image: &RightImage) -> Arc<Camera> {
+    let step = Translation3::new(image.baseline_m, 0.0, 0.0);
+    Arc::new(Camera { robot_from_camera: left.robot_from_camera * step, ..left.clone() })
 }
 
 /// Data computed from a frame and shared by several plugins; see [`Frame::derived`].
+///
+/// ```
+/// # use tagalong_core::*;
+/// # use nalgebra::Isometry3;
+/// # use tagalong_geometry::Camera;
+/// /// Distance of the nearest point of the laser scan, m.
+/// struct Clearance(f64);
+///
+/// impl Derived for Clearance {
+///     fn derive(frame: &Frame) -> Result<Self> {
+///         let ranges = frame.scan()?.points.iter().map(|point| point.coords.norm());
+///         Ok(Self(ranges.fold(f64::INFINITY, f64::min)))
+///     }
+/// }
+///
+/// let sensors = Sensors::default().with(LaserScan::of_points([[3.0, 4.0, 0.0].into()]));
+/// let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
+/// let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, sensors);
+/// assert_eq!(frame.derived::<Clearance>()?.0, 5.0);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Derived: Send + Sync + Sized + 'static {
     /// Computes the data.
     ///
@@ -43,27 +88,24 @@ pub trait Derived: Send + Sync + Sized + 'static {
 /// Derived data, or the error of their computation.
 type Slot = OnceLock<Result<Arc<dyn Any + Send + Sync>>>;
 
-/// One moment of a log: images or a laser scan, the camera, and the robot's motion since the
-/// previous frame. A frame is immutable; data that plugins derive from it are computed once, on
-/// first use.
+/// One moment of a log: the data of the sensors, and the robot's motion since the previous frame. A
+/// frame is immutable; data that plugins derive from it are computed once, on first use.
 pub struct Frame {
     /// 1-based index of the image in the log.
     pub index: u64,
     /// Capture time of the frame.
     pub stamp: Stamp,
-    /// The camera of all images; [`Camera::blind`] in a frame of a laser scan alone.
+    /// The camera to which boxes in the image refer; [`Camera::blind`] in a frame without images.
     pub camera: Arc<Camera>,
     /// The robot's motion since the previous frame.
     pub motion: EgoMotion,
-    images: Images,
-    recorded: Option<Vec<ExternalDetection>>,
-    laser: Option<LaserScan>,
+    sensors: Sensors,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
 }
 
 impl Frame {
-    /// Creates a frame without a laser scan and recorded detections.
+    /// Creates a frame of the images of its camera.
     pub fn new(
         index: u64,
         stamp: Stamp,
@@ -71,39 +113,65 @@ impl Frame {
         motion: EgoMotion,
         images: Images,
     ) -> Self {
-        Self {
-            index,
-            stamp,
-            camera,
-            motion,
-            images,
-            recorded: None,
-            laser: None,
-            grey: OnceLock::new(),
-            derived: Mutex::default(),
-        }
+        let sensors = images.taken_by(&camera);
+        Self::of_sensors(index, stamp, camera, motion, sensors)
     }
 
-    /// Returns the frame with the detections that an external detector recorded.
+    /// Creates a frame of the data of any sensors.
+    pub fn of_sensors(
+        index: u64,
+        stamp: Stamp,
+        camera: Arc<Camera>,
+        motion: EgoMotion,
+        sensors: Sensors,
+    ) -> Self {
+        let (grey, derived) = (OnceLock::new(), Mutex::default());
+        Self { index, stamp, camera, motion, sensors, grey, derived }
+    }
+
+    /// Returns the frame with the data of one more sensor, in place of data of the same type.
+    pub fn with_sensor<S: Sensor>(self, sensor: S) -> Self {
+        self.of_same_moment(self.sensors.clone().with(sensor))
+    }
+
+    /// Returns the data of a sensor.
+    ///
+    /// # Errors
+    /// [`Error::MissingImage`] if the frame carries none.
+    pub fn sensor<S: Sensor>(&self) -> Result<&S> {
+        self.sensors.get().ok_or(Error::MissingImage { input: S::INPUT })
+    }
+
+    /// Returns the data of all sensors.
+    pub fn sensors(&self) -> &Sensors {
+        &self.sensors
+    }
+
+    /// Returns the frame with the detections that an external detector recorded, if any.
     pub fn with_recorded(self, recorded: Option<Vec<ExternalDetection>>) -> Self {
-        Self { recorded, ..self }
+        let Some(detections) = recorded else { return self };
+        let camera = Arc::clone(&self.camera);
+        self.with_sensor(ExternalDetections { detections, camera })
     }
 
     /// Returns the detections that an external detector recorded; `None` if no topic is configured
     /// for them (`[input] detections_topic`).
     pub fn recorded(&self) -> Option<&[ExternalDetection]> {
-        self.recorded.as_deref()
+        self.sensors.get::<ExternalDetections>().map(|recorded| &recorded.detections[..])
     }
 
-    /// Returns the frame with a laser scan.
+    /// Returns the frame with a laser scan, if there is one.
     pub fn with_laser(self, laser: Option<LaserScan>) -> Self {
-        Self { laser, ..self }
+        match laser {
+            Some(scan) => self.with_sensor(scan),
+            None => self,
+        }
     }
 
     /// Returns the laser scan, in the robot frame at the time of the frame; `None` without a
     /// scanner, or if it delivered no scan.
     pub fn laser(&self) -> Option<&LaserScan> {
-        self.laser.as_ref()
+        self.sensors.get()
     }
 
     /// Returns the laser scan, for plugins that require one.
@@ -111,56 +179,38 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] if the log carries none.
     pub fn scan(&self) -> Result<&LaserScan> {
-        self.laser.as_ref().ok_or(Error::MissingImage { input: Input::Laser })
+        self.sensor()
     }
 
     /// Returns the same moment with a depth image. Derived data are not copied.
     pub fn with_depth(&self, depth: Arc<DepthImage>) -> Self {
-        let images = Images { depth: Some(depth), ..self.images.clone() };
-        let camera = Arc::clone(&self.camera);
-        let frame = Self::new(self.index, self.stamp, camera, self.motion, images);
-        let (recorded, laser) = (self.recorded.clone(), self.laser.clone());
+        let taken = CameraImage { image: depth, camera: Arc::clone(&self.camera) };
+        let frame = self.of_same_moment(self.sensors.clone().with(taken));
         // Derived data may depend on the depth image and are left behind; the grey image does not.
-        Self { recorded, laser, grey: self.grey.clone(), ..frame }
+        Self { grey: self.grey.clone(), ..frame }
     }
 
     /// Returns true if the frame holds this input.
     pub fn holds(&self, input: Input) -> bool {
-        let Images { colour, grey, depth, right } = &self.images;
-        match input {
-            Input::Colour => colour.is_some() || grey.is_some(),
-            Input::Depth => depth.is_some(),
-            Input::Right => right.is_some(),
-            Input::Laser => self.laser.is_some(),
-            Input::Detections => self.recorded.is_some(),
-        }
+        self.sensors.holds(input)
     }
 
     /// Returns the same moment with the declared inputs alone; `None` if it holds no others. Images
     /// are shared, not copied.
     pub fn restricted_to(&self, inputs: &Inputs) -> Option<Self> {
-        if Input::ALL.into_iter().all(|input| inputs.uses(input) || !self.holds(input)) {
-            return None;
-        }
-        let Images { colour, grey, depth, right } = &self.images;
         // The new frame starts without derived data, which may stem from the withheld inputs.
-        let uses = |input| inputs.uses(input).then_some(());
-        let images = Images {
-            colour: uses(Input::Colour).and_then(|()| colour.clone()),
-            grey: uses(Input::Colour).and_then(|()| grey.clone()),
-            depth: uses(Input::Depth).and_then(|()| depth.clone()),
-            right: uses(Input::Right).and_then(|()| right.clone()),
-        };
-        let camera = Arc::clone(&self.camera);
-        let frame = Self::new(self.index, self.stamp, camera, self.motion, images);
-        let laser = uses(Input::Laser).and_then(|()| self.laser.clone());
-        let recorded = uses(Input::Detections).and_then(|()| self.recorded.clone());
-        Some(frame.with_laser(laser).with_recorded(recorded))
+        let restricted = || self.of_same_moment(self.sensors.restricted_to(inputs));
+        (!self.sensors.are_within(inputs)).then(restricted)
     }
 
     /// Returns the images of the log.
-    pub fn images(&self) -> &Images {
-        &self.images
+    pub fn images(&self) -> Images {
+        Images {
+            colour: self.image().map(Arc::clone),
+            grey: self.image().map(Arc::clone),
+            depth: self.image().map(Arc::clone),
+            right: self.image().map(Arc::clone),
+        }
     }
 
     /// Returns the colour image.
@@ -168,7 +218,7 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] if the log carries none.
     pub fn colour(&self) -> Result<&RgbImage> {
-        self.images.colour.as_deref().ok_or(Error::MissingImage { input: Input::Colour })
+        self.required_image()
     }
 
     /// Returns the depth image: metres along the optical axis, NaN = no reading.
@@ -176,7 +226,7 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] if the log carries none.
     pub fn depth(&self) -> Result<&DepthImage> {
-        self.images.depth.as_deref().ok_or(Error::MissingImage { input: Input::Depth })
+        self.required_image()
     }
 
     /// Returns the right image of a stereo pair.
@@ -184,7 +234,7 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] if the log carries none.
     pub fn right(&self) -> Result<&RightImage> {
-        self.images.right.as_deref().ok_or(Error::MissingImage { input: Input::Right })
+        self.required_image()
     }
 
     /// Returns the intensity image, converted from colour if the log carries only that.
@@ -192,11 +242,10 @@ impl Frame {
     /// # Errors
     /// [`Error::MissingImage`] if the log carries neither.
     pub fn grey(&self) -> Result<&GreyImage> {
-        if let Some(grey) = &self.images.grey {
+        if let Some(grey) = self.image::<GreyImage>() {
             return Ok(grey);
         }
-        let missing = Error::MissingImage { input: Input::Colour };
-        let colour = self.images.colour.as_ref().ok_or(missing)?;
+        let colour = self.colour()?;
         Ok(self.grey.get_or_init(|| Arc::new(colour.to_grey())))
     }
 
@@ -214,6 +263,28 @@ impl Frame {
         };
         let shared = slot.get_or_init(|| Ok(Arc::new(T::derive(self)?))).clone()?;
         shared.downcast::<T>().map_err(|_| Error::Other("a derived image changed its type".into()))
+    }
+
+    /// Returns a frame of the same moment with other sensors, without derived data.
+    fn of_same_moment(&self, sensors: Sensors) -> Self {
+        let camera = Arc::clone(&self.camera);
+        Self::of_sensors(self.index, self.stamp, camera, self.motion, sensors)
+    }
+
+    /// Returns the image of a kind, if the frame carries one.
+    fn image<T: 'static>(&self) -> Option<&Arc<T>>
+    where
+        CameraImage<T>: Sensor,
+    {
+        self.sensors.get::<CameraImage<T>>().map(|taken| &taken.image)
+    }
+
+    /// Returns the image of a kind.
+    fn required_image<T: 'static>(&self) -> Result<&T>
+    where
+        CameraImage<T>: Sensor,
+    {
+        self.sensor::<CameraImage<T>>().map(|taken| &*taken.image)
     }
 }
 

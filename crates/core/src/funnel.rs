@@ -1,5 +1,7 @@
 use tagalong_geometry::Rect;
 
+use crate::Detection;
+
 /// Number of candidates that one test dropped, with one example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dropped {
@@ -24,6 +26,11 @@ impl Funnel {
     /// Records one dropped candidate and its region.
     pub fn drop_at(&mut self, test: &'static str, region: Rect) {
         self.add(test, 1, Some(region));
+    }
+
+    /// Records one dropped detection, with its rectangle if it has a box in the image.
+    pub fn drop_detection(&mut self, test: &'static str, detection: &Detection) {
+        self.add(test, 1, detection.rect());
     }
 
     /// Records `count` dropped candidates.

@@ -5,12 +5,12 @@
 //! [`Associator`] assigns them to [`Track`]s, a [`Filter`] estimates their states, a
 //! [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of them.
 //!
-//! # Why a detection has a region and a position
+//! # Why a detection has a position, and a box if a camera made it
 //!
-//! A detection is an image region *and* a position in the robot frame. Stereo, RGB-D and panorama
-//! cameras therefore share one interface, and a filter may work in pixels or in metres. The
-//! [`Camera`] converts between them. An unknown coordinate (the height of a person in a panorama)
-//! has a large variance; no field is ever missing.
+//! A detection is a position in the robot frame, with a box in the image if a camera made it.
+//! Stereo, RGB-D and panorama cameras and laser scanners therefore share one interface, and a
+//! filter may work in pixels or in metres. The [`tagalong_geometry::Camera`] converts between
+//! them. An unknown coordinate (the height of a person in a panorama) has a large variance.
 //!
 //! # Conventions
 //!
@@ -40,19 +40,23 @@ mod manager;
 mod mixture;
 mod motion;
 mod scan;
+mod sensors;
 mod sketch;
 mod time;
 mod track;
 
 pub use associator::{Association, Associations, Associator, Gate};
 pub use command_history::CommandHistory;
-pub use control::{Command, Controller, Reason, Scene, WheelSpeeds};
+pub use control::{Command, Controller, Reason, Scene, Twist, WheelSpeeds};
 pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Query, ScoreCalibration, Verifier};
 pub use error::{Error, Result};
 pub use external::ExternalDetection;
-pub use filter::{Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter, Update};
-pub use frame::{Derived, Frame, Images, RightImage};
+pub use filter::{
+    Estimate, Evidence, Filter, FilterRequirements, Matched, PerPerson, Person, PersonFilter,
+    Update,
+};
+pub use frame::{Derived, Frame, Images};
 pub use funnel::{Dropped, Funnel};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use inputs::{Capabilities, Input, Inputs, Usage};
@@ -62,6 +66,7 @@ pub use manager::{
 pub use mixture::match_moments;
 pub use motion::{DiffDrive, EgoMotion, planar_pose};
 pub use scan::LaserScan;
+pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

@@ -1,3 +1,4 @@
+use crate::{Twist, WheelSpeeds};
 use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Vector2, Vector3};
 
 /// Motion of the robot between two image stamps, in its frame at the first.
@@ -22,6 +23,28 @@ pub struct DiffDrive {
     pub half_separation_m: f64,
     /// Slip: standard deviation of a wheel's travel as a fraction of it.
     pub slip: f64,
+}
+
+impl DiffDrive {
+    /// Returns the twist of the robot at these wheel speeds.
+    pub fn twist(&self, WheelSpeeds { left, right }: WheelSpeeds) -> Twist {
+        Twist::new(0.5 * (left + right), 0.5 * (right - left) / self.half_separation_m)
+    }
+
+    /// Returns the wheel speeds of a twist, without its lateral part.
+    pub fn wheels(&self, twist: Twist) -> WheelSpeeds {
+        let rim = twist.angular_rps * self.half_separation_m;
+        WheelSpeeds { left: twist.linear_mps - rim, right: twist.linear_mps + rim }
+    }
+
+    /// Returns the wheel speeds of a twist, on the same arc no faster than `max_mps` for each
+    /// wheel.
+    pub fn wheels_within(&self, twist: Twist, max_mps: f64) -> WheelSpeeds {
+        let rim = twist.angular_rps * self.half_separation_m;
+        let scale = max_mps / (twist.linear_mps.abs() + rim.abs()).max(max_mps);
+        let WheelSpeeds { left, right } = self.wheels(twist);
+        WheelSpeeds { left: left * scale, right: right * scale }
+    }
 }
 
 impl EgoMotion {
@@ -122,6 +145,26 @@ mod tests {
     fn equal_speeds_drive_straight() {
         let motion = EgoMotion::from_wheels(0.5, 0.5, &WHEELS, 0.1);
         assert_eq!((motion.forward, motion.left, motion.turn), (0.05, 0.0, 0.0));
+    }
+
+    #[test]
+    fn a_twist_and_its_wheels_are_the_same_motion() {
+        let twist = Twist::new(0.5, -1.0);
+        let wheels = WHEELS.wheels(twist);
+        assert!((wheels.left - 0.667).abs() < 1e-12 && (wheels.right - 0.333).abs() < 1e-12);
+        let back = WHEELS.twist(wheels);
+        assert!((back.linear_mps - 0.5).abs() < 1e-12 && (back.angular_rps + 1.0).abs() < 1e-12);
+        assert_eq!(WHEELS.wheels(Twist { lateral_mps: 0.3, ..twist }), wheels);
+    }
+
+    #[test]
+    fn twists_beyond_the_wheels_are_driven_slower_on_the_same_arc() {
+        let fast = Twist::new(0.9, 0.9 / WHEELS.half_separation_m);
+        let limited = WHEELS.wheels_within(fast, 0.9);
+        assert!(limited.left.abs() < 1e-12 && (limited.right - 0.9).abs() < 1e-12, "{limited:?}");
+        let slow = Twist::new(0.3, 0.5);
+        assert_eq!(WHEELS.wheels_within(slow, 0.9), WHEELS.wheels(slow));
+        assert_eq!(WHEELS.wheels_within(fast.scaled(0.5), 0.9), WHEELS.wheels(fast.scaled(0.5)));
     }
 
     proptest! {

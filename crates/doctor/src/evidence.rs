@@ -74,18 +74,18 @@ impl Samples {
         self.camera.get_or_insert_with(|| Arc::clone(&frame.camera));
         let grey = frame.grey().ok();
         self.exposures.extend(grey.map(Exposure::of));
-        let Some(depth) = &frame.images().depth else { return };
+        let Some(depth) = frame.images().depth else { return };
         if self.depths.len() < KEPT_DEPTHS {
-            self.depths.push(Arc::clone(depth));
+            self.depths.push(Arc::clone(&depth));
         }
         // Edges and floor are measured in pinhole images only.
         if frame.camera.panorama().is_some() {
             return;
         }
         if let Some(grey) = grey {
-            self.overlap.add(grey, depth);
+            self.overlap.add(grey, &depth);
         }
-        let floor = ground_of_depth(depth, &frame.camera, &GroundSettings::default());
+        let floor = ground_of_depth(&depth, &frame.camera, &GroundSettings::default());
         self.floors.extend(floor.map(|floor| (floor, Arc::clone(&frame.camera))));
     }
 }

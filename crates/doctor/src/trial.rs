@@ -71,7 +71,7 @@ impl Trial {
 fn dropped(report: &FrameReport) -> BTreeMap<&'static str, Rect> {
     let examples = report.funnel.entries().iter().filter_map(|e| Some((e.test, e.example?)));
     let candidates = report.candidates.iter().filter_map(|candidate| match candidate.fate {
-        Fate::Dropped(test) => Some((test, candidate.detection.region)),
+        Fate::Dropped(test) => Some((test, candidate.detection.rect()?)),
         _ => None,
     });
     // Candidates come last and replace the funnel's example of the same test.
@@ -84,7 +84,7 @@ const PART: f64 = 0.6;
 
 /// Returns the region of the image, enlarged or reduced to one size.
 fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
-    let image = background(frame.images())?;
+    let image = background(&frame.images())?;
     let scale = place.width.max(place.height) / (PART * SIDE_PX as f64);
     let centre = place.centre();
     let half = 0.5 * SIDE_PX as f64;

@@ -1,5 +1,5 @@
 use tagalong_core::{
-    Command, Controller, EgoMotion, Frame, Inputs, Reason, Scene, Stamp, Track, TrackId,
+    Command, Controller, EgoMotion, Frame, Inputs, Reason, Scene, Stamp, Track, TrackId, Twist,
     WheelSpeeds,
 };
 use tagalong_tracking::{Guarded, StepError};
@@ -116,8 +116,8 @@ impl Steering {
         let lock = self.lock.update(frame, motion, tracks, settled);
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);
-        let wheels = self.ask(frame, tracks, target)?;
-        let (wheels, aim) = self.aim(wheels, tracks);
+        let twist = self.ask(frame, tracks, target)?;
+        let (wheels, aim) = self.aim(twist, tracks);
         let wish = Wish {
             wheels,
             stamp: frame.stamp,
@@ -146,7 +146,7 @@ impl Steering {
         frame: &Frame,
         tracks: &[Track],
         target: Option<&Track>,
-    ) -> Result<WheelSpeeds, StepError> {
+    ) -> Result<Twist, StepError> {
         // A controller plans around people; a tentative track may be noise.
         let confirmed: Vec<Track> = tracks.iter().filter(|t| t.confirmed).cloned().collect();
         let scene = Scene {
@@ -161,25 +161,26 @@ impl Steering {
 
     /// Chooses the wheel speeds and their purpose: the controller's wish while a target is
     /// followed, the search's while it is lost.
-    fn aim(&mut self, wheels: WheelSpeeds, tracks: &[Track]) -> (WheelSpeeds, Aim) {
+    fn aim(&mut self, twist: Twist, tracks: &[Track]) -> (WheelSpeeds, Aim) {
         match self.lock.state() {
             LockState::Initial => (WheelSpeeds::STOP, Aim::Nobody),
             LockState::Lost => match self.look_for(tracks) {
-                Some(wheels) => (wheels, Aim::Search),
+                Some(twist) => (self.robot.wheels().wheels(twist), Aim::Search),
                 None => (WheelSpeeds::STOP, Aim::Nobody),
             },
             state => {
                 self.search = Search::default();
+                let wheels = self.robot.wheels().wheels_within(twist, self.robot.max_speed_mps);
                 (wheels, if state.doubts() { Aim::Perhaps } else { Aim::Person })
             }
         }
     }
 
-    fn look_for(&mut self, tracks: &[Track]) -> Option<WheelSpeeds> {
+    fn look_for(&mut self, tracks: &[Track]) -> Option<Twist> {
         let last = self.lock.last_seen()?;
-        let (lost_s, wheels) = (self.lock.since_s(), self.robot.wheels());
+        let lost_s = self.lock.since_s();
         let candidate = self.lock.candidate(tracks);
-        self.search.wish(&self.search_settings, last, candidate, lost_s, &wheels)
+        self.search.wish(&self.search_settings, last, candidate, lost_s)
     }
 
     /// Counts a frame; returns true once enough frames were processed since the last reset.

@@ -12,7 +12,7 @@ mod rect;
 pub use camera::{Camera, Distortion, Lens, Pinhole};
 pub use locate::{FaceDepth, PointEstimate};
 pub use panorama::{ConicalMirror, Panorama};
-pub use rect::Rect;
+pub use rect::{Extent, ImageBox, Rect};
 
 /// Distance from the visible surface of a head to its centre, in metres.
 ///

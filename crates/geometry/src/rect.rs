@@ -103,6 +103,37 @@ impl Rect {
     }
 }
 
+/// Part of a person that a box encloses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extent {
+    /// Head and shoulders: the square of [`crate::Camera::upper_body`].
+    UpperBody,
+    /// The whole person, from head to feet.
+    FullBody,
+}
+
+/// Box of a person in an image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ImageBox {
+    /// The rectangle, pixels.
+    pub rect: Rect,
+    /// Part of the person that the rectangle encloses.
+    pub extent: Extent,
+}
+
+impl ImageBox {
+    /// Creates the box of head and shoulders.
+    pub const fn upper_body(rect: Rect) -> Self {
+        Self { rect, extent: Extent::UpperBody }
+    }
+
+    /// Creates the box of a whole person.
+    pub const fn full_body(rect: Rect) -> Self {
+        Self { rect, extent: Extent::FullBody }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -157,7 +157,7 @@ impl Pipeline {
             .iter()
             .map(|slot| (&*slot.settings.plugin, slot.plugin.plugin().capabilities().inputs))
             .chain(verifiers.iter().map(|verifier| (verifier.name(), verifier.plugin().inputs())))
-            .chain([(filter.name(), filter.plugin().inputs())])
+            .chain([(filter.name(), filter.plugin().requirements().inputs)])
             .chain(steering.as_ref().map(Steering::inputs))
             .collect();
         let without_span = root.get("without").map(Spanned::span);
@@ -483,7 +483,7 @@ fn check_weighing(
 ) -> Result<(), ConfigError> {
     let weighs = |slot: &DetectorSlot| slot.settings.roles.contains(&Role::Weigh);
     // A filter that weighs scenes would have no measurement without such a detector.
-    if !filter.plugin().weighs_scenes() || detectors.iter().any(weighs) {
+    if !filter.plugin().requirements().likelihood || detectors.iter().any(weighs) {
         return Ok(());
     }
     let message = format!(

@@ -99,7 +99,7 @@ fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
 fn draw_rejected(canvas: &mut Canvas, scene: &OverlayData) {
     for candidate in &scene.report.candidates {
         if let Fate::Dropped(test) = candidate.fate {
-            label(canvas, &candidate.detection.region, test);
+            label(canvas, &candidate.detection.rect_in(&scene.camera), test);
         }
     }
     // A funnel entry without a visible candidate is shown once, with its count.

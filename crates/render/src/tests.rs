@@ -3,7 +3,7 @@ use tagalong_core::{
     DepthImage, Detection, Estimate, Person, Silhouette, Sketch, SketchMap, SketchPoint, Stamp,
     Track, TrackId,
 };
-use tagalong_geometry::{Distortion, Pinhole, Rect};
+use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 use tagalong_pipeline::{Candidate, Fate};
 
 use super::canvas::LINE_PX;
@@ -77,7 +77,7 @@ fn a_person_shows_in_the_image_and_from_above() {
 #[test]
 fn what_was_dropped_is_drawn_too() {
     let detection = Detection {
-        region: Rect::new(20.0, 150.0, 60.0, 60.0),
+        image: Some(ImageBox::upper_body(Rect::new(20.0, 150.0, 60.0, 60.0))),
         position: Point3::new(4.0, 1.0, 1.0),
         covariance: nalgebra::Matrix3::identity(),
         score: -1.0,

@@ -167,7 +167,7 @@ impl DetectionSet {
         let candidate = |pending: PendingDetection| {
             let fate = pending.fate.unwrap_or(Fate::Dropped("score"));
             if let Fate::Dropped(test) = fate {
-                funnel.drop_at(test, pending.detection.region);
+                funnel.drop_detection(test, &pending.detection);
             }
             Candidate { detection: pending.detection, fate }
         };
@@ -190,7 +190,8 @@ fn is_same_person(a: &Detection, b: &Detection, settings: &MergeSettings) -> boo
     let spread = (a.covariance + b.covariance).fixed_view::<2, 2>(0, 0).into_owned();
     let contradicts =
         spread.cholesky().is_none_or(|s| apart.dot(&s.solve(&apart)) > CHI_SQUARED_2_99);
-    !contradicts && a.region.iou(&b.region) > settings.same_person_iou
+    let overlap = a.rect().zip(b.rect()).map_or(0.0, |(a, b)| a.iou(&b));
+    !contradicts && overlap > settings.same_person_iou
 }
 
 /// 99 % point of chi-squared with two degrees of freedom.
@@ -200,7 +201,7 @@ const CHI_SQUARED_2_99: f64 = 9.21;
 mod tests {
     use nalgebra::{Matrix3, Point3};
     use tagalong_core::Association;
-    use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -209,7 +210,9 @@ mod tests {
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let position = Point3::new(x, y, 1.6);
         Detection {
-            region: Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            image: Some(ImageBox::upper_body(
+                Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            )),
             position,
             covariance: Matrix3::identity() * 0.01,
             score: 1.0,
@@ -221,7 +224,7 @@ mod tests {
     fn two_people_one_behind_the_other_are_two_unless_their_range_is_unknown() {
         let settings = MergeSettings::default();
         let (near, far) = (person(3.0, 0.0), person(3.6, 0.0));
-        assert!(near.region.iou(&far.region) > settings.same_person_iou);
+        assert!(near.rect().unwrap().iou(&far.rect().unwrap()) > settings.same_person_iou);
         assert!(!is_same_person(&near, &far, &settings));
         let vague = |d: Detection| Detection { covariance: Matrix3::identity() * 4.0, ..d };
         assert!(is_same_person(&vague(near), &vague(far), &settings));
@@ -232,7 +235,11 @@ mod tests {
         let settings = MergeSettings::default();
         let at = |x: f64, y: f64, region_x: f64| {
             let region = Rect::new(region_x, 0.0, 100.0, 100.0);
-            Detection { region, covariance: Matrix3::identity() * 0.02, ..person(x, y) }
+            Detection {
+                image: Some(ImageBox::upper_body(region)),
+                covariance: Matrix3::identity() * 0.02,
+                ..person(x, y)
+            }
         };
         let first = at(3.0, 0.0, 0.0);
         assert!(is_same_person(&first, &at(3.0, 0.24, 500.0), &settings));

@@ -32,6 +32,7 @@ mod clock;
 mod detections;
 mod duplicates;
 mod guarded;
+mod half_hidden;
 mod memo;
 mod occlusion;
 mod preprocess;

@@ -34,7 +34,7 @@ pub(crate) enum Visibility {
 impl Occluder {
     /// Creates the occluder of a detection.
     pub(crate) fn of(seen: &Detection, camera: &Camera) -> Self {
-        Self::new(seen.region, &seen.position, &seen.covariance, camera)
+        Self::new(seen.rect_in(camera), &seen.position, &seen.covariance, camera)
     }
 
     /// Returns the occluder at the expected position instead, if the detector gave the direction
@@ -64,7 +64,7 @@ pub(crate) fn range_m(position: &Point3<f64>, camera: &Camera) -> f64 {
 }
 
 /// Returns the vector from the camera to a point in the robot frame, m.
-fn ray(position: &Point3<f64>, camera: &Camera) -> Vector3<f64> {
+pub(crate) fn ray(position: &Point3<f64>, camera: &Camera) -> Vector3<f64> {
     position.coords - camera.robot_from_camera.translation.vector
 }
 
@@ -104,22 +104,6 @@ pub(crate) fn part_shown(
 ) -> f64 {
     let Shown { inside, visible, .. } = shown(region, position, occluders, camera, settings);
     if inside > 0 { f64::from(visible) / f64::from(inside) } else { 1.0 }
-}
-
-/// Returns the covariance, in the robot frame, m², of the lateral error of a half-hidden person:
-/// the detection occluders the visible half, and its middle is off by up to half the width of the
-/// hidden part. Without it, a filter takes on the velocity of the person that passes in front.
-pub(crate) fn lateral_covariance(
-    part_shown: f64,
-    position: &Point3<f64>,
-    camera: &Camera,
-    settings: &OcclusionSettings,
-) -> Matrix3<f64> {
-    let ray = ray(position, camera);
-    // A person straight above the camera has no lateral direction; the covariance is then zero.
-    let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
-    let off = across * (0.5 * settings.body_width_m * (1.0 - part_shown));
-    off * off.transpose()
 }
 
 /// Visible part of a silhouette, in samples.
@@ -276,18 +260,6 @@ mod tests {
         let aside = Point3::new(-4.0, 0.5, 1.5);
         assert!(camera.upper_body(&aside).x < 40.0);
         assert_eq!(seen(Point3::new(-2.0, 0.18, 1.5), aside), Visibility::Hidden);
-    }
-
-    #[test]
-    fn who_is_half_hidden_may_stand_aside_and_not_nearer() {
-        let settings = OcclusionSettings { body_width_m: 0.5, ..OcclusionSettings::default() };
-        let of = |part| lateral_covariance(part, &Point3::new(3.0, 0.0, 1.6), &camera(), &settings);
-        assert_eq!(of(1.0), Matrix3::zeros());
-        let off = of(0.4);
-        assert!((off[(1, 1)].sqrt() - 0.15).abs() < 1e-12, "{off}");
-        assert_eq!((off[(0, 0)], off[(2, 2)]), (0.0, 0.0));
-        let left = lateral_covariance(0.4, &Point3::new(0.0, 3.0, 1.6), &camera(), &settings);
-        assert!((left[(0, 0)].sqrt() - 0.15).abs() < 1e-12 && left[(1, 1)] == 0.0, "{left}");
     }
 
     #[test]

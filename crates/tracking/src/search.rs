@@ -34,6 +34,8 @@ impl DetectorSlot {
 pub(crate) struct SearchStage {
     pub(crate) detectors: Vec<DetectorSlot>,
     pub(crate) verifiers: Vec<Guarded<dyn Verifier>>,
+    /// True if the filter uses detections with a box in the image alone.
+    pub(crate) requires_box: bool,
     /// Identities of the plugins if their results are shared with other pipelines.
     pub(crate) shared: Option<Identities>,
 }
@@ -107,6 +109,10 @@ impl SearchStage {
                 funnel.drop_many("detection not finite", 1);
                 continue;
             }
+            if self.requires_box && detection.image.is_none() {
+                funnel.drop_many("no image box", 1);
+                continue;
+            }
             let pending = PendingDetection::new(detection, index, discovered);
             if self.detectors[index].settings.verify {
                 passed.extend(self.verify(frame, pending, funnel)?);
@@ -135,7 +141,7 @@ impl SearchStage {
             })?;
         }
         if !sum.is_finite() {
-            funnel.drop_at("verifier not finite", pending.detection.region);
+            funnel.drop_detection("verifier not finite", &pending.detection);
             return Ok(None);
         }
         pending.detection.score = (pending.detection.score + sum).clamp(-CERTAIN, CERTAIN);

@@ -11,10 +11,10 @@ use tagalong_core::{
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
+use crate::half_hidden::inflate_half_hidden;
 use crate::memo::Identities;
 use crate::occlusion::{
-    Occluder, Visibility, lateral_covariance, occluder_of_detection, occluder_of_estimate,
-    part_shown, visibility,
+    Occluder, Visibility, occluder_of_detection, occluder_of_estimate, visibility,
 };
 use crate::preprocess::preprocess;
 use crate::search::SearchStage;
@@ -81,11 +81,12 @@ impl Tracker {
     /// Creates a tracker without tracks.
     pub fn new(parts: Parts, settings: TrackerSettings) -> Self {
         let Parts { preprocessors, detectors, verifiers, associator, filter, manager } = parts;
+        let requires_box = filter.plugin().requirements().image_box;
         Self {
             clock: Clock::new(settings.clock.clone()),
             settings,
             preprocessors,
-            search: SearchStage { detectors, verifiers, shared: None },
+            search: SearchStage { detectors, verifiers, requires_box, shared: None },
             associator,
             filter,
             manager,
@@ -123,6 +124,7 @@ impl Tracker {
         self.search_image(frame, &due, &mut detections, &mut log)?;
         log.timed(STAGES[3], ());
         self.associate(frame, &predicted, &gate, &mut detections, &mut log)?;
+        inflate_half_hidden(frame, &predicted, &mut detections, &self.settings.occlusion);
         log.timed(STAGES[4], ());
         let posterior = self.update(frame, &mut detections, &mut report, &mut log)?;
         let posterior = log.timed(STAGES[5], posterior);
@@ -296,31 +298,7 @@ impl Tracker {
         let impossible = remove_impossible(&mut answer, predicted, &found, gate);
         log.funnel.drop_many("association not possible", impossible);
         detections.take_over(&answer, predicted, &open);
-        self.inflate_occluded(frame, predicted, detections);
         Ok(())
-    }
-
-    /// Increases the covariances of detections of half-hidden people.
-    fn inflate_occluded(&self, frame: &Frame, predicted: &[Track], detections: &mut DetectionSet) {
-        let settings = &self.settings.occlusion;
-        if settings.body_width_m == 0.0 {
-            return;
-        }
-        let camera = &frame.camera;
-        let mut occluders: Vec<Occluder> = Vec::new();
-        for track in predicted {
-            let Estimate { region, person, .. } = &track.estimate;
-            let part = part_shown(region, &person.position, &occluders, camera, settings);
-            let inflate = |found: &mut Detection| {
-                found.covariance += lateral_covariance(part, &found.position, camera, settings);
-            };
-            match detections.change_of_track(track.id, inflate) {
-                Some(found) => occluders.push(occluder_of_detection(found, &track.estimate, frame)),
-                // A confirmed track still hides the people behind it when it is missed.
-                None => occluders
-                    .extend(track.confirmed.then(|| occluder_of_estimate(&track.estimate, frame))),
-            }
-        }
     }
 
     /// Updates the filter with the evidence of the frame.
@@ -523,7 +501,7 @@ impl Tracker {
     /// Returns true if the detector that found the track last, or the filter itself, processed this
     /// frame. A frame on which a detector does not run is no miss for its tracks.
     fn was_searched(&self, due: &[usize], id: TrackId) -> bool {
-        let by_filter = self.filter.plugin().weighs_scenes();
+        let by_filter = self.filter.plugin().requirements().likelihood;
         by_filter || self.table.detector(id).is_none_or(|detector| due.contains(&detector))
     }
 

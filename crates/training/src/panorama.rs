@@ -6,7 +6,6 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::threads::threads;
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
-use tagalong_geometry::Rect;
 use tagalong_sim::{Scene, Split, Truth, Variant};
 use tagalong_trials::Draw;
 
@@ -116,7 +115,7 @@ fn take(
 ) -> Result<(), Failure> {
     let mut add = |at, example| {
         let candidate = Detection {
-            region: Rect::default(),
+            image: None,
             position: at,
             covariance: Matrix3::zeros(),
             score: 0.0,

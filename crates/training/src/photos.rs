@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Point3};
 use tagalong_app::outcome::Failure;
 use tagalong_config::Example;
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
 use tagalong_stats::{RandomSource, SplitMix64};
 
@@ -289,7 +289,13 @@ pub fn frame(grey: GreyImage) -> Frame {
 /// Returns a candidate of which only the region is known.
 pub fn candidate(region: Rect) -> Detection {
     let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), Matrix3::identity());
-    Detection { region, position, covariance, score: 0.0, source: "photograph" }
+    Detection {
+        image: Some(ImageBox::upper_body(region)),
+        position,
+        covariance,
+        score: 0.0,
+        source: "photograph",
+    }
 }
 
 #[cfg(test)]

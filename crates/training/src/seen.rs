@@ -61,7 +61,9 @@ pub fn label(candidate: &Detection, people: &[Known]) -> Label {
     let Some(nearest) = people.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
         return Label::Nobody;
     };
-    let overlap = |known: &Known| known.region.map_or(0.0, |r| r.iou(&candidate.region));
+    let overlap = |known: &Known| {
+        known.region.zip(candidate.rect()).map_or(0.0, |(known, seen)| known.iou(&seen))
+    };
     let covers_nobody = people.iter().all(|known| overlap(known) < 0.2);
     match off(&nearest) {
         _ if nearest.ignore && off(&nearest) <= NOBODY_M => Label::Unclear,
@@ -143,6 +145,7 @@ fn annotated(truth: &Truth) -> Option<Known> {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
+    use tagalong_geometry::ImageBox;
 
     use super::*;
 
@@ -153,7 +156,7 @@ mod tests {
 
     fn at(x: f64, left: f64) -> Detection {
         Detection {
-            region: Rect::new(left, 50.0, 60.0, 60.0),
+            image: Some(ImageBox::upper_body(Rect::new(left, 50.0, 60.0, 60.0))),
             position: Point3::new(x, 0.0, 1.6),
             covariance: Matrix3::identity(),
             score: 0.0,

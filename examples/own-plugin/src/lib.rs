@@ -52,7 +52,7 @@ impl Verifier for OwnContrast {
 
     fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let grey = frame.grey()?;
-        let inside = candidate.region.clipped(grey.width(), grey.height());
+        let inside = candidate.rect_in(&frame.camera).clipped(grey.width(), grey.height());
         let (left, right) = (inside.x as usize, inside.right() as usize);
         let (top, bottom) = (inside.y as usize, inside.bottom() as usize);
         // A region outside of the image is no evidence.

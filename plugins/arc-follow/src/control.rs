@@ -1,7 +1,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::Vector2;
-use tagalong_core::{CommandHistory, Controller, DiffDrive, EgoMotion, Scene, Track, WheelSpeeds};
+use tagalong_core::{CommandHistory, Controller, EgoMotion, Scene, Track, Twist, WheelSpeeds};
 
 use crate::aim::Aim;
 use crate::config::{Config, MOST, Path};
@@ -24,30 +24,14 @@ pub struct ArcFollow {
     trail: Trail,
 }
 
-/// Forward speed, m/s, and turn rate, rad/s.
-#[derive(Clone, Copy, Debug)]
-struct Twist {
-    speed_mps: f64,
-    turn_rate: f64,
-}
-
-impl Twist {
-    fn of_wheels(self, wheels: &DiffDrive) -> WheelSpeeds {
-        let rim = self.turn_rate * wheels.half_separation_m;
-        WheelSpeeds { left: self.speed_mps - rim, right: self.speed_mps + rim }
-    }
-}
-
 impl Controller for ArcFollow {
-    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
+    fn command(&mut self, scene: &Scene<'_>) -> Twist {
         let dt = step_s(&scene.frame.motion);
         self.history.age(dt);
-        let command = match self.steer(scene, dt) {
-            Some(twist) => twist.of_wheels(&scene.wheels),
-            None => self.halt(),
-        };
-        self.history.add(command);
-        command
+        let twist = self.steer(scene, dt);
+        // A drive with impossible dimensions has no wheel speeds, not even at rest.
+        self.history.add(twist.map_or(WheelSpeeds::STOP, |twist| scene.wheels.wheels(twist)));
+        twist.unwrap_or_else(|| self.halt())
     }
 
     fn stand_off_m(&self) -> Option<f64> {
@@ -87,9 +71,9 @@ impl ArcFollow {
         // The slower the robot drives, the more it may turn on the spot.
         let facing = trust * (1.0 - speed_mps / max) * self.facing_rate(&towards);
         let turn_rate = speed_mps * self.curvature(&towards, gain)? + facing;
-        let twist = self.within_limits(Twist { speed_mps, turn_rate }, scene);
-        self.speed_mps = twist.speed_mps;
-        twist.turn_rate.is_finite().then_some(twist)
+        let twist = self.within_limits(Twist::new(speed_mps, turn_rate), scene);
+        self.speed_mps = twist.linear_mps;
+        twist.angular_rps.is_finite().then_some(twist)
     }
 
     /// Where the person went, so far ahead as the setting says; `None` if the person is
@@ -105,11 +89,11 @@ impl ArcFollow {
     }
 
     /// Stands still, and will start anew.
-    fn halt(&mut self) -> WheelSpeeds {
+    fn halt(&mut self) -> Twist {
         self.turning = None;
         self.speed_mps = 0.0;
         self.trail = Trail::default();
-        WheelSpeeds::STOP
+        Twist::STOP
     }
 
     /// Returns the weight of a target that is coasting: 1, then less, then 0.
@@ -180,12 +164,12 @@ impl ArcFollow {
 
     /// Slower where the robot cannot do it, on the same path.
     fn within_limits(&self, twist: Twist, scene: &Scene<'_>) -> Twist {
-        let rim = twist.turn_rate.abs() * scene.wheels.half_separation_m;
-        let by_speed = scene.max_speed_mps / (twist.speed_mps + rim);
-        let by_turn = self.config.max_turn_rate / twist.turn_rate.abs();
+        let rim = twist.angular_rps.abs() * scene.wheels.half_separation_m;
+        let by_speed = scene.max_speed_mps / (twist.linear_mps + rim);
+        let by_turn = self.config.max_turn_rate / twist.angular_rps.abs();
         let scale = if self.config.as_printed { by_speed } else { by_speed.min(by_turn) }.min(1.0);
         // Both by the same factor, so that the curvature stays.
-        Twist { speed_mps: twist.speed_mps * scale, turn_rate: twist.turn_rate * scale }
+        twist.scaled(scale)
     }
 }
 

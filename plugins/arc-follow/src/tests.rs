@@ -9,7 +9,7 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_config::Registry;
 use tagalong_conformance::target;
 use tagalong_core::{
-    Controller, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, WheelSpeeds,
+    Controller, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, Twist, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -28,7 +28,8 @@ fn command(controller: &mut ArcFollow, motion: EgoMotion, target: Option<&Track>
     let tracks = target.map_or(&[][..], std::slice::from_ref);
     let frame = frame(motion);
     let max_speed_mps = MAX_MPS;
-    controller.command(&Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps })
+    let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps };
+    WHEELS.wheels(controller.command(&scene))
 }
 
 fn speed(wheels: WheelSpeeds) -> f64 {
@@ -119,7 +120,7 @@ fn a_drive_that_cannot_be_is_not_steered() {
         let wheels = DiffDrive { half_separation_m, slip: 0.0 };
         let (target, tracks) = (Some(&person), &[][..]);
         let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
-        controller.command(&scene) != WheelSpeeds::STOP
+        controller.command(&scene) != Twist::STOP
     };
     assert!(drives(0.167, 0.9));
     for odd in [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX] {

@@ -54,7 +54,7 @@ mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
     use tagalong_config::Registry;
     use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -63,7 +63,9 @@ mod tests {
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let position = Point3::new(x, y, 1.6);
         Detection {
-            region: Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            image: Some(ImageBox::upper_body(
+                Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+            )),
             position,
             covariance: Matrix3::identity() * 0.01,
             score: 1.0,
@@ -131,7 +133,8 @@ mod tests {
             track
         };
         let tracks = [at(0.0), at(50.0)];
-        let seen = [2.0, 51.0].map(|x| Detection { region: boxed(x), ..person(3.0, 0.0) });
+        let seen = [2.0, 51.0]
+            .map(|x| Detection { image: Some(ImageBox::upper_body(boxed(x))), ..person(3.0, 0.0) });
         let given = |compat_printed_cost: bool| {
             let settings = Config { cost: Cost::Overlap, compat_printed_cost, ..Config::default() };
             let answer = Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE);

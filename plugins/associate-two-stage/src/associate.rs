@@ -84,7 +84,7 @@ mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
     use tagalong_config::Registry;
     use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::Rect;
+    use tagalong_geometry::{ImageBox, Rect};
 
     use super::*;
 
@@ -92,7 +92,7 @@ mod tests {
 
     fn detection(y: f64, score: f64) -> Detection {
         Detection {
-            region: Rect::new(0.0, 0.0, 9.0, 9.0),
+            image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
             position: Point3::new(3.0, y, 1.6),
             covariance: Matrix3::identity() * 0.01,
             score,

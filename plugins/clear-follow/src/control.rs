@@ -1,11 +1,11 @@
 use nalgebra::{Point2, Vector2};
 use tagalong_core::{
-    CommandHistory, Controller, EgoMotion, Input, Inputs, Scene, Track, WheelSpeeds,
+    CommandHistory, Controller, EgoMotion, Input, Inputs, Scene, Track, Twist, WheelSpeeds,
 };
 
 use crate::around::NearestObstacles;
 use crate::config::{Config, MOST};
-use crate::plan::{PlanningInput, Twist, Walker, plan};
+use crate::plan::{PlanningInput, Walker, plan};
 
 /// A longer pause between frames counts as this one, s.
 const LONGEST_STEP_S: f64 = 0.5;
@@ -29,18 +29,20 @@ impl Controller for ClearFollow {
         Inputs::NONE.accept(Input::Depth)
     }
 
-    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
+    fn command(&mut self, scene: &Scene<'_>) -> Twist {
         let motion = &scene.frame.motion;
         // After a long pause the speed must not jump.
         let dt = if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 };
         self.history.age(dt);
         self.look(scene);
-        let command = self.steer(scene, dt).unwrap_or_else(|| {
+        let twist = self.steer(scene, dt);
+        let wheels = |twist| scene.wheels.wheels_within(twist, scene.max_speed_mps);
+        // A drive with impossible dimensions has no wheel speeds, not even at rest.
+        self.history.add(twist.map_or(WheelSpeeds::STOP, wheels));
+        twist.unwrap_or_else(|| {
             self.speed_mps = 0.0;
-            WheelSpeeds::STOP
-        });
-        self.history.add(command);
-        command
+            Twist::STOP
+        })
     }
 
     fn stand_off_m(&self) -> Option<f64> {
@@ -76,7 +78,7 @@ impl ClearFollow {
         }
     }
 
-    fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<WheelSpeeds> {
+    fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
         let (wheels, max_mps) = (&scene.wheels, scene.max_speed_mps);
         let is_sensible = |number: f64| number > 0.0 && number <= MOST;
         if !is_sensible(wheels.half_separation_m) || !is_sensible(max_mps) {
@@ -93,8 +95,8 @@ impl ClearFollow {
         let around = PlanningInput { things: &things, others: &others, person, max_mps };
         let planned = plan(&self.config, nominal, &around);
         let twist = self.ramped(nominal, planned, dt);
-        self.speed_mps = twist.speed_mps;
-        Some(of_wheels(twist, wheels.half_separation_m, max_mps))
+        self.speed_mps = twist.linear_mps;
+        Some(twist)
     }
 
     /// Returns the command for an empty room: to face the person, and to keep the distance.
@@ -113,7 +115,7 @@ impl ClearFollow {
         // A robot that faces away turns first.
         let ahead = bearing.cos().max(0.0).powi(2);
         let speed_mps = (wanted.clamp(0.0, max_mps) * ahead).min(trust * max_mps);
-        Twist { speed_mps, turn_rate }
+        Twist::new(speed_mps, turn_rate)
     }
 
     /// On the way from the last speed to the planned one. The detour keeps its
@@ -121,11 +123,11 @@ impl ClearFollow {
     fn ramped(&self, nominal: Twist, planned: Twist, dt: f64) -> Twist {
         let least = self.speed_mps - self.config.max_deceleration * dt;
         let most = self.speed_mps + self.config.max_acceleration * dt;
-        let speed_mps = planned.speed_mps.clamp(least, most).max(0.0);
-        let detour = planned.turn_rate - nominal.turn_rate;
+        let speed_mps = planned.linear_mps.clamp(least, most).max(0.0);
+        let detour = planned.angular_rps - nominal.angular_rps;
         // At a speed that is not reached yet the whole detour would turn too sharply.
-        let share = if planned.speed_mps > 0.0 { speed_mps / planned.speed_mps } else { 1.0 };
-        Twist { speed_mps, turn_rate: nominal.turn_rate + detour * share.min(1.0) }
+        let share = if planned.linear_mps > 0.0 { speed_mps / planned.linear_mps } else { 1.0 };
+        Twist::new(speed_mps, nominal.angular_rps + detour * share.min(1.0))
     }
 
     /// Returns the weight of a target that is coasting: 1, then less, then 0.
@@ -144,12 +146,4 @@ fn walker(track: &Track, to_come: &EgoMotion) -> Option<Walker> {
     let at = to_come.apply_to_point(person.position.xy() + velocity * to_come.dt);
     let velocity = to_come.apply_to_velocity(velocity);
     at.iter().all(|v| v.abs() < MOST).then_some(Walker { at, velocity })
-}
-
-/// Slower where the wheels cannot do it, on the same arc.
-fn of_wheels(twist: Twist, half_separation_m: f64, max_mps: f64) -> WheelSpeeds {
-    let rim = twist.turn_rate * half_separation_m;
-    // Both wheels by the same factor, so that the curvature stays.
-    let scale = (max_mps / (twist.speed_mps.abs() + rim.abs()).max(max_mps)).min(1.0);
-    WheelSpeeds { left: (twist.speed_mps - rim) * scale, right: (twist.speed_mps + rim) * scale }
 }

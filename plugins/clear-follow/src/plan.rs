@@ -1,4 +1,5 @@
 use nalgebra::{Isometry2, Point2, Vector2};
+use tagalong_core::Twist;
 
 use crate::config::Config;
 
@@ -13,23 +14,14 @@ const PERSON_M: f64 = 0.25;
 /// Distance from the line of sight within which another person hides the target, m.
 const SIGHT_M: f64 = 0.35;
 
-/// Forward speed, m/s, and turn rate, rad/s, to the left positive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Twist {
-    pub(crate) speed_mps: f64,
-    pub(crate) turn_rate: f64,
-}
-
-impl Twist {
-    /// Where the robot is after some time.
-    fn after(self, seconds: f64) -> Isometry2<f64> {
-        let turn = self.turn_rate * seconds;
-        let half = 0.5 * turn;
-        let chord =
-            // The chord of a short arc is its length; the quotient would be 0 / 0.
-            self.speed_mps * seconds * if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
-        Isometry2::new(Vector2::new(half.cos(), half.sin()) * chord, turn)
-    }
+/// Returns the pose of the robot after some time at a twist.
+fn pose_after(twist: Twist, seconds: f64) -> Isometry2<f64> {
+    let turn = twist.angular_rps * seconds;
+    let half = 0.5 * turn;
+    // The chord of a short arc is its length; the quotient would be 0 / 0.
+    let chord =
+        twist.linear_mps * seconds * if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
+    Isometry2::new(Vector2::new(half.cos(), half.sin()) * chord, turn)
 }
 
 /// Walking person, in the axes of the robot when the wheels answer.
@@ -56,12 +48,12 @@ pub(crate) struct PlanningInput<'a> {
 /// The cheapest change of a twist.
 pub(crate) fn plan(config: &Config, nominal: Twist, around: &PlanningInput<'_>) -> Twist {
     // Changes to the side of the turn come first, so that ties do not turn away from the person.
-    let side = if nominal.turn_rate < 0.0 { -1.0 } else { 1.0 };
+    let side = if nominal.angular_rps < 0.0 { -1.0 } else { 1.0 };
     let limit = config.max_turn_rate;
     let candidates = SPEEDS.iter().flat_map(|part| {
-        TURNS.iter().map(move |change| Twist {
-            speed_mps: part * nominal.speed_mps,
-            turn_rate: (nominal.turn_rate + side * change).clamp(-limit, limit),
+        TURNS.iter().map(move |change| {
+            let turn = (nominal.angular_rps + side * change).clamp(-limit, limit);
+            Twist::new(part * nominal.linear_mps, turn)
         })
     });
     let cost = |twist: &Twist| cost(config, nominal, *twist, around);
@@ -69,8 +61,8 @@ pub(crate) fn plan(config: &Config, nominal: Twist, around: &PlanningInput<'_>) 
 }
 
 fn cost(config: &Config, nominal: Twist, twist: Twist, around: &PlanningInput<'_>) -> f64 {
-    let slower = (nominal.speed_mps - twist.speed_mps).abs() / around.max_mps;
-    let turned = (nominal.turn_rate - twist.turn_rate).abs();
+    let slower = (nominal.linear_mps - twist.linear_mps).abs() / around.max_mps;
+    let turned = (nominal.angular_rps - twist.angular_rps).abs();
     let room = clearance(config, twist, around) / config.room_m;
     // The cost is bounded, so that all plans in a tight place stay comparable.
     let tight = (1.0 - room).clamp(0.0, 2.0);
@@ -84,14 +76,14 @@ fn cost(config: &Config, nominal: Twist, twist: Twist, around: &PlanningInput<'_
 /// comes nearer to nothing.
 fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     // A standing robot comes nearer to nothing.
-    if twist.speed_mps <= 0.0 {
+    if twist.linear_mps <= 0.0 {
         return f64::INFINITY;
     }
     let step_s = config.horizon_s / f64::from(STEPS);
     let mut least = f64::INFINITY;
     for step in 1..=STEPS {
         let seconds = step_s * f64::from(step);
-        let robot = Point2::from(twist.after(seconds).translation.vector);
+        let robot = Point2::from(pose_after(twist, seconds).translation.vector);
         let gap = |at: Point2<f64>, its_m: f64| (at - robot).norm() - its_m - config.radius_m;
         let things = around.things.iter().map(|at| gap(*at, 0.0));
         let people = around.others.iter().map(|other| gap(other.after(seconds), PERSON_M));
@@ -103,7 +95,7 @@ fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
 /// Returns the degree to which another person is before the target at the end of the horizon, 0 to
 /// 1.
 fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
-    let pose = twist.after(config.horizon_s);
+    let pose = pose_after(twist, config.horizon_s);
     let seen =
         |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
     let person = seen(&around.person);
@@ -122,7 +114,7 @@ fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
 mod tests {
     use super::*;
 
-    const AHEAD: Twist = Twist { speed_mps: 0.8, turn_rate: 0.0 };
+    const AHEAD: Twist = Twist::new(0.8, 0.0);
 
     fn planned(things: &[Point2<f64>], others: &[Walker]) -> Twist {
         let person = Walker { at: Point2::new(3.0, 0.0), velocity: Vector2::new(0.8, 0.0) };
@@ -138,15 +130,15 @@ mod tests {
     #[test]
     fn it_goes_round_things_on_the_free_side() {
         let left = planned(&[Point2::new(1.1, -0.2)], &[]);
-        assert!(left.turn_rate > 0.0 && left.speed_mps > 0.0, "{left:?}");
+        assert!(left.angular_rps > 0.0 && left.linear_mps > 0.0, "{left:?}");
         let right = planned(&[Point2::new(1.1, 0.2)], &[]);
-        assert!(right.turn_rate < 0.0 && right.speed_mps > 0.0, "{right:?}");
+        assert!(right.angular_rps < 0.0 && right.linear_mps > 0.0, "{right:?}");
     }
 
     #[test]
     fn a_wall_stops_it() {
         let wall: Vec<_> = (-20..=20).map(|i| Point2::new(0.5, 0.1 * f64::from(i))).collect();
-        assert_eq!(planned(&wall, &[]).speed_mps, 0.0);
+        assert_eq!(planned(&wall, &[]).linear_mps, 0.0);
     }
 
     #[test]
@@ -154,22 +146,22 @@ mod tests {
         let leaves = Walker { at: Point2::new(1.0, 0.1), velocity: Vector2::new(0.0, 1.4) };
         let comes = Walker { at: Point2::new(0.9, -1.2), velocity: Vector2::new(0.0, 1.0) };
         let stays = Walker { velocity: Vector2::zeros(), ..leaves };
-        let speed = |walker| planned(&[], &[walker]).speed_mps;
+        let speed = |walker| planned(&[], &[walker]).linear_mps;
         assert_eq!(planned(&[], &[leaves]), AHEAD, "gone by then");
-        assert!(speed(comes) < 0.8 || planned(&[], &[comes]).turn_rate != 0.0);
-        assert!(speed(stays) < 0.8 || planned(&[], &[stays]).turn_rate != 0.0);
+        assert!(speed(comes) < 0.8 || planned(&[], &[comes]).angular_rps != 0.0);
+        assert!(speed(stays) < 0.8 || planned(&[], &[stays]).angular_rps != 0.0);
     }
 
     #[test]
     fn arcs_end_where_small_steps_lead() {
-        let twist = Twist { speed_mps: 0.7, turn_rate: -0.9 };
-        let step = twist.after(0.001);
+        let twist = Twist::new(0.7, -0.9);
+        let step = pose_after(twist, 0.001);
         let steps = (0..1500).fold(Isometry2::identity(), |pose, _| pose * step);
-        let whole = twist.after(1.5);
+        let whole = pose_after(twist, 1.5);
         assert!((steps.translation.vector - whole.translation.vector).norm() < 1e-6);
     }
 
-    const STILL: Twist = Twist { speed_mps: 0.0, turn_rate: 0.0 };
+    const STILL: Twist = Twist::new(0.0, 0.0);
 
     fn stands(x: f64, y: f64) -> Walker {
         Walker { at: Point2::new(x, y), velocity: Vector2::zeros() }
@@ -209,7 +201,7 @@ mod tests {
         assert!((hidden(&config, STILL, &around(&[], &two)) - 0.8).abs() < 1e-9, "the worst");
         let leaves = Walker { velocity: Vector2::new(0.0, 1.0), ..stands(1.5, 0.0) };
         assert_eq!(hidden(&config, STILL, &around(&[], &[leaves])), 0.0, "gone by then");
-        let turns = Twist { speed_mps: 0.0, turn_rate: 1.0 };
+        let turns = Twist::new(0.0, 1.0);
         let turned = hidden(&config, turns, &around(&[], &[stands(1.5, 0.0)]));
         assert!((turned - 1.0).abs() < 1e-9, "a turn in place changes nothing: {turned}");
     }
@@ -222,8 +214,8 @@ mod tests {
         };
         let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found}");
         near(price(AHEAD, &[], &[]), 0.0);
-        near(price(Twist { speed_mps: 0.35, ..AHEAD }, &[], &[]), 0.5);
-        near(price(Twist { turn_rate: -0.6, ..AHEAD }, &[], &[]), 0.15);
+        near(price(Twist { linear_mps: 0.35, ..AHEAD }, &[], &[]), 0.5);
+        near(price(Twist { angular_rps: -0.6, ..AHEAD }, &[], &[]), 0.15);
         // 0.1 m of room where 0.2 m are wanted: half of it, squared, twice.
         near(price(AHEAD, &[Point2::new(0.8, 0.35)], &[]), 0.5);
         near(price(AHEAD, &[Point2::new(0.8, 0.5)], &[]), 0.0);
@@ -237,12 +229,12 @@ mod tests {
         let wall: Vec<_> = (-9..=9).map(|i| Point2::new(0.7, 0.2 * f64::from(i))).collect();
         let person = stands(0.0, 3.0);
         for turn_rate in [1.0, -1.0] {
-            let nominal = Twist { speed_mps: 0.6, turn_rate };
+            let nominal = Twist::new(0.6, turn_rate);
             let scene = PlanningInput { things: &wall, others: &[], person, max_mps: 0.9 };
             let planned = plan(&config, nominal, &scene);
-            assert!(planned.turn_rate.abs() <= 1.2 && planned != nominal, "{planned:?}");
-            let mirrored = plan(&config, Twist { turn_rate: -turn_rate, ..nominal }, &scene);
-            assert_eq!(planned.turn_rate, -mirrored.turn_rate);
+            assert!(planned.angular_rps.abs() <= 1.2 && planned != nominal, "{planned:?}");
+            let mirrored = plan(&config, Twist { angular_rps: -turn_rate, ..nominal }, &scene);
+            assert_eq!(planned.angular_rps, -mirrored.angular_rps);
         }
     }
 }

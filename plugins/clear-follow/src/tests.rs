@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_conformance::target;
 use tagalong_core::{
-    Controller, DepthImage, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, WheelSpeeds,
+    Controller, DepthImage, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, Twist,
+    WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -31,7 +32,7 @@ fn command(
     let frame = Frame::new(1, Stamp::default(), camera(), motion, images);
     let tracks = target.map_or(&[][..], std::slice::from_ref);
     let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
-    controller.command(&scene)
+    WHEELS.wheels_within(controller.command(&scene), MAX_MPS)
 }
 
 /// Follows a person whose place in the world is given for each time, for some seconds; returns
@@ -191,7 +192,7 @@ fn a_drive_that_cannot_be_is_not_steered() {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let (target, tracks) = (Some(&person), &[][..]);
         let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
-        controller.command(&scene) != WheelSpeeds::STOP
+        controller.command(&scene) != Twist::STOP
     };
     assert!(drives(0.167, 0.9));
     for odd in [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX] {

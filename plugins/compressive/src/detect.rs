@@ -6,7 +6,7 @@ use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
     Track, TrackId,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, PointEstimate, Rect};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, ImageBox, PointEstimate, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
@@ -79,7 +79,7 @@ struct Dropped {
 impl<'a> FrameImages<'a> {
     fn of(frame: &'a Frame) -> Result<Self> {
         let integral = frame.derived::<Integral>()?;
-        Ok(Self { integral, depth: frame.images().depth.as_deref(), camera: &frame.camera })
+        Ok(Self { integral, depth: frame.depth().ok(), camera: &frame.camera })
     }
 
     /// Expected depth of a track's face, m, where there are depths to compare.
@@ -414,7 +414,13 @@ fn sighting(
     // A person behind the camera has no pixel: the answer is as good as none.
     let unknown = PointEstimate { position: expected, covariance: Matrix3::identity() * 100.0 };
     let PointEstimate { position, covariance } = place(head_m).unwrap_or(unknown);
-    Detection { region, position, covariance, score: config.score, source: NAME }
+    Detection {
+        image: Some(ImageBox::upper_body(region)),
+        position,
+        covariance,
+        score: config.score,
+        source: NAME,
+    }
 }
 
 impl Detector for Compressive {
@@ -529,7 +535,7 @@ mod tests {
         let face_m = camera.depth_of(&expected) - HEAD_RADIUS_M;
         let there = sighting(&config, &camera, &track, before, Some(face_m));
         assert!((there.position - expected).norm() < 1e-9, "{}", there.position);
-        assert_eq!((there.region, there.score), (before, config.score));
+        assert_eq!((there.rect().unwrap(), there.score), (before, config.score));
         // Half a width to the right in the image, and 0.3 m farther away.
         let aside = Rect { x: before.x + 0.5 * before.width, ..before };
         let moved = sighting(&config, &camera, &track, aside, Some(face_m + 0.3));

@@ -123,7 +123,7 @@ fn a_person_is_followed_who_moves_by_a_third_of_their_width() {
         let frame = World { with_depth, ..World::at(after) }.frame();
         let (found, funnel) = near(&mut detector, &frame, before);
         let found = found.unwrap_or_else(|| panic!("{funnel:?}"));
-        let off = found.region.centre() - camera().upper_body(&after).centre();
+        let off = found.rect().unwrap().centre() - camera().upper_body(&after).centre();
         assert!(off.norm() < 2.0, "{off}");
         assert!((found.position - after).norm() < 0.06 || !with_depth, "{}", found.position);
     }
@@ -212,7 +212,7 @@ fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
     let frame = World::at(now).frame();
     let search = Query::Track(&expected);
     let found = detector.detect(&frame, &search, &mut Funnel::default()).unwrap();
-    found[0].region.width / camera().upper_body(&before).width
+    found[0].rect().unwrap().width / camera().upper_body(&before).width
 }
 
 #[test]

@@ -5,7 +5,7 @@ use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Input, Inputs, Query,
     Result, Stamp, Track, TrackId,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, ImageBox, Rect, UPPER_BODY_SIDE_M};
 
 use crate::picture::{Distance, SIDE};
 use crate::strip::Lattice;
@@ -159,7 +159,13 @@ pub(crate) fn sighting(
     let sigma_px = config.sigma_place_m * camera.focal_px() / head_m;
     let pixel = camera.project(&position).unwrap_or(region.centre());
     let covariance = camera.covariance(pixel, head_m, sigma_px, config.sigma_distance_m);
-    Detection { region, position, covariance, score: config.score, source: NAME }
+    Detection {
+        image: Some(ImageBox::upper_body(region)),
+        position,
+        covariance,
+        score: config.score,
+        source: NAME,
+    }
 }
 
 impl Detector for Correlation {

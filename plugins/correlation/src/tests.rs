@@ -320,11 +320,11 @@ fn a_sighting_says_where_by_its_cells_and_how_sure_it_is() {
     let square = expected.estimate.region;
     let best = crate::detect::Placed { down: -6, ..placed(12, 0.9, 1.0, 0.0) };
     let found = crate::detect::sighting(&config, &camera, &expected, &square, best);
-    assert!((found.region.x - square.x - 0.5 * square.width).abs() < 1e-9);
-    assert!((found.region.y - square.y + 0.25 * square.width).abs() < 1e-9);
-    assert_eq!((found.region.width, found.score), (square.width, 0.7));
+    assert!((found.rect().unwrap().x - square.x - 0.5 * square.width).abs() < 1e-9);
+    assert!((found.rect().unwrap().y - square.y + 0.25 * square.width).abs() < 1e-9);
+    assert_eq!((found.rect().unwrap().width, found.score), (square.width, 0.7));
     assert!((camera.depth_of(&found.position) - 2.5).abs() < 1e-9, "as far as expected");
-    assert!(camera.upper_body(&found.position).iou(&found.region) > 0.99);
+    assert!(camera.upper_body(&found.position).iou(&found.rect().unwrap()) > 0.99);
     let middle =
         crate::detect::sighting(&config, &camera, &expected, &square, placed(0, 0.9, 1.0, 0.0));
     assert!((middle.covariance[(1, 1)].sqrt() - 0.05).abs() < 0.005, "{}", middle.covariance);

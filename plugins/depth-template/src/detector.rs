@@ -6,7 +6,7 @@ use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood,
     Query, Result, Track,
 };
-use tagalong_geometry::{HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{HEAD_RADIUS_M, ImageBox, Rect};
 use tagalong_vision::RowSums;
 
 use crate::NAME;
@@ -293,7 +293,7 @@ impl DepthTemplate {
         let sigma_depth_m = c.sigma_depth_m + c.sigma_depth_per_m2 * depth_m * depth_m;
         let sigma_px = c.sigma_across_m * px_per_m;
         Ok(Detection {
-            region: frame.camera.upper_body(&position),
+            image: Some(ImageBox::upper_body(frame.camera.upper_body(&position))),
             position,
             covariance: frame.camera.covariance(pixel, depth_m, sigma_px, sigma_depth_m),
             score: c.score_per_cost * (c.even_cost - person.cost),

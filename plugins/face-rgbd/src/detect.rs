@@ -3,7 +3,7 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{Camera, FaceDepth, PointEstimate, Rect};
+use tagalong_geometry::{Camera, FaceDepth, ImageBox, PointEstimate, Rect};
 
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
@@ -46,7 +46,7 @@ impl FaceRgbd {
     fn search(&mut self, frame: &Frame, near: Option<Rect>, funnel: &mut Funnel) -> Result<()> {
         let Self { config, cascade, scanner, proposals, hits, .. } = self;
         let camera = &*frame.camera;
-        let depth = frame.images().depth.as_deref().filter(|_| config.depth_proposals);
+        let depth = frame.depth().ok().filter(|_| config.depth_proposals);
         let image = frame.grey()?;
         if let Some(depth) = depth {
             let [points, possible, searched] = proposals.sample(frame, depth, config);
@@ -90,7 +90,7 @@ impl FaceRgbd {
             camera.locate(head_px, face.head_m(), config.sigma_place * side, face.sigma_m);
         let (slope, offset) = self.line;
         let detection = Detection {
-            region: camera.upper_body(&position),
+            image: Some(ImageBox::upper_body(camera.upper_body(&position))),
             position,
             covariance,
             // The logarithm needs a positive strength.
@@ -123,7 +123,7 @@ impl Detector for FaceRgbd {
         };
         self.search(frame, near, funnel)?;
         self.grouping.group(&self.hits, self.config.min_neighbours);
-        let depth = frame.images().depth.as_deref();
+        let depth = frame.depth().ok();
         let of = |group| self.detection(&frame.camera, depth, group);
         let mut found: Vec<Detection> = self.grouping.kept().iter().filter_map(of).collect();
         let all = found.len();
@@ -238,7 +238,7 @@ mod tests {
             assert!((found.covariance[(0, 0)].sqrt() / sigma_m - 1.0).abs() < 0.05);
             let aside = config.sigma_place * 20.0 / FOCAL_PX * (face_m + HEAD_RADIUS_M);
             assert!((found.covariance[(2, 2)].sqrt() / aside - 1.0).abs() < 0.05);
-            assert_eq!(found.region, camera.upper_body(&found.position));
+            assert_eq!(found.rect().unwrap(), camera.upper_body(&found.position));
             assert!((found.score - (1.5 * 3.0_f64.ln() - 2.0)).abs() < 1e-9);
         }
         let sure = Group { strength: 1e9, ..group };

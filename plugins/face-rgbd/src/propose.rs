@@ -60,7 +60,7 @@ impl Proposals {
     pub fn sample(&mut self, frame: &Frame, depth: &DepthImage, config: &Config) -> [u64; 3] {
         let camera = &*frame.camera;
         (self.columns, self.rows) = (camera.width / GRID_PX, camera.height / GRID_PX);
-        let colour = frame.images().colour.as_deref();
+        let colour = frame.colour().ok();
         self.depth.clear();
         self.skin.clear();
         for at in 0..self.columns * self.rows {

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Matched, Stamp, TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
 use crate::state::State;
 use crate::{Config, FloorKalman, Form, Measurement};
@@ -24,7 +24,7 @@ fn frame() -> Frame {
 
 fn sighting(x: f64, y: f64) -> Detection {
     Detection {
-        region: Rect::new(0.0, 0.0, 9.0, 9.0),
+        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
         position: Point3::new(x, y, 1.6),
         covariance: Matrix3::from_diagonal_element(0.02),
         score: 1.0,

@@ -4,7 +4,7 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{Camera, FaceDepth, PointEstimate, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{Camera, FaceDepth, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 
 use crate::lattice::Lattice;
 use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
@@ -52,7 +52,7 @@ impl HogUpperBody {
         let PointEstimate { position, covariance } =
             camera.locate_head(&window.region, face, config.sigma_place * width);
         let detection = Detection {
-            region: window.region,
+            image: Some(ImageBox::upper_body(window.region)),
             position,
             covariance,
             score: self.model.log_odds(window.sum).min(config.max_score),
@@ -172,7 +172,7 @@ impl Detector for HogUpperBody {
     ) -> Result<Vec<Detection>> {
         let grey = frame.grey()?;
         let camera = &*frame.camera;
-        let depth = frame.images().depth.as_deref().filter(|_| self.config.depth_proposals);
+        let depth = frame.depth().ok().filter(|_| self.config.depth_proposals);
         let near = match search {
             Query::Track(track) => Some(track.estimate.region),
             Query::Discover { .. } => None,
@@ -305,7 +305,7 @@ mod tests {
             assert!((found.covariance[(0, 0)].sqrt() / sigma_m - 1.0).abs() < 0.02);
             let aside = config.sigma_place * side / 525.0 * (face_m + HEAD_RADIUS_M);
             assert!((found.covariance[(1, 1)].sqrt() / aside - 1.0).abs() < 0.02);
-            assert!((found.score - 1.0).abs() < 1e-4 && found.region == region);
+            assert!((found.score - 1.0).abs() < 1e-4 && found.rect().unwrap() == region);
         }
         let sure = Window { sum: detector.model.sum_at(99.0), ..window(None) };
         assert_eq!(detector.detection(&camera, &sure).unwrap().score, config.max_score);

@@ -1,6 +1,8 @@
 use std::collections::BTreeMap;
 
-use tagalong_core::{Detection, EgoMotion, Estimate, Evidence, Filter, Result, TrackId, Update};
+use tagalong_core::{
+    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Result, TrackId, Update,
+};
 use tagalong_geometry::Camera;
 
 use crate::{Config, State};
@@ -23,6 +25,12 @@ impl ImageKalman {
 }
 
 impl Filter for ImageKalman {
+    /// The state is that of a box; a box invented from a position would be counted as evidence
+    /// beside the position.
+    fn requirements(&self) -> FilterRequirements {
+        FilterRequirements { image_box: true, ..FilterRequirements::default() }
+    }
+
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
         let state = State::start(&self.config, detection, camera);
         self.states.insert(id, state);

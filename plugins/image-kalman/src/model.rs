@@ -48,13 +48,11 @@ struct Shape {
 impl Shape {
     /// Returns the shape of a detection; `None` for a box without area or a head behind the camera.
     fn of(detection: &Detection, camera: &Camera) -> Option<Self> {
-        let Rect { width, height, .. } = detection.region;
+        let rect = detection.rect_in(camera);
+        let Rect { width, height, .. } = rect;
         let head = camera.project(&detection.position)?;
         let is_box = width >= MIN_WIDTH_PX && height >= MIN_WIDTH_PX;
-        is_box.then(|| Self {
-            aspect: height / width,
-            head: (head - detection.region.centre()) / width,
-        })
+        is_box.then(|| Self { aspect: height / width, head: (head - rect.centre()) / width })
     }
 
     fn blend(&mut self, seen: &Self, weight: f64) {
@@ -66,8 +64,9 @@ impl Shape {
 impl State {
     /// Initialises the state from the first detection.
     pub fn start(config: &Config, detection: &Detection, camera: &Camera) -> Self {
-        let centre = detection.region.centre();
-        let width = detection.region.width.max(MIN_WIDTH_PX);
+        let rect = detection.rect_in(camera);
+        let centre = rect.centre();
+        let width = rect.width.max(MIN_WIDTH_PX);
         let speed = (config.initial_speed * width).powi(2);
         let mut image_covariance = Matrix5::from_diagonal_element(speed);
         let noise = image_noise(config, detection, width, camera);
@@ -191,8 +190,8 @@ impl State {
         let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
         let look = measurement(dt);
         let noise = image_noise(config, seen, self.image[4], camera);
-        let centre = seen.region.centre();
-        let measured = Vector3::new(centre.x, centre.y, seen.region.width);
+        let rect = seen.rect_in(camera);
+        let measured = Vector3::new(rect.centre().x, rect.centre().y, rect.width);
         let innovation = measured - look * self.image;
         let p = self.image_covariance;
         let spread = (look * p * look.transpose() + noise).cholesky()?;

@@ -6,7 +6,7 @@ use tagalong_config::Registry;
 use tagalong_core::{
     Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, Stamp, TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
 use crate::space::{RobotPoint, pixel_covariance};
 use crate::{Config, ImageKalman, State};
@@ -20,7 +20,7 @@ fn camera() -> Arc<Camera> {
 
 fn person(head: Point3<f64>) -> Detection {
     Detection {
-        region: camera().upper_body(&head),
+        image: Some(ImageBox::upper_body(camera().upper_body(&head))),
         position: head,
         covariance: Matrix3::identity() * 1e-4,
         score: 3.0,
@@ -42,8 +42,13 @@ fn fed(config: Config, sightings: &[Detection], motion: EgoMotion) -> State {
 /// Detections of a box that moves by 120 pixels a second.
 fn sliding(frames: usize) -> Vec<Detection> {
     let start = person(Point3::new(4.0, 1.0, 1.6));
-    let shifted = |i: usize| Rect { x: start.region.x + 120.0 * DT_S * i as f64, ..start.region };
-    (0..frames).map(|i| Detection { region: shifted(i), ..start.clone() }).collect()
+    let shifted = |i: usize| Rect {
+        x: start.rect().unwrap().x + 120.0 * DT_S * i as f64,
+        ..start.rect().unwrap()
+    };
+    (0..frames)
+        .map(|i| Detection { image: Some(ImageBox::upper_body(shifted(i))), ..start.clone() })
+        .collect()
 }
 
 #[test]
@@ -60,7 +65,7 @@ fn the_printed_measurement_lags_by_one_frame_and_ours_does_not() {
     let lag = |compat_printed_measurement| {
         let config = Config { compat_printed_measurement, ..Config::default() };
         let state = fed(config, &sightings, EgoMotion::at_rest(DT_S));
-        sightings[59].region.centre().x - state.image[0]
+        sightings[59].rect().unwrap().centre().x - state.image[0]
     };
     assert!(lag(false).abs() < 0.1, "{}", lag(false));
     let step = 120.0 * DT_S;
@@ -99,7 +104,7 @@ fn the_box_coasts_with_the_picture_while_the_robot_turns() {
     let (config, camera) = (Config::default(), camera());
     let mut state = fed(config.clone(), seen, motion);
     hidden.iter().for_each(|_| state.predict(&config, &motion, &camera));
-    let iou = state.estimate(&camera).region.iou(&hidden[9].region);
+    let iou = state.estimate(&camera).region.iou(&hidden[9].rect().unwrap());
     assert!(iou > 0.85, "{iou}");
 }
 
@@ -118,17 +123,20 @@ fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
     turn(&mut state, -0.15);
     let back = state.estimate(&camera);
     assert!((back.person.position - place).norm() < 0.05, "{back:?}");
-    assert!(back.region.iou(&person(place).region) > 0.9);
+    assert!(back.region.iou(&person(place).rect().unwrap()) > 0.9);
 }
 
 #[test]
 fn a_box_of_any_shape_keeps_its_shape() {
     let seen = person(Point3::new(4.0, 0.3, 1.6));
-    let Rect { x, y, width, height } = seen.region;
-    let tall = Detection { region: Rect::new(x, y, width, 2.6 * height), ..seen };
+    let Rect { x, y, width, height } = seen.rect().unwrap();
+    let tall = Detection {
+        image: Some(ImageBox::upper_body(Rect::new(x, y, width, 2.6 * height))),
+        ..seen
+    };
     let state = fed(Config::default(), &vec![tall.clone(); 5], EgoMotion::at_rest(DT_S));
     let estimate = state.estimate(&camera());
-    assert!(estimate.region.iou(&tall.region) > 0.999, "{:?}", estimate.region);
+    assert!(estimate.region.iou(&tall.rect().unwrap()) > 0.999, "{:?}", estimate.region);
     assert!((estimate.person.position - tall.position).norm() < 1e-6);
 }
 
@@ -148,11 +156,14 @@ fn a_depth_that_is_a_guess_stays_uncertain() {
 fn sightings_that_make_no_sense_leave_finite_numbers() {
     let seen = person(Point3::new(4.0, 0.3, 1.6));
     let odd = [
-        Detection { region: Rect::default(), ..seen.clone() },
+        Detection { image: Some(ImageBox::upper_body(Rect::default())), ..seen.clone() },
         Detection { position: Point3::new(-3.0, 0.0, 1.6), ..seen.clone() },
         Detection { covariance: Matrix3::zeros(), ..seen.clone() },
         Detection { covariance: Matrix3::identity() * 1e12, ..seen.clone() },
-        Detection { region: Rect::new(-1e6, 1e6, 1e5, 1.0), ..seen.clone() },
+        Detection {
+            image: Some(ImageBox::upper_body(Rect::new(-1e6, 1e6, 1e5, 1.0))),
+            ..seen.clone()
+        },
     ];
     let moves = EgoMotion { forward: 3.0, turn: 2.0, ..EgoMotion::at_rest(0.0) };
     for odd in odd {
@@ -196,7 +207,16 @@ fn ahead(range_m: f64) -> (Camera, Detection) {
     let position = Point3::from(eye + Vector3::new(range_m, 0.0, 0.0));
     let region = camera.upper_body(&position);
     let covariance = Matrix3::zeros();
-    (camera, Detection { region, position, covariance, score: 1.0, source: "test" })
+    (
+        camera,
+        Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position,
+            covariance,
+            score: 1.0,
+            source: "test",
+        },
+    )
 }
 
 /// Position and rate of one axis, filtered by the textbook equations.
@@ -245,12 +265,15 @@ impl Line {
 fn a_step_is_that_of_the_textbook() {
     let ((camera, first), config, dt) = (ahead(4.0), Config::default(), 0.1);
     let (_, farther) = ahead(4.2);
-    let Rect { x, y, width, height } = first.region;
-    let second = Detection { region: Rect::new(x + 5.0, y - 3.0, width + 4.0, height), ..farther };
+    let Rect { x, y, width, height } = first.rect().unwrap();
+    let second = Detection {
+        image: Some(ImageBox::upper_body(Rect::new(x + 5.0, y - 3.0, width + 4.0, height))),
+        ..farther
+    };
     let mut state = State::start(&config, &first, &camera);
     let noise = |width: f64| (config.sigma_centre * width).powi(2);
     let speed = (config.initial_speed * width).powi(2);
-    let centre = first.region.centre();
+    let centre = first.rect().unwrap().centre();
     let mut lines = [centre.x, centre.y].map(|at| Line::start(at, noise(width), speed));
     let rate = config.initial_range_speed_mps.powi(2);
     let mut range = Line::start(4.0, config.sigma_range_m.powi(2), rate);
@@ -264,7 +287,7 @@ fn a_step_is_that_of_the_textbook() {
     assert!((state.image_covariance[(4, 4)] - wandered).abs() < 1e-9);
 
     let support = state.correct(&config, &second, &camera);
-    let seen = second.region.centre();
+    let seen = second.rect().unwrap().centre();
     let mut nis = lines[0].correct(seen.x, noise(width)) + lines[1].correct(seen.y, noise(width));
     nis += range.correct(4.2, config.sigma_range_m.powi(2));
     nis += 16.0 / (wandered + scale);
@@ -316,11 +339,11 @@ fn a_box_grows_as_the_robot_comes_near() {
     let ((camera, seen), config) = (ahead(4.0), Config::default());
     let mut state = State::start(&config, &seen, &camera);
     state.predict(&config, &EgoMotion { forward: 1.0, ..EgoMotion::at_rest(0.1) }, &camera);
-    assert!((state.image[4] / seen.region.width - 4.0 / 3.0).abs() < 1e-9);
+    assert!((state.image[4] / seen.rect().unwrap().width - 4.0 / 3.0).abs() < 1e-9);
     assert!((state.range.x - 3.0).abs() < 1e-9);
     let mut still = State::start(&config, &seen, &camera);
     still.predict(&config, &EgoMotion::at_rest(0.1), &camera);
-    assert_eq!((still.image[4], still.range.x), (seen.region.width, 4.0));
+    assert_eq!((still.image[4], still.range.x), (seen.rect().unwrap().width, 4.0));
 }
 
 /// A sideways step moves a near person farther in the image than a far one: the shift is as
@@ -360,8 +383,11 @@ fn a_range_that_cannot_be_is_left_out() {
 #[test]
 fn the_shape_follows_what_is_seen_by_its_weight() {
     let (camera, seen) = ahead(4.0);
-    let Rect { x, y, width, height } = seen.region;
-    let tall = Detection { region: Rect::new(x, y, width, 2.0 * height), ..seen.clone() };
+    let Rect { x, y, width, height } = seen.rect().unwrap();
+    let tall = Detection {
+        image: Some(ImageBox::upper_body(Rect::new(x, y, width, 2.0 * height))),
+        ..seen.clone()
+    };
     for (shape_weight, aspect) in [(0.0, 1.0), (0.25, 1.25), (1.0, 2.0)] {
         let config = Config { shape_weight, ..Config::default() };
         let mut state = State::start(&config, &seen, &camera);
@@ -373,7 +399,11 @@ fn the_shape_follows_what_is_seen_by_its_weight() {
     let config = Config { shape_weight: 1.0, ..Config::default() };
     for flat in [Rect::new(x, y, width, 0.5), Rect::new(x, y, 0.5, height)] {
         let mut state = State::start(&config, &seen, &camera);
-        state.correct(&config, &Detection { region: flat, ..seen.clone() }, &camera);
+        state.correct(
+            &config,
+            &Detection { image: Some(ImageBox::upper_body(flat)), ..seen.clone() },
+            &camera,
+        );
         let Rect { width, height, .. } = state.estimate(&camera).region;
         assert!((height / width - 1.0).abs() < 1e-9, "{width} {height}");
     }

@@ -2,8 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
-    Detection, EgoMotion, Estimate, Evidence, Filter, Input, Inputs, Person, Result, Sketch,
-    TrackId, Update,
+    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Input, Inputs, Person,
+    Result, Sketch, TrackId, Update,
 };
 use tagalong_geometry::Camera;
 
@@ -188,8 +188,9 @@ fn ids(group: &Group) -> BTreeSet<TrackId> {
 }
 
 impl Filter for JointParticle {
-    fn inputs(&self) -> Inputs {
-        Inputs::NONE.accept(Input::Colour)
+    fn requirements(&self) -> FilterRequirements {
+        let inputs = Inputs::NONE.accept(Input::Colour);
+        FilterRequirements { inputs, likelihood: true, image_box: false }
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
@@ -268,10 +269,6 @@ impl Filter for JointParticle {
         self.unfound_s.remove(&id);
         self.wardrobe.forget(id);
     }
-
-    fn weighs_scenes(&self) -> bool {
-        true
-    }
 }
 
 impl JointParticle {
@@ -291,7 +288,7 @@ mod tests {
 
     use nalgebra::Matrix3;
     use tagalong_core::{Frame, Images, Likelihood, Matched, Stamp};
-    use tagalong_geometry::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -315,7 +312,13 @@ mod tests {
         let position = Point3::new(2.0, 0.0, 1.6);
         let region = Rect::new(40.0, 30.0, 20.0, 20.0);
         let covariance = Matrix3::identity() * 0.01;
-        Detection { region, position, covariance, score: 3.0, source: "drawn" }
+        Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position,
+            covariance,
+            score: 3.0,
+            source: "drawn",
+        }
     }
 
     /// Returns for twelve frames without a detection if a person that explains this many nats is

@@ -112,13 +112,13 @@ fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
 mod tests {
     use std::f64::consts::FRAC_PI_2;
 
-    use tagalong_geometry::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
     fn sighting(x: f64, y: f64) -> Detection {
         Detection {
-            region: Rect::new(0.0, 0.0, 9.0, 9.0),
+            image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
             position: Point3::new(x, y, 1.6),
             covariance: Matrix3::identity() * 0.01,
             score: 1.0,

@@ -3,14 +3,14 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track,
     TrackChanges, TrackId, TrackManager, Unassociated,
 };
-use tagalong_geometry::Rect;
+use tagalong_geometry::{ImageBox, Rect};
 
 use crate::{Config, MOfN};
 
 /// A person at a place on the floor, whose head is 1.6 m high.
 pub(crate) fn person(x: f64, y: f64) -> Detection {
     Detection {
-        region: Rect::new(0.0, 0.0, 9.0, 9.0),
+        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
         position: Point3::new(x, y, 1.6),
         covariance: Matrix3::identity() * 0.01,
         score: 1.0,
@@ -47,7 +47,7 @@ impl Rig {
         self.started += 1;
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
         let estimate =
-            Estimate { person, covariance: SMatrix::identity(), region: detection.region };
+            Estimate { person, covariance: SMatrix::identity(), region: detection.rect().unwrap() };
         self.tracks.push(Track {
             id,
             estimate,

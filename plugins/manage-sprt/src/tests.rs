@@ -4,7 +4,7 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
-use tagalong_geometry::Rect;
+use tagalong_geometry::{ImageBox, Rect};
 
 use crate::{Config, Sprt};
 
@@ -12,7 +12,7 @@ const DT_S: f64 = 0.1;
 
 fn detection(x: f64, log_odds: f64) -> Detection {
     Detection {
-        region: Rect::new(0.0, 0.0, 9.0, 9.0),
+        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
         position: Point3::new(x, 0.0, 1.6),
         covariance: Matrix3::identity() * 0.01,
         score: log_odds,
@@ -49,7 +49,7 @@ impl Scene {
                 let covariance = SMatrix::identity() * 0.0025;
                 self.track = Some(Track {
                     id,
-                    estimate: Estimate { person, covariance, region: seen.region },
+                    estimate: Estimate { person, covariance, region: seen.rect().unwrap() },
                     seen: true,
                     occluded: false,
                     confirmed: health.confirmed,

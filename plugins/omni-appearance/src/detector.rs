@@ -3,7 +3,7 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Query, Result, Track,
 };
-use tagalong_geometry::Camera;
+use tagalong_geometry::{Camera, ImageBox};
 
 use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, PanoramaGeometry};
 
@@ -70,7 +70,7 @@ impl OmniAppearance {
         // dropped.
         position.z = (top - HALF_HEAD_M).clamp(low - 0.5, high + 0.5);
         Detection {
-            region: camera.upper_body(&position),
+            image: Some(ImageBox::upper_body(camera.upper_body(&position))),
             position,
             covariance: self.covariance(&position, camera, [distance, sigma], blob.visible),
             score: self.score(position.z),
@@ -147,9 +147,9 @@ impl Detector for OmniAppearance {
         for blob in &blobs {
             let person = self.placed(blob, &frame.camera, &view);
             if !(low..=high).contains(&person.position.z) {
-                funnel.drop_at("head height", person.region);
+                funnel.drop_detection("head height", &person);
             } else if !fits(search, &person) {
-                funnel.drop_at("not near the track", person.region);
+                funnel.drop_detection("not near the track", &person);
             } else {
                 found.push(person);
             }
@@ -252,7 +252,7 @@ mod tests {
         let near = |way: Vector2<f64>| {
             let position = Point3::new(2.0 + way.x, 1.0 + way.y, 0.2);
             let person = Detection {
-                region: Rect::default(),
+                image: Some(ImageBox::upper_body(Rect::default())),
                 position,
                 covariance: Matrix3::identity(),
                 score: 0.0,

@@ -57,7 +57,7 @@ impl Eyes {
             funnel.drop_many("no panorama", 1);
             return Ok(Vec::new());
         };
-        let grey = frame.images().colour.is_none();
+        let grey = frame.colour().is_err();
         let size = if grey {
             (frame.grey()?.width(), frame.grey()?.height())
         } else {
@@ -187,7 +187,7 @@ impl ImageState {
             false => (adapt_s, absorb_s, TURNS),
         };
         let pace = Pace { part: dt_s / adapt_s, absorb_s, dt_s, turns };
-        let colour = frame.images().colour.as_deref();
+        let colour = frame.colour().ok();
         let colours = colour.map_or(&self.grey[..], |c| c.pixels().as_flattened());
         let taken = &self.segmenter.counts().taken;
         self.background.follow(colours, taken, &pace, self.phase);

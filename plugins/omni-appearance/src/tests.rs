@@ -96,7 +96,8 @@ fn people_are_found_all_around_and_across_the_seam() {
         assert!(off < 0.35, "{place}: {:?}", person.position);
         assert!((person.position.z - 1.63).abs() < 0.15, "{:?}", person.position);
         assert!(person.is_sane() && person.covariance.cholesky().is_some());
-        assert!(person.region.x >= 0.0 && person.region.x < COLUMNS as f64, "{:?}", person.region);
+        let region = person.rect().unwrap();
+        assert!(region.x >= 0.0 && region.x < COLUMNS as f64, "{region:?}");
     }
 }
 

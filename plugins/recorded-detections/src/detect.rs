@@ -4,7 +4,9 @@ use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs,
     Query, Result, Track,
 };
-use tagalong_geometry::{FaceDepth, HEAD_BELOW_TOP_M, PointEstimate, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{
+    FaceDepth, HEAD_BELOW_TOP_M, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M,
+};
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};
@@ -54,23 +56,26 @@ impl RecordedDetections {
 
     fn detection(&self, frame: &Frame, recorded: &ExternalDetection) -> Option<Detection> {
         let camera = &*frame.camera;
-        let (region, position, covariance) = match (recorded.head, recorded.region) {
+        let (image, position, covariance) = match (recorded.head, recorded.region) {
             (Some(head), region) => {
                 let variance = self.config.sigma_position_m.powi(2);
                 let region = region.unwrap_or_else(|| camera.upper_body(&head));
-                (region, head, Matrix3::identity() * variance)
+                (ImageBox::upper_body(region), head, Matrix3::identity() * variance)
             }
             (None, Some(region)) => {
                 let upper_body = self.upper_body(&region);
                 let PointEstimate { position, covariance } = self.located(frame, &upper_body)?;
-                let keeps_box = self.config.body == Body::FullBox;
-                (if keeps_box { region } else { upper_body }, position, covariance)
+                let image = match self.config.body {
+                    Body::FullBox => ImageBox::full_body(region),
+                    Body::Full | Body::Upper => ImageBox::upper_body(upper_body),
+                };
+                (image, position, covariance)
             }
             (None, None) => return None,
         };
-        let inside = region.clipped(camera.width, camera.height).area() > 0.0;
+        let inside = image.rect.clipped(camera.width, camera.height).area() > 0.0;
         let score = self.log_odds(recorded.score);
-        let detection = Detection { region, position, covariance, score, source: NAME };
+        let detection = Detection { image: Some(image), position, covariance, score, source: NAME };
         (inside && detection.is_sane()).then_some(detection)
     }
 
@@ -85,7 +90,7 @@ impl RecordedDetections {
     /// image where that shows the face, otherwise from the size of the square.
     fn located(&self, frame: &Frame, region: &Rect) -> Option<PointEstimate> {
         let (camera, config) = (&*frame.camera, &self.config);
-        let measured = frame.images().depth.as_deref().and_then(|depth| face_depth(depth, region));
+        let measured = frame.depth().ok().and_then(|depth| face_depth(depth, region));
         let face =
             FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, region.width, config.sigma_distance)
                 .or_measured(measured, config.sigma_depth_m);
@@ -106,7 +111,7 @@ impl RecordedDetections {
 
     /// Returns a score of the fit of a detection to a track; `None` if it is not near.
     fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        let overlap = track.estimate.region.iou(&detection.region);
+        let overlap = detection.rect().map_or(0.0, |seen| track.estimate.region.iou(&seen));
         let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
         // The distance by size alone may be far off on the floor, so overlap is enough for such a
         // box.

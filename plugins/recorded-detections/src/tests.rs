@@ -6,7 +6,7 @@ use tagalong_core::{
     DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, ExternalDetection, Frame,
     Funnel, Images, Person, Query, Stamp, Track, TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
 
 use super::*;
 
@@ -62,7 +62,7 @@ fn a_whole_body_becomes_an_upper_body_with_a_place() {
     assert!(detect(&mut detector, &frame(1, None)).is_empty(), "it is of frame 2");
     let by_size = &detect(&mut detector, &frame(2, None))[0];
     assert!((by_size.position - head).norm() < 0.05, "{}", by_size.position);
-    assert!(by_size.region.iou(&camera().upper_body(&head)) > 0.95);
+    assert!(by_size.rect().unwrap().iou(&camera().upper_body(&head)) > 0.95);
     assert!(by_size.covariance[(0, 0)].sqrt() > 0.5, "a distance by size is a guess");
     let face_m = (camera().depth_of(&head) - HEAD_RADIUS_M) as f32;
     let by_depth = &detect(&mut detector, &frame(2, Some(face_m)))[0];
@@ -80,7 +80,9 @@ fn a_whole_body_can_be_tracked_as_the_box_that_it_is() {
         detect(&mut square, &frame(2, None)).remove(0),
         detect(&mut whole, &frame(2, None)).remove(0),
     );
-    assert!((whole.region.height / whole.region.width - 3.4).abs() < 1e-6, "{:?}", whole.region);
+    let (upper, full) = (square.image.unwrap(), whole.image.unwrap());
+    assert_eq!((upper.extent, full.extent), (Extent::UpperBody, Extent::FullBody));
+    assert!((full.rect.height / full.rect.width - 3.4).abs() < 1e-6, "{full:?}");
     assert_eq!((square.position, square.covariance), (whole.position, whole.covariance));
 }
 
@@ -115,7 +117,7 @@ fn recorded_positions_of_the_log_are_taken_as_they_are() {
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
     let found = detect(&mut detector, &frame);
     assert_eq!(found[0].position, head);
-    assert_eq!(found[0].region, camera().upper_body(&head));
+    assert_eq!(found[0].rect().unwrap(), camera().upper_body(&head));
 }
 
 #[test]
@@ -246,7 +248,7 @@ fn a_square_of_head_and_shoulders_is_taken_as_it_is() {
     let text = format!("1,-1,{},{},{},{},0.9", square.x, square.y, square.width, square.height);
     let mut detector = of_file(&text, Config { body: Body::Upper, ..Config::default() }).unwrap();
     let found = detect(&mut detector, &frame(1, None)).remove(0);
-    assert_eq!(found.region, square);
+    assert_eq!(found.rect().unwrap(), square);
     assert!((found.position - head).norm() < 1e-3, "{}", found.position);
     let ahead_m = camera().depth_of(&found.position);
     let sigma = found.covariance[(0, 0)].sqrt();

@@ -69,7 +69,8 @@ mod training {
             assert_eq!(model.sampler, Sampler { grow: 0.1, scaling });
             for seed in 500..520 {
                 let picture = picture(seed % 2 == 0, seed);
-                let log_odds = model.log_odds(&model.sampler.patch(&picture, &candidate().region));
+                let log_odds =
+                    model.log_odds(&model.sampler.patch(&picture, &candidate().rect().unwrap()));
                 assert!((log_odds > 1.0) == (seed % 2 == 0), "{scaling:?}, {seed}: {log_odds}");
             }
             assert_eq!(fitted.figures["people"].as_integer(), Some(30));

@@ -31,7 +31,7 @@ impl Verifier for SvmPatch {
     }
 
     fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
-        let patch = self.model.sampler.patch(frame.grey()?, &candidate.region);
+        let patch = self.model.sampler.patch(frame.grey()?, &candidate.rect_in(&frame.camera));
         Ok(self.calibration.calibrate(self.model.log_odds(&patch)))
     }
 }

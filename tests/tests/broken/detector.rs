@@ -4,7 +4,7 @@ use tagalong_core::{
     Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood, Person,
     Query, Result, Track,
 };
-use tagalong_geometry::HEAD_RADIUS_M;
+use tagalong_geometry::{HEAD_RADIUS_M, ImageBox};
 
 use super::{mood, register_with_fault};
 
@@ -66,7 +66,13 @@ impl Heads {
             _ => {}
         }
         let score = if self.fault == "moody" { self.mood } else { 2.0 };
-        Detection { region, position, covariance, score, source: "heads" }
+        Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position,
+            covariance,
+            score,
+            source: "heads",
+        }
     }
 
     fn places(&self, frame: &Frame, search: &Query<'_>) -> Result<Vec<Point3<f64>>> {

@@ -30,7 +30,7 @@ impl Verifier for Brightness {
             return Err(Error::Other("something is missing".into()));
         }
         let grey = frame.grey()?;
-        let inside = candidate.region.clipped(grey.width(), grey.height());
+        let inside = candidate.rect_in(&frame.camera).clipped(grey.width(), grey.height());
         if inside.area() <= 0.0 {
             return Ok(-1.0);
         }

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{
     Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, LaserScan, Query, Result,
 };
-use tagalong_geometry::Rect;
 
 /// Settings of `legs`.
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
@@ -60,7 +59,7 @@ impl Detector for Legs {
             // Legs contain no information on a person's height.
             let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 1e3].into());
             let position = Point3::new(at.x, at.y, 1.6);
-            Detection { region: Rect::default(), position, covariance, score: 1.5, source: "legs" }
+            Detection { image: None, position, covariance, score: 1.5, source: "legs" }
         };
         Ok(pairs.map(detection).collect())
     }

@@ -152,7 +152,7 @@ fn scene(item: &Item, report: FrameReport) -> OverlayData {
     let frame = &item.frame.frame;
     OverlayData {
         camera: frame.camera.clone(),
-        images: frame.images().clone(),
+        images: frame.images(),
         odom_from_robot: item.frame.odom_from_robot,
         report,
     }

@@ -13,7 +13,7 @@ pub(crate) use collision_monitor::Ahead;
 pub(crate) use obstacle_memory::ObstacleMemory;
 pub use settings::{CollisionMonitorSettings, CommandLimiterSettings};
 
-use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, WheelSpeeds};
+use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, Twist, WheelSpeeds};
 
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
@@ -24,7 +24,7 @@ const STILL_MPS: f64 = 1e-6;
 /// Wish of a controller, with the facts that the command limiter needs about the frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Wish {
-    /// Wheel speeds of the controller; any numbers, also NaN and infinite ones.
+    /// Wheel speeds of the wish; any numbers, also NaN and infinite ones.
     pub(crate) wheels: WheelSpeeds,
     /// Stamp of the frame.
     pub(crate) stamp: Stamp,
@@ -79,6 +79,7 @@ impl Orders {
     /// make it last longer.
     pub fn at(&self, now: Stamp) -> Command {
         let stop = |reason| Command {
+            twist: Twist::STOP,
             wheels: WheelSpeeds::STOP,
             stamp: now,
             valid_until: now.plus_seconds(self.valid_s),
@@ -107,33 +108,9 @@ pub(crate) struct CommandLimiter {
     fault: Option<&'static str>,
 }
 
-/// Forward speed, m/s, and turn rate, rad/s, positive to the left.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Twist {
-    forward: f64,
-    turn: f64,
-}
-
-impl Twist {
-    fn of(wheels: WheelSpeeds, drive: &DiffDrive) -> Self {
-        let WheelSpeeds { left, right } = wheels;
-        let turn = 0.5 * (right - left) / drive.half_separation_m;
-        Self { forward: 0.5 * (left + right), turn }
-    }
-
-    fn wheels(self, drive: &DiffDrive) -> WheelSpeeds {
-        let by_turn = self.turn * drive.half_separation_m;
-        WheelSpeeds { left: self.forward - by_turn, right: self.forward + by_turn }
-    }
-
-    fn scaled(self, by: f64) -> Self {
-        Self { forward: self.forward * by, turn: self.turn * by }
-    }
-
-    /// Returns the curvature, 1/m; 0 for a turn in place.
-    fn curvature(self) -> f64 {
-        if self.forward.abs() > STILL_MPS { self.turn / self.forward } else { 0.0 }
-    }
+/// Returns the curvature, 1/m; 0 for a turn in place.
+fn curvature(twist: Twist) -> f64 {
+    if twist.linear_mps.abs() > STILL_MPS { twist.angular_rps / twist.linear_mps } else { 0.0 }
 }
 
 impl CommandLimiter {
@@ -159,7 +136,8 @@ impl CommandLimiter {
             None => self.limited(wish, look),
         };
         let valid_until = wish.stamp.plus_seconds(self.settings.valid_s);
-        let command = Command { wheels, stamp: wish.stamp, valid_until, reason };
+        let twist = self.wheels.twist(wheels);
+        let command = Command { twist, wheels, stamp: wish.stamp, valid_until, reason };
         // Stops are remembered, too: the ramp of the next command starts from this one.
         self.last = Some(command);
         command
@@ -234,8 +212,8 @@ impl CommandLimiter {
             (cap, why) = (0.5 * self.max_speed_mps, Reason::Slow);
         }
         // A turn in place stays in place, and the corridor shows nothing behind the robot.
-        if wanted.forward > STILL_MPS {
-            match look(&self.monitor, wanted.curvature()) {
+        if wanted.linear_mps > STILL_MPS {
+            match look(&self.monitor, curvature(wanted)) {
                 Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
                 Some(Ahead::Something(at_m)) if self.speed_before(at_m) < cap => {
                     (cap, why) = (self.speed_before(at_m), Reason::Obstacle);
@@ -245,31 +223,32 @@ impl CommandLimiter {
         }
         // Turning stays allowed: it may free the path.
         if cap <= STILL_MPS {
-            return (Twist { forward: 0.0, ..wanted }.wheels(&self.wheels), Reason::Blocked);
+            let turn = Twist { linear_mps: 0.0, ..wanted };
+            return (self.wheels.wheels(turn), Reason::Blocked);
         }
         let ramped = self.ramped(wanted, wish.stamp);
         let as_wished = as_wished && ramped == wanted;
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
         // The cap comes after the ramp, so it may brake harder than `max_decel_mps2`.
-        if ramped.forward.abs() > cap {
-            let slower = ramped.scaled(cap / ramped.forward.abs());
-            return (self.in_reach(slower.wheels(&self.wheels)), why);
+        if ramped.linear_mps.abs() > cap {
+            let slower = ramped.scaled(cap / ramped.linear_mps.abs());
+            return (self.in_reach(self.wheels.wheels(slower)), why);
         }
-        (self.in_reach(ramped.wheels(&self.wheels)), reason)
+        (self.in_reach(self.wheels.wheels(ramped)), reason)
     }
 
     /// Limits the wheel speeds to the drive and the turn rate, on the same arc, and returns whether
     /// they are as wished.
     fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
-        let twist = Twist::of(self.in_reach(wheels), &self.wheels);
+        let twist = self.wheels.twist(self.in_reach(wheels));
         let twist = match self.settings.reverse {
-            false if twist.forward < 0.0 => Twist { forward: 0.0, ..twist },
+            false if twist.linear_mps < 0.0 => Twist { linear_mps: 0.0, ..twist },
             _ => twist,
         };
         let limit = self.settings.max_turn_radps;
         // Forward speed and turn rate shrink by the same factor, which keeps the curvature.
-        let slower = twist.scaled(limit / twist.turn.abs().max(limit));
-        let WheelSpeeds { left, right } = slower.wheels(&self.wheels);
+        let slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
+        let WheelSpeeds { left, right } = self.wheels.wheels(slower);
         let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
         (slower, as_wished)
     }
@@ -283,23 +262,24 @@ impl CommandLimiter {
 
     /// Moves the speed towards the wish as far as the acceleration allows, on the wished arc.
     fn ramped(&self, wanted: Twist, now: Stamp) -> Twist {
-        let before = self.last.map_or(Twist::default(), |c| Twist::of(c.wheels, &self.wheels));
+        let before = self.last.map_or(Twist::STOP, |c| c.twist);
         let dt = self.last.map_or(LONGEST_STEP_S, |c| now.seconds_since(c.stamp));
         // Stamps may stand still or step back; both allow no change of speed.
         let dt = dt.clamp(0.0, LONGEST_STEP_S);
         let CommandLimiterSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
         // Away from standstill is acceleration, towards it is deceleration.
-        let up = if before.forward < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
-        let down = if before.forward > 0.0 { max_decel_mps2 } else { max_accel_mps2 };
-        let forward = wanted.forward.clamp(before.forward - down * dt, before.forward + up * dt);
-        if forward == wanted.forward {
+        let up = if before.linear_mps < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
+        let down = if before.linear_mps > 0.0 { max_decel_mps2 } else { max_accel_mps2 };
+        let (least, most) = (before.linear_mps - down * dt, before.linear_mps + up * dt);
+        let forward = wanted.linear_mps.clamp(least, most);
+        if forward == wanted.linear_mps {
             return wanted;
         }
-        let turn = match wanted.forward.abs() > STILL_MPS {
-            true => wanted.turn * (forward / wanted.forward).clamp(0.0, 1.0),
-            false => wanted.turn,
+        let turn = match wanted.linear_mps.abs() > STILL_MPS {
+            true => wanted.angular_rps * (forward / wanted.linear_mps).clamp(0.0, 1.0),
+            false => wanted.angular_rps,
         };
-        Twist { forward, turn }
+        Twist::new(forward, turn)
     }
 
     /// Scales the wheel speeds to the limit of the faster wheel, on the same arc.

@@ -1,5 +1,5 @@
 use nalgebra::Point2;
-use tagalong_core::{DiffDrive, WheelSpeeds};
+use tagalong_core::Twist;
 
 use super::lock::LastSeen;
 use super::settings::SearchSettings;
@@ -24,15 +24,14 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    /// Returns the wheel speeds to wish for, `lost_s` after the person was lost.
+    /// Returns the velocity to wish for, `lost_s` after the person was lost.
     pub(crate) fn wish(
         &mut self,
         settings: &SearchSettings,
         last: &LastSeen,
         candidate: Option<Point2<f64>>,
         lost_s: f64,
-        wheels: &DiffDrive,
-    ) -> Option<WheelSpeeds> {
+    ) -> Option<Twist> {
         if !settings.enabled || lost_s < settings.wait_s || lost_s > settings.give_up_s {
             return None;
         }
@@ -45,8 +44,7 @@ impl Search {
             None if self.arrived => (0.0, self.look_round(settings, last)),
             None => drive_to(settings, &last.place),
         };
-        let rim = turn * wheels.half_separation_m;
-        Some(WheelSpeeds { left: speed_mps - rim, right: speed_mps + rim })
+        Some(Twist::new(speed_mps, turn))
     }
 
     /// Records whether the command limiter blocked the wish.
@@ -81,8 +79,6 @@ mod tests {
 
     use super::*;
 
-    const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-
     fn settings() -> SearchSettings {
         SearchSettings { enabled: true, ..SearchSettings::default() }
     }
@@ -91,19 +87,19 @@ mod tests {
         LastSeen { place: Point2::new(x, y), velocity: Vector2::new(0.0, -0.8), ago_s: 1.0 }
     }
 
-    fn wish(last: &LastSeen, lost_s: f64) -> Option<WheelSpeeds> {
-        Search::default().wish(&settings(), last, None, lost_s, &WHEELS)
+    fn wish(last: &LastSeen, lost_s: f64) -> Option<Twist> {
+        Search::default().wish(&settings(), last, None, lost_s)
     }
 
     #[test]
     fn it_waits_drives_looks_round_and_gives_up() {
         assert_eq!(wish(&last(3.0, 0.0), 0.5), None);
         let ahead = wish(&last(3.0, 0.0), 1.5).unwrap();
-        assert!(ahead.left > 0.3 && ahead.left == ahead.right, "{ahead:?}");
+        assert!(ahead.linear_mps > 0.3 && ahead.angular_rps == 0.0, "{ahead:?}");
         let aside = wish(&last(0.0, 3.0), 1.5).unwrap();
-        assert!(aside.left == -aside.right && aside.right > 0.0, "turns first: {aside:?}");
+        assert!(aside.linear_mps == 0.0 && aside.angular_rps > 0.0, "turns first: {aside:?}");
         let there = wish(&last(0.3, 0.0), 1.5).unwrap();
-        assert!(there.left > 0.0 && there.right == -there.left, "to the right: {there:?}");
+        assert!(there.linear_mps == 0.0 && there.angular_rps < 0.0, "to the right: {there:?}");
         assert_eq!(wish(&last(3.0, 0.0), 20.5), None);
     }
 
@@ -111,32 +107,28 @@ mod tests {
     fn something_in_the_way_makes_it_look_round_instead() {
         let mut search = Search::default();
         (0..12).for_each(|_| search.add_block(true, 0.1));
-        let there = search.wish(&settings(), &last(3.0, 0.0), None, 3.0, &WHEELS).unwrap();
-        assert_eq!(there.left, -there.right);
+        let there = search.wish(&settings(), &last(3.0, 0.0), None, 3.0).unwrap();
+        assert_eq!(there.linear_mps, 0.0);
     }
 
     #[test]
     fn whoever_may_be_the_person_is_looked_at() {
         let mut search = Search::default();
         let left = Some(Point2::new(1.0, 2.0));
-        let turns = search.wish(&settings(), &last(3.0, 0.0), left, 3.0, &WHEELS).unwrap();
-        assert!(turns.right > 0.0 && turns.left == -turns.right, "{turns:?}");
+        let turns = search.wish(&settings(), &last(3.0, 0.0), left, 3.0).unwrap();
+        assert!(turns.angular_rps > 0.0 && turns.linear_mps == 0.0, "{turns:?}");
     }
 
     #[test]
     fn only_where_it_is_allowed() {
         let settings = SearchSettings::default();
-        assert_eq!(Search::default().wish(&settings, &last(3.0, 0.0), None, 1.5, &WHEELS), None);
-    }
-
-    fn twist(wheels: WheelSpeeds) -> (f64, f64) {
-        let turn = (wheels.right - wheels.left) / (2.0 * WHEELS.half_separation_m);
-        (0.5 * (wheels.left + wheels.right), turn)
+        assert_eq!(Search::default().wish(&settings, &last(3.0, 0.0), None, 1.5), None);
     }
 
     fn wished(x: f64, y: f64, lost_s: f64) -> (f64, f64) {
-        let (speed, turn) = twist(wish(&last(x, y), lost_s).unwrap());
-        ((speed * 1e6).round() / 1e6, (turn * 1e6).round() / 1e6)
+        let twist = wish(&last(x, y), lost_s).unwrap();
+        let rounded = |number: f64| (number * 1e6).round() / 1e6;
+        (rounded(twist.linear_mps), rounded(twist.angular_rps))
     }
 
     #[test]
@@ -166,7 +158,7 @@ mod tests {
         let way = |y: f64, velocity_y: f64| {
             let velocity = Vector2::new(0.0, velocity_y);
             let last = LastSeen { place: Point2::new(0.5, y), velocity, ago_s: 1.0 };
-            twist(Search::default().wish(&settings(), &last, None, 1.5, &WHEELS).unwrap()).1
+            Search::default().wish(&settings(), &last, None, 1.5).unwrap().angular_rps
         };
         assert!(way(0.0, 0.5) > 0.0 && way(0.0, -0.5) < 0.0);
         // In the second and a half for which the person is assumed to go on, they cross the middle.
@@ -178,7 +170,7 @@ mod tests {
         let mut search = Search::default();
         let mut turn = |y: f64| {
             let last = LastSeen { velocity: Vector2::zeros(), ..last(0.3, y) };
-            twist(search.wish(&settings(), &last, None, 1.5, &WHEELS).unwrap()).1
+            search.wish(&settings(), &last, None, 1.5).unwrap().angular_rps
         };
         assert!(turn(0.1) > 0.0 && turn(-0.1) > 0.0);
     }
@@ -188,8 +180,7 @@ mod tests {
         let drives = |blocked: &[bool]| {
             let mut search = Search::default();
             blocked.iter().for_each(|now| search.add_block(*now, 0.4));
-            let wheels = search.wish(&settings(), &last(3.0, 0.0), None, 3.0, &WHEELS).unwrap();
-            twist(wheels).0 > 0.0
+            search.wish(&settings(), &last(3.0, 0.0), None, 3.0).unwrap().linear_mps > 0.0
         };
         assert!(drives(&[true, true]) && !drives(&[true, true, true]));
         assert!(drives(&[true, true, false, true, true]));

@@ -75,7 +75,7 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
         ),
         (
             plain("roles = ['discover', 'track']\nconfig = { how = 'discover' }"),
-            &["a.toml:4:9", "cannot find a tracked person again: remove the role follow"],
+            &["a.toml:4:9", "cannot find a tracked person again: remove the role track"],
         ),
         (own("without = ['dept']"), &["a.toml:1:12", "did you mean `depth`?"]),
         (
@@ -295,8 +295,8 @@ fn seeds(run: u64) -> Vec<u64> {
 struct Still;
 
 impl tagalong_core::Controller for Still {
-    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::WheelSpeeds {
-        tagalong_core::WheelSpeeds::STOP
+    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::Twist {
+        tagalong_core::Twist::STOP
     }
 }
 

@@ -119,7 +119,7 @@ fn the_motion_over_a_skipped_frame_is_not_lost() {
     let moving = |index, t_s, forward| {
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.05) };
         let still = frame(index, t_s);
-        Frame::new(index, still.stamp, still.camera.clone(), motion, still.images().clone())
+        Frame::new(index, still.stamp, still.camera.clone(), motion, still.images())
     };
     for (index, t_s, forward) in [(1, 0.0, 0.0), (2, 0.0, 0.03), (3, 0.1, 0.04)] {
         pipeline.step(&moving(index, t_s, forward)).unwrap();

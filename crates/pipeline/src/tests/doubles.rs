@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
 use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
-    EgoMotion, Error, Estimate, Evidence, Filter, Frame, Funnel, Gate, Images, Input, Inputs,
-    Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track, TrackId,
-    Update, Verifier, WheelSpeeds,
+    EgoMotion, Error, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images,
+    Input, Inputs, Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track,
+    TrackId, Twist, Update, Verifier, WheelSpeeds,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
 use crate::{FrameReport, Pipeline};
 
@@ -43,7 +43,7 @@ pub fn frame(index: u64, t_s: f64) -> Frame {
 pub fn person(x: f64, y: f64) -> Detection {
     let position = Point3::new(x, y, 1.6);
     Detection {
-        region: camera().upper_body(&position),
+        image: Some(ImageBox::upper_body(camera().upper_body(&position))),
         position,
         covariance: Matrix3::identity() * 0.01,
         score: 1.0,
@@ -250,6 +250,12 @@ struct Odd {
 }
 
 impl Filter for Odd {
+    fn requirements(&self) -> FilterRequirements {
+        let how = self.config.how.as_str();
+        let (image_box, likelihood) = (how == "boxes", how == "weighs");
+        FilterRequirements { inputs: Inputs::NONE, image_box, likelihood }
+    }
+
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
         assert!(self.config.how != "panic", "cannot start {id}");
         self.ids.insert(id);
@@ -281,10 +287,6 @@ impl Filter for Odd {
     fn stop(&mut self, id: TrackId) {
         self.ids.remove(&id);
     }
-
-    fn weighs_scenes(&self) -> bool {
-        self.config.how == "weighs"
-    }
 }
 
 /// Gives each track the first detection, with a weight; or impossible pairs.
@@ -310,12 +312,13 @@ impl Associator for Weighs {
 struct Drive(Config);
 
 impl Controller for Drive {
-    fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
+    fn command(&mut self, scene: &Scene<'_>) -> Twist {
+        let wheels = |left, right| scene.wheels.twist(WheelSpeeds { left, right });
         match self.0.how.as_str() {
             "panic at 21" if scene.frame.index == 21 => panic!("which way?"),
-            "nan" => WheelSpeeds { left: f64::NAN, right: 0.0 },
+            "nan" => wheels(f64::NAN, 0.0),
             "panic" => panic!("which way?"),
-            _ => WheelSpeeds { left: 2.0, right: 4.0 },
+            _ => wheels(2.0, 4.0),
         }
     }
 

@@ -2,9 +2,14 @@
 
 use std::sync::Arc;
 
-use tagalong_core::{DepthImage, Frame, GreyImage, Images, Input, Inputs, RgbImage, RightImage};
+use std::path::Path;
 
-use super::doubles::{PLAIN, World, frame, person};
+use tagalong_core::{
+    Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Images, Input, Inputs,
+    Query, Result, RgbImage, RightImage, Sensor,
+};
+
+use super::doubles::{Config, PLAIN, World, frame, person};
 use crate::{FrameReport, Pipeline};
 
 fn world() -> World {
@@ -94,4 +99,40 @@ fn stereo_replaces_depth_that_the_config_does_without() {
     let frame = Frame::new(plain.index, plain.stamp, plain.camera, plain.motion, images);
     let report = pipeline.step(&frame).unwrap();
     assert!(report.funnel.entries().iter().any(|entry| entry.test.starts_with("stereo pixels: ")));
+}
+
+/// Distances straight ahead, m, by a sensor that no crate but this one knows.
+struct Radar(Vec<f64>);
+
+impl Sensor for Radar {
+    const INPUT: Input = Input::Named("radar");
+}
+
+struct RadarDetector;
+
+impl Detector for RadarDetector {
+    fn capabilities(&self) -> Capabilities {
+        let inputs = Inputs::NONE.require(Radar::INPUT);
+        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+    }
+
+    fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+        let echoes = frame.sensor::<Radar>()?.0.iter();
+        Ok(echoes.map(|metres| Detection { image: None, ..person(*metres, 0.0) }).collect())
+    }
+}
+
+#[test]
+fn a_sensor_that_another_crate_defines_reaches_the_plugins_that_declare_it() {
+    let mut registry = world().registry();
+    registry.detector("radar", "reads echoes", |_: Config, _| Ok(RadarDetector));
+    let config = PLAIN.replace("'script'", "'radar'");
+    let mut pipeline = Pipeline::from_toml(&config, Path::new("."), &registry).unwrap().0;
+    assert_eq!(pipeline.inputs(), Inputs::NONE.require(Radar::INPUT));
+    let seen = |index| frame(index, index as f64 * 0.1).with_sensor(Radar(vec![2.5]));
+    let report = pipeline.step(&seen(1)).unwrap();
+    assert_eq!(report.tracks[0].estimate.person.position.x, 2.5);
+    let lacking = pipeline.step(&frame(2, 0.2)).unwrap_err().to_string();
+    assert!(lacking.contains("radar, which this log does not carry"), "{lacking}");
+    assert!(seen(3).restricted_to(&inputs(PLAIN)).unwrap().sensor::<Radar>().is_err());
 }

@@ -33,6 +33,29 @@ fn a_high_score_confirms_at_once() {
     assert!(reports[0].tracks[0].confirmed);
 }
 
+/// A laser scan has no pixels: two people in one line of sight are not merged by their boxes, and
+/// the track's region is where the filter expects the person in the image.
+#[test]
+fn a_detection_without_a_box_is_tracked_all_the_same() {
+    let boxless = |x, y| Detection { image: None, ..person(x, y) };
+    let two = || vec![boxless(3.0, 0.0), boxless(3.6, 0.0)];
+    let reports = World::of((0..3).map(|_| two())).run(PLAIN, 3, 0.1);
+    assert_eq!(ids(&reports[2]), [1, 2]);
+    let track = &reports[2].tracks[0];
+    assert!(track.confirmed && track.seen);
+    assert_eq!(Some(track.estimate.region), person(3.0, 0.0).rect());
+}
+
+#[test]
+fn a_filter_of_boxes_receives_no_detection_without_one() {
+    let config = PLAIN.replace("'steady'", "'odd'\nconfig = { how = 'boxes' }");
+    let boxless = Detection { image: None, ..person(5.0, 0.0) };
+    let reports = World::of([vec![person(3.0, 0.0), boxless]]).run(&config, 1, 0.1);
+    assert_eq!(ids(&reports[0]), [1]);
+    assert_eq!(reports[0].candidates.len(), 1);
+    assert_eq!(reports[0].funnel.count("no image box"), 1);
+}
+
 #[test]
 fn tracks_are_reported_near_to_far() {
     let people = vec![person(4.0, 0.0), person(2.0, 0.5), person(3.0, -0.5)];

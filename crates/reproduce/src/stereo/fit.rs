@@ -219,7 +219,7 @@ impl Walk {
         let mut runs: Vec<Run> = contenders.iter().map(run).collect();
         for (frame, _) in &self.shots {
             // A new frame for each trial, so that the data derived from it are freed afterwards.
-            let images = frame.images().clone();
+            let images = frame.images();
             let (camera, motion) = (frame.camera.clone(), frame.motion);
             let frame = Frame::new(frame.index, frame.stamp, camera, motion, images);
             for (pipeline, run) in pipelines.iter_mut().zip(&mut runs) {

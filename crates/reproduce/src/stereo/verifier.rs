@@ -343,7 +343,8 @@ pub fn whose(detection: &Detection, people: &[Truth]) -> Whose {
 
 /// Returns true if the person counts and the detection overlaps head and shoulders.
 fn overlaps(detection: &Detection, truth: &Truth) -> bool {
-    let overlap = truth.upper_body.map_or(0.0, |region| region.iou(&detection.region));
+    let both = truth.upper_body.zip(detection.rect());
+    let overlap = both.map_or(0.0, |(region, seen)| region.iou(&seen));
     !truth.ignore && overlap >= SAME_OVERLAP
 }
 

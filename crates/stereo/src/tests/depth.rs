@@ -122,7 +122,7 @@ fn a_camera_that_is_not_calibrated_is_an_error() {
     for fx in [0.0, -200.0, f64::NAN, f64::INFINITY] {
         let lens = Pinhole { fx, fy: FX, cx: 0.0, cy: 0.0, distortion: Distortion::None };
         let camera = Arc::new(Camera { lens: Lens::Pinhole(lens), ..Camera::clone(&whole.camera) });
-        let images = whole.images().clone();
+        let images = whole.images();
         let bad = Frame::new(1, whole.stamp, camera, whole.motion, images);
         let mut stereo = StereoDepth::new(StereoSettings::default()).unwrap();
         let error = stereo.depth(&bad, &mut Funnel::default()).unwrap_err().to_string();
@@ -149,14 +149,14 @@ fn what_is_missing_or_does_not_fit_is_an_error() {
         |frame: &Frame| stereo.depth(frame, &mut Funnel::default()).unwrap_err().to_string();
     let whole = frame(left.clone(), right.clone());
     let bare = |images| Frame::new(1, whole.stamp, Arc::clone(&whole.camera), whole.motion, images);
-    let only_left = Images { right: None, ..whole.images().clone() };
+    let only_left = Images { right: None, ..whole.images() };
     assert!(error(&bare(only_left)).contains("needs right images"));
-    let only_right = Images { grey: None, ..whole.images().clone() };
+    let only_right = Images { grey: None, ..whole.images() };
     assert!(error(&bare(only_right)).contains("needs colour or grey images"));
     assert!(error(&frame(left.clone(), GreyImage::filled(64, 47, 0))).contains("64x47"));
     for baseline_m in [0.0, -0.1, f64::NAN] {
         let right = Some(Arc::new(RightImage { image: right.clone(), baseline_m }));
-        let frame = bare(Images { right, ..whole.images().clone() });
+        let frame = bare(Images { right, ..whole.images() });
         assert!(error(&frame).contains("baseline"));
     }
 }

@@ -60,7 +60,7 @@ fn mean_of(plane: &UprightGrey, block: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
-    use tagalong_geometry::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -73,7 +73,7 @@ mod tests {
         let metres = |pixel: usize| (160.0 - pixel as f64) / 300.0 * ahead_m;
         let image = GreyImage::from_fn(320, 320, |x, y| paint(metres(x), 1.2 + metres(y)));
         let candidate = Detection {
-            region: Rect::new(140.0, 60.0, 40.0, 40.0),
+            image: Some(ImageBox::upper_body(Rect::new(140.0, 60.0, 40.0, 40.0))),
             position: Point3::new(ahead_m, 0.0, 1.6),
             covariance: Matrix3::identity(),
             score: 0.0,

@@ -81,7 +81,7 @@ impl Features {
     /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
     /// Colour and depth may be missing.
     pub fn look(&mut self, frame: &Frame, candidate: &Detection) -> Result<()> {
-        let (grey, region) = (frame.grey()?, &candidate.region);
+        let (grey, region) = (frame.grey()?, &candidate.rect_in(&frame.camera));
         let out = &mut self.0;
         out.clear();
         let Some(window) = Window::new(grey, region) else {

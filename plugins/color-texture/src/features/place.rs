@@ -10,14 +10,15 @@ pub const COUNT: usize = 4;
 pub fn push(camera: &Camera, candidate: &Detection, out: &mut Vec<f32>) {
     let eye = camera.robot_from_camera.translation.vector;
     let distance_m = (candidate.position.coords - eye).norm();
-    let numbers = [candidate.position.z, distance_m, candidate.region.width, candidate.score];
+    let width_px = candidate.rect_in(camera).width;
+    let numbers = [candidate.position.z, distance_m, width_px, candidate.score];
     out.extend(numbers.map(|number| number as f32));
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
-    use tagalong_geometry::{Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -26,7 +27,7 @@ mod tests {
         let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 64, 64, 1.2, 0.0, 0.0);
         let candidate = Detection {
-            region: Rect::new(8.0, 8.0, 20.0, 20.0),
+            image: Some(ImageBox::upper_body(Rect::new(8.0, 8.0, 20.0, 20.0))),
             position: Point3::new(3.0, 4.0, 1.2),
             covariance: Matrix3::identity(),
             score: -1.5,

@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
 use tagalong_core::{Detection, EgoMotion, PersonFilter};
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 use tagalong_stats::{RandomSource, SplitMix64};
 
 use crate::{Ekf, State};
@@ -22,7 +22,7 @@ pub fn camera() -> Camera {
 
 pub fn detection(position: Point3<f64>, sigma_m: f64) -> Detection {
     Detection {
-        region: Rect::default(),
+        image: Some(ImageBox::upper_body(Rect::default())),
         position,
         covariance: Matrix3::identity() * (sigma_m * sigma_m),
         score: 1.0,

@@ -199,15 +199,19 @@ impl Trainer for CascadeTrainer {
             self.pictures.push(Picture { use_, grey: Arc::new(grey.clone()), faces });
         }
         if example.is_person {
-            self.pictures.last_mut().into_iter().for_each(|p| p.faces.push(candidate.region));
+            self.pictures
+                .last_mut()
+                .into_iter()
+                .for_each(|p| p.faces.push(candidate.rect_in(&frame.camera)));
         }
         if use_ != Use::Fit {
             return Ok(());
         }
         if example.is_person {
-            self.add_face(grey, &candidate.region);
+            self.add_face(grey, &candidate.rect_in(&frame.camera));
         } else {
-            let pixels = window(grey, &candidate.region, 0.0, self.config.training.side);
+            let pixels =
+                window(grey, &candidate.rect_in(&frame.camera), 0.0, self.config.training.side);
             self.others.extend(Patch::new(&pixels, self.config.training.side));
         }
         Ok(())

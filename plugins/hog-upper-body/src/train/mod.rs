@@ -235,7 +235,7 @@ impl Trainer for HogTrainer {
         let grey = frame.grey()?;
         let use_ = use_of(example.group, &[CALIBRATION]);
         if example.is_person {
-            self.add_person(grey, &candidate.region, use_);
+            self.add_person(grey, &candidate.rect_in(&frame.camera), use_);
             return Ok(());
         }
         // A picture comes once for each of its candidates, and is stored once.

@@ -5,7 +5,7 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
     Result, RgbImage, Sketch, Stamp, TrackId, Update,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
 use crate::{Config, JointParticle};
 
@@ -52,7 +52,13 @@ pub fn frame(motion: EgoMotion, colour: Option<RgbImage>) -> Frame {
 pub fn sighting(position: Point3<f64>, sigmas: [f64; 3]) -> Detection {
     let covariance = Matrix3::from_diagonal(&Vector3::from(sigmas).map(|s| s * s));
     let region = Rect::new(40.0, 30.0, 20.0, 20.0);
-    Detection { region, position, covariance, score: 3.0, source: "drawn" }
+    Detection {
+        image: Some(ImageBox::upper_body(region)),
+        position,
+        covariance,
+        score: 3.0,
+        source: "drawn",
+    }
 }
 
 /// A filter and its frames.

@@ -93,7 +93,7 @@ impl PatchTrainer {
 
 impl Trainer for PatchTrainer {
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
-        let patch = Box::new(self.sampler.patch(frame.grey()?, &candidate.region));
+        let patch = Box::new(self.sampler.patch(frame.grey()?, &candidate.rect_in(&frame.camera)));
         self.samples.push(Sample { patch, example });
         Ok(())
     }
