@@ -96,7 +96,8 @@ fn start(
     tell: &dyn Fn(&str),
 ) -> Result<Option<(LiveSource, Vec<Ear>)>, BridgeError> {
     let name = format!("ROS domain {}", options.domain);
-    let mut listening = Listening::new(&name, &setup.input, &setup.limits, setup.pipeline.inputs())?;
+    let mut listening =
+        Listening::new(&name, &setup.input, &setup.limits, setup.pipeline.inputs())?;
     let mut ears: Vec<Ear> = Vec::new();
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;

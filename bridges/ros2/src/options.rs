@@ -113,8 +113,8 @@ impl Options {
         let pipelines = tagalong_pipeline::Options { foreign, seed: None };
         let mistake =
             |error: tagalong_config::ConfigError| BridgeError::Config(error.render(&shown, &text));
-        let (pipeline, run) = Pipeline::from_toml_with(&text, folder, &registry, &pipelines)
-            .map_err(mistake)?;
+        let (pipeline, run) =
+            Pipeline::from_toml_with(&text, folder, &registry, &pipelines).map_err(mistake)?;
         let input = run.table("input").map_err(mistake)?;
         let limits = run.table("limits").map_err(mistake)?;
         Ok(Setup { pipeline, robot: run.robot, input: self.named(input), limits })

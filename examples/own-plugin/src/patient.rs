@@ -2,7 +2,9 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Initiation, ObservedTrack, TrackChanges, TrackHealth, TrackId, TrackManager, Unassociated};
+use tagalong_core::{
+    Initiation, ObservedTrack, TrackChanges, TrackHealth, TrackId, TrackManager, Unassociated,
+};
 
 /// Settings of `own-patient`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
