@@ -11,8 +11,15 @@ use crate::{Ekf, State};
 pub const DT_S: f64 = 0.09;
 pub const SIGMA_M: f64 = 0.05;
 
+/// Returns three standard normal numbers (Box and Muller).
 pub fn normal3(random: &mut SplitMix64) -> Vector3<f64> {
-    Vector3::new(random.normal(), random.normal(), random.normal())
+    // From numbers in [0, 1) and not those of `RandomSource::normal`: the bounds of these tests
+    // were set with this sequence.
+    let mut normal = || {
+        let radius = (-2.0 * (1.0 - random.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * random.uniform()).cos()
+    };
+    Vector3::new(normal(), normal(), normal())
 }
 
 pub fn camera() -> Camera {
