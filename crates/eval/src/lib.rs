@@ -26,6 +26,7 @@
 //! * [`DetectionTally`]: single detections; the miss-rate curve and its average.
 //! * [`SetTally`]: OSPA and GOSPA, one number for place and count errors.
 //! * [`PositionError`], [`Times`], [`Following`]: what a robot cares about.
+//! * [`FloorClear`]: CLEAR on the floor with a cut in metres, as benchmarks of leg trackers count.
 //! * [`events`]: when and where it went wrong, for a list to look through.
 //! * [`Consistency`]: whether a filter knows how wrong it is.
 //! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: how far a
@@ -43,6 +44,7 @@ mod clear;
 mod consistency;
 mod error;
 mod events;
+mod floor;
 pub mod formats;
 mod hota;
 mod identity;
@@ -63,6 +65,7 @@ pub use clear::{Clear, MATCH_SIMILARITY, Match};
 pub use consistency::{Consistency, chi_square_quantile};
 pub use error::EvalError;
 pub use events::{Event, EventKind, events};
+pub use floor::{FloorClear, FloorPoint, FloorScan, FloorTally};
 pub use hota::{Hota, HotaLevel, LEVELS, alpha};
 pub use identity::Identity;
 pub use missrate::{CurvePoint, DetectionTally, PrecisionRecall, REFERENCE_FPPI, Verdict};

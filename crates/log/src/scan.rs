@@ -10,7 +10,8 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
-use crate::mcap_walk::{Channel, Counters, Message, Walker};
+use crate::log_walk::LogWalker;
+use crate::mcap_walk::{Channel, Counters, Message};
 use crate::msgs::{
     CameraInfo, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
 };
@@ -162,7 +163,7 @@ impl Scan {
         known: &[Arc<Channel>],
     ) -> Result<Self, LogError> {
         let file = Hashing { reader: open_file(path)?, hash: Sha256::new(), bytes: 0 };
-        let mut walker = Walker::new(file, limits)
+        let mut walker = LogWalker::new(file, limits)
             .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?
             .knowing(known.iter().cloned());
         let mut gathering = Gathering::new(depth_unit_m);
@@ -247,7 +248,7 @@ impl Gathering {
     /// Returns a topic; adds it if it is new.
     pub(crate) fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
         self.topics.entry(name.to_owned()).or_insert_with(|| Topic {
-            kind: if encoding == "cdr" { Type::of(schema) } else { Type::Other },
+            kind: if matches!(encoding, "cdr" | "ros1") { Type::of(schema) } else { Type::Other },
             schema: schema.to_owned(),
             encoding: encoding.to_owned(),
             count: 0,

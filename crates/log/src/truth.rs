@@ -13,7 +13,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::mcap_walk::Walker;
+use crate::log_walk::LogWalker;
 use crate::msgs::{StringMsg, decode};
 use crate::scan::open_file;
 use crate::{Limits, LogError};
@@ -85,7 +85,7 @@ impl TruthFrame {
 /// A log that cannot be opened, or a message of the channel that is no [`TruthFrame`], because an
 /// incomplete truth would give wrong figures.
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
-    let mut walker = Walker::new(open_file(path)?, limits)
+    let mut walker = LogWalker::new(open_file(path)?, limits)
         .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
     let mut frames: Vec<TruthFrame> = Vec::new();
     while let Some(message) = walker.next() {

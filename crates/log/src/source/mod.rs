@@ -17,13 +17,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use assembly::{Assembly, Messages};
+pub(crate) use laser::{is_sane as scan_is_sane, seen_from as scan_seen_from};
 pub use live::{Listening, LiveSource};
 use nalgebra::Isometry2;
 use plan::{plan, tally_of};
 use serde::Serialize;
 use tagalong_core::Frame;
 
-use crate::mcap_walk::{Message, Walker};
+use crate::log_walk::LogWalker;
+use crate::mcap_walk::Message;
 use crate::scan::{Scan, open_file};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
@@ -85,13 +87,13 @@ pub struct LogFacts {
 
 /// Frames of a log, one after the other.
 pub struct FrameSource {
-    walker: Walker<File>,
+    walker: LogWalker<File>,
     assembly: Assembly,
     facts: LogFacts,
     first: Option<LogFrame>,
 }
 
-impl Messages for Walker<File> {
+impl Messages for LogWalker<File> {
     fn next_message(&mut self) -> Option<Message<'_>> {
         self.next()
     }
@@ -196,9 +198,9 @@ impl FrameSource {
 }
 
 /// Starts the second pass over a log.
-fn walk(scan: &Scan, limits: &Limits) -> Result<Walker<File>, LogError> {
+fn walk(scan: &Scan, limits: &Limits) -> Result<LogWalker<File>, LogError> {
     let path = &scan.path;
-    let walker = Walker::new(open_file(path)?, limits)
+    let walker = LogWalker::new(open_file(path)?, limits)
         .map_err(|source| LogError::NotMcap { path: path.clone(), source })?;
     Ok(walker.knowing(scan.channels.iter().cloned()))
 }
