@@ -17,9 +17,17 @@ pub struct Config {
     /// Two legs belong to one person if their middles are no farther apart, m.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub max_stride_m: f64,
-    /// Added to the sum of both legs' log-odds, because two legs side by side are rarely clutter.
+    /// Added to the log-odds of a single leg: most segments like legs are furniture.
+    #[schemars(range(min = -10.0, max = 10.0))]
+    pub single_log_odds: f64,
+    /// Added to the sum of both legs' log-odds.
     #[schemars(range(min = -10.0, max = 10.0))]
     pub pair_log_odds: f64,
+    /// Added to the log-odds of a person where nothing was in the last two seconds, and taken from
+    /// them where something was: people move, furniture does not. Only for robots with odometry, or
+    /// at rest; 0: earlier scans are not looked at.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub free_log_odds: f64,
     /// Log-odds of a detection are limited to plus and minus this: one scan is never beyond doubt.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub limit: f64,
@@ -86,7 +94,9 @@ impl Default for Config {
             segments: Segmentation::default(),
             min_leg_log_odds: -1.0,
             max_stride_m: 0.7,
+            single_log_odds: 0.0,
             pair_log_odds: 0.5,
+            free_log_odds: 0.0,
             limit: 3.0,
             pair_sigma_m: 0.08,
             single_sigma_m: 0.16,
@@ -104,13 +114,7 @@ impl Default for Segmentation {
 
 impl Default for Training {
     fn default() -> Self {
-        Self {
-            trees: vec![50, 100, 200],
-            depth: 3,
-            folds: 3,
-            every_ray: vec![2, 3],
-            label_m: 0.15,
-        }
+        Self { trees: vec![50, 100, 200], depth: 3, folds: 3, every_ray: vec![2, 3], label_m: 0.15 }
     }
 }
 

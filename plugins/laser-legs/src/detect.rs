@@ -5,6 +5,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::Rect;
 
+use crate::past::PastScans;
 use crate::{Beams, Config, Model, NAME, features};
 
 /// The model that is part of the program.
@@ -17,6 +18,7 @@ const UNKNOWN_HEIGHT: f64 = 1e3;
 pub struct LaserLegs {
     config: Config,
     model: Model,
+    past: PastScans,
 }
 
 /// Segment that may be a leg.
@@ -36,18 +38,19 @@ impl LaserLegs {
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { config, model })
+        Ok(Self { config, model, past: PastScans::default() })
     }
 
     /// Returns the segments that may be legs.
-    fn legs(&self, scan: &LaserScan, funnel: &mut Funnel) -> Vec<Leg> {
-        let beams = Beams::new(scan, 1);
+    fn legs(&self, beams: &Beams, funnel: &mut Funnel) -> Vec<Leg> {
+        let max_width_m = self.config.segments.max_width_m;
         let segments = beams.segments(&self.config.segments);
         let leg = |segment| {
-            let log_odds = self.model.log_odds(&features(&beams, segment, &segments));
+            let log_odds = self.model.log_odds(&features(beams, segment, &segments));
             Leg { at: beams.middle(segment.clone()), log_odds }
         };
-        let mut legs: Vec<Leg> = segments.iter().map(leg).collect();
+        let narrow = segments.iter().filter(|s| beams.width((*s).clone()) <= max_width_m);
+        let mut legs: Vec<Leg> = narrow.map(leg).collect();
         legs.retain(|leg| {
             let is_leg = leg.log_odds >= self.config.min_leg_log_odds;
             if !is_leg {
@@ -73,7 +76,8 @@ impl LaserLegs {
                 people.push(vec![legs[a], legs[b]]);
             }
         }
-        people.extend(legs.iter().zip(is_free).filter(|(_, free)| *free).map(|(leg, _)| vec![*leg]));
+        people
+            .extend(legs.iter().zip(is_free).filter(|(_, free)| *free).map(|(leg, _)| vec![*leg]));
         people
     }
 
@@ -86,7 +90,7 @@ impl LaserLegs {
                 let both = a.log_odds + b.log_odds + config.pair_log_odds;
                 (center(&a.at, &b.at), both, config.pair_sigma_m)
             }
-            [one] => (one.at, one.log_odds, config.single_sigma_m),
+            [one] => (one.at, one.log_odds + config.single_log_odds, config.single_sigma_m),
             [] => (Point2::origin(), 0.0, config.single_sigma_m),
         };
         let at = at + scanner;
@@ -95,7 +99,8 @@ impl LaserLegs {
             region: Rect::default(),
             position: Point3::new(at.x, at.y, config.head_height_m),
             covariance: Matrix3::from_diagonal(&Vector3::new(variance, variance, UNKNOWN_HEIGHT)),
-            score: log_odds.clamp(-config.limit, config.limit),
+            score: (log_odds + config.free_log_odds * self.past.was_free(&at))
+                .clamp(-config.limit, config.limit),
             source: NAME,
         }
     }
@@ -114,11 +119,21 @@ impl Detector for LaserLegs {
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let scan = frame.scan()?;
-        let legs = self.legs(scan, funnel);
-        Ok(self.people(&legs).iter().map(|legs| self.detection(legs, scan)).collect())
+        let beams = Beams::new(scan, 1);
+        let is_needed = self.config.free_log_odds > 0.0;
+        if is_needed {
+            self.past.predict(&frame.motion);
+        }
+        let legs = self.legs(&beams, funnel);
+        let people = self.people(&legs);
+        let found = people.iter().map(|legs| self.detection(legs, scan)).collect();
+        if is_needed {
+            self.past.add(&beams, scan.robot_from_scanner.translation.vector.xy());
+        }
+        Ok(found)
     }
 
     fn remembers(&self) -> bool {
-        false
+        self.config.free_log_odds > 0.0
     }
 }

@@ -4,7 +4,7 @@ use crate::{Beams, Segment};
 
 /// Names of the features, in the order of a model file. All lengths are in metres, and none depends
 /// on the number of rays but `points`, which counts few of them.
-pub const FEATURES: [&str; 17] = [
+pub const FEATURES: [&str; 20] = [
     "width",
     "deviation",
     "deviation_from_median",
@@ -22,6 +22,9 @@ pub const FEATURES: [&str; 17] = [
     "occluded_sides",
     "points",
     "neighbour",
+    "second_neighbour",
+    "neighbours",
+    "wall",
 ];
 
 /// Number of features of a segment.
@@ -36,6 +39,8 @@ const STRAIGHT_M: f64 = 1.0;
 const FAR_M: f64 = 0.5;
 /// Neighbours above this are no second leg, m.
 const APART_M: f64 = 1.0;
+/// Segments that are wider than this are no legs, m.
+const WIDE_M: f64 = 0.4;
 /// Curvatures above this are noise, 1/m.
 const SHARP: f64 = 50.0;
 /// Numbers of points above this are not told apart: they depend on the resolution.
@@ -55,6 +60,8 @@ pub fn features(beams: &Beams, segment: &Segment, segments: &[Segment]) -> Featu
     let jumps = [before(beams, segment), after(beams, segment)];
     let [first, second] = jumps.map(|jump| jump.map_or(FAR_M, |(apart, _)| apart.min(FAR_M)));
     let occluded = jumps.iter().flatten().filter(|(_, is_nearer)| *is_nearer).count();
+    let [neighbour, second_neighbour, neighbours, wall] =
+        surroundings(beams, segment, &middle, segments);
     let values = [
         beams.width(segment.clone()),
         deviation,
@@ -72,7 +79,10 @@ pub fn features(beams: &Beams, segment: &Segment, segments: &[Segment]) -> Featu
         first.max(second),
         occluded as f64,
         points.len().min(MANY_POINTS) as f64,
-        neighbour(beams, segment, &middle, segments),
+        neighbour,
+        second_neighbour,
+        neighbours,
+        wall,
     ];
     values.map(|value| value as f32)
 }
@@ -86,7 +96,8 @@ fn spread(points: &[Point2<f64>], middle: &Point2<f64>) -> [f64; 3] {
     let half_trace = 0.5 * scatter.trace();
     let root = (half_trace.powi(2) - scatter.determinant()).max(0.0).sqrt();
     let [small, large] = [half_trace - root, half_trace + root].map(|v| v.max(0.0).sqrt());
-    let total = (scatter.trace() * points.len() as f64 / (points.len() as f64 - 1.0).max(1.0)).sqrt();
+    let total =
+        (scatter.trace() * points.len() as f64 / (points.len() as f64 - 1.0).max(1.0)).sqrt();
     [total, small, small / large.max(1e-6)]
 }
 
@@ -171,9 +182,30 @@ fn jump(beams: &Beams, inside: usize, outside: usize) -> Option<(f64, bool)> {
     (gap <= OPEN_RAYS).then_some((apart, beams.ranges[outside] < beams.ranges[inside]))
 }
 
-/// Returns the distance to the nearest other segment, which may be the other leg, m.
-fn neighbour(beams: &Beams, own: &Segment, middle: &Point2<f64>, segments: &[Segment]) -> f64 {
-    let others = segments.iter().filter(|other| *other != own);
-    let apart = others.map(|other| (beams.middle(other.clone()) - middle).norm());
-    apart.fold(APART_M, f64::min)
+/// Returns the distances to the nearest two other small segments, one of which may be the other
+/// leg, the number of small segments nearby, and the distance to the nearest wide one, m.
+fn surroundings(
+    beams: &Beams,
+    own: &Segment,
+    middle: &Point2<f64>,
+    segments: &[Segment],
+) -> [f64; 4] {
+    let [mut first, mut second, mut count, mut wall] = [APART_M, APART_M, 0.0, APART_M];
+    for other in segments.iter().filter(|other| *other != own) {
+        if beams.width(other.clone()) > WIDE_M {
+            let apart = beams.points[other.clone()].iter().map(|point| (point - middle).norm());
+            wall = apart.fold(wall, f64::min);
+            continue;
+        }
+        let apart = (beams.middle(other.clone()) - middle).norm();
+        if apart < APART_M {
+            count += 1.0;
+        }
+        if apart < first {
+            (first, second) = (apart, first);
+        } else {
+            second = second.min(apart);
+        }
+    }
+    [first, second, count, wall]
 }

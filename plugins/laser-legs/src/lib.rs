@@ -15,6 +15,7 @@ mod config;
 mod detect;
 mod features;
 mod model;
+mod past;
 mod segment;
 #[cfg(test)]
 mod tests;
@@ -35,7 +36,5 @@ pub const NAME: &str = "laser-legs";
 pub fn register(registry: &mut Registry) {
     registry.detector(NAME, "legs in a laser scan, by boosted geometric features", LaserLegs::new);
     #[cfg(feature = "train")]
-    registry.trainer(NAME, |config: Config, context| {
-        train::LegTrainer::new(&config, context.seed)
-    });
+    registry.trainer(NAME, |config: Config, context| train::LegTrainer::new(&config, context.seed));
 }

@@ -108,7 +108,9 @@ fn is_sound(tree: &Tree) -> bool {
     let is_node = |(index, node): (usize, &Node)| {
         let leads_on = |next: &usize| *next == 0 || (index < *next && *next < tree.len());
         let numbers = [node.below, node.leaves[0], node.leaves[1]];
-        node.feature < COUNT && node.next.iter().all(leads_on) && numbers.iter().all(|n| n.is_finite())
+        node.feature < COUNT
+            && node.next.iter().all(leads_on)
+            && numbers.iter().all(|n| n.is_finite())
     };
     !tree.is_empty() && tree.iter().enumerate().all(is_node)
 }

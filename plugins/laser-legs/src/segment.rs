@@ -38,7 +38,7 @@ impl Beams {
         Self { points, ranges, rays, step_rad }
     }
 
-    /// Returns the segments of the scan, each at least as long and at most as wide as allowed.
+    /// Returns the segments of the scan that are no single points of noise.
     pub fn segments(&self, settings: &Segmentation) -> Vec<Segment> {
         let mut segments = Vec::new();
         let mut start = 0;
@@ -48,11 +48,7 @@ impl Beams {
                 start = end;
             }
         }
-        let is_used = |segment: &Segment| {
-            segment.len() >= settings.min_points
-                && self.width(segment.clone()) <= settings.max_width_m
-        };
-        segments.retain(is_used);
+        segments.retain(|segment| segment.len() >= settings.min_points);
         segments
     }
 

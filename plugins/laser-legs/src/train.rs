@@ -11,7 +11,7 @@ use tagalong_learn::{Line, accepted, area, parts, platt};
 
 use crate::config::Config;
 use crate::model::{Node, Tree};
-use crate::{Beams, COUNT, Features, Model, Segmentation, Training, features};
+use crate::{Beams, COUNT, Features, Model, Segment, Segmentation, Training, features};
 
 /// Features of a segment with its label.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,8 @@ impl LegTrainer {
         for step in steps {
             let beams = Beams::new(scan, step);
             let segments = beams.segments(&self.segments);
-            for segment in &segments {
+            let is_narrow = |s: &&Segment| beams.width((*s).clone()) <= self.segments.max_width_m;
+            for segment in segments.iter().filter(is_narrow) {
                 let at = beams.middle(segment.clone()) + scanner;
                 let apart = self.legs.iter().map(|leg| (leg - at).norm());
                 let nearest = apart.fold(f64::INFINITY, f64::min);

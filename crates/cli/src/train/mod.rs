@@ -9,6 +9,7 @@ mod card;
 mod faces;
 mod held_out;
 mod in_use;
+mod legs;
 #[cfg(test)]
 mod overlap;
 mod panorama;
@@ -50,7 +51,8 @@ const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 #[derive(Args, Debug)]
 pub struct TrainArgs {
     /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
-    /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`.
+    /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`; `laser-legs` is
+    /// trained on bags of laser scans.
     pub plugin: String,
     /// Output file of the model; its card is written beside it [default:
     /// configs/models/<plugin>.toml].
@@ -146,6 +148,9 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
         return panorama::train(&session, args);
     }
     let mut trainer = session.trainer()?;
+    if args.plugin == legs::NAME {
+        return legs::train(&session, trainer.as_mut());
+    }
     let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
     if is_detector || args.plugin == faces::NAME {
         return windows::train(&session, trainer.as_mut());
@@ -377,6 +382,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
         "body-net" => "[training]\nepochs = 2",
         "color-texture" => "[training]\ntrees = [25, 50]",
         "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
+        "laser-legs" => "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
         "cascade" => "[training]\nstages = 4\nfeatures = 200",
         _ => "",
     };

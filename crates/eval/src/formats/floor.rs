@@ -15,6 +15,8 @@ pub struct Row {
     pub odom_m: Option<[f64; 2]>,
     /// Neither a miss nor a false alarm.
     pub ignore: bool,
+    /// True for a place that was annotated, false for one between two annotations.
+    pub annotated: bool,
 }
 
 /// Reads `people-floor.csv`; columns are found by name, unknown ones are passed over.
@@ -24,9 +26,10 @@ pub struct Row {
 /// A missing column, something that is no number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
-    let [scan, id, x, y, ignore] =
-        ["scan", "id", "x_laser_m", "y_laser_m", "ignore"].map(|name| Ok((name, table.column(name)?)));
-    let (scan, id, x, y, ignore) = (scan?, id?, x?, y?, ignore?);
+    let column = |name: &'static str| Ok::<_, FormatError>((name, table.column(name)?));
+    let [scan, id, ignore, source] =
+        [column("scan")?, column("id")?, column("ignore")?, column("source")?];
+    let [x, y] = [column("x_laser_m")?, column("y_laser_m")?];
     let odom = [table.find("x_odom_m"), table.find("y_odom_m")];
     let row = |line: &super::Line<'_>| {
         // An empty field is a place that is not known.
@@ -41,6 +44,7 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
             person: FloorPoint { id: line.whole(id.1, id.0)?, at_m },
             odom_m,
             ignore: line.number(ignore.1, ignore.0)? != 0.0,
+            annotated: line.text(source.1, source.0)? == "annotated",
         })
     };
     table.rows.iter().map(row).collect()
@@ -57,8 +61,9 @@ mod tests {
         let text = format!("{HEADER}\n1.5,3,1000,2.0,-1.0,,,1,gap\n1.6,4,2,1,2,3,4,0,annotated\n");
         let rows = parse(&text, "a.csv").unwrap();
         let person = FloorPoint { id: 1000, at_m: [2.0, -1.0] };
-        assert_eq!(rows[0], Row { scan: 3, person, odom_m: None, ignore: true });
+        assert_eq!(rows[0], Row { scan: 3, person, odom_m: None, ignore: true, annotated: false });
         assert_eq!((rows[1].odom_m, rows[1].ignore), (Some([3.0, 4.0]), false));
+        assert!(rows[1].annotated);
     }
 
     #[test]

@@ -15,8 +15,8 @@ mod vision;
 
 pub use common::{Header, StringMsg, Time};
 pub use geometry::{
-    Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage, Transform,
-    TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
+    Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
+    Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 use re_cdr::{BigEndian, LittleEndian};
 pub use sensor::{CameraInfo, CompressedImage, Image, JointState, LaserScan, RegionOfInterest};
