@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::Isometry3;
+use tagalong_core::Track;
 use tagalong_eval::formats::floor::{self, Row as TruthRow};
 use tagalong_eval::{FloorClear, FloorPoint, FloorScan, FloorTally};
 use tagalong_log::{FrameSource, InputSettings, Limits};
@@ -31,8 +32,11 @@ pub const SYSTEM: System = System {
     ],
 };
 
-/// Name of the config.
-const CONFIG: &str = "laser-legs";
+/// Configs, and the log by which the settings of each were chosen.
+const CONFIGS: [(&str, &str); 2] =
+    [("laser-legs", "laser-moving"), ("laser-follow", "laser-following")];
+/// Tracks that no scan has supported for longer than this are no estimates, s.
+const COASTING_S: [f64; 2] = [0.0, 0.35];
 /// Largest distance of a person and its estimate, m (the benchmark's).
 const CUT_M: f64 = 0.75;
 /// Bearings in the frame of the laser within which people and estimates count in `laser-moving`,
@@ -75,13 +79,20 @@ type Figures = [Option<f64>; 8];
 
 /// Result on a log.
 struct Tracked {
+    config: &'static str,
+    /// True if the settings were chosen on this log, so that the figures are no result.
+    is_chosen_here: bool,
+    coasting_s: f64,
     clear: FloorClear,
     /// Number of the first scan with an estimate of an annotated person.
     first: Option<u32>,
 }
 
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
-    let Some(tracked) = MOVING.track(lab)? else { return Ok(MOVING.without_data().into()) };
+    let tracked = MOVING.track_all(lab)?;
+    if tracked.is_empty() {
+        return Ok(MOVING.without_data().into());
+    }
     let given = |of: [f64; 8]| of.map(Some);
     let mut table = MOVING.table(
         "People beside a robot that drives (laser-moving, strict, 0.75 m)",
@@ -107,11 +118,16 @@ fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
          so they are no measure for this one."
             .into(),
     );
-    Ok(Findings { tables: vec![table, MOVING.people(&tracked)], ..Findings::default() })
+    let seen = tracked.iter().filter(|tracked| tracked.coasting_s == 0.0);
+    let tables = std::iter::once(table).chain(seen.map(|tracked| MOVING.people(tracked)));
+    Ok(Findings { tables: tables.collect(), ..Findings::default() })
 }
 
 fn following(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
-    let Some(tracked) = FOLLOWING.track(lab)? else { return Ok(FOLLOWING.without_data().into()) };
+    let tracked = FOLLOWING.track_all(lab)?;
+    if tracked.is_empty() {
+        return Ok(FOLLOWING.without_data().into());
+    }
     let figures = |of: [f64; 6]| {
         let [objects, valid, switches, misses, recall, motp] = of.map(Some);
         [objects, valid, switches, misses, None, None, recall, motp]
@@ -131,11 +147,13 @@ fn following(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     table.rows.extend(FOLLOWING_PUBLISHED.map(|(name, [valid, switches, misses, motp])| {
         published(name, figures([6179.0, valid, switches, misses, recall(valid), motp]))
     }));
-    let first = tracked.first.map_or("never".into(), |scan| {
-        format!("{:.1} s after the first scan", f64::from(scan) * FOLLOWING.scan_s)
-    });
+    table.notes.extend(tracked.iter().filter(|tracked| tracked.coasting_s == 0.0).map(|tracked| {
+        let first = tracked.first.map_or("never".into(), |scan| {
+            format!("{:.1} s after the first scan", f64::from(scan) * FOLLOWING.scan_s)
+        });
+        format!("`{}` finds the person {first}; it stands still for 8.0 s.", tracked.config)
+    }));
     table.notes.extend([
-        format!("The person is found first {first}; it stands still for 8.0 s."),
         "Only one person is annotated, so estimates of others are no false positives, and their \
          number is stated beside the recall. The published rows are of the whole bag, of which \
          this log is a part."
@@ -173,46 +191,74 @@ fn published(name: &str, figures: Figures) -> Row {
 }
 
 impl Log {
-    /// Runs the pipeline; `None` without the log.
-    fn track(&self, lab: &Lab<'_>) -> Result<Option<Tracked>, ReproduceError> {
+    /// Runs all configs; nothing without the log.
+    fn track_all(&self, lab: &Lab<'_>) -> Result<Vec<Tracked>, ReproduceError> {
         let Some(folder) = lab.data.as_ref().map(|data| data.join("laser")) else {
-            return Ok(None);
+            return Ok(Vec::new());
         };
         let log = folder.join(format!("{}.mcap", self.name));
         if !log.is_file() {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let truth = truth(&folder.join(format!("{}.people-floor.csv", self.name)))?;
+        lab.progress.begin(CONFIGS.len(), self.name);
+        let mut all = Vec::new();
+        for (config, chosen_on) in CONFIGS {
+            for (coasting_s, (clear, first)) in self.track(lab, &log, &truth, config)? {
+                let is_chosen_here = chosen_on == self.name;
+                all.push(Tracked { config, is_chosen_here, coasting_s, clear, first });
+            }
+            lab.progress.step();
+        }
+        Ok(all)
+    }
+
+    /// Runs one config, and counts its estimates with and without coasting tracks.
+    fn track(
+        &self,
+        lab: &Lab<'_>,
+        log: &Path,
+        truth: &BTreeMap<u32, Vec<TruthRow>>,
+        config: &str,
+    ) -> Result<[(f64, (FloorClear, Option<u32>)); 2], ReproduceError> {
         let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
-        let mut pipeline = lab.contender(CONFIG)?.pipeline(lab.registry, 1)?;
+        let mut pipeline = lab.contender(config)?.pipeline(lab.registry, 1)?;
         let (input, limits) = (InputSettings::default(), Limits::default());
-        let mut source = FrameSource::open(&log, &input, &limits, pipeline.inputs())
+        let mut source = FrameSource::open(log, &input, &limits, pipeline.inputs())
             .map_err(|error| failed(error.to_string()))?;
-        lab.progress.begin(truth.len(), self.name);
-        let mut tally = FloorTally::new(CUT_M);
-        let (mut number, mut first) = (0, None);
+        let mut tallies = COASTING_S.map(|coasting_s| (coasting_s, FloorTally::new(CUT_M), None));
+        let mut number = 0;
         while let Some(item) = source.next_frame() {
             let report = pipeline.step(&item.frame).map_err(|error| failed(error.to_string()))?;
             let scan = item.frame.scan().map_err(|error| failed(error.to_string()))?;
             let people = truth.get(&number).map_or(&[][..], Vec::as_slice);
-            let scan = self.scan(people, &report, &scan.robot_from_scanner);
-            tally.add(&scan);
-            if first.is_none() && has_match(&scan) {
-                first = Some(number);
+            for (coasting_s, tally, first) in &mut tallies {
+                let scan = self.scan(people, &report, &scan.robot_from_scanner, *coasting_s);
+                tally.add(&scan);
+                if first.is_none() && has_match(&scan) {
+                    *first = Some(number);
+                }
             }
             number += 1;
-            lab.progress.step();
         }
-        Ok(Some(Tracked { clear: tally.finish(), first }))
+        Ok(tallies.map(|(coasting_s, tally, first)| (coasting_s, (tally.finish(), first))))
     }
 
     /// Returns the people and the estimates of a scan that count, in the frame of the laser.
-    fn scan(&self, people: &[TruthRow], report: &FrameReport, laser: &Isometry3<f64>) -> FloorScan {
+    fn scan(
+        &self,
+        people: &[TruthRow],
+        report: &FrameReport,
+        laser: &Isometry3<f64>,
+        coasting_s: f64,
+    ) -> FloorScan {
         let annotated = people.iter().filter(|row| row.annotated).map(|row| row.person);
         FloorScan {
             people: annotated.filter(|point| self.is_inside(point)).collect(),
             ignored: Vec::new(),
-            estimates: estimates(report, laser).filter(|point| self.is_inside(point)).collect(),
+            estimates: estimates(report, laser, coasting_s)
+                .filter(|point| self.is_inside(point))
+                .collect(),
         }
     }
 
@@ -222,18 +268,26 @@ impl Log {
         self.sector_deg.is_none_or(|[right, left]| (right..=left).contains(&bearing_deg))
     }
 
-    fn table(&self, title: &str, floors: &[(&str, Figures)], tracked: &Tracked) -> Table {
+    fn table(&self, title: &str, floors: &[(&str, Figures)], tracked: &[Tracked]) -> Table {
         let floors =
             floors.iter().map(|(name, of)| Row::ours(format!("floor: {name}"), cells(*of)));
-        let ours = Row::ours(CONFIG, self.cells(&tracked.clear));
+        let ours = tracked.iter().map(|tracked| {
+            let chosen = if tracked.is_chosen_here { ", chosen on this log" } else { "" };
+            let coasting = match tracked.coasting_s {
+                0.0 => String::new(),
+                seconds => format!(", coasting for {seconds} s"),
+            };
+            Row::ours(format!("`{}`{coasting}{chosen}", tracked.config), self.cells(&tracked.clear))
+        });
+        let clusters = if self.is_complete { "people" } else { "blocks of 45 scans" };
         Table {
             title: title.into(),
             columns: COLUMNS.map(String::from).to_vec(),
-            rows: floors.chain([ours]).collect(),
+            rows: floors.chain(ours).collect(),
             notes: vec![format!(
-                "Estimates are confirmed tracks that this scan supports. Intervals of 95 % are over \
-                 {}. A match that is a switch is not valid.",
-                if tracked.clear.people.len() > 1 { "people" } else { "blocks of 45 scans" },
+                "Estimates are confirmed tracks that this scan supports, or one within the time of \
+                 coasting. Intervals of 95 % are over {clusters}. A match that is a switch is not \
+                 valid. A row that says so is no result: its settings were chosen by these figures."
             )],
         }
     }
@@ -261,7 +315,7 @@ impl Log {
     }
 
     /// Returns the table of recall by person, and of the rate of false positives.
-    fn people(&self, Tracked { clear, .. }: &Tracked) -> Table {
+    fn people(&self, Tracked { config, clear, .. }: &Tracked) -> Table {
         let person = |(id, [found, of]): (&i64, &[u64; 2])| {
             Row::ours(
                 format!("person {id}"),
@@ -274,7 +328,7 @@ impl Log {
             None => format!("{:.1} a minute", rate.estimate),
         });
         Table {
-            title: format!("Recall by person ({})", self.name),
+            title: format!("Recall by person (`{config}` on {})", self.name),
             columns: vec!["objects".into(), "recall, %".into()],
             rows: clear.people.iter().map(person).collect(),
             notes: vec![
@@ -305,14 +359,17 @@ fn truth(path: &Path) -> Result<BTreeMap<u32, Vec<TruthRow>>, ReproduceError> {
     Ok(truth)
 }
 
-/// Yields the confirmed tracks that this scan supports, in the frame of the laser.
-fn estimates<'a>(
-    report: &'a FrameReport,
+/// Yields the confirmed tracks that were supported within so many seconds, in the frame of the laser.
+fn estimates(
+    report: &FrameReport,
     laser: &Isometry3<f64>,
-) -> impl Iterator<Item = FloorPoint> + 'a {
+    coasting_s: f64,
+) -> impl Iterator<Item = FloorPoint> {
     let laser_from_robot = laser.inverse();
-    let tracks = report.tracks.iter().filter(|track| track.confirmed && track.seen);
-    tracks.map(move |track| {
+    let is_estimate = move |track: &&Track| {
+        track.confirmed && (track.seen || (coasting_s > 0.0 && track.unseen_s <= coasting_s))
+    };
+    report.tracks.iter().filter(is_estimate).map(move |track| {
         let at = laser_from_robot * track.estimate.person.position;
         FloorPoint { id: i64::from(track.id.0), at_m: [at.x, at.y] }
     })

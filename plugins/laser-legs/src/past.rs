@@ -73,11 +73,6 @@ impl PastScans {
         }
         if count < FEWEST { 0.0 } else { sum / count }
     }
-
-    /// Forgets all scans.
-    pub(crate) fn clear(&mut self) {
-        self.scans.clear();
-    }
 }
 
 impl PastScan {
@@ -143,8 +138,6 @@ mod tests {
         assert_eq!(past.was_free(&Point2::new(2.5, 0.0)), -1.0);
         assert_eq!(past.was_free(&Point2::new(2.0, 0.8)), 1.0, "nobody was here");
         assert_eq!(past.was_free(&Point2::new(3.3, 0.0)), 1.0, "one thin thing hides little");
-        past.clear();
-        assert_eq!(past.was_free(&Point2::new(2.5, 0.0)), 0.0);
     }
 
     #[test]

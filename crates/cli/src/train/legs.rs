@@ -1,5 +1,6 @@
 //! Training of `laser-legs` on laser scans with annotated legs.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -103,10 +104,11 @@ fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, 
     let mut scans = read_leg_scans(bag, &Limits::default()).map_err(Failure::failed)?;
     let has_people = scans.iter().any(|scan| !scan.legs.is_empty());
     let share = if has_people { 1 } else { QUIET_SHARE } * if quick { 5 } else { 1 };
-    let mut index = 0;
-    scans.retain(|_| {
-        index += 1;
-        index % share == 0
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    scans.retain(|scan| {
+        let count = counts.entry(scan.topic.clone()).or_default();
+        *count += 1;
+        count.is_multiple_of(share)
     });
     let name = bag.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     for scan in &scans {
