@@ -69,11 +69,16 @@ fn chunk(compression: &str, size: u32, packed: &[u8]) -> Vec<u8> {
     record(&header, packed)
 }
 
+fn four_scans(first: u32) -> Vec<u8> {
+    let mut records = connection(3, "/scan", "sensor_msgs/LaserScan");
+    (first..first + 4).for_each(|at| records.extend(message(3, at, &scan(at))));
+    records
+}
+
 fn bag(compression: &str) -> Vec<u8> {
     let mut out = [MAGIC, &record(&[field("op", &[3])], &[b' '; 40])].concat();
     for first in (0..MESSAGES).step_by(4) {
-        let mut records = connection(3, "/scan", "sensor_msgs/LaserScan");
-        (first..first + 4).for_each(|at| records.extend(message(3, at, &scan(at))));
+        let records = four_scans(first);
         out.extend(chunk(compression, records.len() as u32, &pack(compression, &records)));
         out.extend(record(&[field("op", &[4])], &[0; 12]));
     }
@@ -108,6 +113,29 @@ fn messages_of_all_chunks_are_delivered_in_order() {
     for compression in COMPRESSIONS {
         let (seconds, counters, lost) = walk(&bag(compression), &Limits::default()).unwrap();
         assert_eq!((seconds, lost), (all(), false), "{compression}: {counters:?}");
+    }
+}
+
+/// Only a decoder of bz2 is among the dependencies: the chunk was packed by another program from the
+/// records of [`four_scans`].
+#[test]
+fn chunks_of_bz2_are_read() {
+    let packed: &[u8] = include_bytes!("data/scans.bz2");
+    let size = four_scans(0).len() as u32;
+    let bytes = [MAGIC, &chunk("bz2", size, packed)].concat();
+    let (seconds, counters, lost) = walk(&bytes, &Limits::default()).unwrap();
+    assert_eq!((seconds, lost), (vec![0, 1, 2, 3], false), "{counters:?}");
+    for end in 0..packed.len() {
+        let bytes = [MAGIC, &chunk("bz2", size, &packed[..end])].concat();
+        let (seconds, counters, lost) = walk(&bytes, &Limits::default()).unwrap();
+        assert!(seconds.is_empty() && lost, "{end}: {counters:?}");
+    }
+    for at in 0..packed.len() {
+        let mut damaged = packed.to_vec();
+        damaged[at] ^= 0x10;
+        assert!(
+            walk(&[MAGIC, &chunk("bz2", size, &damaged)].concat(), &Limits::default()).is_some()
+        );
     }
 }
 
