@@ -25,6 +25,7 @@ pub fn register(registry: &mut Registry) {
     tagalong_hog_upper_body::register(registry);
     tagalong_image_kalman::register(registry);
     tagalong_joint_particle::register(registry);
+    tagalong_laser_legs::register(registry);
     tagalong_last_seen::register(registry);
     tagalong_manage_m_of_n::register(registry);
     tagalong_manage_sprt::register(registry);

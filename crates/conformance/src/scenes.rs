@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, EgoMotion, Estimate, Frame, Image, Images, Inputs, Person, RgbImage,
-    RightImage, Stamp, Track, TrackId, Usage,
+    DepthImage, Detection, EgoMotion, Estimate, Frame, Image, Images, Inputs, LaserScan, Person,
+    RgbImage, RightImage, Stamp, Track, TrackId, Usage,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 use tagalong_stats::{RandomSource, SplitMix64};
@@ -72,7 +72,9 @@ pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
             depth: Some(Arc::new(DepthImage::filled(w, h, depth))),
             right: Some(Arc::new(RightImage { image: Image::filled(w, h, grey), baseline_m: 0.1 })),
         };
-        frame(1, camera, images)
+        // Five reflections at the scanner itself: a scan without useful content, too.
+        let scan = LaserScan::of_points(vec![Point3::origin(); 5]);
+        frame(1, camera, images).with_laser(Some(scan))
     };
     let sized = |width: usize, height: usize| {
         let camera = camera(640, 1.2, 0.0, 0.0);

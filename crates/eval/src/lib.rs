@@ -26,6 +26,7 @@
 //! * [`DetectionTally`]: single detections; the miss-rate curve and its average.
 //! * [`SetTally`]: OSPA and GOSPA, one number for place and count errors.
 //! * [`PositionError`], [`Times`], [`Following`]: figures that matter to a robot.
+//! * [`FloorClear`]: CLEAR on the floor with a cut in metres, as benchmarks of leg trackers count.
 //! * [`events`]: when and where it went wrong, for a list to look through.
 //! * [`Consistency`]: whether the covariance of a filter agrees with its errors.
 //! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: the uncertainty of a
@@ -43,6 +44,7 @@ mod clear;
 mod consistency;
 mod error;
 mod events;
+mod floor;
 pub mod formats;
 mod hota;
 mod identity;
@@ -60,6 +62,7 @@ pub use clear::{Clear, MATCH_SIMILARITY, Match};
 pub use consistency::{Consistency, chi_square_quantile};
 pub use error::EvalError;
 pub use events::{Event, EventKind, events};
+pub use floor::{FloorClear, FloorPoint, FloorScan, FloorTally};
 pub use hota::{Hota, HotaLevel, LEVELS, alpha};
 pub use identity::Identity;
 pub use missrate::{CurvePoint, DetectionTally, PrecisionRecall, REFERENCE_FPPI, Verdict};

@@ -66,6 +66,14 @@ pub enum LogError {
         /// Reason.
         why: String,
     },
+    /// A log of scans with annotated legs is not complete.
+    #[error("`{}`: {why}", path.display())]
+    LegScans {
+        /// Path of the file.
+        path: PathBuf,
+        /// Reason.
+        why: String,
+    },
     /// The settings of `[input]` are invalid.
     #[error("[input] {0}")]
     Settings(String),

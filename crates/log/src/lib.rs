@@ -1,4 +1,4 @@
-//! Input and output of logs: MCAP files with ROS 2 messages.
+//! Input and output of logs: MCAP files with ROS 2 messages; ROS 1 bags as input, too.
 //!
 //! A log is read twice. The first pass decodes no image: it finds the topics, the calibrations and
 //! the static transforms of the whole log, counts damage and hashes the file, so that every missing
@@ -9,17 +9,21 @@
 //! Messages that arrive live, over a network, take the same way: [`Listening`] is the first pass,
 //! [`LiveSource`] the second.
 //!
-//! The contents of a file are not trusted: see [`mcap_walk`] for the container, [`msgs`] for
+//! The contents of a file are not trusted: see [`mcap_walk`] and
+//! [`bag_walk`] for the containers, [`msgs`] for
 //! messages, [`images`] for pictures and [`Limits`] for sizes. Intact data is used; lost data is
 //! counted under a name.
 
+pub mod bag_walk;
 pub mod camera_info;
 mod error;
 pub mod images;
 mod input;
 mod inspect;
+mod leg_scans;
 mod limits;
 mod log_files;
+mod log_walk;
 pub mod mcap_walk;
 pub mod msgs;
 pub mod odometry;
@@ -35,8 +39,10 @@ pub mod write;
 pub use error::LogError;
 pub use input::{InputSettings, MountSettings};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
+pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;
 pub use log_files::LogFiles;
+pub use log_walk::LogWalker;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};

@@ -10,7 +10,8 @@ use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
 use crate::log_files::{LogFiles, open_file};
-use crate::mcap_walk::{Channel, Counters, Message, Walker};
+use crate::log_walk::LogWalker;
+use crate::mcap_walk::{Channel, Counters, Message};
 use crate::msgs::{
     CameraInfo, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
 };
@@ -155,7 +156,7 @@ impl Scan {
         let mut hash = Sha256::new();
         for part in parts {
             let file = Hashing { reader: open_file(&part.path)?, hash, bytes: 0 };
-            let mut walker = Walker::new(file, limits)
+            let mut walker = LogWalker::new(file, limits)
                 .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?
                 .knowing(part.channels.iter().cloned());
             while let Some(message) = walker.next() {
@@ -175,7 +176,7 @@ impl Scan {
     }
 
     /// Adds the walk through one file.
-    fn add_part<R: Read>(&mut self, part: &LogPart, walker: &Walker<R>, is_split: bool) {
+    fn add_part<R: Read>(&mut self, part: &LogPart, walker: &LogWalker<R>, is_split: bool) {
         let channels = walker.channels().cloned().collect();
         self.parts.push(LogPart { path: part.path.clone(), channels });
         for (name, count) in walker.counters() {
@@ -260,7 +261,7 @@ impl Gathering {
     /// Returns a topic; adds it if it is new.
     pub(crate) fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
         self.topics.entry(name.to_owned()).or_insert_with(|| Topic {
-            kind: if encoding == "cdr" { Type::of(schema) } else { Type::Other },
+            kind: if matches!(encoding, "cdr" | "ros1") { Type::of(schema) } else { Type::Other },
             schema: schema.to_owned(),
             encoding: encoding.to_owned(),
             count: 0,

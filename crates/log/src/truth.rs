@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::log_files::{LogFiles, open_file};
-use crate::mcap_walk::Walker;
+use crate::log_walk::LogWalker;
 use crate::msgs::{StringMsg, decode};
 use crate::{Limits, LogError};
 
@@ -82,7 +82,7 @@ impl TruthFrame {
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
     let (mut frames, mut present) = (Vec::new(), false);
     for part in LogFiles::of(path)?.parts() {
-        let mut walker = Walker::new(open_file(part)?, limits)
+        let mut walker = LogWalker::new(open_file(part)?, limits)
             .map_err(|source| LogError::NotMcap { path: part.clone(), source })?;
         while let Some(message) = walker.next() {
             if message.channel.topic == TRUTH_TOPIC {

@@ -3,7 +3,7 @@ use tagalong_sim::Seeds;
 
 use crate::lab::Drawn;
 use crate::{
-    Lab, ReproduceError, Table, joint_particle, omni_appearance, rgbd_compressive, stereo,
+    Lab, ReproduceError, Table, joint_particle, laser, omni_appearance, rgbd_compressive, stereo,
 };
 
 /// All systems, in the order of the papers.
@@ -13,6 +13,7 @@ pub const SYSTEMS: &[System] = &[
     joint_particle::SYSTEM,
     stereo::STEREO_SVM_EKF,
     omni_appearance::SYSTEM,
+    laser::SYSTEM,
 ];
 
 /// A published system.

@@ -15,6 +15,7 @@ mod findings;
 mod given;
 mod joint_particle;
 mod lab;
+mod laser;
 mod omni_appearance;
 mod recorded;
 mod rgbd_compressive;

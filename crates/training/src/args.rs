@@ -6,7 +6,8 @@ use clap::Args;
 #[derive(Args, Debug)]
 pub struct TrainArgs {
     /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
-    /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`.
+    /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`; `laser-legs` is
+    /// trained on bags of laser scans.
     pub plugin: String,
     /// Output file of the model; its card is written beside it [default:
     /// configs/models/<plugin>.toml].

@@ -10,6 +10,7 @@ mod card;
 mod faces;
 mod held_out;
 mod in_use;
+mod legs;
 #[cfg(test)]
 mod overlap;
 mod panorama;
@@ -40,6 +41,9 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
         return panorama::train(&session, args);
     }
     let mut trainer = session.trainer()?;
+    if args.plugin == legs::NAME {
+        return legs::train(&session, trainer.as_mut());
+    }
     let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
     if is_detector || args.plugin == faces::NAME {
         return windows::train(&session, trainer.as_mut());

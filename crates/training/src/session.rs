@@ -265,6 +265,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
         "body-net" => "[training]\nepochs = 2",
         "color-texture" => "[training]\ntrees = [25, 50]",
         "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
+        "laser-legs" => "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
         "cascade" => "[training]\nstages = 4\nfeatures = 200",
         _ => "",
     };

@@ -35,7 +35,7 @@ fn lay_out(home: &Path) {
     write("deep.toml", &format!("{fine}config = {{ max_depth_m = \"far\" }}\n"));
     write("empty.mcap", "");
     write("words.mcap", "these are only words, and a lot of them, but no log\n");
-    write("old.bag", "#ROSBAG V2.0\n");
+    write("old.bag", "#ROSBAG V1.2\n");
     write("bag.db3", "SQLite format 3");
     fs::create_dir_all(home.join("full")).unwrap();
     write("full/precious.txt", "keep me");
@@ -73,7 +73,7 @@ fn mistakes() -> Vec<Mistake> {
         m("a folder as log", "run nearest.toml logs", 1, &["directory", "inside.mcap"]),
         m("an empty log", "run nearest.toml empty.mcap", 1, &["empty.mcap"]),
         m("a log of words", "run nearest.toml words.mcap", 1, &["words.mcap"]),
-        m("a ROS 1 bag", "run nearest.toml old.bag", 1, &["rosbags-convert --src old.bag"]),
+        m("an old ROS 1 bag", "run nearest.toml old.bag", 1, &["rosbag fix"]),
         m("a SQLite bag", "inspect bag.db3", 1, &["--src bag.db3 --src-typestore ros2_humble"]),
         m("no depth", "run nearest.toml no-depth.mcap", 1, &["depth"]),
         m("a log that does not fit", "check nearest.toml no-depth.mcap", 1, &["depth"]),

@@ -4,11 +4,13 @@
 //! * [`trackeval`]: the folder tree that TrackEval reads.
 //! * [`kitti`]: KITTI tracking labels.
 //! * [`people`]: `people.csv`, the upper-body annotation of recordings.
+//! * [`floor`]: `people-floor.csv`, people annotated in laser scans.
 //! * [`metres`]: `tracks-metres.csv`, the places that a run writes.
 //!
 //! Readers keep every row as it stands; a second step turns rows into frames and decides which rows
 //! count.
 
+pub mod floor;
 pub mod kitti;
 pub mod metres;
 pub mod mot;

@@ -12,8 +12,8 @@
 //! Source: the MCAP specification, version 0, sections "Records" and "Chunk".
 
 mod chunk;
-mod record;
-mod source;
+pub(crate) mod record;
+pub(crate) mod source;
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -119,8 +119,20 @@ impl<R: Read> Walker<R> {
         let mut source = Source::new(reader);
         let mut magic = [0; 8];
         let got = source.fill(&mut magic);
-        if got < 8 || magic != record::MAGIC {
-            return Err(NotMcap(describe_start(&magic[..got])));
+        Self::behind(source, &magic[..got], limits)
+    }
+
+    /// Starts a walk behind the first eight bytes of the file.
+    ///
+    /// # Errors
+    /// As [`Walker::new`].
+    pub(crate) fn behind(
+        source: Source<R>,
+        magic: &[u8],
+        limits: &Limits,
+    ) -> Result<Self, NotMcap> {
+        if magic != record::MAGIC {
+            return Err(NotMcap(describe_start(magic)));
         }
         Ok(Self {
             source,
@@ -433,13 +445,13 @@ impl<R: Read> Walker<R> {
 }
 
 /// Maximum number of sentences kept about one file.
-const MAX_NOTES: usize = 12;
+pub(crate) const MAX_NOTES: usize = 12;
 
 fn describe_start(start: &[u8]) -> String {
     match start {
         [] => "it is empty".into(),
         [b'#', b'R', b'O', b'S', ..] => {
-            "it is a ROS 1 bag; convert it with `rosbags-convert`".into()
+            "it is a ROS 1 bag of another version than 2.0; convert it with `rosbag fix`".into()
         }
         [b'S', b'Q', b'L', b'i', ..] => {
             "it is a SQLite bag; convert it with `ros2 bag convert` to storage `mcap`".into()

@@ -6,7 +6,7 @@ use std::io::{BufReader, Read};
 /// really there.
 const STEP: usize = 1 << 20;
 
-pub(super) struct Source<R> {
+pub(crate) struct Source<R> {
     reader: BufReader<R>,
     position: u64,
     crc: crc32fast::Hasher,
@@ -14,7 +14,7 @@ pub(super) struct Source<R> {
 }
 
 impl<R: Read> Source<R> {
-    pub(super) fn new(reader: R) -> Self {
+    pub(crate) fn new(reader: R) -> Self {
         Self {
             reader: BufReader::with_capacity(1 << 16, reader),
             position: 0,
@@ -23,20 +23,20 @@ impl<R: Read> Source<R> {
         }
     }
 
-    pub(super) fn position(&self) -> u64 {
+    pub(crate) fn position(&self) -> u64 {
         self.position
     }
 
-    pub(super) fn crc(&self) -> u32 {
+    pub(crate) fn crc(&self) -> u32 {
         self.crc.clone().finalize()
     }
 
-    pub(super) fn into_inner(self) -> R {
+    pub(crate) fn into_inner(self) -> R {
         self.reader.into_inner()
     }
 
     /// Fills `out` as far as the file goes; returns the number of bytes.
-    pub(super) fn fill(&mut self, out: &mut [u8]) -> usize {
+    pub(crate) fn fill(&mut self, out: &mut [u8]) -> usize {
         let mut got = 0;
         while got < out.len() {
             match self.read(&mut out[got..]) {
@@ -48,7 +48,7 @@ impl<R: Read> Source<R> {
     }
 
     /// Replaces the contents of `out` by the next `length` bytes, or as many as there are.
-    pub(super) fn read_into(&mut self, out: &mut Vec<u8>, length: u64) -> u64 {
+    pub(crate) fn read_into(&mut self, out: &mut Vec<u8>, length: u64) -> u64 {
         out.clear();
         while (out.len() as u64) < length {
             let from = out.len();
@@ -65,7 +65,7 @@ impl<R: Read> Source<R> {
     }
 
     /// Skips `length` bytes; returns the number of bytes that there were.
-    pub(super) fn skip(&mut self, length: u64) -> u64 {
+    pub(crate) fn skip(&mut self, length: u64) -> u64 {
         // Read and not sought, because the checksum covers skipped records, too.
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.resize(1 << 16, 0);

@@ -45,6 +45,15 @@ pub struct Pose {
     pub orientation: Quaternion,
 }
 
+/// `geometry_msgs/PoseArray`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PoseArray {
+    /// Time and frame.
+    pub header: Header,
+    /// The poses.
+    pub poses: Vec<Pose>,
+}
+
 /// `geometry_msgs/Transform`, with the CDR layout of a [`Pose`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transform {

@@ -9,13 +9,14 @@
 
 mod common;
 mod geometry;
+mod ros1;
 mod sensor;
 mod vision;
 
 pub use common::{Header, StringMsg, Time};
 pub use geometry::{
-    Odometry, Point, Pose, PoseStamped, PoseWithCovariance, Quaternion, TFMessage, Transform,
-    TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
+    Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
+    Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 use re_cdr::{BigEndian, LittleEndian};
 pub use sensor::{CameraInfo, CompressedImage, Image, JointState, LaserScan, RegionOfInterest};
@@ -55,7 +56,12 @@ pub enum CdrError {
     Content(String),
 }
 
-/// Reads a message with its four-byte encapsulation header.
+/// Bytes in the place of an encapsulation header of CDR, in front of a message that is serialised as
+/// ROS 1 does.
+pub(crate) const ROS1_MARK: [u8; 4] = *b"ros1";
+
+/// Reads a message with its four-byte encapsulation header, or one of a ROS 1 bag as
+/// [`crate::bag_walk`] delivers it.
 ///
 /// # Errors
 /// [`CdrError`]. Bytes after the message are allowed, because some writers pad.
@@ -68,6 +74,9 @@ pub enum CdrError {
 pub fn decode<'de, T: Deserialize<'de>>(message: &'de [u8]) -> Result<T, CdrError> {
     let (header, body) =
         message.split_at_checked(4).ok_or_else(|| CdrError::Encapsulation(message.to_vec()))?;
+    if header == ROS1_MARK {
+        return ros1::from_bytes(body).map_err(CdrError::Content);
+    }
     let read = match header[..2] {
         [0, 0] => re_cdr::from_bytes::<T, BigEndian>(body),
         [0, 1] => re_cdr::from_bytes::<T, LittleEndian>(body),

@@ -43,7 +43,7 @@ impl Scans {
 }
 
 /// Returns a scan in the frame of a robot that has moved by `robot_from_then` since.
-pub(super) fn seen_from(
+pub(crate) fn seen_from(
     scan: &LaserScan,
     robot_from_laser: &Isometry3<f64>,
     robot_from_then: &Isometry2<f64>,
@@ -69,7 +69,7 @@ pub(super) fn seen_from(
 }
 
 /// Returns false for a scan with invalid angles or ranges.
-pub(super) fn is_sane(scan: &LaserScan) -> bool {
+pub(crate) fn is_sane(scan: &LaserScan) -> bool {
     let angles = [scan.angle_min, scan.angle_increment];
     let is_known = angles.into_iter().all(f32::is_finite) && !limits(scan).is_empty();
     is_known && scan.ranges.len() <= MAX_RAYS

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use assembly::{Assembly, Messages};
+pub(crate) use laser::{is_sane as scan_is_sane, seen_from as scan_seen_from};
 pub use live::{Listening, LiveSource};
 use nalgebra::Isometry2;
 use parts::PartsWalker;

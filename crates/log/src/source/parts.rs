@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use super::assembly::Messages;
 use crate::log_files::open_file;
-use crate::mcap_walk::{Message, Walker};
+use crate::log_walk::LogWalker;
+use crate::mcap_walk::Message;
 use crate::scan::{LogPart, Scan};
 use crate::{Limits, LogError};
 
@@ -13,7 +14,7 @@ use crate::{Limits, LogError};
 pub(super) struct PartsWalker {
     scan: Arc<Scan>,
     limits: Limits,
-    walker: Walker<File>,
+    walker: LogWalker<File>,
     /// Number of files that have been opened.
     opened: usize,
     /// Bytes of the files that are finished.
@@ -84,8 +85,8 @@ impl Messages for PartsWalker {
     }
 }
 
-fn open_part(part: &LogPart, limits: &Limits) -> Result<Walker<File>, LogError> {
-    let walker = Walker::new(open_file(&part.path)?, limits)
+fn open_part(part: &LogPart, limits: &Limits) -> Result<LogWalker<File>, LogError> {
+    let walker = LogWalker::new(open_file(&part.path)?, limits)
         .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?;
     Ok(walker.knowing(part.channels.iter().cloned()))
 }

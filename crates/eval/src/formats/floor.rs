@@ -1,0 +1,77 @@
+//! `people-floor.csv`: people annotated in laser scans, in the frame of the laser. The first line
+//! names the columns; scans are numbered from 0.
+
+use super::{FormatError, Table};
+use crate::FloorPoint;
+
+/// One annotated person in one scan.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Row {
+    /// Number of the scan, from 0.
+    pub scan: u32,
+    /// The person at a place in the frame of the laser.
+    pub person: FloorPoint,
+    /// The person in the odometry frame, m; `None` without odometry.
+    pub odom_m: Option<[f64; 2]>,
+    /// Neither a miss nor a false alarm.
+    pub ignore: bool,
+    /// True for a place that was annotated, false for one between two annotations.
+    pub annotated: bool,
+}
+
+/// Reads `people-floor.csv`; columns are found by name, unknown ones are passed over.
+///
+/// # Errors
+///
+/// A missing column, something that is no number.
+pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
+    let table = Table::new(text, file)?;
+    let column = |name: &'static str| Ok::<_, FormatError>((name, table.column(name)?));
+    let [scan, id, ignore, source] =
+        [column("scan")?, column("id")?, column("ignore")?, column("source")?];
+    let [x, y] = [column("x_laser_m")?, column("y_laser_m")?];
+    let odom = [table.find("x_odom_m"), table.find("y_odom_m")];
+    let row = |line: &super::Line<'_>| {
+        // An empty field is a place that is not known.
+        let known = |at: Option<usize>| {
+            let at = at.filter(|at| line.fields.get(*at).is_some_and(|text| !text.is_empty()));
+            at.map(|at| line.number(at, "x_odom_m or y_odom_m")).transpose()
+        };
+        let odom_m = known(odom[0])?.zip(known(odom[1])?).map(|(x, y)| [x, y]);
+        let at_m = [line.number(x.1, x.0)?, line.number(y.1, y.0)?];
+        Ok(Row {
+            scan: line.frame(scan.1, 0)?,
+            person: FloorPoint { id: line.whole(id.1, id.0)?, at_m },
+            odom_m,
+            ignore: line.number(ignore.1, ignore.0)? != 0.0,
+            annotated: line.text(source.1, source.0)? == "annotated",
+        })
+    };
+    table.rows.iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "stamp_s,scan,id,x_laser_m,y_laser_m,x_odom_m,y_odom_m,ignore,source";
+
+    #[test]
+    fn columns_are_found_by_name_and_odometry_may_be_empty() {
+        let text = format!("{HEADER}\n1.5,3,1000,2.0,-1.0,,,1,gap\n1.6,4,2,1,2,3,4,0,annotated\n");
+        let rows = parse(&text, "a.csv").unwrap();
+        let person = FloorPoint { id: 1000, at_m: [2.0, -1.0] };
+        assert_eq!(rows[0], Row { scan: 3, person, odom_m: None, ignore: true, annotated: false });
+        assert_eq!((rows[1].odom_m, rows[1].ignore), (Some([3.0, 4.0]), false));
+        assert!(rows[1].annotated);
+    }
+
+    #[test]
+    fn errors_name_the_line_and_the_column() {
+        let error = parse("scan,id\n", "a.csv").unwrap_err().to_string();
+        assert!(error.contains("x_laser_m"), "{error}");
+        let text = format!("{HEADER}\n1.5,3,1,near,0,,,0,annotated\n");
+        let error = parse(&text, "a.csv").unwrap_err().to_string();
+        assert!(error.contains("line 2") && error.contains("near"), "{error}");
+    }
+}

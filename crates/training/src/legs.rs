@@ -1,0 +1,143 @@
+//! Training of `laser-legs` on laser scans with annotated legs.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3};
+use serde::Serialize;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_config::{Example, Trainer};
+use tagalong_core::{Detection, EgoMotion, Frame, Images, LaserScan, Stamp};
+use tagalong_geometry::Camera;
+use tagalong_log::{LegScan, Limits, read_leg_scans};
+
+use super::photos::fingerprint;
+use crate::session::{Session, write};
+
+/// Name of the plugin.
+pub(super) const NAME: &str = "laser-legs";
+
+/// Folder of the bags in the data.
+const FOLDER: &str = "laser/train";
+
+/// Of a bag without people, one scan in so many is used: neighbours in time are alike, and there
+/// are far more segments without people than legs.
+const QUIET_SHARE: usize = 5;
+
+/// Card of the model.
+#[derive(Serialize)]
+struct LegCard {
+    plugin: &'static str,
+    quick: bool,
+    seed: u64,
+    trained_on: Vec<String>,
+    scans: usize,
+    fit: toml::Table,
+}
+
+/// Passes the scans of all bags to the trainer, fits, writes model and card.
+///
+/// # Errors
+/// No folder of bags, a damaged bag, files that cannot be written.
+pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
+    let bags = bags(session)?;
+    session.tell(0, "reading bags");
+    session.bar.set_length(bags.len() as u64);
+    let mut scans = 0;
+    for bag in &bags {
+        scans += add_bag(bag, session.args.quick, trainer)?;
+        session.bar.inc(1);
+    }
+    session.tell(0, "fitting");
+    session.bar.set_length(1000);
+    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
+    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    session.bar.finish_and_clear();
+    write(&session.model, &fitted.model)?;
+    let name = |bag: &PathBuf| {
+        let name = bag.file_name().map(|name| name.to_string_lossy().into_owned());
+        format!("{FOLDER}/{}", name.unwrap_or_default())
+    };
+    let card = LegCard {
+        plugin: NAME,
+        quick: session.args.quick,
+        seed: session.args.seed,
+        trained_on: bags.iter().map(name).collect(),
+        scans,
+        fit: fitted.figures,
+    };
+    let text = toml::to_string(&card).map_err(Failure::failed)?;
+    let text = format!(
+        "# Made by `tagalong train {NAME}`. Cross-validation is over bags: no bag is split between\n\
+         # fitted and held-out scans. Shares are of segments, at even odds.\n{text}"
+    );
+    let path = session.model.with_extension("card.toml");
+    write(&path, &text)?;
+    print(&text)?;
+    say(&format!("{} and {}", session.model.display(), path.display()));
+    Ok(Ended::Well)
+}
+
+/// Returns the bags in the order of their names.
+fn bags(session: &Session<'_>) -> Result<Vec<PathBuf>, Failure> {
+    let why = |folder: &str| {
+        let text = format!("is trained on bags of laser scans: name a folder with {FOLDER}");
+        Failure::usage(format!("`{NAME}` {text} with --data{folder}"))
+    };
+    let data = session.args.data.as_ref().ok_or_else(|| why(""))?;
+    let folder = data.join(FOLDER);
+    let entries = std::fs::read_dir(&folder)
+        .map_err(|error| why(&format!("; {}: {error}", folder.display())))?;
+    let paths = entries.flatten().map(|entry| entry.path());
+    let mut bags: Vec<PathBuf> =
+        paths.filter(|path| path.extension().is_some_and(|e| e == "bag")).collect();
+    bags.sort();
+    match bags.is_empty() {
+        true => Err(why(&format!("; {} has none", folder.display()))),
+        false => Ok(bags),
+    }
+}
+
+/// Passes the scans of a bag to the trainer; returns their number.
+fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, Failure> {
+    let mut scans = read_leg_scans(bag, &Limits::default()).map_err(Failure::failed)?;
+    let has_people = scans.iter().any(|scan| !scan.legs.is_empty());
+    let share = if has_people { 1 } else { QUIET_SHARE } * if quick { 5 } else { 1 };
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    scans.retain(|scan| {
+        let count = counts.entry(scan.topic.clone()).or_default();
+        *count += 1;
+        count.is_multiple_of(share)
+    });
+    let name = bag.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    for scan in &scans {
+        // Scanners that look elsewhere see other things, so each topic is a group.
+        let group = fingerprint(&format!("{name} {}", scan.topic));
+        add_scan(scan, group, trainer)?;
+    }
+    Ok(scans.len())
+}
+
+/// Passes the legs of a scan to the trainer, and then the scan as a whole.
+fn add_scan(scan: &LegScan, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
+    let frame = frame(&scan.scan);
+    let mut add = |x: f64, y: f64, is_person: bool| {
+        let candidate = Detection {
+            image: None,
+            position: Point3::new(x, y, 0.0),
+            covariance: Matrix3::zeros(),
+            score: 0.0,
+            source: "annotation",
+        };
+        trainer.add(&frame, &candidate, Example { is_person, group }).map_err(Failure::failed)
+    };
+    scan.legs.iter().try_for_each(|leg| add(leg.x, leg.y, true))?;
+    add(0.0, 0.0, false)
+}
+
+fn frame(scan: &LaserScan) -> Frame {
+    let camera = Arc::new(Camera::blind(Isometry3::identity()));
+    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), Images::default())
+        .with_laser(Some(scan.clone()))
+}

@@ -1,0 +1,40 @@
+//! Detector of people by their legs in a laser scan (K. Arras, O. Mozos, W. Burgard, *Using boosted
+//! features for the detection of people in 2D range data*, ICRA 2007).
+//!
+//! A scan is divided into segments where neighbouring points are farther apart than the rays
+//! explain. Each segment becomes a vector of lengths and shapes in metres ([`features`]), boosted
+//! trees turn that into log-odds ([`Model`]), and legs near each other are paired to a person.
+//!
+//! The features contain neither the range nor the number of rays, so that one model serves scanners
+//! of any resolution and height at which legs are seen; the trainer also shows it scans with every
+//! second, third or fourth ray only.
+//!
+//! With the feature `train` the crate also fits models (`train`).
+
+mod config;
+mod detect;
+mod features;
+mod model;
+mod past;
+mod segment;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+
+pub use config::{Config, Segmentation, Training};
+pub use detect::LaserLegs;
+pub use features::{COUNT, FEATURES, Features, features};
+pub use model::{Model, Node, Tree};
+pub use segment::{Beams, Segment};
+use tagalong_config::Registry;
+
+/// Name of this plugin in configs.
+pub const NAME: &str = "laser-legs";
+
+/// Registers the plugin, and its trainer if that is compiled in.
+pub fn register(registry: &mut Registry) {
+    registry.detector(NAME, "legs in a laser scan, by boosted geometric features", LaserLegs::new);
+    #[cfg(feature = "train")]
+    registry.trainer(NAME, |config: Config, context| train::LegTrainer::new(&config, context.seed));
+}

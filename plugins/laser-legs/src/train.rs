@@ -1,0 +1,181 @@
+//! Trainer of a [`Model`] from scans with annotated legs.
+//!
+//! The legs of a scan come first, as candidates at their places; a candidate that is no person
+//! closes the scan, and labels its other segments as clutter.
+
+use nalgebra::Point2;
+use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_core::{Detection, Error, Frame, LaserScan, Result};
+use tagalong_learn::boost::{Boosting, Levels, Next, Question};
+use tagalong_learn::{Line, accepted, area, parts, platt};
+
+use crate::config::Config;
+use crate::model::{Node, Tree};
+use crate::{Beams, COUNT, Features, Model, Segment, Segmentation, Training, features};
+
+/// Features of a segment with its label.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// The features.
+    pub features: Features,
+    /// Label and group.
+    pub example: Example,
+}
+
+/// Collector of segments that fits models to them.
+pub struct LegTrainer {
+    training: Training,
+    segments: Segmentation,
+    seed: u64,
+    /// Legs of the scan that is not closed yet, robot frame, m.
+    legs: Vec<Point2<f64>>,
+    samples: Vec<Sample>,
+}
+
+/// A number of trees with the held-out sums.
+struct Trial {
+    trees: usize,
+    held_out: Vec<(f64, bool)>,
+}
+
+impl LegTrainer {
+    /// Creates a trainer without samples.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for settings outside their ranges.
+    pub fn new(config: &Config, seed: u64) -> Result<Self> {
+        config.check()?;
+        let Config { training, segments, .. } = config.clone();
+        Ok(Self { training, segments, seed, legs: Vec::new(), samples: Vec::new() })
+    }
+
+    /// Adds the segments of a scan, as they are and with fewer rays.
+    fn add_scan(&mut self, scan: &LaserScan, group: u64) {
+        let steps: Vec<u32> = std::iter::once(1).chain(self.training.every_ray.clone()).collect();
+        let scanner = scan.robot_from_scanner.translation.vector.xy();
+        for step in steps {
+            let beams = Beams::new(scan, step);
+            let segments = beams.segments(&self.segments);
+            let is_narrow = |s: &&Segment| beams.width((*s).clone()) <= self.segments.max_width_m;
+            for segment in segments.iter().filter(is_narrow) {
+                let at = beams.middle(segment.clone()) + scanner;
+                let apart = self.legs.iter().map(|leg| (leg - at).norm());
+                let nearest = apart.fold(f64::INFINITY, f64::min);
+                let is_person = nearest <= self.training.label_m;
+                if is_person || nearest > 2.0 * self.training.label_m {
+                    let features = features(&beams, segment, &segments);
+                    self.samples.push(Sample { features, example: Example { is_person, group } });
+                }
+            }
+        }
+    }
+
+    /// Grows trees on the samples that `is_used`.
+    fn grow(&self, count: usize, is_used: impl Fn(&Sample) -> bool) -> Vec<Tree> {
+        let used: Vec<&Sample> = self.samples.iter().filter(|sample| is_used(sample)).collect();
+        let mut table = Levels::new(used.len());
+        (0..COUNT).for_each(|f| table.push(used.iter().map(move |sample| sample.features[f])));
+        let mut boosting = Boosting::new(&table, used.iter().map(|s| s.example.is_person));
+        let all: Vec<usize> = (0..COUNT).collect();
+        (0..count).map(|_| tree(&boosting.grow(&all, self.training.depth))).collect()
+    }
+
+    /// Tries all numbers of trees on held-out groups.
+    fn trials(&self, progress: &mut dyn FnMut(f64)) -> Vec<Trial> {
+        let Training { trees: counts, folds, .. } = &self.training;
+        let parts = parts(self.samples.iter().map(|s| s.example), *folds, self.seed);
+        let most = counts.iter().copied().max().unwrap_or(0);
+        let mut trials: Vec<Trial> =
+            counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
+        for fold in 0..*folds {
+            let is_out = |sample: &Sample| parts.get(&sample.example.group) == Some(&fold);
+            let trees = self.grow(most, |sample| !is_out(sample));
+            for trial in &mut trials {
+                let trees = trees[..trial.trees.min(trees.len())].to_vec();
+                let model = Model { trees, slope: 1.0, offset: 0.0 };
+                let out = self.samples.iter().filter(|sample| is_out(sample));
+                let judged = out.map(|s| (model.sum(&s.features), s.example.is_person));
+                trial.held_out.extend(judged);
+            }
+            progress((fold + 1) as f64 / (folds + 1) as f64);
+        }
+        trials
+    }
+
+    fn figures(&self, trials: &[Trial], model: &Model) -> toml::Table {
+        let legs = self.samples.iter().filter(|sample| sample.example.is_person).count();
+        let number = |n: usize| toml::Value::Integer(n as i64);
+        let row = |trial: &Trial| {
+            toml::Value::Table(toml::Table::from_iter([
+                ("trees".to_owned(), number(trial.trees)),
+                ("area_under_roc".to_owned(), rounded(area(&trial.held_out))),
+                ("legs_accepted".to_owned(), rounded(accepted(&calibrated(trial), true))),
+                ("others_accepted".to_owned(), rounded(accepted(&calibrated(trial), false))),
+            ]))
+        };
+        toml::Table::from_iter([
+            ("legs".to_owned(), number(legs)),
+            ("others".to_owned(), number(self.samples.len() - legs)),
+            ("trees".to_owned(), number(model.trees.len())),
+            ("slope".to_owned(), rounded(model.slope)),
+            ("offset".to_owned(), rounded(model.offset)),
+            ("cross_validation".to_owned(), toml::Value::Array(trials.iter().map(row).collect())),
+        ])
+    }
+}
+
+impl Trainer for LegTrainer {
+    fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
+        if example.is_person {
+            self.legs.push(candidate.position.xy());
+            return Ok(());
+        }
+        self.add_scan(frame.scan()?, example.group);
+        self.legs.clear();
+        Ok(())
+    }
+
+    fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        let legs = self.samples.iter().filter(|sample| sample.example.is_person).count();
+        if legs < 10 || self.samples.len() - legs < 10 {
+            return Err(Error::Other("fewer than ten legs, or than ten other segments".into()));
+        }
+        let trials = self.trials(progress);
+        let best = trials.iter().max_by(|a, b| area(&a.held_out).total_cmp(&area(&b.held_out)));
+        let best = best.ok_or_else(|| Error::Other("nothing to try".into()))?;
+        // Held-out sums: those of fitted samples are too confident.
+        let Line { slope, offset } = platt(&best.held_out);
+        let model = Model { trees: self.grow(best.trees, |_| true), slope, offset };
+        progress(1.0);
+        Ok(Fitted { figures: self.figures(&trials, &model), model: model.to_text() })
+    }
+}
+
+/// Returns the held-out log-odds of a trial.
+fn calibrated(trial: &Trial) -> Vec<(f64, bool)> {
+    let Line { slope, offset } = platt(&trial.held_out);
+    trial.held_out.iter().map(|(sum, is)| (slope * sum + offset, *is)).collect()
+}
+
+/// Converts a grown tree; its numbers are rounded so that a file is short.
+fn tree(questions: &[Question]) -> Tree {
+    let short = |value: f32| (value * 1e4).round() / 1e4;
+    let node = |question: &Question| {
+        let way = |next: &Next| match *next {
+            Next::Question(index) => (index, 0.0),
+            Next::Leaf(value) => (0, short(value)),
+        };
+        let [(first, low), (second, high)] = question.next.each_ref().map(way);
+        Node {
+            feature: question.feature,
+            below: short(question.below),
+            next: [first, second],
+            leaves: [low, high],
+        }
+    };
+    questions.iter().map(node).collect()
+}
+
+fn rounded(value: f64) -> toml::Value {
+    ((value * 1e4).round() / 1e4).into()
+}
