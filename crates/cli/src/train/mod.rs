@@ -7,6 +7,7 @@
 
 mod card;
 mod faces;
+mod frames;
 mod held_out;
 mod in_use;
 #[cfg(test)]
@@ -15,6 +16,7 @@ mod panorama;
 mod photos;
 mod rooms;
 mod seen;
+mod wide_rooms;
 mod windows;
 
 use std::fs;
@@ -146,6 +148,9 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
         return panorama::train(&session, args);
     }
     let mut trainer = session.trainer()?;
+    if args.plugin == frames::NAME {
+        return frames::train(&session, trainer.as_mut());
+    }
     let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
     if is_detector || args.plugin == faces::NAME {
         return windows::train(&session, trainer.as_mut());
@@ -375,6 +380,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
         "body-net" => "[training]\nepochs = 2",
+        "depth-net" => "[training]\nsteps = 40\nreal_steps = 10",
         "color-texture" => "[training]\ntrees = [25, 50]",
         "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
         "cascade" => "[training]\nstages = 4\nfeatures = 200",

@@ -156,7 +156,8 @@ impl Chance {
         low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn pick<T: Copy>(&mut self, all: &[T]) -> T {
+    /// Returns one of several values.
+    pub fn pick<T: Copy>(&mut self, all: &[T]) -> T {
         all[(self.next() % all.len() as u64) as usize]
     }
 }
