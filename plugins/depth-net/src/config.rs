@@ -76,7 +76,7 @@ pub struct Training {
 
 impl Default for Training {
     fn default() -> Self {
-        Self { steps: 900, real_steps: 200, batch: 16, real_share: 0.6, rate: 3e-3, decay: 1e-4 }
+        Self { steps: 800, real_steps: 100, batch: 12, real_share: 0.6, rate: 3e-3, decay: 1e-4 }
     }
 }
 

@@ -88,11 +88,14 @@ impl Detector for DepthNet {
         funnel.drop_many("peak: score", low.len() as u64);
         let camera = &*frame.camera;
         Ok(match search {
-            Query::Track(track) => {
-                self.near(track, &found).and_then(|peak| self.detection(camera, peak)).into_iter().collect()
-            }
+            Query::Track(track) => self
+                .near(track, &found)
+                .and_then(|peak| self.detection(camera, peak))
+                .into_iter()
+                .collect(),
             Query::Discover { .. } => {
-                let free = found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
+                let free =
+                    found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
                 free.filter_map(|peak| self.detection(camera, peak)).collect()
             }
         })

@@ -172,7 +172,8 @@ pub fn reduced(camera: &Camera, depth: &DepthImage) -> Option<(Camera, DepthImag
     let (first, by) = (step / 2, step as f64);
     let count = |size: usize| (size - first).div_ceil(step);
     let (width, height) = (count(depth.width()), count(depth.height()));
-    let image = DepthImage::from_fn(width, height, |x, y| depth.row(first + y * step)[first + x * step]);
+    let image =
+        DepthImage::from_fn(width, height, |x, y| depth.row(first + y * step)[first + x * step]);
     let mut lens = *lens;
     (lens.fx, lens.fy) = (lens.fx / by, lens.fy / by);
     (lens.cx, lens.cy) = ((lens.cx - first as f64) / by, (lens.cy - first as f64) / by);
@@ -199,8 +200,7 @@ mod tests {
     use super::*;
 
     fn camera(height_m: f64) -> Camera {
-        let lens =
-            Pinhole { fx: 60.0, fy: 60.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
+        let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
         Camera::mounted(lens, 80, 60, height_m, 0.0, 0.0)
     }
 
@@ -240,7 +240,8 @@ mod tests {
     #[test]
     fn a_larger_image_of_the_same_scene_gives_nearly_the_same_map() {
         let small = camera(1.0);
-        let lens = Pinhole { fx: 480.0, fy: 480.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let lens =
+            Pinhole { fx: 480.0, fy: 480.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let large = Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0);
         let (camera, image) = reduced(&large, &DepthImage::filled(640, 480, 2.53)).unwrap();
         assert_eq!((image.width(), image.height(), camera.width), (320, 240, 320));

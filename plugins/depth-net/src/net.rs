@@ -101,20 +101,8 @@ impl Net {
 
     /// Inputs of one output of each part; zero for what starts at zero.
     #[cfg(feature = "train")]
-    pub(crate) const INPUTS: [usize; 12] = [
-        9 * FloorMap::FINE,
-        0,
-        9 * JOINED,
-        0,
-        9 * WIDE,
-        0,
-        9 * WIDE,
-        0,
-        9 * WIDE,
-        0,
-        WIDE,
-        0,
-    ];
+    pub(crate) const INPUTS: [usize; 12] =
+        [9 * FloorMap::FINE, 0, 9 * JOINED, 0, 9 * WIDE, 0, 9 * WIDE, 0, 9 * WIDE, 0, WIDE, 0];
 
     /// All numbers that are learned.
     pub(crate) fn parts(&self) -> [&[f32]; 12] {

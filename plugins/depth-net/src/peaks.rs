@@ -47,9 +47,8 @@ pub fn peaks(map: &FloorMap, pass: &Pass, least: f64, separation_m: f64) -> Vec<
 fn is_highest(map: &FloorMap, pass: &Pass, [row, column]: [usize; 2]) -> bool {
     let near = |at: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(FloorMap::CELLS);
     let own = pass.logit(row, column);
-    let is_higher = |y: usize, x: usize| {
-        map.in_view[y * FloorMap::CELLS + x] && pass.logit(y, x) > own
-    };
+    let is_higher =
+        |y: usize, x: usize| map.in_view[y * FloorMap::CELLS + x] && pass.logit(y, x) > own;
     !near(row).any(|y| near(column).any(|x| is_higher(y, x)))
 }
 
@@ -77,9 +76,14 @@ mod tests {
             in_view: (0..64 * 64).map(|cell| cell % 64 < 60).collect(),
         };
         pass.answer.values.as_chunks_mut::<4>().0.iter_mut().for_each(|cell| cell[0] = -9.0);
-        for (row, column, logit) in
-            [(10, 10, 1.0), (10, 11, 2.0), (10, 14, 1.5), (30, 30, 3.0), (40, 62, 5.0), (50, 5, -1.0)]
-        {
+        for (row, column, logit) in [
+            (10, 10, 1.0),
+            (10, 11, 2.0),
+            (10, 14, 1.5),
+            (30, 30, 3.0),
+            (40, 62, 5.0),
+            (50, 5, -1.0),
+        ] {
             *pass.answer.at_mut(row, column) = [logit, 0.02, -0.03, 0.25];
         }
         let found = peaks(&map, &pass, 0.0, 0.35);

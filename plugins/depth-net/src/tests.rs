@@ -135,8 +135,10 @@ fn settings_that_cannot_work_are_refused_by_name() {
         DepthNet::new(config, &context()).err().map_or(String::new(), |error| error.to_string())
     };
     assert!(refusal(Config { sigma_m: 0.0, ..Config::default() }).contains("sigma_m"));
-    assert!(refusal(Config { model: "nowhere.toml".into(), ..Config::default() })
-        .contains("nowhere.toml"));
+    assert!(
+        refusal(Config { model: "nowhere.toml".into(), ..Config::default() })
+            .contains("nowhere.toml")
+    );
     assert!(!NAME.is_empty());
 }
 
@@ -169,13 +171,8 @@ mod training {
 
     #[test]
     fn it_learns_the_room_that_it_sees_and_the_same_samples_give_the_same_bytes() {
-        let training = Training {
-            steps: 60,
-            real_steps: 20,
-            batch: 6,
-            rate: 0.01,
-            ..Training::default()
-        };
+        let training =
+            Training { steps: 60, real_steps: 20, batch: 6, rate: 0.01, ..Training::default() };
         let mut progress = Vec::new();
         let fitted = trainer(training.clone()).fit(&mut |part| progress.push(part)).unwrap();
         assert!(progress.is_sorted() && progress.last() == Some(&1.0), "{progress:?}");

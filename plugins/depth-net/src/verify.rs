@@ -40,8 +40,8 @@ impl Verifier for DepthNetVerifier {
             (off.norm() < self.radius_m).then(|| f64::from(pass.logit(row, column)))
         });
         // Outside of the map and of the view the network says nothing.
-        Ok(near.reduce(f64::max).map_or(0.0, |logit| {
-            self.calibration.calibrate(self.model.log_odds(logit))
-        }))
+        Ok(near
+            .reduce(f64::max)
+            .map_or(0.0, |logit| self.calibration.calibrate(self.model.log_odds(logit))))
     }
 }

@@ -7,8 +7,8 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point2, Point3};
 use tagalong_config::{AnnotatedPerson, Trainer};
 use tagalong_core::Frame;
-use tagalong_eval::formats::{mot, people};
 use tagalong_eval::Region;
+use tagalong_eval::formats::{mot, people};
 use tagalong_geometry::HEAD_RADIUS_M;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_sim::{Split, Truth};
@@ -34,7 +34,7 @@ const ROOMS: [(&str, &str); 6] = [
 ];
 
 /// Scenes without `--scenes`, and in a quick training.
-const SCENES: [u64; 2] = [700, 12];
+const SCENES: [u64; 2] = [400, 12];
 /// Few images per second: distant moments are more informative than neighbouring ones.
 const LOOK: ImageTiming = ImageTiming { rate_hz: 1.0, duration_s: 3.6 };
 /// Height of the head's centre below the upper edge of a box around a person, as a fraction of the
@@ -87,11 +87,7 @@ fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), 
 
 /// People who are hardly seen are left to the trainer, which counts their surface.
 fn of_truth(truth: &Truth) -> AnnotatedPerson {
-    AnnotatedPerson {
-        head: truth.head_in_robot,
-        counts: true,
-        visible: truth.visible_fraction,
-    }
+    AnnotatedPerson { head: truth.head_in_robot, counts: true, visible: truth.visible_fraction }
 }
 
 /// Passes the frames of a log to a trainer.
@@ -123,7 +119,8 @@ enum RealTruth {
 
 impl RealTruth {
     fn read(folder: &Path, log: &str) -> Result<Self, Failure> {
-        let [heads, boxes] = ["people", "boxes"].map(|kind| folder.join(format!("{log}.{kind}.csv")));
+        let [heads, boxes] =
+            ["people", "boxes"].map(|kind| folder.join(format!("{log}.{kind}.csv")));
         let path = if heads.is_file() { &heads } else { &boxes };
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path)
@@ -172,8 +169,7 @@ fn of_box(region: &Region, frame: &Frame) -> Option<AnnotatedPerson> {
         height * region.height,
     );
     let depth_m = frame.depth().ok()?.surface_m(&trunk)?;
-    let pixel =
-        Point2::new(region.x + 0.5 * region.width, region.y + HEAD_IN_BOX * region.height);
+    let pixel = Point2::new(region.x + 0.5 * region.width, region.y + HEAD_IN_BOX * region.height);
     let head = frame.camera.back_project(pixel, depth_m + HEAD_RADIUS_M);
     Some(AnnotatedPerson { head, counts: true, visible: 1.0 })
 }
@@ -194,7 +190,8 @@ fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> String {
          # people are more than 0.6 m from anybody. `left out`: trained on simulated rooms and the\n\
          # other real ones; `simulation only`: on no real room. The model itself has seen all.\n{card}"
     );
-    let _ = write!(text, "\n{}", toml::to_string(&with_key("figures", figures)).unwrap_or_default());
+    let _ =
+        write!(text, "\n{}", toml::to_string(&with_key("figures", figures)).unwrap_or_default());
     text
 }
 

@@ -2,8 +2,8 @@
 //! above head height, any furniture anywhere, people near and far, cut by the image and seated.
 
 use tagalong_sim::{
-    AtEnd, CameraSettings, FaultSettings, Furniture, FurnitureKind, PersonSettings,
-    RobotSettings, RoomSettings, Scene, Split,
+    AtEnd, CameraSettings, FaultSettings, Furniture, FurnitureKind, PersonSettings, RobotSettings,
+    RoomSettings, Scene, Split,
 };
 
 use super::rooms::{Chance, ImageTiming};
@@ -27,8 +27,8 @@ const FURNITURE: [FurnitureKind; 13] = [
 
 /// Postures, each as often as it is listed.
 const POSTURES: [&str; 12] = [
-    "upright", "upright", "upright", "upright", "upright", "upright", "upright", "upright", "phone",
-    "bending", "seated", "seated",
+    "upright", "upright", "upright", "upright", "upright", "upright", "upright", "upright",
+    "phone", "bending", "seated", "seated",
 ];
 
 /// Numbers of people, likewise.
@@ -50,8 +50,7 @@ pub fn wide_scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene,
     let furniture = if is_corridor { 0.0..3.0 } else { 1.0..9.0 };
     let furniture = chance.between(furniture.start, furniture.end) as usize;
     let clutter = if is_corridor { 0 } else { chance.between(0.0, 15.0) as usize };
-    let mut furniture: Vec<Furniture> =
-        (0..furniture).map(|_| piece(&mut chance, &view)).collect();
+    let mut furniture: Vec<Furniture> = (0..furniture).map(|_| piece(&mut chance, &view)).collect();
     let people: Vec<PersonSettings> =
         (0..chance.pick(&PEOPLE)).map(|_| person(&mut chance, &view)).collect();
     furniture.extend(people.iter().filter_map(|person| in_front(&mut chance, &view, person)));

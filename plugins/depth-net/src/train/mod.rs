@@ -161,9 +161,10 @@ impl Trainer for DepthNetTrainer {
         let mut done = 0.0;
         let mut part_of = |steps: usize, part: f64| progress((done + part * steps as f64) / total);
         let none = Chosen::new();
-        let begun = self.trained(start(self.seed), steps, [&simulated, &none], rate, &mut |part| {
-            part_of(steps, part);
-        })?;
+        let begun =
+            self.trained(start(self.seed), steps, [&simulated, &none], rate, &mut |part| {
+                part_of(steps, part);
+            })?;
         done += steps as f64;
         let mut figures = toml::Table::new();
         let mut held_out = Score::default();
@@ -175,18 +176,25 @@ impl Trainer for DepthNetTrainer {
             let out = self.chosen(|sample| sample.room.as_ref() == Some(room));
             let others = self.chosen(|sample| sample.room.as_ref().is_some_and(|r| r != room));
             report(format!("{room}: simulation only"), &self.scored(&begun, &out));
-            let left = self.trained(begun.clone(), real_steps, [&simulated, &others], 0.5 * rate, &mut |part| {
-                progress((done + part * real_steps as f64) / total);
-            })?;
+            let left = self.trained(
+                begun.clone(),
+                real_steps,
+                [&simulated, &others],
+                0.5 * rate,
+                &mut |part| {
+                    progress((done + part * real_steps as f64) / total);
+                },
+            )?;
             done += real_steps as f64;
             let score = self.scored(&left, &out);
             report(format!("{room}: left out"), &score);
             held_out.extend(score);
         }
         if !rooms.is_empty() {
-            net = self.trained(begun, real_steps, [&simulated, &real], 0.5 * rate, &mut |part| {
-                progress((done + part * real_steps as f64) / total);
-            })?;
+            net =
+                self.trained(begun, real_steps, [&simulated, &real], 0.5 * rate, &mut |part| {
+                    progress((done + part * real_steps as f64) / total);
+                })?;
             report("all rooms left out".into(), &held_out);
         } else {
             held_out = in_simulation;

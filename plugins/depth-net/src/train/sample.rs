@@ -106,7 +106,8 @@ impl Sample {
         camera.robot_from_camera = misjudged(&pose, draws);
         degrade(&mut depth, draws);
         let (camera, depth) = cut(camera, depth, draws);
-        let (map, targets) = (FloorMap::new(&camera, &depth), Targets::new(&people, &camera, &depth));
+        let (map, targets) =
+            (FloorMap::new(&camera, &depth), Targets::new(&people, &camera, &depth));
         match draws.chance(0.5) {
             true => (map.mirrored(), targets.mirrored()),
             false => (map, targets),
@@ -127,7 +128,11 @@ fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
     let (width, height) = (depth.width(), depth.height());
     if draws.chance(0.3) {
         let share = draws.between(0.0, 0.4);
-        let lost = |metres: &mut f32| if draws.chance(share) { *metres = f32::NAN };
+        let lost = |metres: &mut f32| {
+            if draws.chance(share) {
+                *metres = f32::NAN
+            }
+        };
         depth.pixels_mut().iter_mut().for_each(lost);
     }
     if draws.chance(0.3) {
@@ -147,7 +152,8 @@ fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
     }
     if draws.chance(0.5) {
         let sigma = draws.between(0.0, 0.004);
-        let noisy = |metres: &mut f32| *metres += *metres * *metres * (sigma * draws.normal()) as f32;
+        let noisy =
+            |metres: &mut f32| *metres += *metres * *metres * (sigma * draws.normal()) as f32;
         depth.pixels_mut().iter_mut().for_each(noisy);
     }
 }

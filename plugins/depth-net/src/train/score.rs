@@ -44,7 +44,8 @@ impl Score {
         self.people += missing.len();
         for peak in peaks(map, pass, LEAST, SEPARATION_M) {
             let off = |k: usize| peak.distance_m(&sample.people[k].head.xy());
-            let nearest = (0..missing.len()).min_by(|a, b| off(missing[*a]).total_cmp(&off(missing[*b])));
+            let nearest =
+                (0..missing.len()).min_by(|a, b| off(missing[*a]).total_cmp(&off(missing[*b])));
             match nearest.filter(|at| off(missing[*at]) < SAME_M) {
                 Some(at) => {
                     let off_m = off(missing.swap_remove(at));
@@ -86,7 +87,10 @@ impl Score {
     /// Returns the best recall with few false people.
     fn best_recall(&self) -> f64 {
         let tried = self.found.iter().map(|(logit, ..)| self.at(*logit));
-        tried.filter(|(_, wrong)| *wrong <= FALSE_A_FRAME).map(|(recall, _)| recall).fold(0.0, f64::max)
+        tried
+            .filter(|(_, wrong)| *wrong <= FALSE_A_FRAME)
+            .map(|(recall, _)| recall)
+            .fold(0.0, f64::max)
     }
 
     /// Returns the figures for a card.
