@@ -169,7 +169,7 @@ impl<
                     for across in Self::taps(column, input.columns) {
                         let (seen, first) = Self::tap(input, [row, column], [up, across]);
                         for (i, value) in seen.iter().enumerate() {
-                            // What is cut off in the layer before depends on nothing.
+                            // The gradient of a rectified zero is zero.
                             if *value == 0.0 {
                                 continue;
                             }
@@ -185,14 +185,14 @@ impl<
         }
     }
 
-    /// What an output sees through a tap, and the first of the tap's weights.
+    /// Returns the inputs of an output through a tap, and the first of the tap's weights.
     #[inline(always)]
     fn tap(input: &Map<IN>, out: [usize; 2], tap: [usize; 2]) -> (&[f32; IN], usize) {
         let [y, x] = Self::place(out, tap);
         (input.at(y, x), (tap[0] * SIZE + tap[1]) * IN)
     }
 
-    /// The taps of an output that are inside an image of this size.
+    /// Returns the taps of an output that are inside an image of this size.
     #[inline(always)]
     fn taps(out: usize, size: usize) -> Range<usize> {
         let reach = DILATION * (SIZE / 2);
@@ -200,7 +200,7 @@ impl<
         first..SIZE.min((size + reach - STRIDE * out).div_ceil(DILATION))
     }
 
-    /// The cell that an output sees through a tap inside the image.
+    /// Returns the cell that an output sees through a tap inside the image.
     #[inline(always)]
     fn place(out: [usize; 2], tap: [usize; 2]) -> [usize; 2] {
         let reach = DILATION * (SIZE / 2);

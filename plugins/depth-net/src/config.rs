@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// Model file, relative to the config; empty: the built-in model.
     pub model: String,
-    /// Log-odds from which a peak of the map is a person.
+    /// Log-odds from which a peak of the map is a person. At the default the scores on rooms left
+    /// out are those of the model's card.
     pub discover_score: f64,
     /// Log-odds from which a peak is a person near a confirmed track.
     pub track_score: f64,
@@ -37,7 +38,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             model: String::new(),
-            discover_score: 0.0,
+            discover_score: 1.0,
             track_score: -1.5,
             track_radius_m: 0.6,
             max_score: 6.0,

@@ -69,7 +69,7 @@ impl Pass {
         [x, y, HEAD_M + height]
     }
 
-    /// Puts the coarse cells beside what the first layer says.
+    /// Concatenates the output of the first layer and the coarse cells.
     #[inline(always)]
     fn join(&mut self, map: &FloorMap) {
         let cells = self.joined.values.as_chunks_mut::<JOINED>().0.iter_mut();

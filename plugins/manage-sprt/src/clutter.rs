@@ -10,7 +10,7 @@ const FAINT: f64 = 0.05;
 #[derive(Clone, Debug)]
 struct ClutterCell {
     at: Point2<f64>,
-    /// How much speaks against a person at this place, log-odds above 0.
+    /// Evidence against a person at this place, log-odds above 0.
     against: f64,
 }
 

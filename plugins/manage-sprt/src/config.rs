@@ -20,16 +20,16 @@ pub struct Config {
     /// One detection says no more than this, for or against, log-odds.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_look: f64,
-    /// What a look counts that is the same as the last one, 0 to 1.
+    /// Weight of an observation that is the same as the last one, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub same_look: f64,
     /// A look is a new one after the track, or the robot that sees it, moved so far, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub new_look_m: f64,
-    /// What a miss says, log-odds.
+    /// Evidence of a miss, log-odds.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub miss_log_odds: f64,
-    /// What it says that the track moved, log-odds.
+    /// Evidence of the track's motion, log-odds.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub moved_log_odds: f64,
     /// A track has moved when it is so far from where it started, m, and farther than its

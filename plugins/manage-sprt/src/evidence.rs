@@ -43,14 +43,14 @@ impl Evidence {
         TrackHealth { confirmed: self.confirmed, log_odds: self.log_odds }
     }
 
-    /// Moves what is remembered into the robot's new frame.
+    /// Moves the remembered places into the robot's new frame.
     pub(crate) fn predict(&mut self, motion: &EgoMotion) {
         self.start = motion.apply_to_point(self.start);
         self.look = (motion.apply_to_point(self.look.0), motion.apply_to_point(self.look.1));
         self.age_s += motion.dt;
     }
 
-    /// Adds what a frame says.
+    /// Adds the evidence of a frame.
     pub(crate) fn add(
         &mut self,
         track: &Track,

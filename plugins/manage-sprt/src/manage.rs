@@ -29,7 +29,7 @@ impl Sprt {
         Ok(Self { config, evidence, clutter, dt_s: 0.0 })
     }
 
-    /// Remembers what ended at a place as clutter, as far as it was disproved.
+    /// Remembers the place of an ended track as clutter, as far as it was disproved.
     fn add_clutter(&mut self, track: &Track, test: &str) {
         let Config { clutter_m, max_clutter, max_look, end_log_odds, .. } = self.config;
         let against = match test {

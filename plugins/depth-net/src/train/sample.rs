@@ -1,4 +1,4 @@
-//! An annotated frame, and what it could have looked like as well.
+//! An annotated frame and its random variations (data augmentation).
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use tagalong_config::AnnotatedPerson;
@@ -56,7 +56,7 @@ pub struct Sample {
     pub camera: Camera,
     /// Depth in steps of a millimetre; 0 is no reading.
     steps: Vec<u16>,
-    /// Everybody who is annotated.
+    /// All annotated people.
     pub people: Vec<AnnotatedPerson>,
     /// The real room, if it is one.
     pub room: Option<String>,
@@ -168,4 +168,58 @@ fn cut(camera: Camera, depth: DepthImage, draws: &mut Draws) -> (Camera, DepthIm
     let rows = height - top - bottom;
     let image = DepthImage::from_fn(depth.width(), rows, |x, y| depth.row(y + top)[x]);
     (Camera { lens: Lens::Pinhole(lens), height: rows, ..camera }, image)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tagalong_conformance::figure::{Figure, World};
+    use tagalong_core::{EgoMotion, Stamp};
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn sample() -> Sample {
+        let lens =
+            Pinhole { fx: 250.0, fy: 250.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0));
+        let images = World::with(&[Figure::at(2.5, 0.4)]).draw(&camera);
+        let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
+        let head = Point3::new(2.5, 0.4, 1.6);
+        let person = AnnotatedPerson { head, counts: true, visible: 1.0 };
+        Sample::new(&frame, &[person], None, 0).unwrap()
+    }
+
+    #[test]
+    fn the_person_moves_with_the_answer_in_every_variation() {
+        let (sample, mut places) = (sample(), Vec::new());
+        for seed in 0..40 {
+            let (map, targets) = sample.varied(&mut Draws(mix(seed)));
+            // A person with few pixels left need not be found.
+            let Some(place) = targets.places().first().copied() else { continue };
+            let (row, column) = (place[0] as usize, place[1] as usize);
+            let near =
+                (row - 3..row + 4).flat_map(|y| (column - 3..column + 4).map(move |x| (y, x)));
+            let is_tall = |(y, x): (usize, usize)| {
+                map.fine.at(2 * y, 2 * x)[FloorMap::FINE - 1] > 0.25 && map.in_view[y * 64 + x]
+            };
+            assert!(near.into_iter().any(is_tall), "{seed}: {place:?}");
+            places.push(place[1]);
+        }
+        places.sort_by(f64::total_cmp);
+        assert!(places.len() > 30, "{}", places.len());
+        // Turned and mirrored, the person is at both sides.
+        assert!(places[0] < 26.0 && places[places.len() - 1] > 38.0, "{places:?}");
+    }
+
+    #[test]
+    fn a_sample_keeps_depth_to_a_millimetre() {
+        let sample = sample();
+        let depth = sample.depth();
+        let centre = depth.get(160, 120).unwrap();
+        assert!((0.5..5.1).contains(&centre), "{centre}");
+        assert_eq!((depth.width(), depth.height()), (320, 240));
+        assert!((centre / STEP_M - (centre / STEP_M).round()).abs() < 1e-2);
+    }
 }

@@ -8,13 +8,13 @@ use crate::{FloorMap, Pass, Peak, peaks};
 const LEAST: f64 = -4.0;
 /// A peak finds a person up to this distance on the floor, m.
 const SAME_M: f64 = 0.4;
-/// A peak this near to somebody is not false, m.
+/// A peak this near to an annotated person is not false, m.
 const NEAR_M: f64 = 0.6;
 /// Two peaks are this far apart, m.
 const SEPARATION_M: f64 = 0.4;
 /// People up to this distance are counted, m ...
 const COUNTED_M: f64 = 5.0;
-/// ... of whom this surface is seen, m² ...
+/// ... with this visible surface, m² ...
 const SEEN_M2: f64 = 0.03;
 /// ... and this fraction of the upper body.
 const VISIBLE: f64 = 0.5;
@@ -107,5 +107,26 @@ impl Score {
             ("recall_at_false_0.05".to_owned(), rounded(self.best_recall())),
             ("off_m".to_owned(), rounded(off.iter().sum::<f64>() / off.len().max(1) as f64)),
         ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recall_and_false_people_depend_on_the_threshold() {
+        let found = vec![(3.0, true, 0.1), (2.0, false, 0.0), (1.0, true, 0.3), (-1.0, true, 0.0)];
+        let mut score = Score { frames: 10, people: 4, found };
+        assert_eq!(score.at(0.0), (0.5, 0.1));
+        assert_eq!(score.at(-2.0), (0.75, 0.1));
+        // One false person in ten frames is too many.
+        assert_eq!(score.best_recall(), 0.25);
+        let figures = score.figures();
+        assert_eq!(figures["recall"].as_float(), Some(0.5));
+        assert_eq!(figures["off_m"].as_float(), Some(0.2));
+        score.extend(Score { frames: 10, people: 0, found: Vec::new() });
+        assert_eq!(score.best_recall(), 0.75);
+        assert_eq!(score.answers().len(), 4);
     }
 }

@@ -8,11 +8,11 @@ use tagalong_geometry::Camera;
 use crate::map::for_each_point;
 use crate::{FloorMap, Pass};
 
-/// Cells nearer to a head than this are of a person, m; those up to `UNCLEAR_M` may say what they
-/// like.
+/// Radius around a head of the cells that have to answer with the person, m; up to `UNCLEAR_M` any
+/// answer is right.
 const PERSON_M: f64 = 0.13;
 const UNCLEAR_M: f64 = 0.36;
-/// Around those who do not count, cells may say what they like up to here, m.
+/// Radius around people that do not count within which any answer is right, m.
 const IGNORED_M: f64 = 0.6;
 /// Surface within `BODY_M` of a person's axis from which on the person has to be found, m².
 const SURFACE_M2: f64 = 0.07;
@@ -27,7 +27,7 @@ const HEAD_M: f64 = 1.5;
 /// Weight of the log-odds.
 const DOUBT: f32 = 3.0;
 
-/// What each coarse cell should answer.
+/// Expected answer of each coarse cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Targets {
     cells: Vec<Target>,
@@ -35,8 +35,8 @@ pub struct Targets {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Target {
-    /// Nobody is here.
-    Nobody,
+    /// No person is here.
+    Empty,
     /// Anything is right.
     Any,
     /// Offset of a head from the centre of the cell, and its height above `HEAD_M`, m.
@@ -44,11 +44,11 @@ enum Target {
 }
 
 impl Targets {
-    /// Finds the answers; people of whom too little is to be seen need not be found.
+    /// Computes the expected answers; people with too little visible surface need not be found.
     pub fn new(people: &[AnnotatedPerson], camera: &Camera, depth: &DepthImage) -> Self {
         let surfaces = surfaces_m2(people, camera, depth);
-        let mut cells = vec![Target::Nobody; FloorMap::CELLS * FloorMap::CELLS];
-        // Those who have to be found come last: they are right beside anybody.
+        let mut cells = vec![Target::Empty; FloorMap::CELLS * FloorMap::CELLS];
+        // People to be found are written last, because they may stand beside ignored ones.
         let has_to = |k: &usize| people[*k].counts && surfaces[*k] > SURFACE_M2;
         let (found, ignored): (Vec<usize>, Vec<usize>) = (0..people.len()).partition(has_to);
         for k in ignored {
@@ -69,6 +69,15 @@ impl Targets {
         Self { cells }
     }
 
+    /// Returns row and column, as fractions, of the cells of people.
+    #[cfg(test)]
+    pub(super) fn places(&self) -> Vec<[f64; 2]> {
+        let side = FloorMap::CELLS;
+        let is_person = |k: &usize| matches!(self.cells[*k], Target::Person(_));
+        let people = (0..side * side).filter(is_person);
+        people.map(|k| [(k / side) as f64, (k % side) as f64]).collect()
+    }
+
     /// Returns the answers with left and right exchanged.
     pub fn mirrored(&self) -> Self {
         let side = FloorMap::CELLS;
@@ -79,8 +88,8 @@ impl Targets {
         Self { cells: (0..side * side).map(of).collect() }
     }
 
-    /// Writes how the loss depends on the answer, and returns the number of cells of people. The
-    /// loss is the logarithm of the probability of what is right, less where it is probable already
+    /// Writes the gradient of the loss by the answer, and returns the number of cells of people.
+    /// The loss is the cross-entropy, with a smaller weight where the answer is right already
     /// (Lin, Goyal, Girshick, He and Dollar, ICCV 2017), and the distance from the place and height.
     pub fn slopes(&self, pass: &Pass, of: &mut Pass) -> f32 {
         let mut people = 0.0;
@@ -93,7 +102,7 @@ impl Targets {
             }
             match target {
                 Target::Any => {}
-                Target::Nobody => slope[0] = DOUBT * focal(-answer[0]) * -1.0,
+                Target::Empty => slope[0] = DOUBT * focal(-answer[0]) * -1.0,
                 Target::Person(right) => {
                     people += 1.0;
                     slope[0] = DOUBT * focal(answer[0]);
@@ -167,7 +176,7 @@ mod tests {
 
     #[test]
     fn mirrored_twice_is_as_before() {
-        let mut cells = vec![Target::Nobody; 64 * 64];
+        let mut cells = vec![Target::Empty; 64 * 64];
         cells[130] = Target::Person([0.01, 0.02, 0.3]);
         let targets = Targets { cells };
         let mirrored = targets.mirrored();
