@@ -6,10 +6,10 @@ use tagalong_conformance::Suite;
 /// Detectors that discover the simulated person in a depth or colour image. A freshly generated
 /// detector finds no people and is not listed; a working one is listed, so that it has to keep
 /// working.
-const DISCOVER: &[&str] = &["depth-template"];
+const DISCOVER: &[&str] = &["depth-net", "depth-template"];
 
 /// Detectors that find the simulated person near a track.
-const FOLLOW: &[&str] = &["depth-template"];
+const FOLLOW: &[&str] = &["depth-net", "depth-template"];
 
 #[test]
 fn every_plugin_of_the_catalog_conforms() {

@@ -18,6 +18,7 @@ pub fn register(registry: &mut Registry) {
     tagalong_color_texture::register(registry);
     tagalong_compressive::register(registry);
     tagalong_correlation::register(registry);
+    tagalong_depth_net::register(registry);
     tagalong_depth_template::register(registry);
     tagalong_ekf::register(registry);
     tagalong_face_rgbd::register(registry);

@@ -16,4 +16,4 @@ pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use settings::{
     ConfigError, Settings, Value, check_settings, commented_defaults, parse_settings,
 };
-pub use trainer::{Example, Fitted, Trainer};
+pub use trainer::{AnnotatedPerson, Example, Fitted, Trainer};

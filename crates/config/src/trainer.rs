@@ -1,4 +1,5 @@
-use tagalong_core::{Detection, Frame, Result};
+use nalgebra::Point3;
+use tagalong_core::{Detection, Error, Frame, Result};
 
 /// Label of a training candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +10,17 @@ pub struct Example {
     /// between the fitted and the held-out part, because its members resemble each other more than
     /// unseen data.
     pub group: u64,
+}
+
+/// Annotated person in a frame, for trainers of detectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnnotatedPerson {
+    /// Centre of the head in the robot frame, m.
+    pub head: Point3<f64>,
+    /// False if it is neither an error to find this person nor one not to.
+    pub counts: bool,
+    /// Visible fraction of the upper body, 0 to 1.
+    pub visible: f64,
 }
 
 /// Result of a fit.
@@ -32,6 +44,23 @@ pub trait Trainer: Send {
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] if the frame lacks an input that the plugin needs.
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()>;
+
+    /// Adds a whole frame with all people in it, for the model of a detector. `room` is the name of
+    /// a real room, of which all frames are held out together; `None` for a simulated one, where
+    /// `group` is the number of the scene.
+    ///
+    /// # Errors
+    /// As [`Trainer::add`]; [`Error::Other`] by trainers that learn from candidates.
+    fn add_frame(
+        &mut self,
+        frame: &Frame,
+        people: &[AnnotatedPerson],
+        room: Option<&str>,
+        group: u64,
+    ) -> Result<()> {
+        let _ = (frame, people, room, group);
+        Err(Error::Other("this model is trained on candidates, not on whole frames".into()))
+    }
 
     /// Fits a model to all examples so far. The same examples in the same order give the same
     /// bytes. `progress` receives the finished fraction, 0 to 1.

@@ -2,18 +2,22 @@
 //! dealt out to folds and never split ([`parts`]), held-out values become figures ([`area`],
 //! [`accepted`]) and log-odds ([`platt`], [`logistic`]), and each picture yields variants
 //! ([`mirrored`], [`shifted`]). Boosted trees are grown here, too ([`boost`]), and experiments run
-//! on all cores ([`side_by_side`]).
+//! on all cores ([`side_by_side`]). Small convolutional networks are made of the layers of [`conv`],
+//! forwards and backwards, and trained by the steps of [`Adam`].
 //!
 //! The features are defined by the plugins.
 
+mod adam;
 pub mod boost;
 mod calibrate;
+pub mod conv;
 mod folds;
 mod held_out;
 mod logistic;
 mod parallel;
 mod variants;
 
+pub use adam::{Adam, pace};
 pub use calibrate::{Line, platt};
 pub use folds::{CALIBRATION, Use, parts, use_of};
 pub use held_out::{accepted, area};

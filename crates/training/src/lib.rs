@@ -8,6 +8,7 @@
 mod args;
 mod card;
 mod faces;
+mod frames;
 mod held_out;
 mod in_use;
 mod legs;
@@ -19,6 +20,7 @@ mod plan;
 mod rooms;
 mod seen;
 mod session;
+mod wide_rooms;
 mod windows;
 
 pub use args::TrainArgs;
@@ -43,6 +45,9 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let mut trainer = session.trainer()?;
     if args.plugin == legs::NAME {
         return legs::train(&session, trainer.as_mut());
+    }
+    if args.plugin == frames::NAME {
+        return frames::train(&session, trainer.as_mut());
     }
     let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
     if is_detector || args.plugin == faces::NAME {

@@ -263,6 +263,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
     let text = match plugin {
         "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
         "body-net" => "[training]\nepochs = 2",
+        "depth-net" => "[training]\nsteps = 40\nreal_steps = 10",
         "color-texture" => "[training]\ntrees = [25, 50]",
         "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
         "laser-legs" => "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",

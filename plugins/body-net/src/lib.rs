@@ -8,7 +8,6 @@
 //! With the feature `train` the plugin also offers a trainer (`train`).
 
 mod config;
-mod conv;
 mod model;
 mod net;
 #[cfg(test)]

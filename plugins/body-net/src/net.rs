@@ -1,6 +1,6 @@
 use multiversion::multiversion;
+use tagalong_learn::conv::{Conv, Map};
 
-use crate::conv::{Conv, Map};
 use crate::view::NetworkInput;
 
 /// Added to the standard deviation of the intensities before they are divided by it: an even

@@ -55,9 +55,9 @@ fn settings_that_cannot_work_are_refused_by_name() {
 
 mod network {
     use proptest::prelude::*;
+    use tagalong_learn::conv::{Conv, Map};
 
     use super::*;
-    use crate::conv::{Conv, Map};
     use crate::{Net, NetworkInput, Pass};
 
     fn conv<const IN: usize, const OUT: usize, const SIZE: usize>(

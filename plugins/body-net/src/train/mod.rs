@@ -1,14 +1,12 @@
 //! Fits a [`Model`] to labelled candidates: networks learn from all groups but some, their outputs
 //! on those calibrate the log-odds, and one that has seen all makes the model.
 
-mod adam;
 mod changes;
 
 use tagalong_config::{Example, Fitted, Trainer};
 use tagalong_core::{Detection, Error, Frame, Result};
-use tagalong_learn::{Line, accepted, area, mix, parts, platt, side_by_side};
+use tagalong_learn::{Adam, Line, accepted, area, mix, pace, parts, platt, side_by_side};
 
-use self::adam::Adam;
 use self::changes::{Draws, changed};
 use crate::{Model, Net, NetworkInput, Pass, Training};
 
@@ -60,7 +58,7 @@ impl NetTrainer {
                 let gradient =
                     self.gradient(&net, few, people as f32 / chosen.len() as f32, seed)?;
                 let rate = rate * pace(done as f64 / batches as f64);
-                adam.step(&mut net, &gradient, rate as f32, decay as f32);
+                adam.step(net.parts_mut(), &gradient.parts(), rate as f32, decay as f32);
                 done += 1;
             }
             progress(f64::from(epoch + 1) / f64::from(epochs));
@@ -169,15 +167,6 @@ fn start(seed: u64) -> Net {
         part.iter_mut().for_each(|value| *value = limit * draws.within());
     }
     net
-}
-
-/// The rate warms up, and falls to zero as a cosine (Loshchilov and Hutter, ICLR 2017).
-fn pace(part: f64) -> f64 {
-    const WARM: f64 = 0.1;
-    match part < WARM {
-        true => part / WARM,
-        false => 0.5 + 0.5 * (std::f64::consts::PI * (part - WARM) / (1.0 - WARM)).cos(),
-    }
 }
 
 fn rounded(value: f64, steps: f64) -> toml::Value {

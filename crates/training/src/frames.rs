@@ -1,0 +1,201 @@
+//! Training of detectors on whole frames: simulated depth, and annotated logs of real rooms, each
+//! of which is left out once.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point2, Point3};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::threads::threads;
+use tagalong_config::{AnnotatedPerson, Trainer};
+use tagalong_core::Frame;
+use tagalong_eval::Region;
+use tagalong_eval::formats::{mot, people};
+use tagalong_geometry::HEAD_RADIUS_M;
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
+use tagalong_sim::{Split, Truth};
+use tagalong_trials::Draw;
+
+use super::args::TrainArgs;
+use super::rooms::ImageTiming;
+use super::session::{Session, write};
+use super::wide_rooms::wide_scene;
+
+/// Name of the detector that is trained on frames.
+pub const NAME: &str = "depth-net";
+
+/// Real rooms, and their logs.
+const ROOMS: [(&str, &str); 6] = [
+    ("um and filinha", "um"),
+    ("um and filinha", "filinha"),
+    ("lab2", "lab2-camera1"),
+    ("lab2", "lab2-camera2"),
+    ("corredor1", "corredor1-camera1"),
+    ("uc3m", "uc3m-single-frames"),
+];
+
+/// Scenes without `--scenes`, and in a quick training.
+const SCENES: [u64; 2] = [400, 12];
+/// Few images per second: distant moments are more informative than neighbouring ones.
+const LOOK: ImageTiming = ImageTiming { rate_hz: 1.0, duration_s: 3.6 };
+/// Height of the head's centre below the upper edge of a box around a person, as a fraction of the
+/// box.
+const HEAD_IN_BOX: f64 = 0.06;
+/// Part of a box in which the depth of the trunk is read: left, top, width, height.
+const TRUNK_IN_BOX: [f64; 4] = [0.25, 0.1, 0.5, 0.5];
+
+/// Simulates, reads logs, fits, writes model and card, and prints the card.
+pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
+    let args = session.args;
+    let scenes = args.scenes.unwrap_or(SCENES[usize::from(args.quick)]);
+    session.bar.set_message("simulating rooms");
+    session.bar.set_length(scenes);
+    for group in 0..scenes {
+        let number = args.seed.wrapping_mul(1000) % 1_000_000 + group;
+        show_scene(number, group, trainer)?;
+        session.bar.inc(1);
+    }
+    session.bar.set_message("reading logs");
+    for (room, log) in ROOMS {
+        if let Some(data) = &args.data {
+            show_log(&data.join("logs"), log, room, trainer)?;
+        }
+    }
+    session.bar.set_message("fitting");
+    session.bar.set_position(0);
+    session.bar.set_length(1000);
+    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
+    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    session.bar.finish_and_clear();
+    write(&session.model, &fitted.model)?;
+    let path = session.model.with_extension("card.toml");
+    let card = card(args, scenes, &fitted.figures);
+    write(&path, &card)?;
+    print(&card)?;
+    say(&format!("{} and {}", session.model.display(), path.display()));
+    Ok(Ended::Well)
+}
+
+fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
+    let scene = wide_scene(Split::Train, number, LOOK).map_err(Failure::failed)?;
+    let mut draw = Draw::new(&scene, threads(None));
+    while let Some(drawn) = draw.next_frame() {
+        let people: Vec<AnnotatedPerson> = drawn.truth.iter().map(of_truth).collect();
+        trainer.add_frame(&drawn.frame, &people, None, group).map_err(Failure::failed)?;
+    }
+    Ok(())
+}
+
+/// Converts the truth of a scene. All people count, because the trainer decides by visible surface.
+fn of_truth(truth: &Truth) -> AnnotatedPerson {
+    AnnotatedPerson { head: truth.head_in_robot, counts: true, visible: truth.visible_fraction }
+}
+
+/// Passes the frames of a log to a trainer.
+fn show_log(
+    folder: &Path,
+    log: &str,
+    room: &str,
+    trainer: &mut dyn Trainer,
+) -> Result<(), Failure> {
+    let truth = RealTruth::read(folder, log)?;
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+    let path = folder.join(log).with_extension("mcap");
+    let mut source = FrameSource::open(&path, &input, &limits, inputs)?;
+    while let Some(item) = source.next_frame() {
+        let people = truth.people(&item.frame);
+        trainer.add_frame(&item.frame, &people, Some(room), 0).map_err(Failure::failed)?;
+    }
+    Ok(())
+}
+
+/// Annotation of a log.
+enum RealTruth {
+    /// Heads.
+    People(Vec<people::Row>),
+    /// Boxes around whole people.
+    Boxes(Vec<mot::Row>),
+}
+
+impl RealTruth {
+    fn read(folder: &Path, log: &str) -> Result<Self, Failure> {
+        let [heads, boxes] =
+            ["people", "boxes"].map(|kind| folder.join(format!("{log}.{kind}.csv")));
+        let path = if heads.is_file() { &heads } else { &boxes };
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
+        if path == &heads {
+            return people::parse(&text, &name).map(Self::People).map_err(Failure::failed);
+        }
+        let rows = mot::parse_truth(&text, &name, mot::Rules::Mot17).map_err(Failure::failed)?;
+        Ok(Self::Boxes(rows))
+    }
+
+    /// Returns the people in a frame.
+    fn people(&self, frame: &Frame) -> Vec<AnnotatedPerson> {
+        let is_here = |number: u32| u64::from(number) == frame.index;
+        match self {
+            Self::People(rows) => {
+                let pose = &frame.camera.robot_from_camera;
+                rows.iter().filter(|row| is_here(row.frame)).map(|row| of_row(row, pose)).collect()
+            }
+            Self::Boxes(rows) => {
+                let here = rows.iter().filter(|row| is_here(row.frame));
+                here.filter_map(|row| of_box(&row.region, frame)).collect()
+            }
+        }
+    }
+}
+
+fn of_row(row: &people::Row, robot_from_camera: &Isometry3<f64>) -> AnnotatedPerson {
+    let surface = Point3::from(row.head_in_camera_m);
+    // Depth sees the surface; tracks estimate the centre of the head.
+    let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
+    AnnotatedPerson {
+        head: robot_from_camera * (surface + ray * HEAD_RADIUS_M),
+        counts: !row.ignore,
+        visible: row.visible,
+    }
+}
+
+/// Returns the person in a box, as far away as the trunk; `None` without depth there.
+fn of_box(region: &Region, frame: &Frame) -> Option<AnnotatedPerson> {
+    let [left, top, width, height] = TRUNK_IN_BOX;
+    let trunk = tagalong_geometry::Rect::new(
+        region.x + left * region.width,
+        region.y + top * region.height,
+        width * region.width,
+        height * region.height,
+    );
+    let depth_m = frame.depth().ok()?.surface_m(&trunk)?;
+    let pixel = Point2::new(region.x + 0.5 * region.width, region.y + HEAD_IN_BOX * region.height);
+    let head = frame.camera.back_project(pixel, depth_m + HEAD_RADIUS_M);
+    Some(AnnotatedPerson { head, counts: true, visible: 1.0 })
+}
+
+/// Returns the card: the origin of the model, and a table of its scores.
+fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> String {
+    let mut sources = vec![format!("{scenes} simulated rooms")];
+    if args.data.is_some() {
+        sources.extend(ROOMS.map(|(_, log)| format!("logs/{log}.mcap")));
+    }
+    let mut card = toml::Table::new();
+    card.insert("plugin".into(), NAME.into());
+    card.insert("quick".into(), args.quick.into());
+    card.insert("seed".into(), (args.seed as i64).into());
+    card.insert("trained_on".into(), sources.into());
+    let mut text = format!(
+        "# Single frames. People within 5 m with at least half the upper body visible; false\n\
+         # people are more than 0.6 m from anybody. `left out`: trained on simulated rooms and the\n\
+         # other real ones; `simulation only`: on no real room. The model itself has seen all.\n{card}"
+    );
+    let _ =
+        write!(text, "\n{}", toml::to_string(&with_key("figures", figures)).unwrap_or_default());
+    text
+}
+
+fn with_key(key: &str, table: &toml::Table) -> toml::Table {
+    toml::Table::from_iter([(key.to_owned(), toml::Value::Table(table.clone()))])
+}

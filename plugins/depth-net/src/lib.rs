@@ -1,0 +1,57 @@
+//! `depth-net`: people in a plan view of the depth image, by a small convolutional network.
+//!
+//! The points of the depth image are collected in a map of the floor ([`FloorMap`]): the surface
+//! per slab of height, the greatest height, and the voxels that the camera sees to be empty or
+//! cannot see, behind others or outside of its image. So a person has the same size and shape at
+//! every distance and camera height, and a head that lies above the image is known to be unknown.
+//! A fully convolutional network ([`Net`]) turns the map into log-odds, the place and the height
+//! of a head for each cell; [`Peak`]s of the log-odds are people.
+//!
+//! The detector `depth-net` discovers people and finds tracked ones again. The verifier
+//! `depth-net-verifier` returns the log-odds of the same map at a candidate's place.
+//!
+//! With the feature `train` the plugin also offers a trainer ([`train`]).
+
+mod config;
+mod detect;
+mod map;
+mod model;
+mod net;
+mod peaks;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "train")]
+pub mod train;
+mod verify;
+
+pub use config::{Config, Training, VerifierConfig};
+pub use detect::DepthNet;
+pub use map::{FloorMap, reduced};
+pub use model::Model;
+pub use net::{Net, Pass};
+pub use peaks::{Peak, peaks};
+use tagalong_config::Registry;
+pub use verify::DepthNetVerifier;
+
+/// Name of the detector in configs.
+pub const NAME: &str = "depth-net";
+
+/// Name of the verifier in configs.
+pub const VERIFIER: &str = "depth-net-verifier";
+
+/// The model that is built in.
+pub(crate) const BUILT_IN: &str = include_str!("../../../configs/models/depth-net.toml");
+
+/// Registers the detector, the verifier, and the trainer if that is compiled in.
+pub fn register(registry: &mut Registry) {
+    registry.detector(NAME, "people in a plan view of depth, by a small network", DepthNet::new);
+    registry.verifier(
+        VERIFIER,
+        "log-odds of depth-net at the place of a candidate",
+        DepthNetVerifier::new,
+    );
+    #[cfg(feature = "train")]
+    registry.trainer(NAME, |config: Config, context| {
+        train::DepthNetTrainer::new(config.training, context.seed)
+    });
+}

@@ -1,0 +1,258 @@
+use nalgebra::{Point2, Point3};
+use tagalong_core::{DepthImage, Derived, Frame, Result};
+use tagalong_geometry::{Camera, Lens};
+use tagalong_learn::conv::Map;
+
+/// Columns of a depth image beyond which it is thinned out.
+const COLUMNS: usize = 320;
+/// Nearest edge of the map in front of the robot, m ...
+const FIRST_X_M: f64 = 0.2;
+/// ... and its right edge, m.
+const FIRST_Y_M: f64 = -3.2;
+/// Side of a fine cell, m.
+const FINE_M: f64 = 0.05;
+/// Height of the lowest slab, m, and height of each, m.
+const FLOOR_M: f64 = 0.1;
+const SLAB_M: f64 = 0.2;
+/// Points above this height are ceilings and lamps, m.
+const CEILING_M: f64 = 2.3;
+/// Nearest depth that counts, m.
+const NEAREST_M: f32 = 0.1;
+/// Depth beside a voxel's by which it is in front of or behind the surface, m.
+const MARGIN_M: f64 = 0.12;
+/// Heights of the voxels, m.
+const HEIGHTS_M: [f64; FloorMap::VOXELS] = [0.3, 0.7, 1.1, 1.5, 1.9];
+/// Cells beside the camera's view in which a partly visible person may stand.
+const BESIDE: usize = 3;
+
+/// Plan view of a depth image in the robot frame. Rows of both grids run forwards from 0.2 m to
+/// 6.6 m, columns from 3.2 m at the right to 3.2 m at the left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FloorMap {
+    /// Cells of 5 cm: for each of ten slabs of 20 cm, from 0.1 m upwards, the root of the surface
+    /// that the camera sees in it, relative to that of its front, at most 1; and half the greatest
+    /// height, m.
+    pub fine: Map<{ Self::FINE }>,
+    /// Cells of 10 cm: for each of five heights, 1 if the voxel there is seen to be empty, and 1
+    /// if it is hidden behind something. Neither holds for a surface and outside of the image.
+    pub coarse: Map<{ Self::COARSE }>,
+    /// True for cells of 10 cm that the camera has in its view, or that are near to it.
+    pub in_view: Vec<bool>,
+}
+
+impl FloorMap {
+    /// Slabs of height.
+    const SLABS: usize = 10;
+    /// Heights of voxels.
+    const VOXELS: usize = 5;
+    /// Channels of the fine cells ...
+    pub const FINE: usize = Self::SLABS + 1;
+    /// ... and of the coarse ones.
+    pub const COARSE: usize = 2 * Self::VOXELS;
+    /// Coarse cells per side of the map; there are twice as many fine ones.
+    pub const CELLS: usize = 64;
+    /// Side of a coarse cell, m.
+    pub const CELL_M: f64 = 2.0 * FINE_M;
+
+    /// Computes the map of a depth image.
+    pub fn new(camera: &Camera, depth: &DepthImage) -> Self {
+        let mut map = Self {
+            fine: Map::new(2 * Self::CELLS, 2 * Self::CELLS),
+            coarse: Map::new(Self::CELLS, Self::CELLS),
+            in_view: vec![false; Self::CELLS * Self::CELLS],
+        };
+        map.add_points(camera, depth);
+        map.add_voxels(camera, depth);
+        map.in_view = widened(&map.in_view);
+        map
+    }
+
+    /// Returns the centre of a coarse cell on the floor, m.
+    pub fn centre(row: usize, column: usize) -> Point2<f64> {
+        let at = |first_m: f64, cell: usize| first_m + Self::CELL_M * (cell as f64 + 0.5);
+        Point2::new(at(FIRST_X_M, row), at(FIRST_Y_M, column))
+    }
+
+    /// Returns the map with left and right exchanged.
+    #[cfg(feature = "train")]
+    pub(crate) fn mirrored(mut self) -> Self {
+        let side = Self::CELLS;
+        for row in self.fine.values.chunks_mut(2 * side * Self::FINE) {
+            row.as_chunks_mut::<{ Self::FINE }>().0.reverse();
+        }
+        for row in self.coarse.values.chunks_mut(side * Self::COARSE) {
+            row.as_chunks_mut::<{ Self::COARSE }>().0.reverse();
+        }
+        self.in_view.chunks_mut(side).for_each(<[bool]>::reverse);
+        self
+    }
+
+    fn add_points(&mut self, camera: &Camera, depth: &DepthImage) {
+        let scale = 1.0 / (FINE_M * SLAB_M);
+        for_each_point(camera, depth, |point, area_m2| {
+            let row = ((point.x - FIRST_X_M) / FINE_M).floor();
+            let column = ((point.y - FIRST_Y_M) / FINE_M).floor();
+            let cells = 0.0..2.0 * Self::CELLS as f64;
+            if !cells.contains(&row) || !cells.contains(&column) || point.z >= CEILING_M {
+                return;
+            }
+            let cell = self.fine.at_mut(row as usize, column as usize);
+            cell[Self::SLABS] = cell[Self::SLABS].max(0.5 * point.z as f32);
+            let slab = ((point.z - FLOOR_M) / SLAB_M).floor();
+            if (0.0..Self::SLABS as f64).contains(&slab) {
+                cell[slab as usize] += (area_m2 * scale) as f32;
+            }
+        });
+        for cell in self.fine.values.as_chunks_mut::<{ Self::FINE }>().0 {
+            cell[..Self::SLABS].iter_mut().for_each(|surface| *surface = surface.sqrt().min(1.0));
+        }
+    }
+
+    fn add_voxels(&mut self, camera: &Camera, depth: &DepthImage) {
+        for cell in 0..Self::CELLS * Self::CELLS {
+            let (row, column) = (cell / Self::CELLS, cell % Self::CELLS);
+            let floor = Self::centre(row, column);
+            for (k, height_m) in HEIGHTS_M.into_iter().enumerate() {
+                let voxel = Point3::new(floor.x, floor.y, height_m);
+                let Some(pixel) = camera.project(&voxel) else { continue };
+                let Some(seen_m) = depth.get(pixel.x.round() as i64, pixel.y.round() as i64) else {
+                    continue;
+                };
+                self.in_view[cell] = true;
+                let behind_m = f64::from(seen_m) - camera.depth_of(&voxel);
+                let voxel = self.coarse.at_mut(row, column);
+                // Neither comparison holds for a pixel without a reading.
+                voxel[2 * k] = f32::from(behind_m > MARGIN_M);
+                voxel[2 * k + 1] = f32::from(behind_m < -MARGIN_M && seen_m > NEAREST_M);
+            }
+        }
+    }
+}
+
+impl Derived for FloorMap {
+    fn derive(frame: &Frame) -> Result<Self> {
+        let depth = frame.depth()?;
+        Ok(match reduced(&frame.camera, depth) {
+            Some((camera, depth)) => Self::new(&camera, &depth),
+            None => Self::new(&frame.camera, depth),
+        })
+    }
+}
+
+/// Calls `see` with each point of a depth image in the robot frame, and with the area that its
+/// pixel covers, m².
+pub(crate) fn for_each_point(
+    camera: &Camera,
+    depth: &DepthImage,
+    mut see: impl FnMut(Point3<f64>, f64),
+) {
+    let pose = camera.robot_from_camera;
+    let (turn, origin) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
+    for y in 0..depth.height() {
+        for (x, depth_m) in depth.row(y).iter().enumerate() {
+            // Also false for "no reading".
+            if *depth_m > NEAREST_M {
+                let depth_m = f64::from(*depth_m);
+                let ray = camera.ray(Point2::new(x as f64, y as f64));
+                let point = turn * ray * depth_m + origin;
+                see(point.into(), (depth_m / camera.focal_px()).powi(2));
+            }
+        }
+    }
+}
+
+/// Returns every second, third ... pixel of a depth image that has more than 320 columns, and the
+/// camera of these; `None` for smaller ones and for cameras without a pinhole.
+pub fn reduced(camera: &Camera, depth: &DepthImage) -> Option<(Camera, DepthImage)> {
+    let step = (depth.width() as f64 / COLUMNS as f64).round() as usize;
+    let Lens::Pinhole(lens) = &camera.lens else { return None };
+    if step < 2 {
+        return None;
+    }
+    let (first, by) = (step / 2, step as f64);
+    let count = |size: usize| (size - first).div_ceil(step);
+    let (width, height) = (count(depth.width()), count(depth.height()));
+    let image =
+        DepthImage::from_fn(width, height, |x, y| depth.row(first + y * step)[first + x * step]);
+    let mut lens = *lens;
+    (lens.fx, lens.fy) = (lens.fx / by, lens.fy / by);
+    (lens.cx, lens.cy) = ((lens.cx - first as f64) / by, (lens.cy - first as f64) / by);
+    Some((Camera { lens: Lens::Pinhole(lens), width, height, ..camera.clone() }, image))
+}
+
+/// Returns the cells that are true or at most [`BESIDE`] cells away from one that is.
+fn widened(cells: &[bool]) -> Vec<bool> {
+    let side = FloorMap::CELLS;
+    let near = |at: usize| at.saturating_sub(BESIDE)..(at + BESIDE + 1).min(side);
+    let spread = |cells: &[bool], get: &dyn Fn(usize, usize) -> usize| -> Vec<bool> {
+        let is_near = |k: usize| near(k % side).any(|other| cells[get(k / side, other)]);
+        (0..side * side).map(is_near).collect()
+    };
+    let along = spread(cells, &|row, column| row * side + column);
+    let across = spread(&along, &|column, row| row * side + column);
+    (0..side * side).map(|k| across[k % side * side + k / side]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera(height_m: f64) -> Camera {
+        let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
+        Camera::mounted(lens, 80, 60, height_m, 0.0, 0.0)
+    }
+
+    /// The coarse cell of a place.
+    fn cell(x: f64, y: f64) -> [usize; 2] {
+        [((x - 0.2) / 0.1) as usize, ((y + 3.2) / 0.1) as usize]
+    }
+
+    #[test]
+    fn a_wall_is_a_surface_hides_what_is_behind_and_leaves_what_is_before_empty() {
+        let map = FloorMap::new(&camera(1.1), &DepthImage::filled(80, 60, 3.02));
+        let [row, column] = cell(3.02, 0.05);
+        let fine = [0, 1].map(|k| map.fine.at(2 * row, 2 * column + k));
+        // Slab 5 is from 1.1 to 1.3 m, before the camera.
+        assert!(fine[0][5] > 0.9 && fine[1][5] > 0.9, "{fine:?}");
+        assert!((fine[0][10] - 1.1).abs() < 0.06, "half the ceiling of 2.3 m: {}", fine[0][10]);
+        let voxel = |x: f64, k: usize| {
+            let [row, column] = cell(x, 0.05);
+            [map.coarse.at(row, column)[2 * k], map.coarse.at(row, column)[2 * k + 1]]
+        };
+        assert_eq!(voxel(2.05, 2), [1.0, 0.0], "empty");
+        assert_eq!(voxel(3.02, 2), [0.0, 0.0], "a surface");
+        assert_eq!(voxel(4.05, 2), [0.0, 1.0], "hidden");
+        assert_eq!(voxel(0.45, 4), [0.0, 0.0], "above the image");
+    }
+
+    #[test]
+    fn cells_beside_the_view_are_not_in_it_but_for_those_near() {
+        let map = FloorMap::new(&camera(1.1), &DepthImage::filled(80, 60, f32::NAN));
+        let is_in = |x: f64, y: f64| map.in_view[cell(x, y)[0] * 64 + cell(x, y)[1]];
+        // At 3 m the view ends 2 m at each side.
+        assert!(is_in(3.05, 1.95) && is_in(3.05, 2.15) && is_in(3.05, -2.15));
+        assert!(!is_in(3.05, 2.65) && !is_in(3.05, -2.65));
+        assert!(map.fine.values.iter().chain(&map.coarse.values).all(|value| *value == 0.0));
+    }
+
+    #[test]
+    fn a_larger_image_of_the_same_scene_gives_nearly_the_same_map() {
+        let small = camera(1.0);
+        let lens =
+            Pinhole { fx: 480.0, fy: 480.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let large = Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0);
+        let (camera, image) = reduced(&large, &DepthImage::filled(640, 480, 2.53)).unwrap();
+        assert_eq!((image.width(), image.height(), camera.width), (320, 240, 320));
+        assert!(reduced(&small, &DepthImage::filled(80, 60, 1.0)).is_none());
+        let ray = camera.ray(Point2::new(10.0, 20.0)) - large.ray(Point2::new(21.0, 41.0));
+        assert!(ray.norm() < 1e-12);
+        let [a, b] = [
+            FloorMap::new(&small, &DepthImage::filled(80, 60, 2.53)),
+            FloorMap::new(&camera, &image),
+        ];
+        let [a, b] = [&a, &b].map(|map| map.fine.at(46, 64)[4]);
+        assert!((a - b).abs() < 0.2, "{a} {b}");
+    }
+}

@@ -1,0 +1,173 @@
+use std::fmt::Write;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tagalong_core::{Derived, Frame, Result};
+
+use crate::{FloorMap, Net, Pass};
+
+/// A network, and the straight line that calibrates its log-odds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Model {
+    /// The network.
+    pub net: Net,
+    /// Log-odds per unit of its answer ...
+    pub slope: f64,
+    /// ... and those of the answer 0.
+    pub offset: f64,
+    /// Fingerprint of the file.
+    mark: u64,
+}
+
+const FORMAT: &str = "depth-net 1";
+/// Numbers in a line of the file.
+const LINE: usize = 16;
+
+/// Answers of networks to a frame, by the fingerprint of the model: several plugins and several
+/// queries ask for the same one.
+struct Answers(Mutex<Vec<(u64, Arc<Pass>)>>);
+
+impl Derived for Answers {
+    fn derive(_: &Frame) -> Result<Self> {
+        Ok(Self(Mutex::default()))
+    }
+}
+
+impl Model {
+    /// Creates a model.
+    pub fn new(net: Net, slope: f64, offset: f64) -> Self {
+        let mut model = Self { net, slope, offset, mark: 0 };
+        model.mark = model.fingerprint();
+        model
+    }
+
+    /// Returns the map of a frame and the network's answer to it.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame without depth.
+    pub fn look(&self, frame: &Frame) -> Result<(Arc<FloorMap>, Arc<Pass>)> {
+        let map = frame.derived::<FloorMap>()?;
+        let answers = frame.derived::<Answers>()?;
+        let mut known = answers.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, pass)) = known.iter().find(|(mark, _)| *mark == self.mark) {
+            return Ok((map, Arc::clone(pass)));
+        }
+        let mut pass = Pass::default();
+        self.net.look(&map, &mut pass);
+        let pass = Arc::new(pass);
+        known.push((self.mark, Arc::clone(&pass)));
+        Ok((map, pass))
+    }
+
+    /// Calibrates an answer of the network: log-odds of a person.
+    pub fn log_odds(&self, logit: f64) -> f64 {
+        self.slope * logit + self.offset
+    }
+
+    /// Returns the answer of the network that has these calibrated log-odds.
+    pub fn logit(&self, log_odds: f64) -> f64 {
+        (log_odds - self.offset) / self.slope
+    }
+
+    /// Returns the model file.
+    pub fn to_text(&self) -> String {
+        let Self { slope, offset, net, .. } = self;
+        let mut text =
+            format!("format = \"{FORMAT}\"\nslope = {slope:?}\noffset = {offset:?}\n\n[net]\n");
+        for (name, part) in Net::PARTS.iter().zip(net.parts()) {
+            let lines = part.chunks(LINE).map(|line| {
+                line.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
+            });
+            let lines: Vec<String> = lines.collect();
+            let _ = writeln!(text, "{name} = [\n  {},\n]", lines.join(",\n  "));
+        }
+        text
+    }
+
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// Text that is no model, in a sentence.
+    pub fn from_text(text: &str) -> std::result::Result<Self, String> {
+        let table: toml::Table =
+            toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
+        let format = table.get("format").and_then(|format| format.as_str()).unwrap_or_default();
+        if format != FORMAT {
+            return Err(format!("the format is `{format}`, not `{FORMAT}`"));
+        }
+        let number = |name: &str| {
+            let value = table.get(name).and_then(|value| value.as_float());
+            value.filter(|v| v.is_finite()).ok_or_else(|| format!("`{name}` is no finite number"))
+        };
+        let (slope, offset) = (number("slope")?, number("offset")?);
+        if slope <= 0.0 {
+            return Err("`slope` is not above zero".into());
+        }
+        let mut net = Net::default();
+        for (name, part) in Net::PARTS.iter().zip(net.parts_mut()) {
+            let values = table.get("net").and_then(|net| net.get(name)?.as_array());
+            let values = values.ok_or_else(|| format!("it has no `{name}`"))?;
+            if values.len() != part.len() {
+                let (has, needs) = (values.len(), part.len());
+                return Err(format!("`{name}` has {has} numbers and needs {needs}"));
+            }
+            for (to, value) in part.iter_mut().zip(values) {
+                *to = value.as_float().unwrap_or(f64::NAN) as f32;
+            }
+            if !part.iter().all(|value| value.is_finite()) {
+                return Err(format!("`{name}` has numbers that are not finite"));
+            }
+        }
+        Ok(Self::new(net, slope, offset))
+    }
+
+    /// FNV-1a over the weights.
+    fn fingerprint(&self) -> u64 {
+        let bytes = self.net.parts().into_iter().flatten().flat_map(|value| value.to_le_bytes());
+        let step = |mark: u64, byte: u8| (mark ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        bytes.fold(0xcbf2_9ce4_8422_2325, step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> Model {
+        let mut net = Net::default();
+        for (k, value) in net.parts_mut().into_iter().flatten().enumerate() {
+            *value = (k % 37) as f32 * 0.01 - 0.15;
+        }
+        Model::new(net, 1.5, -0.25)
+    }
+
+    #[test]
+    fn a_model_survives_its_file_and_another_has_another_fingerprint() {
+        let again = Model::from_text(&model().to_text()).unwrap();
+        assert_eq!(again, model());
+        let mut other = model().net;
+        other.parts_mut()[3][2] += 0.5;
+        assert_ne!(Model::new(other, 1.5, -0.25).mark, model().mark);
+    }
+
+    #[test]
+    fn broken_files_are_refused_in_a_sentence() {
+        let good = model().to_text();
+        let refusal = |from: &str, to: &str| {
+            assert!(good.contains(from), "{from}");
+            Model::from_text(&good.replacen(from, to, 1)).unwrap_err()
+        };
+        assert!(refusal("depth-net 1", "depth-net 9").contains("depth-net 9"));
+        assert!(refusal("slope = 1.5", "slope = inf").contains("`slope`"));
+        assert!(refusal("slope = 1.5", "slope = -1.5").contains("above zero"));
+        assert!(refusal("third = [", "thirst = [").contains("no `third`"));
+        assert!(refusal("last = [\n", "last = [ 1.0,\n").contains("needs 64"));
+        assert!(refusal("first = [\n  -0.15", "first = [\n  nan").contains("not finite"));
+        assert!(Model::from_text("nonsense").is_err());
+    }
+
+    #[test]
+    fn calibration_and_its_inverse() {
+        assert_eq!(model().log_odds(2.0), 2.75);
+        assert_eq!(model().logit(2.75), 2.0);
+    }
+}

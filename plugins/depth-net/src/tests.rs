@@ -1,0 +1,233 @@
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use tagalong_config::Registry;
+use tagalong_conformance::{Suite, context};
+use tagalong_core::{
+    Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Query, Stamp, Verifier,
+};
+use tagalong_sim::{Event, Scene, Simulation, Truth};
+
+use crate::{Config, DepthNet, DepthNetVerifier, NAME, VerifierConfig};
+
+/// A room with furniture, seen from a height; two people, if they are there.
+fn room(height_m: f64, people: &str) -> (Frame, Vec<Truth>) {
+    let text = format!(
+        "seed = 5
+        duration_s = 0.3
+        camera = {{ colour = false, width = 320, height = 240, height_m = {height_m} }}
+        faults = {{ dropped = 0.0, late = 0.0 }}
+        [[furniture]]
+        kind = \"coat-stand\"
+        at = [5.0, 4.4]
+        [[furniture]]
+        kind = \"chair\"
+        at = [4.0, 1.8]
+        [[furniture]]
+        kind = \"shelf\"
+        at = [6.5, 2.0]
+        {people}"
+    );
+    let mut simulation = Simulation::new(&Scene::parse(&text).unwrap(), 1);
+    let camera = Arc::new(simulation.camera().clone());
+    loop {
+        if let Some(Event::Shot(shot)) = simulation.next_event() {
+            let images = Images { depth: shot.images.depth.clone(), ..Images::default() };
+            let motion = EgoMotion::at_rest(0.1);
+            return (Frame::new(1, Stamp::default(), camera, motion, images), shot.truth);
+        }
+    }
+}
+
+const NEAR_AND_FAR: &str = "
+    [[people]]
+    path = [[2.5, 2.6]]
+    heading_deg = 180.0
+    [[people]]
+    path = [[4.6, 3.4]]
+    heading_deg = 90.0";
+
+fn detector(config: Config) -> DepthNet {
+    DepthNet::new(config, &context()).unwrap()
+}
+
+fn found(frame: &Frame) -> Vec<Detection> {
+    let query = Query::Discover { occupied: &[] };
+    detector(Config::default()).detect(frame, &query, &mut Funnel::default()).unwrap()
+}
+
+#[test]
+fn it_keeps_the_promises_of_its_kinds() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let suite = Suite::new(&registry).must_discover(NAME).must_follow(NAME);
+    let failures = suite.check_all();
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn people_are_found_from_every_height_and_the_near_one_without_a_head() {
+    for height_m in [0.4, 0.8, 1.2, 1.6] {
+        let (frame, truth) = room(height_m, NEAR_AND_FAR);
+        let found = found(&frame);
+        assert_eq!(found.len(), 2, "{height_m} m: {found:?}");
+        for person in truth {
+            let off = |d: &Detection| (d.position.xy() - person.head_in_robot.xy()).norm();
+            let nearest = found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+            assert!(off(nearest) < 0.25, "{height_m} m: {}", off(nearest));
+            let off_m = (nearest.position.z - person.head_in_robot.z).abs();
+            assert!(off_m < 0.3, "{height_m} m: height {off_m}");
+        }
+    }
+    let (frame, truth) = room(0.4, NEAR_AND_FAR);
+    let near = frame.camera.project(&truth[0].head_in_robot).unwrap();
+    assert!(near.y < 0.0, "the head is above the image");
+    let sigmas: Vec<f64> = found(&frame).iter().map(|d| d.covariance[(2, 2)].sqrt()).collect();
+    let unseen = Config::default().sigma_unseen_height_m;
+    assert!(sigmas.iter().any(|sigma| (sigma - unseen).abs() < 1e-9), "{sigmas:?}");
+}
+
+#[test]
+fn furniture_is_nobody() {
+    for height_m in [0.4, 0.8, 1.2, 1.6] {
+        assert!(found(&room(height_m, "").0).is_empty(), "{height_m} m");
+    }
+}
+
+#[test]
+fn somebody_known_is_not_discovered_again() {
+    let (frame, _) = room(1.2, NEAR_AND_FAR);
+    let first = found(&frame);
+    let query = Query::Discover { occupied: &first[..1] };
+    let rest = detector(Config::default()).detect(&frame, &query, &mut Funnel::default()).unwrap();
+    assert_eq!(rest, first[1..]);
+}
+
+#[test]
+fn the_verifier_believes_people_doubts_furniture_and_says_nothing_out_of_sight() {
+    let (frame, truth) = room(1.2, NEAR_AND_FAR);
+    let mut verifier = DepthNetVerifier::new(VerifierConfig::default(), &context()).unwrap();
+    let candidate = found(&frame).remove(0);
+    let mut log_odds = |position: Point3<f64>| {
+        verifier.log_odds(&frame, &Detection { position, ..candidate.clone() }).unwrap()
+    };
+    assert!(log_odds(truth[0].head_in_robot) > 1.0);
+    let shelf = Point3::new(5.5, -1.0, 1.5);
+    assert!(log_odds(shelf) < -1.0, "{}", log_odds(shelf));
+    assert_eq!(log_odds(Point3::new(-2.0, 0.0, 1.5)), 0.0);
+}
+
+#[test]
+fn without_depth_the_detector_complains_and_the_verifier_is_undecided() {
+    let (frame, _) = room(1.2, NEAR_AND_FAR);
+    let candidate = found(&frame).remove(0);
+    let (camera, motion) = (Arc::clone(&frame.camera), EgoMotion::at_rest(0.1));
+    let dark = Frame::new(1, Stamp::default(), camera, motion, Images::default());
+    let query = Query::Discover { occupied: &[] };
+    let answer = detector(Config::default()).detect(&dark, &query, &mut Funnel::default());
+    assert!(matches!(answer, Err(Error::MissingImage { .. })));
+    let mut verifier = DepthNetVerifier::new(VerifierConfig::default(), &context()).unwrap();
+    assert_eq!(verifier.log_odds(&dark, &candidate).unwrap(), 0.0);
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    let refusal = |config: Config| {
+        DepthNet::new(config, &context()).err().map_or(String::new(), |error| error.to_string())
+    };
+    assert!(refusal(Config { sigma_m: 0.0, ..Config::default() }).contains("sigma_m"));
+    assert!(
+        refusal(Config { model: "nowhere.toml".into(), ..Config::default() })
+            .contains("nowhere.toml")
+    );
+}
+
+#[cfg(feature = "train")]
+mod training {
+    use tagalong_config::{AnnotatedPerson, Trainer};
+
+    use super::*;
+    use crate::train::DepthNetTrainer;
+    use crate::{FloorMap, Model, Net, Pass, Training};
+
+    fn people(truth: &[Truth]) -> Vec<AnnotatedPerson> {
+        let of = |person: &Truth| AnnotatedPerson {
+            head: person.head_in_robot,
+            counts: true,
+            visible: person.visible_fraction,
+        };
+        truth.iter().map(of).collect()
+    }
+
+    fn trainer(training: Training) -> DepthNetTrainer {
+        let mut trainer = DepthNetTrainer::new(training, 3).unwrap();
+        for (group, text) in [NEAR_AND_FAR, "", NEAR_AND_FAR].into_iter().enumerate() {
+            let (frame, truth) = room(1.2, text);
+            let room = (group == 2).then_some("another");
+            trainer.add_frame(&frame, &people(&truth), room, group as u64).unwrap();
+        }
+        trainer
+    }
+
+    #[test]
+    fn it_learns_the_room_that_it_sees_and_the_same_samples_give_the_same_bytes() {
+        let training =
+            Training { steps: 60, real_steps: 20, batch: 6, rate: 0.01, ..Training::default() };
+        let mut progress = Vec::new();
+        let fitted = trainer(training.clone()).fit(&mut |part| progress.push(part)).unwrap();
+        assert!(progress.is_sorted() && progress.last() == Some(&1.0), "{progress:?}");
+        let model = Model::from_text(&fitted.model).unwrap();
+        let (frame, truth) = room(1.2, NEAR_AND_FAR);
+        let (map, pass) = model.look(&frame).unwrap();
+        let best = crate::peaks(&map, &pass, -9.0, 0.4)[0];
+        let off = truth.iter().map(|person| best.distance_m(&person.head_in_robot.xy()));
+        assert!(off.fold(9.0, f64::min) < 0.3, "{best:?}");
+        let left_out = fitted.figures["another: left out"].as_table().unwrap();
+        assert_eq!(left_out["frames"].as_integer(), Some(1));
+        let short = Training { steps: 2, real_steps: 1, ..training };
+        let [first, second] = [(); 2].map(|()| trainer(short.clone()).fit(&mut |_| {}).unwrap());
+        assert_eq!(first, second);
+    }
+
+    /// Each part of the network a little larger and smaller.
+    #[test]
+    fn the_gradient_is_that_of_small_steps() {
+        let (frame, _) = room(1.2, NEAR_AND_FAR);
+        let map = FloorMap::new(&frame.camera, frame.depth().unwrap());
+        let mut net = crate::train::start(4);
+        // Without a bias, empty cells lie on the corner of the rectifier, which has no slope.
+        net.parts_mut().into_iter().skip(1).step_by(2).flatten().for_each(|bias| *bias += 0.1);
+        let mut pass = Pass::default();
+        net.look(&map, &mut pass);
+        let (mut gradient, mut of) = (Net::default(), Pass::default());
+        let weight = |k: usize| ((k as f32) * 12.9898).sin() * 0.01;
+        for (k, slope) in of.answer.values.iter_mut().enumerate() {
+            *slope = if map.in_view[k / 4] { weight(k) } else { 0.0 };
+        }
+        net.learn(&map, &pass, &mut gradient, &mut of);
+        let loss = |net: &Net, pass: &mut Pass| -> f64 {
+            net.look(&map, pass);
+            let values = pass.answer.values.iter().enumerate();
+            values.map(|(k, value)| f64::from(weight(k)) * f64::from(*value)).sum()
+        };
+        for part in 0..Net::PARTS.len() {
+            let count = net.parts()[part].len();
+            for k in (0..count).step_by(count.div_ceil(5)) {
+                let (value, step) = (net.parts()[part][k], 1e-3);
+                net.parts_mut()[part][k] = value + step;
+                let more = loss(&net, &mut pass);
+                net.parts_mut()[part][k] = value - step;
+                let slope = (more - loss(&net, &mut pass)) / (2.0 * f64::from(step));
+                net.parts_mut()[part][k] = value;
+                let off = (slope - f64::from(gradient.parts()[part][k])).abs();
+                assert!(off < 0.03 * (1.0 + slope.abs()), "{part} {k}: {slope}");
+            }
+        }
+    }
+
+    #[test]
+    fn without_simulated_rooms_there_is_nothing_to_begin_with() {
+        let mut trainer = DepthNetTrainer::new(Training::default(), 1).unwrap();
+        assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("simulated"));
+    }
+}

@@ -1,0 +1,225 @@
+//! An annotated frame and its random variations (data augmentation).
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use tagalong_config::AnnotatedPerson;
+use tagalong_core::{DepthImage, Frame, Result};
+use tagalong_geometry::{Camera, Lens};
+use tagalong_learn::mix;
+
+use super::Targets;
+use crate::{FloorMap, reduced};
+
+/// Depth is kept in steps of this, m.
+const STEP_M: f32 = 0.001;
+/// Largest turn of the robot, rad.
+const TURN_RAD: f64 = 0.45;
+/// Range of the factor by which the scene grows.
+const SCALE: [f64; 2] = [0.95, 1.06];
+/// Standard deviations of the camera's pitch and roll, rad, and of its height, m.
+const TILT_RAD: f64 = 0.006;
+const HEIGHT_M: f64 = 0.02;
+
+/// Numbers that look random.
+pub struct Draws(pub u64);
+
+impl Draws {
+    /// Returns the next number.
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(1);
+        mix(self.0)
+    }
+
+    /// Returns a number between two others.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Returns a whole number below `end`.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.next() % end.max(1) as u64) as usize
+    }
+
+    /// Returns true with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.between(0.0, 1.0) < probability
+    }
+
+    /// Returns a number of standard deviation 1 (nearly normal: a sum of four).
+    pub fn normal(&mut self) -> f64 {
+        (0..4).map(|_| self.between(-1.0, 1.0)).sum::<f64>() * 0.75f64.sqrt()
+    }
+}
+
+/// An annotated frame, thinned out.
+pub struct Sample {
+    /// The camera of the thinned image.
+    pub camera: Camera,
+    /// Depth in steps of a millimetre; 0 is no reading.
+    steps: Vec<u16>,
+    /// All annotated people.
+    pub people: Vec<AnnotatedPerson>,
+    /// The real room, if it is one.
+    pub room: Option<String>,
+    /// Number of the scene.
+    pub group: u64,
+}
+
+impl Sample {
+    /// Keeps a frame.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame without depth.
+    pub fn new(
+        frame: &Frame,
+        people: &[AnnotatedPerson],
+        room: Option<&str>,
+        group: u64,
+    ) -> Result<Self> {
+        let depth = frame.depth()?;
+        let (camera, depth) = reduced(&frame.camera, depth)
+            .unwrap_or_else(|| ((*frame.camera).clone(), depth.clone()));
+        let steps = depth.pixels().iter().map(|metres| (metres / STEP_M).round() as u16).collect();
+        let (people, room) = (people.to_vec(), room.map(str::to_owned));
+        Ok(Self { camera, steps, people, room, group })
+    }
+
+    /// Returns the depth image.
+    pub fn depth(&self) -> DepthImage {
+        let metres = |step: u16| if step == 0 { f32::NAN } else { f32::from(step) * STEP_M };
+        let pixels = self.steps.iter().map(|step| metres(*step)).collect();
+        DepthImage::from_pixels(self.camera.width, self.camera.height, pixels).unwrap_or_default()
+    }
+
+    /// Returns the map of a variation, and the answer to it: the robot turned, the scene a little
+    /// larger or smaller, the camera a little off, the image cut, noisier and with holes, all of it
+    /// perhaps mirrored.
+    pub fn varied(&self, draws: &mut Draws) -> (FloorMap, Targets) {
+        let (mut camera, mut people) = (self.camera.clone(), self.people.clone());
+        let scale = draws.between(SCALE[0], SCALE[1]);
+        let mut depth = self.depth();
+        depth.pixels_mut().iter_mut().for_each(|metres| *metres *= scale as f32);
+        let turn = Isometry3::rotation(Vector3::z() * draws.between(-TURN_RAD, TURN_RAD));
+        let grown = |point: Point3<f64>| turn * Point3::from(point.coords * scale);
+        people.iter_mut().for_each(|person| person.head = grown(person.head));
+        let mut pose = turn * camera.robot_from_camera;
+        pose.translation.vector = grown(camera.robot_from_camera.translation.vector.into()).coords;
+        camera.robot_from_camera = misjudged(&pose, draws);
+        degrade(&mut depth, draws);
+        let (camera, depth) = cut(camera, depth, draws);
+        let (map, targets) =
+            (FloorMap::new(&camera, &depth), Targets::new(&people, &camera, &depth));
+        match draws.chance(0.5) {
+            true => (map.mirrored(), targets.mirrored()),
+            false => (map, targets),
+        }
+    }
+}
+
+/// Returns the pose as a calibration might give it.
+fn misjudged(pose: &Isometry3<f64>, draws: &mut Draws) -> Isometry3<f64> {
+    let tilt = Vector3::new(draws.normal(), draws.normal(), 0.0) * TILT_RAD;
+    let lift = Translation3::new(0.0, 0.0, draws.normal() * HEIGHT_M);
+    let turned = UnitQuaternion::from_scaled_axis(tilt) * pose.rotation;
+    lift * Isometry3::from_parts(pose.translation, turned)
+}
+
+/// Takes readings away, and adds noise.
+fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
+    let (width, height) = (depth.width(), depth.height());
+    if draws.chance(0.3) {
+        let share = draws.between(0.0, 0.4);
+        let lost = |metres: &mut f32| {
+            if draws.chance(share) {
+                *metres = f32::NAN
+            }
+        };
+        depth.pixels_mut().iter_mut().for_each(lost);
+    }
+    if draws.chance(0.3) {
+        for _ in 0..1 + draws.below(5) {
+            let (left, top) = (draws.below(width), draws.below(height));
+            let (right, bottom) = (left + 5 + draws.below(45), top + 5 + draws.below(45));
+            for y in top..bottom.min(height) {
+                let row = y * width;
+                depth.pixels_mut()[row + left..row + right.min(width)].fill(f32::NAN);
+            }
+        }
+    }
+    if draws.chance(0.2) {
+        let farthest = draws.between(3.0, 5.5) as f32;
+        let far = depth.pixels_mut().iter_mut().filter(|metres| **metres > farthest);
+        far.for_each(|metres| *metres = f32::NAN);
+    }
+    if draws.chance(0.5) {
+        let sigma = draws.between(0.0, 0.004);
+        let noisy =
+            |metres: &mut f32| *metres += *metres * *metres * (sigma * draws.normal()) as f32;
+        depth.pixels_mut().iter_mut().for_each(noisy);
+    }
+}
+
+/// Cuts rows off, as a camera of another pitch and field of view would.
+fn cut(camera: Camera, depth: DepthImage, draws: &mut Draws) -> (Camera, DepthImage) {
+    let height = depth.height();
+    let top = if draws.chance(0.35) { draws.below(1 + height * 45 / 100) } else { 0 };
+    let bottom = if draws.chance(0.15) { draws.below(1 + height * 40 / 100) } else { 0 };
+    let Lens::Pinhole(mut lens) = camera.lens else { return (camera, depth) };
+    lens.cy -= top as f64;
+    let rows = height - top - bottom;
+    let image = DepthImage::from_fn(depth.width(), rows, |x, y| depth.row(y + top)[x]);
+    (Camera { lens: Lens::Pinhole(lens), height: rows, ..camera }, image)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tagalong_conformance::figure::{Figure, World};
+    use tagalong_core::{EgoMotion, Stamp};
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn sample() -> Sample {
+        let lens =
+            Pinhole { fx: 250.0, fy: 250.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0));
+        let images = World::with(&[Figure::at(2.5, 0.4)]).draw(&camera);
+        let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
+        let head = Point3::new(2.5, 0.4, 1.6);
+        let person = AnnotatedPerson { head, counts: true, visible: 1.0 };
+        Sample::new(&frame, &[person], None, 0).unwrap()
+    }
+
+    #[test]
+    fn the_person_moves_with_the_answer_in_every_variation() {
+        let (sample, mut places) = (sample(), Vec::new());
+        for seed in 0..40 {
+            let (map, targets) = sample.varied(&mut Draws(mix(seed)));
+            // A person with few pixels left need not be found.
+            let Some(place) = targets.places().first().copied() else { continue };
+            let (row, column) = (place[0] as usize, place[1] as usize);
+            let near =
+                (row - 3..row + 4).flat_map(|y| (column - 3..column + 4).map(move |x| (y, x)));
+            let is_tall = |(y, x): (usize, usize)| {
+                map.fine.at(2 * y, 2 * x)[FloorMap::FINE - 1] > 0.25 && map.in_view[y * 64 + x]
+            };
+            assert!(near.into_iter().any(is_tall), "{seed}: {place:?}");
+            places.push(place[1]);
+        }
+        places.sort_by(f64::total_cmp);
+        assert!(places.len() > 30, "{}", places.len());
+        // Turned and mirrored, the person is at both sides.
+        assert!(places[0] < 26.0 && places[places.len() - 1] > 38.0, "{places:?}");
+    }
+
+    #[test]
+    fn a_sample_keeps_depth_to_a_millimetre() {
+        let sample = sample();
+        let depth = sample.depth();
+        let centre = depth.get(160, 120).unwrap();
+        assert!((0.5..5.1).contains(&centre), "{centre}");
+        assert_eq!((depth.width(), depth.height()), (320, 240));
+        assert!((centre / STEP_M - (centre / STEP_M).round()).abs() < 1e-2);
+    }
+}

@@ -1,0 +1,132 @@
+//! How good answers are.
+
+use super::Sample;
+use super::targets::surfaces_m2;
+use crate::{FloorMap, Pass, Peak, peaks};
+
+/// Peaks from these log-odds on are counted.
+const LEAST: f64 = -4.0;
+/// A peak finds a person up to this distance on the floor, m.
+const SAME_M: f64 = 0.4;
+/// A peak this near to an annotated person is not false, m.
+const NEAR_M: f64 = 0.6;
+/// Two peaks are this far apart, m.
+const SEPARATION_M: f64 = 0.4;
+/// People up to this distance are counted, m ...
+const COUNTED_M: f64 = 5.0;
+/// ... with this visible surface, m² ...
+const SEEN_M2: f64 = 0.03;
+/// ... and this fraction of the upper body.
+const VISIBLE: f64 = 0.5;
+/// False people per frame at which the recall is given.
+const FALSE_A_FRAME: f64 = 0.05;
+
+/// Answers of a network to annotated frames.
+#[derive(Clone, Debug, Default)]
+pub struct Score {
+    frames: usize,
+    people: usize,
+    /// Uncalibrated log-odds of each peak, whether it is a person, and how far off, m.
+    found: Vec<(f64, bool, f64)>,
+}
+
+impl Score {
+    /// Adds the answer to a sample.
+    pub fn add(&mut self, map: &FloorMap, pass: &Pass, sample: &Sample) {
+        let surfaces = surfaces_m2(&sample.people, &sample.camera, &sample.depth());
+        let counts = |k: &usize| {
+            let person = &sample.people[*k];
+            let is_seen = surfaces[*k] > SEEN_M2 && person.visible >= VISIBLE;
+            person.counts && is_seen && person.head.xy().coords.norm() < COUNTED_M
+        };
+        let mut missing: Vec<usize> = (0..sample.people.len()).filter(counts).collect();
+        self.frames += 1;
+        self.people += missing.len();
+        for peak in peaks(map, pass, LEAST, SEPARATION_M) {
+            let off = |k: usize| peak.distance_m(&sample.people[k].head.xy());
+            let nearest =
+                (0..missing.len()).min_by(|a, b| off(missing[*a]).total_cmp(&off(missing[*b])));
+            match nearest.filter(|at| off(missing[*at]) < SAME_M) {
+                Some(at) => {
+                    let off_m = off(missing.swap_remove(at));
+                    self.found.push((peak.logit, true, off_m));
+                }
+                None => self.add_false(&peak, sample),
+            }
+        }
+    }
+
+    fn add_false(&mut self, peak: &Peak, sample: &Sample) {
+        let is_near = |at: nalgebra::Point2<f64>| peak.distance_m(&at) < NEAR_M;
+        if !sample.people.iter().any(|person| is_near(person.head.xy())) {
+            self.found.push((peak.logit, false, 0.0));
+        }
+    }
+
+    /// Adds the answers of another score.
+    pub fn extend(&mut self, other: Self) {
+        self.frames += other.frames;
+        self.people += other.people;
+        self.found.extend(other.found);
+    }
+
+    /// Returns uncalibrated log-odds, and whether they are of a person.
+    pub fn answers(&self) -> Vec<(f64, bool)> {
+        self.found.iter().map(|(logit, is_person, _)| (*logit, *is_person)).collect()
+    }
+
+    /// Returns recall and false people per frame of peaks with at least these log-odds.
+    fn at(&self, least: f64) -> (f64, f64) {
+        let count = |is: bool| {
+            self.found.iter().filter(|(logit, person, _)| *logit >= least && *person == is).count()
+        };
+        let of = |count: usize, all: usize| count as f64 / all.max(1) as f64;
+        (of(count(true), self.people), of(count(false), self.frames))
+    }
+
+    /// Returns the best recall with few false people.
+    fn best_recall(&self) -> f64 {
+        let tried = self.found.iter().map(|(logit, ..)| self.at(*logit));
+        tried
+            .filter(|(_, wrong)| *wrong <= FALSE_A_FRAME)
+            .map(|(recall, _)| recall)
+            .fold(0.0, f64::max)
+    }
+
+    /// Returns the figures for a card.
+    pub fn figures(&self) -> toml::Table {
+        let rounded = |value: f64| toml::Value::from((value * 1e3).round() / 1e3);
+        let (recall, wrong) = self.at(0.0);
+        let off: Vec<f64> =
+            self.found.iter().filter(|(l, is, _)| *is && *l >= 0.0).map(|(.., off)| *off).collect();
+        toml::Table::from_iter([
+            ("frames".to_owned(), (self.frames as i64).into()),
+            ("people".to_owned(), (self.people as i64).into()),
+            ("recall".to_owned(), rounded(recall)),
+            ("false_a_frame".to_owned(), rounded(wrong)),
+            ("recall_at_false_0.05".to_owned(), rounded(self.best_recall())),
+            ("off_m".to_owned(), rounded(off.iter().sum::<f64>() / off.len().max(1) as f64)),
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recall_and_false_people_depend_on_the_threshold() {
+        let found = vec![(3.0, true, 0.1), (2.0, false, 0.0), (1.0, true, 0.3), (-1.0, true, 0.0)];
+        let mut score = Score { frames: 10, people: 4, found };
+        assert_eq!(score.at(0.0), (0.5, 0.1));
+        assert_eq!(score.at(-2.0), (0.75, 0.1));
+        // One false person in ten frames is too many.
+        assert_eq!(score.best_recall(), 0.25);
+        let figures = score.figures();
+        assert_eq!(figures["recall"].as_float(), Some(0.5));
+        assert_eq!(figures["off_m"].as_float(), Some(0.2));
+        score.extend(Score { frames: 10, people: 0, found: Vec::new() });
+        assert_eq!(score.best_recall(), 0.75);
+        assert_eq!(score.answers().len(), 4);
+    }
+}
