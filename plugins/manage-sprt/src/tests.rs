@@ -202,7 +202,7 @@ fn settings_that_cannot_work_are_refused() {
         Config { confirm_log_odds: -1.0, ..Config::default() },
         Config { end_log_odds: 0.5, ..Config::default() },
         Config { max_log_odds: 1.0, ..Config::default() },
-        Config { same_look: 1.1, ..Config::default() },
+        Config { usual: 1.1, ..Config::default() },
         Config { miss_log_odds: 0.1, ..Config::default() },
         Config { clutter_s: f64::NAN, ..Config::default() },
     ] {

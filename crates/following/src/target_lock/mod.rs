@@ -8,7 +8,6 @@
 //! one stood.
 
 mod lock;
-mod looks;
 mod memory;
 mod search;
 mod settings;
