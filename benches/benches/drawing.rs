@@ -1,5 +1,5 @@
-//! How long images of 512x384 with five people take to draw on two threads: a
-//! stereo pair, and depth alone.
+//! Rendering time of images of 512x384 with five people on two threads: a stereo pair, and depth
+//! alone.
 #![allow(clippy::expect_used, missing_docs, reason = "a broken bench may stop loudly")]
 
 use std::hint::black_box;

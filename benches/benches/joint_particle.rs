@@ -1,4 +1,4 @@
-//! Weighing scenes of two people: what P3 counts as template matching.
+//! Weighing scenes of two people, which P3 counts as template matching.
 #![allow(clippy::expect_used, missing_docs, reason = "a broken test or bench may stop loudly")]
 
 use std::f64::consts::PI;
@@ -13,7 +13,7 @@ use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 const HEADS: [Point3<f64>; 2] = [Point3::new(2.5, 0.1, 1.6), Point3::new(3.4, -0.15, 1.65)];
 
-/// Two people who overlap, in front of a wall, at P3's 512x384.
+/// Two people that overlap, in front of a wall, at P3's 512x384.
 fn frame(index: u64, depth: &Arc<DepthImage>, camera: &Arc<Camera>) -> Frame {
     let images = Images { depth: Some(Arc::clone(depth)), ..Images::default() };
     let stamp = Stamp::from_nanos(index * 100_000_000);

@@ -1,4 +1,4 @@
-//! How long the circular image of a conical mirror takes to draw and to unwrap.
+//! Rendering and unwrapping time of the circular image of a conical mirror.
 #![allow(clippy::expect_used, missing_docs, reason = "a broken bench may stop loudly")]
 
 use std::hint::black_box;
@@ -56,7 +56,7 @@ fn unwrapping(c: &mut Criterion) {
     });
 }
 
-/// What a frame costs a tracker: unwrapping it and finding three people in it.
+/// Measures the cost of a frame for a tracker: unwrapping it and finding three people in it.
 fn detecting(c: &mut Criterion) {
     let mut world = simulation();
     let panorama = *world.panorama().expect("the scene has a mirror");

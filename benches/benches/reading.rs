@@ -1,5 +1,5 @@
-//! Reading speed: a real log through the frame source, beside what decoding its
-//! images alone costs. Without `../shared/data/logs` it says that it skips.
+//! Reading speed: a real log through the frame source, beside the mere decoding of its images.
+//! Without `../shared/data/logs` it prints that it skips.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,

@@ -50,7 +50,7 @@ path = [[3.6, 2.0]]
 heading_deg = 180.0
 ";
 
-/// What the processor worked on the thread.
+/// Processor time of the thread.
 struct ProcessorTime;
 
 impl Measurement for ProcessorTime {
@@ -174,8 +174,8 @@ impl Bench {
     }
 }
 
-/// All configs with both matchers, in front of the first two people whom all of them
-/// see: who looks how is up to the simulator.
+/// Returns all configs with both matchers, in front of the first two people that all of them see:
+/// the simulator decides on clothes and posture.
 fn all() -> Vec<(String, Bench)> {
     let of_seed = |seed| {
         let seen = shot(seed);

@@ -1,5 +1,5 @@
-//! Boxes in the image: the trackers that know somebody again, for one person and one
-//! frame, and the whole pipeline on recorded boxes.
+//! Boxes in the image: the trackers that re-identify people, for one person and one frame, and the
+//! whole pipeline on recorded boxes.
 #![allow(clippy::expect_used, missing_docs, reason = "a broken test or bench may stop loudly")]
 
 use std::hint::black_box;
@@ -39,7 +39,7 @@ fn frame(camera: &Arc<Camera>, of: Rect, index: u64, face_m: f32) -> Frame {
     Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.04), images)
 }
 
-/// Somebody at 3 m who may be elsewhere by so much, m.
+/// Returns a track at 3 m with this standard deviation, m.
 fn track(camera: &Camera, sigma_m: f64) -> Track {
     let head = Point3::new(3.0, 0.0, 1.35);
     let region = camera.upper_body(&head);
@@ -57,7 +57,7 @@ fn track(camera: &Camera, sigma_m: f64) -> Track {
     }
 }
 
-/// The widest search there is, and what everybody costs who is in plain view.
+/// Measures the widest search there is, and the cost of each person in plain view.
 fn correlation(criterion: &mut Criterion) {
     let camera = camera();
     let (sure, unsure) = (track(&camera, 0.1), track(&camera, 0.4));
@@ -100,7 +100,7 @@ fn compressive(criterion: &mut Criterion) {
     });
 }
 
-/// Eight people who walk to and fro, as boxes of whole bodies.
+/// Returns eight people that walk to and fro, as boxes of whole bodies.
 fn recorded(index: u64) -> Vec<ExternalDetection> {
     let person = |k: u64| {
         let x = 300.0 + 200.0 * ((index as f64) * 0.02 + k as f64).sin();

@@ -73,7 +73,7 @@ fn mistakes_are_answered_with_place_cause_and_remedy() {
         ("gate_m = 1.0", "gate_m = -1.0", &["my.toml:14:", "`gate_m` must be positive"]),
         ("gate_m = 1.0", "gate_m = nan", &["my.toml:14:", "`gate_m` must be positive"]),
         ("\"mahalanobis\"", "\"overlp\"", &["my.toml:13:8", "`overlp`", "`overlap`"]),
-        ("\"follow\", ", "\"folow\", ", &["my.toml:5:", "`folow`", "`follow`"]),
+        ("\"track\", ", "\"trak\", ", &["my.toml:5:", "`trak`", "`track`"]),
         ("every = 2", "every = 0", &["my.toml:6:", "every"]),
         ("every = 2", "every = 2\noffset = 2", &["my.toml:7:", "offset"]),
         (
@@ -100,8 +100,7 @@ fn mistakes_are_answered_with_place_cause_and_remedy() {
 #[test]
 fn a_method_that_was_removed_from_the_config_is_gone() {
     let removed = GOOD.replace("config = { max_depth_m = 5.0 }\n", "");
-    let filterless =
-        removed.replace("roles = [\"follow\", \"discover\"]", "roles = [\"discover\"]");
+    let filterless = removed.replace("roles = [\"track\", \"discover\"]", "roles = [\"discover\"]");
     build(&filterless).unwrap();
     let message = build("[filter]\nplugin = \"ekf\"\n").err().map(|error| error.message);
     assert!(message.as_ref().is_some_and(|m| m.contains("detector")), "{message:?}");

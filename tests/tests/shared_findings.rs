@@ -57,7 +57,8 @@ fn run(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
         std::iter::from_fn(|| draw.next_frame()).map(|drawn| drawn.frame).collect();
     let say = |frame| -> Vec<String> {
         // Timings differ between any two runs.
-        let untimed = |report| FrameReport { timings: Vec::new(), ..report };
+        let untimed =
+            |report| FrameReport { timings: Vec::new(), plugin_timings: Vec::new(), ..report };
         pipelines.iter_mut().map(|p| format!("{:?}", untimed(p.step(frame).unwrap()))).collect()
     };
     frames.iter().map(say).collect()

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{FaceDepth, PointEstimate, Rect};
 
 fn main() -> ExitCode {
     tagalong_cli::main_with(|registry| {
@@ -71,9 +71,8 @@ impl Detector for NearestThing {
         let side = 0.57 * scale;
         let left = bounds.centre().x - 0.5 * side;
         let region = Rect::new(left, bounds.y - 0.025 * scale, side, side);
-        let position = frame.camera.head_of(&region, depth_m);
-        let covariance =
-            frame.camera.covariance(region.centre(), depth_m + HEAD_RADIUS_M, 3.0, 0.05);
+        let face = FaceDepth { depth_m, sigma_m: 0.05 };
+        let PointEstimate { position, covariance } = frame.camera.locate_head(&region, face, 3.0);
         Ok(vec![Detection { region, position, covariance, score: 2.0, source: "nearest-thing" }])
     }
 }

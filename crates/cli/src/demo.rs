@@ -4,15 +4,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
+use tagalong_benchmark::{BenchArgs, bench};
 use tagalong_config::Registry;
 use tagalong_log::write::RunDir;
 use tagalong_sim::{Scene, Simulation};
+use tagalong_simulate::record;
 
-use crate::args::{Format, RunArgs};
-use crate::bench::{self, BenchArgs};
-use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
-use crate::simulate::{record, threads};
-use crate::{run, signals::Signals};
+use crate::run::{self, RunArgs};
 
 const SCENE: &str = include_str!("../../../configs/scenes/demo.toml");
 
@@ -58,7 +60,7 @@ pub fn demo(args: &DemoArgs, registry: &Registry) -> Outcome {
         }
     }
     say("4/4 comparing both with the truth");
-    let ended = bench::bench(&bench_args(folder, &log), registry)?;
+    let ended = bench(&bench_args(folder, &log), registry)?;
     print(&what_now(folder))?;
     Ok(ended)
 }

@@ -5,10 +5,9 @@ use std::fmt::Write as _;
 
 use schemars::schema_for;
 use serde_json::{Map, Value, json};
+use tagalong_app::config_file::OuterSettings;
 use tagalong_config::{PluginInfo, Registry};
 use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings};
-
-use crate::config_file::OuterSettings;
 
 /// Returns the schemas of everything around the plugins.
 fn around() -> [Value; 2] {

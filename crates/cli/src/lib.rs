@@ -14,33 +14,16 @@
 //! config, 3 finished but part of the log was lost, 130 and 143 after SIGINT and SIGTERM.
 
 mod args;
-mod bench;
 mod commands;
-mod config_file;
 mod demo;
-mod doctor;
-mod follow;
-mod import;
 mod keys;
-mod outcome;
-mod overlay;
-mod realism;
-mod reproduce;
 mod run;
-mod sample;
-mod scoring;
-mod signals;
-mod simulate;
-mod suggest;
-mod train;
-mod trials;
-mod triangulate;
 
 use std::process::ExitCode;
 
 use args::{Cli, Command};
-use clap::Parser;
-use outcome::{Outcome, say};
+use clap::{CommandFactory as _, Parser};
+use tagalong_app::outcome::{Outcome, say};
 use tagalong_config::Registry;
 
 /// Runs the whole program: registers the plugins, parses the command line, dispatches the command.
@@ -75,22 +58,22 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin, format } => commands::config(registry, plugin, *format),
         Command::Schema => commands::schema(registry),
-        Command::Completions { shell } => commands::completions(*shell),
-        Command::Man { output } => commands::man(output),
+        Command::Completions { shell } => commands::completions(Cli::command(), *shell),
+        Command::Man { output } => commands::man(Cli::command(), output),
         Command::Check { config, log, format } => {
             commands::check(registry, config, log.as_deref(), *format)
         }
-        Command::Bench(args) => bench::bench(args, registry),
+        Command::Bench(args) => tagalong_benchmark::bench(args, registry),
         Command::Demo(args) => demo::demo(args, registry),
-        Command::Doctor(args) => doctor::doctor(args, registry),
-        Command::Import(args) => import::import(args),
-        Command::Follow(args) => follow::follow(args, registry),
+        Command::Doctor(args) => tagalong_doctor::doctor(args, registry),
+        Command::Import(args) => tagalong_import::import(args),
+        Command::Follow(args) => tagalong_experiments::follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
-        Command::Simulate(args) => simulate::simulate(args, registry),
-        Command::Triangulate(args) => triangulate::triangulate(args),
-        Command::Reproduce(args) => reproduce::reproduce(args, registry),
-        Command::Trials(args) => trials::trials(args, registry),
-        Command::Train(args) => train::train(args, registry),
+        Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
+        Command::Triangulate(args) => tagalong_webcams::triangulate(args),
+        Command::Reproduce(args) => tagalong_experiments::reproduce::reproduce(args, registry),
+        Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
+        Command::Train(args) => tagalong_training::train(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }

@@ -120,6 +120,7 @@ impl PluginInfo {
 ///
 /// ```
 /// # use tagalong_core::*;
+/// # use tagalong_config::Registry;
 /// #[derive(Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 /// #[serde(default, deny_unknown_fields)]
 /// struct Config {}
@@ -665,8 +666,8 @@ mod tests {
             _ => Ok(Counting),
         });
         let info = registry.find("tall").unwrap();
-        assert_eq!(info.defaults(), "# How tall, m.\nheight_m = 0.0\n");
-        assert_eq!(info.schema()["properties"]["height_m"]["description"], "How tall, m.");
+        assert_eq!(info.defaults(), "# Height, m.\nheight_m = 0.0\n");
+        assert_eq!(info.schema()["properties"]["height_m"]["description"], "Height, m.");
         let text = "{ height_m = -1.0 }";
         let value = toml::de::DeValue::parse(text).unwrap();
         let error = registry.build_verifier("tall", Some(value), &context()).err().unwrap();

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_core::{
     Association, Associations, Associator, Detection, Estimate, Gate, Person, Track, TrackId,
 };
+use tagalong_stats::{RandomSource, SplitMix64};
 
-use crate::random::Random;
 use crate::scenes::{DT_S, level, sighting};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
@@ -20,7 +20,7 @@ pub(crate) const CHECKS: &[Check] = &[
 
 const GATE: Gate = Gate { dt_s: DT_S, start_log_odds: 0.0 };
 
-fn detection(x: f64, y: f64, random: &mut Random) -> Detection {
+fn detection(x: f64, y: f64, random: &mut SplitMix64) -> Detection {
     sighting(&Point3::new(x, y, 1.6), &level(), 0.05, random)
 }
 
@@ -43,15 +43,16 @@ fn track(id: u32, x: f64, y: f64) -> Track {
 }
 
 /// Returns tracks and detections at random positions, some detections with low scores.
-fn crowd(random: &mut Random, tracks: u32, detections: usize) -> (Vec<Track>, Vec<Detection>) {
-    let mut place = || (2.0 + 4.0 * random.uniform(), 3.0 * random.uniform() - 1.5);
+fn crowd(random: &mut SplitMix64, tracks: u32, detections: usize) -> (Vec<Track>, Vec<Detection>) {
+    let mut place =
+        || (2.0 + 4.0 * random.positive_uniform(), 3.0 * random.positive_uniform() - 1.5);
     let places: Vec<(f64, f64)> = (0..tracks as usize + detections).map(|_| place()).collect();
     let (of_tracks, of_detections) = places.split_at(tracks as usize);
     let tracks = (1..).zip(of_tracks).map(|(id, (x, y))| track(id, *x, *y)).collect();
     let found = of_detections.iter().map(|(x, y)| {
         let mut found = detection(*x, *y, random);
-        found.score = 6.0 * random.uniform() - 4.0;
-        found.covariance = Matrix3::identity() * (0.01 + 0.2 * random.uniform());
+        found.score = 6.0 * random.positive_uniform() - 4.0;
+        found.covariance = Matrix3::identity() * (0.01 + 0.2 * random.positive_uniform());
         found
     });
     (tracks, found.collect())
@@ -59,7 +60,7 @@ fn crowd(random: &mut Random, tracks: u32, detections: usize) -> (Vec<Track>, Ve
 
 fn nothing_leads_to_nothing(subject: &Subject<'_>) -> Verdict {
     let mut associator = subject.associator(From::Nothing)?;
-    let (tracks, detections) = crowd(&mut Random::new(3), 2, 2);
+    let (tracks, detections) = crowd(&mut SplitMix64::new(3), 2, 2);
     for (name, tracks, detections) in [
         ("no tracks and no detections", &[][..], &[][..]),
         ("no tracks", &[], &detections[..]),
@@ -73,7 +74,7 @@ fn nothing_leads_to_nothing(subject: &Subject<'_>) -> Verdict {
 
 fn pairs_are_possible(subject: &Subject<'_>) -> Verdict {
     let mut associator = subject.associator(From::Nothing)?;
-    let mut random = Random::new(5);
+    let mut random = SplitMix64::new(5);
     for round in 0..40 {
         let (tracks, detections) = crowd(&mut random, round % 7, (round % 5) as usize * 2);
         let answer = associator.associate(&tracks, &detections, &GATE);
@@ -112,7 +113,7 @@ fn check_sums(answer: &Associations, tracks: usize, detections: usize) -> Verdic
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {
     let defaults = subject.info.defaults();
-    let (tracks, detections) = crowd(&mut Random::new(8), 6, 8);
+    let (tracks, detections) = crowd(&mut SplitMix64::new(8), 6, 8);
     let answer = |from| -> Result<_, String> {
         Ok(subject.associator(from)?.associate(&tracks, &detections, &GATE))
     };
@@ -132,7 +133,7 @@ fn best(answer: &Associations, tracks: usize) -> Vec<Option<usize>> {
 
 fn own_detections(subject: &Subject<'_>) -> Verdict {
     let mut associator = subject.associator(From::Nothing)?;
-    let mut random = Random::new(2);
+    let mut random = SplitMix64::new(2);
     let places = [(3.0, -1.2), (3.0, 0.0), (4.0, 1.3)];
     let tracks: Vec<Track> = (1..).zip(places).map(|(id, (x, y))| track(id, x, y)).collect();
     let detections: Vec<Detection> =
@@ -145,7 +146,7 @@ fn own_detections(subject: &Subject<'_>) -> Verdict {
 
 fn far_detections(subject: &Subject<'_>) -> Verdict {
     let mut associator = subject.associator(From::Nothing)?;
-    let mut random = Random::new(2);
+    let mut random = SplitMix64::new(2);
     let tracks = [track(1, 3.0, 0.0)];
     let detections = [detection(6.0, 2.0, &mut random)];
     let answer = associator.associate(&tracks, &detections, &GATE);

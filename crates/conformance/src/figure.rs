@@ -9,8 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3, Rotation3, Vector3};
 use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Camera;
-
-use crate::random::Random;
+use tagalong_stats::{RandomSource, SplitMix64};
 
 /// A person standing on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +76,7 @@ impl World {
 
     fn add_noise(&self, depth: &mut DepthImage) {
         let Some(seed) = self.noise_seed else { return };
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         for depth in depth.pixels_mut() {
             // Axial noise of a structured-light camera, Nguyen, Izadi & Lovell.
             let sigma_m = 0.0012 + 0.0019 * (f64::from(*depth) - 0.4).powi(2);

@@ -12,8 +12,8 @@ use tagalong_core::{
     TrackId, Update,
 };
 use tagalong_geometry::Camera;
+use tagalong_stats::SplitMix64;
 
-use crate::random::Random;
 use crate::scenes::{DT_S, level, moving_frame, odd_frames, sighting};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
@@ -53,7 +53,7 @@ struct Run {
     camera: Arc<Camera>,
     world_from_robot: Isometry2<f64>,
     motion: EgoMotion,
-    random: Random,
+    random: SplitMix64,
     index: u64,
     stopped: Vec<TrackId>,
 }
@@ -65,7 +65,7 @@ impl Run {
             camera: level(),
             world_from_robot: Isometry2::identity(),
             motion,
-            random: Random::new(11),
+            random: SplitMix64::new(11),
             index: 0,
             stopped: Vec::new(),
         })

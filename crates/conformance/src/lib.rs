@@ -26,7 +26,6 @@ mod general;
 mod likelihoods;
 mod managers;
 pub mod patch;
-mod random;
 mod scenes;
 mod subject;
 mod verifiers;

@@ -7,8 +7,8 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
+use tagalong_stats::SplitMix64;
 
-use crate::random::Random;
 use crate::scenes::{DT_S, level, sighting};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
@@ -36,7 +36,7 @@ const DETECTED: Observation = Observation::Detected { log_odds: SURE };
 
 fn person(y: f64, log_odds: f64) -> Detection {
     let place = Point3::new(3.0, y, 1.6);
-    Detection { score: log_odds, ..sighting(&place, &level(), 0.02, &mut Random::new(4)) }
+    Detection { score: log_odds, ..sighting(&place, &level(), 0.02, &mut SplitMix64::new(4)) }
 }
 
 impl Run {

@@ -8,9 +8,9 @@ use tagalong_core::{
     RightImage, Stamp, Track, TrackId, Usage,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_stats::{RandomSource, SplitMix64};
 
 use crate::figure::{Figure, World};
-use crate::random::Random;
 
 /// Time between frames, s.
 pub(crate) const DT_S: f64 = 0.1;
@@ -129,7 +129,7 @@ pub(crate) fn sighting(
     head: &Point3<f64>,
     camera: &Camera,
     sigma_m: f64,
-    random: &mut Random,
+    random: &mut SplitMix64,
 ) -> Detection {
     let error = nalgebra::Vector3::from_fn(|_, _| sigma_m * random.normal());
     let position = head + error;

@@ -2,9 +2,9 @@
 
 use tagalong_core::{Detection, Error, Frame, Verifier};
 use tagalong_geometry::Rect;
+use tagalong_stats::SplitMix64;
 
 use crate::figure::Figure;
-use crate::random::Random;
 use crate::scenes::{bare_frame, drawn, level, odd_frames, required, restricted, sighting};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
@@ -32,7 +32,7 @@ fn margin(
 /// Returns candidates on, beside and outside the person, and of odd sizes.
 fn candidates() -> Vec<Detection> {
     let figure = Figure::at(2.0, 0.1);
-    let good = sighting(&figure.head, &level(), 0.02, &mut Random::new(1));
+    let good = sighting(&figure.head, &level(), 0.02, &mut SplitMix64::new(1));
     let r = good.region;
     let regions = [
         r,

@@ -43,7 +43,7 @@ impl Associations {
     /// Returns the decisions of a one-to-one assignment: the detection of each track.
     ///
     /// ```
-    /// use crate::Associations;
+    /// use tagalong_core::Associations;
     /// let associations = Associations::one_to_one([Some(1), None]);
     /// assert_eq!(associations.pairs[0].detection, 1);
     /// assert_eq!(associations.pairs.len(), 1);

@@ -33,7 +33,7 @@ pub enum Error {
     Settings {
         /// The key, dotted where it stands in a table.
         key: String,
-        /// What it must be, and its value.
+        /// Condition on it, and its value.
         why: String,
     },
     /// Any other failure, as a sentence.

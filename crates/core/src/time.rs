@@ -18,7 +18,7 @@ impl Stamp {
     /// Seconds from `earlier` to `self`; negative when `self` is the earlier one.
     ///
     /// ```
-    /// use crate::Stamp;
+    /// use tagalong_core::Stamp;
     /// let (a, b) = (Stamp::from_nanos(1_000_000_000), Stamp::from_nanos(1_250_000_000));
     /// assert_eq!(b.seconds_since(a), 0.25);
     /// assert_eq!(a.seconds_since(b), -0.25);

@@ -6,7 +6,7 @@
 //! shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), which
 //! costs O(rows² · columns) per group.
 
-/// A pair that may be matched, and what that is worth.
+/// Pair that may be matched, and its weight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Edge {
     /// Index of the row (truth).
@@ -69,6 +69,7 @@ impl Matcher {
         for (e, edge) in edges.iter().enumerate().filter(|(_, edge)| edge.weight > 0.0) {
             self.order.push(e as u32);
             let (a, b) = (self.root(edge.row), self.root(edge.col + rows as u32));
+            // The smaller root wins, which keeps the result independent of the order of edges.
             self.parent[a.max(b) as usize] = a.min(b);
         }
         for node in 0..(rows + cols) as u32 {
@@ -81,6 +82,7 @@ impl Matcher {
     fn root(&mut self, mut node: u32) -> u32 {
         while self.parent[node as usize] != node {
             let above = self.parent[self.parent[node as usize] as usize];
+            // Path halving keeps the trees flat.
             self.parent[node as usize] = above;
             node = above;
         }

@@ -36,8 +36,8 @@ pub struct Clear {
     pub fp: u64,
     /// Changes of the track that goes with a truth.
     pub id_switches: u64,
-    /// Interruptions: how often a truth was found again after a pause. As in
-    /// TrackEval somebody who left the view and came back counts, too.
+    /// Interruptions: the number of times that a truth was found again after a pause. As in
+    /// TrackEval a person that left the view and came back counts, too.
     pub fragmentations: u64,
     /// Truths matched in more than 80 % of their frames.
     pub mostly_tracked: u64,
@@ -108,7 +108,7 @@ impl Clear {
     }
 }
 
-/// What has to be remembered from frame to frame.
+/// State that lasts from frame to frame.
 struct Run {
     clear: Clear,
     matcher: Matcher,
@@ -143,7 +143,7 @@ impl Run {
     fn step(&mut self, frame: &PreparedFrame) -> Vec<Match> {
         let (truths, tracks) = (frame.truths.len(), frame.tracks.len());
         if truths == 0 || tracks == 0 {
-            // A frame with nobody on one side does not interrupt anything.
+            // A frame without truths or without reports does not interrupt anything.
             self.clear.fp += tracks as u64;
             self.clear.fn_ += truths as u64;
             return Vec::new();
@@ -161,11 +161,14 @@ impl Run {
     }
 
     fn score_pairs(&mut self, frame: &PreparedFrame) {
+        // The tolerance of TrackEval: a similarity of exactly one half is a match in spite of
+        // rounding.
         let enough = MATCH_SIMILARITY - f64::EPSILON;
         self.scored.clear();
         for pair in frame.pairs.iter().filter(|pair| pair.weight >= enough) {
             let truth = frame.truths[pair.row as usize] as usize;
             let goes_on = self.previous[truth] == Some(frame.tracks[pair.col as usize]);
+            // A pair that goes on outweighs any set of new ones, as CLEAR MOT demands.
             let bonus = if goes_on { CONTINUATION } else { 0.0 };
             self.scored.push(Edge { weight: pair.weight + bonus, ..*pair });
         }
@@ -191,6 +194,8 @@ impl Run {
             self.starts[truth] += u32::from(self.previous[truth].is_none());
             self.matched[truth] += 1;
         }
+        // Only a match in the frame before continues: the others are forgotten, but not for
+        // switches.
         for truth in self.held.drain(..) {
             self.previous[truth as usize] = None;
         }
@@ -208,12 +213,14 @@ impl Run {
             let fraction = f64::from(matched) / f64::from(frames);
             let clear = &mut self.clear;
             match fraction {
+                // The bounds of TrackEval: above 80 % is mostly tracked, below 20 % mostly lost.
                 f if f > 0.8 => clear.mostly_tracked += 1,
                 f if f >= 0.2 => clear.partly_tracked += 1,
                 _ => clear.mostly_lost += 1,
             }
         }
         self.clear.fragmentations =
+            // The first start is no interruption.
             self.starts.iter().map(|&n| u64::from(n.saturating_sub(1))).sum();
         self.clear
     }

@@ -12,7 +12,7 @@ use statrs::function::gamma::checked_gamma_lr;
 pub struct Consistency {
     /// Mean of the values.
     pub mean: f64,
-    /// What the mean should be: the degrees of freedom of a single value.
+    /// Expected mean: the degrees of freedom of a single value.
     pub expected: f64,
     /// Lower bound of the mean.
     pub lower: f64,
@@ -37,7 +37,7 @@ impl Consistency {
         let tail = 0.5 * (1.0 - confidence);
         let limit = chi_square_quantile(confidence, single)?;
         Some(Self {
-            mean: values.iter().sum::<f64>() / count,
+            mean: tagalong_stats::mean(values)?,
             expected: single,
             lower: chi_square_quantile(tail, single * count)? / count,
             upper: chi_square_quantile(1.0 - tail, single * count)? / count,

@@ -17,7 +17,7 @@ pub enum EvalError {
         /// The id.
         id: i64,
     },
-    /// Somebody has no place of the kind that the similarity compares.
+    /// A place of the kind that the similarity compares is missing.
     #[error(
         "sequence `{sequence}`, frame {frame} (1-based): {side} id {id} has no {what}; \
          score with the other similarity or supply it"

@@ -10,11 +10,11 @@ pub struct Event {
     pub frame: usize,
     /// Stamp of that frame, in nanoseconds.
     pub stamp_ns: i64,
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
 }
 
-/// What can happen; ids are those of the truth and of the tracks.
+/// Kinds of events; ids are those of the truth and of the tracks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub enum EventKind {
@@ -25,7 +25,7 @@ pub enum EventKind {
         /// The track they had before, if any.
         track: Option<i64>,
     },
-    /// A person who was missed is matched again, or for the first time.
+    /// A missed person is matched again, or for the first time.
     Found {
         /// The person.
         person: i64,
@@ -45,19 +45,19 @@ pub enum EventKind {
     WrongPerson {
         /// The track.
         track: i64,
-        /// Whom it began with.
+        /// Person that it began with.
         began_with: i64,
-        /// Who it is on now.
+        /// Person that it is on now.
         person: i64,
     },
-    /// A track begins to be where nobody is.
+    /// A track begins where there is no person.
     FalseTrack {
         /// The track.
         track: i64,
     },
 }
 
-/// Lists what happened, in the order of time, from the matches of CLEAR MOT.
+/// Lists the events, in the order of time, from the matches of CLEAR MOT.
 pub fn events(prepared: &Prepared, matches: &[Vec<Match>]) -> Vec<Event> {
     let mut watch = Watch {
         prepared,
@@ -111,6 +111,7 @@ impl Watch<'_> {
             let person = self.person_id(truth);
             let last = self.last_track[truth as usize];
             let missing = &mut self.missing[truth as usize];
+            // A miss is reported once, when it begins.
             let was_missing = std::mem::replace(missing, partner.is_none());
             match partner {
                 None if !was_missing => {
@@ -142,6 +143,7 @@ impl Watch<'_> {
             match place {
                 _ if place == before => {}
                 Whereabouts::On(truth) => {
+                    // The first person of a track is its own; only others are wrong.
                     let first = *self.began_with[index as usize].get_or_insert(truth);
                     if first != truth {
                         let (began_with, person) = (self.person_id(first), self.person_id(truth));

@@ -51,6 +51,7 @@ impl HotaLevel {
 
     /// Mean similarity of the matches; 1 without any, as in TrackEval.
     pub fn loc_a(&self) -> f64 {
+        // TrackEval's guard against a division by 0, kept for equal digits.
         self.similarity_sum.max(1e-10) / (self.tp as f64).max(1e-10)
     }
 
@@ -135,9 +136,9 @@ impl Hota {
     }
 }
 
-/// How well each pair goes together over the whole sequence, 0 to 1: the soft
-/// Jaccard index of their frames (Luiten et al., section 5; as in TrackEval a
-/// similarity is first divided by all that compete with it).
+/// Computes the alignment of each pair over the whole sequence, 0 to 1: the soft Jaccard index of
+/// their frames (Luiten et al., section 5; as in TrackEval a similarity is first divided by all
+/// that compete with it).
 fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
     let mut together = vec![0.0; table.pairs.len()];
     let (mut of_row, mut of_col) = (Vec::new(), Vec::new());
@@ -146,12 +147,14 @@ fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
         sums(frame, &mut of_row, &mut of_col);
         for (pair, &index) in frame.pairs.iter().zip(&mut indices) {
             let rivals = of_col[pair.col as usize] + of_row[pair.row as usize] - pair.weight;
+            // A similarity of 0 to all others leaves 0 / 0.
             if rivals > f64::EPSILON {
                 together[index as usize] += pair.weight / rivals;
             }
         }
     }
     let jaccard = |(&(truth, track), both): (&(u32, u32), f64)| {
+        // Jaccard: both over either, each frame weighted by its share.
         let either = prepared.truth_frames[truth as usize] + prepared.track_frames[track as usize];
         both / (f64::from(either) - both)
     };
@@ -182,12 +185,15 @@ struct Run {
 impl Run {
     fn step(&mut self, frame: &PreparedFrame, pair_of: &[u32], alignment: &[f64]) {
         let (truths, tracks) = (frame.truths.len(), frame.tracks.len());
+        // All are wrong at first; `add` takes the matched ones away again.
         for level in &mut self.hota.levels {
             level.fn_ += truths as u64;
             level.fp += tracks as u64;
         }
         self.scored.clear();
         self.scored.extend(frame.pairs.iter().zip(pair_of).map(|(pair, &index)| Edge {
+            // Weighted by the global alignment, so that pairs that last are preferred (Luiten et
+            // al.).
             weight: alignment[index as usize] * pair.weight,
             ..*pair
         }));
@@ -202,6 +208,7 @@ impl Run {
     }
 
     fn finish(mut self, prepared: &Prepared, table: &PairTable) -> Hota {
+        // A match at a level is one at all lower levels, too.
         for level in (0..LEVELS - 1).rev() {
             self.hota.levels[level].similarity_sum += self.hota.levels[level + 1].similarity_sum;
         }

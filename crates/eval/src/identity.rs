@@ -23,6 +23,8 @@ pub struct Identity {
 impl Identity {
     /// Scores one sequence.
     pub fn measure(prepared: &Prepared, table: &PairTable) -> Self {
+        // Identity is decided over the whole sequence: an assignment of tracks to people, not of
+        // frames.
         let together = table.count(prepared, |pair| pair.weight >= MATCH_SIMILARITY);
         let edges = table.edges(|pair| together[pair] as f64);
         let mut matched = Vec::new();

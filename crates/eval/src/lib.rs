@@ -1,9 +1,9 @@
 //! Pure tracking and detection metrics.
 //!
-//! A [`Sequence`] holds frames, a [`Frame`] holds who was there ([`Truth`]) and
-//! who was reported ([`Report`]); the metrics compare the two, either in the
-//! image (intersection over union) or on the floor (metres). Nothing here reads
-//! a file or a clock: the text formats in [`formats`] work on strings.
+//! A [`Sequence`] holds frames, a [`Frame`] holds the people in it ([`Truth`]) and the tracks that
+//! were reported ([`Report`]); the metrics compare the two, either in the image (intersection over
+//! union) or on the floor (metres). Nothing here reads a file or a clock: the text formats in
+//! [`formats`] work on strings.
 //!
 //! ```
 //! use tagalong_eval::{Frame, Region, Report, Scores, Sequence, Similarity, Truth};
@@ -25,18 +25,18 @@
 //! * [`Hota`], [`Clear`], [`Identity`]: tracking, equal to TrackEval's figures.
 //! * [`DetectionTally`]: single detections; the miss-rate curve and its average.
 //! * [`SetTally`]: OSPA and GOSPA, one number for place and count errors.
-//! * [`PositionError`], [`Times`], [`Following`]: what a robot cares about.
+//! * [`PositionError`], [`Times`], [`Following`]: figures that matter to a robot.
 //! * [`events`]: when and where it went wrong, for a list to look through.
-//! * [`Consistency`]: whether a filter knows how wrong it is.
-//! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: how far a
-//!   figure can be trusted; [`paired_gain`], [`holm`]: how far a difference can.
+//! * [`Consistency`]: whether the covariance of a filter agrees with its errors.
+//! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: the uncertainty of a
+//!   figure; [`paired_gain`], [`holm`]: that of a difference.
 //!
 //! # Why similarities are computed once
 //!
-//! All families look at the same pairs. [`Prepared`] leaves out what must not
-//! count, numbers the ids densely and keeps only the pairs that are alike at
-//! all, some per person; everything after that works on short lists. Scoring is
-//! so cheap that it can stand inside a jackknife or a parameter search.
+//! All families look at the same pairs. [`Prepared`] leaves out the parts that must not count,
+//! numbers the ids densely and keeps only the pairs that are alike at all, some per person;
+//! everything after that works on short lists. Scoring is so cheap that it can stand inside a
+//! jackknife or a parameter search.
 
 mod assign;
 mod clear;
@@ -50,11 +50,8 @@ mod missrate;
 mod pairs;
 mod position;
 mod prepare;
-mod random;
 mod scores;
 mod sets;
-mod significance;
-mod statistics;
 mod times;
 mod types;
 
@@ -71,9 +68,9 @@ pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};
 pub use scores::{Scores, Tally};
 pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
-pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
-pub use statistics::{
-    CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, percentile, wilson,
+pub use tagalong_stats::{
+    CONFIDENCE, Gain, Interval, clustered_share, draws_interval, holm, is_significant,
+    mean_interval, paired_gain, percentile, sign_flip, wilson,
 };
 pub use times::{Following, Times};
 pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};

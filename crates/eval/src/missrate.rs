@@ -10,13 +10,13 @@ pub const REFERENCE_FPPI: [f64; 9] =
 /// The least miss rate that enters the logarithm.
 const FLOOR: f64 = 1e-10;
 
-/// Every detection with its score and whether it was right: what the miss-rate
-/// and the precision-recall curve are drawn from.
+/// Every detection with its score and its correctness: the data of the miss-rate and the
+/// precision-recall curve.
 ///
-/// The protocol is that of the Caltech benchmark (Dollár et al., PAMI 2012):
-/// detections in descending score each take the best free truth, a real one
-/// before an ignored one; an ignored truth absorbs any number of detections,
-/// and the overlap with it is taken over the detection's own area.
+/// The protocol is that of the Caltech benchmark (Dollár et al., PAMI 2012): detections in
+/// descending score each take the best free truth, a real one before an ignored one; an ignored
+/// truth absorbs any number of detections, and the overlap with it is taken over the detection's
+/// own area.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct DetectionTally {
     /// Score and verdict of each detection that counts.
@@ -30,13 +30,13 @@ pub struct DetectionTally {
 /// A detection that counts.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
-    /// How sure the detector was.
+    /// Confidence of the detector.
     pub score: f64,
     /// Whether it found a truth of its own.
     pub right: bool,
 }
 
-/// What accepting everything from a score on would give.
+/// Point of the curve: the result of accepting all detections from a score on.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// The least score accepted.
@@ -75,6 +75,7 @@ impl DetectionTally {
         self.truths += real.len() as u64;
         let mut taken = vec![false; real.len()];
         let mut reports: Vec<&Report> = frame.reports.iter().collect();
+        // In descending score, so that a weak detection cannot take the truth of a strong one.
         reports.sort_by(|a, b| b.score.total_cmp(&a.score));
         for report in reports {
             let right = match judge.best_free(&real, &taken, report) {
@@ -96,6 +97,7 @@ impl DetectionTally {
         sorted.sort_by(|a, b| b.score.total_cmp(&a.score));
         let (mut right, mut wrong) = (0_u64, 0_u64);
         let mut points = Vec::new();
+        // Detections of equal score are accepted together: their order means nothing.
         for equal in sorted.chunk_by(|a, b| a.score == b.score) {
             let found = equal.iter().filter(|v| v.right).count() as u64;
             right += found;
@@ -119,9 +121,11 @@ impl DetectionTally {
         }
         let curve = self.curve();
         let read = |fppi: f64| {
+            // Left of the curve all people are missed, as in the Caltech benchmark.
             let within = curve.partition_point(|point| point.fppi <= fppi);
             within.checked_sub(1).map_or(1.0, |last| curve[last].miss_rate)
         };
+        // The logarithm of a miss rate of 0 is infinite.
         let sum: f64 = REFERENCE_FPPI.iter().map(|&fppi| read(fppi).max(FLOOR).ln()).sum();
         Some((sum / REFERENCE_FPPI.len() as f64).exp())
     }
@@ -150,6 +154,7 @@ impl DetectionTally {
             return None;
         }
         let (mut area, mut best, mut recall_after) = (0.0, 0.0_f64, None);
+        // From the right, so that precision is made monotonic on the way.
         for point in self.curve().iter().rev() {
             let recall = 1.0 - point.miss_rate;
             area += best * (recall_after.unwrap_or(recall) - recall);
@@ -160,7 +165,7 @@ impl DetectionTally {
     }
 }
 
-/// How good a detector is at one threshold.
+/// Quality of a detector at one threshold.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct PrecisionRecall {
     /// Right detections.
@@ -210,6 +215,7 @@ impl Judge {
 
     fn ignored(&self, frame: &Frame, report: &Report) -> bool {
         let mut ignored = frame.truths.iter().filter(|t| t.role == Role::Ignored);
+        // Over the detection's own area: an ignored truth may hold a whole crowd.
         let inside = |region| report.region.is_some_and(|r| r.covered_by(region) >= self.at_least);
         ignored.any(|truth| match (self.similarity, &truth.region) {
             (Similarity::Iou, Some(region)) => inside(region),

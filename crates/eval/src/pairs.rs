@@ -21,6 +21,7 @@ impl PairTable {
             .flat_map(|frame| {
                 frame.pairs.iter().map(|pair| {
                     let truth = u64::from(frame.truths[pair.row as usize]);
+                    // One number for both ids, so that pairs can be sorted at once.
                     truth * tracks + u64::from(frame.tracks[pair.col as usize])
                 })
             })

@@ -1,11 +1,11 @@
 use serde::{Deserialize, Serialize};
+use tagalong_stats::{mean, percentile};
 
 use crate::clear::Match;
 use crate::prepare::Prepared;
-use crate::statistics::percentile;
 use crate::types::{Sequence, distance_m};
 
-/// How far the reported places of matched people were off, in metres on the floor.
+/// Errors of the reported places of matched people, in metres on the floor.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct PositionError {
     /// Mean.
@@ -33,7 +33,7 @@ impl PositionError {
         let count = errors_m.len() as f64;
         Some(Self {
             p95_m: percentile(errors_m, 0.95)?,
-            mean_m: errors_m.iter().sum::<f64>() / count,
+            mean_m: mean(errors_m)?,
             rms_m: (errors_m.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
             max_m: errors_m.iter().copied().fold(0.0, f64::max),
             count: errors_m.len() as u64,

@@ -2,10 +2,10 @@ use crate::assign::{Edge, Matcher};
 use crate::error::EvalError;
 use crate::types::{Frame, Report, Role, Sequence, Similarity, Truth};
 
-/// How truth and reports are compared before anything is counted.
+/// Comparison of truth and reports before anything is counted.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Comparison {
-    /// What makes a truth and a report alike.
+    /// Similarity of a truth and a report.
     pub similarity: Similarity,
     /// Similarity from which on a report that matches an ignored truth is left
     /// out; 0.5 as in TrackEval.
@@ -35,14 +35,14 @@ impl From<Similarity> for Comparison {
     }
 }
 
-/// What is left of a frame once the ignored is gone.
+/// Frame without the ignored truths and reports.
 #[derive(Clone, Debug, Default)]
 pub struct PreparedFrame {
     /// When, in nanoseconds.
     pub stamp_ns: i64,
-    /// Who was there, as indices into [`Prepared::truth_ids`].
+    /// People, as indices into [`Prepared::truth_ids`].
     pub truths: Vec<u32>,
-    /// Who was reported, as indices into [`Prepared::track_ids`].
+    /// Reports, as indices into [`Prepared::track_ids`].
     pub tracks: Vec<u32>,
     /// For each of `truths` its index in the frame of the sequence.
     pub truth_at: Vec<u32>,
@@ -53,8 +53,8 @@ pub struct PreparedFrame {
     pub pairs: Vec<Edge>,
 }
 
-/// A sequence made ready for the metrics: ignored truths and whoever reported
-/// them are gone, ids are numbered from zero, similarities are computed once.
+/// Sequence made ready for the metrics: ignored truths and the reports on them are removed, ids are
+/// numbered from zero, similarities are computed once.
 #[derive(Clone, Debug, Default)]
 pub struct Prepared {
     /// The truth's ids in ascending order.
@@ -70,18 +70,17 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Compares truth and reports of each frame and leaves out what must not count.
+    /// Compares truth and reports of each frame and leaves out the parts that must not count.
     ///
-    /// As TrackEval does for MOT16 to MOT20 (Milan et al., arXiv 1603.00831,
-    /// section 4): all truths of a frame, whatever their [`Role`], are matched
-    /// with the reports; a report that goes with an ignored truth is left out;
-    /// then only the truths that count stay. Frames without ignored truths need
-    /// no such matching, which is the MOT15 rule.
+    /// As TrackEval does for MOT16 to MOT20 (Milan et al., arXiv 1603.00831, section 4): all truths
+    /// of a frame, whatever their [`Role`], are matched with the reports; a report that goes with
+    /// an ignored truth is left out; then only the truths that count stay. Frames without ignored
+    /// truths need no such matching, which is the MOT15 rule.
     ///
     /// # Errors
     ///
-    /// When an id occurs twice in a frame, somebody lacks the place that is
-    /// compared, a number is not finite, or the frames are not in order.
+    /// When an id occurs twice in a frame, the place that is compared is missing, a number is not
+    /// finite, or the frames are not in order.
     pub fn new(sequence: &Sequence, comparison: &Comparison) -> Result<Self, EvalError> {
         check(sequence, comparison.similarity)?;
         let mut matcher = Matcher::new();
@@ -136,6 +135,7 @@ fn unique(
 ) -> Vec<i64> {
     let mut all: Vec<i64> =
         kept.iter().zip(&sequence.frames).flat_map(|(frame, of)| ids(frame, of)).collect();
+    // Sorted ids make the numbers independent of the order of frames and readers.
     all.sort_unstable();
     all.dedup();
     all
@@ -147,6 +147,7 @@ fn similar_pairs(frame: &Frame, similarity: Similarity) -> Vec<Edge> {
     for (row, truth) in frame.truths.iter().enumerate() {
         for (col, report) in frame.reports.iter().enumerate() {
             let weight = similarity.between(truth, report);
+            // Pairs without any similarity are most of all, and none can be matched.
             if weight > 0.0 {
                 pairs.push(Edge { row: row as u32, col: col as u32, weight });
             }
@@ -195,6 +196,7 @@ fn kept_reports(
     let mut keep = vec![true; frame.reports.len()];
     let by_region = !frame.ignore_regions.is_empty();
     let by_size = comparison.ignore_unmatched_below_px.is_some();
+    // Without anything to ignore, the matching would change nothing.
     if !by_region && !by_size && frame.truths.iter().all(|t| t.role != Role::Ignored) {
         return keep;
     }
@@ -207,6 +209,7 @@ fn kept_reports(
         partner[pair.col as usize] = Some(frame.truths[pair.row as usize].role);
     }
     for (col, report) in frame.reports.iter().enumerate() {
+        // A report on an ignored truth is neither right nor wrong.
         keep[col] = match partner[col] {
             Some(role) => role != Role::Ignored,
             None => !excused(report, frame, comparison),
@@ -215,7 +218,7 @@ fn kept_reports(
     keep
 }
 
-/// True for a report that matches nobody and lies in an ignore region or is too small.
+/// Returns true for a report that matches no truth and lies in an ignore region or is too small.
 fn excused(report: &Report, frame: &Frame, comparison: &Comparison) -> bool {
     let Some(region) = report.region else { return false };
     let small = comparison
@@ -249,13 +252,13 @@ struct FrameContext<'a> {
     similarity: Similarity,
 }
 
-/// What truths and reports have in common.
+/// Properties that truths and reports have in common.
 struct Someone {
     id: i64,
     has_region: bool,
     has_floor: bool,
-    /// Whoever does not count may lack the place that is compared: they then
-    /// excuse nobody.
+    /// True if the place that is compared may be missing; such a truth does not count and excuses
+    /// no report.
     may_lack_place: bool,
     sane: bool,
 }
@@ -309,6 +312,7 @@ impl FrameContext<'_> {
                 });
             }
         }
+        // Equal ids are neighbours after sorting.
         all.sort_unstable_by_key(|someone| someone.id);
         match all.windows(2).find(|two| two[0].id == two[1].id) {
             Some(two) => {

@@ -156,12 +156,9 @@ impl Tally {
     }
 
     fn add_times(&self, scores: &mut Scores) {
-        let mean = |values: &[f64]| {
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
-        scores.time_to_confirm_mean_s = mean(&self.times.confirm_s);
+        scores.time_to_confirm_mean_s = tagalong_stats::mean(&self.times.confirm_s);
         scores.never_confirmed = self.times.never_confirmed;
-        scores.time_to_reacquire_mean_s = mean(&self.times.reacquire_s);
+        scores.time_to_reacquire_mean_s = tagalong_stats::mean(&self.times.reacquire_s);
         scores.never_reacquired = self.times.never_reacquired;
         scores.wrong_person_s = self.times.wrong_person_s;
     }
@@ -169,8 +166,8 @@ impl Tally {
 
 /// All figures of a run under the names that the field uses, as one flat object.
 ///
-/// Rates lie between 0 and 1 (MOTA may be negative). A figure that makes no
-/// sense on the input, such as an accuracy where nobody was there, is absent.
+/// Rates lie between 0 and 1 (MOTA may be negative). A figure that makes no sense on the input,
+/// such as an accuracy without people, is absent.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Scores {
     /// Higher order tracking accuracy, mean over the thresholds.

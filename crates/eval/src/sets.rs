@@ -7,8 +7,8 @@ use crate::types::{Frame, Sequence, Similarity, distance_m};
 /// Settings of the distances between sets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SetDistance {
-    /// What a person too many or too few costs, and the greatest distance of a
-    /// pair: metres on the floor, or `1 - IoU` in the image (then at most 1).
+    /// Cost of a person too many or too few, and the greatest distance of a pair: metres on the
+    /// floor, or `1 - IoU` in the image (then at most 1).
     pub cutoff: f64,
     /// Order of the mean, at least 1; 2 punishes outliers.
     pub order: f64,
@@ -34,6 +34,7 @@ impl SetDistance {
     /// proposition 1) both gain `cutoff^order - distance^order` by a match.
     pub fn between(&self, truths: usize, reports: usize, near: &[Edge]) -> FrameDistance {
         let pay = self.cutoff.powf(self.order);
+        // The solver maximises; a pair gains whatever it saves against two unmatched ones.
         let gain = |edge: &Edge| Edge { weight: pay - edge.weight.powf(self.order), ..*edge };
         let gains: Vec<Edge> = near.iter().map(gain).collect();
         let mut matched = Vec::new();
@@ -42,10 +43,13 @@ impl SetDistance {
         let (pairs, most) = (matched.len(), truths.max(reports));
         let parts = GospaParts {
             location,
+            // Half the penalty for each side, as GOSPA with alpha = 2.
             missed: 0.5 * pay * (truths - pairs) as f64,
             false_: 0.5 * pay * (reports - pairs) as f64,
         };
+        // Rounding may bring the sum a little below 0.
         let root = |value: f64| value.max(0.0).powf(self.order.recip());
+        // OSPA divides by the larger set; empty sets are at distance 0.
         let mean = (location + pay * (most - pairs) as f64) / most.max(1) as f64;
         FrameDistance { ospa: root(mean), gospa: root(parts.total()), parts }
     }
@@ -58,7 +62,7 @@ pub struct FrameDistance {
     pub ospa: f64,
     /// Generalised OSPA, 0 upwards.
     pub gospa: f64,
-    /// What the generalised one consists of.
+    /// Parts of the generalised one.
     pub parts: GospaParts,
 }
 

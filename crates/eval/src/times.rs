@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use crate::clear::Match;
 use crate::prepare::Prepared;
 
-/// How long things took, in seconds of the recording.
+/// Durations, in seconds of the recording.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Times {
     /// For each person found at all: from the first frame in which they count
@@ -16,8 +16,8 @@ pub struct Times {
     pub reacquire_s: Vec<f64>,
     /// Losses that did not end.
     pub never_reacquired: u64,
-    /// Time that tracks spent on somebody else than the person they were first
-    /// matched with, summed over the tracks.
+    /// Time that tracks spent on other people than the one that they were first matched with,
+    /// summed over the tracks.
     pub wrong_person_s: f64,
     /// Length of the recording, for rates.
     pub duration_s: f64,
@@ -35,6 +35,7 @@ impl Times {
             for m in matches {
                 found[m.row as usize] = true;
                 let truth = frame.truths[m.row as usize];
+                // A track belongs to the first person that it was matched with.
                 let owner = owners[frame.tracks[m.col as usize] as usize].get_or_insert(truth);
                 times.wrong_person_s += if *owner == truth { 0.0 } else { lengths_s[index] };
             }
@@ -73,6 +74,7 @@ struct Watched {
 
 impl Watched {
     fn look(&mut self, frame: usize, stamp_ns: i64, found: bool, times: &mut Times) {
+        // A person that left the view and came back waits anew.
         let stayed = frame > 0 && self.last_in_view == Some(frame - 1);
         self.last_in_view = Some(frame);
         if !self.confirmed {
@@ -95,7 +97,7 @@ impl Watched {
     }
 }
 
-/// What became of following one person.
+/// Result of following one person.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Following {
     /// Time on the right person.
@@ -106,13 +108,13 @@ pub struct Following {
     pub nobody_s: f64,
     /// Time without following anything.
     pub idle_s: f64,
-    /// How often the target was left after having been followed.
+    /// Number of times the target was left after having been followed.
     pub losses: u64,
 }
 
 impl Following {
-    /// Judges whom a robot followed: `followed` holds for each frame the id of
-    /// the track under the target lock, `target` is the truth's id.
+    /// Judges which person a robot followed: `followed` holds for each frame the id of the track
+    /// under the target lock, `target` is the truth's id.
     pub fn measure(
         prepared: &Prepared,
         matches: &[Vec<Match>],
@@ -149,12 +151,13 @@ impl Following {
     }
 }
 
-/// How long each frame stands: until the next; the last as long as the one before.
+/// Returns the duration of each frame: until the next; the last as long as the one before.
 fn frame_lengths_s(prepared: &Prepared) -> Vec<f64> {
     let frames = &prepared.frames;
     let mut lengths: Vec<f64> =
         frames.windows(2).map(|two| seconds(two[1].stamp_ns - two[0].stamp_ns)).collect();
     if !frames.is_empty() {
+        // The last frame has no next one; a single frame lasts no time.
         lengths.push(lengths.last().copied().unwrap_or(0.0));
     }
     lengths

@@ -59,7 +59,7 @@ impl Region {
     }
 }
 
-/// What an annotated object means for the score.
+/// Role of an annotated object in the score.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
@@ -69,15 +69,14 @@ pub enum Role {
     /// Neither a miss nor, when reported, a false alarm (too far, too hidden,
     /// a reflection, a person on a poster).
     Ignored,
-    /// Is there and can be mistaken for a person, but excuses nobody: whoever
-    /// reports it is wrong (a car in MOT17).
+    /// Can be mistaken for a person, but excuses no report: reporting it is wrong (a car in MOT17).
     Bystander,
 }
 
 /// An annotated person in one frame.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Truth {
-    /// Who it is, the same in all frames of a sequence.
+    /// Id, the same in all frames of a sequence.
     pub id: i64,
     /// Where in the image, in pixels; absent when only the floor is annotated.
     pub region: Option<Region>,
@@ -96,11 +95,11 @@ pub struct Report {
     pub region: Option<Region>,
     /// Where on the floor, in metres, in the frame of the truth.
     pub floor_m: Option<[f64; 2]>,
-    /// How sure the tracker is; only the order matters.
+    /// Confidence of the tracker; only the order matters.
     pub score: f64,
 }
 
-/// One moment: what was there and what was reported.
+/// One moment: the truth and the reports.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Frame {
     /// When, in nanoseconds.
@@ -109,8 +108,8 @@ pub struct Frame {
     pub truths: Vec<Truth>,
     /// Everybody reported.
     pub reports: Vec<Report>,
-    /// Parts of the image that are not annotated (KITTI's `DontCare`): reports
-    /// that match nobody and lie mostly inside are left out.
+    /// Parts of the image that are not annotated (KITTI's `DontCare`): reports that match no truth
+    /// and lie mostly inside are left out.
     pub ignore_regions: Vec<Region>,
 }
 
@@ -123,7 +122,7 @@ pub struct Sequence {
     pub frames: Vec<Frame>,
 }
 
-/// How alike a truth and a report are: a number from 0 to 1.
+/// Similarity of a truth and a report: a number from 0 to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Similarity {

@@ -191,7 +191,7 @@ fn kitti_labels_survive_a_round_trip_and_mean_what_they_say() {
     assert_eq!((frame.reports.len(), frame.reports[0].score), (2, 1.0));
     assert_eq!(sequence.frames[1].ignore_regions, [Region::new(200.0, 100.0, 60.0, 80.0)]);
     assert_eq!(sequence.frames[1].stamp_ns, 100_000_000);
-    // Only the walker counts; the one who is cut off is excused with their report.
+    // Only the walker counts; the person that is cut off is excused with their report.
     let tally = |similarity| {
         Tally::measure(&sequence, &kitti::comparison(similarity), &SetDistance::default()).unwrap()
     };

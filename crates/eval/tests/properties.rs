@@ -1,5 +1,5 @@
-//! What must hold whatever the input: bounds, symmetries, and agreement with
-//! slow and obvious references.
+//! Properties that hold for any input: bounds, symmetries, and agreement with slow and obvious
+//! references.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -43,7 +43,7 @@ fn some_edges() -> impl Strategy<Value = (u32, u32, Vec<Edge>)> {
     })
 }
 
-/// Where somebody is: a lattice, so that people meet, hide and coincide.
+/// Places of a person: a lattice, so that people meet, hide and coincide.
 fn somewhere() -> impl Strategy<Value = (Region, [f64; 2])> {
     (0..12_i32, 0..4_i32, 0.0..1.0_f64).prop_map(|(x, y, jitter)| {
         let (x, y) = (f64::from(x) + 0.3 * jitter, f64::from(y));
@@ -101,8 +101,8 @@ fn tally(sequence: &Sequence, similarity: Similarity) -> Tally {
     Tally::measure(sequence, &similarity.into(), &SetDistance::default()).unwrap()
 }
 
-/// The sequence with a tracker that reports exactly the truth that counts.
-/// People are moved apart: of two in one place nobody can say who is who.
+/// Returns the sequence with a tracker that reports exactly the truth that counts. People are moved
+/// apart: two in one place cannot be told apart.
 fn with_perfect_tracker(mut sequence: Sequence) -> Sequence {
     for frame in &mut sequence.frames {
         let report =
@@ -233,7 +233,7 @@ proptest! {
             }
             prop_assert!(scores.ospa.unwrap() < 1e-9 && scores.gospa.unwrap() < 1e-9);
             prop_assert!(scores.lamr.unwrap() < 1e-9);
-            // Who leaves and comes back is a fragment even so, as in TrackEval.
+            // A person that leaves and comes back is a fragment even so, as in TrackEval.
             prop_assert_eq!((scores.fp, scores.fn_, scores.idsw), (0, 0, 0));
             prop_assert_eq!(scores.mt, scores.truth_ids);
             prop_assert_eq!((scores.wrong_person_s, scores.never_confirmed), (0.0, 0));

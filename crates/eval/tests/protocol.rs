@@ -23,10 +23,10 @@ fn report(id: i64, x: f64) -> Report {
     Report { id, region: Some(region(x)), floor_m: Some([x, 0.0]), score: 0.5 }
 }
 
-/// Who is where: id and place.
+/// Places of people: id and place.
 type Places<'a> = &'a [(i64, f64)];
 
-/// One frame a second from (who is where) and (which track is where).
+/// One frame a second from (places of people) and (places of tracks).
 fn sequence(frames: &[(Places<'_>, Places<'_>)]) -> Sequence {
     let frame = |(index, (truths, reports)): (usize, &(Places<'_>, Places<'_>))| Frame {
         stamp_ns: index as i64 * SECOND_NS,

@@ -5,10 +5,12 @@
 //! robot with a laser scanner only.
 
 mod camera;
+mod locate;
 mod panorama;
 mod rect;
 
 pub use camera::{Camera, Distortion, Lens, Pinhole};
+pub use locate::{FaceDepth, PointEstimate};
 pub use panorama::{ConicalMirror, Panorama};
 pub use rect::Rect;
 

@@ -1,6 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tagalong_config::Example;
+use tagalong_stats::mix;
 
 /// Deals the groups out to `folds` parts, those with people and those without in turn, so that each
 /// part has both. The deal depends on the seed, not on the order of the examples.
@@ -23,15 +24,6 @@ pub fn parts(
         set.iter().enumerate().map(|(k, (_, group))| (*group, k % folds.max(1))).collect()
     };
     deal(&with_people).into_iter().chain(deal(&without)).collect()
-}
-
-/// Returns a number that looks random and depends on `seed` only (SplitMix64: Steele, Lea and
-/// Flood, OOPSLA 2014).
-pub fn mix(seed: u64) -> u64 {
-    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }
 
 /// Purpose of a group of examples.

@@ -15,8 +15,9 @@ mod parallel;
 mod variants;
 
 pub use calibrate::{Line, platt};
-pub use folds::{CALIBRATION, Use, mix, parts, use_of};
+pub use folds::{CALIBRATION, Use, parts, use_of};
 pub use held_out::{accepted, area};
 pub use logistic::{Example, logistic};
 pub use parallel::side_by_side;
+pub use tagalong_stats::mix;
 pub use variants::{mirrored, shifted};

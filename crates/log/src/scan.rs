@@ -1,7 +1,6 @@
 //! First pass over a log: its contents. No image is decoded.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +9,7 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
+use crate::log_files::{LogFiles, open_file};
 use crate::mcap_walk::{Channel, Counters, Message, Walker};
 use crate::msgs::{
     CameraInfo, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
@@ -77,7 +77,8 @@ pub(crate) struct Scan {
     pub(crate) path: PathBuf,
     pub(crate) bytes: u64,
     pub(crate) sha256: String,
-    pub(crate) channels: Vec<Arc<Channel>>,
+    /// Files of the log; none for a source that is no file.
+    pub(crate) parts: Vec<LogPart>,
     pub(crate) topics: BTreeMap<String, Topic>,
     /// First calibration of each topic.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
@@ -88,26 +89,12 @@ pub(crate) struct Scan {
     pub(crate) data_lost: bool,
 }
 
-/// Opens a log that is a regular file.
-///
-/// # Errors
-/// [`LogError::Open`], [`LogError::NotAFile`].
-pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
-    let failed = |source| LogError::Open { path: path.to_owned(), source };
-    let kind = std::fs::metadata(path).map_err(failed)?;
-    if kind.is_dir() {
-        let remedy = " (the .mcap in it)";
-        return Err(LogError::NotAFile { path: path.to_owned(), kind: "a directory", remedy });
-    }
-    if !kind.is_file() {
-        let remedy = "; a pipe can be written to a file first";
-        return Err(LogError::NotAFile {
-            path: path.to_owned(),
-            kind: "a pipe or a device",
-            remedy,
-        });
-    }
-    File::open(path).map_err(failed)
+/// One file of a log.
+#[derive(Clone, Debug)]
+pub(crate) struct LogPart {
+    pub(crate) path: PathBuf,
+    /// Ids of channels belong to one file.
+    pub(crate) channels: Vec<Arc<Channel>>,
 }
 
 /// Reader that passes bytes on and hashes them.
@@ -128,18 +115,17 @@ impl<R: Read> Read for Hashing<R> {
 
 impl<R: Read> Hashing<R> {
     /// Reads the rest, and returns size and hash of everything.
-    fn finish(mut self) -> (u64, String) {
+    fn finish(mut self) -> (u64, Sha256) {
         let mut rest = vec![0; 1 << 16];
         // The hash covers the whole file, also the part behind the last record.
         while matches!(self.read(&mut rest), Ok(count) if count > 0) {}
-        let hash = self.hash.finalize();
-        (self.bytes, hash.iter().map(|byte| format!("{byte:02x}")).collect())
+        (self.bytes, self.hash)
     }
 }
 
 impl Scan {
-    /// Reads the whole log once; a second time if there were messages of channels that became known
-    /// only later.
+    /// Reads the whole log once; a file a second time if there were messages of channels that became
+    /// known only later.
     ///
     /// # Errors
     /// A file that cannot be opened or is not MCAP.
@@ -148,47 +134,68 @@ impl Scan {
         depth_unit_m: Option<f64>,
         limits: &Limits,
     ) -> Result<Self, LogError> {
-        let first = Self::pass(path, depth_unit_m, limits, &[])?;
-        if first.counters.contains_key("unknown_channel_messages") {
-            return Self::pass(path, depth_unit_m, limits, &first.channels);
-        }
-        Ok(first)
+        let files = LogFiles::of(path)?;
+        let first = Self::pass(path, depth_unit_m, limits, &unread(&files))?;
+        let scan = if first.counters.contains_key("unknown_channel_messages") {
+            Self::pass(path, depth_unit_m, limits, &first.parts)?
+        } else {
+            first
+        };
+        Ok(scan.without_parts(files.missing()))
     }
 
     fn pass(
         path: &Path,
         depth_unit_m: Option<f64>,
         limits: &Limits,
-        known: &[Arc<Channel>],
+        parts: &[LogPart],
     ) -> Result<Self, LogError> {
-        let file = Hashing { reader: open_file(path)?, hash: Sha256::new(), bytes: 0 };
-        let mut walker = Walker::new(file, limits)
-            .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?
-            .knowing(known.iter().cloned());
         let mut gathering = Gathering::new(depth_unit_m);
-        while let Some(message) = walker.next() {
-            gathering.take(&message);
+        let mut scan = Self { parts: Vec::new(), ..gathering.scan("") };
+        let mut hash = Sha256::new();
+        for part in parts {
+            let file = Hashing { reader: open_file(&part.path)?, hash, bytes: 0 };
+            let mut walker = Walker::new(file, limits)
+                .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?
+                .knowing(part.channels.iter().cloned());
+            while let Some(message) = walker.next() {
+                gathering.take(&message);
+            }
+            // Topics without messages are listed, too.
+            for channel in walker.channels() {
+                gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
+            }
+            scan.add_part(part, &walker, parts.len() > 1);
+            let (bytes, so_far) = walker.into_reader().finish();
+            (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
-        // Topics without messages are listed, too.
-        for channel in walker.channels() {
-            gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
-        }
-        let (counters, notes) = (walker.counters().clone(), walker.notes().to_vec());
+        let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let Gathering { topics, infos, tf, .. } = gathering;
+        Ok(Self { path: path.to_owned(), sha256, topics, infos, tf, ..scan })
+    }
+
+    /// Adds the walk through one file.
+    fn add_part<R: Read>(&mut self, part: &LogPart, walker: &Walker<R>, is_split: bool) {
         let channels = walker.channels().cloned().collect();
-        let data_lost = walker.data_lost();
-        let (bytes, sha256) = walker.into_reader().finish();
-        Ok(Self {
-            path: path.to_owned(),
-            bytes,
-            sha256,
-            channels,
-            topics: gathering.topics,
-            infos: gathering.infos,
-            tf: gathering.tf,
-            counters,
-            notes,
-            data_lost,
-        })
+        self.parts.push(LogPart { path: part.path.clone(), channels });
+        for (name, count) in walker.counters() {
+            *self.counters.entry(name).or_default() += count;
+        }
+        let file = part.path.file_name().unwrap_or_default().display();
+        let said = |note: &String| if is_split { format!("{file}: {note}") } else { note.clone() };
+        self.notes.extend(walker.notes().iter().map(said));
+        self.data_lost |= walker.data_lost();
+    }
+
+    /// Counts files that are not there as lost.
+    fn without_parts(mut self, missing: &[String]) -> Self {
+        if missing.is_empty() {
+            return self;
+        }
+        self.data_lost = true;
+        self.counters.insert("missing_files", missing.len() as u64);
+        self.notes.push(format!("not there, and listed in metadata.yaml: {}", missing.join(", ")));
+        self
     }
 
     /// Returns the frame of the images of a topic.
@@ -206,6 +213,12 @@ impl Scan {
         let lines: Vec<_> = self.topics.iter().map(line).collect();
         if lines.is_empty() { "  nothing".into() } else { lines.join("\n") }
     }
+}
+
+/// Returns the files of a log, of whose channels nothing is known yet.
+fn unread(files: &LogFiles) -> Vec<LogPart> {
+    let part = |path: &PathBuf| LogPart { path: path.clone(), channels: Vec::new() };
+    files.parts().iter().map(part).collect()
 }
 
 /// Contents that are gathered message by message.
@@ -229,7 +242,7 @@ impl Gathering {
             path: name.into(),
             bytes: 0,
             sha256: String::new(),
-            channels: Vec::new(),
+            parts: Vec::new(),
             topics: self.topics.clone(),
             infos: self.infos.clone(),
             tf: self.tf.clone(),

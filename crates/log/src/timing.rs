@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use tagalong_core::Stamp;
+use tagalong_stats::median;
 
 /// Statistics of the stamps of one topic, in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -22,11 +23,10 @@ impl Timing {
     /// Computes the statistics; `None` if no stamp is later than the previous one.
     pub fn of(stamps: &[Stamp]) -> Option<Self> {
         let steps: Vec<f64> = stamps.windows(2).map(|w| w[1].seconds_since(w[0])).collect();
-        let mut ahead: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
-        ahead.sort_by(f64::total_cmp);
+        let ahead = || steps.iter().copied().filter(|step| *step > 0.0);
         Some(Self {
-            median_period_s: *ahead.get(ahead.len() / 2)?,
-            longest_gap_s: *ahead.last()?,
+            median_period_s: median(ahead())?,
+            longest_gap_s: ahead().fold(0.0, f64::max),
             steps_back: steps.iter().filter(|step| **step < 0.0).count(),
             // Adding 0 turns a negative zero into a positive one.
             longest_step_back_s: -steps.iter().copied().fold(0.0, f64::min) + 0.0,
@@ -49,11 +49,10 @@ impl Skew {
     pub fn between(first: &[Stamp], second: &[Stamp], tolerance_s: f64) -> Option<Self> {
         let mut second = second.to_vec();
         second.sort();
-        let mut offsets: Vec<f64> = first.iter().filter_map(|at| nearest(&second, *at)).collect();
-        offsets.sort_by(f64::total_cmp);
+        let offsets: Vec<f64> = first.iter().filter_map(|at| nearest(&second, *at)).collect();
         let paired = offsets.iter().filter(|offset| offset.abs() <= tolerance_s).count();
         Some(Self {
-            median_s: *offsets.get(offsets.len() / 2)?,
+            median_s: median(offsets.iter().copied())?,
             paired: paired as f64 / offsets.len() as f64,
         })
     }

@@ -13,9 +13,9 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::log_files::{LogFiles, open_file};
 use crate::mcap_walk::Walker;
 use crate::msgs::{StringMsg, decode};
-use crate::scan::open_file;
 use crate::{Limits, LogError};
 
 /// Topic of the truth.
@@ -68,11 +68,6 @@ fn whole() -> f64 {
 }
 
 impl TruthFrame {
-    /// Returns the message as bytes.
-    pub fn encode(&self) -> Vec<u8> {
-        serde_json::to_vec(self).unwrap_or_default()
-    }
-
     /// Returns the JSON schema of the message, for the log's schema record.
     pub fn schema() -> String {
         schemars::schema_for!(TruthFrame).to_value().to_string()
@@ -85,22 +80,24 @@ impl TruthFrame {
 /// A log that cannot be opened, or a message of the channel that is no [`TruthFrame`], because an
 /// incomplete truth would give wrong figures.
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
-    let mut walker = Walker::new(open_file(path)?, limits)
-        .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
-    let mut frames: Vec<TruthFrame> = Vec::new();
-    while let Some(message) = walker.next() {
-        if message.channel.topic == TRUTH_TOPIC {
-            let plain = message.channel.encoding == "json";
-            let frame = parse(message.data, plain).map_err(|why| LogError::Truth {
-                path: path.to_owned(),
-                number: frames.len() + 1,
-                why,
-            })?;
-            frames.push(frame);
+    let (mut frames, mut present) = (Vec::new(), false);
+    for part in LogFiles::of(path)?.parts() {
+        let mut walker = Walker::new(open_file(part)?, limits)
+            .map_err(|source| LogError::NotMcap { path: part.clone(), source })?;
+        while let Some(message) = walker.next() {
+            if message.channel.topic == TRUTH_TOPIC {
+                let plain = message.channel.encoding == "json";
+                let frame = parse(message.data, plain).map_err(|why| LogError::Truth {
+                    path: part.clone(),
+                    number: frames.len() + 1,
+                    why,
+                })?;
+                frames.push(frame);
+            }
         }
+        present |= walker.channels().any(|channel| channel.topic == TRUTH_TOPIC);
     }
-    let present = walker.channels().any(|channel| channel.topic == TRUTH_TOPIC);
-    frames.sort_by_key(|frame| frame.stamp_ns);
+    frames.sort_by_key(|frame: &TruthFrame| frame.stamp_ns);
     Ok(present.then_some(frames))
 }
 
@@ -138,9 +135,8 @@ mod tests {
     fn truth_is_read_from_lines_and_a_wrong_one_is_named() {
         let path =
             std::env::temp_dir().join(format!("tagalong-lines-{}.jsonl", std::process::id()));
-        let line = |stamp_ns| {
-            String::from_utf8(TruthFrame { stamp_ns, people: Vec::new() }.encode()).unwrap()
-        };
+        let line =
+            |stamp_ns| serde_json::to_string(&TruthFrame { stamp_ns, people: Vec::new() }).unwrap();
         std::fs::write(&path, format!("{}\n\n{}\n", line(7), line(5))).unwrap();
         let stamps: Vec<u64> =
             read_truth_lines(&path).unwrap().iter().map(|frame| frame.stamp_ns).collect();
@@ -158,7 +154,8 @@ mod tests {
         let frame: TruthFrame = serde_json::from_str(text).unwrap();
         let person = &frame.people[0];
         assert_eq!((person.visible, person.ignore, person.upper_body_px), (1.0, false, None));
-        assert_eq!(serde_json::from_slice::<TruthFrame>(&frame.encode()).unwrap(), frame);
+        let text = serde_json::to_string(&frame).unwrap();
+        assert_eq!(serde_json::from_str::<TruthFrame>(&text).unwrap(), frame);
         assert!(TruthFrame::schema().contains("head_in_robot_m"));
     }
 }

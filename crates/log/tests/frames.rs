@@ -576,3 +576,62 @@ fn images_that_are_not_declared_are_not_read() {
     assert!(found[1].frame.colour().is_err() && found[2].frame.colour().is_ok());
     assert!(source.data_lost());
 }
+
+/// Writes frames `from` to `to`, ten a second, with odometry; the odometry's channel comes first or
+/// last, so that the files of one log number their channels differently.
+fn part(from: u32, to: u32, odometry_first: bool) -> LogWriter {
+    let mut log = LogWriter::plain();
+    if odometry_first {
+        log.odometry(at(0.1 * f64::from(from) - 0.05), 0.0, 0.0);
+    }
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    for i in from..to {
+        let stamp = at(0.1 * f64::from(i));
+        log.colour(stamp);
+        log.depth(stamp, "colour", 2.0 + i as f32);
+        log.odometry(stamp, 0.05 * f64::from(i), 0.0);
+    }
+    log
+}
+
+#[test]
+fn the_parts_of_a_folder_are_one_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, log: LogWriter| {
+        std::fs::write(folder.path().join(name), log.finish()).unwrap();
+    };
+    write("drive_0.mcap", part(0, 5, false));
+    write("drive_1.mcap", part(5, 9, true));
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let mut split = FrameSource::open(folder.path(), &input, &limits, DEPTH).unwrap();
+    let (mut whole, _saved) = open(part(0, 9, false), DEPTH);
+    let (expected, found) = (frames(&mut whole), frames(&mut split));
+    assert_eq!(indices(&found), (1..=9).collect::<Vec<_>>());
+    for (found, expected) in found.iter().zip(&expected) {
+        assert_eq!(found.frame.stamp, expected.frame.stamp);
+        assert_eq!(found.frame.depth().unwrap(), expected.frame.depth().unwrap());
+        assert_eq!(found.odom_from_robot, expected.odom_from_robot);
+    }
+    assert!(!split.data_lost(), "{:?}", split.notes());
+    assert_eq!(split.progress(), 1.0);
+    assert_eq!(split.facts().path, folder.path());
+}
+
+#[test]
+fn a_part_that_is_cut_or_missing_costs_its_own_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = part(0, 5, false).finish();
+    std::fs::write(folder.path().join("drive_0.mcap"), &first[..first.len() - 40]).unwrap();
+    std::fs::write(folder.path().join("drive_2.mcap"), part(10, 14, true).finish()).unwrap();
+    let listed = "  relative_file_paths:\n    - drive_0.mcap\n    - drive_1.mcap\n    - \
+                  drive_2.mcap\n";
+    std::fs::write(folder.path().join("metadata.yaml"), listed).unwrap();
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let mut source = FrameSource::open(folder.path(), &input, &limits, DEPTH).unwrap();
+    assert_eq!(frames(&mut source).len(), 9);
+    assert!(source.data_lost());
+    assert_eq!(count(&source, "missing_files"), 1);
+    let notes = source.notes().join("\n");
+    assert!(notes.contains("drive_1.mcap") && notes.contains("drive_0.mcap: "), "{notes}");
+}

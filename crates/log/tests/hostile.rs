@@ -11,6 +11,7 @@ use mcap::{Compression, WriteOptions};
 use tagalong_log::mcap_walk::Walker;
 use tagalong_log::msgs::StringMsg;
 use tagalong_log::{FrameSource, InputSettings, Inputs, Limits};
+use tagalong_stats::{RandomSource, XorShift64};
 
 const MESSAGES: usize = 120;
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -153,26 +154,15 @@ fn a_truncated_file_gives_its_complete_chunks() {
     }
 }
 
-/// Small random generator with a seed (xorshift).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % end as u64) as usize
-    }
-}
-
 #[test]
 fn a_flipped_byte_never_delivers_a_wrong_message_unnoticed() {
     for (name, compression) in compressions() {
         let whole = healthy(compression);
-        let mut random = Random(0x1234_5678_9abc_def1);
+        let mut random = XorShift64::new(0x1234_5678_9abc_def1);
         let mut unnoticed = 0;
         for _ in 0..600 {
-            let (place, with) = (random.below(whole.len()), 1 + random.below(255) as u8);
+            let (place, with) =
+                (random.below(whole.len() as u64) as usize, 1 + random.below(255) as u8);
             let mut bytes = whole.clone();
             bytes[place] ^= with;
             let Some(found) = walk(&bytes) else {

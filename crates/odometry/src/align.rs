@@ -214,9 +214,8 @@ fn pose(state: &State) -> Isometry2<f64> {
 
 /// Returns the median; `None` of fewer than [`LEAST_POINTS`] values.
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    (values.len() >= LEAST_POINTS).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let values: Vec<f64> = values.collect();
+    (values.len() >= LEAST_POINTS).then(|| tagalong_stats::median(values)).flatten()
 }
 
 #[cfg(test)]

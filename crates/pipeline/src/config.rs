@@ -18,6 +18,7 @@ use crate::pipeline::Pipeline;
 use crate::preprocessors::preprocessors;
 use crate::settings::{PipelineSettings, PluginSettings};
 use tagalong_following::{CommandLimiterSettings, RobotSettings, Steering};
+use tagalong_stats::mix;
 
 mod checks;
 mod document;
@@ -492,12 +493,4 @@ fn check_weighing(
         filter.name()
     );
     Err(ConfigError { message, span: Some(span) })
-}
-
-/// Mixes a seed by one step of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
-fn mix(seed: u64) -> u64 {
-    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

@@ -118,11 +118,7 @@ pub fn per_log<'a>(
             values.entry(&task.log).or_default().push(value);
         }
     }
-    values.into_iter().map(|(log, v)| (log, mean(&v))).collect()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+    values.into_iter().filter_map(|(log, v)| Some((log, tagalong_stats::mean(&v)?))).collect()
 }
 
 fn pipeline(view: &OrderedBenchmark<'_>, name: &str) -> PipelineSummary {

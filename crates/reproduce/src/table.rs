@@ -48,13 +48,10 @@ impl Cell {
 
     /// Creates a cell of mean and standard deviation; empty without values.
     pub fn mean(values: &[f64], digits: usize) -> Self {
-        if values.is_empty() {
-            return Self::default();
-        }
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-        Self { deviation: Some(variance.sqrt()), ..Self::number(mean, digits) }
+        tagalong_stats::mean_and_deviation(values).map_or_else(
+            Self::default,
+            |(mean, deviation)| Self { deviation: Some(deviation), ..Self::number(mean, digits) },
+        )
     }
 
     /// Creates a cell of an estimate with its interval, if there is one.

@@ -1,5 +1,5 @@
-//! What people do: they walk along their ways, keep off each other and off
-//! furniture, and some of them play tricks when the robot cannot see them.
+//! Behaviour of people: they walk along their ways, keep off each other and off furniture, and some
+//! of them play tricks when the robot cannot see them.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
@@ -8,13 +8,13 @@ use crate::gait::Gait;
 use crate::person::Person;
 use crate::scene::{AtEnd, PersonSettings, Posture, Trick};
 
-/// How fast a walker's velocity can change, m/s².
+/// Largest change of a walker's velocity, m/s².
 const MAX_ACCELERATION: f64 = 1.2;
-/// How fast a body turns, rad/s.
+/// Largest turn rate of a body, rad/s.
 const MAX_TURN: f64 = 2.6;
 /// A point of the path is reached at this distance, m.
 const REACHED_M: f64 = 0.25;
-/// Who is held up so near to it, m, by something that stands there, leaves it at that.
+/// Distance from a waypoint, m, at which a walker gives it up if an object blocks the way.
 const NEAR_ENOUGH_M: f64 = 1.0;
 /// Strength, m/s², and reach, m, of the push between people (Helbing & Molnár
 /// 1995, with the reach of indoor crowds).
@@ -22,24 +22,24 @@ const PUSH: f64 = 2.2;
 const PUSH_REACH_M: f64 = 0.45;
 /// Reach of the push away from things, m: people pass close to door jambs.
 const THING_REACH_M: f64 = 0.18;
-/// Who makes so little headway, as a part of their speed, for so long, s, and so near
-/// to the surface of a thing, m, is held up by it and goes round it for some time, s,
-/// so much to the side, rad.
+/// Detour around an object. A walker that makes so little headway, as a part of their speed, for so
+/// long, s, and so near to its surface, m, is blocked; they go round it for some time, s, so much
+/// to the side, rad.
 const HEADWAY: f64 = 0.3;
 const HELD_UP_S: f64 = 0.6;
 const HELD_UP_M: f64 = 0.7;
 const ROUND_S: f64 = 2.0;
 const ROUND_RAD: f64 = 1.4;
-/// Somebody with the posture [`Posture::Bending`] bends down for the second half
-/// of every so many seconds, by this angle, rad, which takes them some time, s.
+/// Bending of a person with the posture [`Posture::Bending`]: in the second half of each period, s,
+/// by this angle, rad, within some time, s.
 const BEND_EVERY_S: f64 = 6.0;
 const BEND_RAD: f64 = 1.1;
 const BEND_TAKES_S: f64 = 0.4;
-/// Slower than this, m/s, somebody stands, and leaves the avoiding to the others.
+/// Speed below which a walker counts as standing and leaves the avoiding to the others, m/s.
 const STANDS_MPS: f64 = 0.1;
 /// Companions come no nearer to each other than about this, m.
 const TOO_NEAR_M: f64 = 0.6;
-/// Whoever walks along closes a gap to their place within about this time, s.
+/// Time in which a companion closes a gap to their place, s.
 const CATCH_UP_S: f64 = 0.8;
 
 /// A round thing that people walk around.
@@ -49,7 +49,7 @@ pub struct Obstacle {
     pub at: Point2<f64>,
     /// Its radius, m.
     pub radius_m: f64,
-    /// Where it goes, m, if it goes: whoever it holds up goes round behind it.
+    /// Velocity with which it moves, if it moves, m: a blocked walker goes round behind it.
     pub ahead: Vector2<f64>,
 }
 
@@ -60,14 +60,14 @@ impl Obstacle {
     }
 }
 
-/// Where somebody who walks along should be now, and how they move there.
+/// Wanted place and motion of a companion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lead {
-    /// The place beside the one who leads, m.
+    /// Place beside the leader, m.
     pub place: Point2<f64>,
-    /// The velocity of the one who leads, m/s.
+    /// Velocity of the leader, m/s.
     pub velocity: Vector2<f64>,
-    /// Where the one who leads looks, rad.
+    /// Heading of the leader, rad.
     pub heading_rad: f64,
 }
 
@@ -78,7 +78,7 @@ pub struct Walker {
     pub person: Person,
     /// Where they are and how they stand.
     pub stance: Stance,
-    /// Whom they walk along with, and where in the axes of that person, m.
+    /// Leader of a companion, and the offset in the leader's axes, m.
     pub beside: Option<(usize, Vector2<f64>)>,
     settings: PersonSettings,
     velocity: Vector2<f64>,
@@ -86,12 +86,12 @@ pub struct Walker {
     ahead: usize,
     waits_until_s: f64,
     tricked: bool,
-    /// How long a thing has held them up, s.
+    /// Time for which an object has blocked the walker, s.
     held_up_s: f64,
 }
 
 impl Walker {
-    /// Somebody at the first point of the path, which must exist.
+    /// Creates a walker at the first point of the path, which must exist.
     pub fn new(person: Person, settings: PersonSettings) -> Self {
         let mut settings = settings;
         for point in &mut settings.path {
@@ -116,8 +116,7 @@ impl Walker {
         }
     }
 
-    /// Somebody who walks along with walker `leader`, at `offset` in the axes of
-    /// that person, m.
+    /// Makes this walker a companion of walker `leader`, at `offset` in the axes of that person, m.
     pub fn along(mut self, leader: (usize, &Self), offset: Vector2<f64>) -> Self {
         let (index, leader) = leader;
         self.stance.place = leader.place_beside(offset);
@@ -137,7 +136,7 @@ impl Walker {
         self.settings.path.iter().map(|point| Point2::from(*point)).collect()
     }
 
-    /// Where somebody who walks along should be.
+    /// Returns the place at which a companion should be.
     pub fn lead(&self, offset: Vector2<f64>) -> Lead {
         let heading_rad = self.stance.heading_rad;
         Lead { place: self.place_beside(offset), velocity: self.velocity, heading_rad }
@@ -147,8 +146,8 @@ impl Walker {
         self.stance.place + Rotation2::new(self.stance.heading_rad) * offset
     }
 
-    /// Moves by a short time. `keep_off` are the places of all who are no
-    /// companions; `lead` is the place of somebody who walks along.
+    /// Moves by a short time. `keep_off` are the places of all people that are no companions;
+    /// `lead` is the place of a companion.
     pub fn step(
         &mut self,
         now_s: f64,
@@ -164,7 +163,7 @@ impl Walker {
             None => self.round(self.wanted(), dt, obstacles),
         };
         let mut change = (wanted - self.velocity) / 0.5;
-        // Who stands lets the others do the avoiding.
+        // A standing person lets the others do the avoiding.
         if wanted != Vector2::zeros() {
             change +=
                 keep_off.iter().map(|p| self.push(p, 0.6, PUSH_REACH_M)).sum::<Vector2<f64>>();
@@ -186,7 +185,7 @@ impl Walker {
         self.bend(now_s, dt);
     }
 
-    /// The wanted velocity, or, for who is held up by a thing, one that leads round it,
+    /// Returns the wanted velocity or, if an object blocks the walker, one that leads round it,
     /// past the side that is nearer.
     fn round(&mut self, wanted: Vector2<f64>, dt: f64, obstacles: &[Obstacle]) -> Vector2<f64> {
         let surface_m = |o: &Obstacle| (o.at - self.stance.place).norm() - o.radius_m;
@@ -211,7 +210,7 @@ impl Walker {
         }
     }
 
-    /// Nobody walks through things, however hard they are pushed.
+    /// Moves the walker out of obstacles, because pushes of others must not lead through them.
     fn stay_outside(&mut self, obstacles: &[Obstacle]) {
         for obstacle in obstacles {
             let away = self.stance.place - obstacle.at;
@@ -286,8 +285,8 @@ impl Walker {
         way.try_normalize(1e-6).unwrap_or_default() * speed * (1.0 - 0.7 * (off / 1.5).min(1.0))
     }
 
-    /// The push away from a place, stronger from ahead than from behind, with a
-    /// part to the right so that people who meet head-on pass each other.
+    /// Returns the push away from a place, stronger from ahead than from behind, with a part to the
+    /// right so that people who meet head-on pass each other.
     fn push(&self, from: &Point2<f64>, radius_m: f64, reach_m: f64) -> Vector2<f64> {
         let away = self.stance.place - from;
         let distance = away.norm();
@@ -333,8 +332,7 @@ impl Walker {
     }
 }
 
-/// Lets those play their tricks who are hidden; `hidden_by[i]` says behind whom
-/// walker `i` is.
+/// Starts the tricks of hidden walkers; `hidden_by[i]` is the walker that hides walker `i`.
 pub fn play_tricks(walkers: &mut [Walker], hidden_by: &[Option<usize>], now_s: f64) {
     for (i, hider) in hidden_by.iter().enumerate() {
         let Some(hider) = *hider else { continue };
@@ -363,13 +361,13 @@ impl Walker {
     }
 }
 
-/// Where a walker should be who walks along with somebody.
+/// Returns the place at which a companion should be; `None` for other walkers.
 pub fn lead_of(walkers: &[Walker], i: usize) -> Option<Lead> {
     walkers[i].beside.map(|(leader, offset)| walkers[leader].lead(offset))
 }
 
-/// The places of all whom a walker keeps off: everybody in the room but their own
-/// group, and of that whoever comes too near.
+/// Returns the places that a walker avoids: those of all people in the room outside of their own
+/// group, and of members of the group that come too near.
 pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
     let group = |j: usize| walkers[j].beside.map_or(j, |(leader, _)| leader);
     let place = |j: usize| walkers[j].stance.place;
@@ -381,9 +379,8 @@ pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
     (0..walkers.len()).filter(counts).map(place).collect()
 }
 
-/// Behind whom each walker is, seen from a place: the middle of their body lies
-/// behind somebody at least 0.3 m nearer, 0.2 m to either side of whose middle
-/// count as body.
+/// Returns the walker that hides each walker, seen from a place: the middle of the hidden body lies
+/// behind a walker at least 0.3 m nearer, 0.2 m to either side of whose middle count as body.
 pub fn hidden_by(walkers: &[Walker], seen_from: &Point2<f64>) -> Vec<Option<usize>> {
     let polar: Vec<(f64, f64)> = walkers
         .iter()
@@ -518,7 +515,7 @@ mod tests {
         }
     }
 
-    /// A robot stopped where somebody wants to go through.
+    /// A robot stopped on the way of a person.
     #[test]
     fn nobody_dances_around_a_point_that_is_taken() {
         let mut one = walker(&[[1.0, 1.0], [4.0, 1.0], [4.0, 4.0]], Trick::None);

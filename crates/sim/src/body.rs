@@ -27,12 +27,12 @@ const HIP: f64 = 0.052;
 /// Arms hang this far away from the body, rad.
 const ARMS_OUT_RAD: f64 = 0.11;
 
-/// Joints of somebody who sits: thighs forward, hands on them.
+/// Joints of a seated person: thighs forward, hands on them.
 const SEATED: LimbAngles =
     LimbAngles { hip: 1.45, knee: 1.45, ankle: 0.0, shoulder: 0.25, elbow: 0.9 };
 /// An arm that holds a phone in front of the chest.
 const PHONE_ARM: (f64, f64) = (0.45, 1.9);
-/// How far the head is bowed over a phone, rad.
+/// Angle by which the head is bowed over a phone, rad.
 const PHONE_NOD_RAD: f64 = 0.4;
 
 /// The size of a body.
@@ -47,12 +47,13 @@ pub struct Build {
 impl Build {
     /// A body of the population: height N(1.70, 0.09) m, breadth within 12 %.
     pub fn random(random: &mut Random) -> Self {
+        // Clamped to sizes that the proportions still fit.
         let height_m = (1.70 + 0.09 * random.normal()).clamp(1.45, 2.0);
         Self { height_m, breadth: random.between(0.88, 1.12) }
     }
 }
 
-/// Where a body is and what it does.
+/// Place and pose of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stance {
     /// On the floor, m.
@@ -63,14 +64,14 @@ pub struct Stance {
     pub speed_mps: f64,
     /// Phase of the walking cycle, 0 to 1.
     pub phase: f64,
-    /// How the body is held.
+    /// Posture of the body.
     pub posture: Posture,
-    /// How far the trunk is bent forward besides walking, rad.
+    /// Forward bend of the trunk in addition to that of walking, rad.
     pub bend_rad: f64,
 }
 
 impl Stance {
-    /// Somebody who stands upright.
+    /// Creates an upright person.
     pub fn standing(place: Point2<f64>, heading_rad: f64) -> Self {
         let posture = Posture::Upright;
         Self { place, heading_rad, speed_mps: 0.0, phase: 0.0, posture, bend_rad: 0.0 }
@@ -80,7 +81,7 @@ impl Stance {
 /// The joints of a body in the world, m. Pairs are left, right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Skeleton {
-    /// How the body is held.
+    /// Posture of the body.
     pub posture: Posture,
     /// Middle between the hip joints.
     pub pelvis: Point3<f64>,
@@ -122,10 +123,11 @@ impl Skeleton {
         let yaw = about_z(stance.heading_rad);
         let pelvis_turn = yaw * about_z(motion.torsion_rad);
         let thorax_turn =
+            // The thorax turns against the pelvis while walking.
             yaw * about_z(-0.6 * motion.torsion_rad) * about_y(motion.lean_rad + bend);
         let head_turn = yaw * about_y(nod_rad(stance));
         let ground = Point3::new(stance.place.x, stance.place.y, 0.0);
-        // Who bends down pushes the hips back to keep the balance.
+        // A bending person pushes the hips back to keep the balance.
         let back = 0.12 * h * bend.sin();
         let height = hip_height(stance.posture) * h + motion.up_m;
         let pelvis = ground + yaw * Vector3::new(motion.forward_m - back, motion.left_m, height);
@@ -150,6 +152,7 @@ impl Skeleton {
             toes: [pelvis; 2],
         };
         for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            // The other side is half a cycle later.
             let phase = stance.phase + 0.5 * side as f64;
             let limb = held(gait.limb(phase), side, stance);
             skeleton.place_arm(side, sign, build, &limb);
@@ -197,6 +200,7 @@ impl Skeleton {
         self.ankles[side] = ankle;
         self.heels[side] = sole - along * (0.2 * FOOT * h);
         self.toes[side] = sole + along * (0.65 * FOOT * h);
+        // Toes never sink into the floor.
         self.toes[side].z = self.toes[side].z.max(0.018 * h);
     }
 }
@@ -209,7 +213,7 @@ fn hip_height(posture: Posture) -> f64 {
     }
 }
 
-/// How far the face looks down.
+/// Returns the angle by which the face looks down.
 fn nod_rad(stance: &Stance) -> f64 {
     let phone = if stance.posture == Posture::Phone { PHONE_NOD_RAD } else { 0.0 };
     0.9 * stance.bend_rad + phone
@@ -233,6 +237,7 @@ fn held(walking: LimbAngles, side: usize, stance: &Stance) -> LimbAngles {
 fn leg(ahead: f64, below: f64, h: f64) -> ((f64, f64), (f64, f64)) {
     let (thigh, shank) = (THIGH * h, SHANK * h);
     let reach = thigh + shank;
+    // Some of the reach is left for the height of the hip.
     let ahead = ahead.clamp(-0.9 * reach, 0.9 * reach);
     let below = below.min((reach * reach - ahead * ahead).sqrt());
     let distance = ahead.hypot(below).max(1.0001 * (thigh - shank).abs());

@@ -1,6 +1,5 @@
-//! How people walk: the walking model of Boulic, Magnenat-Thalmann & Thalmann
-//! (1990), which gives the pelvis and the joint angles as functions of the
-//! phase of the walking cycle and of the speed.
+//! Gait of people: the walking model of Boulic, Magnenat-Thalmann & Thalmann (1990), which gives
+//! the pelvis and the joint angles as functions of the phase of the walking cycle and of the speed.
 
 use std::f64::consts::TAU;
 
@@ -55,6 +54,7 @@ impl Gait {
     /// model ends at 2.3 leg lengths per second; faster bodies move like that.
     pub fn new(height_m: f64, speed_mps: f64) -> Self {
         let leg_m = LEG * height_m;
+        // The model is fitted up to this speed.
         Self { leg_m, relative_speed: (speed_mps / leg_m).clamp(0.0, 2.3) }
     }
 
@@ -89,9 +89,9 @@ impl Gait {
         }
     }
 
-    /// How far the left ankle has to be moved forward from where the joint angles
-    /// put it so that the flat foot stays where it is on the floor, m: the angles
-    /// alone let it slide. In between the correction goes over smoothly.
+    /// Returns the shift of the left ankle, forward from the place that the joint angles give, at
+    /// which the flat foot stays where it is on the floor, m: the angles alone let it slide. In
+    /// between the correction goes over smoothly.
     pub fn plant_m(&self, phase: f64) -> f64 {
         let phase = phase.rem_euclid(1.0);
         let [start, end] = FLAT;

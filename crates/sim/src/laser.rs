@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use tagalong_core::LaserScan;
 
-use crate::random::{mix, normal_at};
+use crate::random::normal_at;
 use crate::world::World;
 
 /// A laser scanner on the robot, above the point between its wheels. It looks
@@ -44,7 +44,7 @@ impl Default for LaserSettings {
 }
 
 impl LaserSettings {
-    /// What must hold, and what to say where it does not.
+    /// Returns the conditions on the settings, each with the message for a violation.
     pub(crate) fn rules(&self) -> [(bool, &'static str); 4] {
         let ranges = 0.0 <= self.min_range_m
             && self.min_range_m < self.max_range_m
@@ -81,8 +81,8 @@ impl LaserSettings {
         (0..self.rays).map(move |ray| first + ray as f64 * step)
     }
 
-    /// What the rays measure, m; infinite where nothing is near enough, NaN where
-    /// something is too near. The noise depends on the seed.
+    /// Measures the ranges of the rays, m; infinite where nothing is near enough, NaN where an
+    /// object is too near. The noise depends on the seed.
     pub(crate) fn measure(
         &self,
         world: &World,
@@ -90,7 +90,7 @@ impl LaserSettings {
         seed: u64,
     ) -> Vec<f32> {
         let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
-        let seed = mix(seed, self.rays as u64);
+        let seed = tagalong_stats::number_at(seed, self.rays as u64);
         let range = |(ray, direction): (u64, f64)| {
             let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
             let metres = world.distance(&eye, &(world_from_robot.rotation * ahead));

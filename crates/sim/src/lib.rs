@@ -1,16 +1,14 @@
-//! Drawn worlds: rooms with people in them, seen by the sensors of a moving
-//! robot, and the truth about all of it.
+//! Simulated worlds: rooms with people in them, seen by the sensors of a moving robot, and the
+//! truth about all of it.
 //!
-//! Real logs with exact truth are rare. A drawn one replaces them only if it is
-//! hard in the ways in which real ones are: people have the sizes, the gait and
-//! the habits of people, furniture has the silhouettes of people, depth has
-//! steps, holes and shadows, odometry drifts, and the camera is not quite where
-//! the log says that it is.
+//! Real logs with exact truth are rare. A simulated one replaces them only if it is hard in the
+//! ways in which real ones are: people have the sizes, the gait and the habits of people, furniture
+//! has the silhouettes of people, depth has steps, holes and shadows, odometry drifts, and the
+//! camera is not quite where the log says that it is.
 //!
-//! A [`Scene`] is read from TOML; a [`Simulation`] hands out [`Event`]s in the
-//! order in which a robot would have recorded them. The caller may steer the
-//! robot between two events: images are drawn from where it really is.
-//! The same scene gives the same events on any number of threads.
+//! A [`Scene`] is read from TOML; a [`Simulation`] hands out [`Event`]s in the order in which a
+//! robot would have recorded them. The caller may steer the robot between two events: images are
+//! drawn from where it really is. The same scene gives the same events on any number of threads.
 //!
 //! ```
 //! use tagalong_sim::{Event, Scene, Simulation};
@@ -23,9 +21,9 @@
 //! assert_eq!(images, 2);
 //! ```
 //!
-//! One file describes any number of scenes: its table `[vary]` says what
-//! differs from seed to seed, a [`Variant`] picks one, and a [`Split`] keeps
-//! seeds, people and rooms for training, validation and test apart.
+//! One file describes any number of scenes: its table `[vary]` lists the settings that differ from
+//! seed to seed, a [`Variant`] picks one, and a [`Split`] keeps seeds, people and rooms for
+//! training, validation and test apart.
 //!
 //! ```
 //! use tagalong_sim::{Scene, Split, Variant};

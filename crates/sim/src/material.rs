@@ -1,5 +1,5 @@
-//! What surfaces look like: colours and procedural patterns. Patterns lie in the
-//! axes of the solid that they are on, so that a stripe moves with its shirt.
+//! Appearance of surfaces: colours and procedural patterns. Patterns lie in the axes of the solid
+//! that they are on, so that a stripe moves with its shirt.
 
 use nalgebra::Vector3;
 
@@ -15,14 +15,14 @@ pub struct Material {
     pub colour: Colour,
     /// The other colour of the pattern; hair on heads.
     pub second: Colour,
-    /// How the two are laid out.
+    /// Layout of the two colours.
     pub pattern: Pattern,
     /// Reflectance in the near infrared of a structured-light camera. Cloth that
     /// is black to the eye often is not black there.
     pub infrared: f64,
 }
 
-/// How the two colours of a surface are laid out. Lengths in metres.
+/// Layout of the two colours of a surface. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pattern {
     /// One colour.
@@ -50,6 +50,7 @@ pub enum Pattern {
 impl Material {
     /// One colour.
     pub fn plain(colour: Colour) -> Self {
+        // Bright cloth usually reflects more infrared, too.
         Self { colour, second: colour, pattern: Pattern::Plain, infrared: 0.3 + 0.6 * luma(colour) }
     }
 
@@ -95,6 +96,7 @@ impl Material {
 
     /// `n` is the point on the unit ball: x forward, y left, z up.
     fn head(&self, n: &Vector3<f64>, hairline: f64) -> Colour {
+        // The hairline is high at the forehead and low at the neck.
         let line = hairline - (1.4 * (0.55 - n.x)).clamp(0.0, 1.2);
         if n.z > line {
             let strand = uniform_at(5, (n.y * 60.0) as i64 as u64);
@@ -167,7 +169,7 @@ fn floor(value: f64) -> i64 {
     towards_zero - i64::from(value < towards_zero as f64)
 }
 
-/// What is left of a number above [`floor`].
+/// Returns the part of a number above its [`floor`].
 fn part(value: f64) -> f64 {
     value - floor(value) as f64
 }
@@ -182,6 +184,7 @@ fn value_noise(p: &Vector3<f64>) -> f64 {
     let part = p.map(|v| smooth(part(v)));
     let corner = |i: u64| {
         let at = |axis: usize| cell[axis] + ((i >> axis) & 1) as i64;
+        // Large primes spread neighbouring cells over the keys (Teschner et al., VMV 2003).
         let key = at(0).wrapping_mul(73_856_093) ^ at(1).wrapping_mul(19_349_663);
         uniform_at(3, (key ^ at(2).wrapping_mul(83_492_791)) as u64)
     };

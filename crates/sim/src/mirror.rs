@@ -1,5 +1,5 @@
-//! What a camera sees in a conical mirror: each pixel's ray meets the cone and
-//! is reflected there, also where the mirror hangs a little askew.
+//! Images in a conical mirror: each pixel's ray meets the cone and is reflected there, also where
+//! the mirror hangs a little askew.
 
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -60,7 +60,7 @@ impl Default for MirrorSettings {
 }
 
 impl MirrorSettings {
-    /// What cannot be.
+    /// Returns the conditions on the settings, each with the message for a violation.
     pub(crate) fn rules(&self) -> [(bool, &'static str); 4] {
         let [from, to] = self.view_deg;
         [
@@ -98,6 +98,7 @@ impl MirrorCamera {
     pub fn new(settings: &CameraSettings, random: &mut Random) -> Self {
         let mirror = mirror(settings);
         let of = &settings.mirror;
+        // Beyond two standard deviations a calibration would have been repeated.
         let mut error = |sigma: f64| sigma * random.normal().clamp(-2.0, 2.0);
         let logged = Point2::new(
             mirror.centre_px.x + error(of.centre_error_px),
@@ -173,8 +174,8 @@ impl MirrorCamera {
         (at.z > 0.0 && at.xy().coords.norm() < self.rim_m).then_some(t)
     }
 
-    /// What is seen in the mirror without any noise; `t` is the distance from
-    /// the mirror in metres. Any number of threads draws the same image.
+    /// Renders the view in the mirror without any noise; `t` is the distance from the mirror in
+    /// metres. The image is the same for any number of threads.
     pub fn draw(
         &self,
         world: &World,
@@ -211,9 +212,9 @@ impl MirrorCamera {
         }
     }
 
-    /// How the upper body of somebody is seen, in pixels of the unwrapped
-    /// panorama. The first region is where it must be by the position of the
-    /// head; the others are what the raw image shows, unwrapped as the log says.
+    /// Returns how the upper body of a person appears, in pixels of the unwrapped panorama. The
+    /// first region is where it must be by the position of the head; the others are those that the
+    /// raw image shows, unwrapped by the calibration in the log.
     pub fn sight(
         &self,
         raw: &Image<Hit>,
@@ -241,11 +242,13 @@ impl MirrorCamera {
         (person, shapes): (u16, &[Shape]),
         region: &Rect,
     ) -> Visibility {
+        // At most some 40 x 40 rays, as with a lens.
         let step = (region.width.max(region.height) / 40.0).ceil();
         let mut count = Count::default();
         for row in 0..(region.height / step) as usize {
             for column in 0..(region.width / step) as usize {
                 let (x, y) = (region.x + step * column as f64, region.y + step * row as f64);
+                // Truth is that of the raw image, where the pixels were measured.
                 let pixel = self.panorama.raw_pixel(x, y).map(f64::round);
                 let there = raw.get(pixel.x as i64, pixel.y as i64);
                 let (Some(there), Some((from, along))) = (there, self.ray(pixel.x, pixel.y)) else {
@@ -261,7 +264,7 @@ impl MirrorCamera {
     }
 }
 
-/// What was seen of somebody, and what of others in front.
+/// Visible pixels of a person, and of others in front.
 #[derive(Default)]
 struct Count {
     whole: u32,
@@ -299,9 +302,11 @@ fn within_reach<'a>(
     let Some((_, eye, _)) = rays.get(rays.len() / 2) else { return Vec::new() };
     let axis = rays.iter().map(|ray| ray.2).sum::<Vector3<f64>>();
     let Some(axis) = axis.try_normalize(1e-3) else { return world.solids().collect() };
+    // A margin for rounding: a solid must not vanish at the edge of a tile.
     let opening = rays.iter().map(|ray| axis.angle(&ray.2)).fold(0.0, f64::max) + 1e-6;
     let apart = rays.iter().map(|ray| (ray.1 - eye).norm()).fold(0.0, f64::max);
     let reaches = |shape: &Shape| {
+        // The rays of a tile start at different points of the cone.
         let (centre, radius) = shape.bound();
         let (way, radius) = (centre - eye, radius + apart);
         let distance = way.norm();
@@ -331,6 +336,7 @@ fn mirror(settings: &CameraSettings) -> ConicalMirror {
 fn rim_m(mirror: &ConicalMirror) -> f64 {
     let slope = mirror.outer_px / mirror.focal_px;
     let surface = mirror.half_angle_rad.tan();
+    // One per cent more than the image shows, so that its edge has no gaps.
     1.01 * mirror.apex_m * surface * slope / (surface - slope)
 }
 

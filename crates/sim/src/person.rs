@@ -1,4 +1,4 @@
-//! People as solids: flesh, clothes, hair and what they carry, on a skeleton.
+//! People as solids: flesh, clothes, hair and carried things, on a skeleton.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::random::Random;
 use crate::scene::Posture;
 use crate::shape::{Form, Shape};
 
-/// What somebody wears and carries.
+/// Clothes and carried things of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outfit {
     /// Face and hands.
@@ -73,7 +73,7 @@ const TROUSERS: &[Colour] =
     &[[0.03, 0.045, 0.1], [0.025; 3], [0.16; 3], [0.3, 0.24, 0.15], [0.08, 0.12, 0.2]];
 
 impl Outfit {
-    /// Somebody's clothes.
+    /// Creates random clothes.
     pub fn random(random: &mut Random) -> Self {
         let (cloth, second) = (random.pick(CLOTHS), random.pick(CLOTHS));
         let pattern = random.pick(&[
@@ -115,7 +115,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Somebody of the population: the same number is the same person.
+    /// Creates a person of the population: the same number is the same person.
     pub fn subject(number: u64) -> Self {
         let mut random = Random::new(number, SUBJECT_STREAM);
         Self { build: Build::random(&mut random), look: Outfit::random(&mut random) }

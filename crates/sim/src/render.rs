@@ -15,8 +15,8 @@ use crate::world::{Hit, World};
 /// Side of a tile, pixels.
 const TILE: usize = 16;
 
-/// What a camera sees of the world without any noise: for each pixel what its
-/// ray meets, where `t` is the depth along the optical axis in metres.
+/// Renders the world as seen by a camera without any noise: for each pixel the surface that its ray
+/// meets, where `t` is the depth along the optical axis in metres.
 pub fn draw(
     world: &World,
     camera: &Camera,
@@ -28,7 +28,7 @@ pub fn draw(
 
 /// A camera in a world.
 pub struct WorldCamera<'a> {
-    /// What there is to see.
+    /// The visible world.
     pub world: &'a World,
     /// The camera.
     pub camera: &'a Camera,
@@ -41,7 +41,7 @@ pub struct WorldCamera<'a> {
 }
 
 impl WorldCamera<'_> {
-    /// For each pixel what its ray meets.
+    /// Renders the surface that the ray of each pixel meets.
     pub fn draw(&self, threads: usize) -> Image<Hit> {
         let mut image = Image::filled(self.camera.width, self.camera.height, Hit::NOTHING);
         in_pieces(image.pixels_mut(), TILE * self.camera.width, threads, |number, pixels| {
@@ -77,9 +77,9 @@ impl WorldCamera<'_> {
         Eye::new(self.camera, &(self.pose)(middle / height as f64))
     }
 
-    /// Compares what is seen of some solids of `person` within an area (left, top,
-    /// right, bottom, pixels, clipped to the image by the caller) with what would
-    /// be seen of them alone. At most some 40 x 40 rays are cast.
+    /// Compares the visible part of some solids of `person` within an area (left, top, right,
+    /// bottom, pixels, clipped to the image by the caller) with the view of them alone. At most
+    /// some 40 x 40 rays are cast.
     pub fn visibility(
         &self,
         image: &Image<Hit>,
@@ -173,13 +173,12 @@ impl<'a> Eye<'a> {
     }
 }
 
-/// How much of some solids of a person is seen in an image.
+/// Visible part of some solids of a person in an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Visibility {
-    /// Seen fraction of what would be seen if nothing else were there; 0 where
-    /// nothing would be.
+    /// Visible fraction of the view without other objects; 0 where that is empty.
     pub fraction: f64,
-    /// Left, upper, right and lower edge of what is seen, pixels.
+    /// Left, upper, right and lower edge of the visible part, pixels.
     pub bounds_px: Option<[f64; 4]>,
     /// The person that hides most of the rest.
     pub occluder: Option<u16>,

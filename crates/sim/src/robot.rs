@@ -17,7 +17,7 @@ const NOD_RAD: f64 = 0.008;
 /// Time constant of the nod, s.
 const NOD_S: f64 = 0.15;
 
-/// What the encoder of a wheel says.
+/// Reading of a wheel's encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoder {
     /// Turned since the start, in whole ticks, rad.
@@ -36,7 +36,7 @@ pub struct Robot {
     pub odometry: Isometry2<f64>,
     /// Speeds of the wheels over ground, m/s.
     wheels: [f64; 2],
-    /// What the encoders say, m/s.
+    /// Speeds that the encoders measure, m/s.
     measured: [f64; 2],
     /// The same since the start, m.
     travelled: [f64; 2],
@@ -57,6 +57,7 @@ impl Robot {
     /// A robot at rest at its start.
     pub fn new(settings: &RobotSettings, mut random: Random) -> Self {
         let bias = settings.wheel_bias;
+        // Wheels are never quite of the nominal size, so the odometry has a bias.
         let mut about_one = || 1.0 + bias * random.normal();
         let (radius, separation) = ([about_one(), about_one()], about_one());
         let start = Vector2::from(settings.start);
@@ -85,8 +86,8 @@ impl Robot {
         self.give(now_s, command);
     }
 
-    /// Commands what leads along the path, or after who stands at `leader`, unless
-    /// somebody steers.
+    /// Sets the command that leads along the path, or after a person at `leader`, unless a caller
+    /// steers.
     pub fn decide(&mut self, now_s: f64, leader: Option<Point2<f64>>) {
         if self.steered {
             return;
@@ -114,6 +115,8 @@ impl Robot {
 
     fn drive(&mut self, dt: f64) {
         let before = self.speed_mps();
+        // A step shorter than the response time gives a first-order lag; a longer one ends at the
+        // target.
         let part = dt / self.settings.response_s.max(dt);
         let targets = [self.command.left, self.command.right];
         let wheels = self.wheels.iter_mut().zip(&mut self.measured);
@@ -128,6 +131,7 @@ impl Robot {
         let acceleration = (self.speed_mps() - before) / dt;
         self.nod_rad += (-NOD_RAD * acceleration - self.nod_rad) * (dt / NOD_S).min(1.0);
         self.pose = self.pose_after(dt);
+        // By the nominal separation, because the odometry does not know the true one.
         self.odometry *= moved(self.measured, self.settings.half_separation_m, dt);
     }
 
@@ -145,6 +149,7 @@ impl Robot {
             self.ahead += 1;
         }
         let last = self.ahead + 1 >= self.settings.path.len();
+        // Between waypoints the robot does not slow down.
         self.towards(goal, if last { 0.0 } else { f64::NEG_INFINITY })
     }
 
@@ -153,6 +158,7 @@ impl Robot {
         let way = self.pose.inverse_transform_point(&goal).coords;
         let off = way.y.atan2(way.x);
         let limit = (way.norm() - away_m).max(0.0);
+        // A robot that faces away turns first: the cosine stops it.
         let speed = self.settings.speed_mps.min(limit) * off.cos().max(0.0).powi(2);
         let turn = (1.6 * off).clamp(-0.9, 0.9) * self.settings.half_separation_m;
         WheelSpeeds { left: speed - turn, right: speed + turn }
@@ -182,11 +188,12 @@ impl Robot {
         (0.5 * (left + right), (right - left) / (2.0 * self.settings.half_separation_m))
     }
 
-    /// What the encoders of the left and the right wheel say.
+    /// Returns the readings of the left and the right encoder.
     pub fn encoders(&self) -> [Encoder; 2] {
         let radius_m = self.settings.wheel_radius_m;
         let tick_rad = TAU / f64::from(self.settings.ticks_per_turn);
         [0, 1].map(|side| Encoder {
+            // Encoders count whole ticks.
             angle_rad: (self.travelled[side] / radius_m / tick_rad).floor() * tick_rad,
             rate_rad_s: self.measured[side] / radius_m,
         })

@@ -1,4 +1,4 @@
-//! Rooms and what stands in them.
+//! Rooms and their furniture.
 
 use nalgebra::{Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 
@@ -192,7 +192,7 @@ pub fn distance(way: &[Point2<f64>], place: &Point2<f64>) -> f64 {
     way.windows(2).map(to_segment).chain(to_points).fold(f64::INFINITY, f64::min)
 }
 
-/// What people walk around.
+/// Returns the obstacles that people walk around.
 pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     let turn = Rotation2::new(piece.heading_deg.to_radians());
     let round = |aside: f64, radius_m: f64| {
@@ -202,7 +202,7 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     match piece.kind {
         FurnitureKind::Desk => vec![round(0.0, 0.75)],
         FurnitureKind::Shelf => vec![round(0.0, 0.45)],
-        // The jambs are thin: who goes through keeps to the middle anyway.
+        // The jambs are thin: people keep to the middle anyway.
         FurnitureKind::Doorway => [(0.6, 0.05), (0.85, 0.2), (1.1, 0.2)]
             .iter()
             .flat_map(|(y, r)| [round(*y, *r), round(-y, *r)])
@@ -212,8 +212,8 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     }
 }
 
-/// The solids of a piece of furniture. Its cloth, tone, size, proportions and parts are by
-/// chance: who has seen one of a kind has not seen the next one.
+/// Returns the solids of a piece of furniture. Its cloth, tone, size, proportions and parts are
+/// random: no two pieces of a kind are the same.
 pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Object {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), piece.heading_deg.to_radians());
     let cloth = random.pick(CLOTHS);

@@ -18,10 +18,10 @@ use crate::webcam::WebcamSettings;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scene {
-    /// What the scene is for.
+    /// Purpose of the scene.
     pub about: String,
-    /// Where all chance comes from; it also says for what the log may be used,
-    /// see [`Split`].
+    /// Seed of all random numbers; it also decides for which purpose the log may be used, see
+    /// [`Split`].
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
@@ -35,15 +35,15 @@ pub struct Scene {
     pub camera: CameraSettings,
     /// The robot.
     pub robot: RobotSettings,
-    /// What goes wrong on the way into the log.
+    /// Faults on the way into the log.
     pub faults: FaultSettings,
     /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
     pub laser: Option<LaserSettings>,
     /// Cameras that hang in the room.
     pub webcams: Vec<WebcamSettings>,
-    /// What stands around.
+    /// Furniture.
     pub furniture: Vec<Furniture>,
-    /// Who is there.
+    /// People.
     pub people: Vec<PersonSettings>,
 }
 
@@ -103,7 +103,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// How many people there are, companions and crowd included.
+    /// Returns the number of people, companions and crowd included.
     pub fn number_of_people(&self) -> usize {
         let with_companions = self.people.iter().map(|p| 1 + p.companions);
         with_companions.fold(self.crowd, usize::saturating_add)
@@ -123,7 +123,7 @@ impl Scene {
         scene
     }
 
-    /// What the log may be used for.
+    /// Returns the split, which is the purpose for which the log may be used.
     pub fn split(&self) -> Split {
         Split::of(self.seed)
     }
@@ -186,7 +186,7 @@ impl Scene {
             ),
             (
                 self.people.iter().all(|p| p.posture != Posture::Seated || !p.path.is_empty()),
-                "who sits needs a path of one point: the place of the chair",
+                "a seated person needs a path of one point: the place of the chair",
             ),
             (self.people.iter().all(|p| p.wander <= 1000), "wander must be at most 1000"),
             (
@@ -216,11 +216,11 @@ impl Scene {
     }
 }
 
-/// What a stereo pair has where a scene does not say otherwise.
+/// Defaults of a stereo pair.
 const STEREO: [(&str, &str); 4] =
     [("width", "512"), ("height", "384"), ("field_of_view_deg", "100.0"), ("baseline_m", "0.12")];
 
-/// Gives a camera that only names its kind what that kind ordinarily has.
+/// Gives a camera that only names its kind the usual settings of that kind.
 fn complete_camera(root: &mut DeTable<'_>) {
     let Some(DeValue::Table(camera)) = root.get_mut("camera").map(Spanned::get_mut) else { return };
     if camera.get("kind").and_then(|kind| kind.get_ref().as_str()) != Some("stereo") {
@@ -265,7 +265,7 @@ impl Default for RoomSettings {
     }
 }
 
-/// What the floor is made of.
+/// Material of the floor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Floor {
@@ -295,7 +295,7 @@ impl Default for LightSettings {
     }
 }
 
-/// What the camera delivers.
+/// Images of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CameraKind {
@@ -314,7 +314,7 @@ pub enum CameraKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSettings {
-    /// What it delivers.
+    /// Images that it delivers.
     pub kind: CameraKind,
     /// Without it an `rgbd` camera delivers depth only, and images are drawn
     /// several times faster.
@@ -345,8 +345,7 @@ pub struct CameraSettings {
     /// The depth of an `rgbd` camera with colour is taken this much later than
     /// the colour, s; its stamp says so.
     pub depth_offset_s: f64,
-    /// The mount differs from what the log says by about this, degrees and (in
-    /// hundredths) metres.
+    /// Typical error of the mount as stated in the log, degrees and (in hundredths) metres.
     pub mount_error_deg: f64,
     /// The mirror of a panorama camera.
     pub mirror: MirrorSettings,
@@ -427,7 +426,7 @@ impl Default for RobotSettings {
     }
 }
 
-/// What goes wrong on the way into the log.
+/// Faults on the way into the log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultSettings {
@@ -447,7 +446,7 @@ impl Default for FaultSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Furniture {
-    /// What it is.
+    /// Kind of furniture.
     pub kind: FurnitureKind,
     /// Where it stands, m.
     pub at: [f64; 2],
@@ -509,7 +508,7 @@ impl FurnitureKind {
     }
 }
 
-/// What somebody does when the robot cannot see them for the first time.
+/// Behaviour of a person when the robot cannot see them for the first time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trick {
@@ -518,13 +517,13 @@ pub enum Trick {
     None,
     /// Turns round and goes back.
     TurnBack,
-    /// Stays behind whoever hides them for `hide_s`.
+    /// Stops behind the occluding person for `hide_s`.
     Stop,
-    /// Takes over the way of whoever hides them, who takes over theirs.
+    /// Exchanges ways with the occluding person.
     Swap,
 }
 
-/// What somebody does at the end of the path.
+/// Behaviour of a person at the end of the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AtEnd {
@@ -537,7 +536,7 @@ pub enum AtEnd {
     Loop,
 }
 
-/// How somebody holds their body.
+/// Posture of a person.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Posture {
@@ -568,22 +567,22 @@ pub struct PersonSettings {
     /// Rests at the points of the path for this long on every visit, s; none where
     /// the list ends.
     pub rest_s: Vec<f64>,
-    /// Is not in the room before, s: whoever learns what the empty room looks
-    /// like needs to see it.
+    /// Time before which the person is not in the room, s: a detector that learns the appearance of
+    /// the empty room needs to see it.
     pub enters_s: f64,
     /// End of the stay in the room, s; none if left out.
     pub leaves_s: Option<f64>,
-    /// What follows the end of the path.
+    /// Behaviour at the end of the path.
     pub at_end: AtEnd,
-    /// What they do when hidden.
+    /// Behaviour when hidden.
     pub trick: Trick,
     /// For how long the trick `stop` stays hidden, s.
     pub hide_s: f64,
     /// The whole path is shifted by this, m.
     pub offset: [f64; 2],
-    /// How they hold their body.
+    /// Posture.
     pub posture: Posture,
-    /// Others who walk along, 0.6 to 1 m apart; they count as people of their own.
+    /// Number of others that walk along, 0.6 to 1 m apart; they count as people of their own.
     pub companions: usize,
     /// Direction of the face at the start, degrees; the way ahead if left out.
     pub heading_deg: Option<f64>,

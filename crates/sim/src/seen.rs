@@ -1,5 +1,5 @@
-//! How a ray meets a solid, split into what depends on the eye alone, which is
-//! done once per image, and what depends on the ray, which is done for millions.
+//! Intersection of a ray and a solid, split into the part that depends on the eye alone, computed
+//! once per image, and the part that depends on the ray, computed millions of times.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,5 +1,5 @@
-//! From what rays meet to what cameras deliver: exposure, blur and noise of
-//! images, and the depth of a structured-light camera.
+//! Sensors: from the surfaces that rays meet to camera images with exposure, blur and noise, and to
+//! the depth of a structured-light camera.
 
 use tagalong_core::{DepthImage, GreyImage, Image, RgbImage};
 
@@ -36,7 +36,7 @@ pub struct Exposure {
     threads: usize,
 }
 
-/// The moment of an image: what changes it besides the view.
+/// Moment of an image: all that changes it besides the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     /// Seed of the noise, another one for each image.
@@ -72,22 +72,24 @@ impl Exposure {
         GreyImage::from_fn(seen.width(), seen.height(), |x, y| pixels[y * seen.width() + x])
     }
 
-    /// Adapts to the light within some images; returns what light is multiplied by.
+    /// Adapts to the light within some images; returns the factor on light.
     fn adapt(&mut self, seen: &Image<Hit>) -> f64 {
         let pixels = seen.pixels();
+        // Every seventh pixel is enough for a mean, and coprime to usual widths.
         let sampled = pixels.iter().step_by(7).map(|hit| luma(hit.light)).sum::<f64>();
         let now = (sampled / pixels.len().div_ceil(7) as f64).max(1e-3);
+        // Part of the way only, because an automatic exposure is slow.
         let light = self.mean_light.map_or(now, |before| before + 0.2 * (now - before));
         self.mean_light = Some(light);
         TARGET / light
     }
 }
 
-/// What the channels of an image have in common.
+/// Properties that the channels of an image share.
 struct Film<'a> {
     seen: &'a Image<Hit>,
     moment: &'a Moment,
-    /// What light is multiplied by, so that 1 is white.
+    /// Factor on light, so that 1 is white.
     factor: f64,
     /// Variance of the read noise, and that of the shot noise of a white pixel.
     noise: [f64; 2],
@@ -97,6 +99,7 @@ struct Film<'a> {
 
 impl<'a> Film<'a> {
     fn new(seen: &'a Image<Hit>, moment: &'a Moment, factor: f64, threads: usize) -> Self {
+        // Below the base light a camera raises its gain, and the noise with it.
         let gain = (TARGET / factor / BASE_LIGHT).recip().clamp(1.0, 16.0);
         let noise = [(READ_NOISE * gain).powi(2), SHOT_NOISE * SHOT_NOISE * gain];
         Self { seen, moment, factor, noise, curve: gamma_curve(), threads }
@@ -122,6 +125,7 @@ impl<'a> Film<'a> {
         let (width, height) = (self.seen.width(), self.seen.height());
         let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
         let (dx, dy) = ((at % width) as f32 - cx, (at / width) as f32 - cy);
+        // Light falls with the square of the distance from the centre, near enough to cos^4.
         let corner = VIGNETTING * (dx * dx + dy * dy) / (cx * cx + cy * cy);
         let dimmed = f64::from(light * (1.0 - corner)) * self.moment.gain;
         let sigma = (self.noise[0] + self.noise[1] * dimmed).sqrt();
@@ -189,6 +193,8 @@ impl DepthSensor {
     }
 
     fn measure_row(&self, seen: &Image<Hit>, seed: u64, y: usize, row: &mut [f32]) {
+        // From right to left, because the projector stands to the right of the camera: near
+        // surfaces shadow the pixels to their left.
         let mut leftmost = f64::INFINITY;
         for x in (0..row.len()).rev() {
             let key = (y * row.len() + x) as u64;
@@ -212,13 +218,14 @@ impl DepthSensor {
     }
 
     fn quantised(&self, depth_m: f64, seed: u64, key: u64) -> f64 {
+        // Structured light measures disparities, so depth has steps that grow with its square.
         let steps = STEPS_PER_PX * self.focal_px * self.baseline_m;
         let disparity = steps / depth_m + normal_at(seed ^ 0x53, key) / 6.0;
         steps / disparity.round().max(1.0)
     }
 }
 
-/// What is seen near a pixel: edges are not where they are.
+/// Returns a surface seen near a pixel: measured edges are displaced.
 fn jittered(seen: &Image<Hit>, x: usize, y: usize, seed: u64, key: u64) -> Hit {
     let off = |salt: u64| (EDGE_JITTER_PX * normal_at(seed ^ salt, key)).round() as i64;
     let near = seen.get(x as i64 + off(0x54), y as i64 + off(0x55));

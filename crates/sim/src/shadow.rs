@@ -10,7 +10,7 @@ use crate::sight::{before, between};
 /// Cells along the side of a face of the cube.
 const CELLS: usize = 16;
 
-/// What stands around a lamp.
+/// Objects around a lamp that cast shadows.
 #[derive(Clone, Debug)]
 pub struct Shadows {
     lamp: Point3<f64>,

@@ -33,7 +33,7 @@ pub struct Shape {
     pub origin: Point3<f64>,
     /// From its own axes to those of the world.
     pub world_from_own: Rotation3<f64>,
-    /// What it is made of.
+    /// Material of the solid.
     pub material: Material,
     /// Centre and squared radius of a ball around it.
     ball: (Point3<f64>, f64),
@@ -64,6 +64,7 @@ impl Shape {
         // A ball that swallows the other is drawn as itself.
         let length = axis.norm().max((radii.0 - radii.1).abs() * 1.01).max(1e-6);
         let up = Unit::try_new(axis, 1e-9).unwrap_or_else(Vector3::z_axis);
+        // Any forward direction is right for a limb along it.
         let right = Unit::try_new(up.cross(&forward), 1e-6)
             .or_else(|| Unit::try_new(up.cross(&Vector3::x()), 1e-6))
             .unwrap_or_else(Vector3::y_axis);
@@ -94,8 +95,8 @@ impl Shape {
         way.norm_squared() - along * along * per_length <= self.ball.1
     }
 
-    /// How far the solid reaches from its origin along a unit vector (its
-    /// support function), m.
+    /// Returns the extent of the solid from its origin along a unit vector (its support function),
+    /// m.
     pub fn extent(&self, along: &Vector3<f64>) -> f64 {
         let own = self.world_from_own.inverse_transform_vector(along);
         match self.form {
@@ -110,13 +111,13 @@ impl Shape {
         self.world_from_own.inverse_transform_vector(&(point - self.origin))
     }
 
-    /// The smallest positive `t` at which `eye + t * ray` enters the solid.
-    /// Who casts many rays from one eye asks [`Shape::seen_from`] instead.
+    /// Returns the smallest positive `t` at which `eye + t * ray` enters the solid. For many rays
+    /// from one eye, [`Shape::seen_from`] is faster.
     pub fn meet(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
         self.seen_from(eye).meet(ray)
     }
 
-    /// What of the meeting with a ray depends on nothing but the eye.
+    /// Computes the part of the intersection that depends on the eye alone.
     pub fn seen_from(&self, eye: &Point3<f64>) -> SolidView {
         let turn = self.world_from_own.matrix().transpose();
         let start = self.own(eye);
@@ -147,6 +148,7 @@ impl Shape {
 
 fn unit(vector: Vector3<f64>) -> Vector3<f64> {
     let length = vector.norm();
+    // At the centre there is no normal; any direction is as good.
     if length > 1e-12 { vector / length } else { Vector3::z() }
 }
 

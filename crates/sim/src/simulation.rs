@@ -1,4 +1,4 @@
-//! A scene in motion: what a robot would record, in the order in which it would.
+//! A scene in motion: the events that a robot would record, in the order in which it would.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -42,7 +42,7 @@ const FEELERS: u32 = 48;
 const FEELERS_M: [f64; 4] = [0.15, 0.45, 0.8, 1.2];
 /// Half the width of a person, m.
 const BODY_M: f64 = 0.2;
-/// Below this visible fraction nobody can be expected to find somebody.
+/// Visible fraction below which no detector can be expected to find a person.
 const LEAST_VISIBLE: f64 = 0.2;
 
 /// Something that the robot records.
@@ -56,7 +56,7 @@ pub enum Event {
     Webcam(WebcamShot),
 }
 
-/// What a camera in the room delivers; its images are neither lost nor late.
+/// Images of a camera in the room; they are neither lost nor late.
 #[derive(Clone, Debug)]
 pub struct WebcamShot {
     /// Which one, from 0 in the order of the scene.
@@ -67,7 +67,7 @@ pub struct WebcamShot {
     pub image: Arc<RgbImage>,
 }
 
-/// What the odometry believes.
+/// Pose and speed as the odometry measures them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OdometryReading {
     /// Since the start, ns.
@@ -86,7 +86,7 @@ pub struct OdometryReading {
     pub commanded_turn_rate: f64,
 }
 
-/// What the camera delivers, and what is true at that moment.
+/// Images of the camera, and the truth at that moment.
 #[derive(Clone, Debug)]
 pub struct Shot {
     /// Since the start, ns.
@@ -98,8 +98,8 @@ pub struct Shot {
     /// Colour and depth, the grey images of a stereo pair, or the circular image
     /// of a mirror.
     pub images: Images,
-    /// What the rays of a laser scanner measure, m, in the order of
-    /// [`LaserSettings::directions`]; none without one.
+    /// Ranges of the rays of a laser scanner, m, in the order of [`LaserSettings::directions`];
+    /// `None` without one.
     pub laser: Option<Vec<f32>>,
     /// Everybody.
     pub truth: Vec<Truth>,
@@ -124,16 +124,16 @@ pub struct Truth {
     pub visible: Option<Rect>,
     /// Seen fraction of the upper body.
     pub visible_fraction: f64,
-    /// Who hides most of the rest.
+    /// Person that hides most of the rest.
     pub occluder: Option<u16>,
     /// Hardly seen: neither a miss nor a false alarm.
     pub ignore: bool,
 }
 
-/// How much room a robot has, m; negative is contact.
+/// Free distance around a robot, m; negative is contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
-    /// To the nearest person; infinite where nobody is.
+    /// To the nearest person; infinite where there is none.
     pub people_m: f64,
     /// To the nearest piece of furniture or wall.
     pub things_m: f64,
@@ -145,7 +145,7 @@ pub struct Simulation {
     camera: Camera,
     /// The camera as it is really mounted.
     true_camera: Camera,
-    /// What the camera looks into, if it is a panorama camera.
+    /// The mirror above the camera, if it is a panorama camera.
     mirror: Option<MirrorCamera>,
     webcams: Vec<Webcam>,
     fixed: Vec<Object>,
@@ -166,6 +166,7 @@ pub struct Simulation {
 impl Simulation {
     /// The start of a scene. `threads` draw the images.
     pub fn new(scene: &Scene, threads: usize) -> Self {
+        // A stream for each purpose: one more chair must not change the gait of the people.
         let stream = |number| Random::new(scene.seed, number);
         let mut pieces = scene.furniture.clone();
         pieces.extend(room::clutter(scene, &mut stream(1)));
@@ -225,8 +226,8 @@ impl Simulation {
         self.webcams.iter().map(Webcam::camera)
     }
 
-    /// What stands around, the clutter that is there by chance included; places are in
-    /// the world.
+    /// Returns the furniture, including the clutter that is there by chance; places are in the
+    /// world.
     pub fn furniture(&self) -> &[Furniture] {
         &self.pieces
     }
@@ -237,7 +238,7 @@ impl Simulation {
         self.robot.steer(self.now_ns as f64 * 1e-9, command);
     }
 
-    /// How much room a round robot of this radius has where it is.
+    /// Returns the free distance around a round robot of this radius at its present place.
     pub fn clearance(&self, radius_m: f64) -> Clearance {
         let robot = Point2::from(self.robot.pose.translation.vector);
         let people =
@@ -264,6 +265,7 @@ impl Simulation {
     pub fn next_event(&mut self) -> Option<Event> {
         let end_ns = (self.scene.duration_s * 1e9) as u64;
         loop {
+            // Late images wait until the time at which the log receives them.
             let due = self.waiting.first_key_value().is_some_and(|(key, _)| key.0 <= self.now_ns);
             if due || self.now_ns >= end_ns {
                 return self.waiting.pop_first().map(|(_, event)| event);
@@ -276,6 +278,8 @@ impl Simulation {
         let due_ns = (self.shots as f64 * 1e9 / self.scene.camera.rate_hz) as u64;
         let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
         let leader = self.walkers.first().map(|walker| walker.stance.place);
+        // The order within a step matters: a robot reads its wheels before the camera of the same
+        // moment.
         self.robot.decide(now_s, leader);
         let odometry = self.read_odometry();
         self.record(self.now_ns, odometry);
@@ -291,12 +295,14 @@ impl Simulation {
 
     fn walk(&mut self, now_s: f64, dt: f64) {
         let robot = Point2::from(self.robot.pose.translation.vector);
+        // Tricks depend on the places of all people before any of them moves.
         let hidden = hidden_by(&self.walkers, &robot);
         play_tricks(&mut self.walkers, &hidden, now_s);
         let ways: Vec<_> = (0..self.walkers.len())
             .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i, now_s)))
             .collect();
         let ahead = self.robot.pose.rotation * Vector2::new(GOES_M, 0.0);
+        // The robot is an obstacle of this step only, because it moves.
         self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M, ahead });
         for (walker, (lead, others)) in self.walkers.iter_mut().zip(&ways) {
             walker.step(now_s, dt, lead.as_ref(), others, &self.obstacles);
@@ -325,6 +331,7 @@ impl Simulation {
 
     fn shoot(&mut self) {
         let faults = &self.scene.faults;
+        // Drawn for every image, so that a change of one fault leaves the others as they are.
         let (dropped, late) = (self.chance.chance(faults.dropped), self.chance.chance(faults.late));
         let delay_ns = (self.chance.between(0.05, 0.15) * 1e9) as u64;
         if dropped {
@@ -344,6 +351,8 @@ impl Simulation {
         }
         let (world, _) = self.world();
         for webcam in due {
+            // The numbers of webcams lie above those of the robot's images, whose noise must
+            // differ.
             let seed = self.scene.seed.rotate_left(20) ^ ((webcam as u64 + 1) << 40);
             let image = Arc::new(self.webcams[webcam].shoot(&world, seed));
             self.record(now_ns, Event::Webcam(WebcamShot { webcam, captured_ns: now_ns, image }));
@@ -352,6 +361,7 @@ impl Simulation {
 
     fn shot(&mut self, recorded_ns: u64) -> Shot {
         let (world, uppers) = self.world();
+        // The middle of the exposure: truth and scan are those of the middle row.
         let pose = self.world_from_robot(0.5);
         let (seen, truth) = match &self.mirror {
             Some(mirror) => self.in_mirror(mirror, &world, &uppers, &pose),
@@ -370,7 +380,7 @@ impl Simulation {
         Shot { captured_ns, recorded_ns, depth_ns, images, laser, truth, world_from_robot }
     }
 
-    /// Who is in the room, with their numbers.
+    /// Returns the people in the room, with their numbers.
     fn present(&self) -> impl Iterator<Item = (&Walker, u16)> {
         let now_s = self.now_ns as f64 * 1e-9;
         self.walkers.iter().zip(1..).filter(move |(walker, _)| walker.is_there(now_s))
@@ -393,6 +403,7 @@ impl Simulation {
     /// The robot's body in the world while a part of the image is taken, from the
     /// upper edge, 0, to the lower, 1; it nods when it brakes.
     fn world_from_robot(&self, part: f64) -> Isometry3<f64> {
+        // A rolling shutter takes the rows one after the other, around the middle one.
         let since_middle = (part - 0.5) * self.scene.camera.rolling_shutter_s;
         let planar = self.robot.pose_after(since_middle);
         let nod = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.robot.nod_rad());
@@ -407,12 +418,13 @@ impl Simulation {
         Moment { seed, smear_px: turned * self.camera.focal_px(), gain }
     }
 
-    /// What the depth camera sees, if it looks later than the colour camera.
+    /// Returns the image of the depth camera, if it is taken later than that of the colour camera.
     fn seen_later(&mut self) -> Option<Image<Hit>> {
         let offset_s = self.scene.camera.depth_offset_s;
         if offset_s == 0.0 {
             return None;
         }
+        // The depth camera looks later, so the world is moved on and back again.
         let (robot, walkers) = (self.robot.clone(), self.walkers.clone());
         let now_s = self.now_ns as f64 * 1e-9;
         self.robot.step(now_s, offset_s);
@@ -447,6 +459,7 @@ impl Simulation {
 
     /// A turn of the robot smears the circle along itself, which is not drawn.
     fn circle(&mut self, seen: &Image<Hit>) -> Images {
+        // A turn smears along circles, which the blur along rows cannot show.
         let moment = Moment { smear_px: 0.0, ..self.moment(0, 1.0) };
         let colour = self.exposures[0].colour(seen, &moment);
         Images { colour: Some(Arc::new(colour)), ..Images::default() }
@@ -454,7 +467,7 @@ impl Simulation {
 
     fn stereo(&mut self, world: &World, left: &Image<Hit>) -> Images {
         let mut camera = self.true_camera.clone();
-        // A fifth of a pixel is what rectification leaves.
+        // A fifth of a pixel is the error that rectification usually leaves.
         let tilt = 0.2 / camera.focal_px();
         let aside = Translation3::new(self.scene.camera.baseline_m, 0.0, 0.0);
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
@@ -462,6 +475,7 @@ impl Simulation {
         let pose = |part| self.world_from_robot(part);
         let right =
             WorldCamera { world, camera: &camera, pose: &pose, lit: true }.draw(self.threads);
+        // The two sensors of a pair never expose quite alike.
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
         let image = self.exposures[1].grey(&right, &moments[1]);
@@ -498,8 +512,8 @@ impl Simulation {
         (seen, truth)
     }
 
-    /// `sight` says how somebody's upper body is seen: the region where it must
-    /// be, and what there is to see of it.
+    /// `sight` returns how the upper body of a person appears: the region where it must be, and the
+    /// visible part of it.
     fn truth(
         &self,
         world: &World,
@@ -528,8 +542,8 @@ impl Simulation {
     }
 }
 
-/// How somebody's upper body is seen: the region where it must be, and what there
-/// is to see of it.
+/// Returns how the upper body of a person appears: the region where it must be, and the visible
+/// part of it.
 fn sight(
     view: &WorldCamera<'_>,
     seen: &Image<Hit>,
@@ -546,6 +560,7 @@ fn sight(
         return (None, Visibility::default());
     }
     let mut visibility = view.visibility(seen, of, pixels(&clipped));
+    // The part of the square outside of the image counts as not visible.
     visibility.fraction *= clipped.area() / whole.area();
     (Some(clipped), visibility)
 }
@@ -570,8 +585,9 @@ fn camera(scene: &Scene) -> Camera {
     Camera::mounted(lens, settings.width, settings.height, settings.height_m, pitch, 0.0)
 }
 
-/// The camera as somebody mounted it who aimed at what the log says.
+/// Returns the camera as mounted by hand, with errors about the pose that the log states.
 fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
+    // Clamped at two deviations, because a worse mount would be noticed and corrected.
     let mut error = || degrees * random.normal().clamp(-2.0, 2.0);
     let angles = Vector3::new(error(), error(), error()).map(f64::to_radians);
     let shift = Vector3::new(error(), error(), error()) * 0.01;
@@ -580,7 +596,7 @@ fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
     Camera { robot_from_camera: camera.robot_from_camera * off, ..camera.clone() }
 }
 
-/// Everybody who sits needs something to sit on.
+/// Returns a chair for each person who sits.
 fn chairs(scene: &Scene) -> impl Iterator<Item = Furniture> {
     let seated = scene.people.iter().filter(|p| p.posture == Posture::Seated);
     seated.map(|person| Furniture {

@@ -1,4 +1,4 @@
-//! What keeps training, validation and test apart.
+//! Separation of training, validation and test.
 
 use std::fmt;
 use std::ops::Range;
@@ -14,10 +14,9 @@ pub const SUBJECTS: u64 = 500;
 /// Into how many slices a range is cut of which each split gets every third.
 const SLICES: u64 = 15;
 
-/// What a drawn log is for. A seed belongs to exactly one split, and all chance
-/// comes from the seed: noise, ways, clutter. People come from a pool of
-/// 500 for each split, and what a scene file varies `apart` takes
-/// different values in each.
+/// Purpose of a simulated log. A seed belongs to exactly one split, and all chance comes from the
+/// seed: noise, ways, clutter. People come from a pool of 500 for each split, and settings that a
+/// scene file varies `apart` take different values in each.
 ///
 /// ```
 /// use tagalong_sim::Split;
@@ -46,7 +45,7 @@ impl Split {
         Self::ALL[(seed / SEEDS).min(2) as usize]
     }
 
-    /// What it is called in commands.
+    /// Returns the name used in commands.
     pub fn name(self) -> &'static str {
         ["train", "validation", "test"][self.index() as usize]
     }
@@ -91,7 +90,7 @@ impl Split {
         seed % SEEDS
     }
 
-    /// Somebody of the pool as a number that no other split has.
+    /// Returns a person of the pool as a number that no other split has.
     pub(crate) fn subject(self, number: u64) -> u64 {
         self.index() * SUBJECTS + number % SUBJECTS
     }
@@ -113,8 +112,8 @@ impl Split {
     }
 }
 
-/// Neighbouring seeds of a split: with the scene and what is set in it, all that
-/// others need to draw the same again, or something else.
+/// Neighbouring seeds of a split. Together with the scene and its changed settings they determine
+/// the simulation, so that others can repeat it.
 ///
 /// ```
 /// use tagalong_sim::Split;

@@ -23,9 +23,8 @@ pub struct Variant {
     pub seed: Option<u64>,
     /// Take the seed from this split.
     pub split: Option<Split>,
-    /// Values that replace the file's and what it varies: dotted keys, with
-    /// indices into lists (`people.0.speed_mps`), and values as in TOML, where
-    /// words need no quotes.
+    /// Values that replace those of the file and of its variations: dotted keys, with indices into
+    /// lists (`people.0.speed_mps`), and values as in TOML, where words need no quotes.
     pub set: Vec<(String, String)>,
 }
 
@@ -52,8 +51,7 @@ impl Variant {
     }
 }
 
-/// Reads a file of scenes as the table of one scene, hands it to `read`, and
-/// returns what `read` makes of it.
+/// Reads a file of scenes as the table of one scene, hands it to `read`, and returns the result.
 pub fn one_scene<T>(
     text: &str,
     variant: &Variant,

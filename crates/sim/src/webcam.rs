@@ -17,7 +17,7 @@ use crate::world::World;
 pub struct WebcamSettings {
     /// Where it hangs, m.
     pub at: [f64; 2],
-    /// How high, m.
+    /// Height above the floor, m.
     pub height_m: f64,
     /// Where it looks, degrees.
     pub heading_deg: f64,
@@ -49,7 +49,7 @@ impl Default for WebcamSettings {
 }
 
 impl WebcamSettings {
-    /// What cannot be.
+    /// Returns the conditions on the settings, each with the message for a violation.
     pub(crate) fn rules(&self) -> [(bool, &'static str); 3] {
         [
             (

@@ -1,4 +1,4 @@
-//! What there is to see at one moment, and the casting of single rays into it.
+//! The visible world at one moment, and the casting of single rays into it.
 
 use std::sync::OnceLock;
 
@@ -49,7 +49,7 @@ pub struct World {
     shadows: OnceLock<Vec<Shadows>>,
 }
 
-/// What a ray meets first.
+/// First surface that a ray meets.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hit {
     /// Distance in lengths of the ray; infinite where there is nothing.
@@ -76,8 +76,8 @@ impl World {
         numbered.flat_map(|(index, object)| object.shapes.iter().map(move |shape| (index, shape)))
     }
 
-    /// How far it is to the first solid in a direction of length one, m; infinite
-    /// where there is none.
+    /// Returns the distance to the first solid in a direction of length one, m; infinite where
+    /// there is none.
     pub(crate) fn distance(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
         distance(&self.objects, eye, ray)
     }
@@ -92,6 +92,7 @@ impl World {
     ) -> Hit {
         let per_length = 1.0 / ray.norm_squared();
         let meet = |(object, shape): (usize, &'a Shape)| {
+            // The bounding ball is cheap, and most solids miss most rays.
             let near = shape.near(eye, ray, per_length);
             Some((near.then(|| shape.meet(eye, ray)).flatten()?, object, shape))
         };
@@ -100,8 +101,8 @@ impl World {
             .map_or(Hit::NOTHING, |(t, object, shape)| self.hit(t, object, shape, (eye, ray), true))
     }
 
-    /// What a ray from an eye meets after `t` lengths of it on a solid of an
-    /// object; without light on it unless it is to be `lit`.
+    /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it; without
+    /// light on it unless it is to be `lit`.
     pub(crate) fn hit(
         &self,
         t: f64,
@@ -142,6 +143,7 @@ impl World {
 impl Lamp {
     /// Illuminance of a point with this normal, lx.
     fn on(&self, shadows: &Shadows, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        // A start a little off the surface, which would otherwise shade itself.
         let start = at + normal * 1e-3;
         let way = self.at - start;
         let square = way.norm_squared();
@@ -155,12 +157,12 @@ impl Lamp {
 }
 
 impl Hit {
-    /// What a ray meets that goes on for ever.
+    /// Result of a ray that meets nothing.
     pub const NOTHING: Self =
         Self { t: f64::INFINITY, light: [0.0; 3], infrared: 0.0, facing: 0.0, person: None };
 }
 
-/// How far it is to the first solid of some objects in a direction of length one, m;
+/// Returns the distance to the first solid of some objects in a direction of length one, m;
 /// infinite where there is none.
 pub(crate) fn distance(objects: &[Object], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     let solids = objects.iter().flat_map(|object| &object.shapes);

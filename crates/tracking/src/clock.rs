@@ -97,12 +97,10 @@ impl Clock {
 
     /// Returns the median time between frames; 0 while too few are known.
     fn usual_period_s(&self) -> f64 {
-        let mut periods: Vec<f64> = self.periods.iter().copied().collect();
-        if periods.len() < MIN_PERIODS {
+        if self.periods.len() < MIN_PERIODS {
             return 0.0;
         }
-        periods.sort_by(f64::total_cmp);
-        periods[periods.len() / 2]
+        tagalong_stats::median(self.periods.iter().copied()).unwrap_or(0.0)
     }
 }
 

@@ -11,7 +11,7 @@ const FOREIGN: [&str; 3] = ["input", "limits", "output"];
 /// A pipeline that takes part in trials.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contender {
-    /// How it is called in tables.
+    /// Name in tables.
     pub name: String,
     /// Its config, TOML.
     pub config: String,
@@ -30,6 +30,7 @@ impl Contender {
     /// # Errors
     /// [`TrialError::Config`] with the place of the mistake.
     pub fn pipeline(&self, registry: &Registry, seed: u64) -> Result<Pipeline, TrialError> {
+        // The seed of the scene: each draw gives the plugins other random numbers, too.
         let options = Options { foreign: FOREIGN.map(str::to_owned).to_vec(), seed: Some(seed) };
         Pipeline::from_toml_with(&self.config, &self.folder, registry, &options)
             .map(|(pipeline, _)| pipeline)

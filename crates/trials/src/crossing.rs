@@ -7,25 +7,23 @@ use tagalong_sim::Truth;
 
 use crate::{Run, Trial};
 
-/// When a crossing counts as a success: P3, Table I, asks that both people are
-/// tracked in all frames, without saying what tracked means. Here it is a place
-/// within half the width of the shoulders, by one and the same track.
+/// Conditions for the success of a crossing: P3, Table I, asks that both people are tracked in all
+/// frames, without saying how near a track must be. Here it is a place within half the width of the
+/// shoulders, by one and the same track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
     /// A newcomer must have a track after this time in view, s.
     pub settle_s: f64,
-    /// Largest error of a head, m: half the shoulder width of somebody 1.7 m
-    /// tall (0.1295 of the height).
+    /// Largest error of a head, m: half the shoulder width of a person 1.7 m tall (0.1295 of the
+    /// height).
     pub max_error_m: f64,
     /// Look at the error across the line of sight alone, as the papers do, whose
     /// errors are pixels; otherwise at the distance on the floor.
     pub across_only: bool,
-    /// Somebody counts while this fraction of the upper body is in the image,
-    /// hidden or not.
+    /// A person counts while this fraction of the upper body is in the image, hidden or not.
     pub min_in_image: f64,
-    /// Frames in which less than this fraction of somebody's upper body is seen
-    /// do not count for that person; 0 counts who is wholly hidden, too, whose
-    /// place can only be guessed.
+    /// Frames in which a smaller fraction of a person's upper body is visible do not count for that
+    /// person; 0 counts wholly hidden people, too, whose place can only be guessed.
     pub min_visible: f64,
 }
 
@@ -51,7 +49,7 @@ pub struct Span {
 /// Why a crossing is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Failing {
-    /// Somebody was in view for `settle_s` without a track.
+    /// A person was in view for `settle_s` without a track.
     NotFound {
         /// The person.
         person: u16,
@@ -63,23 +61,21 @@ pub enum Failing {
         /// When, s since the start.
         at_s: f64,
     },
-    /// A person's track was elsewhere, on somebody else perhaps.
+    /// A person's track was elsewhere, possibly on another person.
     Astray {
         /// The person.
         person: u16,
         /// When, s since the start.
         at_s: f64,
     },
-    /// Nobody was ever in view.
+    /// No person was ever in view.
     Nobody,
 }
 
-/// Judges a crossing: everybody who is in view must keep one track in all
-/// frames. Predicted tracks count, for somebody who is hidden can only be
-/// predicted.
+/// Judges a crossing: every person in view must keep one track in all frames. Predicted tracks
+/// count, because a hidden person can only be predicted.
 ///
-/// # Errors
-/// The first thing that went wrong, person by person.
+/// # Errors The first thing that went wrong, person by person.
 pub fn crossing(trial: &Trial, run: &Run, rules: &Crossing) -> Result<Span, Failing> {
     let people: BTreeSet<u16> =
         trial.moments.iter().flat_map(|moment| &moment.truth).map(|truth| truth.id).collect();
@@ -109,16 +105,19 @@ fn follow(
                 && t.visible_fraction >= rules.min_visible
         };
         let Some(truth) = truth.filter(inside) else { continue };
+        // A frame that the pipeline skipped tells nothing about the tracks.
         if !report.outcome.is_processed() {
             continue;
         }
         let at_s = moment.stamp.nanos() as f64 / 1e9;
+        // Time to start a track counts from the first frame in view.
         let since = *in_view_since.get_or_insert(at_s);
         let error = |track: &Track| rules.error_m(truth, track, &trial.camera);
         let mut confirmed = report.tracks.iter().filter(|track| track.confirmed);
         match own {
             None => {
                 own = confirmed
+                    // A track that belongs to another person cannot be found again as this one.
                     .filter(|t| !taken.contains(&t.id) && error(t) <= rules.max_error_m)
                     .map(|t| (apart_m(truth, t), t.id))
                     .filter(|(apart_m, _)| *apart_m < SAME_M)
@@ -142,7 +141,7 @@ fn follow(
     Ok(())
 }
 
-/// Somebody farther away than this is another one, though in the same direction, m.
+/// Distance from which on a person in the same direction is another one, m.
 const SAME_M: f64 = 1.0;
 
 /// Distance on the floor.
@@ -155,6 +154,7 @@ impl Crossing {
         if !self.across_only {
             return apart_m(truth, track);
         }
+        // Errors along the line of sight, those of the depth, do not count.
         let off = (track.estimate.person.position - truth.head_in_robot).xy();
         let eye = camera.robot_from_camera.translation.vector;
         let sight = (truth.head_in_robot.coords - eye).xy();

@@ -16,7 +16,7 @@ const REORDERED: usize = 3;
 /// Odometry is kept for this long, ns: longer than any image is late.
 const KEPT_NS: u64 = 1_000_000_000;
 
-/// What one moment of a scene is for a pipeline, and what is true of it.
+/// Input of a pipeline at one moment of a scene, and the truth at that moment.
 pub struct Drawn {
     /// The frame.
     pub frame: Frame,
@@ -87,8 +87,8 @@ impl Draw {
         self.next_frame_while(|_, _| None)
     }
 
-    /// The next frame, with somebody at the wheels until it comes: `at_wheels`
-    /// sees all that happens, and may command them.
+    /// Returns the next frame, with a caller at the wheels until it comes: `at_wheels` receives all
+    /// events, and may command them.
     pub fn next_frame_while(
         &mut self,
         mut at_wheels: impl FnMut(&Simulation, &Event) -> Option<WheelSpeeds>,
@@ -101,6 +101,7 @@ impl Draw {
             match event {
                 Some(Event::Odometry(reading)) => {
                     self.odometry.insert(reading.at_ns, reading.odom_from_robot);
+                    // Odometry older than any waiting image is not needed again.
                     self.odometry = self.odometry.split_off(&reading.at_ns.saturating_sub(KEPT_NS));
                 }
                 Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.captured_ns, *shot)),
@@ -134,18 +135,20 @@ impl Draw {
         }
     }
 
-    /// Depth travels as millimetres, and what reads logs unwraps circles. The
-    /// panorama of a simulation fits its images, so nothing is ever left wrapped.
+    /// Converts images as a log does: depth is stored in millimetres, and log readers unwrap
+    /// circles. The panorama of a simulation fits its images, so nothing is ever left wrapped.
     fn as_logged(&mut self, images: Images) -> Images {
         if let Some(panorama) = self.camera.panorama() {
             return self.unwrapping.apply(panorama, &images).unwrap_or(images);
         }
+        // Recorded depth has whole millimetres.
         let round = |depth: Arc<DepthImage>| Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001));
         Images { depth: images.depth.map(round), ..images }
     }
 
     /// From the frame before; none to a frame that is older than that.
     fn motion(&mut self, stamp: Stamp, here: Isometry2<f64>) -> EgoMotion {
+        // An image that is older than the last one has no motion since then.
         let before = self.previous.filter(|(then, _)| *then < stamp);
         if before.is_some() || self.previous.is_none() {
             self.previous = Some((stamp, here));

@@ -9,12 +9,12 @@ use tagalong_pipeline::FrameReport;
 
 use crate::{Moment, Run, Trial, TrialError};
 
-/// Who counts, and what is compared.
+/// People that count, and the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judge {
     /// Places on the floor, or boxes in the image.
     pub similarity: Similarity,
-    /// Whoever is farther away is neither a miss nor a false alarm, m.
+    /// Distance from which on a person is neither a miss nor a false alarm, m.
     pub max_range_m: f64,
     /// Tracks that are predicted only count as reports, too.
     pub coasting: bool,
@@ -26,7 +26,7 @@ impl Default for Judge {
     }
 }
 
-/// How a contender did on a scene.
+/// Result of a contender on a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Judged {
     /// All counts; tallies of several trials add up by [`Tally::combine`].
@@ -46,6 +46,7 @@ impl Judge {
     pub fn judge(&self, trial: &Trial, run: &Run) -> Result<Judged, TrialError> {
         let moments = processed(trial, run);
         let sequence = self.sequence(trial, &moments);
+        // The same defaults as `eval`, so that trials and logs are comparable.
         let comparison = Comparison::from(self.similarity);
         let tally = Tally::measure(&sequence, &comparison, &SetDistance::default())?;
         let prepared = Prepared::new(&sequence, &comparison)?;
@@ -59,7 +60,7 @@ impl Judge {
         Sequence { name: format!("seed {}", trial.seed), frames: frames.collect() }
     }
 
-    /// Frames without a place are no frames for whoever compares places.
+    /// Returns the frame; where places are compared, frames without a place do not count.
     fn frame(&self, trial: &Trial, moment: &Moment, report: &FrameReport) -> Frame {
         let by_box = self.similarity == Similarity::Iou;
         let truths = moment.truth.iter().map(|person| self.truth(person));
@@ -71,8 +72,8 @@ impl Judge {
         }
     }
 
-    /// What counts of what a pipeline said of a frame, of an image with so many columns
-    /// and rows.
+    /// Returns the reports that count of a pipeline's report on a frame, of an image with so many
+    /// columns and rows.
     pub fn reports(&self, report: &FrameReport, size: (usize, usize)) -> Vec<Report> {
         let by_box = self.similarity == Similarity::Iou;
         let tracks = report.tracks.iter().filter(|t| t.confirmed && (t.seen || self.coasting));
@@ -82,6 +83,7 @@ impl Judge {
 
     fn truth(&self, person: &tagalong_sim::Truth) -> Truth {
         let head = person.head_in_robot;
+        // Beyond the range both the person and reports on it are left out.
         let far = head.x.hypot(head.y) > self.max_range_m;
         Truth {
             id: i64::from(person.id),
@@ -113,8 +115,8 @@ fn region(rect: &Rect) -> Region {
     Region::new(rect.x, rect.y, rect.width, rect.height)
 }
 
-/// How far the matches were off. In the frame of the start the truth goes by
-/// the robot's real way, the report by the motions that the pipeline believed.
+/// Returns the errors of the matches. In the frame of the start the truth follows the robot's real
+/// way, the report the ego-motion that the pipeline estimated.
 fn errors_m(
     moments: &[(&Moment, &FrameReport)],
     sequence: &Sequence,

@@ -1,27 +1,25 @@
-//! Trials of pipelines on drawn scenes, in memory: draw once, run many.
+//! Trials of pipelines on simulated scenes, in memory: render once, run many.
 //!
-//! A published figure comes from a dozen recordings that nobody else has. Its
-//! fair counterpart is the same layout drawn again and again, with other people,
-//! other furniture and other luck, until the interval around the figure is
-//! narrow enough to say something. [`each`] does that: it draws every scene of a
-//! list, takes all contenders over the very same frames, and hands each
-//! [`Trial`] to a function that keeps what it needs of it, so that memory stays
-//! flat over thousands of trials.
+//! A published figure comes from a dozen recordings that are not available. Its fair counterpart is
+//! the same layout simulated again and again, with other people, other furniture and other luck,
+//! until the interval around the figure is narrow enough to say something. [`each`] does that: it
+//! renders every scene of a list, takes all contenders over the very same frames, and hands each
+//! [`Trial`] to a function that keeps the parts that it needs, so that memory stays flat over
+//! thousands of trials.
 //!
-//! [`Draw`] makes the frames that the log reader would make of the recorded
-//! scene: the camera as the log describes it, not as it is mounted; the robot's
-//! motion from its odometry, not from the truth; images that came late, in
-//! order. Only the JPEG compression of colour images is left out.
+//! [`Draw`] makes the frames that the log reader would make of the recorded scene: the camera as
+//! the log describes it, not as it is mounted; the robot's motion from its odometry, not from the
+//! truth; images that came late, in order. Only the JPEG compression of colour images is left out.
 //!
-//! What a trial says is told by [`Judge`] (the metrics of `tagalong-eval`, and
-//! position errors in two frames), [`crossing`] (is everybody tracked in all
-//! frames?) and [`occlusions`] (is somebody known again?).
+//! A trial is judged by [`Judge`] (the metrics of `tagalong-eval`, and position errors in two
+//! frames), [`crossing`] (are all people tracked in all frames?) and [`occlusions`] (is a person
+//! re-identified after it?).
 //!
-//! A [`Ride`] closes the loop: the contender drives the robot, and a [`RideJudge`]
-//! says how well it stayed with the person.
+//! A [`Ride`] closes the loop: the contender drives the robot, and a [`RideJudge`] measures how
+//! well it stayed with the person.
 //!
-//! The result of a list of scenes depends on the scenes and configs alone, not
-//! on the number of threads.
+//! The result of a list of scenes depends on the scenes and configs alone, not on the number of
+//! threads.
 
 mod contender;
 mod crossing;

@@ -11,16 +11,16 @@ const HIDDEN: f64 = 0.2;
 const VISIBLE: f64 = 0.5;
 /// A track this near to a person is theirs, m.
 const NEAR_M: f64 = 0.5;
-/// How far back a hidden person's track is looked for, and how long they may
-/// take to be found again, s.
+/// Longest time before the occlusion in which a track of the person is looked for, and after it
+/// until they must be found again, s.
 const PATIENCE_S: f64 = 1.5;
 
-/// A time during which somebody was hidden behind somebody else.
+/// Time during which a person was hidden behind another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Occlusion {
-    /// Who.
+    /// Hidden person.
     pub person: u16,
-    /// Behind whom.
+    /// Occluding person.
     pub behind: u16,
     /// Index of the first hidden moment.
     pub first: usize,
@@ -32,14 +32,14 @@ pub struct Occlusion {
     pub gap_m: f64,
 }
 
-/// How a contender came through an occlusion.
+/// Result of a contender in an occlusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// The same track goes on.
     Kept,
     /// Found again under a new number.
     Renamed,
-    /// Found again under the number of somebody else.
+    /// Found again under the number of another person.
     Swapped,
     /// Not found again in time.
     Lost,
@@ -98,7 +98,7 @@ fn occlusion(
     })
 }
 
-/// What became of the person's track.
+/// Returns the fate of the person's track.
 pub fn outcome(trial: &Trial, run: &Run, occlusion: &Occlusion) -> Outcome {
     let Occlusion { person, first, again, .. } = *occlusion;
     let near = |index: usize| track_at(trial, &run.reports[index], index, person);
@@ -121,8 +121,8 @@ fn existed(reports: &[FrameReport], id: TrackId) -> bool {
     reports.iter().flat_map(|report| &report.tracks).any(|track| track.confirmed && track.id == id)
 }
 
-/// The confirmed, seen track that is nearest to a person, if it is near enough
-/// and to nobody else nearer.
+/// Returns the confirmed, observed track that is nearest to a person, if it is near enough and no
+/// other person is nearer to it.
 fn track_at(trial: &Trial, report: &FrameReport, index: usize, person: u16) -> Option<TrackId> {
     let moment = &trial.moments[index];
     let distance = |truth: &Truth, track: &tagalong_core::Track| {
@@ -148,7 +148,7 @@ fn truth(trial: &Trial, index: usize, person: u16) -> Option<&Truth> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Path, Seen, trial};
+    use crate::testing::{FloorPosition, Path, trial};
 
     /// Person 2 walks behind person 1 and is hidden from frame 10 to 19.
     fn after(places: Option<(f64, f64)>, id: u32) -> Outcome {
@@ -158,8 +158,8 @@ mod tests {
         before[10..].fill(None);
         let mut later = [None; 40];
         later[22..].fill(places);
-        let mut one: Vec<Seen> = vec![Some((3.0, 0.0)); 40];
-        let mut tracks: Vec<(u32, Vec<Seen>)> = vec![(2, before.to_vec())];
+        let mut one: Vec<FloorPosition> = vec![Some((3.0, 0.0)); 40];
+        let mut tracks: Vec<(u32, Vec<FloorPosition>)> = vec![(2, before.to_vec())];
         match id {
             1 => one[22..].fill(places),
             2 => tracks[0].1[22..].copy_from_slice(&later[22..]),

@@ -5,12 +5,11 @@ use tagalong_sim::Scene;
 
 use crate::{Contender, Trial, TrialError};
 
-/// Draws all scenes, takes all contenders over each, and keeps what `keep` makes
-/// of the trials, in the order of the scenes. `threads` trials run at a time;
-/// `done` hears after each how many are through.
+/// Renders all scenes, runs all contenders on each, and keeps the results of `keep` on the trials,
+/// in the order of the scenes. `threads` trials run at a time; `done` receives after each the
+/// number of finished ones.
 ///
-/// # Errors
-/// The error of the first scene, in the order of the list, that has one.
+/// # Errors The error of the first scene, in the order of the list, that has one.
 pub fn each<T: Send>(
     scenes: &[Scene],
     contenders: &[Contender],
@@ -23,11 +22,10 @@ pub fn each<T: Send>(
     in_order(scenes, threads, trial, done)
 }
 
-/// What `work` makes of each thing, in the order of the things, `threads` at a
-/// time; `done` hears after each how many are through.
+/// Returns the results of `work` on each thing, in the order of the things, `threads` at a time;
+/// `done` receives after each the number of finished ones.
 ///
-/// # Errors
-/// The error of the first thing, in the order of the list, that has one.
+/// # Errors The error of the first thing, in the order of the list, that has one.
 pub fn in_order<S: Sync, T: Send>(
     things: &[S],
     threads: usize,

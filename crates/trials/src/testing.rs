@@ -11,14 +11,14 @@ use crate::{Moment, Run, Trial};
 /// Frames per second.
 pub const RATE_HZ: f64 = 10.0;
 
-/// Where somebody is, and how much is seen of them.
-pub type Place = (f64, f64, f64);
+/// Place of a person, and their visible fraction.
+pub type HeadSample = (f64, f64, f64);
 
 /// Where a track is on the floor in a frame, if it is there, m.
-pub type Seen = Option<(f64, f64)>;
+pub type FloorPosition = Option<(f64, f64)>;
 
 /// A track's number, and where it is in every frame.
-pub type Path<'a> = (u32, &'a [Seen]);
+pub type Path<'a> = (u32, &'a [FloorPosition]);
 
 fn camera() -> Camera {
     let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
@@ -26,7 +26,7 @@ fn camera() -> Camera {
 }
 
 /// A robot at rest, and for each person and each track a place in every frame.
-pub fn trial(people: &[&[Place]], tracks: &[Path<'_>]) -> Trial {
+pub fn trial(people: &[&[HeadSample]], tracks: &[Path<'_>]) -> Trial {
     let frames = people[0].len();
     let camera = camera();
     let moments = (0..frames).map(|at| moment(at, people, &camera)).collect();
@@ -39,7 +39,7 @@ fn stamp(at: usize) -> Stamp {
     Stamp::default().plus_seconds(at as f64 / RATE_HZ)
 }
 
-fn moment(at: usize, people: &[&[Place]], camera: &Camera) -> Moment {
+fn moment(at: usize, people: &[&[HeadSample]], camera: &Camera) -> Moment {
     let truth = (1..).zip(people).map(|(id, places)| {
         let (x, y, visible_fraction) = places[at];
         let head = Point3::new(x, y, 1.6);

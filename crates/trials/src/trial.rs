@@ -24,7 +24,7 @@ pub enum TrialError {
         pipeline: String,
         /// Seed of the scene.
         seed: u64,
-        /// What happened.
+        /// Cause.
         error: StepError,
     },
     /// A frame whose stereo pair gives no depth.
@@ -33,7 +33,7 @@ pub enum TrialError {
     /// Tracks that cannot be scored.
     #[error(transparent)]
     Eval(#[from] EvalError),
-    /// Whoever watched could not write it down.
+    /// The observer could not write the ride down.
     #[error("{0}")]
     Witness(String),
     /// A thread that works on trials died.
@@ -41,7 +41,7 @@ pub enum TrialError {
     Panicked,
 }
 
-/// What is true of one frame.
+/// Truth of one frame.
 #[derive(Clone, Debug)]
 pub struct Moment {
     /// Stamp of the frame.
@@ -54,7 +54,7 @@ pub struct Moment {
     pub world_from_robot: Isometry2<f64>,
 }
 
-/// What one contender said about a scene.
+/// Reports of one contender on a scene.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Name of the contender.
@@ -65,14 +65,14 @@ pub struct Run {
     pub worked_ms: f64,
 }
 
-/// One scene, and what each contender said about it.
+/// One scene, and the reports of each contender on it.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Seed of the scene.
     pub seed: u64,
     /// The camera, as the pipelines believe it to be.
     pub camera: Camera,
-    /// What stands around; places are in the world.
+    /// Furniture; places are in the world.
     pub furniture: Vec<Furniture>,
     /// The frames.
     pub moments: Vec<Moment>,

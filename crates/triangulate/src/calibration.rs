@@ -3,12 +3,12 @@ use nalgebra::{Matrix4, Point2, Vector4};
 use crate::station::wrapped;
 use crate::{Sight, Station};
 
-/// A place that is known, and who saw the hat there.
+/// Known place, and the cameras that saw the hat there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
     /// The place, m.
     pub place: Point2<f64>,
-    /// What the cameras saw.
+    /// Bearings of the cameras.
     pub sights: Vec<Sight>,
 }
 

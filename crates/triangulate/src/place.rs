@@ -32,7 +32,7 @@ impl Fix {
     }
 }
 
-/// Cameras whose places are known, and what is believed of what they see.
+/// Cameras at known places, and the assumed errors of their bearings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cameras {
     /// The cameras.
@@ -213,7 +213,7 @@ mod tests {
         }
     }
 
-    /// Who sees a place, some of them with an error of the bearing, rad.
+    /// Returns the cameras that see a place, some of them with an error of the bearing, rad.
     fn sights(place: Point2<f64>, errors: &[(usize, f64)]) -> Vec<Sight> {
         let stations = stations();
         let sight = |(station, error): &(usize, f64)| {
@@ -228,7 +228,7 @@ mod tests {
         let (cameras, place) = (Cameras::new(stations()), Point2::new(3.0, 2.0));
         let fix = cameras.fix(&sights(place, &[(0, 0.0), (1, 0.3), (2, 0.0), (3, 0.0)])).unwrap();
         assert!((fix.place - place).norm() < 1e-6 && fix.cameras == 3, "{fix:?}");
-        // Of three, two of which must be wrong, nobody knows which.
+        // Of three bearings, two of which must be wrong, the right one is unknown.
         assert_eq!(cameras.fix(&sights(place, &[(0, 0.0), (0, 0.5), (0, -0.5)])), None);
     }
 

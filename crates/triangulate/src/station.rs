@@ -9,7 +9,7 @@ pub struct Station {
     pub at: Point2<f64>,
     /// Where it looks, rad from the X axis towards Y.
     pub heading_rad: f64,
-    /// How far it looks down, rad.
+    /// Pitch downwards, rad.
     pub pitch_down_rad: f64,
     /// Focal length, pixels.
     pub focal_px: f64,
@@ -18,7 +18,7 @@ pub struct Station {
 }
 
 impl Station {
-    /// The bearing in the room of what a pixel shows, rad.
+    /// Returns the bearing of a pixel's ray in the room, rad.
     pub fn bearing(&self, pixel: &Point2<f64>) -> f64 {
         let (right, down) = (
             (pixel.x - self.centre_px.x) / self.focal_px,
@@ -34,9 +34,9 @@ impl Station {
         way.y.atan2(way.x)
     }
 
-    /// What is calibrated: place (m), heading (rad), and focal length in units of
-    /// `unit_px`, so that all numbers are of like size. The pitch is not: bearings
-    /// to a hat that is always equally high fit any pitch, with another place.
+    /// Returns the calibrated parameters: place (m), heading (rad), and focal length in units of
+    /// `unit_px`, so that all numbers are of like size. The pitch is not among them: bearings to a
+    /// hat that is always equally high fit any pitch, with another place.
     pub(crate) fn parameters(&self, unit_px: f64) -> Vector4<f64> {
         Vector4::new(self.at.x, self.at.y, self.heading_rad, self.focal_px / unit_px)
     }

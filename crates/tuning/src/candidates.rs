@@ -1,13 +1,12 @@
 use std::collections::BTreeSet;
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use tagalong_pipeline::Tunable;
+use tagalong_stats::{ChaCha, RandomSource};
 
 /// One value for each tunable setting, in their order.
 pub type Candidate = Vec<toml::Value>;
 
-/// How often the settings are dealt anew for a candidate that is not there yet.
+/// Largest number of new deals for a candidate that is not there yet.
 const ROUNDS: usize = 64;
 
 /// Returns the settings to be tried, at most `budget`, as they are in the config first. All
@@ -42,9 +41,9 @@ fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Ca
     (all.len() <= most).then_some(all)
 }
 
-/// Settings are dealt in blocks, so that a larger budget adds to what a smaller one tries.
+/// Returns settings dealt in blocks, so that a larger budget adds to those of a smaller one.
 fn sample(tunables: &[Tunable], shipped: &Candidate, count: usize, seed: u64) -> Vec<Candidate> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = ChaCha::new(seed, 0);
     let mut seen = BTreeSet::from([shown(shipped)]);
     let mut chosen = Vec::new();
     let block = tunables.iter().map(|tunable| tunable.values.len()).max().unwrap_or(0);
@@ -62,17 +61,14 @@ fn sample(tunables: &[Tunable], shipped: &Candidate, count: usize, seed: u64) ->
 }
 
 /// So many values in random order, each as often as the others, or once more.
-fn dealt(values: &[toml::Value], count: usize, random: &mut ChaCha8Rng) -> Candidate {
+fn dealt(values: &[toml::Value], count: usize, random: &mut ChaCha) -> Candidate {
     let order = shuffled(values.to_vec(), random);
     shuffled(order.into_iter().cycle().take(count).collect(), random)
 }
 
-/// The shuffle of Fisher and Yates.
-fn shuffled(mut values: Candidate, random: &mut ChaCha8Rng) -> Candidate {
-    for end in (1..values.len()).rev() {
-        let at = (random.next_u64() % (end as u64 + 1)) as usize;
-        values.swap(at, end);
-    }
+/// Returns the values in random order.
+fn shuffled(mut values: Candidate, random: &mut ChaCha) -> Candidate {
+    random.shuffle(&mut values);
     values
 }
 

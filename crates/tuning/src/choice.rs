@@ -16,11 +16,11 @@ pub struct Figures {
     /// False people in a frame.
     #[serde(rename = "FP_per_frame")]
     pub false_a_frame: f64,
-    /// Part of the people who were found.
+    /// Fraction of the people that were found.
     pub recall: f64,
 }
 
-/// What is made as large as possible.
+/// Figure to maximise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Objective {
     /// HOTA.
@@ -45,7 +45,7 @@ pub struct Choice {
 }
 
 impl Figures {
-    /// Takes the figures of a log; nothing if it has nobody to find.
+    /// Takes the figures of a log; `None` if it has no people.
     pub fn of(scores: &Scores) -> Option<Self> {
         Some(Self {
             hota: scores.hota?,
@@ -83,9 +83,9 @@ pub fn mean<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Figures {
     Figures { hota, idf1, mota, false_a_frame, recall }
 }
 
-/// Returns what is chosen without each room, and with all. `figures` has those of each
-/// candidate in each room, of which there are two at least. Of equally good candidates the
-/// first is taken, so that a setting stays as it is where nothing is better.
+/// Returns the choice without each room, and the one with all. `figures` has those of each
+/// candidate in each room, of which there are two at least. Of equally good candidates the first is
+/// taken, so that a setting stays as it is where nothing is better.
 pub fn leave_one_out(figures: &[Vec<Figures>], objective: Objective) -> Choice {
     let rooms = figures.first().map_or(0, Vec::len);
     Choice {

@@ -19,9 +19,9 @@ pub struct Rooms {
 /// A room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
-    /// How it is called in tables.
+    /// Name in tables.
     pub name: String,
-    /// What it is.
+    /// Description.
     pub about: String,
     /// Its logs.
     pub logs: Vec<RoomLog>,
@@ -54,11 +54,10 @@ struct Entry {
 }
 
 impl Rooms {
-    /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`;
-    /// or at `logs_dir`, if there is one.
+    /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`; or at
+    /// `logs_dir`, if there is one.
     ///
-    /// # Errors
-    /// What is wrong with the text, with its place.
+    /// # Errors The fault in the text, with its place.
     pub fn parse(
         text: &str,
         base_dir: &Path,

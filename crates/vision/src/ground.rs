@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, Point2, Point3, Unit, Vector3};
 use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
+use tagalong_stats::{RandomSource, XorShift64};
 
 /// Settings of the ground estimation.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,11 +99,12 @@ pub fn ground_of_depth(
 /// plane qualifies.
 pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
     // A fixed seed: the same image always gives the same floor.
-    let mut random = Sequence(0x9e37_79b9_7f4a_7c15);
+    let mut random = XorShift64::new(0x9e37_79b9_7f4a_7c15);
     let thinned: Vec<_> = points.iter().step_by(points.len() / 1000 + 1).copied().collect();
     let mut best: Option<(f64, Ground)> = None;
     for _ in 0..settings.trials {
-        let Some(plane) = random.plane(&thinned).filter(|p| plausible(p, settings)) else {
+        let Some(plane) = random_plane(&mut random, &thinned).filter(|p| plausible(p, settings))
+        else {
             continue;
         };
         let score = score(&plane, &thinned, settings);
@@ -176,24 +178,13 @@ fn through(point: &Vector3<f64>, normal: Vector3<f64>) -> Option<Ground> {
     Some(Ground { up_in_camera: up, height_m: -up.dot(point), inliers: 0.0 })
 }
 
-/// Fixed sequence of pseudo-random numbers (xorshift).
-struct Sequence(u64);
-
-impl Sequence {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % count as u64) as usize
+/// Returns the plane through three points at random; `None` of fewer, or if they lie in a line.
+fn random_plane(random: &mut XorShift64, points: &[Point3<f64>]) -> Option<Ground> {
+    if points.len() < 3 {
+        return None;
     }
-
-    fn plane(&mut self, points: &[Point3<f64>]) -> Option<Ground> {
-        if points.len() < 3 {
-            return None;
-        }
-        let [a, b, c] = [(); 3].map(|()| points[self.below(points.len())].coords);
-        through(&a, (b - a).cross(&(c - a)))
-    }
+    let [a, b, c] = [(); 3].map(|()| random.pick(points).coords);
+    through(&a, (b - a).cross(&(c - a)))
 }
 
 #[cfg(test)]

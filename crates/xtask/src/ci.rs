@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::workspace::{Workspace, succeed};
 
-/// Runs what the server runs.
+/// Runs all checks that the server runs.
 pub fn ci(workspace: &Workspace) -> Result<()> {
     succeed(Command::new("bash").arg(".ci/run").current_dir(workspace.root()))
 }

@@ -1,9 +1,9 @@
 //! Parts of the documents that a command prints.
 //!
-//! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands what that
-//! command prints. `cargo xtask docs` fills these parts, and `cargo xtask tidy`
-//! complains about those that have become stale. What takes long, the tables of
-//! `reproduce`, `follow` and `bench`, is filled only when it is asked for.
+//! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands the output of that command.
+//! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
+//! become stale. Slow parts, the tables of `reproduce`, `follow` and `bench`, are filled only on
+//! request.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -45,6 +45,7 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
 pub fn stale(workspace: &Workspace) -> Result<Vec<String>> {
     let mut complaints = Vec::new();
     for document in documents(workspace)? {
+        // Slow parts are compared only when they are filled.
         let wanted = |command: &str| !is_slow(command);
         let filled = filled(&document.text, wanted, |command| printed(workspace, command))
             .with_context(|| format!("in {}", document.path.display()))?;
@@ -93,7 +94,7 @@ fn filled(
     Ok(out + rest)
 }
 
-/// What the command prints, with the program of this workspace.
+/// Returns the output of the command, with the program of this workspace.
 fn printed(workspace: &Workspace, command: &str) -> Result<String> {
     let mut words = command.split_whitespace();
     if words.next() != Some("tagalong") {
@@ -101,6 +102,7 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
     }
     let mut cargo = Command::new("cargo");
     cargo.args(["run", "--quiet", "--package", "tagalong-cli"]);
+    // Figures of slow commands take hours without optimisation.
     if is_slow(command) {
         cargo.arg("--release");
     }

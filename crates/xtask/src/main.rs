@@ -1,4 +1,4 @@
-//! Commands for those who work on Tagalong: `cargo xtask --help`.
+//! Commands for developers of Tagalong: `cargo xtask --help`.
 
 mod ci;
 mod docs;
@@ -22,7 +22,7 @@ use clap::{Args, Parser, Subcommand};
 use new_plugin::Kind;
 use workspace::Workspace;
 
-/// Commands for those who work on Tagalong.
+/// Commands for developers of Tagalong.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 struct Cli {
@@ -45,8 +45,8 @@ enum Command {
     },
     /// Runs the command lines of the documents that take no more than seconds
     Rehearse,
-    /// Runs every config on every log and writes checksums of what comes out, to be
-    /// compared with those after a change
+    /// Runs every config on every log and writes checksums of the results, to be compared with
+    /// those after a change
     Record {
         /// The file to write.
         file: PathBuf,
@@ -60,7 +60,7 @@ enum Command {
 
 #[derive(Args)]
 struct NewPlugin {
-    /// What the plugin is.
+    /// Kind of the plugin.
     #[arg(required_unless_present = "try_out")]
     kind: Option<Kind>,
     /// Its name in configs, for example `leg-width`.

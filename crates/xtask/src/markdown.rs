@@ -45,6 +45,7 @@ fn parse(path: PathBuf, text: &str) -> Document {
 impl Document {
     fn add_shell(&mut self, number: usize, line: &str) {
         match self.shell.last_mut() {
+            // A backslash at the end of a line continues the command.
             Some((_, before)) if before.ends_with('\\') => {
                 before.pop();
                 before.push_str(line.trim_start());

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::workspace::{Workspace, output};
 
-/// What `cargo metadata` says, as far as it matters here.
+/// Output of `cargo metadata`, as far as it matters here.
 #[derive(Deserialize)]
 pub struct Metadata {
     /// Every package of the dependency tree.
@@ -27,9 +27,9 @@ pub struct Package {
     pub license: Option<String>,
     /// The folder with its manifest is the parent of this.
     pub manifest_path: PathBuf,
-    /// What it depends on, directly.
+    /// Direct dependencies.
     pub dependencies: Vec<Dependency>,
-    /// What is built from it.
+    /// Targets that are built from it.
     pub targets: Vec<Target>,
 }
 

@@ -14,7 +14,7 @@ use crate::workspace::{Workspace, succeed};
 pub enum Kind {
     /// Finds people in images.
     Detector,
-    /// Judges what a detector found.
+    /// Judges the detections of a detector.
     Verifier,
     /// Decides which detection belongs to which track.
     Associator,
@@ -66,6 +66,7 @@ impl Kind {
 /// Writes the crate, its lines in the workspace and the catalog, and a config.
 /// Nothing is written if anything is in the way.
 pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
+    // All checks come first, so that a wrong name leaves nothing behind.
     check_name(workspace, name)?;
     let lists = lists_with(workspace, name)?;
     let template = kind.template();
@@ -88,7 +89,7 @@ pub fn format(workspace: &Workspace, name: &str) -> Result<()> {
     succeed(cargo.current_dir(workspace.root()))
 }
 
-/// What to do with the new crate, in a few lines.
+/// Returns the next steps with the new crate, in a few lines.
 pub fn what_now(kind: Kind, name: &str) -> String {
     let verb = kind.template().verb.0;
     format!(
@@ -102,6 +103,7 @@ pub fn what_now(kind: Kind, name: &str) -> String {
 fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
     let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
     let well_formed = name.starts_with(|c: char| c.is_ascii_lowercase())
+        // Names become parts of crate names, module names and paths.
         && name.split('-').all(|word| !word.is_empty() && word.chars().all(letters));
     ensure!(
         well_formed,
@@ -111,7 +113,7 @@ fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
     taken.extend(["tests", "benches", "config", "pipeline"].map(String::from));
     ensure!(
         !taken.contains(name),
-        "`{name}` is the name of a room of the workspace: choose another"
+        "`{name}` is the name of a crate or command of the workspace: choose another"
     );
     for path in [format!("plugins/{name}"), format!("configs/{name}.toml")] {
         if workspace.root().join(&path).exists() {
@@ -147,6 +149,7 @@ fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, Strin
 fn insert_sorted(text: &str, line: &str, is_sibling: fn(&str) -> bool) -> Option<String> {
     let mut lines: Vec<&str> = text.lines().collect();
     let siblings: Vec<usize> = (0..lines.len()).filter(|i| is_sibling(lines[*i])).collect();
+    // Before the first sibling that is greater, so that lists stay sorted.
     let after = siblings.iter().find(|i| lines[**i] > line).copied();
     lines.insert(after.or(siblings.last().map(|last| last + 1))?, line);
     Some(lines.join("\n") + "\n")

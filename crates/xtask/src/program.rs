@@ -11,7 +11,7 @@ use crate::workspace::{Workspace, output};
 /// The built program.
 pub struct Program(PathBuf);
 
-/// What cargo says of a thing that it built.
+/// Message of cargo about an artifact that it built.
 #[derive(Deserialize)]
 struct Built {
     executable: Option<PathBuf>,

@@ -1,9 +1,9 @@
-//! A record of what every config does, to hold a renovation against.
+//! A record of the results of every config, to check a refactoring against.
 //!
-//! Every config runs on every real log and on logs of some scenes, and drives through one
-//! scene if it has a controller. A line for each run holds the exit code and checksums of
-//! the tracks and the report. `cargo xtask record before.txt` before a change and
-//! `cargo xtask record after.txt` after it: `diff` names the runs whose bytes changed.
+//! Every config runs on every real log and on logs of some scenes, and drives through one scene if
+//! it has a controller. A line for each run holds the exit code and checksums of the tracks and the
+//! report. `cargo xtask record before.txt` before a change and `cargo xtask record after.txt` after
+//! it: `diff` names the runs whose bytes changed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -99,12 +99,13 @@ fn run_line(
     Ok(line + "\n")
 }
 
-/// The checksum of a report without what it says of the config's text, and of the commands
-/// of a ride without its times.
+/// Computes the checksum of a report without the text of the config, and of the commands of a ride
+/// without its times.
 fn report_checksum(report: &Path) -> String {
     let text = fs::read_to_string(report).unwrap_or_default();
     match serde_json::from_str::<serde_json::Value>(&text) {
         Ok(serde_json::Value::Object(mut facts)) => {
+            // The report quotes the config, whose comments may change.
             facts.remove("config");
             checksum(serde_json::Value::Object(facts).to_string().as_bytes())
         }
@@ -132,6 +133,7 @@ fn files_with(folder: &Path, extension: &str) -> Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
+    // The order of a folder's entries differs between file systems.
     files.sort();
     Ok(files)
 }

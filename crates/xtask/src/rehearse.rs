@@ -18,10 +18,10 @@ const STAGE: &str = "target/rehearsal";
 /// Lines with this in them are not run, for a reason. Tidy checks their options.
 const LEFT_OUT: &[(&str, &str)] = &[
     ("contrast", "needs the plugin of the walk-through, whose own trial runs it"),
-    ("import bag", "needs somebody else's data"),
-    ("import kitti", "needs somebody else's data"),
-    ("import mot", "needs somebody else's data"),
-    ("import tum", "needs somebody else's data"),
+    ("import bag", "needs another data set"),
+    ("import kitti", "needs another data set"),
+    ("import mot", "needs another data set"),
+    ("import tum", "needs another data set"),
     ("../shared", "needs the annotated logs"),
     ("benches/rooms.toml", "needs the annotated logs"),
     ("LOG.people.csv", "needs an annotated log"),
@@ -38,7 +38,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("--gallery pictures", "takes half a minute, as the tests build it"),
 ];
 
-/// What lies in each folder: a short log, a folder of logs, and one of images.
+/// Contents of each folder: a short log, a folder of logs, and one of images.
 const PROPS: &[&str] = &[
     "simulate configs/scenes/crossing.toml --set duration_s=3 -o LOG.mcap",
     "simulate configs/scenes/crossing.toml --set duration_s=3 -o logs/drawn.mcap",
@@ -63,6 +63,7 @@ pub fn rehearse(workspace: &Workspace) -> Result<()> {
             continue;
         }
         let folder = stage.join(number.to_string());
+        // A folder for each document, so that results of one cannot help another.
         copy(&props, &folder)?;
         for (at, line) in lines {
             let place = format!("{}:{at}", document.path.display());
@@ -90,6 +91,7 @@ fn lines(document: &Document) -> impl Iterator<Item = (usize, String)> {
 /// The line as `tagalong ...`, without its comment; `None` if it calls something else.
 fn call(line: &str) -> Option<String> {
     let line = line.trim_start().trim_start_matches("$ ");
+    // Comments behind a command belong to the reader.
     let line = line.split(" #").next().unwrap_or(line).trim_end();
     match line.strip_prefix("cargo run --release -- ") {
         Some(rest) => Some(format!("tagalong {rest}")),
@@ -104,6 +106,7 @@ fn words(line: &str) -> Vec<&str> {
 /// The line as a shell runs it, for `tagalong` this workspace's program.
 fn in_shell(program: &Program, line: &str, folder: &Path) -> Result<Command> {
     let others = env::var_os("PATH").unwrap_or_default();
+    // The program that was just built comes first, before an installed one.
     let all = std::iter::once(program.folder().to_owned()).chain(env::split_paths(&others));
     let mut shell = Command::new("sh");
     shell.args(["-c", line]).current_dir(folder).env("PATH", env::join_paths(all)?);

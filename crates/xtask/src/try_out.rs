@@ -1,5 +1,5 @@
-//! Generates one plugin of each kind in a copy of the workspace, and the one of
-//! the walk-through, and demands of them what is demanded of every plugin.
+//! Generates one plugin of each kind in a copy of the workspace, and the one of the walk-through,
+//! and runs the checks of every plugin on them.
 
 use std::path::Path;
 use std::process::Command;
@@ -44,6 +44,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
         eprintln!("new-plugin --try: {step}");
         let mut cargo = Command::new("cargo");
         let (before, after) = match args.iter().position(|arg| *arg == "--") {
+            // Options of cargo stand before `--`, those of the tool behind it.
             Some(at) => args.split_at(at),
             None => (args, &[][..]),
         };
@@ -66,9 +67,8 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-/// Copies what cargo made of crates from outside, so that nobody waits for them a
-/// second time. Without a build, or with one of an earlier trial, there is nothing
-/// to do.
+/// Copies the outside crates that cargo has built, so that they are not built a second time.
+/// Without a build, or with one of an earlier trial, there is nothing to do.
 fn lend(from: &Path, to: &Path) -> Result<()> {
     if to.exists() || !from.exists() {
         return Ok(());
@@ -81,13 +81,14 @@ fn lend(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies a folder without what is ours, tests and other programs included. Cargo
-/// trusts what has the times that it gave it.
+/// Copies a folder without the crates of this workspace, tests and other programs included. Cargo
+/// reuses files that keep their modification times.
 fn copy_outside(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
         let (path, name) = (entry.path(), entry.file_name());
+        // Executables in `deps` have no extension; libraries do.
         let is_program = from.ends_with("deps") && path.extension().is_none();
         if is_program || name.to_string_lossy().contains("tagalong") {
             continue;
@@ -96,6 +97,7 @@ fn copy_outside(from: &Path, to: &Path) -> io::Result<()> {
             copy_outside(&path, &to.join(&name))?;
         } else {
             fs::copy(&path, to.join(&name))?;
+            // Cargo compares modification times, and a copy has new ones.
             let copied = fs::File::options().write(true).open(to.join(&name))?;
             copied.set_modified(entry.metadata()?.modified()?)?;
         }

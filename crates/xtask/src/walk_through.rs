@@ -10,7 +10,7 @@ pub const NAME: &str = "contrast";
 
 const GUIDE: &str = "plugins/README.md";
 
-/// Generates the plugin and puts in what the guide prints.
+/// Generates the plugin and puts in the code of the guide.
 pub fn walk(workspace: &Workspace) -> Result<()> {
     create(workspace, Kind::Verifier, NAME)?;
     let guide = workspace.read(GUIDE)?;
@@ -21,12 +21,13 @@ pub fn walk(workspace: &Workspace) -> Result<()> {
         guide.split_once("in `Default` by `").with_context(|| format!("{GUIDE}: no default"))?;
     let default = after.split('`').next().unwrap_or_default();
     edit(workspace, "config.rs", |text| {
+        // The guide shows the changed parts only; the template has the rest.
         let text =
             replace_between(text, "    /// Added to every margin", "pub bias: f64,\n", &field)?;
         Some(text.replace("bias: 0.0", default))
     })?;
     edit(workspace, "verify.rs", |text| {
-        replace_between(text, "    fn margin(", "\n    }\n", &method)
+        replace_between(text, "    fn log_odds(", "\n    }\n", &method)
     })
 }
 
@@ -46,7 +47,7 @@ fn fences(text: &str, word: &str) -> Vec<String> {
     parts.filter_map(|part| part.split("```").next()).map(str::to_owned).collect()
 }
 
-/// Replaces what lies from one text to another, both included.
+/// Replaces the part from one text to another, both included.
 fn replace_between(text: &str, from: &str, to: &str, by: &str) -> Option<String> {
     let start = text.find(from)?;
     let end = start + text[start..].find(to)? + to.len();

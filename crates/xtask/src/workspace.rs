@@ -11,8 +11,8 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// The workspace in which cargo runs this program. The folder it was built
-    /// in may be another one: copies of a workspace can share what is built.
+    /// Finds the workspace in which cargo runs this program. The folder it was built in may be
+    /// another one: copies of a workspace can share built crates.
     pub fn find() -> Result<Self> {
         let here = env::var("CARGO_MANIFEST_DIR").context("start this with `cargo xtask`")?;
         let root = Path::new(&here).ancestors().nth(2).context("xtask does not lie in crates/")?;
@@ -64,12 +64,14 @@ impl Workspace {
     /// All files that git tracks or would track, relative to the root, sorted.
     pub fn files(&self) -> Result<Vec<PathBuf>> {
         let mut git = Command::new("git");
+        // New files count, too; ignored ones do not.
         git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]);
         let listed = output(git.current_dir(&self.root))?;
         let mut files: Vec<PathBuf> = listed
             .split('\0')
             .filter(|name| !name.is_empty())
             .map(PathBuf::from)
+            // Git still lists files that were removed.
             .filter(|path| self.root.join(path).is_file())
             .collect();
         files.sort();
@@ -105,7 +107,7 @@ pub fn remove_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What a command prints; an error if it fails.
+/// Returns the output of a command; an error if it fails.
 pub fn output(command: &mut Command) -> Result<String> {
     let shown = shown(command);
     let output = command.output().with_context(|| format!("cannot start `{shown}`"))?;

@@ -10,7 +10,7 @@ pub(crate) struct Aim {
     pub(crate) bearing: f64,
     /// Sine of the bearing; zero at the origin.
     pub(crate) sine: f64,
-    /// How fast the person goes away from where the robot is, over ground, m/s.
+    /// Speed at which the person goes away from the robot's place, over ground, m/s.
     pub(crate) receding_mps: f64,
 }
 
@@ -30,6 +30,7 @@ impl Aim {
         if !range_m.is_finite() {
             return None;
         }
+        // At the origin there is no direction; straight ahead is as good as any.
         let towards = if range_m > 0.0 { place.coords / range_m } else { Vector2::x() };
         Some(Self {
             range_m,

@@ -22,8 +22,8 @@ pub struct Config {
     /// The way to the target: "A" on a circle, "B" turn first and then
     /// straight, "C" turn while driving.
     pub path: Path,
-    /// By what path C divides the radius of the circle (k in P1, section 3):
-    /// 1.5 to 2.5 for usual fields of view. No unit.
+    /// Divisor of the radius of the circle on path C (k in P1, section 3): 1.5 to 2.5 for usual
+    /// fields of view. No unit.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub path_gain: f64,
     /// The wheel speeds exactly as the papers print them: no bound on the
@@ -64,8 +64,8 @@ pub struct Config {
     /// person: through the middle of doors and round corners. 0 is off.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub trail_m: f64,
-    /// Drives after a person who is not seen for half of this time, then slows
-    /// down, and stands still at the end of it, s.
+    /// Drives after a person that is not seen for half of this time, then slows down, and stands
+    /// still at the end of it, s.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_unseen_s: f64,
     /// From the capture of an image until the wheels answer to it, s: the

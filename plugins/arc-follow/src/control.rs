@@ -9,7 +9,7 @@ use crate::trail::Trail;
 
 /// A longer pause between frames counts as this one, s.
 const LONGEST_STEP_S: f64 = 0.5;
-/// Whoever is farther aside than this is looked at, wherever they went, rad.
+/// Bearing from which on the robot turns towards the person, wherever they went, rad.
 const IN_VIEW_RAD: f64 = 0.4;
 
 /// Follows a person along the paths of P1, section 3.
@@ -74,6 +74,7 @@ impl ArcFollow {
         let target = scene.target?;
         let to_come = self.history.forecast(wheels);
         let aim = Aim::new(&target.estimate.person, &to_come)?;
+        // The trail is followed only towards a person ahead and beyond the stand-off.
         let goes_after = aim.range_m > self.config.stand_off_m && aim.bearing.abs() < IN_VIEW_RAD;
         let way = self.way(scene, target, &to_come).filter(|_| goes_after);
         let trust = self.trust(target);
@@ -83,6 +84,7 @@ impl ArcFollow {
             Some(way) => (way, 1.0),
             None => (aim, self.config.gain()),
         };
+        // The slower the robot drives, the more it may turn on the spot.
         let facing = trust * (1.0 - speed_mps / max) * self.facing_rate(&towards);
         let turn_rate = speed_mps * self.curvature(&towards, gain)? + facing;
         let twist = self.within_limits(Twist { speed_mps, turn_rate }, scene);
@@ -110,7 +112,7 @@ impl ArcFollow {
         WheelSpeeds::STOP
     }
 
-    /// How far to believe in somebody who is coasting: 1, then less, then 0.
+    /// Returns the weight of a target that is coasting: 1, then less, then 0.
     fn trust(&self, target: &Track) -> f64 {
         let left = 2.0 * (1.0 - target.unseen_s / self.config.max_unseen_s);
         if left > 0.0 { left.min(1.0) } else { 0.0 }
@@ -124,6 +126,7 @@ impl ArcFollow {
         }
         let [off, on] = self.config.turning_bounds();
         let bound = if self.turning.is_some() { off } else { on };
+        // The direction of a turn is kept behind the robot, where the bearing jumps by a full turn.
         let way = self.turning.filter(|_| aim.bearing.abs() > FRAC_PI_2);
         (aim.bearing.abs() > bound).then(|| way.unwrap_or(aim.bearing.signum()))
     }
@@ -136,6 +139,7 @@ impl ArcFollow {
         if config.as_printed {
             return speed;
         }
+        // A robot that faces away turns first.
         let ahead = aim.bearing.cos().max(0.0);
         if self.turning.is_some() { 0.0 } else { speed * ahead * ahead }
     }
@@ -155,11 +159,12 @@ impl ArcFollow {
             return curvature.is_finite().then_some(curvature);
         }
         let range = aim.range_m.max(config.min_range_m);
+        // Near the robot the curvature is limited, because it grows without bound there.
         let curvature = 2.0 * gain * aim.sine * (aim.range_m / range) / range;
         Some(curvature.clamp(-config.max_curvature, config.max_curvature))
     }
 
-    /// How fast a standing robot turns to face the target, rad/s.
+    /// Returns the turn rate of a standing robot towards the target, rad/s.
     fn facing_rate(&self, aim: &Aim) -> f64 {
         let config = &self.config;
         let is_straight = config.path == Path::B && self.turning.is_none();
@@ -179,6 +184,7 @@ impl ArcFollow {
         let by_speed = scene.max_speed_mps / (twist.speed_mps + rim);
         let by_turn = self.config.max_turn_rate / twist.turn_rate.abs();
         let scale = if self.config.as_printed { by_speed } else { by_speed.min(by_turn) }.min(1.0);
+        // Both by the same factor, so that the curvature stays.
         Twist { speed_mps: twist.speed_mps * scale, turn_rate: twist.turn_rate * scale }
     }
 }

@@ -1,19 +1,17 @@
-//! `arc-follow`: follows a person on circular paths (P1, section 3; P4,
-//! section IV).
+//! `arc-follow`: follows a person on circular paths (P1, section 3; P4, section IV).
 //!
-//! The circle that leaves along the robot's heading and meets a target at
-//! (X, Y) has the radius `rho = (X² + Y²) / (2 Y)`; the wheels run at
-//! `v (1 ∓ d / rho)`. Path A drives on it, path B turns first and then drives
-//! straight, path C divides the radius by k and so turns while driving.
+//! The circle that leaves along the robot's heading and meets a target at (X, Y) has the radius
+//! `rho = (X² + Y²) / (2 Y)`; the wheels run at `v (1 ∓ d / rho)`. Path A drives on it, path B
+//! turns first and then drives straight, path C divides the radius by k and so turns while driving.
 //!
-//! In polar terms the turn rate is `2 k v sin(bearing) / range`, which is pure
-//! pursuit with the target itself as the look-ahead point. A target at rest then
-//! keeps `sin(bearing) / range^(2k - 1)` constant: k = 1 stays on the circle,
-//! k = 2 has almost turned towards the target long before it is there.
+//! In polar terms the turn rate is `2 k v sin(bearing) / range`, which is pure pursuit with the
+//! target itself as the look-ahead point. A target at rest then keeps `sin(bearing) / range^(2k -
+//! 1)` constant: k = 1 stays on the circle, k = 2 has almost turned towards the target long before
+//! it is there.
 //!
-//! The papers leave open how fast to drive, and their law cannot turn a robot
-//! at rest, drives away from whoever stands behind it, and divides by zero at
-//! the origin. What is done about it is in the README, each with its test.
+//! The papers leave open how fast to drive, and their law cannot turn a robot at rest, drives away
+//! from a person behind it, and divides by zero at the origin. The README lists the remedies, each
+//! with its test.
 
 mod aim;
 mod config;

@@ -1,4 +1,4 @@
-//! What the README says of the controller.
+//! The statements of the README about the controller.
 
 mod laws;
 mod states;
@@ -39,15 +39,15 @@ fn turn_rate(wheels: WheelSpeeds) -> f64 {
     (wheels.right - wheels.left) / (2.0 * WHEELS.half_separation_m)
 }
 
-/// A controller, and a person who is there for so long that the speed is no
-/// longer held back by the acceleration.
+/// Returns the command of a controller for a person that has been there for so long that the
+/// acceleration does not limit the speed any longer.
 fn settled(config: Config, person: &Track) -> WheelSpeeds {
     let mut controller = ArcFollow::new(config).unwrap();
     let steps = (0..40).map(|_| command(&mut controller, EgoMotion::at_rest(0.1), Some(person)));
     steps.last().unwrap()
 }
 
-/// A robot that does at once what it is told, or `delay` steps later.
+/// A robot that executes commands at once, or `delay` steps later.
 struct Drive {
     controller: ArcFollow,
     pose: Isometry2<f64>,
@@ -67,7 +67,7 @@ impl Drive {
         }
     }
 
-    /// The person, who is at a place in the world, in robot axes.
+    /// Returns the person at a place in the world, in robot axes.
     fn seen(&self, place: Point2<f64>, velocity: Vector2<f64>) -> Track {
         let at = self.pose.inverse_transform_point(&place);
         target(at.x, at.y, self.pose.inverse_transform_vector(&velocity))
@@ -79,7 +79,7 @@ impl Drive {
         (at.x.hypot(at.y), at.y.atan2(at.x))
     }
 
-    /// One step; what was commanded in it.
+    /// Executes one step; returns its command.
     fn step(&mut self, place: Point2<f64>, velocity: Vector2<f64>) -> WheelSpeeds {
         let seen = self.seen(place, velocity);
         let wheels = command(&mut self.controller, self.motion, Some(&seen));

@@ -16,18 +16,20 @@ pub(crate) struct Trail {
 }
 
 impl Trail {
-    /// The robot has moved, and the person is at a place. What the robot has passed is
-    /// forgotten, and all of it if it was somebody else's.
+    /// Moves the trail along with the robot and adds the person's place. The part that the robot
+    /// has passed is forgotten, and all of it if it was another person's.
     pub(crate) fn go_on(&mut self, motion: &EgoMotion, whose: TrackId, place: Point2<f64>) {
         if self.whose != Some(whose) {
             *self = Self { whose: Some(whose), points: VecDeque::new() };
         }
         self.points.iter_mut().for_each(|point| *point = motion.apply_to_point(*point));
+        // Points closer together would be the noise of a standing person.
         let is_new = |last: &Point2<f64>| distance(last, &place) >= APART_M;
         if self.points.back().is_none_or(is_new) {
             self.points.push_back(place);
         }
         self.points.retain(|point| point.iter().all(|v| v.is_finite()));
+        // The part up to the nearest point is behind the robot.
         self.points.drain(..self.nearest().max(self.points.len().saturating_sub(POINTS)));
     }
 

@@ -29,8 +29,7 @@ pub struct Config {
     /// Overlap, as P2 prints it (eq. 10): a pair that overlaps less costs nothing, and
     /// so comes first.
     pub compat_printed_cost: bool,
-    /// What it costs to leave a track without a detection, as a multiple of
-    /// the cost at the gate.
+    /// Cost of leaving a track without a detection, as a multiple of the cost at the gate.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub miss_factor: f64,
 }

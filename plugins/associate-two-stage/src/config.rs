@@ -25,8 +25,7 @@ pub struct Config {
     pub min_overlap: f64,
     /// Overlap: `iou` or `dice`.
     pub overlap: Overlap,
-    /// What it costs to leave a track without a detection, as a multiple of the cost at the
-    /// gate.
+    /// Cost of leaving a track without a detection, as a multiple of the cost at the gate.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub miss_factor: f64,
     /// Detections from these log-odds on are strong.

@@ -12,9 +12,9 @@ pub struct Config {
     /// Log-odds of one frame are limited to plus and minus this: one look is
     /// never beyond doubt.
     pub limit: f64,
-    /// Added to what one look says, log-odds. Below zero the verifier is stricter.
+    /// Added to the evidence of each frame, log-odds. Below zero the verifier is stricter.
     pub bias: f64,
-    /// How a model is fitted; only `tagalong train` reads it.
+    /// Fit of a model; only `tagalong train` reads it.
     pub training: Training,
 }
 
@@ -30,11 +30,11 @@ impl Default for Config {
     }
 }
 
-/// How a model is fitted.
+/// Fit of a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
-    /// How often each candidate is looked at, each time a little changed.
+    /// Number of passes over the candidates, each time a little changed.
     pub epochs: u32,
     /// Largest step of a weight.
     pub rate: f64,

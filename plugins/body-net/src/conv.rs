@@ -41,8 +41,8 @@ fn cell_mut<const N: usize>(values: &mut [f32], index: usize) -> &mut [f32; N] {
     &mut values.as_chunks_mut::<N>().0[index]
 }
 
-/// A convolution of `SIZE` by `SIZE` cells at every second cell, and what is below zero
-/// cut off: `out = max(0, bias + sum over taps and inputs of weight * input)`.
+/// Convolution of `SIZE` by `SIZE` cells at every second cell, followed by a rectifier: `out =
+/// max(0, bias + sum over taps and inputs of weight * input)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conv<const IN: usize, const OUT: usize, const SIZE: usize> {
     /// Of each tap, row by row, of each input: the weights of the outputs.
@@ -112,7 +112,7 @@ impl<const IN: usize, const OUT: usize, const SIZE: usize> Conv<IN, OUT, SIZE> {
                     for across in taps::<SIZE>(column, input.columns) {
                         let (seen, first) = Self::tap(input, [row, column], [up, across]);
                         for (i, value) in seen.iter().enumerate() {
-                            // What is cut off in the layer before depends on nothing.
+                            // The gradient of a rectified zero is zero.
                             if *value == 0.0 {
                                 continue;
                             }
@@ -128,7 +128,7 @@ impl<const IN: usize, const OUT: usize, const SIZE: usize> Conv<IN, OUT, SIZE> {
         }
     }
 
-    /// What an output sees through a tap, and the first of the tap's weights.
+    /// Returns the inputs of an output through a tap, and the first of the tap's weights.
     #[inline(always)]
     fn tap(input: &Map<IN>, out: [usize; 2], tap: [usize; 2]) -> (&[f32; IN], usize) {
         let [y, x] = place::<SIZE>(out, tap);

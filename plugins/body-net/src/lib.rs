@@ -1,9 +1,9 @@
-//! Doubts candidates by what a small convolutional network makes of all of them.
+//! Verifies candidates by a small convolutional network on their whole bodies.
 //!
-//! An upright plane through the candidate, from the floor to 2 m, is sampled in
-//! intensity and depth ([`NetworkInput`]), always at one scale. A network of four layers
-//! ([`Net`]) turns it into log-odds ([`Model`]). Where there is no depth it says nothing:
-//! where the candidate is would be a guess.
+//! An upright plane through the candidate, from the floor to 2 m, is sampled in intensity and depth
+//! ([`NetworkInput`]), always at one scale. A network of four layers ([`Net`]) turns it into
+//! log-odds ([`Model`]). Without depth it gives no evidence, because the place of the candidate
+//! would be a guess.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 

@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use crate::{Net, NetworkInput, Pass};
 
-/// A network, and the straight line that turns what it says into log-odds.
+/// A network, and the straight line that turns its output into log-odds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// The network.

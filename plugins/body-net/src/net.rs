@@ -3,8 +3,8 @@ use multiversion::multiversion;
 use crate::conv::{Conv, Map};
 use crate::view::NetworkInput;
 
-/// Added to the standard deviation of the intensities before they are divided by it:
-/// what is even has no texture.
+/// Added to the standard deviation of the intensities before they are divided by it: an even
+/// surface has no texture.
 const NOISE: f32 = 8.0;
 
 /// Channels of the first layer, and with the two of the depth.
@@ -28,7 +28,7 @@ pub struct Net {
     pub(crate) bias: Vec<f32>,
 }
 
-/// What the layers say of one view.
+/// Activations of the layers on one view.
 #[derive(Clone, Debug)]
 pub struct Pass {
     grey: Map<1>,
@@ -119,7 +119,7 @@ impl Net {
         ]
     }
 
-    /// Inputs of one output of each part; zero for what starts at zero.
+    /// Number of inputs of one output of each part; zero for parts that start at zero.
     #[cfg(feature = "train")]
     pub(crate) const INPUTS: [usize; 10] = [
         Conv::<1, FIRST, 5>::INPUTS,
@@ -134,7 +134,7 @@ impl Net {
         0,
     ];
 
-    /// What the network says of a view; above zero it is rather a person.
+    /// Returns the output of the network on a view; above zero it is rather a person.
     pub fn look(&self, view: &NetworkInput, pass: &mut Pass) -> f32 {
         pass.show(view);
         forward(self, pass)

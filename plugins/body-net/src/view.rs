@@ -10,12 +10,11 @@ const STEP_M: f32 = 0.01;
 /// Depth that is not known.
 const UNKNOWN: i8 = i8::MIN;
 
-/// What the network sees of a candidate: an upright plane through it, in intensity and
-/// in depth.
+/// Input of the network: an upright plane through the candidate, in intensity and in depth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkInput {
     pub(crate) grey: Vec<u8>,
-    /// How far what is seen is behind the plane, in hundredths of a metre.
+    /// Distance of the surface behind the plane, in hundredths of a metre.
     pub(crate) behind: Vec<i8>,
 }
 
@@ -36,6 +35,7 @@ impl NetworkInput {
             return Ok(None);
         };
         let steps = |behind_m: Option<f32>| {
+            // A surface farther from the plane than this is not part of the person anyway.
             behind_m.map_or(UNKNOWN, |m| (m.clamp(-REACH_M, REACH_M) / STEP_M).round() as i8)
         };
         Ok(plane.grey(grey).map(|seen| Self {

@@ -35,7 +35,7 @@ impl NearestObstacles {
         self.things.iter().flatten().map(|thing| thing.at)
     }
 
-    /// The robot has moved; what is older than `memory_s` is forgotten.
+    /// Moves the memory along with the robot; points older than `memory_s` are forgotten.
     pub(crate) fn move_along(&mut self, motion: &EgoMotion, memory_s: f64) {
         let before = std::mem::replace(&mut self.things, vec![None; DIRECTIONS]);
         for thing in before.into_iter().flatten() {
@@ -46,8 +46,8 @@ impl NearestObstacles {
         }
     }
 
-    /// Takes in a depth image: what it shows replaces what was remembered there.
-    /// Points between the `heights`, m, count that `is_thing` says yes to.
+    /// Adds a depth image: its points replace those remembered in the same directions. Points
+    /// between the `heights`, m, count for which `is_thing` returns true.
     pub(crate) fn look(
         &mut self,
         camera: &Camera,
@@ -55,6 +55,7 @@ impl NearestObstacles {
         heights: [f64; 2],
         is_thing: impl Fn(&Point2<f64>) -> bool,
     ) {
+        // A grid of pixels is enough: an obstacle of some size covers many.
         let across = depth.width().div_ceil(COLUMNS).max(1);
         let down = depth.height().div_ceil(ROWS).max(1);
         let mut seen = vec![None; DIRECTIONS];
@@ -75,6 +76,7 @@ impl NearestObstacles {
                 }
             }
         }
+        // Directions that the image did not show keep their memory.
         for (direction, thing) in seen.into_iter().enumerate().filter(|(d, _)| looked[*d]) {
             self.things[direction] = thing;
         }
@@ -94,7 +96,7 @@ fn keep_nearer(place: &mut Option<Obstacle>, thing: Obstacle) {
     }
 }
 
-/// The direction of a place; `None` for what is far away or not a number.
+/// Returns the direction of a place; `None` for a place that is far away or not a number.
 fn direction(at: &Point2<f64>) -> Option<usize> {
     let part = at.y.atan2(at.x).rem_euclid(TAU) / TAU;
     let direction = (part * DIRECTIONS as f64) as usize % DIRECTIONS;

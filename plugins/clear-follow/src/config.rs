@@ -26,8 +26,8 @@ pub struct Config {
     /// Slows down by at most this much, m/s².
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_deceleration: f64,
-    /// Drives after a person who is not seen for half of this time, then slows
-    /// down, and stands still at the end of it, s.
+    /// Drives after a person that is not seen for half of this time, then slows down, and stands
+    /// still at the end of it, s.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_unseen_s: f64,
     /// From the capture of an image until the wheels answer to it, s.
@@ -47,14 +47,13 @@ pub struct Config {
     /// Remembers things out of sight for this long, s.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub memory_s: f64,
-    /// What it costs to have no room at all; a change of the speed by its whole
-    /// limit costs one.
+    /// Cost of having no free distance at all; a change of the speed by its whole limit costs one.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub room_weight: f64,
-    /// What it costs to have somebody right before the person.
+    /// Cost of another person right before the target.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub sight_weight: f64,
-    /// What it costs to turn differently, for each rad/s.
+    /// Cost of a different turn rate, for each rad/s.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub turn_weight: f64,
 }

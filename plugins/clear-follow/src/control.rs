@@ -9,7 +9,7 @@ use crate::plan::{PlanningInput, Twist, Walker, plan};
 
 /// A longer pause between frames counts as this one, s.
 const LONGEST_STEP_S: f64 = 0.5;
-/// Points this near to somebody are that person, m.
+/// Distance within which points belong to a person, m.
 const PERSON_M: f64 = 0.45;
 /// The person is never nearer than this to the law that turns, m.
 const LEAST_RANGE_M: f64 = 0.5;
@@ -31,6 +31,7 @@ impl Controller for ClearFollow {
 
     fn command(&mut self, scene: &Scene<'_>) -> WheelSpeeds {
         let motion = &scene.frame.motion;
+        // After a long pause the speed must not jump.
         let dt = if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 };
         self.history.age(dt);
         self.look(scene);
@@ -58,7 +59,7 @@ impl ClearFollow {
         Ok(Self { config, around: NearestObstacles::new(), speed_mps: 0.0, history })
     }
 
-    /// What stands around; people walk and are told apart.
+    /// Updates the obstacles; people are kept apart from them, because they walk.
     fn look(&mut self, scene: &Scene<'_>) {
         let people: Vec<Point2<f64>> = scene
             .tracks
@@ -66,6 +67,7 @@ impl ClearFollow {
             .chain(scene.target)
             .map(|t| t.estimate.person.position.xy())
             .collect();
+        // Points on people are not obstacles: they walk, and the target would stop the robot.
         let is_thing =
             |at: &Point2<f64>| people.iter().all(|p| nalgebra::distance(p, at) > PERSON_M);
         self.around.move_along(&scene.frame.motion, self.config.memory_s);
@@ -81,6 +83,7 @@ impl ClearFollow {
             return None;
         }
         let target = scene.target?;
+        // The command acts only after the latency, so the plan starts where the robot will be then.
         let to_come = self.history.forecast(wheels);
         let person = walker(target, &to_come)?;
         let nominal = self.nominal(&person, self.trust(target), max_mps);
@@ -94,18 +97,20 @@ impl ClearFollow {
         Some(of_wheels(twist, wheels.half_separation_m, max_mps))
     }
 
-    /// What would be right in an empty room: to face the person, and to keep the
-    /// distance.
+    /// Returns the command for an empty room: to face the person, and to keep the distance.
     fn nominal(&self, person: &Walker, trust: f64, max_mps: f64) -> Twist {
         let config = &self.config;
         let range_m = person.at.coords.norm();
         let bearing = person.at.y.atan2(person.at.x);
         let towards = person.at.coords.try_normalize(1e-6).unwrap_or_else(Vector2::x);
+        // A person that walks across the line of sight turns it; the least range keeps the quotient
+        // finite.
         let around = towards.perp(&person.velocity) / range_m.max(LEAST_RANGE_M);
         let turn = config.bearing_gain_per_s * bearing + around;
         let turn_rate = trust * turn.clamp(-config.max_turn_rate, config.max_turn_rate);
         let recedes = person.velocity.dot(&towards).max(0.0);
         let wanted = config.range_gain_per_s * (range_m - config.stand_off_m) + recedes;
+        // A robot that faces away turns first.
         let ahead = bearing.cos().max(0.0).powi(2);
         let speed_mps = (wanted.clamp(0.0, max_mps) * ahead).min(trust * max_mps);
         Twist { speed_mps, turn_rate }
@@ -118,19 +123,20 @@ impl ClearFollow {
         let most = self.speed_mps + self.config.max_acceleration * dt;
         let speed_mps = planned.speed_mps.clamp(least, most).max(0.0);
         let detour = planned.turn_rate - nominal.turn_rate;
+        // At a speed that is not reached yet the whole detour would turn too sharply.
         let share = if planned.speed_mps > 0.0 { speed_mps / planned.speed_mps } else { 1.0 };
         Twist { speed_mps, turn_rate: nominal.turn_rate + detour * share.min(1.0) }
     }
 
-    /// How far to believe in somebody who is coasting: 1, then less, then 0.
+    /// Returns the weight of a target that is coasting: 1, then less, then 0.
     fn trust(&self, target: &Track) -> f64 {
         let left = 2.0 * (1.0 - target.unseen_s / self.config.max_unseen_s);
         if left > 0.0 { left.min(1.0) } else { 0.0 }
     }
 }
 
-/// Somebody as the robot will see them after its motion to come; `None` if they
-/// are nowhere.
+/// Returns a person in the axes of the robot after its motion to come; `None` if the place is not
+/// finite.
 fn walker(track: &Track, to_come: &EgoMotion) -> Option<Walker> {
     let person = &track.estimate.person;
     let is_known = person.velocity.iter().all(|v| v.abs() < MOST);
@@ -143,6 +149,7 @@ fn walker(track: &Track, to_come: &EgoMotion) -> Option<Walker> {
 /// Slower where the wheels cannot do it, on the same arc.
 fn of_wheels(twist: Twist, half_separation_m: f64, max_mps: f64) -> WheelSpeeds {
     let rim = twist.turn_rate * half_separation_m;
+    // Both wheels by the same factor, so that the curvature stays.
     let scale = (max_mps / (twist.speed_mps.abs() + rim.abs()).max(max_mps)).min(1.0);
     WheelSpeeds { left: (twist.speed_mps - rim) * scale, right: (twist.speed_mps + rim) * scale }
 }

@@ -4,13 +4,13 @@ use crate::config::Config;
 
 /// The horizon is looked at in so many steps.
 const STEPS: u32 = 6;
-/// What is left of the speed.
+/// Factors on the speed.
 const SPEEDS: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.0];
-/// What is added to the turn rate, rad/s, to the side to which it turns.
+/// Changes of the turn rate, rad/s, to the side to which it turns.
 const TURNS: [f64; 9] = [0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9];
 /// Radius of a person, m.
 const PERSON_M: f64 = 0.25;
-/// Somebody nearer than this to the line of sight hides the person, m.
+/// Distance from the line of sight within which another person hides the target, m.
 const SIGHT_M: f64 = 0.35;
 
 /// Forward speed, m/s, and turn rate, rad/s, to the left positive.
@@ -26,12 +26,13 @@ impl Twist {
         let turn = self.turn_rate * seconds;
         let half = 0.5 * turn;
         let chord =
+            // The chord of a short arc is its length; the quotient would be 0 / 0.
             self.speed_mps * seconds * if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
         Isometry2::new(Vector2::new(half.cos(), half.sin()) * chord, turn)
     }
 }
 
-/// Somebody who walks, as the robot will see it when the wheels answer.
+/// Walking person, in the axes of the robot when the wheels answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Walker {
     pub(crate) at: Point2<f64>,
@@ -44,7 +45,7 @@ impl Walker {
     }
 }
 
-/// What a plan has to mind, as the robot will see it when the wheels answer.
+/// Input of a plan, in the axes of the robot when the wheels answer.
 pub(crate) struct PlanningInput<'a> {
     pub(crate) things: &'a [Point2<f64>],
     pub(crate) others: &'a [Walker],
@@ -54,6 +55,7 @@ pub(crate) struct PlanningInput<'a> {
 
 /// The cheapest change of a twist.
 pub(crate) fn plan(config: &Config, nominal: Twist, around: &PlanningInput<'_>) -> Twist {
+    // Changes to the side of the turn come first, so that ties do not turn away from the person.
     let side = if nominal.turn_rate < 0.0 { -1.0 } else { 1.0 };
     let limit = config.max_turn_rate;
     let candidates = SPEEDS.iter().flat_map(|part| {
@@ -70,6 +72,7 @@ fn cost(config: &Config, nominal: Twist, twist: Twist, around: &PlanningInput<'_
     let slower = (nominal.speed_mps - twist.speed_mps).abs() / around.max_mps;
     let turned = (nominal.turn_rate - twist.turn_rate).abs();
     let room = clearance(config, twist, around) / config.room_m;
+    // The cost is bounded, so that all plans in a tight place stay comparable.
     let tight = (1.0 - room).clamp(0.0, 2.0);
     slower
         + config.turn_weight * turned
@@ -80,6 +83,7 @@ fn cost(config: &Config, nominal: Twist, twist: Twist, around: &PlanningInput<'_
 /// The least room to things and people on the way, m. A robot that does not drive
 /// comes nearer to nothing.
 fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
+    // A standing robot comes nearer to nothing.
     if twist.speed_mps <= 0.0 {
         return f64::INFINITY;
     }
@@ -96,7 +100,8 @@ fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     least
 }
 
-/// How far somebody else is before the person at the end of the horizon, 0 to 1.
+/// Returns the degree to which another person is before the target at the end of the horizon, 0 to
+/// 1.
 fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     let pose = twist.after(config.horizon_s);
     let seen =
@@ -106,6 +111,7 @@ fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     let before = |other: &Walker| {
         let at = seen(other);
         let (along, aside) = (at.dot(&sight), at.perp(&sight).abs());
+        // A person behind the target, or behind the robot, hides nothing.
         let between = along > 0.0 && along < person.norm() - PERSON_M;
         if between { (1.0 - aside / SIGHT_M).max(0.0) } else { 0.0 }
     };

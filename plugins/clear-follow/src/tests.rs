@@ -1,4 +1,4 @@
-//! What the README says of the controller.
+//! The statements of the README about the controller.
 
 use std::sync::Arc;
 
@@ -34,8 +34,8 @@ fn command(
     controller.command(&scene)
 }
 
-/// Follows somebody whose place in the world is given for each time, for some
-/// seconds; hands out range and bearing at the end.
+/// Follows a person whose place in the world is given for each time, for some seconds; returns
+/// range and bearing at the end.
 fn ride(config: Config, seconds: f64, person: impl Fn(f64) -> Point2<f64>) -> (f64, f64) {
     let mut controller = ClearFollow::new(config).unwrap();
     let (mut pose, mut motion, dt) = (Isometry2::identity(), EgoMotion::at_rest(0.1), 0.1);

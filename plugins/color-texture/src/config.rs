@@ -12,10 +12,10 @@ pub struct Config {
     /// Log-odds of one frame are limited to plus and minus this: one look is
     /// never beyond doubt.
     pub limit: f64,
-    /// Added to what one look says, log-odds: what is known before it. Below
-    /// zero the verifier is stricter.
+    /// Prior evidence, added to the evidence of each frame, log-odds. Below zero the verifier is
+    /// stricter.
     pub bias: f64,
-    /// How a model is fitted; only `tagalong train` reads it.
+    /// Fit of a model; only `tagalong train` reads it.
     pub training: Training,
 }
 
@@ -31,7 +31,7 @@ impl Default for Config {
     }
 }
 
-/// How a model is fitted.
+/// Fit of a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {

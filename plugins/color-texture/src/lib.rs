@@ -1,14 +1,11 @@
-//! Doubts candidates by colour and texture, as P1 asks of whatever follows its
-//! silhouettes, and by the shape of their surface in depth.
+//! Doubts candidates by colour and texture, as P1 demands after its silhouettes, and by the shape
+//! of their surface in depth.
 //!
-//! A candidate is reduced to numbers
-//! ([`Features`]): gradients, local binary patterns, colours of head and torso,
-//! what the depth says beyond the silhouette that the detector has
-//! already matched (a coat stand is thin below, a poster is flat, a plant is
-//! rough), and the gradients of all that is there from the floor up. A sum of
-//! small trees of decisions ([`Model`]) turns them into log-odds. What a frame
-//! does not show, colour in a grey log or depth in a photograph, says neither
-//! yes nor no.
+//! A candidate is reduced to numbers ([`Features`]): gradients, local binary patterns, colours of
+//! head and torso, the depth beyond the silhouette that the detector has already matched (a coat
+//! stand is thin below, a poster is flat, a plant is rough), and the gradients of all that is there
+//! from the floor up. A sum of small trees of decisions ([`Model`]) turns them into log-odds.
+//! Features that a frame lacks, colour in a grey log or depth in a photograph, have no vote.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 

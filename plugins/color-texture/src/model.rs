@@ -2,8 +2,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{COUNT, Features};
 
-/// A decision by one number: what it adds to the sum where the number is below
-/// a threshold and where it is not. A number that is not known adds nothing.
+/// A decision by one feature: its votes where the feature is below a threshold and where it is not.
+/// An unknown feature has no vote.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "(usize, f32, f32, f32)", into = "(usize, f32, f32, f32)")]
 pub struct Stump {
@@ -30,7 +30,7 @@ impl From<Stump> for (usize, f32, f32, f32) {
 }
 
 impl Stump {
-    /// What it adds for a value of its number.
+    /// Returns the vote for a value of its feature.
     pub fn vote(&self, value: f32) -> f32 {
         if value.is_nan() {
             0.0
@@ -71,10 +71,11 @@ impl From<Tree> for (usize, f32, Stump, Stump) {
 }
 
 impl Tree {
-    /// What it adds for the numbers of a candidate.
+    /// Returns the vote for the features of a candidate.
     pub fn vote(&self, values: &[f32]) -> f32 {
         let value = |feature: usize| values.get(feature).copied().unwrap_or(f32::NAN);
         let first = value(self.feature);
+        // A tree without its first feature has no vote.
         if first.is_nan() {
             return 0.0;
         }
@@ -109,7 +110,7 @@ pub struct Model {
 #[serde(deny_unknown_fields)]
 struct File {
     format: String,
-    /// How many numbers its trees choose from.
+    /// Number of features that its trees choose from.
     features: usize,
     slope: f64,
     offset: f64,
@@ -150,6 +151,7 @@ impl Model {
         if file.format != FORMAT {
             return Err(format!("the format is `{}`, not `{FORMAT}`", file.format));
         }
+        // A model of other features would vote on the wrong numbers.
         if file.features != COUNT || file.trees.iter().flat_map(Tree::features).any(|f| f >= COUNT)
         {
             return Err(format!("it is not made of the {COUNT} numbers of this program"));

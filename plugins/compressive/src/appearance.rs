@@ -1,6 +1,6 @@
 //! The naive Bayes classifier (P2, eqs 4 to 6).
 
-/// What boxes on a person look like, and what boxes beside them.
+/// Distributions of the features of boxes on a person, and of boxes beside them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appearance {
     person: Normals,
@@ -51,7 +51,7 @@ impl Samples {
         }
     }
 
-    /// How many there are.
+    /// Returns the number of features.
     pub fn len(&self) -> usize {
         self.count
     }

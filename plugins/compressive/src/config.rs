@@ -24,7 +24,7 @@ pub struct Config {
     /// never changed so far must not decide alone.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub min_sigma: f64,
-    /// How far from the expected place boxes are searched, widths.
+    /// Largest distance of searched boxes from the expected place, widths.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub search_radius: f64,
     /// Distance of the boxes of the coarse search, widths.
@@ -34,10 +34,10 @@ pub struct Config {
     /// pixel as long as the boxes are small.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub fine_radius: f64,
-    /// Boxes this near to the person teach what they look like, widths.
+    /// Boxes this near to the person are positive examples, widths.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub positive_radius: f64,
-    /// Boxes at least so far teach what they do not look like, widths, ...
+    /// Boxes at least so far are negative examples, widths, ...
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub negative_from: f64,
     /// ... and at most so far.
@@ -48,10 +48,10 @@ pub struct Config {
     pub negatives: usize,
     /// Drops boxes that do not show something at the person's distance.
     pub depth_filter: bool,
-    /// What is nearer than this to the expected distance may be the person, m.
+    /// Readings that differ by less than this from the expected distance may be of the person, m.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub depth_tolerance_m: f64,
-    /// Whatever is nearer than the person by more than this hides them, m.
+    /// Readings nearer than the person by more than this are of an occluder, m.
     pub hidden_by_m: f64,
     /// Takes the size of the box from the distance.
     pub scale_from_depth: bool,
@@ -74,7 +74,7 @@ pub struct Config {
     /// Standard deviation of a distance from the depth image, m.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub sigma_depth_m: f64,
-    /// As in the papers: learn in every frame, whoever is in the box.
+    /// As in the papers: learn in every frame, even if the box may show another person.
     pub compat_always_learn: bool,
     /// As in the public code: the model starts at mean 0 and deviation 1 and
     /// meets its first frame with the same weight as any other.

@@ -1,12 +1,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Point3};
+use nalgebra::Matrix3;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
     Track, TrackId,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, PointEstimate, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
@@ -23,7 +23,7 @@ const OTHER_MODE: f64 = 0.5;
 /// The standard deviation of a distance that is only expected, as a fraction.
 const SIGMA_EXPECTED: f64 = 0.5;
 
-/// Follows people by what they look like.
+/// Follows people by their appearance.
 pub struct Compressive {
     config: Config,
     features: Features,
@@ -31,7 +31,7 @@ pub struct Compressive {
     scratch: Scratch,
 }
 
-/// What is kept of a person.
+/// Memory of one person.
 struct Target {
     appearance: Appearance,
     /// It has learnt from a frame at least.
@@ -171,8 +171,7 @@ impl Compressive {
     }
 }
 
-/// Weight of the past for what this frame teaches; `None` where nothing is to
-/// be learnt.
+/// Returns the weight of the past against this frame; `None` where nothing is to be learned.
 fn memory(config: &Config, track: &Track, found: Option<(Rect, f32)>, is_new: bool) -> Option<f64> {
     let is_clear = track.seen && !track.occluded;
     if is_new && is_clear {
@@ -230,8 +229,8 @@ impl Target {
         }
     }
 
-    /// Takes the size that the person should have now: that of the expected box,
-    /// or what the distance says, without jumps. `None` if the box is too small.
+    /// Takes the size that the person should have now: that of the expected box, or that of the
+    /// measured distance, without jumps. `None` if the box is too small.
     fn resize(
         &mut self,
         config: &Config,
@@ -325,9 +324,8 @@ impl Hunt<'_> {
         Some(finest)
     }
 
-    /// How sure the box with this upper left corner is; `None` where it is not
-    /// looked at. The fine search has no depth test: its boxes are those of one
-    /// that passed.
+    /// Scores the box with this upper left corner; `None` where it is skipped. The fine search has
+    /// no depth test: its boxes are those of one that passed.
     fn look(&mut self, x: i64, y: i64, dropped: Option<&mut Dropped>) -> Option<Scored> {
         if !self.target.scaled.fits(&self.view.integral, x, y) {
             dropped.into_iter().for_each(|d| d.outside += 1);
@@ -404,18 +402,18 @@ fn sighting(
         Some(face_m) => (face_m + HEAD_RADIUS_M, config.sigma_depth_m),
         None => (camera.depth_of(&expected), SIGMA_EXPECTED * camera.depth_of(&expected)),
     };
-    let place = |head_m: f64| -> Option<(Point3<f64>, Matrix3<f64>)> {
+    let place = |head_m: f64| -> Option<PointEstimate> {
         let before = track.estimate.region;
         let shift = region.centre() - before.centre();
         let pixel = camera.project(&expected)?;
         let grown = region.width / before.width.max(1.0);
         let pixel = before.centre() + shift + (pixel - before.centre()) * grown;
         let sigma_px = config.sigma_box * region.width;
-        let covariance = camera.covariance(pixel, head_m, sigma_px, sigma_m);
-        Some((camera.back_project(pixel, head_m), covariance))
+        Some(camera.locate(pixel, head_m, sigma_px, sigma_m))
     };
-    let unknown = (expected, Matrix3::identity() * 100.0);
-    let (position, covariance) = place(head_m).unwrap_or(unknown);
+    // A person behind the camera has no pixel: the answer is as good as none.
+    let unknown = PointEstimate { position: expected, covariance: Matrix3::identity() * 100.0 };
+    let PointEstimate { position, covariance } = place(head_m).unwrap_or(unknown);
     Detection { region, position, covariance, score: config.score, source: NAME }
 }
 

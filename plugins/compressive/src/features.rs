@@ -1,8 +1,7 @@
 //! Signed rectangles: the sparse random projection of P2, eqs 1 to 3.
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use tagalong_core::GreyImage;
+use tagalong_stats::{ChaCha, RandomSource};
 use tagalong_vision::Integral;
 
 /// A rectangle in a box of size 1 by 1, with its weight.
@@ -29,8 +28,8 @@ impl Features {
     /// four entries other than 0 on average, of either sign; they are scaled by
     /// the root of their number, so that all lists vary alike.
     pub fn draw(count: usize, most: usize, seed: u64) -> Self {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let list = |random: &mut ChaCha8Rng| {
+        let mut random = ChaCha::new(seed, 0);
+        let list = |random: &mut ChaCha| {
             let rectangles = 2 + below(random, most.max(2) - 1);
             let weight = 1.0 / (rectangles as f64).sqrt();
             (0..rectangles).map(|_| rectangle(random, weight)).collect()
@@ -38,7 +37,7 @@ impl Features {
         Self((0..count).map(|_| list(&mut random)).collect())
     }
 
-    /// How many numbers describe a box.
+    /// Returns the number of features of a box.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -98,24 +97,21 @@ impl Rectangle {
     }
 }
 
-fn rectangle(random: &mut ChaCha8Rng, weight: f64) -> Rectangle {
-    let width = 0.05 + 0.45 * uniform(random);
-    let height = 0.05 + 0.45 * uniform(random);
+fn rectangle(random: &mut ChaCha, weight: f64) -> Rectangle {
+    let width = 0.05 + 0.45 * random.uniform();
+    let height = 0.05 + 0.45 * random.uniform();
     Rectangle {
-        left: uniform(random) * (1.0 - width),
-        top: uniform(random) * (1.0 - height),
+        left: random.uniform() * (1.0 - width),
+        top: random.uniform() * (1.0 - height),
         width,
         height,
         weight: if below(random, 2) == 0 { weight } else { -weight },
     }
 }
 
-fn uniform(random: &mut ChaCha8Rng) -> f64 {
-    (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-fn below(random: &mut ChaCha8Rng, end: usize) -> usize {
-    ((uniform(random) * end as f64) as usize).min(end - 1)
+fn below(random: &mut ChaCha, end: usize) -> usize {
+    // Rounding can give `end` itself.
+    ((random.uniform() * end as f64) as usize).min(end - 1)
 }
 
 /// The rectangles for boxes of one size, as places in an integral image.

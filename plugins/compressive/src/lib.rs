@@ -1,21 +1,19 @@
-//! `compressive`: where is this person now, by what they look like (P2, section
-//! III-C; K. Zhang, L. Zhang and M.-H. Yang, *Fast compressive tracking*, TPAMI
-//! 36(10), 2014).
+//! `compressive`: finds a known person by their appearance (P2, section III-C; K. Zhang, L. Zhang
+//! and M.-H. Yang, *Fast compressive tracking*, TPAMI 36(10), 2014).
 //!
-//! A box is described by some dozens of numbers, each a few signed rectangles of
-//! an integral image: a sparse random projection of all rectangles there are,
-//! drawn once and never built as a matrix ([`Features`]). For each person two
-//! normal distributions a number are kept, one of boxes on the person and one of
-//! boxes beside them ([`Appearance`]); the best box is where the ratio of the two
+//! A box is described by some dozens of numbers, each a few signed rectangles of an integral image:
+//! a sparse random projection of all rectangles there are, drawn once and never built as a matrix
+//! ([`Features`]). For each person two normal distributions a number are kept, one of boxes on the
+//! person and one of boxes beside them ([`Appearance`]); the best box is where the ratio of the two
 //! is largest, searched first coarsely and then finely around the expected one.
 //!
-//! Depth does what colour cannot: boxes that do not show something at the
-//! person's distance are not looked at, which both saves time and tells a hidden
-//! person from one who looks different now; and it gives the scale.
+//! Depth does what colour cannot: boxes that do not show something at the person's distance are not
+//! looked at, which both saves time and tells a hidden person from one whose appearance has
+//! changed; and it gives the scale.
 //!
-//! Such a tracker follows whatever it has learnt, so most of the care goes into
-//! not learning: not from hidden people, not when unsure, and its score is too
-//! low to keep a track alive alone.
+//! Such a tracker follows any object that it has learned, so most of the care goes into not
+//! learning: not from hidden people, not when unsure, and its score is too low to keep a track
+//! alive alone.
 
 mod appearance;
 mod candidates;

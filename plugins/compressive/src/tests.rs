@@ -26,7 +26,7 @@ fn pattern(u: f64, v: f64, kind: f64) -> f64 {
     127.0 + 60.0 * wave(9.0, 2.0) + 40.0 * wave(-4.0, 7.0 + kind) + 25.0 * wave(15.0, -11.0)
 }
 
-/// A person as a patterned square, 0.57 m wide, at a place; and what is in front.
+/// A person as a patterned square, 0.57 m wide, at a place; and the objects in front.
 struct World {
     head: Point3<f64>,
     /// A board of the given depth, over the columns up to this one.
@@ -173,7 +173,7 @@ fn depth_leaves_few_boxes_of_a_wide_search() {
     assert!(found.is_some() && funnel.count("box: depth") == 0);
 }
 
-/// What is found of somebody who stands still, and the test that failed if nothing is.
+/// Returns true if a standing person is found, and the tests that failed.
 fn answer(config: Config) -> (bool, Vec<&'static str>) {
     let head = place(3.0, 0.0);
     let (found, funnel) = near(&mut taught(config, head), &World::at(head).frame(), head);
@@ -198,8 +198,8 @@ fn the_best_box_has_to_be_sure_and_ahead_of_other_places() {
     assert_eq!(answer(Config { min_lead: -1e6, ..blind }), (true, vec![]));
 }
 
-/// The width of the box that is found where somebody is expected, who was learnt 3 m
-/// away, in parts of the width there.
+/// Returns the width of the box found at the expected place of a person learned 3 m away, in parts
+/// of the width there.
 fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
     let (before, now) = (place(3.0, 0.0), place(expected_m, 0.0));
     let mut detector = taught(config, before);

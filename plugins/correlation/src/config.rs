@@ -7,7 +7,7 @@ use tagalong_core::Result;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// A picture that correlates less with what is seen is not found.
+    /// Least correlation of a picture with the image for a detection.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_correlation: f64,
     /// It must correlate by so much more than elsewhere, ...
@@ -22,7 +22,7 @@ pub struct Config {
     /// Where this part of the body has depth, other detectors know better.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_known: f64,
-    /// What is nearer or farther than the person by more is something else, m.
+    /// Difference from the distance of the person from which on a reading is of another object, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub depth_tolerance_m: f64,
     /// People are searched so many standard deviations around the expected place, ...
@@ -44,12 +44,12 @@ pub struct Config {
     /// Standard deviation of the distance, which a picture does not tell, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance_m: f64,
-    /// A picture that is older than this is not looked for, s: what was taken for a person
-    /// is found again as well, and its track must end.
+    /// Age from which on a picture is not searched any more, s: an object that was mistaken for a
+    /// person is found again as well, and its track must end.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub memory_s: f64,
-    /// Score of a sighting, log-odds. 0: a picture says who it is, not whether that is a
-    /// person.
+    /// Score of a detection, log-odds. 0: a picture identifies a person, but is no evidence that it
+    /// is one.
     pub score: f64,
 }
 

@@ -17,9 +17,9 @@ const SIDES_PX: std::ops::RangeInclusive<f64> = 12.0..=1000.0;
 const CELL_M: f64 = UPPER_BODY_SIDE_M / SIDE as f64;
 
 /// Something, or the test that it failed.
-type Found<T> = std::result::Result<T, &'static str>;
+type TestResult<T> = std::result::Result<T, &'static str>;
 
-/// Remembers what people look like, and finds them by that.
+/// Remembers the appearance of people, and finds them by it.
 pub struct Correlation {
     config: Config,
     pictures: BTreeMap<TrackId, (Stamp, Picture)>,
@@ -62,7 +62,7 @@ impl Correlation {
     }
 
     /// Where a person is, or the test that failed.
-    fn near(&mut self, view: &FrameImages<'_>, track: &Track) -> Found<Detection> {
+    fn near(&mut self, view: &FrameImages<'_>, track: &Track) -> TestResult<Detection> {
         let Self { config, pictures, strip, fits } = self;
         let (taken, picture) = pictures.get(&track.id).ok_or("correlation: not seen well yet")?;
         if view.stamp.seconds_since(*taken) > config.memory_s {
@@ -81,7 +81,7 @@ impl Correlation {
         Ok(sighting(config, view.camera, track, &square, best))
     }
 
-    /// Remembers what a person looks like who is in plain view.
+    /// Remembers the appearance of a person in plain view.
     fn remember(&mut self, view: &FrameImages<'_>, track: &Track) {
         let Some(square) = square(track).filter(|_| track.seen && !track.occluded) else { return };
         let (distance, least) = (distance(&self.config, view.camera, track), self.config.min_body);
@@ -101,7 +101,7 @@ fn distance(config: &Config, camera: &Camera, track: &Track) -> Distance {
     Distance { ahead_m, tolerance_m: config.depth_tolerance_m }
 }
 
-/// How far around the expected place people are searched, in cells aside and down.
+/// Returns the extent of the search around the expected place, in cells aside and down.
 pub(crate) fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i64) {
     let estimate = &track.estimate;
     let ray = estimate.person.position.coords - camera.robot_from_camera.translation.vector;
@@ -127,7 +127,7 @@ fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut
 }
 
 /// The best place, or the test that it failed.
-pub(crate) fn choose(config: &Config, fits: &[Placed]) -> Found<Placed> {
+pub(crate) fn choose(config: &Config, fits: &[Placed]) -> TestResult<Placed> {
     let shown = || fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown);
     let by_correlation = |a: &Placed, b: &Placed| a.fit.correlation.total_cmp(&b.fit.correlation);
     let best = shown().max_by(by_correlation).ok_or("correlation: hidden")?;

@@ -1,17 +1,16 @@
-//! `correlation`: where is this person now, whom one camera of a stereo pair sees and
-//! the other does not? By the picture that was remembered of them.
+//! `correlation`: finds a known person in the part of the scene that only one camera of a stereo
+//! pair sees, by the picture that was remembered of them.
 //!
-//! Beside whoever stands near the robot lies a strip that the left camera sees and the
-//! right one does not. It has no depth, so detectors that look at depth find nobody
-//! there, and that is where people come into view again after somebody passed in
-//! between. What they look like is known from before: each person's upper body is
-//! remembered while depth tells its outline ([`Picture`]), and slid over the image around
-//! the expected place, at the scale of the expected distance. Normalised
-//! cross-correlation, over what is of the body and not behind something nearer, says how
-//! well it fits ([`Strip`]).
+//! Beside a person near the robot lies a strip that the left camera sees and the right one does
+//! not. It has no depth, so depth detectors find no person there, and that is where people come
+//! into view again after another person passed in between. Their appearance is known from before:
+//! each person's upper body is remembered while depth tells its outline ([`Picture`]), and slid
+//! over the image around the expected place, at the scale of the expected distance. Normalised
+//! cross-correlation, over the pixels of the body that nothing nearer hides, is the measure of fit
+//! ([`Strip`]).
 //!
-//! A picture tells the direction and not the distance: that stays what was expected. It
-//! answers only where depth does not know better.
+//! A picture gives the direction and not the distance: that stays the expected one. The plugin
+//! answers only where there is no depth.
 
 mod config;
 mod detect;

@@ -12,7 +12,7 @@ pub(crate) const CELLS: usize = SIDE * SIDE;
 /// Grey values are counted from here: sums of squares stay small.
 const MIDDLE: f32 = 128.0;
 
-/// What an upper body looks like, always in the same number of cells.
+/// Appearance of an upper body, always in the same number of cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Brightness, row by row.
@@ -28,16 +28,16 @@ pub struct Picture {
 pub(crate) struct Distance {
     /// Along the optical axis, m.
     pub(crate) ahead_m: f64,
-    /// What is nearer or farther by more is something else, m.
+    /// Difference of distance from which on a reading is of another object, m.
     pub(crate) tolerance_m: f64,
 }
 
-/// What the depth of a cell says.
+/// Meaning of the depth of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shows {
     /// Nothing is known.
     Nothing,
-    /// What is looked for may be there.
+    /// The person may be there.
     Body,
     Nearer,
     Farther,
@@ -86,7 +86,8 @@ impl Picture {
         Some(picture)
     }
 
-    /// The part of the body, 0 to 1, in a square in which depth shows somebody so far away.
+    /// Returns the fraction of the body, 0 to 1, in a square in which depth shows a person at this
+    /// distance.
     pub(crate) fn part_known(&self, depth: &DepthImage, square: &Rect, distance: &Distance) -> f64 {
         let shown = Lattice::around(square, 0, 0).middles().zip(&self.body).filter(|(at, body)| {
             **body > 0.0 && nearest(depth, *at).is_some_and(|m| distance.shows(m) == Shows::Body)

@@ -21,11 +21,11 @@ pub struct Strip {
     known: Vec<f32>,
 }
 
-/// How well a picture fits somewhere.
+/// Goodness of fit of a picture at one place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fit {
-    /// Normalised cross-correlation, -1 to 1, over what is shown of the body; 0 where the
-    /// picture or what is seen has no contrast.
+    /// Normalised cross-correlation, -1 to 1, over the visible part of the body; 0 where the
+    /// picture or the image has no contrast.
     pub correlation: f64,
     /// The part of the body that is not behind something nearer, 0 to 1.
     pub shown: f64,
@@ -100,10 +100,9 @@ impl Strip {
         ((self.columns + 1).saturating_sub(SIDE), (self.rows + 1).saturating_sub(SIDE))
     }
 
-    /// How well a picture fits with its upper left corner at a cell.
+    /// Computes the fit of a picture with its upper left corner at a cell.
     ///
-    /// # Panics
-    /// Outside of [`Strip::places`].
+    /// # Panics Outside of [`Strip::places`].
     pub fn fit(&self, picture: &Picture, column: usize, row: usize) -> Fit {
         let [mut n, mut known, mut a, mut b, mut aa, mut bb, mut ab] = [[0.0; SIDE]; 7];
         for (line, own) in picture.grey.as_chunks::<SIDE>().0.iter().enumerate() {

@@ -26,13 +26,13 @@ fn pattern(u: f64, v: f64, kind: f64) -> f64 {
     127.0 + 60.0 * wave(9.0, 2.0) + 40.0 * wave(-4.0, 7.0 + kind) + 25.0 * wave(15.0, -11.0)
 }
 
-/// A person as a patterned square, and who stands in front of the camera.
+/// A person as a patterned square, and a passer-by in front of the camera.
 #[derive(Clone)]
 struct World {
     head: Point3<f64>,
-    /// What the person wears.
+    /// Number of the clothes' pattern.
     kind: f64,
-    /// Somebody half a metre away, from the first to the second column.
+    /// Columns that a passer-by half a metre away covers, the second excluded.
     passer: Option<(usize, usize)>,
     /// Columns without depth, which one camera alone sees.
     shadow: std::ops::Range<usize>,
@@ -100,7 +100,8 @@ const ASIDE: Point3<f64> = Point3::new(2.5, 0.3, 1.6);
 /// The columns around that place.
 const SHADOW: std::ops::Range<usize> = 90..190;
 
-/// Who was remembered at [`HEAD`] and is expected there, and the test that failed.
+/// Returns the detection of the person that was learned at [`HEAD`] and is expected there, and the
+/// tests that failed.
 fn look(taught: &World, now: &World) -> (Option<Detection>, Vec<&'static str>) {
     let mut detector = Correlation::new(Config::default()).unwrap();
     detector.learn(&taught.frame(), &[track(HEAD, true)]).unwrap();

@@ -34,9 +34,9 @@ impl Direction {
     }
 }
 
-/// The person in one row of a template: a single run of pixels. What lies
-/// beside it within the window is background, but for a narrow guard along the
-/// silhouette, where sensors mix foreground and background.
+/// The person in one row of a template: a single run of pixels. The rest of the window is
+/// background, except a narrow guard along the silhouette, where sensors mix foreground and
+/// background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemplateRow {
     /// Row relative to the head centre, pixels.
@@ -49,7 +49,7 @@ pub struct TemplateRow {
     pub guard_from: i64,
     /// ... and goes on with this one.
     pub guard_to: i64,
-    /// How far the person lies behind the face in this row, m.
+    /// Depth of the person behind the face in this row, m.
     pub relief_m: f64,
 }
 

@@ -31,9 +31,9 @@ pub fn body_parts() -> [Part; 9] {
     ]
 }
 
-/// How far each point of the body's image lies behind the plane through the
-/// centre of the head, m; NaN beside the body. A square of [`Relief::SIZE`]
-/// cells, [`Relief::SIDE_M`] wide, the head centre in the middle.
+/// Depth of each point of the body's image behind the plane through the centre of the head, m; NaN
+/// beside the body. A square of [`Relief::SIZE`] cells, [`Relief::SIDE_M`] wide, the head centre in
+/// the middle.
 #[derive(Clone, Debug)]
 pub struct Relief {
     cells: Vec<f64>,

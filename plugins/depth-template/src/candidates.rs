@@ -3,7 +3,7 @@ use tagalong_vision::RowSums;
 use crate::config::DepthTemplateConfig;
 use crate::view::Local;
 
-/// The names under which the tests count what they drop.
+/// Names under which the tests count the candidates that they drop.
 pub mod tests_named {
     /// Outside of the heights and depths where heads are.
     pub const VOLUME: &str = "detection volume";
@@ -17,14 +17,14 @@ pub mod tests_named {
     pub const COST: &str = "template cost";
     /// Too few cells agree.
     pub const SIZE: &str = "component size";
-    /// Somebody already found in this frame.
+    /// Place of a person that was already found in this frame.
     pub const OCCUPIED: &str = "occupied";
     /// Outside of the window around the prediction.
     pub const WINDOW: &str = "search window";
 }
 
-/// True if what is seen goes on above, straight or aslant, at the same depth: a
-/// shoulder has the head aslant above it.
+/// Returns true if the surface goes on above, straight or aslant, at the same depth: a shoulder has
+/// the head aslant above it.
 pub fn is_below_something(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
     [-ASLANT_M, 0.0, ASLANT_M].into_iter().any(|right| {
         let (x, y) = local.offset(right, -config.boundary_distance_m);
@@ -37,10 +37,10 @@ pub fn is_below_something(rows: &RowSums, local: &Local, config: &DepthTemplateC
 /// aside, m: more than half a head, less than half the shoulders.
 const ASLANT_M: f64 = 0.12;
 
-/// P4's boundary points: left of, right of and above the head the scene must be
-/// farther away. A point without a reading, or nearer than the head (somebody
-/// in front), says nothing; one at the head's own depth contradicts. Somebody
-/// may stand on one side; but what goes on above is no head.
+/// Tests P4's boundary points: left of, right of and above the head the scene must be farther away.
+/// A point without a reading, or nearer than the head (an object in front), is no evidence; one at
+/// the head's own depth contradicts. Another person may stand on one side; but a surface that goes
+/// on above is no head.
 pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
     let (d, margin) = (config.boundary_distance_m, config.boundary_margin_m);
     let behind = |right: f64, down: f64| {
@@ -58,10 +58,10 @@ pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> 
 
 /// Depth steps smaller than this belong to the same head, m.
 const SAME_HEAD_M: f64 = 0.20;
-/// How far to look for the edge of a head, m.
+/// Distance within which the edge of a head is searched, m.
 const EDGE_REACH_M: f64 = 0.30;
 
-/// Width of what the head belongs to at its own height, m.
+/// Returns the width of the object that the head belongs to, at the head's own height, m.
 pub fn head_width_m(rows: &RowSums, local: &Local) -> f64 {
     let reach = |side: f64| {
         let steps = (EDGE_REACH_M * local.px_per_m) as i64 + 1;
@@ -115,8 +115,8 @@ mod tests {
 
     use super::*;
 
-    /// Somebody seen from the side, 100 pixels a metre: a head 3 m away, and the
-    /// nearer shoulder.
+    /// Renders a person from the side, 100 pixels a metre: a head 3 m away, and the nearer
+    /// shoulder.
     fn from_the_side() -> RowSums {
         let depth = DepthImage::from_fn(100, 100, |x, y| {
             let (dx, dy) = (x as f32 - 50.0, y as f32 - 40.0);

@@ -4,7 +4,7 @@ use tagalong_geometry::HEAD_RADIUS_M;
 
 use crate::bank::Direction;
 
-/// How a silhouette is compared with the image.
+/// Comparison of a silhouette with the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cost {
@@ -19,7 +19,7 @@ pub enum Cost {
     Printed,
 }
 
-/// How imagined scenes are weighed (role `weigh`).
+/// Weighing of imagined scenes (role `weigh`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weighing {
@@ -63,7 +63,7 @@ pub struct DepthTemplateConfig {
     /// Body directions that have a template: `along` (from the front or the
     /// back), `left`, `right`. P4 has three and does not say which.
     pub directions: Vec<Direction>,
-    /// How silhouettes are compared.
+    /// Comparison of silhouettes with the image.
     pub cost: Cost,
     /// As P4 prints it: the plain sum of the squared differences of depth over the window,
     /// against the depth of the face and one background depth (`background_percentile` of
@@ -75,17 +75,17 @@ pub struct DepthTemplateConfig {
     pub relief_free_m: f64,
     /// Depth error of the person at which the cost is full, m.
     pub relief_full_m: f64,
-    /// What is added to both per square metre of depth, 1/m: the noise of stereo,
-    /// `sigma_px / (f B)` for a scatter of its disparity, grows with the square.
+    /// Increase of both per square metre of depth, 1/m: the noise of stereo, `sigma_px / (f B)` for
+    /// a scatter of its disparity, grows with the square.
     pub relief_per_m2: f64,
     /// Part of the person's pixels that must have a reading, 0 to 1.
     pub min_foreground_valid: f64,
-    /// Cost of a pixel beside the person that has no reading, or shows somebody
-    /// nearer, 0 to 1. Less where a camera sees nothing of what is far away.
+    /// Cost of a pixel beside the person that has no reading, or shows an object nearer, 0 to 1.
+    /// Less where a camera does not measure far surfaces.
     pub unknown_cost: f64,
     /// Largest cost of a newcomer, and of a track that is not confirmed yet.
     pub discover_cost: f64,
-    /// Largest cost of somebody already tracked and confirmed.
+    /// Largest cost of a person already tracked and confirmed.
     pub follow_cost: f64,
     /// Cells up to this cost are looked at more closely.
     pub refine_cost: f64,
@@ -104,34 +104,33 @@ pub struct DepthTemplateConfig {
     /// Background of the frame as a percentile of its depths, for the costs
     /// `squared` and `printed` and for `compat_printed_dissimilarity` (P3, P4: 90).
     pub background_percentile: f64,
-    /// How imagined scenes are weighed.
+    /// Weighing of imagined scenes.
     pub weighing: Weighing,
     /// Standard deviation of the dissimilarity of a scene that is as imagined, for the
     /// weighings `printed` and `rms`, m. P3 sets it "experientially".
     pub likelihood_sigma: f64,
-    /// Log-likelihood of a person in an imagined scene who fits perfectly and
-    /// is wholly visible (role `weigh`), nats. Neighbouring pixels err alike, so
-    /// that this is far below the number of pixels.
+    /// Log-likelihood of a person in an imagined scene that fits perfectly and is wholly visible
+    /// (role `weigh`), nats. Neighbouring pixels err alike, so that this is far below the number of
+    /// pixels.
     pub likelihood_nats: f64,
     /// Depth error of a person in an imagined scene at which a pixel no longer
     /// speaks for the person, m; never less than three standard deviations of
     /// the depth.
     pub likelihood_tolerance_m: f64,
-    /// How much of what lies beside a person in an imagined scene, at the same
-    /// depth, counts against the person where there is more on one side than on
-    /// the other, 0 to 1: a rucksack or an arm. What is on both sides counts whole.
+    /// Weight of pixels beside a person in an imagined scene, at the same depth, if there are more
+    /// of them on one side than on the other, 0 to 1: a rucksack or an arm. Those on both sides
+    /// count whole.
     pub likelihood_one_sided: f64,
     /// Rows of a template that are evaluated at most.
     pub max_rows: usize,
-    /// How far the centre of a head lies behind the depth that is measured of
-    /// it, m. Stereo sees less than the radius of the head: the contrast is at
-    /// its outline, which lies behind the face.
+    /// Distance of the centre of a head behind its measured depth, m. Stereo sees less than the
+    /// radius of the head: the contrast is at its outline, which lies behind the face.
     pub centre_behind_m: f64,
     /// Standard deviation of the head's place across the viewing ray, m.
     pub sigma_across_m: f64,
     /// Standard deviation of the head's depth at 0 m ...
     pub sigma_depth_m: f64,
-    /// ... and what is added per square metre of depth, 1/m.
+    /// ... and its increase per square metre of depth, 1/m.
     pub sigma_depth_per_m2: f64,
 }
 

@@ -45,7 +45,7 @@ struct PreparedFrame<'a> {
     rows: &'a RowSums,
     view: Arc<MetricImage>,
     matcher: Matcher,
-    /// What is compared in place of what the matcher compares, where a config asks for it.
+    /// Comparison in place of that of the matcher, where a config asks for it.
     printed: Option<Dissimilarity>,
 }
 
@@ -366,7 +366,7 @@ fn spacing(px_per_m: f64) -> i64 {
     }
 }
 
-/// What the tests of one scan dropped; an example is worked out at the end.
+/// Candidates dropped by the tests of one scan; an example is worked out at the end.
 #[derive(Default)]
 struct Tests {
     entries: Vec<(&'static str, u64, (i64, i64, f64))>,

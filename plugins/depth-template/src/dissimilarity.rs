@@ -100,7 +100,7 @@ mod tests {
         }
     }
 
-    /// The cost of somebody who fits, 2 m behind whom is a wall.
+    /// Returns the cost of a person that fits, 2 m in front of a wall.
     fn cost_at(z: f64, max_rows: usize) -> f64 {
         let pose = Pose::nearest(Direction::Along, 0.0, 0.0, 250.0 / z);
         let shape = Bank::new(10_000).template(pose).clone();

@@ -1,17 +1,16 @@
-//! Finds people in depth images by the silhouette of head and shoulders
-//! (P1 section 2.2, P4 section II).
+//! Finds people in depth images by the silhouette of head and shoulders (P1 section 2.2, P4 section
+//! II).
 //!
 //! The path of a pixel: is it at a height and depth where a head can be
-//! ([`DepthTemplateConfig::min_head_height_m`]), is the scene farther away
-//! left, right and above of it (P4's boundary points), is what it belongs to as
-//! wide as a head, is there a body below; then, does the silhouette of one of
-//! three body directions fit ([`Matcher`])? What is left is grouped into
-//! people.
+//! ([`DepthTemplateConfig::min_head_height_m`]), is the scene farther away left, right and above of
+//! it (P4's boundary points), is the object that it belongs to as wide as a head, is there a body
+//! below; then, does the silhouette of one of three body directions fit ([`Matcher`])? The
+//! remaining pixels are grouped into people.
 //!
-//! Why not the printed squared difference of depths against one background
-//! value? Because a wall two metres behind a person then costs more than the
-//! person fits, and because a fixed threshold means something else at every
-//! range. The README lists the differences, with the test behind each.
+//! Why not the printed squared difference of depths against one background value? Because a wall
+//! two metres behind a person then costs more than the person fits, and because a fixed threshold
+//! means something else at every range. The README lists the differences, with the test behind
+//! each.
 
 mod bank;
 mod body;

@@ -3,7 +3,7 @@ use tagalong_vision::RowSums;
 use crate::bank::Template;
 use crate::config::{Cost, DepthTemplateConfig};
 
-/// How well a silhouette fits at one place.
+/// Fit of a silhouette at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
     /// Dissimilarity; 0 is perfect. The scale depends on [`Cost`].
@@ -22,7 +22,7 @@ pub struct Matcher {
     rises: bool,
 }
 
-/// What one template collects over its rows.
+/// Sums that one template collects over its rows.
 #[derive(Default)]
 struct Tally {
     foreground_valid: f64,
@@ -39,12 +39,12 @@ const ROWS_PER_LOOK: usize = 4;
 /// A run of pixels of a row, inside the image.
 type Run = (usize, usize, usize);
 
-/// What the depth of a face says of all rows. Inverse depths are in
+/// Thresholds of all rows that follow from the depth of a face. Inverse depths are in
 /// [`RowSums::UNITS`].
 struct Face {
     depth_m: f64,
     inverse: f64,
-    /// What is beside the person and nearer than this is somebody else.
+    /// Value from which on a pixel beside the person is nearer than the person.
     nearest_beside: f64,
     /// Background that is farther than this is as good as background can be.
     clearly_behind: f64,
@@ -91,8 +91,8 @@ impl Matcher {
         self.fit_up_to(f64::INFINITY, rows, template, (x, y), depth_m)
     }
 
-    /// As [`Matcher::fit`]; `None` also where the rows down to some one already cost
-    /// more than `most`: most places where nobody is cost too much within a few rows.
+    /// As [`Matcher::fit`]; `None` also where the rows down to some one already cost more than
+    /// `most`: most places without a person cost too much within a few rows.
     pub fn fit_up_to(
         &self,
         most: f64,
@@ -196,8 +196,8 @@ impl Matcher {
         Some(Match { cost, foreground_valid })
     }
 
-    /// The cost of what was collected; `holes` are pixels of the person without a
-    /// reading that are too many.
+    /// Returns the cost of the collected sums; `holes` are pixels of the person without a reading
+    /// that are too many.
     fn robust_cost(&self, tally: &Tally, template: &Template, holes: f64) -> f64 {
         let inside = (tally.foreground_cost + 3.0 * holes) / template.person.max(1.0);
         let unknown = self.config.unknown_cost * tally.unknown;

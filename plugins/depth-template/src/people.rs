@@ -24,10 +24,9 @@ pub struct Group {
     pub cells: u32,
 }
 
-/// Groups cells into people: every minimum of the cost that is not nearer than
-/// `separation_m` on the floor to a better one is a person, and each cell goes
-/// to the nearest of them, so that a component of two people who touch is split
-/// at its minima.
+/// Groups cells into people: every minimum of the cost that is not nearer than `separation_m` on
+/// the floor to a better one is a person, and each cell goes to the nearest of them, so that a
+/// component of two people that touch is split at its minima.
 pub fn group(cells: &mut [Cell], separation_m: f64) -> Vec<Group> {
     cells.sort_by(|a, b| a.cost.total_cmp(&b.cost).then((a.y, a.x).cmp(&(b.y, b.x))));
     let mut groups: Vec<Group> = Vec::new();

@@ -102,7 +102,8 @@ impl Printed {
         })
     }
 
-    /// What the scenes of a frame are compared with; `kept` is that of the last frame.
+    /// Returns the image that the scenes of a frame are compared with; `kept` is that of the last
+    /// frame.
     pub fn canvas(&self, frame: &Frame, kept: &mut Option<Arc<Canvas>>) -> Result<Arc<Canvas>> {
         let metres = frame.derived::<Metres>()?;
         if let Some(canvas) = kept.as_ref().filter(|kept| Arc::ptr_eq(&kept.metres, &metres)) {
@@ -219,7 +220,7 @@ mod tests {
         }
     }
 
-    /// What is seen of people in front of a wall.
+    /// Renders the depth of people in front of a wall.
     fn picture(people: &[Painted]) -> DepthImage {
         DepthImage::from_fn(80, 60, |x, y| {
             let here = people.iter().filter(|p| p.covers(x as i64, y as i64));
@@ -288,7 +289,7 @@ mod tests {
     #[test]
     fn the_printed_form_tells_less_of_large_windows_than_a_root_mean_square() {
         let d = |weighing, x: f64| {
-            // Somebody expected where only the wall is.
+            // A person expected where there is only the wall.
             let frame = frame(picture(&[]));
             let config = DepthTemplateConfig { likelihood_sigma: 1.0, ..config(weighing) };
             let log = Weigher::new(&config).log_likelihood(&frame, &[standing(x, 0.0)]).unwrap();

@@ -21,7 +21,7 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Level(usize);
 
-/// The levels of what lies some way behind a face.
+/// Levels of surfaces at some distance behind a face.
 #[derive(Clone, Copy, Debug)]
 pub struct Levels {
     face: f64,
@@ -39,20 +39,20 @@ impl Levels {
     pub fn behind(&self, behind_m: f64) -> Level {
         let part = behind_m * self.per_metre;
         let level = self.face + (part - 0.5 * part * part) * PER_STEP;
-        // A cast rounds down, and what is negative up to zero.
+        // A cast rounds down, and negative values up to zero.
         Level(((level + 0.5) as usize).min(LEVELS - 1))
     }
 }
 
-/// Running sums of what the pixels of a row say of a person at one level, in
-/// units of 1 / [`ONE`] pixels.
+/// Running sums of the evidence in the pixels of a row for a person at one level, in units of 1 /
+/// [`ONE`] pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sum {
-    /// If the person covers them: [`ONE`] at the person's depth, falling with
-    /// the square of the error; negative where one looks past the person;
-    /// zero where something nearer, or no reading, hides what is there.
+    /// If the person covers them: [`ONE`] at the person's depth, falling with the square of the
+    /// error; negative where one looks past the person; zero where a nearer object, or no reading,
+    /// hides the place.
     pub covered: i32,
-    /// If the person does not: what is at the person's depth nevertheless.
+    /// If the person does not: pixels at the person's depth nevertheless.
     pub beside: i32,
 }
 
@@ -70,7 +70,7 @@ pub struct Scores {
     verdicts: Vec<Verdict>,
 }
 
-/// What a value says at one level.
+/// Evidence of a value at one level.
 #[derive(Clone, Copy, Debug)]
 struct Verdict {
     expected: f32,

@@ -5,8 +5,7 @@ use tagalong_core::{DepthImage, Derived, Frame, Result};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_vision::RowSums;
 
-/// The reduced inverse-depth image of a frame, shared by whoever matches
-/// silhouettes in it.
+/// Reduced inverse-depth image of a frame, shared by all plugins that match silhouettes in it.
 pub struct Working(pub RowSums);
 
 /// Depth images are reduced by the whole factor that brings their focal length
@@ -35,7 +34,7 @@ pub struct MetricImage {
     geometry: Vec<Geometry>,
 }
 
-/// What depends on the viewing ray alone.
+/// Properties of a pixel that depend on the viewing ray alone.
 #[derive(Clone, Copy, Debug, Default)]
 struct Geometry {
     /// Height gained per metre of depth.
@@ -55,9 +54,9 @@ pub struct Local {
     pub depth_m: f64,
     /// Reduced pixels per metre at that depth.
     pub px_per_m: f64,
-    /// How far the viewing ray points below the horizon, rad.
+    /// Angle of the viewing ray below the horizon, rad.
     pub pitch_rad: f64,
-    /// How far the upward direction leans to the right in the image, rad.
+    /// Lean of the upward direction to the right in the image, rad.
     pub roll_rad: f64,
     /// Sine and cosine of `roll_rad`.
     sin_cos: (f64, f64),
@@ -70,7 +69,7 @@ impl Local {
         self
     }
 
-    /// Of somebody upright at the height of the camera.
+    /// Rays to an upright person at the height of the camera.
     #[cfg(test)]
     pub fn upright(x: i64, y: i64, depth_m: f64, px_per_m: f64) -> Self {
         let sin_cos = (0.0, 1.0);

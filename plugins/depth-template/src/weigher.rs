@@ -10,20 +10,19 @@ use crate::printed::{Canvas, Printed};
 use crate::scores::{Levels, ONE, Scores};
 use crate::view::{MetricImage, Working};
 
-/// Weighs imagined scenes by their overlapping silhouettes (P3, section II-C):
-/// each person is painted over those behind.
+/// Weighs imagined scenes by their overlapping silhouettes (P3, section II-C): each person is
+/// painted over those behind.
 ///
-/// The weight is a log-likelihood ratio against a scene without people, so that
-/// pixels outside of all windows cancel and hypotheses of any size compare. A
-/// person who fits perfectly and is wholly visible weighs `likelihood_nats`, at
-/// any range; who is hidden weighs nothing.
+/// The weight is a log-likelihood ratio against a scene without people, so that pixels outside of
+/// all windows cancel and hypotheses of any size compare. A person that fits perfectly and is
+/// wholly visible weighs `likelihood_nats`, at any range; a hidden one weighs nothing.
 pub struct Weigher {
     nats: f64,
     printed: Option<Printed>,
     tools: Mutex<Tools>,
 }
 
-/// What is reused from scene to scene and from frame to frame.
+/// Memory that is reused from scene to scene and from frame to frame.
 struct Tools {
     tolerance_m: f64,
     one_sided: f64,
@@ -39,8 +38,8 @@ struct Tools {
 /// A run of pixels of a row: from, to.
 pub(crate) type Span = (i64, i64);
 
-/// A silhouette at a place: all that matters for somebody who is alone. Scenes
-/// that combine few people ask for the same ones again and again.
+/// A silhouette at a place: all that matters for a person alone. Scenes that combine few people ask
+/// for the same ones again and again.
 type Spot = (usize, i64, i64, u64);
 
 /// Every second row is looked at, and every fourth of people so near that many
@@ -69,14 +68,14 @@ struct Silhouette {
     area: f64,
 }
 
-/// Somebody in a scene.
+/// Person in a scene.
 #[derive(Clone)]
 pub(crate) struct Placed {
     silhouette: Arc<Silhouette>,
     pub(crate) x: i64,
     y: i64,
     pub(crate) depth_m: f64,
-    /// Who is nearer than this may be what is seen where this person is, m.
+    /// Depth, m, up to which another person can cause the readings at this one's place.
     reach_m: f64,
     levels: Levels,
 }
@@ -193,7 +192,8 @@ impl Likelihood for Weigher {
 }
 
 impl Tools {
-    /// The bodies of a scene where nobody nearer is, as runs in the image.
+    /// Returns the visible bodies of a scene, without the parts that nearer ones hide, as runs in
+    /// the image.
     fn silhouettes(&mut self, frame: &Frame, image: &Working, scene: &[Person]) -> Vec<Vec<Rect>> {
         let view = self.view_of(frame, image);
         let cast: Vec<Option<Placed>> = scene
@@ -221,8 +221,8 @@ impl Tools {
         }
     }
 
-    /// Where a person's silhouette is in the image; `None` for who is behind
-    /// the camera, or so far aside that nothing can be seen.
+    /// Returns the place of a person's silhouette in the image; `None` behind the camera, or so far
+    /// aside that nothing can be seen.
     fn place(
         &mut self,
         person: &Person,
@@ -252,14 +252,14 @@ impl Tools {
         (0..scene.len()).map(|k| self.weigh_one(scene, k)).sum()
     }
 
-    /// What person `k` of the scene explains, as a part of the whole person.
+    /// Returns the weight that person `k` of the scene explains, as a part of the whole person.
     fn weigh_one(&mut self, scene: &[Placed], k: usize) -> f64 {
         let alone = self.alone(&scene[k]);
         let taken = self.taken(scene, k);
         alone.without(taken).weight(self.one_sided) / (f64::from(ONE) * scene[k].silhouette.area)
     }
 
-    /// What a person finds where nobody else is.
+    /// Returns the fit of a person in a scene of their own.
     fn alone(&mut self, person: &Placed) -> SilhouetteFit {
         let Self { scores, alone, .. } = self;
         *alone.entry(person.spot()).or_insert_with(|| {
@@ -274,9 +274,9 @@ impl Tools {
         })
     }
 
-    /// How much of that the others take: the body where nearer ones hide it,
-    /// and what is beside it where it is theirs. Who is clearly farther away is
-    /// not what is seen at this person's depth.
+    /// Returns the part of that fit which the others take: the body where nearer ones hide it, and
+    /// the pixels beside it where they are theirs. A person that is clearly farther away cannot
+    /// cause the readings at this person's depth.
     fn taken(&mut self, scene: &[Placed], k: usize) -> SilhouetteFit {
         if scene.len() <= 2 {
             let other = rivals(scene, k).next();
@@ -302,8 +302,8 @@ impl Tools {
         taken
     }
 
-    /// The same where there is one other, who needs no union. Most rows of most
-    /// pairs do not meet, and are left before their sums are asked for.
+    /// As [`Self::taken`] with one other person, which needs no union. Most rows of most pairs do
+    /// not meet, and are left before their sums are asked for.
     fn taken_by_one(&mut self, person: &Placed, other: &Placed, is_nearer: bool) -> SilhouetteFit {
         let half = person.silhouette.half_width;
         let window = (person.x - half, person.x + half + 1);
@@ -326,7 +326,7 @@ impl Tools {
     }
 }
 
-/// What a silhouette finds in the image, in units of 1 / [`ONE`] pixels.
+/// Fit of a silhouette in the image, in units of 1 / [`ONE`] pixels.
 #[derive(Clone, Copy, Debug, Default)]
 struct SilhouetteFit {
     /// Pixels of the body that speak for the person, less those against.
@@ -352,9 +352,9 @@ impl SilhouetteFit {
         }
     }
 
-    /// What goes on at the same depth on both sides is no person but furniture
-    /// or a wall; on one side it may be a rucksack or an arm, and counts as the
-    /// part `one_sided`.
+    /// Returns the weight. A surface that goes on at the same depth on both sides is no person but
+    /// furniture or a wall; on one side it may be a rucksack or an arm, and counts as the part
+    /// `one_sided`.
     fn weight(self, one_sided: f64) -> f64 {
         let Self { covered, left, right } = self;
         let (both, rest) = (2 * left.min(right), left.abs_diff(right));
@@ -362,19 +362,19 @@ impl SilhouetteFit {
     }
 }
 
-/// What two spans share; ends before it starts where that is nothing.
+/// Returns the intersection of two spans; it ends before it starts where that is empty.
 fn common(a: Span, b: Span) -> Span {
     (a.0.max(b.0), a.1.min(b.1))
 }
 
 /// A face that is nearer than this has no silhouette, m.
 const MIN_DEPTH_M: f64 = 0.3;
-/// A person who is farther away than this is a dot, m.
+/// Depth from which on a person is a dot, m.
 const MAX_DEPTH_M: f64 = 20.0;
-/// Nobody is looked for farther outside of the image than this.
+/// Largest distance outside of the image at which people are considered.
 const MAX_PIXEL: f64 = 4000.0;
 
-/// Everybody in the scene who may be what is seen where person `k` is.
+/// Returns the people of the scene that can cause the readings at the place of person `k`.
 fn rivals(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
     let reach_m = scene[k].reach_m;
     scene[..k].iter().chain(scene[k + 1..].iter().take_while(move |p| p.depth_m < reach_m))
@@ -420,7 +420,7 @@ impl Placed {
         (self.x + row.from, self.x + row.to)
     }
 
-    /// Where the body, edges included, hides what is behind. Below the window
+    /// Returns the run in which the body, edges included, hides the scene behind. Below the window
     /// the trunk goes on.
     fn body(&self, line: i64) -> Option<Span> {
         let rows = &self.silhouette.rows;
@@ -430,7 +430,7 @@ impl Placed {
         (span.0 < span.1).then_some(span)
     }
 
-    /// What lies beside the body within the window.
+    /// Returns the runs beside the body within the window.
     fn beside(&self, row: &TemplateRow) -> [Span; 2] {
         let half = self.silhouette.half_width;
         [(self.x - half, self.x + row.guard_from), (self.x + row.guard_to, self.x + half + 1)]
@@ -515,7 +515,7 @@ fn direction(person: &Person, camera: &Camera) -> Direction {
     }
 }
 
-/// Who is slower than this may face anywhere, m/s.
+/// Speed below which a person may face anywhere, m/s.
 const SLOW_MPS: f64 = 0.3;
 /// Cosine of the angle to the viewing ray from which on a body is seen from the side.
 const TURNED_COSINE: f64 = 0.7;

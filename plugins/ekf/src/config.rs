@@ -10,15 +10,14 @@ pub struct Config {
     /// Spectral density of the person's white acceleration, m²/s³.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub acceleration_noise: f64,
-    /// How fast the height of the head may wander (sitting down, gait),
-    /// m per square root of a second.
+    /// Random walk of the height of the head (sitting down, gait), m per square root of a second.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub height_noise: f64,
     /// Variance of each velocity component of a newcomer, m²/s².
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub initial_velocity_variance: f64,
-    /// Standard deviation added to that of each detection, m: what detectors
-    /// do not know about themselves.
+    /// Standard deviation added to that of each detection, m, because detectors underestimate their
+    /// errors.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub extra_sigma_m: f64,
     /// Degrees of freedom of the measurement noise: with few of them, 4 say, a

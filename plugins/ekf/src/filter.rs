@@ -15,7 +15,7 @@ const UNMEASURED_M2: f64 = 100.0;
 /// Rounds in which the weight of a detection is found; it settles at once.
 const STUDENT_ROUNDS: usize = 2;
 
-/// What is believed of a person.
+/// Gaussian state of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// (x, y, z, vx, vy) in the robot frame: m, m/s over ground.
@@ -66,7 +66,7 @@ impl Ekf {
         noise
     }
 
-    /// J M J': what the uncertainty of the robot's own motion adds.
+    /// Returns J M J': the noise of the robot's own uncertain motion.
     fn ego_noise(&self, predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5 {
         if self.config.compat_printed_noise {
             return Matrix5::zeros();
@@ -152,9 +152,9 @@ impl PersonFilter for Ekf {
 }
 
 impl Ekf {
-    /// How much a detection counts if its noise has the tails of Student's t:
-    /// `(dof + m) / (dof + d^2)`, where d^2 depends on the weight in turn
-    /// (`algorithms`, section 11). Better than expected counts no more than 1.
+    /// Returns the weight of a detection if its noise has the tails of Student's t: `(dof + m) /
+    /// (dof + d^2)`, where d^2 depends on the weight in turn (`algorithms`, section 11). A
+    /// detection better than expected has no more than 1.
     fn weight(
         &self,
         prior: &Matrix3<f64>,

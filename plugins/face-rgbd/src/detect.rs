@@ -3,7 +3,7 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{Camera, FaceDepth, PointEstimate, Rect};
 
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
@@ -80,21 +80,19 @@ impl FaceRgbd {
         group: &Group,
     ) -> Option<Detection> {
         let (config, side) = (&self.config, group.region.width);
-        let by_size = camera.focal_px() * config.face_m / side;
-        let (face_m, sigma_m) = match depth.and_then(|depth| depth.surface_m(&group.region)) {
-            Some(metres) => (metres, config.sigma_depth_m),
-            None => (by_size, by_size * config.sigma_distance),
-        };
+        let measured = depth.and_then(|depth| depth.surface_m(&group.region));
+        let face = FaceDepth::by_size(camera, config.face_m, side, config.sigma_distance)
+            .or_measured(measured, config.sigma_depth_m);
         let centre = group.region.centre();
         let head_px = Point2::new(centre.x, centre.y - config.head_above * side);
         // The depth is that of the face's surface, and the position that of the head's centre.
-        let depth_m = face_m + HEAD_RADIUS_M;
-        let position = camera.back_project(head_px, depth_m);
+        let PointEstimate { position, covariance } =
+            camera.locate(head_px, face.head_m(), config.sigma_place * side, face.sigma_m);
         let (slope, offset) = self.line;
         let detection = Detection {
             region: camera.upper_body(&position),
             position,
-            covariance: camera.covariance(head_px, depth_m, config.sigma_place * side, sigma_m),
+            covariance,
             // The logarithm needs a positive strength.
             score: (slope * group.strength.max(1e-3).ln() + offset).min(config.max_score),
             source: NAME,
@@ -149,7 +147,7 @@ mod tests {
 
     use nalgebra::{Point3, SMatrix, Vector2};
     use tagalong_core::{EgoMotion, Estimate, Images, Person, Stamp, Track, TrackId};
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, HEAD_RADIUS_M, Pinhole};
 
     use super::*;
     use crate::tests::{noise, small};

@@ -2,6 +2,7 @@ use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
+use tagalong_stats::{RandomSource, XorShift64};
 
 use crate::{
     Cascade, Feature, Hit, Level, Next, Node, Part, PassedWindow, Scanner, Split, Stage, grouped,
@@ -9,13 +10,8 @@ use crate::{
 };
 
 pub(crate) fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
-    let mut state = seed | 1;
-    GreyImage::from_fn(width, height, |_, _| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 40) as u8
-    })
+    let mut random = XorShift64::new(seed | 1);
+    GreyImage::from_fn(width, height, |_, _| (random.next_u64() >> 40) as u8)
 }
 
 fn part(x: usize, y: usize, width: usize, height: usize) -> Part {

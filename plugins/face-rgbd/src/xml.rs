@@ -14,14 +14,14 @@ use crate::cascade::{Cascade, Feature, Next, Node, Part, Split, Stage, Tree};
 /// Amount by which OpenCV lowers the threshold of a file.
 const SLACK: f32 = 1e-5;
 
-type Found<T> = Result<T, String>;
+type XmlResult<T> = Result<T, String>;
 
 impl Cascade {
     /// Parses a file of either layout.
     ///
     /// Text that is not XML, not a cascade, has tilted or unknown features, or is inconsistent; the
     /// message is one sentence.
-    pub fn from_xml(text: &str) -> Found<Self> {
+    pub fn from_xml(text: &str) -> XmlResult<Self> {
         let options =
             ParsingOptions { allow_dtd: false, nodes_limit: 2_000_000, ..Default::default() };
         let document = Document::parse_with_options(text, options).map_err(|e| e.to_string())?;
@@ -109,10 +109,11 @@ fn write_feature(feature: &Feature, out: &mut String) -> std::fmt::Result {
 }
 
 /// Parses the layout of `opencv_traincascade`.
-fn new(root: Element<'_, '_>) -> Found<Cascade> {
-    let features = elements(wanted(root, "features")?).map(feature).collect::<Found<Vec<_>>>()?;
+fn new(root: Element<'_, '_>) -> XmlResult<Cascade> {
+    let features =
+        elements(wanted(root, "features")?).map(feature).collect::<XmlResult<Vec<_>>>()?;
     let stages = elements(wanted(root, "stages")?);
-    let stages = stages.map(|stage| new_stage(stage, &features)).collect::<Found<Vec<_>>>()?;
+    let stages = stages.map(|stage| new_stage(stage, &features)).collect::<XmlResult<Vec<_>>>()?;
     let calibration = match child(root, "logOdds") {
         Some(line) => match numbers::<f64>(line)?[..] {
             [slope, offset] if slope > 0.0 && slope.is_finite() && offset.is_finite() => {
@@ -126,14 +127,14 @@ fn new(root: Element<'_, '_>) -> Found<Cascade> {
     Ok(Cascade { width, height, features, stages, calibration })
 }
 
-fn new_stage(stage: Element<'_, '_>, features: &[Feature]) -> Found<Stage> {
+fn new_stage(stage: Element<'_, '_>, features: &[Feature]) -> XmlResult<Stage> {
     let threshold: f32 = number(stage, "stageThreshold")?;
     let trees = elements(wanted(stage, "weakClassifiers")?);
-    let trees = trees.map(|tree| new_tree(tree, features)).collect::<Found<_>>()?;
+    let trees = trees.map(|tree| new_tree(tree, features)).collect::<XmlResult<_>>()?;
     Ok(Stage { threshold: threshold - SLACK, trees })
 }
 
-fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> Found<Tree> {
+fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> XmlResult<Tree> {
     // Some files have NaN in leaves that no window of the training reached.
     let leaves: Vec<f32> = numbers(wanted(tree, "leafValues")?)?;
     let leaves: Vec<f32> = leaves.into_iter().map(|v| if v.is_nan() { 0.0 } else { v }).collect();
@@ -164,7 +165,7 @@ fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> Found<Tree> {
     words.chunks_exact(length).map(node).collect()
 }
 
-fn feature(feature: Element<'_, '_>) -> Found<Feature> {
+fn feature(feature: Element<'_, '_>) -> XmlResult<Feature> {
     if child(feature, "tilted").is_some_and(|t| t.text().is_some_and(|t| t.trim() == "1")) {
         return Err("it has tilted features, which are not supported".into());
     }
@@ -176,11 +177,11 @@ fn feature(feature: Element<'_, '_>) -> Found<Feature> {
         let weight = words.get(4).ok_or("a rectangle has no weight")?;
         Ok((part(&words)?, *weight as f32))
     };
-    let parts = elements(wanted(feature, "rects")?).map(weighted).collect::<Found<Vec<_>>>()?;
+    let parts = elements(wanted(feature, "rects")?).map(weighted).collect::<XmlResult<Vec<_>>>()?;
     Ok(Feature::Haar(parts.into_iter().filter(|(_, weight)| *weight != 0.0).collect()))
 }
 
-fn part(words: &[f64]) -> Found<Part> {
+fn part(words: &[f64]) -> XmlResult<Part> {
     match words {
         [x, y, w, h, ..] if words.iter().take(4).all(|v| (0.0..1e4).contains(v)) => {
             let [x, y, width, height] = [*x, *y, *w, *h].map(|v| v as usize);
@@ -191,7 +192,7 @@ fn part(words: &[f64]) -> Found<Part> {
 }
 
 /// Parses the layout of `opencv_haartraining`.
-fn old(root: Element<'_, '_>, size: Element<'_, '_>) -> Found<Cascade> {
+fn old(root: Element<'_, '_>, size: Element<'_, '_>) -> XmlResult<Cascade> {
     let [width, height] = numbers::<usize>(size)?[..] else {
         return Err("its `size` is not two numbers".into());
     };
@@ -199,13 +200,13 @@ fn old(root: Element<'_, '_>, size: Element<'_, '_>) -> Found<Cascade> {
     let stage = |stage| {
         let threshold: f32 = number(stage, "stage_threshold")?;
         let trees = elements(wanted(stage, "trees")?).map(|tree| old_tree(tree, &mut features));
-        Ok(Stage { trees: trees.collect::<Found<_>>()?, threshold: threshold - SLACK })
+        Ok(Stage { trees: trees.collect::<XmlResult<_>>()?, threshold: threshold - SLACK })
     };
-    let stages = elements(wanted(root, "stages")?).map(stage).collect::<Found<_>>()?;
+    let stages = elements(wanted(root, "stages")?).map(stage).collect::<XmlResult<_>>()?;
     Ok(Cascade { width, height, features, stages, calibration: None })
 }
 
-fn old_tree(tree: Element<'_, '_>, features: &mut Vec<Feature>) -> Found<Tree> {
+fn old_tree(tree: Element<'_, '_>, features: &mut Vec<Feature>) -> XmlResult<Tree> {
     let mut node = |node: Element<'_, '_>| {
         features.push(feature(wanted(node, "feature")?)?);
         let next = |side: &str| match child(node, &format!("{side}_node")) {
@@ -226,20 +227,20 @@ fn child<'a, 'i>(of: Element<'a, 'i>, name: &str) -> Option<Element<'a, 'i>> {
     elements(of).find(|element| element.has_tag_name(name))
 }
 
-fn wanted<'a, 'i>(of: Element<'a, 'i>, name: &str) -> Found<Element<'a, 'i>> {
+fn wanted<'a, 'i>(of: Element<'a, 'i>, name: &str) -> XmlResult<Element<'a, 'i>> {
     child(of, name).ok_or_else(|| format!("a part of it has no `{name}`"))
 }
 
-fn number<T: std::str::FromStr>(of: Element<'_, '_>, name: &str) -> Found<T> {
+fn number<T: std::str::FromStr>(of: Element<'_, '_>, name: &str) -> XmlResult<T> {
     parsed(wanted(of, name)?)
 }
 
-fn parsed<T: std::str::FromStr>(element: Element<'_, '_>) -> Found<T> {
+fn parsed<T: std::str::FromStr>(element: Element<'_, '_>) -> XmlResult<T> {
     let text = element.text().unwrap_or_default().trim();
     text.parse().map_err(|_| format!("`{text}` is not a number"))
 }
 
-fn numbers<T: std::str::FromStr>(element: Element<'_, '_>) -> Found<Vec<T>> {
+fn numbers<T: std::str::FromStr>(element: Element<'_, '_>) -> XmlResult<Vec<T>> {
     let words = element.text().unwrap_or_default().split_ascii_whitespace();
     // OpenCV writes `.Nan`.
     words

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result};
 
-/// How a person's next position is predicted.
+/// Prediction of a person's next position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
@@ -16,7 +16,7 @@ pub enum Form {
     ConstantVelocity,
 }
 
-/// How well a detection's place is known.
+/// Covariance of a detection's position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measurement {
@@ -32,23 +32,24 @@ pub enum Measurement {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// How the next position is predicted: `still`, `last-difference` or
-    /// `constant-velocity`.
+    /// Prediction of the next position: `still`, `last-difference` or `constant-velocity`.
     pub form: Form,
-    /// How well detections are believed: `detection`, `fixed` or `polar`.
+    /// Covariance of detections: `detection`, `fixed` or `polar`.
     pub measurement: Measurement,
     /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`
     /// (P5, equation 10).
+    #[schemars(inner(range(min = -999_999, max = 999_999)))]
     pub process_m2: [f64; 3],
     /// The time between two images to which Q belongs, s.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub step_s: f64,
     /// R of `fixed`: xx, xy, yy in room axes, m² (P5, equation 10).
+    #[schemars(inner(range(min = -999_999, max = 999_999)))]
     pub measurement_m2: [f64; 3],
     /// Of `polar`: standard deviation of the range at the robot, m.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub sigma_range_m: f64,
-    /// Of `polar`: what each metre of range adds to it, m.
+    /// Of `polar`: increase per metre of range, m.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub sigma_range_per_m: f64,
     /// Of `polar`: standard deviation of the bearing, degrees.
@@ -60,7 +61,7 @@ pub struct Config {
     /// Standard deviation of a newcomer's velocity components, m/s.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub initial_speed_mps: f64,
-    /// How fast the height of the head may wander, m per square root of a second.
+    /// Random walk of the height of the head, m per square root of a second.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub height_noise: f64,
     /// From the robot's heading at the start to the X axis of the room, degrees.

@@ -56,8 +56,8 @@ impl FloorKalman {
         turned(out.matrix(), &Matrix2::new(along * along, 0.0, 0.0, across * across))
     }
 
-    /// What the uncertainty of the robot's motion adds to a place in the room as
-    /// the robot sees it.
+    /// Returns the noise of a place in the room, in robot axes, due to the uncertain motion of the
+    /// robot.
     fn ego_noise(&self, at: &Vector2<f64>, motion: &EgoMotion) -> Matrix2<f64> {
         let from_robot = at - self.room_from_robot.translation.vector;
         let mut j = Matrix2x3::zeros();

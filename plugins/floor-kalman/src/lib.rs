@@ -1,13 +1,13 @@
-//! `floor-kalman`: a Kalman filter of where each person is on the floor, in
-//! coordinates of the room (P5, section 5).
+//! `floor-kalman`: a Kalman filter of where each person is on the floor, in coordinates of the room
+//! (P5, section 5).
 //!
-//! The paper's state is the position alone, and its prediction adds a "nominal
-//! velocity" u, which is a displacement: nothing multiplies it by time. How u is
-//! found is not said. [`Form`] has what it can be: nothing, the last posterior
-//! difference, or, for those who take the question seriously, two more states.
+//! The paper's state is the position alone, and its prediction adds a "nominal velocity" u, which
+//! is a displacement: nothing multiplies it by time. The paper does not say how u is found.
+//! [`Form`] has the possible meanings: nothing, the last posterior difference or, as in most
+//! trackers, two more states.
 //!
-//! The room is the robot's frame at the start of the run, turned by
-//! `room_heading_deg`; odometry carries it on, so the robot may move.
+//! The room is the robot's frame at the start of the run, turned by `room_heading_deg`; odometry
+//! carries it on, so the robot may move.
 
 mod config;
 mod filter;

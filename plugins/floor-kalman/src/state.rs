@@ -2,8 +2,8 @@ use nalgebra::{Matrix2, Matrix4, Matrix4x2, Vector2, Vector4};
 
 use crate::{Config, Form};
 
-/// What is believed of a person, in the room. The forms without velocity use
-/// the position's part of mean and covariance only.
+/// Gaussian state of a person, in the room. The forms without velocity use the position's part of
+/// mean and covariance only.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct State {
     /// (x, y, vx, vy): m, m/s.
@@ -47,8 +47,8 @@ impl State {
         self.covariance.fixed_view::<2, 2>(0, 0).into_owned()
     }
 
-    /// Equations 5 and 6, or their counterpart with velocity. `ego` is what the
-    /// robot's uncertain motion adds.
+    /// Applies equations 5 and 6, or their counterpart with velocity. `ego` is the noise of the
+    /// robot's uncertain motion.
     pub(crate) fn predict(&mut self, dt: f64, ego: &Matrix2<f64>, config: &Config) {
         match config.form {
             Form::Still => self.grow(&config.process(dt)),

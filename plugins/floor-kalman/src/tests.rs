@@ -47,7 +47,7 @@ fn forms() -> [Form; 3] {
     [Form::Still, Form::LastDifference, Form::ConstantVelocity]
 }
 
-/// Somebody at a steady walk, seen without noise.
+/// Returns the filter after a person's steady walk, observed without noise.
 fn after_a_walk(config: Config) -> FloorKalman {
     let mut filter = FloorKalman::new(config).unwrap();
     filter.start(ID, &sighting(2.0, 0.0), &camera());
@@ -280,7 +280,7 @@ fn four_states_are_those_of_a_filter_written_down() {
         };
         room_from_robot *= motion.isometry();
         let rotation = turn(&room_from_robot);
-        // A turn of the robot moves whom it sees across, by as much as they are away.
+        // A turn of the robot moves the person across, in proportion to their distance.
         let away = book.mean.rows(0, 2) - room_from_robot.translation.vector;
         let j = Matrix2x3::from_columns(&[
             rotation.column(0).into_owned(),
@@ -361,13 +361,13 @@ fn polar_noise_lies_along_the_ray_however_the_robot_is_turned() {
     let angle = 2.0_f64.to_radians();
     let (along, across) = spread(3.0, -4.0, Vector2::new(0.6, -0.8));
     assert!((along - 0.7).abs() < 1e-9 && (across - 5.0 * angle).abs() < 1e-9, "{along} {across}");
-    // Nobody is nearer than the robot's own size.
+    // No person is nearer than the robot's own size.
     let (along, across) = spread(0.05, 0.0, Vector2::x());
     assert!((along - 0.205).abs() < 1e-9 && (across - 0.1 * angle).abs() < 1e-9);
 }
 
-/// What `last-difference` says of its own errors, against the recursion of the joint
-/// covariance of two posteriors.
+/// The error that `last-difference` states, against the recursion of the joint covariance of two
+/// posteriors.
 #[test]
 fn the_noise_of_differences_is_that_of_the_joint_covariance() {
     let config = Config { form: Form::LastDifference, ..Config::default() };

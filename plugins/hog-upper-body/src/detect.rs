@@ -1,11 +1,10 @@
 use std::ops::RangeInclusive;
 
-use nalgebra::Matrix3;
 use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{Camera, FaceDepth, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 
 use crate::lattice::Lattice;
 use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
@@ -47,18 +46,14 @@ impl HogUpperBody {
 
     fn detection(&self, camera: &Camera, window: &Window) -> Option<Detection> {
         let config = &self.config;
-        let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / window.region.width;
-        let (face_m, sigma_m) = match window.depth_m {
-            Some(depth_m) => (depth_m, config.sigma_depth_m),
-            None => (by_size, by_size * config.sigma_distance),
-        };
-        let sigma_px = config.sigma_place * window.region.width;
-        let depth_m = face_m + HEAD_RADIUS_M;
-        let covariance: Matrix3<f64> =
-            camera.covariance(window.region.centre(), depth_m, sigma_px, sigma_m);
+        let width = window.region.width;
+        let face = FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, width, config.sigma_distance)
+            .or_measured(window.depth_m, config.sigma_depth_m);
+        let PointEstimate { position, covariance } =
+            camera.locate_head(&window.region, face, config.sigma_place * width);
         let detection = Detection {
             region: window.region,
-            position: camera.head_of(&window.region, face_m),
+            position,
             covariance,
             score: self.model.log_odds(window.sum).min(config.max_score),
             source: NAME,
@@ -216,7 +211,7 @@ mod tests {
 
     use nalgebra::{Point3, SMatrix, Vector2};
     use tagalong_core::{EgoMotion, Estimate, GreyImage, Images, Person, Stamp, Track, TrackId};
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::{Distortion, HEAD_RADIUS_M, Pinhole};
 
     use super::*;
 

@@ -2,6 +2,7 @@ use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
+use tagalong_stats::{RandomSource, XorShift64};
 
 use crate::channels::{self, DEPTH};
 use crate::hog::{BINS, BLOCK, CELL};
@@ -14,13 +15,8 @@ use crate::{
 };
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
-    let mut state = seed | 1;
-    GreyImage::from_fn(width, height, |_, _| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 40) as u8
-    })
+    let mut random = XorShift64::new(seed | 1);
+    GreyImage::from_fn(width, height, |_, _| (random.next_u64() >> 40) as u8)
 }
 
 #[test]

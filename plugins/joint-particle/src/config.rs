@@ -87,11 +87,14 @@ pub struct Config {
     #[schemars(range(min = 0.0, max = 1.0))]
     pub from_detection: f64,
     /// A person is seen if the scene is more likely by this with the person than without, nats, ...
+    #[schemars(range(min = -1e6, max = 1e6))]
     pub min_support: f64,
     /// by this if a detector found the person in this very frame, ...
+    #[schemars(range(min = -1e6, max = 1e6))]
     pub min_support_found: f64,
     /// ... and by this if no detector found the person for longer than `trust_s`: furniture
     /// explains a little of the image, a person most of it.
+    #[schemars(range(min = -1e6, max = 1e6))]
     pub min_support_unfound: f64,
     /// Time for which a silhouette without detections is trusted, s.
     #[schemars(range(min = 0.0, max = 1e9))]

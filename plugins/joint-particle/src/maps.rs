@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use crate::config::{Config, Method};
 
 /// Positions of two people across the viewing ray of the near one's mean: near, far, m.
-pub type Place = [f64; 2];
+pub type PositionPair = [f64; 2];
 
 /// Widths of the kernel along the two positions, m.
 #[derive(Clone, Copy, Debug)]
@@ -22,14 +22,19 @@ impl Kernel {
         Self([width(config.kernel_near_m), width(config.kernel_far_m)])
     }
 
-    fn at(&self, a: &Place, b: &Place) -> f64 {
+    fn at(&self, a: &PositionPair, b: &PositionPair) -> f64 {
         let square: f64 = (0..2).map(|i| ((a[i] - b[i]) / self.0[i]).powi(2)).sum();
         (-0.5 * square).exp()
     }
 }
 
 /// Returns P3's estimate: the sum of kernels at the compared places, each scaled by its likelihood.
-pub fn parzen(places: &[Place], likelihoods: &[f64], kernel: Kernel, at: &Place) -> f64 {
+pub fn parzen(
+    places: &[PositionPair],
+    likelihoods: &[f64],
+    kernel: Kernel,
+    at: &PositionPair,
+) -> f64 {
     places.iter().zip(likelihoods).map(|(place, l)| l * kernel.at(place, at)).sum()
 }
 
@@ -37,7 +42,7 @@ pub fn parzen(places: &[Place], likelihoods: &[f64], kernel: Kernel, at: &Place)
 /// places were compared; this is not.
 #[derive(Clone, Debug)]
 pub struct Gp {
-    places: Vec<Place>,
+    places: Vec<PositionPair>,
     coefficients: DVector<f64>,
     kernel: Kernel,
 }
@@ -45,7 +50,7 @@ pub struct Gp {
 impl Gp {
     /// Fits the process; `None` if the covariance matrix of the places is singular.
     pub fn fit(
-        places: Vec<Place>,
+        places: Vec<PositionPair>,
         likelihoods: &[f64],
         kernel: Kernel,
         nugget: f64,
@@ -61,7 +66,7 @@ impl Gp {
     }
 
     /// Returns the likelihood at a place; never negative.
-    pub fn at(&self, at: &Place) -> f64 {
+    pub fn at(&self, at: &PositionPair) -> f64 {
         parzen(&self.places, self.coefficients.as_slice(), self.kernel, at).max(0.0)
     }
 }
@@ -72,14 +77,19 @@ pub enum LikelihoodMap {
     /// Known at all places of a table.
     Table(Grid, Vec<f64>),
     /// Known at a few; a sum of kernels.
-    Kernels(Vec<Place>, Vec<f64>, Kernel),
+    Kernels(Vec<PositionPair>, Vec<f64>, Kernel),
     /// Known at a few; interpolated.
     Gp(Gp),
 }
 
 impl LikelihoodMap {
     /// Creates the map of a method. If there is no Gaussian process, kernels are summed.
-    pub fn new(method: Method, places: Vec<Place>, known: Vec<f64>, config: &Config) -> Self {
+    pub fn new(
+        method: Method,
+        places: Vec<PositionPair>,
+        known: Vec<f64>,
+        config: &Config,
+    ) -> Self {
         let kernel = Kernel::new(config);
         let gp = match method {
             Method::Table => return Self::Table(Grid::new(config), known),
@@ -90,7 +100,7 @@ impl LikelihoodMap {
     }
 
     /// Returns the likelihood at a place.
-    pub fn at(&self, at: &Place) -> f64 {
+    pub fn at(&self, at: &PositionPair) -> f64 {
         match self {
             Self::Table(grid, known) => grid.look_up(known, at),
             Self::Kernels(places, known, kernel) => parzen(places, known, *kernel, at),
@@ -120,7 +130,7 @@ impl Grid {
     }
 
     /// Returns all places, ordered by that of the near person.
-    pub fn places(&self) -> Vec<Place> {
+    pub fn places(&self) -> Vec<PositionPair> {
         let value = |axis: usize, i: usize| i as f64 * self.step - self.reach[axis];
         let rows = 0..self.sides[0];
         rows.flat_map(|i| (0..self.sides[1]).map(move |j| [value(0, i), value(1, j)])).collect()
@@ -132,7 +142,7 @@ impl Grid {
     }
 
     /// Returns the value of the nearest place; outside of the table that of its edge.
-    pub fn look_up(&self, table: &[f64], at: &Place) -> f64 {
+    pub fn look_up(&self, table: &[f64], at: &PositionPair) -> f64 {
         let index = |axis: usize| {
             let steps = ((at[axis] + self.reach[axis]) / self.step).round();
             steps.clamp(0.0, (self.sides[axis] - 1) as f64) as usize
@@ -150,13 +160,13 @@ mod tests {
     use crate::random::Random;
 
     /// A likelihood ridge of two people: sharp in the near one, wide and sloping in the far one.
-    fn ridge(at: &Place) -> f64 {
+    fn ridge(at: &PositionPair) -> f64 {
         let (near, far) = (at[0] - 0.03, at[1] - 0.2 - 0.5 * at[0]);
         (-0.5 * (near / 0.06).powi(2) - 0.5 * (far / 0.18).powi(2)).exp()
     }
 
     /// Places near the ridge, like those of the best particles of the previous frame.
-    fn sampled(count: usize, seed: u64) -> Vec<Place> {
+    fn sampled(count: usize, seed: u64) -> Vec<PositionPair> {
         let mut random = Random::new(seed, 0);
         let mut draw = |centre: f64, spread: f64| centre + spread * random.normal();
         (0..count).map(|_| [draw(0.03, 0.08), draw(0.2, 0.25)]).collect()
@@ -183,7 +193,7 @@ mod tests {
             let places = sampled(50, seed);
             let known: Vec<f64> = places.iter().map(ridge).collect();
             let gp = Gp::fit(places.clone(), &known, right, 0.03).unwrap();
-            let of = |map: &dyn Fn(&Place) -> f64| {
+            let of = |map: &dyn Fn(&PositionPair) -> f64| {
                 correlation(&grid.iter().map(map).collect::<Vec<_>>(), &truth)
             };
             sums[0] += of(&|at| parzen(&places, &known, printed, at)) / 10.0;
@@ -249,7 +259,7 @@ mod tests {
     fn interpolation_finds_the_mean_that_a_sum_of_kernels_misses() {
         let grid = Grid::new(&Config::default()).places();
         let kernel = Kernel::new(&Config::default());
-        let mean = |map: &dyn Fn(&Place) -> f64| {
+        let mean = |map: &dyn Fn(&PositionPair) -> f64| {
             let sum: f64 = grid.iter().map(map).sum();
             grid.iter().map(|at| at[1] * map(at)).sum::<f64>() / sum
         };

@@ -1,29 +1,23 @@
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use tagalong_stats::{ChaCha, RandomSource};
 
-/// Seeded random numbers that are the same on every machine. The distributions are implemented
-/// here, because those of general libraries change between versions.
+/// Seeded random numbers with the distributions of a particle filter.
 #[derive(Clone, Debug)]
-pub struct Random(ChaCha8Rng);
+pub struct Random(ChaCha);
 
 impl Random {
     /// Creates a generator for one purpose: the streams of a seed are independent of each other.
     pub fn new(seed: u64, stream: u64) -> Self {
-        let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator.set_stream(stream);
-        Self(generator)
+        Self(ChaCha::new(seed, stream))
     }
 
     /// Returns a number that is uniform in (0, 1].
     pub fn uniform(&mut self) -> f64 {
-        // 53 bits are the precision of f64; 0 is excluded for the logarithm in `normal`.
-        ((self.0.next_u64() >> 11) + 1) as f64 / (1u64 << 53) as f64
+        self.0.positive_uniform()
     }
 
-    /// Returns a standard normal number (Box & Muller 1958).
+    /// Returns a standard normal number.
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * self.uniform().ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
+        self.0.normal()
     }
 
     /// Returns a uniform number with mean zero and variance one.

@@ -9,7 +9,7 @@ use tagalong_core::{
 
 use crate::config::{Chosen, Config, Method};
 use crate::group::Group;
-use crate::maps::{Grid, LikelihoodMap, Place};
+use crate::maps::{Grid, LikelihoodMap, PositionPair};
 use crate::particle::{Particle, across};
 use crate::resampling::{effective_size, from_logs, heaviest, normalise};
 
@@ -211,7 +211,7 @@ impl Lateral {
         Self { near, far, origin, across, means }
     }
 
-    fn places(&self, group: &Group) -> Vec<Place> {
+    fn places(&self, group: &Group) -> Vec<PositionPair> {
         (0..group.rows()).map(|row| self.place(group.row(row))).collect()
     }
 
@@ -221,7 +221,7 @@ impl Lateral {
         group: &Group,
         look: &mut WeighingInput<'_>,
         method: Method,
-        chosen: &[Place],
+        chosen: &[PositionPair],
     ) -> Result<LikelihoodMap> {
         let grid = Grid::new(look.config);
         let places = if method == Method::Table { grid.places() } else { chosen.to_vec() };
@@ -233,12 +233,12 @@ impl Lateral {
         Ok(LikelihoodMap::new(method, places, known, look.config))
     }
 
-    fn place(&self, row: &[Particle]) -> Place {
+    fn place(&self, row: &[Particle]) -> PositionPair {
         [self.near, self.far].map(|p| self.across.dot(&(row[p].floor() - self.origin)))
     }
 
     /// Returns the scene with the two people at a place, in the order of the columns.
-    fn scene(&self, place: &Place) -> [Particle; 2] {
+    fn scene(&self, place: &PositionPair) -> [Particle; 2] {
         let moved = |i: usize| {
             let mut mean = self.means[i];
             let now = self.across.dot(&(Point2::new(mean[0], mean[1]) - self.origin));
@@ -271,7 +271,7 @@ fn mapped(group: &mut Group, look: &mut WeighingInput<'_>) -> Result<()> {
 }
 
 /// Returns the places that are compared with the image.
-fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
+fn chosen(all: &[PositionPair], before: &[f64], config: &Config) -> Vec<PositionPair> {
     if config.chosen == Chosen::PreviousBest {
         return heaviest(before, config.points).into_iter().map(|row| all[row]).collect();
     }
@@ -279,7 +279,7 @@ fn chosen(all: &[Place], before: &[f64], config: &Config) -> Vec<Place> {
         [-1.0, 0.0, 1.0]
             .map(|far| [0.5 * near * config.reach_near_m, 0.5 * far * config.reach_far_m])
     });
-    let coarse: Vec<Place> = coarse.into_iter().flatten().take(config.points).collect();
+    let coarse: Vec<PositionPair> = coarse.into_iter().flatten().take(config.points).collect();
     let rest = (config.points - coarse.len()).min(all.len());
     let spread = (0..rest).map(|i| all[i * all.len() / rest.max(1)]);
     coarse.iter().copied().chain(spread).collect()
@@ -589,7 +589,7 @@ mod tests {
 
     #[test]
     fn the_likeliest_places_are_compared_or_places_all_over() {
-        let all: Vec<Place> =
+        let all: Vec<PositionPair> =
             (0..100).map(|i| [0.01 * f64::from(i), -0.01 * f64::from(i)]).collect();
         let before: Vec<f64> = (0..100).map(|i| f64::from((i * 37) % 100)).collect();
         let of = |chosen, points| {
@@ -598,12 +598,12 @@ mod tests {
         // 37 times 27, 54 and 81 leave 99, 98 and 97.
         assert_eq!(of(Chosen::PreviousBest, 3), [all[27], all[54], all[81]]);
         let spread = of(Chosen::Spread, 29);
-        let coarse: Vec<Place> = [-0.15, 0.0, 0.15]
+        let coarse: Vec<PositionPair> = [-0.15, 0.0, 0.15]
             .into_iter()
             .flat_map(|near| [-0.45, 0.0, 0.45].map(|far| [near, far]))
             .collect();
         assert_eq!(spread[..9], coarse[..]);
-        let fifth: Vec<Place> = all.iter().copied().step_by(5).collect();
+        let fifth: Vec<PositionPair> = all.iter().copied().step_by(5).collect();
         assert_eq!(spread[9..], fifth[..]);
         assert_eq!(of(Chosen::Spread, 4), coarse[..4]);
     }

@@ -11,8 +11,8 @@ pub struct Config {
     /// the room. Otherwise at the same place before the robot, wherever that
     /// goes.
     pub ego_motion: bool,
-    /// How fast somebody may have moved away unseen: the standard deviation
-    /// grows by this, metres per square root of a second.
+    /// Random walk of an unobserved person: growth of the standard deviation, metres per square
+    /// root of a second.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub wander: f64,
     /// The velocity that is reported, and used for nothing, is the way between

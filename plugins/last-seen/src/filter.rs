@@ -6,21 +6,21 @@ use tagalong_geometry::Camera;
 
 use crate::Config;
 
-/// How fast a head may rise or sink unseen, metres per square root of a second.
+/// Random walk of the height of an unobserved head, metres per square root of a second.
 const HEIGHT_WANDER: f64 = 0.1;
 /// Variance of a velocity component, m²/s²: it is hardly known.
 const VELOCITY_VARIANCE: f64 = 1.0;
 /// Sightings of one person that are remembered at most.
 const MOST_SIGHTINGS: usize = 64;
 
-/// What is believed of a person, in the robot frame.
+/// State of a person, in the robot frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Centre of the head when last seen, m.
     position: Point3<f64>,
     /// Its covariance, m².
     covariance: Matrix3<f64>,
-    /// How long ago somebody was seen, s, and where on the floor; newest last.
+    /// Age of each detection of the person, s, and its place on the floor; newest last.
     sightings: VecDeque<(f64, Point2<f64>)>,
 }
 
@@ -171,7 +171,8 @@ mod tests {
         Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0)
     }
 
-    /// Somebody seen each half second at these places, by a robot that moves like that.
+    /// Returns the estimate of a person detected each half second at these places, by a robot with
+    /// this motion.
     fn seen_at(config: Config, motion: EgoMotion, places: &[(f64, f64)]) -> Estimate {
         let filter = LastSeen::new(config).unwrap();
         let mut state = filter.start(&sighting(places[0].0, places[0].1));
@@ -215,7 +216,7 @@ mod tests {
         let mut state = filter.start(&seen);
         filter.predict(&mut state, &EgoMotion { turn: FRAC_PI_2, ..EgoMotion::at_rest(0.5) });
         let estimate = filter.estimate(&state, &camera());
-        // What was ahead is to the right now.
+        // After the turn, places ahead are to the right.
         let expected = [0.01 + 0.08, 0.04 + 0.08, 0.02 + 0.005, 1.0, 1.0];
         for (found, expected) in estimate.covariance.diagonal().iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12, "{}", estimate.covariance);

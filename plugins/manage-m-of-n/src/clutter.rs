@@ -21,7 +21,7 @@ pub(crate) struct ClutterMap {
 #[derive(Clone, Debug)]
 struct ClutterCell {
     at: Point2<f64>,
-    /// Sum of what was said, below zero.
+    /// Sum of the evidence, below zero.
     log_odds: f64,
 }
 
@@ -57,7 +57,7 @@ impl ClutterMap {
         self.places.clear();
     }
 
-    /// Takes out what is remembered of the nearest place within a radius, m.
+    /// Removes and returns the evidence at the nearest place within a radius, m.
     fn take(&mut self, at: &Point2<f64>, radius_m: f64) -> f64 {
         let off = |place: &ClutterCell| (place.at - at).norm();
         let near = self.places.iter().enumerate().filter(|(_, place)| off(place) <= radius_m);

@@ -10,8 +10,8 @@ pub struct Config {
     /// A detection that belongs to no track starts one from this score on
     /// (log-odds, verifiers included).
     pub start_score: f64,
-    /// Newcomers who were rejected at the same place count, too, and are forgotten
-    /// with this time constant, s; 0: each newcomer is judged alone.
+    /// Newcomers that were rejected at the same place count, too, and are forgotten with this time
+    /// constant, s; 0: each newcomer is judged alone.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub doubt_s: f64,
     /// A place is the same within this, m.
@@ -48,8 +48,8 @@ pub struct Config {
     /// Weight of a frame in the score of a track, 0 to 1.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub score_weight: f64,
-    /// What a miss says: the score that a track tends to while it should be
-    /// visible and is not.
+    /// Score of a miss: the value that the score of a track tends to while it should be visible and
+    /// is not.
     pub miss_score: f64,
     /// A track with a lower score ends. It takes several doubtful sightings
     /// to get there.

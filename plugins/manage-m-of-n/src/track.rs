@@ -2,7 +2,7 @@ use tagalong_core::{Observation, TrackHealth};
 
 use crate::Config;
 
-/// What is counted of one track.
+/// Counts of one track.
 #[derive(Clone, Debug)]
 pub(crate) struct TrackCount {
     pub(crate) score: f64,
@@ -32,7 +32,7 @@ impl TrackCount {
         TrackHealth { confirmed: self.confirmed, log_odds: self.score }
     }
 
-    /// Takes in what one frame, `dt_s` after the last one, says of the track.
+    /// Adds the observation of the track in one frame, `dt_s` after the last one.
     pub(crate) fn observe(&mut self, observation: Observation, dt_s: f64, settings: &Config) {
         self.observation = observation;
         match observation {

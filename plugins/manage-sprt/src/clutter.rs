@@ -10,9 +10,9 @@ const FAINT: f64 = 0.05;
 #[derive(Clone, Debug)]
 struct ClutterCell {
     at: Point2<f64>,
-    /// How much spoke against a person when it was seen last, log-odds above 0.
+    /// Evidence against a person when the thing was seen last, log-odds above 0.
     against: f64,
-    /// What is left of it, 0 to 1.
+    /// Part of it that is left, 0 to 1.
     left: f64,
 }
 

@@ -35,19 +35,19 @@ pub struct Config {
     /// taken off within `undecided_s`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub usual: f64,
-    /// What each of several misses in a row says, log-odds.
+    /// Evidence of each of several misses in a row, log-odds.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub miss_log_odds: f64,
-    /// What it says that for a second the filter alone saw the track, log-odds per second.
+    /// Evidence of a second in which the filter alone supports the track, log-odds per second.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub unverified_log_odds: f64,
-    /// What it says that a track is seen for a second and has not moved, log-odds per second ...
+    /// Evidence of a second in which a track is seen and has not moved, log-odds per second ...
     #[schemars(range(min = -1e6, max = 0.0))]
     pub still_log_odds: f64,
     /// ... and at most.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub max_still: f64,
-    /// What it says that the track moved, log-odds.
+    /// Evidence of the track's motion, log-odds.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub moved_log_odds: f64,
     /// A track has moved when it is so far from where it started, m, and farther than its

@@ -70,13 +70,13 @@ impl Evidence {
         known + unverified + config.miss_log_odds * f64::from(self.misses)
     }
 
-    /// Returns what it says that the track moved, or did not.
+    /// Returns the evidence of the track's motion, or of its absence.
     fn motion_log_odds(&self, config: &Config) -> f64 {
         if !self.moved {
             return (config.still_log_odds * self.still_s).max(config.max_still);
         }
-        // A person who stopped goes on looking like a person. A track that a thing took over does
-        // not, and what was seen of the person before speaks against the thing.
+        // A person who stops goes on looking like a person. A track that changed over to a thing
+        // does not, and the looks at the person before speak against the thing.
         let stayed = (self.looks.stayed_s() / config.undecided_s).min(1.0);
         config.moved_log_odds - stayed * config.usual * self.looks.usual(config.max_look).max(0.0)
     }

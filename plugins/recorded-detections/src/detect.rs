@@ -1,10 +1,10 @@
-use nalgebra::{Matrix3, Point3};
+use nalgebra::Matrix3;
 use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs,
     Query, Result, Track,
 };
-use tagalong_geometry::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::{FaceDepth, HEAD_BELOW_TOP_M, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};
@@ -62,7 +62,7 @@ impl RecordedDetections {
             }
             (None, Some(region)) => {
                 let upper_body = self.upper_body(&region);
-                let (position, covariance) = self.placed(frame, &upper_body)?;
+                let PointEstimate { position, covariance } = self.located(frame, &upper_body)?;
                 let keeps_box = self.config.body == Body::FullBox;
                 (if keeps_box { region } else { upper_body }, position, covariance)
             }
@@ -83,22 +83,14 @@ impl RecordedDetections {
 
     /// Returns the head position for an upper-body square, with its covariance: from the depth
     /// image where that shows the face, otherwise from the size of the square.
-    fn placed(&self, frame: &Frame, region: &Rect) -> Option<(Point3<f64>, Matrix3<f64>)> {
-        let camera = &*frame.camera;
+    fn located(&self, frame: &Frame, region: &Rect) -> Option<PointEstimate> {
+        let (camera, config) = (&*frame.camera, &self.config);
         let measured = frame.images().depth.as_deref().and_then(|depth| face_depth(depth, region));
-        let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / region.width;
-        let (face_m, sigma_m) = match measured {
-            Some(depth_m) => (depth_m, self.config.sigma_depth_m),
-            None => (by_size, by_size * self.config.sigma_distance),
-        };
-        let sane = face_m.is_finite() && face_m > 0.05;
-        sane.then(|| {
-            let depth_m = face_m + HEAD_RADIUS_M;
-            let position = camera.head_of(region, face_m);
-            let centre = region.centre();
-            let covariance = camera.covariance(centre, depth_m, self.config.sigma_px, sigma_m);
-            (position, covariance)
-        })
+        let face =
+            FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, region.width, config.sigma_distance)
+                .or_measured(measured, config.sigma_depth_m);
+        let sane = face.depth_m.is_finite() && face.depth_m > 0.05;
+        sane.then(|| camera.locate_head(region, face, config.sigma_px))
     }
 
     fn log_odds(&self, score: f64) -> f64 {

@@ -288,6 +288,6 @@ fn each_setting_that_cannot_work_is_named() {
         ("sigma_position_m", Config { sigma_position_m: 0.0, ..Config::default() }),
     ] {
         let error = RecordedDetections::new(config, &context(".".as_ref())).err().unwrap();
-        assert!(error.to_string().starts_with(key), "{error}");
+        assert!(error.to_string().starts_with(&format!("`{key}`")), "{error}");
     }
 }

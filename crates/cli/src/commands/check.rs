@@ -1,14 +1,13 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Usage};
 use tagalong_pipeline::Pipeline;
-
-use crate::args::Format;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, print};
-use crate::suggest::check_log_path;
 
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;

@@ -1,11 +1,12 @@
+use tagalong_app::config_file::OuterSettings;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::serialize::to_json;
 use tagalong_config::{PluginInfo, Registry, commented_defaults};
+use tagalong_doctor::remedies;
 use tagalong_pipeline::PipelineSettings;
 
-use crate::config_file::OuterSettings;
-use crate::doctor::remedies;
 use crate::keys;
-use crate::outcome::{Ended, Failure, Outcome, print};
-use crate::reproduce::TableFormat;
 
 /// Name under which the keys around the plugins are printed.
 const PIPELINE: &str = "pipeline";
@@ -15,6 +16,9 @@ const ALL: &str = "all";
 
 /// Name under which the settings of the rejection funnel's tests are printed.
 const FUNNEL: &str = "funnel";
+
+/// Name of a schema in messages.
+const SCHEMA: &str = "the schema";
 
 /// Example of the plugin sections of a config.
 const PLUGIN_SECTIONS: &str = "\
@@ -34,7 +38,7 @@ const PLUGIN_SECTIONS: &str = "\
 ";
 
 /// Returns everything around the plugins, with its defaults.
-pub fn pipeline_defaults() -> String {
+fn pipeline_defaults() -> String {
     let own = commented_defaults::<PipelineSettings>();
     let outer = commented_defaults::<OuterSettings>();
     format!("{own}\n{PLUGIN_SECTIONS}{outer}")
@@ -46,10 +50,10 @@ pub fn pipeline_defaults() -> String {
 /// If there is no such plugin: names the nearest one.
 pub fn config(registry: &Registry, plugin: &str, format: TableFormat) -> Outcome {
     let text = match plugin {
-        PIPELINE => around(format),
-        ALL => all(registry, format),
-        FUNNEL => funnel(format),
-        name => one(find(registry, name)?, format),
+        PIPELINE => around(format)?,
+        ALL => all(registry, format)?,
+        FUNNEL => funnel(format)?,
+        name => one(find(registry, name)?, format)?,
     };
     print(&text)?;
     Ok(Ended::Well)
@@ -60,7 +64,7 @@ pub fn config(registry: &Registry, plugin: &str, format: TableFormat) -> Outcome
 /// # Errors
 /// If stdout cannot be written.
 pub fn schema(registry: &Registry) -> Outcome {
-    print(&pretty(&keys::schema(registry)))?;
+    print(&to_json(SCHEMA, &keys::schema(registry))?)?;
     Ok(Ended::Well)
 }
 
@@ -70,42 +74,38 @@ fn find<'a>(registry: &'a Registry, name: &str) -> Result<&'a PluginInfo, Failur
     })
 }
 
-fn around(format: TableFormat) -> String {
-    match format {
+fn around(format: TableFormat) -> Result<String, Failure> {
+    Ok(match format {
         TableFormat::Text => pipeline_defaults(),
         TableFormat::Markdown => keys::markdown_around(),
-        TableFormat::Json => pretty(&keys::around_schema()),
-    }
+        TableFormat::Json => to_json(SCHEMA, &keys::around_schema())?,
+    })
 }
 
-fn one(plugin: &PluginInfo, format: TableFormat) -> String {
-    match format {
+fn one(plugin: &PluginInfo, format: TableFormat) -> Result<String, Failure> {
+    Ok(match format {
         TableFormat::Text => plugin.defaults(),
         TableFormat::Markdown => keys::markdown_of(plugin),
-        TableFormat::Json => pretty(&plugin.schema()),
-    }
+        TableFormat::Json => to_json(SCHEMA, &plugin.schema())?,
+    })
 }
 
-fn all(registry: &Registry, format: TableFormat) -> String {
-    match format {
+fn all(registry: &Registry, format: TableFormat) -> Result<String, Failure> {
+    Ok(match format {
         TableFormat::Text => {
             let plugins = registry.plugins();
             let defaults = plugins.map(|p| format!("\n# ---- {}\n{}", p.name, p.defaults()));
             pipeline_defaults() + &defaults.collect::<String>()
         }
         TableFormat::Markdown => keys::markdown(registry),
-        TableFormat::Json => pretty(&keys::schema(registry)),
-    }
+        TableFormat::Json => to_json(SCHEMA, &keys::schema(registry))?,
+    })
 }
 
-fn funnel(format: TableFormat) -> String {
-    match format {
+fn funnel(format: TableFormat) -> Result<String, Failure> {
+    Ok(match format {
         TableFormat::Text => remedies::TABLE.to_owned(),
         TableFormat::Markdown => remedies::markdown(),
-        TableFormat::Json => pretty(&serde_json::json!(remedies::all())),
-    }
-}
-
-fn pretty(value: &serde_json::Value) -> String {
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+        TableFormat::Json => to_json("the remedies", &serde_json::json!(remedies::all()))?,
+    })
 }

@@ -3,16 +3,16 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::serialize::{to_json, to_json_line};
+use tagalong_app::suggest::check_log_path;
 use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{Scores, Sequence, Similarity};
-
-use crate::args::Format;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, print};
-use crate::scoring::{
+use tagalong_scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
 };
-use crate::suggest::check_log_path;
 
 /// Arguments of `tagalong eval`.
 #[derive(Args, Debug)]
@@ -84,8 +84,8 @@ pub fn eval(args: &EvalArgs) -> Outcome {
     }
     let said = Said { scores: &scores, rules: rules(&truth), notes: &notes };
     print(&match args.format {
-        Format::Json => serde_json::to_string_pretty(&said).unwrap_or_default() + "\n",
-        Format::Text => as_text(&said),
+        Format::Json => to_json("the scores", &said)?,
+        Format::Text => as_text(&said)?,
     })?;
     Ok(Ended::Well)
 }
@@ -204,11 +204,11 @@ fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {
 }
 
 /// Formats one figure per line, in the order of the fields, then the rules and the notes.
-fn as_text(said: &Said<'_>) -> String {
+fn as_text(said: &Said<'_>) -> Result<String, Failure> {
     // The JSON text keeps the order of the fields, which a parsed map would not.
-    let json = serde_json::to_string(said.scores).unwrap_or_default();
+    let json = to_json_line("the scores", said.scores)?;
     let mut out = String::new();
-    let inside = json.trim_start_matches('{').trim_end_matches('}');
+    let inside = json.trim_end().trim_start_matches('{').trim_end_matches('}');
     for field in inside.split(',') {
         let (name, value) = field.split_once(':').unwrap_or((field, ""));
         let value = match (value, value.parse::<f64>()) {
@@ -224,5 +224,5 @@ fn as_text(said: &Said<'_>) -> String {
     for note in said.notes {
         let _ = writeln!(out, "note: {note}");
     }
-    out
+    Ok(out)
 }

@@ -1,9 +1,10 @@
 use std::path::Path;
 
-use crate::args::Format;
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Outcome, print};
-use crate::suggest::check_log_path;
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Outcome, print};
+use tagalong_app::serialize::to_json;
+use tagalong_app::suggest::check_log_path;
 
 /// Runs `tagalong inspect LOG`.
 ///
@@ -18,7 +19,7 @@ pub fn inspect(log: &Path, config: Option<&Path>, format: Format) -> Outcome {
     let found = tagalong_log::inspect(log, &outer.input, &outer.limits)?;
     print(&match format {
         Format::Text => found.to_string(),
-        Format::Json => serde_json::to_string_pretty(&found).unwrap_or_default() + "\n",
+        Format::Json => to_json("the contents of the log", &found)?,
     })?;
     Ok(Ended::Well)
 }

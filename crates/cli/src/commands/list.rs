@@ -1,9 +1,9 @@
 use std::fmt::Write as _;
 
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::serialize::to_json;
 use tagalong_config::Registry;
-
-use crate::args::Format;
-use crate::outcome::{Ended, Outcome, print};
 
 /// Runs `tagalong list`.
 ///
@@ -12,7 +12,7 @@ use crate::outcome::{Ended, Outcome, print};
 pub fn list(registry: &Registry, format: Format) -> Outcome {
     print(&match format {
         Format::Text => as_text(registry),
-        Format::Json => as_json(registry),
+        Format::Json => as_json(registry)?,
     })?;
     Ok(Ended::Well)
 }
@@ -30,7 +30,7 @@ fn as_text(registry: &Registry) -> String {
     out
 }
 
-fn as_json(registry: &Registry) -> String {
+fn as_json(registry: &Registry) -> Result<String, Failure> {
     let plugins: Vec<_> = registry
         .plugins()
         .map(|plugin| {
@@ -42,5 +42,5 @@ fn as_json(registry: &Registry) -> String {
             })
         })
         .collect();
-    serde_json::to_string_pretty(&plugins).unwrap_or_default() + "\n"
+    to_json("the list of plugins", &plugins)
 }

@@ -8,8 +8,6 @@ mod list;
 mod shell;
 
 pub use check::check;
-#[cfg(test)]
-pub use config::pipeline_defaults;
 pub use config::{config, schema};
 pub use eval::{EvalArgs, eval};
 pub use inspect::inspect;

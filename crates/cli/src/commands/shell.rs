@@ -1,18 +1,16 @@
 use std::path::Path;
 
-use clap::CommandFactory as _;
+use clap::Command;
 use clap_complete::Shell;
-
-use crate::args::Cli;
-use crate::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
 
 /// Runs `tagalong completions`.
 ///
 /// # Errors
 /// If stdout cannot be written.
-pub fn completions(shell: Shell) -> Outcome {
+pub fn completions(mut command: Command, shell: Shell) -> Outcome {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "tagalong", &mut script);
+    clap_complete::generate(shell, &mut command, "tagalong", &mut script);
     print(&String::from_utf8_lossy(&script))?;
     Ok(Ended::Well)
 }
@@ -21,10 +19,10 @@ pub fn completions(shell: Shell) -> Outcome {
 ///
 /// # Errors
 /// A folder that cannot be made or written.
-pub fn man(folder: &Path) -> Outcome {
+pub fn man(command: Command, folder: &Path) -> Outcome {
     make_folder(folder)?;
     let shown = folder.display();
-    clap_mangen::generate_to(Cli::command(), folder)
+    clap_mangen::generate_to(command, folder)
         .map_err(|error| Failure::usage(format!("cannot write to {shown}: {error}")))?;
     say(&format!("the pages are in {shown}; `man {shown}/tagalong.1` shows the first"));
     Ok(Ended::Well)

@@ -2,10 +2,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use tagalong_app::outcome::Failure;
+use tagalong_app::signals::Signals;
 use tagalong_log::{FrameSource, LogFrame};
-
-use crate::outcome::Failure;
-use crate::signals::Signals;
 
 /// Frames that are decoded ahead; each holds its images.
 const AHEAD: usize = 2;

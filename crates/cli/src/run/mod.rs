@@ -1,33 +1,34 @@
 //! `tagalong run`: reads a log and a config, writes a directory of results.
 
+mod args;
 mod frames;
 mod pictures;
-pub mod progress;
 mod report;
 mod summary;
-pub mod timings;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+pub use args::RunArgs;
 use frames::{Frames, Item};
 use pictures::Pictures;
-use progress::Progress;
 use report::{FileFacts, RunReport, Tally};
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::progress::Progress;
+use tagalong_app::serialize::to_json;
+use tagalong_app::signals::Signals;
+use tagalong_app::suggest::check_log_path;
+use tagalong_app::threads::threads;
+use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
-use timings::Timings;
-
-use crate::args::{Format, RunArgs};
-use crate::config_file::{ConfigFile, OuterSettings};
-use crate::outcome::{Ended, Failure, Outcome, print, say};
-use crate::overlay::{Overlay, OverlayData};
-use crate::sample;
-use crate::signals::Signals;
-use crate::suggest::check_log_path;
+use tagalong_render::{Overlay, OverlayData};
+use tagalong_simulate::sample;
 
 /// Runs a pipeline over a log.
 ///
@@ -42,7 +43,8 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     }
     let job = Job::prepare(args, registry)?;
     let mut desk = Desk::open(args, &job)?;
-    let threads = args.threads.map_or_else(default_threads, usize::from);
+    // Reading ahead pays from the second core on, rendering in parallel from the third.
+    let threads = threads(args.threads);
     let mut pictures = Pictures::new(desk.overlay.take(), threads);
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
@@ -52,12 +54,6 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     pictures.finish()?;
     let source = frames.finish()?;
     desk.close(args, job.report, source, stopped?, &signals)
-}
-
-/// Returns the number of cores: reading ahead pays from the second one on, rendering in parallel
-/// from the third.
-fn default_threads() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Everything that is read and checked before anything is written.
@@ -83,7 +79,7 @@ impl Job {
         // A picture shows colour, whether or not the pipeline uses it.
         let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
-        let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved());
+        let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);
         Ok(Self { pipeline, outer, source, resolved, folder, report })
@@ -228,10 +224,9 @@ impl Desk {
             self.log.discard().map_err(Failure::failed)?;
             return verdict(args, &report, stopped, signals);
         }
-        let times = serde_json::to_string_pretty(&self.timings.summary()).unwrap_or_default();
-        let json = report.to_json();
-        let folder =
-            self.log.finish(about(&report), &json, &(times + "\n")).map_err(Failure::failed)?;
+        let times = to_json("timings.json", &self.timings.summary())?;
+        let json = to_json("report.json", &report)?;
+        let folder = self.log.finish(about(&report), &json, &times).map_err(Failure::failed)?;
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,

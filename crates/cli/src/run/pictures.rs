@@ -1,8 +1,8 @@
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use crate::outcome::Failure;
-use crate::overlay::{Overlay, OverlayData};
+use tagalong_app::outcome::Failure;
+use tagalong_render::{Overlay, OverlayData};
 
 /// Pictures that wait to be rendered; each holds its images.
 const WAITING: usize = 2;

@@ -191,10 +191,3 @@ impl Tally {
         });
     }
 }
-
-impl RunReport {
-    /// Returns the text of `report.json`.
-    pub fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
-    }
-}

@@ -53,9 +53,9 @@ impl Label {
         (x > -999.0 && z > -999.0).then_some([x, z])
     }
 
-    /// What the label means when pedestrians are scored: other classes are not
-    /// looked at, seated people and those who are cut off or of unknown
-    /// occlusion are ignored (the rules of TrackEval).
+    /// Returns the role of the label when pedestrians are scored: other classes have none, seated
+    /// people and those that are cut off or of unknown occlusion are ignored (the rules of
+    /// TrackEval).
     pub fn pedestrian_role(&self) -> Option<Role> {
         let hard = self.occluded > 2.0 || self.truncated > 0.0;
         match self.class.to_ascii_lowercase().as_str() {
@@ -76,8 +76,8 @@ impl Label {
     }
 }
 
-/// Reads label lines; `file` names the text in errors. Boxes without an area stay, as in
-/// TrackEval: they match nobody.
+/// Reads label lines; `file` names the text in errors. Boxes without an area stay, as in TrackEval:
+/// they match no box.
 ///
 /// # Errors
 ///
@@ -107,8 +107,8 @@ fn label(line: &Line<'_>) -> Result<Label, FormatError> {
     })
 }
 
-/// Adds labels to a timeline as truth for pedestrians; `DontCare` becomes an
-/// ignore region, and who is anonymous is left out. Frames keep KITTI's numbers, from 0.
+/// Adds labels to a timeline as truth for pedestrians; `DontCare` becomes an ignore region, and
+/// people without an id are left out. Frames keep KITTI's numbers, from 0.
 pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
     for label in labels.iter().filter(|label| !label.is_anonymous()) {
         let frame = timeline.frame(label.frame);

@@ -6,8 +6,8 @@
 //! * [`people`]: `people.csv`, the upper-body annotation of recordings.
 //! * [`metres`]: `tracks-metres.csv`, the places that a run writes.
 //!
-//! Readers keep every row as it stands; a second step turns rows into frames
-//! and decides what counts.
+//! Readers keep every row as it stands; a second step turns rows into frames and decides which rows
+//! count.
 
 pub mod kitti;
 pub mod metres;
@@ -27,14 +27,14 @@ pub struct FormatError {
     pub file: String,
     /// 1-based line, 0 for the file as a whole.
     pub line: usize,
-    /// What is wrong and what was expected.
+    /// The fault, and the expected text.
     pub why: String,
 }
 
 /// Lines of a file that were read and mean less than their writer thought.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OddLines {
-    /// How many there are.
+    /// Number of such rows.
     pub count: usize,
     /// The first of them, from 1.
     pub first: usize,
@@ -128,7 +128,7 @@ impl Timeline {
     }
 }
 
-/// One line cut into fields, with what is needed to complain about it.
+/// One line cut into fields, with its place for error messages.
 struct Line<'a> {
     file: &'a str,
     number: usize,

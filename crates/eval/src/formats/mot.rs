@@ -20,21 +20,20 @@ pub struct Row {
     pub region: Region,
     /// Score of a report; in truth 0 marks a box that does not count.
     pub confidence: f64,
-    /// What stands in the field of the class, if the line is long enough: from MOT16
-    /// on the class of a truth (1 = pedestrian); in MOT15 -1, or a place in metres.
+    /// Value in the field of the class, if the line is long enough: from MOT16 on the class of a
+    /// truth (1 = pedestrian); in MOT15 -1, or a place in metres.
     pub class: Option<f64>,
     /// Visible fraction of a truth, if the line is long enough.
     pub visibility: Option<f64>,
 }
 
-/// Whose rules say what a truth means.
+/// Rules by which a truth counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Rules {
     /// MOT15: there are no classes, a zero confidence takes a truth out.
     Mot15,
-    /// MOT16 and MOT17: only pedestrians count; whoever is matched with a
-    /// person on a vehicle, a static person, a distractor or a reflection is
-    /// left out.
+    /// MOT16 and MOT17: only pedestrians count; reports matched with a person on a vehicle, a
+    /// static person, a distractor or a reflection are left out.
     #[default]
     Mot17,
     /// MOT20: as MOT17, and vehicles that are not motorised excuse as well.
@@ -90,7 +89,7 @@ const NON_MOTORISED_VEHICLE: i64 = 6;
 const LAST_CLASS: i64 = 13;
 
 impl Row {
-    /// What the row means as truth.
+    /// Returns the role of the row as truth.
     pub fn role(&self, rules: Rules) -> Role {
         // The confidence of truth is a flag, read as a whole number.
         let counts = self.confidence.trunc() != 0.0;
@@ -135,8 +134,8 @@ impl Row {
     }
 }
 
-/// Reads truth, tracks or detections; `file` names the text in errors. Boxes without an
-/// area stay, as in TrackEval: they match nobody.
+/// Reads truth, tracks or detections; `file` names the text in errors. Boxes without an area stay,
+/// as in TrackEval: they match no box.
 ///
 /// # Errors
 ///
@@ -145,7 +144,7 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     lines(text, file).map(|line| row(&line)).collect()
 }
 
-/// Reads truth; as [`parse`], but refuses what TrackEval refuses.
+/// Reads truth; as [`parse`], but refuses the rows that TrackEval refuses.
 ///
 /// # Errors
 ///
@@ -161,7 +160,7 @@ pub fn parse_truth(text: &str, file: &str, rules: Rules) -> Result<Vec<Row>, For
     Ok(rows)
 }
 
-/// Reads tracks; as [`parse`], but refuses what TrackEval refuses.
+/// Reads tracks; as [`parse`], but refuses the rows that TrackEval refuses.
 ///
 /// # Errors
 ///
@@ -188,9 +187,9 @@ pub fn check_length(rows: &[Row], file: &str, length: u32) -> Result<(), FormatE
 }
 
 impl Row {
-    /// One id for whoever has none would be one person in many places.
+    /// Refuses rows without an id: one id for all of them would be one person in many places.
     fn check_id(&self, file: &str) -> Result<(), FormatError> {
-        let why = || format!("id {}; who is told apart has an id from 0 on", self.id);
+        let why = || format!("id {}; rows with an identity have an id from 0 on", self.id);
         if self.id >= 0 { Ok(()) } else { Err(self.error(file, why())) }
     }
 }

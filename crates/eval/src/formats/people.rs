@@ -15,7 +15,7 @@ head_x,head_y,head_z,visible,occluder,ignore,interpolated";
 pub struct Row {
     /// Number of the colour image, from 1.
     pub frame: u32,
-    /// Who it is.
+    /// Id of the person.
     pub id: i64,
     /// The upper-body square in pixels, clipped to the image.
     pub upper_body: Region,
@@ -26,7 +26,7 @@ pub struct Row {
     pub head_in_camera_m: [f64; 3],
     /// Visible fraction of the upper body.
     pub visible: f64,
-    /// What hides it: `0` nothing, a person's id, `border` or `static`.
+    /// Occluder: `0` nothing, a person's id, `border` or `static`.
     pub occluder: String,
     /// Neither a miss nor a false alarm.
     pub ignore: bool,

@@ -46,12 +46,12 @@ pub fn write(benchmark: &str, tracker: &str, sequences: &[(SequenceInfo, Sequenc
     files
 }
 
-/// Reads one tracker's results out of such a tree; `rules` say what truth means.
+/// Reads one tracker's results out of such a tree; `rules` decide which truths count.
 ///
 /// # Errors
 ///
-/// A missing file, a line that cannot be read, or a frame beyond the length
-/// that `seqinfo.ini` states.
+/// A missing file, a line that cannot be read, or a frame beyond the length that `seqinfo.ini`
+/// states.
 pub fn read(
     files: &Files,
     benchmark: &str,
@@ -118,7 +118,7 @@ fn report_text(sequence: &Sequence) -> String {
     })
 }
 
-/// Collects what a writer writes; writing to memory cannot fail.
+/// Returns the text of a writer; writing to memory cannot fail.
 fn text(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
     let mut bytes = Vec::new();
     let written = write(&mut bytes);

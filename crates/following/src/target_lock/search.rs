@@ -169,7 +169,7 @@ mod tests {
             twist(Search::default().wish(&settings(), &last, None, 1.5, &WHEELS).unwrap()).1
         };
         assert!(way(0.0, 0.5) > 0.0 && way(0.0, -0.5) < 0.0);
-        // In the second and a half that somebody goes on, they cross the middle.
+        // In the second and a half for which the person is assumed to go on, they cross the middle.
         assert!(way(0.2, -0.1) > 0.0 && way(0.2, -0.2) < 0.0);
     }
 

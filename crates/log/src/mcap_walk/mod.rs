@@ -149,6 +149,12 @@ impl<R: Read> Walker<R> {
     /// Returns the next message in the order of the file; `None` at the end, and from then on.
     #[expect(clippy::should_implement_trait, reason = "the message borrows the walker's buffer")]
     pub fn next(&mut self) -> Option<Message<'_>> {
+        self.advance();
+        self.message()
+    }
+
+    /// Goes on to the next message; returns false at the end.
+    pub(crate) fn advance(&mut self) -> bool {
         self.located = None;
         while self.located.is_none() && !self.ended {
             if self.rest.is_empty() {
@@ -157,6 +163,11 @@ impl<R: Read> Walker<R> {
                 self.step_in_buffer();
             }
         }
+        self.located.is_some()
+    }
+
+    /// Returns the message that [`Walker::advance`] reached.
+    pub(crate) fn message(&self) -> Option<Message<'_>> {
         let found = self.located.as_ref()?;
         Some(Message {
             channel: &found.channel,

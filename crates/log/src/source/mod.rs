@@ -7,24 +7,24 @@ mod laser;
 mod live;
 mod mount;
 mod pairing;
+mod parts;
 mod plan;
 mod recorded;
 mod tally;
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use assembly::{Assembly, Messages};
 pub use live::{Listening, LiveSource};
 use nalgebra::Isometry2;
+use parts::PartsWalker;
 use plan::{plan, tally_of};
 use serde::Serialize;
 use tagalong_core::Frame;
 
-use crate::mcap_walk::{Message, Walker};
-use crate::scan::{Scan, open_file};
+use crate::scan::Scan;
 use crate::{InputSettings, Inputs, Limits, LogError};
 
 /// Frame with the pose of the robot.
@@ -85,16 +85,10 @@ pub struct LogFacts {
 
 /// Frames of a log, one after the other.
 pub struct FrameSource {
-    walker: Walker<File>,
+    walker: PartsWalker,
     assembly: Assembly,
     facts: LogFacts,
     first: Option<LogFrame>,
-}
-
-impl Messages for Walker<File> {
-    fn next_message(&mut self) -> Option<Message<'_>> {
-        self.next()
-    }
 }
 
 impl FrameSource {
@@ -123,10 +117,10 @@ impl FrameSource {
         inputs: Inputs,
     ) -> Result<Self, LogError> {
         let mut tally = tally_of(&scan);
-        let reread = || Ok(Box::new(walk(&scan, limits)?) as Box<dyn Messages>);
+        let reread = || Ok(Box::new(PartsWalker::new(&scan, limits)?) as Box<dyn Messages>);
         let plan = plan(Arc::clone(&scan), input, limits, inputs, &mut tally, &reread)?;
         let mut source = Self {
-            walker: walk(&scan, limits)?,
+            walker: PartsWalker::new(&scan, limits)?,
             assembly: Assembly::new(plan, tally),
             facts: LogFacts::default(),
             first: None,
@@ -158,7 +152,7 @@ impl FrameSource {
     fn check_whole(&mut self) {
         let Assembly { plan, tally, .. } = &mut self.assembly;
         if self.walker.data_lost() && !plan.scan.data_lost {
-            let notes = self.walker.notes().join("; ");
+            let notes = self.walker.notes();
             tally.lose("log_changed_while_read", || {
                 format!("the file was whole when it was opened and is not any more: {notes}")
             });
@@ -193,12 +187,4 @@ impl FrameSource {
     pub fn facts(&self) -> &LogFacts {
         &self.facts
     }
-}
-
-/// Starts the second pass over a log.
-fn walk(scan: &Scan, limits: &Limits) -> Result<Walker<File>, LogError> {
-    let path = &scan.path;
-    let walker = Walker::new(open_file(path)?, limits)
-        .map_err(|source| LogError::NotMcap { path: path.clone(), source })?;
-    Ok(walker.knowing(scan.channels.iter().cloned()))
 }

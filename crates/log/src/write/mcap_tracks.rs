@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::{Seek, Write};
+use std::io::{self, Seek, Write};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapResult, WriteOptions, Writer};
@@ -70,7 +70,7 @@ impl<W: Write + Seek> McapTracks<W> {
         let at = record.stamp;
         let detections = encode(&messages::detections(record, &self.frames.base));
         self.tracks.send(&mut self.writer, at, &detections)?;
-        let json = encode(&StringMsg { data: messages::json(record) });
+        let json = encode(&StringMsg { data: messages::json(record).map_err(io::Error::from)? });
         self.json.send(&mut self.writer, at, &json)?;
         let tf = encode(&messages::transforms(record, &self.frames));
         self.tf.send(&mut self.writer, at, &tf)?;

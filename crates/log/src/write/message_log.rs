@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
@@ -64,10 +64,25 @@ impl MessageLog {
     /// time.
     ///
     /// # Errors
-    /// [`WriteError::Mcap`].
+    /// As for [`MessageLog::send_json`].
     pub fn send_truth(&mut self, recorded: Stamp, truth: &TruthFrame) -> Result<(), WriteError> {
-        let data = String::from_utf8(truth.encode()).unwrap_or_default();
-        self.send(TRUTH_TOPIC, recorded, &StringMsg { data })
+        self.send_json(TRUTH_TOPIC, recorded, truth)
+    }
+
+    /// Writes a value as a JSON text; `captured` is its publish time and its log time.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`] for a value that JSON cannot express, [`WriteError::Mcap`].
+    pub fn send_json<T: Serialize>(
+        &mut self,
+        topic: &str,
+        captured: Stamp,
+        value: &T,
+    ) -> Result<(), WriteError> {
+        let data = serde_json::to_string(value)
+            .map_err(|why| io::Error::other(format!("a message of {topic} as JSON: {why}")))
+            .map_err(WriteError::io(&self.path))?;
+        self.send(topic, captured, &StringMsg { data })
     }
 
     fn put(&mut self, channel_id: u16, at: Stamp, data: &[u8]) -> Result<(), WriteError> {

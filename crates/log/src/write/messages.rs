@@ -137,7 +137,10 @@ struct TrackJson {
 }
 
 /// Returns all tracks of a frame as JSON, tentative ones too, with velocity, age and occlusion.
-pub(super) fn json(record: &FrameRecord<'_>) -> String {
+///
+/// # Errors
+/// None that is known: the message has no maps.
+pub(super) fn json(record: &FrameRecord<'_>) -> serde_json::Result<String> {
     let frame = FrameJson {
         stamp_ns: record.stamp.nanos(),
         frame: record.index,
@@ -145,7 +148,7 @@ pub(super) fn json(record: &FrameRecord<'_>) -> String {
         wheel_speeds_mps: record.command.map(|WheelSpeeds { left, right }| [left, right]),
         tracks: record.tracks.iter().map(|track| track_json(record, track)).collect(),
     };
-    serde_json::to_string(&frame).unwrap_or_default()
+    serde_json::to_string(&frame)
 }
 
 fn track_json(record: &FrameRecord<'_>, track: &Track) -> TrackJson {

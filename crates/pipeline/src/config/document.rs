@@ -48,11 +48,10 @@ impl Base {
 }
 
 impl Document {
-    /// Reads a config. What it extends is looked for from `folder`.
+    /// Reads a config. The config that it extends is looked for from `folder`.
     ///
-    /// # Errors
-    /// A text that is no TOML, too long or nested too deep, and a base that cannot be read,
-    /// extends itself, or has such a fault.
+    /// # Errors A text that is no TOML, too long or nested too deep, and a base that cannot be
+    /// read, extends itself, or has such a fault.
     pub fn read(text: &str, folder: &Path) -> Result<Self, ConfigError> {
         let mut document = Self { text: text.to_owned(), bases: Vec::new() };
         let (mut folder, mut end) = (folder.to_owned(), text.len());
@@ -134,7 +133,7 @@ pub fn flattened(text: &str, folder: &Path) -> Result<String, ConfigError> {
     toml::to_string(&document.table()?).map_err(|error| ConfigError::new(error.to_string()))
 }
 
-/// Parses a text that begins `start` bytes into what is given.
+/// Parses a text that begins at byte `start` of the given one.
 fn parse(padded: &str, start: usize) -> Result<DeTable<'_>, ConfigError> {
     let bytes = padded.len() - start;
     if bytes > MAX_BYTES {
@@ -183,7 +182,7 @@ fn base_at(
     Ok(Base { path, padded: "\n".repeat(start) + &text, start })
 }
 
-/// Adds what a table lacks. Lists are not joined, and the settings of another plugin are
+/// Adds the keys that a table lacks. Lists are not joined, and the settings of another plugin are
 /// not inherited.
 fn inherit<'a>(table: &mut DeTable<'a>, base: DeTable<'a>) {
     for (key, value) in base {

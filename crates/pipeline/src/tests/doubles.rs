@@ -55,13 +55,13 @@ pub fn scored(score: f64, detection: Detection) -> Detection {
     Detection { score, ..detection }
 }
 
-type Seen = BTreeMap<(usize, u64), Vec<Detection>>;
+type ScriptedDetections = BTreeMap<(usize, u64), Vec<Detection>>;
 type Question = (usize, u64, Option<TrackId>);
 
 /// Detections by script and frame, and a record of the calls.
 #[derive(Clone, Default)]
 pub struct World {
-    seen: Arc<Mutex<Seen>>,
+    seen: Arc<Mutex<ScriptedDetections>>,
     pub asked: Arc<Mutex<Vec<Question>>>,
     pub predicted: Arc<Mutex<Vec<EgoMotion>>>,
 }

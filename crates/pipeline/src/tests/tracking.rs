@@ -294,7 +294,7 @@ fn nobody_looks_for_a_person_behind_one_who_was_found() {
 
 #[test]
 fn a_follower_that_looks_elsewhere_is_gated() {
-    let config = FOLLOWING.replace("'follow']", "'follow']\nconfig = { how = 'far' }");
+    let config = FOLLOWING.replace("'track']", "'track']\nconfig = { how = 'far' }");
     let world = World::of([vec![person(3.0, 0.0)], vec![person(3.0, 0.0), person(4.5, 1.0)]]);
     let report = world.run(&config, 2, 0.1).remove(1);
     assert_eq!(report.funnel.count("gate"), 1);

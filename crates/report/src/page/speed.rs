@@ -137,5 +137,5 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
 /// Returns the mean of the finite values.
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)
+    tagalong_stats::mean(&finite)
 }

@@ -54,7 +54,7 @@ fn in_turn(lab: &Lab, seeds: u64, each_s: f64) -> Result<Vec<Scene>, ReproduceEr
 
 /// Returns the mean; 0 of no values.
 fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    tagalong_stats::mean(values).unwrap_or(0.0)
 }
 
 /// Returns the means of the draws that have any values.

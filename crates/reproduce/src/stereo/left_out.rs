@@ -183,7 +183,7 @@ fn table(
 }
 
 /// A labelled candidate of the detector.
-struct Sighting<'a> {
+struct LabelledCandidate<'a> {
     detection: &'a Detection,
     is_person: bool,
     /// Furniture at the position of a candidate that is not a person.
@@ -193,7 +193,7 @@ struct Sighting<'a> {
 }
 
 /// Callback for each candidate.
-type See<'a> = &'a mut dyn FnMut(&Frame, &Sighting<'_>) -> Result<(), ReproduceError>;
+type See<'a> = &'a mut dyn FnMut(&Frame, &LabelledCandidate<'_>) -> Result<(), ReproduceError>;
 
 /// Runs the detector on `seeds` draws of each room of a split.
 fn visit(
@@ -234,7 +234,10 @@ fn in_scene(
             let thing = (!is_person).then(|| what_stands_at(at, &furniture));
             let is_believed = !matches!(candidate.fate, Fate::Dropped(_));
             // Candidates of one scene share a group, which cross-validation does not split.
-            see(&frame, &Sighting { detection, is_person, thing, is_believed, group: scene.seed })?;
+            see(
+                &frame,
+                &LabelledCandidate { detection, is_person, thing, is_believed, group: scene.seed },
+            )?;
         }
     }
     Ok(())

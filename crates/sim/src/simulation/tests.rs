@@ -222,7 +222,7 @@ fn clearance_is_to_what_is_really_there() {
     assert!(people_m == f64::INFINITY && (things_m - 1.25).abs() < 0.02, "{things_m}");
 }
 
-/// Two who wander, one after the other.
+/// Two people that wander, one after the other.
 const TURNS: &str = "seed = 4\nduration_s = 6.0\n[camera]\nwidth = 16\nheight = 16\n\
     rate_hz = 2.0\n[room]\nclutter = 5\n[robot]\nstart = [4.5, 3.0]\n\
     [[people]]\nwander = 30\nleaves_s = 3.0\n[[people]]\nwander = 30\nenters_s = 3.0\n";

@@ -5,7 +5,7 @@ use super::*;
 /// So many of a crowd come as two.
 const CROWD_PAIRS: f64 = 0.3;
 
-/// Returns the people whom the scene names, and its crowd, where they start.
+/// Returns the people of the scene and its crowd, at their starting points.
 pub(super) fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random) -> Vec<Walker> {
     let mut walkers = Vec::new();
     for person in &scene.people {
@@ -27,7 +27,7 @@ pub(super) fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random
     walkers
 }
 
-/// Somebody and those who walk along, to the left and to the right of them.
+/// Adds a person and their companions, to the left and to the right of them.
 fn add_group(
     walkers: &mut Vec<Walker>,
     person: PersonSettings,
@@ -66,7 +66,7 @@ fn somebody(settings: PersonSettings, split: Split, random: &mut Random) -> Walk
     Walker::new(person, settings)
 }
 
-/// Somebody who walks between random points of the room.
+/// Returns a person that walks between random points of the room.
 fn wanderer(
     scene: &Scene,
     walkers: &[Walker],
@@ -98,7 +98,7 @@ struct Area {
 
 /// Where a crowd wanders: ahead of a robot that starts at the near end.
 const MIDDLE: Area = Area { parts: [[0.2, 0.92], [0.15, 0.85]], off_robot_m: 1.5 };
-/// Where somebody with `wander` goes.
+/// Area in which a person with `wander` walks.
 const ANYWHERE: Area = Area { parts: [[0.06, 0.94], [0.1, 0.9]], off_robot_m: 0.9 };
 
 /// A random point of an area off the robot's start, furniture and people; after

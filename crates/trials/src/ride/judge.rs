@@ -7,7 +7,7 @@ use tagalong_sim::Truth;
 use super::{Ride, Tick};
 use crate::Moment;
 
-/// Number of the person who is to be followed: the first of the scene.
+/// Number of the person to follow: the first of the scene.
 const WHOM: u16 = 1;
 /// A longer pause between frames counts as this one, s.
 const LONGEST_PAUSE_S: f64 = 0.5;
@@ -23,11 +23,11 @@ const SPEED_S: f64 = 0.6;
 pub struct RideJudge {
     /// A track within this distance of a person's head is on that person, m.
     pub same_m: f64,
-    /// Somebody is in view from this visible fraction of the upper body on ...
+    /// A person is in view from this visible fraction of the upper body on ...
     pub min_visible: f64,
     /// ... up to this range, m.
     pub max_range_m: f64,
-    /// Whoever comes back into view is to be found within this time, s.
+    /// Time within which a person that comes back into view must be found, s.
     pub refind_s: f64,
     /// Following the wrong one for longer in one go spoils the ride, s.
     pub most_wrong_s: f64,
@@ -62,12 +62,12 @@ pub struct Episode {
     pub found_s: Option<f64>,
 }
 
-/// How a ride went.
+/// Result of a ride.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Ridden {
     /// Seed of the scene.
     pub seed: u64,
-    /// The person was followed, or rightly given up, and nobody else for long.
+    /// The person was followed, or rightly given up, and no other person for long.
     pub kept: bool,
     /// Length of the ride, s.
     pub time_s: f64,
@@ -75,7 +75,7 @@ pub struct Ridden {
     pub in_view_s: f64,
     /// The right person was followed, s.
     pub right_s: f64,
-    /// Somebody or something else was followed, s.
+    /// Time during which another person or an object was followed, s.
     pub wrong_s: f64,
     /// The same in one go, s.
     pub longest_wrong_s: f64,
@@ -87,18 +87,18 @@ pub struct Ridden {
     pub farther_m: Option<f64>,
     /// Times without the person after the first with them.
     pub episodes: Vec<Episode>,
-    /// Least room to people while the robot moved, m; none where nobody is.
+    /// Least free distance to people while the robot moved, m; `None` without people.
     pub clearance_people_m: Option<f64>,
     /// Least room to furniture and walls while the robot moved, m.
     pub clearance_things_m: Option<f64>,
     /// Root of the mean square of the forward jerk, m/s³.
     pub jerk_mps3: f64,
-    /// What the lock thought of each sighting, and whether it was the person.
+    /// Score of the lock for each detection, and whether it was the person.
     #[serde(skip)]
     pub likeness: Vec<(Likeness, bool)>,
 }
 
-/// Who is followed in a frame.
+/// Followed person in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Whom {
     Nobody,
@@ -133,6 +133,7 @@ impl RideJudge {
         };
         let farther = |l: &JudgedFrame| Some(l.dt_s * (l.range_m? - ride.stand_off_m?));
         let slow_s = sum(&slow);
+        // Distance to the person counts only while they are slow enough to be kept up with.
         let farther_ms: f64 = looks.iter().filter(|l| slow(l)).filter_map(farther).sum();
         let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
         let episodes = episodes(&looks);
@@ -156,8 +157,8 @@ impl RideJudge {
         }
     }
 
-    /// Whether somebody who came back into view was found in time; `None` if the
-    /// person never came back, or only just before the end.
+    /// Returns true if a person that came back into view was found in time; `None` if the person
+    /// never came back, or only just before the end.
     pub fn refound(&self, episode: &Episode, end_s: f64) -> Option<bool> {
         let in_view_s = episode.in_view_s?;
         match episode.found_s {
@@ -170,6 +171,7 @@ impl RideJudge {
         let found = looks.iter().any(|look| look.whom == Whom::Right);
         let end_s = looks.last().map_or(0.0, |look| look.at_s);
         let last = episodes.last().filter(|episode| episode.found_s.is_none());
+        // A loss at the very end, without time to find the person again, is no failure.
         found && last.and_then(|episode| self.refound(episode, end_s)).unwrap_or(true)
     }
 
@@ -184,6 +186,7 @@ impl RideJudge {
             let next_s = seconds.get(at + 1).copied().unwrap_or(seconds[at]);
             JudgedFrame {
                 at_s: seconds[at],
+                // A gap in the frames must not count as following for its whole length.
                 dt_s: (next_s - seconds[at]).clamp(0.0, LONGEST_PAUSE_S),
                 whom: before,
                 in_view: truth.is_some_and(|truth| self.is_in_view(truth)),
@@ -199,7 +202,7 @@ impl RideJudge {
         truth.visible_fraction >= self.min_visible && range_m <= self.max_range_m
     }
 
-    /// Who is followed; a track that is not seen is on whom it was before.
+    /// Returns the followed person; a track that is not observed stays on the person of before.
     fn whom(&self, moment: &Moment, report: &FrameReport, before: Whom) -> Whom {
         if !report.outcome.is_processed() {
             return before;
@@ -211,12 +214,13 @@ impl RideJudge {
                 true => Whom::Right,
                 false => Whom::Wrong,
             },
+            // A target that was never observed cannot be the person.
             Some(_) if before == Whom::Nobody => Whom::Wrong,
             Some(_) => before,
         }
     }
 
-    /// Whether a track is on the person who is to be followed.
+    /// Returns true if a track is on the person to follow.
     fn is_of(&self, track: &Track, moment: &Moment) -> bool {
         let place = track.estimate.person.position.xy();
         let off = |truth: &&Truth| (truth.head_in_robot.xy() - place).norm();
@@ -272,6 +276,7 @@ fn episodes(looks: &[JudgedFrame]) -> Vec<Episode> {
             }
             _ => {}
         }
+        // A person that leaves the view again restarts the wait.
         if let Some(open) = all.last_mut().filter(|_| !right) {
             open.in_view_s = look.in_view.then(|| open.in_view_s.unwrap_or(look.at_s));
         }
@@ -300,6 +305,7 @@ fn least(values: impl Iterator<Item = f64>) -> Option<f64> {
 fn jerk(ticks: &[Tick]) -> f64 {
     let mut samples: Vec<(f64, f64)> = Vec::new();
     for tick in ticks {
+        // Ticks are denser than the jerk is defined for; rounding must not skip one.
         if samples.last().is_none_or(|(at_s, _)| tick.at_s - at_s >= JERK_S - 1e-6) {
             samples.push((tick.at_s, tick.speed_mps));
         }

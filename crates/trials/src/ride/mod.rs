@@ -16,12 +16,12 @@ use crate::{Contender, Draw, Drawn, Moment, TrialError};
 /// the papers, which is 0.38 m wide and 0.47 m long.
 const RADIUS_M: f64 = 0.25;
 
-/// Somebody who watches a ride, to write it down, say.
+/// Observer of a ride, for example one that writes a log.
 pub trait Witness {
     /// Something that the robot recorded.
     fn event(&mut self, _event: &Event) {}
 
-    /// What the pipeline made of a frame.
+    /// Takes a frame and the report of the pipeline on it.
     fn frame(&mut self, _drawn: &Drawn, _report: &FrameReport) {}
 
     /// False ends the ride.
@@ -30,7 +30,7 @@ pub trait Witness {
     }
 }
 
-/// Nobody watches.
+/// No observer.
 impl Witness for () {}
 
 /// The robot at a step of the simulation.
@@ -40,7 +40,7 @@ pub struct Tick {
     pub at_s: f64,
     /// True forward speed, m/s.
     pub speed_mps: f64,
-    /// How much room it has.
+    /// Free distance around it.
     pub clearance: Clearance,
 }
 
@@ -51,23 +51,22 @@ pub struct Ride {
     pub seed: u64,
     /// The distance that the controller keeps from the person, m, if it keeps one.
     pub stand_off_m: Option<f64>,
-    /// What is true of each frame.
+    /// Truth of each frame.
     pub moments: Vec<Moment>,
-    /// What the pipeline made of it.
+    /// Report of the pipeline on each frame.
     pub reports: Vec<FrameReport>,
-    /// How long that took, ms; the only part that differs between two rides.
+    /// Time of each step, ms; the only part that differs between two rides.
     pub took_ms: Vec<f64>,
     /// The robot, step by step.
     pub ticks: Vec<Tick>,
 }
 
 impl Ride {
-    /// Draws a scene in which the contender's controller drives the robot. Images
-    /// that come late are late for it, too; between them the wheels get what [`Pipeline::command_at`] says, as often as
-    /// the odometry speaks.
+    /// Simulates a scene in which the contender's controller drives the robot. Images that come
+    /// late are late for it, too; between them the wheels get the command of
+    /// [`Pipeline::command_at`] at each message of the odometry.
     ///
-    /// # Errors
-    /// A config that is wrong or has no controller, or a plugin that fails.
+    /// # Errors A config that is wrong or has no controller, or a plugin that fails.
     pub fn new(
         scene: &Scene,
         contender: &Contender,
@@ -94,6 +93,7 @@ impl Ride {
             let start = Instant::now();
             let report = pipeline.step(&drawn.frame).map_err(failed)?;
             ride.took_ms.push(start.elapsed().as_secs_f64() * 1e3);
+            // Between frames `command_at` steers; this is the fresh command.
             if let Some(command) = report.command {
                 draw.steer(command.wheels);
             }
@@ -115,6 +115,7 @@ impl Ride {
         }
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
+            // Only the odometry ticks: it is the fastest message of the robot.
             let Event::Odometry(reading) = event else { return None };
             self.ticks.push(tick(simulation, reading.at_ns));
             command(pipeline, Stamp::from_nanos(reading.at_ns))

@@ -46,7 +46,7 @@ fn calls(line: &str) -> Vec<Call<'_>> {
 fn calls_of_part(part: &str) -> Vec<Call<'_>> {
     let settings = |word: &&str| word.contains('=');
     let all: Vec<&str> = part.split_whitespace().skip_while(settings).collect();
-    // What goes on in the shell is none of the program's.
+    // Redirections and pipes belong to the shell, not to the program.
     let words = all.split(|word| matches!(*word, ">" | "|")).next().unwrap_or_default();
     match words {
         ["tagalong", rest @ ..] => vec![Call::Tagalong(rest.to_vec())],
@@ -68,7 +68,7 @@ fn calls_of_part(part: &str) -> Vec<Call<'_>> {
 /// Sub-commands that need an installation of their own.
 const INSTALLED: &[&str] = &["deny", "install"];
 
-/// What there is to call.
+/// Commands and files that documents may call.
 struct Known {
     cargo: BTreeSet<String>,
     program: Option<Program>,
@@ -98,7 +98,7 @@ impl Known {
     }
 }
 
-/// What the program says to words that it does not understand; asked for help, it
+/// Returns the error of the program about words that it does not understand; asked for help, it
 /// reads them all and does nothing.
 fn misunderstood(program: &Program, words: &[&str]) -> Result<Option<String>> {
     let said = program.call(&[]).args(words.iter().map(plain)).arg("--help").output()?;

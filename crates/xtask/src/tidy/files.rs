@@ -11,7 +11,7 @@ const MAX_BYTES: u64 = 2 << 20;
 /// Longer sources are split.
 const MAX_RUST_LINES: usize = 700;
 
-/// What a finished source does not contain. In pieces, so that this file may.
+/// Marks of unfinished sources. In pieces, so that this file may contain them.
 const UNFINISHED: &[&str] =
     &[concat!("to", "do!"), concat!("unimpl", "emented!"), concat!("FIX", "ME")];
 

@@ -1,5 +1,5 @@
-//! What the compiler does not check: who may depend on whom, whether every
-//! plugin is listed, whether what the documents say is there.
+//! Rules that the compiler does not check: allowed dependencies between crates, complete lists of
+//! plugins, documents without stale parts, plain words in comments.
 
 mod arrows;
 mod commands;
@@ -7,6 +7,7 @@ mod files;
 mod licences;
 mod paths;
 mod plugins;
+mod words;
 
 use anyhow::{Result, bail};
 
@@ -21,6 +22,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     complaints.extend(plugins::check(workspace, &metadata)?);
     complaints.extend(licences::check(workspace, &metadata)?);
     complaints.extend(files::check(workspace)?);
+    complaints.extend(words::check(workspace)?);
     let documents = markdown::documents(workspace)?;
     complaints.extend(paths::check(workspace, &documents));
     complaints.extend(commands::check(workspace, &metadata, &documents)?);

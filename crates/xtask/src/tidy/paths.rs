@@ -29,7 +29,7 @@ fn links(line: &str) -> impl Iterator<Item = &str> {
     files.filter_map(|target| target.split('#').next()).filter(|target| !target.is_empty())
 }
 
-/// What stands in backticks and looks like a path.
+/// Returns the words in backticks that look like paths.
 fn backticked(line: &str) -> impl Iterator<Item = &str> {
     let in_path = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
     let quoted = line.split('`').skip(1).step_by(2);

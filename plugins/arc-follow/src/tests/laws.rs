@@ -1,8 +1,8 @@
-//! The laws of the papers, and what is done where they have none.
+//! The laws of the papers, and the extensions where they have none.
 
 use super::*;
 
-/// Only what the papers print, up to the target itself.
+/// Returns a config of the printed laws only, up to the target itself.
 fn bare(path: Path, gain: f64) -> Config {
     Config {
         path,
@@ -19,8 +19,8 @@ fn bare(path: Path, gain: f64) -> Config {
     }
 }
 
-/// Drives to somebody who stands 3 m away at 34 degrees, until 0.8 m from
-/// them; ranges and bearings on the way.
+/// Drives to a person that stands 3 m away at 34 degrees, until 0.8 m from them; returns ranges and
+/// bearings on the way.
 fn approach(config: Config) -> Vec<(f64, f64)> {
     let bearing = 34_f64.to_radians();
     let place = Point2::new(3.0 * bearing.cos(), 3.0 * bearing.sin());
@@ -274,8 +274,8 @@ fn it_turns_too_far_if_it_does_not_know_of_its_latency() {
     assert!(overshoot(0.3) < 1.0, "{}", overshoot(0.3));
 }
 
-/// How far the robot has left its lane 0.4 m before the bend of a person's way who is
-/// some metres ahead.
+/// Returns the distance of the robot from its lane 0.4 m before the bend of a person's way some
+/// metres ahead.
 fn cut_m(trail_m: f64) -> f64 {
     let mut drive = Drive::new(Config { trail_m, ..Config::default() }, 0.1, 1);
     for step in 0..120 {

@@ -1,4 +1,4 @@
-//! Whatever the pipeline may say, the wheels get something sensible.
+//! For any report of the pipeline the wheels get a sensible command.
 
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ const ROW: usize = 50;
 /// A million states in release, a tenth of that in debug.
 const ROWS: u32 = if cfg!(debug_assertions) { 2_000 } else { 20_000 };
 
-/// What a controller is told of one frame.
+/// Input of a controller in one frame.
 #[derive(Clone, Debug)]
 struct State {
     place: [f64; 2],
@@ -143,8 +143,8 @@ proptest! {
             command(&mut controller, EgoMotion::at_rest(0.1), Some(&target(x, y, velocity)))
         };
         let (here, there) = (first(x, y), first(x + 1e-7, y - 1e-7));
-        // Where turning on the spot begins, the wanted speed jumps, and the
-        // acceleration bounds what comes of it.
+        // Where turning on the spot begins, the wanted speed jumps, and the acceleration limits the
+        // result.
         let near = (y.atan2(x).abs().to_degrees() - 60.0).abs() < 1e-3;
         let bound = if near { 0.1 } else { 1e-4 };
         prop_assert!((here.left - there.left).abs() < bound, "{here:?} {there:?}");

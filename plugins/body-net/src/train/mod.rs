@@ -1,6 +1,5 @@
-//! Fits a [`Model`] to labelled candidates: networks learn from all groups but some,
-//! what they say of those calibrates the log-odds, and one that has seen all makes the
-//! model.
+//! Fits a [`Model`] to labelled candidates: networks learn from all groups but some, their outputs
+//! on those calibrate the log-odds, and one that has seen all makes the model.
 
 mod adam;
 mod changes;
@@ -72,8 +71,8 @@ impl NetTrainer {
         Ok(net)
     }
 
-    /// How the mean loss of a batch depends on the weights. People and others weigh the
-    /// same; `share` is that of people.
+    /// Computes the gradient of the mean loss of a batch. People and others have the same weight;
+    /// `share` is that of people.
     fn gradient(&self, net: &Net, batch: &[usize], share: f32, seed: u64) -> Result<Net> {
         let chunks: Vec<&[usize]> = batch.chunks(batch.len().div_ceil(PARTS)).collect();
         let of_part = |part: &&[usize]| {
@@ -98,7 +97,7 @@ impl NetTrainer {
         Ok(sum)
     }
 
-    /// What networks say of candidates that they have not seen.
+    /// Returns the outputs of networks on candidates that they have not seen.
     fn held_out(&self, progress: &mut dyn FnMut(f64)) -> Result<Vec<(f64, bool)>> {
         let folds = self.training.folds;
         let parts = parts(self.examples.iter().copied(), folds, self.seed);

@@ -22,13 +22,17 @@ pub fn push(camera: &Camera, image: &GreyImage, candidate: &Detection, out: &mut
     let start = out.len();
     let upright = Upright::new(camera, &candidate.position);
     let Some(plane) = upright.and_then(|plane| plane.grey(image)) else {
+        // Without a plane in front of the camera all features are unknown.
         out.resize(start + COUNT, f32::NAN);
         return;
     };
     let strength = Blocks { grey: &plane.grey, columns: COLUMNS, block: BLOCK }.push(out);
+    // Strengths span decades; their logarithms do not.
     out.extend(strength.iter().map(|sum| sum.ln_1p()));
+    // Relative to the whole plane: absolute brightness is the exposure's.
     let mean = plane.grey.iter().sum::<f32>() / plane.grey.len() as f32;
     out.extend((0..BLOCKS).map(|block| mean_of(&plane, block) - mean));
+    // Blocks outside of the image are unknown, not dark.
     for block in (0..BLOCKS).filter(|block| !plane.is_seen[middle(*block)]) {
         let histogram = start + block * DIRECTIONS;
         out[histogram..histogram + DIRECTIONS].fill(f32::NAN);
@@ -60,8 +64,8 @@ mod tests {
 
     use super::*;
 
-    /// A camera 1.2 m above the floor, and what is painted on an upright plane so far
-    /// ahead, m, by how far it is to the left and above the floor, m.
+    /// Computes the features of a pattern on an upright plane so far ahead, m, for a camera 1.2 m
+    /// above the floor; `paint` takes the offset to the left and the height above the floor, m.
     fn numbers(ahead_m: f64, paint: impl Fn(f64, f64) -> u8) -> Vec<f32> {
         let lens =
             Pinhole { fx: 300.0, fy: 300.0, cx: 160.0, cy: 160.0, distortion: Distortion::None };

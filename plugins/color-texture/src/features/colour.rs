@@ -28,6 +28,7 @@ pub fn push(colour: &Grid<[f32; 3]>, surface: Option<&Surface>, out: &mut Vec<f3
     out.extend(head);
     out.extend(torso);
     let hues = head[..HUES].iter().zip(&torso[..HUES]);
+    // People often wear other colours than they have on the head; pillars do not.
     out.push(hues.map(|(a, b)| (a - b).abs()).sum());
     out.push((head[HUES] - torso[HUES]).hypot(head[HUES + 2] - torso[HUES + 2]));
     out.push(head[OF_ZONE - 2] - torso[OF_ZONE - 2]);
@@ -57,6 +58,7 @@ fn intensity(colour: [f32; 3]) -> f32 {
 
 /// Shares of red and green.
 fn chromaticity(colour: [f32; 3]) -> [f32; 2] {
+    // The constant keeps the chromaticity of black pixels at grey.
     let sum = colour.iter().sum::<f32>() + 3.0;
     [(colour[0] + 1.0) / sum, (colour[1] + 1.0) / sum]
 }
@@ -78,6 +80,7 @@ fn ends(colour: [f32; 3]) -> (f32, f32) {
 fn hues(cells: &[[f32; 3]]) -> [f32; HUES] {
     let mut histogram = [0.0; HUES];
     for colour in cells {
+        // Grey pixels have no hue, so the saturation is the weight.
         histogram[hue(*colour)] += saturation(*colour) / cells.len() as f32;
     }
     if cells.is_empty() { [f32::NAN; HUES] } else { histogram }

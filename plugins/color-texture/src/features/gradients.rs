@@ -25,7 +25,7 @@ pub fn push(grey: &Grid<f32>, out: &mut Vec<f32>) {
 pub struct Blocks<'a> {
     /// Intensities, row by row.
     pub grey: &'a [f32],
-    /// How many are in a row.
+    /// Number of blocks in a row.
     pub columns: usize,
     /// Rows and columns of a block.
     pub block: [usize; 2],
@@ -37,6 +37,7 @@ impl Blocks<'_> {
     pub fn push(&self, out: &mut Vec<f32>) -> Vec<f32> {
         let histograms = self.histograms();
         let strength: Vec<f32> = histograms.iter().map(|h| h.iter().sum()).collect();
+        // Noise of even blocks must not be normalised to full strength.
         let noise = NOISE * (self.block[0] * self.block[1]) as f32;
         for (block, histogram) in histograms.iter().enumerate() {
             let around = self.around(&strength, block) + noise;
@@ -98,6 +99,7 @@ impl Blocks<'_> {
 
 /// Shares a gradient, as direction in bins and length, between the bins next to it.
 fn add(histogram: &mut [f32; DIRECTIONS], [direction, length]: [f32; 2]) {
+    // Interpolated between neighbouring directions, so that a small turn changes little.
     let turn = direction + (DIRECTIONS as f32 - 0.5);
     let (lower, part) = (turn as usize, turn.fract());
     histogram[lower % DIRECTIONS] += (1.0 - part) * length;

@@ -1,4 +1,4 @@
-//! What is looked at.
+//! Features of a candidate.
 
 mod body;
 mod colour;
@@ -18,7 +18,7 @@ use self::window::{Surface, Window};
 pub const COUNT: usize =
     gradients::COUNT + texture::COUNT + colour::COUNT + shape::COUNT + place::COUNT + body::COUNT;
 
-/// What a number is about.
+/// Family of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Directions of intensity edges.
@@ -92,6 +92,7 @@ impl Features {
         let intensity = window.grey(grey);
         gradients::push(&intensity, out);
         texture::push(&intensity, out);
+        // A colour image of another size is not registered to the grey one.
         match frame.colour().ok() {
             Some(image) if same_size(image, grey) => {
                 colour::push(&window.colour(image), surface.as_ref(), out);
@@ -137,5 +138,6 @@ fn spread(values: impl Iterator<Item = f32>) -> [f32; 2] {
         squares += value * value;
     }
     let mean = sum / count;
+    // Rounding may bring the variance of an even zone below 0.
     [mean, (squares / count - mean * mean).max(0.0).sqrt()]
 }

@@ -46,6 +46,7 @@ fn run(surface: &Surface, row: usize) -> (usize, usize) {
 fn profile(surface: &Surface, pair: usize) -> [f32; 3] {
     let runs = [2 * pair, 2 * pair + 1].map(|row| (row, run(surface, row)));
     let readings = runs.iter().map(|(row, _)| &surface.0[row * SIDE..(row + 1) * SIDE]);
+    // No reading in two rows is unknown; readings off the candidate are a width of 0.
     if readings.flatten().all(|d| d.is_nan()) {
         return [f32::NAN; 3];
     }
@@ -62,11 +63,12 @@ fn block_depth(surface: &Surface, block: usize) -> f32 {
     let (top, left) = (block / across * COARSE, block % across * COARSE);
     let zone = Zone { rows: [top, top + COARSE], columns: [left, left + COARSE] };
     let depths = zone.cells().map(|cell| surface.0[cell]).filter(|d| !d.is_nan());
+    // Far background counts as far, not as how far.
     spread(depths.map(|d| d.clamp(-FAR_M, FAR_M)))[0]
 }
 
-/// How far the candidate is from the plane that fits it best, m (root mean
-/// square): nothing for posters and cardboard.
+/// Computes the distance of the candidate's surface from the plane that fits it best, m (root mean
+/// square): zero for posters and cardboard.
 fn unevenness(surface: &Surface, zone: Zone) -> f32 {
     let points = || {
         zone.cells().filter(|cell| surface.is_on(*cell)).map(|cell| {
@@ -79,6 +81,7 @@ fn unevenness(surface: &Surface, zone: Zone) -> f32 {
         squares += place * place.transpose();
         sums += place * depth;
     }
+    // A plane has three parameters; fewer points than 8 fit it by chance.
     if points().count() < 8 {
         return f32::NAN;
     }
@@ -88,8 +91,7 @@ fn unevenness(surface: &Surface, zone: Zone) -> f32 {
     mean.hypot(deviation)
 }
 
-/// How much farther the ends of the runs are than their middles, m: heads are
-/// round.
+/// Computes the depth of the ends of the runs behind their middles, m: heads are round.
 fn roundness(surface: &Surface, zone: Zone) -> f32 {
     let rows = (zone.rows[0]..zone.rows[1]).filter_map(|row| {
         let (left, right) = run(surface, row);
@@ -105,6 +107,7 @@ fn roundness(surface: &Surface, zone: Zone) -> f32 {
 /// Mean bend between neighbours on the candidate, m: leaves are rough.
 fn roughness(surface: &Surface, zone: Zone) -> f32 {
     let inner = Zone { columns: [zone.columns[0] + 1, zone.columns[1] - 1], ..zone };
+    // A bend over an edge of the candidate is that of the background.
     let all_on = |cell: &usize| [cell - 1, *cell, cell + 1].iter().all(|c| surface.is_on(*c));
     let d = |cell: usize| surface.0[cell];
     let bend = |cell: usize| (d(cell - 1) - 2.0 * d(cell) + d(cell + 1)).abs();
@@ -122,7 +125,7 @@ fn shares(surface: &Surface) -> [f32; 3] {
     ]
 }
 
-/// How often a row goes onto the candidate or off it, on average.
+/// Returns the average number of times that a row goes onto the candidate or off it.
 fn changes(surface: &Surface) -> f32 {
     let count = (0..SIDE * SIDE)
         .filter(|cell| cell % SIDE > 0 && surface.is_on(*cell) != surface.is_on(cell - 1))

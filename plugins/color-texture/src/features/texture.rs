@@ -37,6 +37,7 @@ fn patterns(grey: &Grid<f32>, zone: Zone) -> [f32; PATTERNS] {
     let mut count = 0.0f32;
     for cell in zone.cells().filter(inner) {
         histogram[pattern(grey, cell)] += 1.0;
+        // The border has no full circle of neighbours.
         count += 1.0;
     }
     histogram.map(|n| n / count.max(1.0))
@@ -49,6 +50,8 @@ fn pattern(grey: &Grid<f32>, cell: usize) -> usize {
         grey[other as usize] > grey[cell] + NOISE
     });
     let changes = (0..8).filter(|k| brighter[*k] != brighter[(k + 1) % 8]).count();
+    // Patterns with more than two changes are noise or fine texture, and share one bin (Ojala et
+    // al., PAMI 2002).
     if changes > 2 { PATTERNS - 1 } else { brighter.iter().filter(|b| **b).count() }
 }
 

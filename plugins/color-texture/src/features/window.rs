@@ -45,8 +45,8 @@ pub struct Window {
 }
 
 impl Window {
-    /// The window of a square; what lies outside the image continues its
-    /// border. `None` in an image without pixels.
+    /// Creates the window of a square; outside of the image its border is continued. `None` in an
+    /// image without pixels.
     pub fn new(image: &GreyImage, region: &Rect) -> Option<Self> {
         let (width, height) = (image.width(), image.height());
         let around = region.inflated(GROW);
@@ -92,6 +92,7 @@ fn cells(start: f64, length: f64, size: usize) -> [(usize, usize); SIDE] {
     let edge = |k: usize| (start + length * k as f64 / SIDE as f64).clamp(0.0, size as f64);
     std::array::from_fn(|k| {
         let first = (edge(k) as usize).min(size - 1);
+        // At least one pixel for a cell, also in small squares.
         (first, (edge(k + 1) as usize).clamp(first + 1, size))
     })
 }

@@ -15,7 +15,7 @@ pub struct Examples {
     bins: Vec<Vec<u8>>,
     /// The truth.
     is_person: Vec<bool>,
-    /// How much each candidate counts.
+    /// Weight of each candidate.
     pub weights: Vec<f64>,
 }
 
@@ -61,7 +61,7 @@ impl Sums {
         Self { slope: self.slope - other.slope, curvature: self.curvature - other.curvature }
     }
 
-    /// The best step, and twice what it gains.
+    /// Returns the best step, and twice its gain.
     fn step(self, caution: f64) -> (f64, f64) {
         let step = self.slope / (self.curvature + caution);
         (step, step * self.slope)
@@ -102,8 +102,7 @@ struct Grower<'a> {
     training: &'a Training,
 }
 
-/// The best stump of some candidates: the last bin below its threshold, and
-/// what it gains.
+/// The best stump of some candidates: the last bin below its threshold, and its gain.
 struct Split {
     gain: f64,
     bin: u8,
@@ -111,8 +110,8 @@ struct Split {
 }
 
 impl Grower<'_> {
-    /// The best stump, whose halves get stumps of their own. What the tree says
-    /// is added to the sums.
+    /// Grows the best stump, whose halves get stumps of their own, and adds the votes of the tree
+    /// to the sums.
     fn tree(&self, chosen: &[usize], sums: &mut [f64]) -> Option<Tree> {
         let Split { bin, stump: root, .. } = self.best(chosen)?;
         let bins = &self.examples.bins[root.feature];

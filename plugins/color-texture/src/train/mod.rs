@@ -166,8 +166,8 @@ impl Trial {
         self.held_out.iter().map(loss).sum::<f64>() / weight
     }
 
-    /// What the model will be asked about: candidates with depth, if there are
-    /// both kinds of them.
+    /// Returns the scores of the candidates that the model will judge in use: those with depth, if
+    /// there are both kinds of them.
     fn in_use(&self) -> Vec<(f64, bool)> {
         let pairs = |depth_only: bool| -> Vec<(f64, bool)> {
             let asked = self.held_out.iter().filter(|j| j.has_depth || !depth_only);
@@ -192,7 +192,7 @@ impl Trial {
     }
 }
 
-/// Share of each family in what the trees can decide.
+/// Returns the share of each family in the votes of the trees.
 fn influence(model: &Model) -> toml::Table {
     let reach = |stump: &Stump| f64::from((stump.above - stump.below).abs());
     let stumps = || model.trees.iter().flat_map(|tree| [tree.below, tree.above]);

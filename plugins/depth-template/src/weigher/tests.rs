@@ -13,7 +13,7 @@ fn frame(pixels: Vec<f32>) -> Frame {
     Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
 }
 
-/// The weight of a scene pixel by pixel: who is in front at each one?
+/// Computes the weight of a scene pixel by pixel: which person is in front at each one?
 fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
     let config = DepthTemplateConfig::default();
     let image = frame.derived::<Working>().unwrap();
@@ -162,8 +162,8 @@ fn the_body_faces_where_it_moves_as_seen_from_the_camera() {
     assert_eq!(of(2.0, 0.0, 0.0, 0.1), Direction::Along, "too slow to tell");
 }
 
-/// Somebody with something at the same depth beside the body, on the left,
-/// the right or both sides.
+/// Renders a person with an object at the same depth beside the body, on the left, the right or
+/// both sides.
 fn laden(near: Person, left: bool, right: bool) -> Frame {
     let bare = painted(&[near]);
     let depth_m = near.position.x as f32 - 0.08;

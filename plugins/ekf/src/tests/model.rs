@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use tagalong_config::{Context, Registry};
 use tagalong_core::{DiffDrive, EgoMotion, PersonFilter};
 
-use super::world::{DT_S, Random, World, camera, detection};
+use super::world::{DT_S, World, camera, detection, normal3};
 use crate::filter::{motion_jacobian, state_jacobian};
 use crate::{Config, Ekf, State};
 
@@ -69,11 +69,11 @@ proptest! {
         seed in any::<u64>(), sigma in 1e-4..1.0f64, motion in motions(),
     ) {
         let filter = filter(Config::default());
-        let mut random = Random(seed);
+        let mut random = tagalong_stats::SplitMix64::new(seed);
         let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         for _ in 0..30 {
             filter.predict(&mut state, &motion);
-            let seen = detection(Point3::from(random.normal3()), sigma);
+            let seen = detection(Point3::from(normal3(&mut random)), sigma);
             filter.correct(&mut state, &seen, &camera());
             prop_assert_eq!(state.covariance, state.covariance.transpose());
             prop_assert!(state.covariance.cholesky().is_some());
@@ -156,7 +156,7 @@ fn the_process_noise_does_not_depend_on_the_frame_rate_as_the_printed_one_does()
     assert!((ratio - 10.0).abs() < 1e-6);
 }
 
-/// The believed height of somebody who stands for 20 s and has sat for 1 s.
+/// Returns the estimated height of a person that stands for 20 s and has sat for 1 s.
 fn height_after_sitting_down(config: Config) -> f64 {
     let filter = filter(config);
     let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));

@@ -1,9 +1,9 @@
-//! A person at rest who is seen from a moving robot stays at rest in the world.
+//! A person at rest observed from a moving robot stays at rest in the world.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tagalong_core::{EgoMotion, PersonFilter};
 
-use super::world::{DT_S, World, mean, track};
+use super::world::{DT_S, World, mean, normal3, track};
 use crate::{Config, Ekf, State};
 
 const SEEDS: u64 = 40;
@@ -25,7 +25,7 @@ fn printed(printed_sigma_w: f64) -> Ekf {
     Ekf::new(config).unwrap()
 }
 
-/// What a run over all seeds gives, after the first two seconds.
+/// Result of a run over all seeds, after the first two seconds.
 struct Outcome {
     /// Mean velocity and position error in the robot's direction.
     velocity_bias_mps: f64,
@@ -90,8 +90,8 @@ fn by_the_printed_form_a_standing_person_drifts() {
     }
 }
 
-/// What no paper prints decides how much of the misprint shows: a filter that believes
-/// nothing of its prediction follows the detections, and errs as soon as there are none.
+/// A setting that no paper prints decides how much of the misprint shows: a filter that puts no
+/// weight on its prediction follows the detections, and errs as soon as there are none.
 #[test]
 fn a_large_printed_noise_hides_the_drift_until_the_person_is_hidden() {
     let got = run(&printed(10.0), 0.0);
@@ -115,8 +115,8 @@ fn the_velocity_of_a_walker_is_over_ground() {
     assert!((position - world.person.xy()).norm() < 0.1);
 }
 
-/// A person who moves just as the filter assumes: the mean of N values of
-/// chi-squared with 3 degrees of freedom is 3 with variance 6 / N.
+/// A person that moves just as the filter assumes: the mean of N values of chi-squared with 3
+/// degrees of freedom is 3 with variance 6 / N.
 #[test]
 fn the_filter_is_consistent() {
     let config = Config { extra_sigma_m: 0.0, ..Config::default() };
@@ -125,7 +125,7 @@ fn the_filter_is_consistent() {
     for seed in 100..100 + SEEDS {
         let mut world = World::new(seed);
         let mut state = filter.start(&world.look());
-        world.velocity = config.initial_velocity_variance.sqrt() * world.random.normal3().xy();
+        world.velocity = config.initial_velocity_variance.sqrt() * normal3(&mut world.random).xy();
         all.extend(track(&filter, &mut state, &mut world, 40, |world| {
             world.walk(config.acceleration_noise, config.height_noise);
             world.drive(SPEED_MPS, 0.3)
@@ -148,7 +148,7 @@ fn errors_of_the_odometry_are_accounted_for() {
             let mut state = filter.start(&world.look());
             all.extend(track(&filter, &mut state, &mut world, 40, |world| {
                 world.walk(0.5, 0.07);
-                let error = sigma.component_mul(&world.random.normal3());
+                let error = sigma.component_mul(&normal3(&mut world.random));
                 let true_motion = world.drive(SPEED_MPS, 0.1);
                 let covariance = Matrix3::from_diagonal(&sigma.component_mul(&sigma));
                 EgoMotion {

@@ -4,31 +4,15 @@
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
 use tagalong_core::{Detection, EgoMotion, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_stats::{RandomSource, SplitMix64};
 
 use crate::{Ekf, State};
 
 pub const DT_S: f64 = 0.09;
 pub const SIGMA_M: f64 = 0.05;
 
-/// SplitMix64 and Box-Muller.
-pub struct Random(pub u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-
-    pub fn normal3(&mut self) -> Vector3<f64> {
-        Vector3::new(self.normal(), self.normal(), self.normal())
-    }
+pub fn normal3(random: &mut SplitMix64) -> Vector3<f64> {
+    Vector3::new(random.normal(), random.normal(), random.normal())
 }
 
 pub fn camera() -> Camera {
@@ -46,12 +30,12 @@ pub fn detection(position: Point3<f64>, sigma_m: f64) -> Detection {
     }
 }
 
-/// A robot at constant speed, and a person who starts at rest.
+/// A robot at constant speed, and a person that starts at rest.
 pub struct World {
     pub robot: Isometry2<f64>,
     pub person: Point3<f64>,
     pub velocity: Vector2<f64>,
-    pub random: Random,
+    pub random: SplitMix64,
 }
 
 impl World {
@@ -60,7 +44,7 @@ impl World {
             robot: Isometry2::identity(),
             person: Point3::new(4.0, 0.5, 1.6),
             velocity: Vector2::zeros(),
-            random: Random(seed),
+            random: SplitMix64::new(seed),
         }
     }
 
@@ -75,7 +59,7 @@ impl World {
 
     /// White acceleration of density `q` and a height that wanders.
     pub fn walk(&mut self, q: f64, height_noise: f64) {
-        let (a, b) = (self.random.normal3(), self.random.normal3());
+        let (a, b) = (normal3(&mut self.random), normal3(&mut self.random));
         let root = q.sqrt();
         let (dv, dp) = (DT_S.sqrt(), DT_S.powf(1.5));
         let kick = root * dv * a.xy();
@@ -92,7 +76,7 @@ impl World {
     }
 
     pub fn look(&mut self) -> Detection {
-        detection(self.person_in_robot() + SIGMA_M * self.random.normal3(), SIGMA_M)
+        detection(self.person_in_robot() + SIGMA_M * normal3(&mut self.random), SIGMA_M)
     }
 
     /// Where the state is in the world, and how fast it moves there.

@@ -247,7 +247,9 @@ impl Log {
         for frame in frames {
             let (log_time, publish_time) = (frame.stamp_ns, frame.stamp_ns);
             let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time };
-            self.writer.write_to_known_channel(&header, &frame.encode()).unwrap();
+            self.writer
+                .write_to_known_channel(&header, &serde_json::to_vec(frame).unwrap())
+                .unwrap();
         }
     }
 

@@ -1,0 +1,203 @@
+//! Config files, with the tables that are not the pipeline's.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use tagalong_config::{ConfigError, Registry, Settings, parse_settings};
+use tagalong_log::write::OutputSettings;
+use tagalong_log::{InputSettings, Limits};
+use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
+
+use crate::outcome::Failure;
+use crate::serialize::to_toml;
+use crate::suggest::config_hint;
+
+/// Longest config that is read, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Text of a config file, with its path.
+pub struct ConfigFile {
+    path: PathBuf,
+    text: String,
+}
+
+/// Tables of a config that are not the pipeline's.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OuterSettings {
+    /// `[input]`: topics and frames of the images.
+    pub input: InputSettings,
+    /// `[limits]`: largest sizes of a log's parts.
+    pub limits: Limits,
+    /// `[output]`: contents of the output files.
+    pub output: OutputSettings,
+}
+
+impl ConfigFile {
+    /// Reads a config.
+    ///
+    /// # Errors
+    /// A file that is missing, unreadable, too long or no text: exit code 2.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let shown = path.display();
+        let size = match fs::metadata(path) {
+            Ok(about) if about.is_dir() => {
+                let message = format!("{shown} is a directory, not a config");
+                // A config in the directory is suggested: `x` stands for any name in it.
+                return Err(Failure::usage(message + &config_hint(&path.join("x"))));
+            }
+            Ok(about) => about.len(),
+            Err(error) => {
+                let message = format!("cannot read config {shown}: {error}");
+                return Err(Failure::usage(message + &config_hint(path)));
+            }
+        };
+        if size > MAX_BYTES {
+            let message = format!("{shown} has {size} bytes; a config has at most {MAX_BYTES}");
+            return Err(Failure::usage(message));
+        }
+        // Read as bytes: a file that is no text gets a message of its own.
+        let bytes = fs::read(path)
+            .map_err(|error| Failure::usage(format!("cannot read config {shown}: {error}")))?;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| Failure::usage(format!("{shown} is not UTF-8 text, so no config")))?;
+        Ok(Self { path: path.to_owned(), text })
+    }
+
+    /// Returns the config that is used where none is given.
+    pub fn built_in() -> Self {
+        let text = include_str!("../../../configs/depth-ekf.toml").to_owned();
+        Self { path: "configs/depth-ekf.toml".into(), text }
+    }
+
+    /// Returns its name without folder and extension.
+    pub fn stem(&self) -> String {
+        self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Returns its name without folder.
+    pub fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Returns the config with another text at the same path, so that it names the same files.
+    pub fn with_text(&self, text: String) -> Self {
+        Self { path: self.path.clone(), text }
+    }
+
+    /// Checks the values of `[tune]` by building the pipeline with each of them.
+    ///
+    /// # Errors
+    /// A value that its setting does not allow, shown with its line: exit code 2.
+    pub fn check_tuning(&self, registry: &Registry) -> Result<(), Failure> {
+        let (pipeline, settings) = self.pipeline(registry, None)?;
+        check_tuning(&settings.tune, &pipeline, self.folder(), registry, &options(None))
+            .map_err(|error| self.mistake(&error))
+    }
+
+    /// Returns the folder against which relative paths are resolved.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// SHA-256 of its bytes, and of those of the configs that it extends.
+    pub fn sha256(&self) -> String {
+        let mut digest = Sha256::new_with_prefix(self.text.as_bytes());
+        if let Ok(document) = self.document() {
+            document.bases().for_each(|(_, text)| digest.update(text.as_bytes()));
+        }
+        digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Returns the files that its settings name, such as models, with the name used there.
+    pub fn files(&self) -> Vec<(String, PathBuf)> {
+        let Ok(table) = self.document().and_then(|document| document.table()) else {
+            return Vec::new();
+        };
+        let folder = self.folder();
+        let mut names = Vec::new();
+        strings(&toml::Value::Table(table), &mut names);
+        let named = names.into_iter().map(|name| (folder.join(&name), name));
+        // Plugins alone know which texts are paths; a text that names a file counts as one.
+        named.filter(|(path, _)| path.is_file()).map(|(path, name)| (name, path)).collect()
+    }
+
+    /// Builds the pipeline.
+    ///
+    /// # Errors
+    /// A mistake in the config, shown with its line: exit code 2.
+    pub fn pipeline(
+        &self,
+        registry: &Registry,
+        seed: Option<u64>,
+    ) -> Result<(Pipeline, RunSettings), Failure> {
+        Pipeline::from_toml_with(&self.text, self.folder(), registry, &options(seed))
+            .map_err(|error| self.mistake(&error))
+    }
+
+    /// Returns its text with those of the configs that it extends.
+    pub fn whole_text(&self) -> String {
+        // A mistake shows its line when the pipeline is built from the text as it is.
+        flattened(&self.text, self.folder()).unwrap_or_else(|_| self.text.clone())
+    }
+
+    /// Returns the tables that are not the pipeline's.
+    ///
+    /// # Errors
+    /// As for [`ConfigFile::pipeline`].
+    pub fn outer(&self) -> Result<OuterSettings, Failure> {
+        let read = || -> Result<OuterSettings, ConfigError> {
+            Ok(OuterSettings {
+                input: self.table("input")?,
+                limits: self.table("limits")?,
+                output: self.table("output")?,
+            })
+        };
+        read().map_err(|error| self.mistake(&error))
+    }
+
+    /// Reads one top-level table, with spans for its mistakes.
+    fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
+        let document = self.document()?;
+        let table = document.root()?.remove(name);
+        parse_settings(table).map_err(|error| document.locate(error))
+    }
+
+    fn document(&self) -> Result<Document, ConfigError> {
+        Document::read(&self.text, self.folder())
+    }
+
+    fn mistake(&self, error: &ConfigError) -> Failure {
+        Failure::usage(error.render(&self.path.display().to_string(), &self.text))
+    }
+}
+
+fn options(seed: Option<u64>) -> Options {
+    Options { foreign: OuterSettings::TABLES.map(str::to_owned).to_vec(), seed }
+}
+
+/// Collects all texts in a value.
+fn strings(value: &toml::Value, out: &mut Vec<String>) {
+    match value {
+        toml::Value::String(text) if !text.is_empty() => out.push(text.clone()),
+        toml::Value::Array(items) => items.iter().for_each(|item| strings(item, out)),
+        toml::Value::Table(table) => table.values().for_each(|item| strings(item, out)),
+        _ => {}
+    }
+}
+
+impl OuterSettings {
+    /// Names of the tables.
+    const TABLES: [&str; 3] = ["input", "limits", "output"];
+
+    /// Returns the tables as TOML, to be appended to the pipeline's resolved config.
+    ///
+    /// # Errors
+    /// As for [`to_toml`].
+    pub fn resolved(&self) -> Result<String, Failure> {
+        to_toml("the tables [input], [limits] and [output]", self)
+    }
+}

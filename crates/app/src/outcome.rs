@@ -1,0 +1,129 @@
+//! Ends of a command: exit codes, failures, and printing.
+
+use std::fmt::Display;
+use std::io;
+use std::path::Path;
+
+use tagalong_log::LogError;
+
+/// End of a command that did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// All went well.
+    Well,
+    /// Finished, but part of the log was lost or could not be used.
+    WithLoss,
+    /// Finished, and found a serious problem.
+    WithFindings,
+    /// Stopped by this signal; the files written until then are valid.
+    BySignal(u8),
+}
+
+impl Ended {
+    /// Returns the exit code.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Well => 0,
+            Self::WithLoss | Self::WithFindings => 3,
+            // The shell's convention for a process that a signal ended.
+            Self::BySignal(signal) => 128u8.saturating_add(signal),
+        }
+    }
+}
+
+/// Reason of a failed command, as shown to the user.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// The exit code.
+    pub code: u8,
+    /// Message with the problem and the remedy; empty if there is no reader.
+    pub message: String,
+}
+
+impl Failure {
+    /// Returns the failure of a job: exit code 1.
+    pub fn failed(message: impl Display) -> Self {
+        Self { code: 1, message: message.to_string() }
+    }
+
+    /// Returns the failure of a request that cannot be fulfilled: exit code 2.
+    pub fn usage(message: impl Display) -> Self {
+        Self { code: 2, message: message.to_string() }
+    }
+
+    /// Returns the quiet end after the reader of stdout is gone (`| head`).
+    fn nobody_listens() -> Self {
+        Self { code: 0, message: String::new() }
+    }
+}
+
+impl From<LogError> for Failure {
+    /// Converts the error of a log: a log that cannot be used is exit code 1, settings that cannot
+    /// are 2.
+    fn from(error: LogError) -> Self {
+        match error {
+            LogError::Settings(_) => Self::usage(error),
+            _ => Self::failed(error),
+        }
+    }
+}
+
+/// Result of a command.
+pub type Outcome = Result<Ended, Failure>;
+
+/// Makes a folder for results, with its parents.
+///
+/// # Errors
+/// A folder that cannot be made there is the user's to change: exit code 2.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let shown = folder.display();
+        Failure::usage(format!("cannot make the folder {shown}: {error}; choose another with -o"))
+    })
+}
+
+/// Makes the parent folder of a file.
+///
+/// # Errors
+/// As for [`make_folder`].
+pub fn make_room_for(file: &Path) -> Result<(), Failure> {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).map_or(Ok(()), make_folder)
+}
+
+/// Refuses to replace an existing file without `overwrite`.
+///
+/// # Errors
+/// An existing file: exit code 2.
+pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
+    if file.exists() && !overwrite {
+        let shown = file.display();
+        let why = format!("{shown} exists; give another name with -o, or --overwrite");
+        return Err(Failure::usage(why));
+    }
+    Ok(())
+}
+
+/// Message after a signal ended the writing of a log.
+pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
+
+/// Prints to stdout. A closed pipe is a quiet end.
+///
+/// # Errors
+/// A stdout that cannot be written: exit code 1.
+pub fn print(text: &str) -> Result<(), Failure> {
+    // Flushed here, so that a full disk or a closed pipe is noticed before the exit code is chosen.
+    let mut out = io::stdout().lock();
+    let written =
+        io::Write::write_all(&mut out, text.as_bytes()).and_then(|()| io::Write::flush(&mut out));
+    written.map_err(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => Failure::nobody_listens(),
+        _ => Failure::failed(format!("cannot write to stdout: {error}")),
+    })
+}
+
+/// Prints a line to stderr.
+pub fn say(text: &str) {
+    // A failed stderr leaves no place to report the failure.
+    // One write for the whole line, so that lines of several threads do not mix.
+    let _ = io::Write::write_all(&mut io::stderr().lock(), format!("{text}\n").as_bytes());
+}

@@ -1,0 +1,40 @@
+//! Progress of a pass over a log.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Progress bar, visible only where stderr is a terminal.
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Progress {
+    /// Returns a bar at its beginning.
+    pub fn new() -> Self {
+        let bar = ProgressBar::new(STEPS);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3}% {msg} {eta}") {
+            bar.set_style(style);
+        }
+        Self { bar }
+    }
+
+    /// Shows the progress of the run.
+    pub fn show(&self, fraction: f64, frame: u64, people: usize) {
+        self.bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        self.bar.set_message(format!("frame {frame}, {people} in view"));
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

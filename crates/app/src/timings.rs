@@ -1,0 +1,130 @@
+//! Times of the stages of a pipeline.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// Resolution of times, ms.
+const SHORTEST_MS: f64 = 1e-3;
+
+/// Ratio of the ends of neighbouring bins: figures are right to 1 %.
+const RATIO: f64 = 1.02;
+
+/// Bins, up to about an hour.
+const BINS: usize = 1120;
+
+/// Times of the stages, in memory that does not grow with the log.
+#[derive(Default)]
+pub struct Timings {
+    stages: BTreeMap<String, Histogram>,
+}
+
+struct Histogram {
+    counts: Vec<u64>,
+    sum_ms: f64,
+    max_ms: f64,
+}
+
+/// Times of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageTimes {
+    /// Number of measured frames.
+    pub frames: u64,
+    /// Median, ms.
+    pub p50_ms: f64,
+    /// 95th percentile, ms.
+    pub p95_ms: f64,
+    /// Mean, ms.
+    pub mean_ms: f64,
+    /// Slowest frame, ms.
+    pub max_ms: f64,
+}
+
+impl Timings {
+    /// Adds one measurement.
+    pub fn add(&mut self, stage: &str, ms: f64) {
+        if !self.stages.contains_key(stage) {
+            self.stages.insert(stage.to_owned(), Histogram::new());
+        }
+        if let Some(histogram) = self.stages.get_mut(stage) {
+            histogram.add(ms);
+        }
+    }
+
+    /// Returns the times, by stage.
+    pub fn summary(&self) -> BTreeMap<&str, StageTimes> {
+        self.stages.iter().map(|(name, h)| (name.as_str(), h.summary())).collect()
+    }
+}
+
+impl Histogram {
+    fn new() -> Self {
+        Self { counts: vec![0; BINS], sum_ms: 0.0, max_ms: 0.0 }
+    }
+
+    fn add(&mut self, ms: f64) {
+        // Logarithmic bins have the same relative error at every length of time.
+        let bin = (ms / SHORTEST_MS).max(1.0).ln() / RATIO.ln();
+        self.counts[(bin as usize).min(BINS - 1)] += 1;
+        self.sum_ms += ms;
+        self.max_ms = self.max_ms.max(ms);
+    }
+
+    fn summary(&self) -> StageTimes {
+        let frames: u64 = self.counts.iter().sum();
+        StageTimes {
+            frames,
+            p50_ms: rounded(self.quantile(frames, 0.50)),
+            p95_ms: rounded(self.quantile(frames, 0.95)),
+            mean_ms: rounded(self.sum_ms / frames.max(1) as f64),
+            max_ms: rounded(self.max_ms),
+        }
+    }
+
+    /// Returns the middle of the bin in which the quantile lies.
+    fn quantile(&self, frames: u64, fraction: f64) -> f64 {
+        let rank = (fraction * frames as f64).ceil() as u64;
+        let mut seen = 0;
+        for (bin, count) in self.counts.iter().enumerate() {
+            seen += count;
+            if seen >= rank {
+                return SHORTEST_MS * RATIO.powf(bin as f64 + 0.5);
+            }
+        }
+        0.0
+    }
+}
+
+fn rounded(ms: f64) -> f64 {
+    (ms * 1e4).round() / 1e4
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn quantiles_are_right_to_a_few_percent(
+            mut times in proptest::collection::vec(0.002..5000.0f64, 1..300),
+        ) {
+            let mut timings = Timings::default();
+            times.iter().for_each(|ms| timings.add("stage", *ms));
+            let told = timings.summary()["stage"].clone();
+            times.sort_by(f64::total_cmp);
+            let at = |fraction: f64| times[(fraction * times.len() as f64).ceil() as usize - 1];
+            prop_assert!((told.p50_ms / at(0.5) - 1.0).abs() < 0.05, "{told:?} {}", at(0.5));
+            prop_assert!((told.p95_ms / at(0.95) - 1.0).abs() < 0.05, "{told:?} {}", at(0.95));
+            prop_assert_eq!(told.frames, times.len() as u64);
+        }
+    }
+
+    #[test]
+    fn odd_times_are_harmless() {
+        let mut timings = Timings::default();
+        [0.0, -1.0, 1e300].iter().for_each(|ms| timings.add("stage", *ms));
+        assert_eq!(timings.summary()["stage"].frames, 3);
+    }
+}

@@ -1,0 +1,142 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use tagalong_app::format::Format;
+
+use super::folder::FolderArgs;
+pub use super::rooms::RoomsArgs;
+
+/// Arguments of `tagalong bench`.
+#[derive(Args, Debug)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct BenchArgs {
+    /// One step; all three without one.
+    #[command(subcommand)]
+    pub(crate) step: Option<Step>,
+    #[command(flatten)]
+    pub(crate) plan: PlanArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+    #[command(flatten)]
+    pub(crate) report: ReportArgs,
+    #[command(flatten)]
+    pub(crate) folder: FolderArgs,
+}
+
+/// Steps of a benchmark.
+#[derive(Debug, Subcommand)]
+pub enum Step {
+    /// Lists the tasks, one JSON object per line
+    #[command(after_help = "Example:\n  tagalong bench plan --logs-dir logs -o bench")]
+    Plan {
+        #[command(flatten)]
+        plan: PlanArgs,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+    /// Runs the planned tasks that have no result yet
+    #[command(after_help = "Examples:\n  tagalong bench run -o bench --jobs 4\n  \
+                            tagalong bench run -o bench --task 17")]
+    Run {
+        #[command(flatten)]
+        run: RunArgs,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+    /// Makes report.html, report.json and report.csv from the results
+    #[command(after_help = "Example:\n  tagalong bench report -o bench --baseline old.json \
+                            --fail-if 'HOTA<-0.01' --fail-if 'IDSW>0'")]
+    Report {
+        #[command(flatten)]
+        report: ReportArgs,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+    /// Fits settings on all rooms but one, and scores them in that one
+    #[command(long_flag = "leave-one-room-out", after_help = super::rooms::HELP)]
+    Rooms(RoomsArgs),
+    /// Writes the results as the folder tree that TrackEval scores
+    #[command(after_help = "Example:\n  tagalong bench export -o bench --trackeval tree")]
+    Export {
+        /// Folder for the tree.
+        #[arg(long, value_name = "DIR")]
+        trackeval: PathBuf,
+        #[command(flatten)]
+        folder: FolderArgs,
+    },
+}
+
+/// Compared pipelines and logs.
+#[derive(Args, Clone, Debug)]
+pub struct PlanArgs {
+    /// The pipelines [default: every config in configs that suits a log].
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub configs: Vec<PathBuf>,
+    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv, or in
+    /// it.
+    #[arg(long, num_args = 1.., value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// Every log with truth in this folder.
+    #[arg(long, value_name = "DIR")]
+    pub logs_dir: Option<PathBuf>,
+    /// Runs each pipeline with this many seeds, counted from that of its config.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+}
+
+/// Execution of the tasks.
+#[derive(Args, Clone, Debug)]
+pub struct RunArgs {
+    /// Tasks that run at once; the results are the same.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: u16,
+    /// Only this task: its number in the plan, or its hash.
+    #[arg(long, value_name = "K|HASH")]
+    pub task: Option<String>,
+    /// Run tasks again that failed before.
+    #[arg(long)]
+    pub retry_failed: bool,
+    /// Measure times, one task at a time, on an otherwise idle machine.
+    #[arg(long)]
+    pub timing: bool,
+}
+
+/// Content of the report.
+#[derive(Args, Clone, Debug)]
+pub struct ReportArgs {
+    #[command(flatten)]
+    pub gate: GateArgs,
+    /// Output format; JSON is the text of report.json.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Conditions under which a benchmark counts as worse than its baseline.
+#[derive(Args, Clone, Debug)]
+pub struct GateArgs {
+    /// An earlier report.json to compare with.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Exit with 1 if a figure changed like this, for example HOTA<-0.01,
+    /// IDSW>0 or metres.MOTA<-0.02.
+    #[arg(long, value_name = "FIGURE<CHANGE", requires = "baseline", num_args = 1..)]
+    pub fail_if: Vec<String>,
+}
+
+impl BenchArgs {
+    /// Returns the arguments for all steps, with one seed and without a gate.
+    pub fn of(configs: Vec<PathBuf>, logs: Vec<PathBuf>, output: PathBuf) -> Self {
+        Self {
+            step: None,
+            plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1 },
+            run: RunArgs { jobs: 1, task: None, retry_failed: false, timing: false },
+            report: ReportArgs {
+                gate: GateArgs { baseline: None, fail_if: Vec::new() },
+                format: Format::Text,
+            },
+            folder: FolderArgs { output },
+        }
+    }
+}

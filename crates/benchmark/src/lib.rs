@@ -1,0 +1,150 @@
+//! `tagalong bench`: pipelines x logs x seeds, in separate steps.
+//!
+//! A plan lists tasks, each with a hash of everything that its result depends on. A result is a
+//! file named by that hash, so that running again costs nothing, several processes or machines can
+//! share a folder, and a changed config is never paired with an old result. A report only reads
+//! results.
+
+mod args;
+mod export;
+mod folder;
+mod gate;
+mod pictures;
+mod plan;
+mod report;
+mod rooms;
+mod store;
+mod watch;
+mod work;
+
+pub use args::BenchArgs;
+use args::{PlanArgs, Step};
+use folder::FolderArgs;
+use gate::Gate;
+use plan::Task;
+use store::Store;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::serialize::to_json_line;
+use tagalong_config::Registry;
+use work::Tally;
+
+/// Runs `tagalong bench`.
+///
+/// # Errors
+/// Files that cannot be read or written; tasks that failed; a gate that closed.
+pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
+    match &args.step {
+        None => everything(args, registry),
+        Some(Step::Plan { plan, folder }) => {
+            print(&make_plan(plan, folder, registry)?)?;
+            Ok(Ended::Well)
+        }
+        Some(Step::Run { run, folder }) => {
+            let tally = work::work(run, &store(folder), registry)?;
+            verdict(tally)
+        }
+        Some(Step::Report { report, folder }) => {
+            let gate = Gate::read(&report.gate)?;
+            make_report(folder, report.format, gate.as_ref())?;
+            Ok(Ended::Well)
+        }
+        Some(Step::Rooms(args)) => rooms::rooms(args, registry),
+        Some(Step::Export { trackeval, folder }) => {
+            let (trackers, sequences) = export::export(&store(folder), trackeval)?;
+            say(&format!(
+                "{trackers} trackers on {sequences} sequences in {}",
+                trackeval.display()
+            ));
+            Ok(Ended::Well)
+        }
+    }
+}
+
+fn store(folder: &FolderArgs) -> Store {
+    Store::new(&folder.output)
+}
+
+/// Runs all steps. A failed task does not keep the others from being reported.
+fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
+    // The gate is read first: a wrong rule should not cost a whole benchmark.
+    let gate = Gate::read(&args.report.gate)?;
+    make_plan(&args.plan, &args.folder, registry)?;
+    let tally = work::work(&args.run, &store(&args.folder), registry)?;
+    if let Some(signal) = tally.signal {
+        return Ok(Ended::BySignal(signal));
+    }
+    // A single task has no complete set of results to report.
+    if args.run.task.is_none() {
+        make_report(&args.folder, args.report.format, gate.as_ref())?;
+    }
+    verdict(tally)
+}
+
+/// Writes the plan, and returns it as text.
+fn make_plan(args: &PlanArgs, folder: &FolderArgs, registry: &Registry) -> Result<String, Failure> {
+    let tasks = plan::plan(args, registry)?;
+    let line = |task: &Task| to_json_line("a task of the plan", task);
+    let text: String = tasks.iter().map(line).collect::<Result<_, _>>()?;
+    store(folder).put("plan.jsonl", text.as_bytes())?;
+    Ok(text)
+}
+
+fn make_report(folder: &FolderArgs, format: Format, gate: Option<&Gate>) -> Result<(), Failure> {
+    let store = store(folder);
+    let benchmark = report::gather(&store)?;
+    let json = report::write(&store, &benchmark)?;
+    match format {
+        Format::Text => print(&report::text(&store, &benchmark))?,
+        Format::Json => print(&json)?,
+    }
+    match gate.and_then(|gate| gate.worse(&benchmark)) {
+        Some(worse) => Err(Failure::failed(worse.trim_end())),
+        None => Ok(()),
+    }
+}
+
+fn verdict(tally: Tally) -> Outcome {
+    let Tally { asked, ran, failed, lost, signal } = tally;
+    say(&format!("{ran} tasks run, {} had their results", asked - ran));
+    if let Some(signal) = signal {
+        return Ok(Ended::BySignal(signal));
+    }
+    match (failed, lost) {
+        (0, false) => Ok(Ended::Well),
+        (0, true) => Ok(Ended::WithLoss),
+        _ => Err(Failure::failed(format!("{failed} of {asked} tasks failed; the report says why"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        bench: BenchArgs,
+    }
+
+    fn parse(line: &str) -> Result<BenchArgs, clap::Error> {
+        Cli::try_parse_from(line.split(' ')).map(|cli| cli.bench)
+    }
+
+    #[test]
+    fn steps_take_only_what_is_theirs() {
+        assert!(parse("bench --logs a.mcap b.mcap --jobs 2 -o x").is_ok());
+        assert!(parse("bench plan --logs a.mcap -o x").is_ok());
+        assert!(parse("bench plan --jobs 2").is_err());
+        assert!(parse("bench run --fail-if HOTA<0").is_err());
+        assert!(parse("bench report --fail-if HOTA<0").is_err(), "a gate needs a baseline");
+    }
+
+    #[test]
+    fn all_arguments_have_their_step() {
+        let args = parse("bench --jobs 3").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((args.plan.seeds, args.run.jobs, args.report.gate.baseline), (1, 3, None));
+    }
+}

@@ -1,0 +1,361 @@
+//! Tasks of a benchmark: pipelines on logs, each with an identifying hash.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::outcome::{Failure, say};
+use tagalong_app::suggest::{self, check_log_path, toml_files};
+use tagalong_config::Registry;
+use tagalong_log::{FrameSource, Inputs, Limits, LogError, read_truth};
+use tagalong_pipeline::Tunable;
+
+use super::args::PlanArgs;
+
+/// Prefix of the inputs that are files named by a config.
+const FILE: &str = "file ";
+
+/// One pipeline on one log with one seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// Its number in the plan, from 1.
+    pub k: usize,
+    /// Content hash of everything that its result depends on.
+    pub hash: String,
+    /// Name of the pipeline.
+    pub pipeline: String,
+    /// Path of its config.
+    pub config: PathBuf,
+    /// Name of the log.
+    pub log_name: String,
+    /// Path of the log.
+    pub log: PathBuf,
+    /// Path of its truth.
+    pub truth: PathBuf,
+    /// True if the boxes of the truth are whole bodies.
+    pub whole_bodies: bool,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Hashed inputs, by name.
+    pub inputs: BTreeMap<String, String>,
+    /// Version of the program that planned it.
+    pub version: String,
+    /// Reason for which it cannot run, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skip: Option<String>,
+}
+
+/// Config that was read, and its inputs.
+pub struct PlannedConfig {
+    /// The config.
+    pub file: ConfigFile,
+    /// Path of the config.
+    pub path: PathBuf,
+    first_seed: u64,
+    /// Its tables around the pipeline.
+    pub outer: OuterSettings,
+    /// Inputs of its pipeline.
+    pub inputs: Inputs,
+    /// Its settings that may be fitted.
+    pub tune: Vec<Tunable>,
+}
+
+impl PlannedConfig {
+    /// Opens a log with this pipeline's settings.
+    ///
+    /// # Errors
+    /// A log that lacks an input that the pipeline needs, or that cannot be read.
+    pub fn open(&self, log: &Path) -> Result<FrameSource, LogError> {
+        FrameSource::open(log, &self.outer.input, &self.outer.limits, self.inputs)
+    }
+
+    /// Returns a key of its reading settings: pipelines with the same key see the same frames.
+    pub fn reading(&self) -> String {
+        format!("{:?}", (&self.outer.input, &self.outer.limits, self.inputs))
+    }
+}
+
+/// Log with its truth.
+pub struct Annotated {
+    /// Path of the log.
+    pub log: PathBuf,
+    /// Its name in tables.
+    pub name: String,
+    /// Hash of the log.
+    pub sha256: String,
+    /// Path of its truth.
+    pub truth: PathBuf,
+    /// Hash of the truth.
+    pub truth_sha256: String,
+    /// True if the boxes of the truth are whole bodies.
+    pub whole_bodies: bool,
+}
+
+/// Plans a benchmark.
+///
+/// # Errors
+/// Configs or logs that cannot be read, or two of the same name.
+pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> {
+    let configs = configs(args, registry)?;
+    let logs = logs(args)?;
+    unique("configs", configs.iter().map(|config| config.file.stem()))?;
+    unique("logs", logs.iter().map(|log| log.name.clone()))?;
+    let version = version()?;
+    let mut tasks = Vec::new();
+    for log in &logs {
+        let mut tried = BTreeMap::new();
+        for config in &configs {
+            let key = config.reading();
+            // Opening a log is slow, so the answer is shared by configs that read it the same way.
+            let skip = match tried.get(&key) {
+                Some(known) => Option::clone(known),
+                None => tried.entry(key).or_insert(why_not(config, log)?).clone(),
+            };
+            for offset in 0..args.seeds {
+                let seed = config.first_seed.wrapping_add(offset);
+                let mut task = task(config, log, seed, &version, registry)?;
+                (task.k, task.skip) = (tasks.len() + 1, skip.clone());
+                tasks.push(task);
+            }
+        }
+    }
+    Ok(tasks)
+}
+
+/// Reads the config of a task again.
+///
+/// # Errors
+/// If it, or its truth, changed since the task was planned.
+pub fn reread(task: &Task, registry: &Registry) -> Result<PlannedConfig, Failure> {
+    let candidate = candidate(&task.config, registry)?;
+    let mut now = task.inputs.clone();
+    // The file list is built anew: the config may name other files now.
+    now.retain(|name, _| !name.starts_with(FILE));
+    now.insert("config".into(), config_hash(&candidate, task.seed, registry)?);
+    now.insert("truth".into(), sha256_of_file(&task.truth)?);
+    now.extend(files(&candidate)?);
+    if now == task.inputs {
+        return Ok(candidate);
+    }
+    let (config, truth) = (task.config.display(), task.truth.display());
+    Err(Failure::usage(format!("{config} or {truth} changed since it was planned; plan again")))
+}
+
+fn files(candidate: &PlannedConfig) -> Result<BTreeMap<String, String>, Failure> {
+    file_hashes(&candidate.file)
+}
+
+/// Returns the hashes of the files that a config names, such as models.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn file_hashes(config: &ConfigFile) -> Result<BTreeMap<String, String>, Failure> {
+    let named = config.files().into_iter();
+    named.map(|(name, path)| Ok((format!("{FILE}{name}"), sha256_of_file(&path)?))).collect()
+}
+
+/// Returns the version of this very program: plugins may differ while the number does not, so a
+/// hash of its bytes belongs to it.
+///
+/// # Errors
+/// If the program cannot read itself.
+pub fn version() -> Result<String, Failure> {
+    let program = std::env::current_exe().map_err(Failure::failed)?;
+    let hash = sha256_of_file(&program)?;
+    Ok(format!("{}+{}", env!("CARGO_PKG_VERSION"), &hash[..12]))
+}
+
+fn task(
+    config: &PlannedConfig,
+    log: &Annotated,
+    seed: u64,
+    version: &str,
+    registry: &Registry,
+) -> Result<Task, Failure> {
+    let mut inputs = BTreeMap::from([
+        ("config".to_owned(), config_hash(config, seed, registry)?),
+        ("log".to_owned(), log.sha256.clone()),
+        ("truth".to_owned(), log.truth_sha256.clone()),
+    ]);
+    inputs.extend(files(config)?);
+    // The hash names the result, so it covers the program and the seed as well.
+    let everything = format!("{version}\n{seed}\n{}\n{inputs:?}", log.whole_bodies);
+    Ok(Task {
+        k: 0,
+        hash: sha256(everything.as_bytes())[..32].to_owned(),
+        pipeline: config.file.stem(),
+        config: config.path.clone(),
+        log_name: log.name.clone(),
+        log: log.log.clone(),
+        truth: log.truth.clone(),
+        whole_bodies: log.whole_bodies,
+        seed,
+        inputs,
+        version: version.to_owned(),
+        skip: None,
+    })
+}
+
+/// Returns the hash of the resolved config: comments and order do not matter, changed defaults do.
+fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result<String, Failure> {
+    let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
+    let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved()?);
+    Ok(sha256(text.as_bytes()))
+}
+
+/// Returns the reason for which the config cannot run on the log, if there is one.
+///
+/// # Errors
+/// A log that cannot be read at all.
+pub fn why_not(config: &PlannedConfig, log: &Annotated) -> Result<Option<String>, Failure> {
+    match config.open(&log.log) {
+        Ok(_) => Ok(None),
+        Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
+            let text = error.to_string();
+            // The first line names the problem, the others give advice; the folder must not reach
+            // the report.
+            let first = text.lines().next().unwrap_or_default();
+            Ok(Some(first.replace(&log.log.display().to_string(), &log.name)))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
+    if !args.configs.is_empty() {
+        return args.configs.iter().map(|path| candidate(path, registry)).collect();
+    }
+    shipped(registry)
+}
+
+/// Reads every config in configs.
+///
+/// # Errors
+/// If there is none.
+pub fn shipped(registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
+    let mut found = Vec::new();
+    for path in toml_files(Path::new("configs")) {
+        match candidate(&path, registry) {
+            Ok(candidate) => found.push(candidate),
+            // A broken config of the folder should not keep the others from running.
+            Err(why) => say(&format!("note: left out: {}", why.message)),
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::usage("no config in the folder configs; name some with --configs"));
+    }
+    Ok(found)
+}
+
+/// Reads a config.
+///
+/// # Errors
+/// Any mistake in it.
+pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Failure> {
+    let file = ConfigFile::read(path)?;
+    let (pipeline, settings) = file.pipeline(registry, None)?;
+    let outer = file.outer()?;
+    let (first_seed, tune, inputs) = (settings.seed, settings.tune, pipeline.inputs());
+    Ok(PlannedConfig { file, path: path.to_owned(), first_seed, outer, inputs, tune })
+}
+
+fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
+    let mut found = Vec::new();
+    for log in &args.logs {
+        check_log_path(log)?;
+        found.push(with_truth(log)?);
+    }
+    for log in args.logs_dir.as_deref().map_or(Ok(Vec::new()), mcap_files)? {
+        match annotated(&log)? {
+            Some(annotated) => found.push(annotated),
+            None => say(&format!("note: left out: {} has no truth", log.display())),
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::usage("no log with truth; name some with --logs or --logs-dir"));
+    }
+    Ok(found)
+}
+
+fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    suggest::mcap_files(folder)
+        .map_err(|error| Failure::usage(format!("cannot read {}: {error}", folder.display())))
+}
+
+/// Returns the log with its truth.
+///
+/// # Errors
+/// A log without truth, or one that cannot be read.
+pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
+    annotated(log)?.ok_or_else(|| {
+        let stem = log.with_extension("");
+        let stem = stem.display();
+        Failure::usage(format!(
+            "{} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
+             {stem}.boxes.csv nor a channel {} in it",
+            log.display(),
+            tagalong_log::TRUTH_TOPIC
+        ))
+    })
+}
+
+/// Returns the log with its truth, if it has any.
+fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
+    let beside = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
+    // Files beside the log take precedence, so that they can replace the log's own truth.
+    let people = beside("people.csv").or_else(|| beside("truth.jsonl"));
+    let (truth, whole_bodies) = match (people, beside("boxes.csv")) {
+        (Some(people), _) => (people, false),
+        (None, Some(boxes)) => (boxes, true),
+        (None, None) if read_truth(log, &Limits::default())?.is_some() => (log.to_owned(), false),
+        (None, None) => return Ok(None),
+    };
+    Ok(Some(Annotated {
+        log: log.to_owned(),
+        name: log.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        sha256: sha256_of_file(log)?,
+        truth_sha256: sha256_of_file(&truth)?,
+        truth,
+        whole_bodies,
+    }))
+}
+
+/// Refuses a name that is used twice: names identify rows of tables.
+///
+/// # Errors
+/// The repeated name.
+pub fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Failure> {
+    let mut seen = std::collections::BTreeSet::new();
+    for name in names {
+        if !seen.insert(name.clone()) {
+            return Err(Failure::usage(format!("two {what} are called `{name}`; rename one")));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the SHA-256 in hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Returns the SHA-256 of a file's bytes.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn sha256_of_file(path: &Path) -> Result<String, Failure> {
+    let failed = |error| Failure::failed(format!("cannot read {}: {error}", path.display()));
+    let mut file = File::open(path).map_err(failed)?;
+    // Read in blocks: a log may be larger than the memory.
+    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut buffer).map_err(failed)? {
+            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            count => hash.update(&buffer[..count]),
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Report of a benchmark from its results.
+
+use std::fmt::Write as _;
+
+use tagalong_app::outcome::Failure;
+use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
+
+use super::plan::Task;
+use super::store::{Store, StoredTiming};
+use super::work::blank;
+
+/// Gathers the results of a plan.
+///
+/// # Errors
+/// If some are missing.
+pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
+    let plan = store.plan()?;
+    let version = plan.first().map_or_else(String::new, |task| task.version.clone());
+    let mut tasks = Vec::new();
+    let mut missing = Vec::new();
+    for task in &plan {
+        match result(store, task) {
+            Some(result) => tasks.push(result),
+            None => missing.push(task.k.to_string()),
+        }
+    }
+    if missing.is_empty() {
+        return Ok(Benchmark { version, tasks });
+    }
+    let (count, first) = (missing.len(), &missing[0]);
+    Err(Failure::failed(format!(
+        "{count} of {} tasks have no result, the first is {first}; `tagalong bench run -o {}` \
+         runs them",
+        plan.len(),
+        store.path("").display()
+    )))
+}
+
+fn result(store: &Store, task: &Task) -> Option<TaskResult> {
+    match &task.skip {
+        Some(why) => {
+            Some(TaskResult { outcome: Outcome::Skipped { why: why.clone() }, ..blank(task) })
+        }
+        None => store.result(&task.hash).map(|stored| stored.result),
+    }
+}
+
+/// Returns the times, if those of all tasks were taken.
+fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
+    let done = benchmark.tasks.iter().filter(|task| task.outcome == Outcome::Done);
+    let all: Option<Vec<(String, StoredTiming)>> =
+        done.map(|task| Some((task.hash.clone(), store.timing(&task.hash)?))).collect();
+    let all = all?;
+    let machine = all.first()?.1.machine.clone();
+    // Times of several machines cannot be compared, which the report has to say.
+    let exclusive = all.iter().all(|(_, timing)| timing.machine == machine);
+    let tasks = all.into_iter().map(|(hash, stored)| (hash, stored.timing)).collect();
+    Some(Timings { exclusive, machine, tasks })
+}
+
+/// Writes the files of the report; returns the JSON of report.json.
+///
+/// # Errors
+/// A disk that fails.
+pub fn write(store: &Store, benchmark: &Benchmark) -> Result<String, Failure> {
+    let timings = timings(store, benchmark);
+    let json = tagalong_report::json(benchmark).map_err(Failure::failed)?;
+    store.put("report.json", json.as_bytes())?;
+    store.put("report.csv", tagalong_report::csv(benchmark).as_bytes())?;
+    store.put("report.html", tagalong_report::html(benchmark, timings.as_ref()).as_bytes())?;
+    if let Some(timings) = &timings {
+        let json = serde_json::to_string_pretty(timings).map_err(Failure::failed)? + "\n";
+        store.put("timings.json", json.as_bytes())?;
+    }
+    Ok(json)
+}
+
+/// Returns the main figures, for a terminal.
+pub fn text(store: &Store, benchmark: &Benchmark) -> String {
+    let name_width = |name: fn(&TaskResult) -> &str| {
+        benchmark.tasks.iter().map(|task| name(task).len()).max().unwrap_or(0).max(8)
+    };
+    let (first, second) = (name_width(|t| &t.pipeline), name_width(|t| &t.log));
+    let mut out = format!(
+        "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>10}\n",
+        "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "error m"
+    );
+    for task in &benchmark.tasks {
+        let _ = write!(out, "{:<first$}  {:<second$}  {:>6}  ", task.pipeline, task.log, task.seed);
+        let _ = match &task.outcome {
+            Outcome::Done => writeln!(out, "{}", figures(task)),
+            Outcome::Failed { why } => writeln!(out, "failed: {}", first_line(why)),
+            Outcome::Skipped { why } => writeln!(out, "skipped: {}", first_line(why)),
+        };
+    }
+    for task in &benchmark.tasks {
+        if task.image.is_some_and(|scores| scores.has_constant_scores()) {
+            let _ = writeln!(
+                out,
+                "note: {} on {}: all reports have the same score; LAMR and AP mean nothing then",
+                task.pipeline, task.log
+            );
+        }
+    }
+    let _ = writeln!(out, "report in {}", store.path("report.html").display());
+    out
+}
+
+fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+fn figures(task: &TaskResult) -> String {
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
+    let Some(scores) = task.image.or(task.metres) else { return "nothing to score".into() };
+    format!(
+        "{:>6}  {:>6}  {:>6}  {:>5}  {:>10}",
+        number(scores.hota),
+        number(scores.mota),
+        number(scores.idf1),
+        scores.idsw,
+        number(scores.position_error_mean_m)
+    )
+}

@@ -1,0 +1,77 @@
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use tagalong_app::format::TableFormat;
+use tagalong_tuning::Objective;
+
+use crate::folder::FolderArgs;
+
+/// Text of `--help` after the arguments.
+pub const HELP: &str = "\
+For each room the settings in `[tune]` of a config are chosen by the other rooms, and scored in this
+one. All rooms choose among the same settings, so each of them runs once on each log; results are
+kept under a hash of everything they depend on, and running again computes only what is missing.
+
+Examples:
+  tagalong bench --leave-one-room-out benches/rooms.toml
+  tagalong bench rooms benches/rooms.toml --configs configs/depth-ekf.toml --budget 60 --jobs 2
+  tagalong bench rooms my-rooms.toml --logs-dir logs --objective MOTA --format json | jq .pipelines";
+
+/// Arguments of `tagalong bench --leave-one-room-out`.
+#[derive(Args, Clone, Debug)]
+pub struct RoomsArgs {
+    /// The rooms and their logs, a TOML file.
+    #[arg(value_name = "ROOMS")]
+    pub rooms: PathBuf,
+    /// The pipelines [default: every config in configs with a table `[tune]`].
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub configs: Vec<PathBuf>,
+    /// Folder of the logs [default: the `folder` that the rooms name].
+    #[arg(long, value_name = "DIR")]
+    pub logs_dir: Option<PathBuf>,
+    /// The objective: the mean of this figure over the rooms is maximised.
+    #[arg(long, value_enum, default_value_t)]
+    pub objective: ObjectiveChoice,
+    /// Most settings that are tried for a pipeline, its own among them: all combinations where they
+    /// are so few, otherwise a sample.
+    #[arg(long, value_name = "N", default_value_t = 32,
+          value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    pub budget: u16,
+    /// Seed of the sample.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Runs at once; the results are the same.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: u16,
+    #[command(flatten)]
+    pub folder: FolderArgs,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: TableFormat,
+}
+
+/// Figure to maximise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ObjectiveChoice {
+    /// Detection and association, with equal weight.
+    #[default]
+    #[value(name = "HOTA")]
+    Hota,
+    /// Association.
+    #[value(name = "IDF1")]
+    Idf1,
+    /// Detection, with few false positives.
+    #[value(name = "MOTA")]
+    Mota,
+}
+
+impl From<ObjectiveChoice> for Objective {
+    fn from(choice: ObjectiveChoice) -> Self {
+        match choice {
+            ObjectiveChoice::Hota => Self::Hota,
+            ObjectiveChoice::Idf1 => Self::Idf1,
+            ObjectiveChoice::Mota => Self::Mota,
+        }
+    }
+}

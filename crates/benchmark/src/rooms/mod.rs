@@ -1,0 +1,95 @@
+//! `tagalong bench --leave-one-room-out`: the settings that a config names in `[tune]` are fitted
+//! on all rooms but one, and scored in that one.
+
+mod args;
+mod contest;
+mod report;
+mod work;
+
+use std::path::Path;
+
+pub use args::{HELP, RoomsArgs};
+use contest::{Contestant, Location};
+use report::Report;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::suggest::check_log_path;
+use tagalong_config::Registry;
+use tagalong_scoring::read_text;
+use tagalong_tuning::Rooms;
+use work::Desk;
+
+use super::plan;
+use super::store::Store;
+
+/// Runs the whole procedure and prints the tables.
+///
+/// # Errors
+/// Files that cannot be read; a pipeline that fails on some log.
+pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
+    let locations = locations(args)?;
+    let contestants = contestants(args, registry)?;
+    let logs = locations.iter().flat_map(|room| &room.logs);
+    let logs: Vec<_> = logs.collect();
+    let store = Store::new(&args.folder.output);
+    let desk = Desk::new(&store, registry, &contestants, &logs)?;
+    let done = desk.work(usize::from(args.jobs))?;
+    say(&format!("{} runs done, {} had their results", done.ran, done.asked - done.ran));
+    if let Some(signal) = done.signal {
+        return Ok(Ended::BySignal(signal));
+    }
+    let report = Report::new(args, &locations, &contestants, &desk)?;
+    let json = report.json()?;
+    store.put("rooms.json", json.as_bytes())?;
+    print(&match args.format {
+        TableFormat::Text => report.text(),
+        TableFormat::Markdown => report.markdown(),
+        TableFormat::Json => json,
+    })?;
+    Ok(if done.lost { Ended::WithLoss } else { Ended::Well })
+}
+
+/// Returns the rooms and their logs, all of which have truth.
+fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
+    let path = &args.rooms;
+    let shown = path.display().to_string();
+    let text = read_text(path).map_err(|failure| Failure::usage(failure.message))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let at = |error: tagalong_config::ConfigError| Failure::usage(error.render(&shown, &text));
+    let rooms = Rooms::parse(&text, folder, args.logs_dir.as_deref()).map_err(at)?;
+    let mut locations = Vec::new();
+    for room in rooms.rooms {
+        let mut logs = Vec::new();
+        for log in &room.logs {
+            let here = |failure: Failure| {
+                let span = Some(log.place.clone());
+                at(tagalong_config::ConfigError { message: failure.message, span })
+            };
+            check_log_path(&log.path).map_err(here)?;
+            logs.push(plan::with_truth(&log.path).map_err(here)?);
+        }
+        locations.push(Location { name: room.name, about: room.about, logs });
+    }
+    Ok(locations)
+}
+
+/// Returns the pipelines with all settings that are tried.
+fn contestants(args: &RoomsArgs, registry: &Registry) -> Result<Vec<Contestant>, Failure> {
+    let named = &args.configs;
+    let mut configs = match named.is_empty() {
+        true => plan::shipped(registry)?,
+        false => {
+            named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?
+        }
+    };
+    // A config that is named takes part even without `[tune]`, for comparison.
+    if named.is_empty() {
+        configs.retain(|config| !config.tune.is_empty());
+    }
+    plan::unique("configs", configs.iter().map(|config| config.file.stem()))?;
+    if configs.is_empty() {
+        let why = "no config in the folder configs has a table [tune]; name some with --configs";
+        return Err(Failure::usage(why));
+    }
+    configs.into_iter().map(|config| Contestant::new(config, args, registry)).collect()
+}

@@ -1,0 +1,342 @@
+//! Chosen settings, with their scores.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_json;
+use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
+
+use super::RoomsArgs;
+use super::contest::{Contestant, Location};
+use super::work::{Desk, Run};
+
+/// Everything that the tables show.
+#[derive(Serialize)]
+pub struct Report {
+    objective: Objective,
+    budget: u16,
+    seed: u64,
+    rooms: Vec<About>,
+    pipelines: Vec<Fitted>,
+}
+
+/// Room with its logs.
+#[derive(Serialize)]
+struct About {
+    name: String,
+    about: String,
+    logs: Vec<String>,
+}
+
+/// Results of a pipeline.
+#[derive(Serialize)]
+struct Fitted {
+    name: String,
+    /// Number of tried settings, those of the config among them.
+    settings: usize,
+    /// Number of settings that contradict themselves, which were not tried.
+    refused: usize,
+    /// Logs that it cannot read.
+    skipped: Vec<Skipped>,
+    shipped: Values,
+    chosen_with_all: Values,
+    rooms: Vec<InRoom>,
+    /// Reason for an empty result.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    too_few: Option<String>,
+}
+
+/// Values of settings, by key.
+type Values = BTreeMap<String, toml::Value>;
+
+#[derive(Serialize)]
+struct Skipped {
+    log: String,
+    why: String,
+}
+
+/// Results of a pipeline in a room.
+#[derive(Serialize)]
+struct InRoom {
+    room: String,
+    /// Settings that the other rooms chose.
+    chosen_without: Values,
+    /// Their score here.
+    without: Figures,
+    /// Score of the choice of all rooms here.
+    with_all: Figures,
+    /// Score of the config's settings here.
+    shipped: Figures,
+}
+
+impl Report {
+    /// Chooses the settings of all pipelines.
+    ///
+    /// # Errors
+    /// A missing result.
+    pub fn new(
+        args: &RoomsArgs,
+        locations: &[Location],
+        contestants: &[Contestant],
+        desk: &Desk<'_>,
+    ) -> Result<Self, Failure> {
+        let objective = args.objective.into();
+        let about = |location: &Location| About {
+            name: location.name.clone(),
+            about: location.about.clone(),
+            logs: location.logs.iter().map(|log| log.name.clone()).collect(),
+        };
+        let fitted = contestants
+            .iter()
+            .enumerate()
+            .map(|(at, contestant)| Scorer { locations, desk, at, contestant }.fitted(objective));
+        Ok(Self {
+            objective,
+            budget: args.budget,
+            seed: args.seed,
+            rooms: locations.iter().map(about).collect(),
+            pipelines: fitted.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Returns everything as JSON.
+    ///
+    /// # Errors
+    /// As for [`to_json`].
+    pub fn json(&self) -> Result<String, Failure> {
+        to_json("the report on the rooms", self)
+    }
+
+    /// Returns the tables for a terminal.
+    pub fn text(&self) -> String {
+        let tables: Vec<String> = self.tables().iter().map(Table::text).collect();
+        tables.join("\n")
+    }
+
+    /// Returns the tables for a page.
+    pub fn markdown(&self) -> String {
+        let tables: Vec<String> = self.tables().iter().map(Table::markdown).collect();
+        tables.join("\n")
+    }
+
+    fn tables(&self) -> Vec<Table> {
+        let each = self.pipelines.iter().map(Fitted::table);
+        std::iter::once(self.summary()).chain(each).collect()
+    }
+
+    /// Returns the means over the rooms.
+    fn summary(&self) -> Table {
+        let row = |fitted: &Fitted| {
+            let rooms = Cell::number(fitted.rooms.len() as f64, 0);
+            let cells = if fitted.rooms.is_empty() { Vec::new() } else { cells(&fitted.mean()) };
+            Row::ours(&fitted.name, [vec![rooms], cells].concat())
+        };
+        let objective = match self.objective {
+            Objective::Hota => "HOTA",
+            Objective::Idf1 => "IDF1",
+            Objective::Mota => "MOTA",
+        };
+        let rooms: Vec<String> = self.rooms.iter().map(About::words).collect();
+        let mut notes = vec![
+            format!("Rooms: {}.", rooms.join("; ")),
+            "w/o: in each room, with the settings that the other rooms chose; all: with those \
+             that all rooms chose, this one among them; gap: HOTA of all less that of w/o; as is: \
+             with the settings of the config; false: false people in a frame. A room's figure is \
+             the mean over its logs, and the means here are over rooms."
+                .to_owned(),
+            format!(
+                "Chosen by the mean of {objective} over rooms, among at most {} settings a \
+                 pipeline (seed {}).",
+                self.budget, self.seed
+            ),
+            "So few rooms bear no interval.".to_owned(),
+        ];
+        let too_few = self.pipelines.iter().filter_map(|fitted| {
+            fitted.too_few.as_ref().map(|why| format!("{}: {why}.", fitted.name))
+        });
+        notes.extend(too_few);
+        let columns = ["rooms"].into_iter().map(String::from).chain(columns()).collect();
+        let title = "Chosen without the room that is scored, and with all: means over the rooms";
+        Table {
+            title: title.into(),
+            columns,
+            rows: self.pipelines.iter().map(row).collect(),
+            notes,
+        }
+    }
+}
+
+impl About {
+    fn words(&self) -> String {
+        let logs = self.logs.join(", ");
+        let about = if self.about.is_empty() { String::new() } else { format!("{}: ", self.about) };
+        format!("{} ({about}{logs})", self.name)
+    }
+}
+
+/// Access to the results of one pipeline.
+struct Scorer<'a> {
+    locations: &'a [Location],
+    desk: &'a Desk<'a>,
+    at: usize,
+    contestant: &'a Contestant,
+}
+
+impl Scorer<'_> {
+    fn fitted(&self, objective: Objective) -> Result<Fitted, Failure> {
+        let mut skipped = Vec::new();
+        let mut rooms: Vec<(&Location, Vec<usize>)> = Vec::new();
+        let mut number = 0..;
+        for location in self.locations {
+            let mut readable = Vec::new();
+            for (log, at) in location.logs.iter().zip(&mut number) {
+                match self.desk.skip(self.at, at) {
+                    Some(why) => {
+                        skipped.push(Skipped { log: log.name.clone(), why: why.to_owned() });
+                    }
+                    None => readable.push(at),
+                }
+            }
+            if !readable.is_empty() {
+                rooms.push((location, readable));
+            }
+        }
+        // With one room there is no other one to choose the settings by.
+        let too_few = (rooms.len() < 2)
+            .then(|| format!("can read logs of {} room, and two are needed", rooms.len()));
+        if too_few.is_some() {
+            rooms.clear();
+        }
+        let settings = self.contestant.settings.len();
+        let table = (0..settings)
+            .map(|setting| rooms.iter().map(|(_, logs)| self.room(setting, logs)).collect())
+            .collect::<Result<Vec<Vec<Figures>>, Failure>>()?;
+        let Choice { without, with_all } = leave_one_out(&table, objective);
+        let in_room = |(at, (location, _)): (usize, &(&Location, Vec<usize>))| InRoom {
+            room: location.name.clone(),
+            chosen_without: self.values(without[at]),
+            without: table[without[at]][at],
+            with_all: table[with_all][at],
+            shipped: table[0][at],
+        };
+        Ok(Fitted {
+            name: self.contestant.name(),
+            settings,
+            refused: self.contestant.refused,
+            skipped,
+            shipped: self.values(0),
+            chosen_with_all: self.values(with_all),
+            rooms: rooms.iter().enumerate().map(in_room).collect(),
+            too_few,
+        })
+    }
+
+    fn room(&self, setting: usize, logs: &[usize]) -> Result<Figures, Failure> {
+        let of = |log: &usize| {
+            let run = Run { contestant: self.at, setting, log: *log };
+            let missing = || Failure::failed("a result went missing; run the command again");
+            self.desk.result(run).map(|result| result.figures).ok_or_else(missing)
+        };
+        let figures: Vec<Figures> = logs.iter().map(of).collect::<Result<_, _>>()?;
+        Ok(mean(&figures))
+    }
+
+    fn values(&self, setting: usize) -> Values {
+        let keys = self.contestant.config.tune.iter().map(|tunable| tunable.key.clone());
+        keys.zip(self.contestant.settings[setting].values.iter().cloned()).collect()
+    }
+}
+
+impl Fitted {
+    /// Returns the means over the rooms.
+    fn mean(&self) -> InRoom {
+        let of = |figures: fn(&InRoom) -> &Figures| mean(self.rooms.iter().map(figures));
+        InRoom {
+            room: "mean".to_owned(),
+            chosen_without: Values::new(),
+            without: of(|room| &room.without),
+            with_all: of(|room| &room.with_all),
+            shipped: of(|room| &room.shipped),
+        }
+    }
+
+    fn table(&self) -> Table {
+        let mean = (!self.rooms.is_empty()).then(|| self.mean());
+        let rows = self.rooms.iter().chain(&mean);
+        Table {
+            title: self.name.clone(),
+            columns: columns().collect(),
+            rows: rows.map(|room| Row::ours(&room.room, cells(room))).collect(),
+            notes: self.notes(),
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![match self.refused {
+            0 => format!("Tried: {} settings.", self.settings),
+            refused => format!(
+                "Tried: {} settings; {refused} contradict themselves and were left out.",
+                self.settings
+            ),
+        }];
+        notes.extend(self.too_few.as_ref().map(|why| format!("Nothing to say: it {why}.")));
+        let mut chosen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        for InRoom { room, chosen_without, .. } in &self.rooms {
+            chosen.entry(self.changes(chosen_without)).or_default().push(room);
+        }
+        if !self.rooms.is_empty() {
+            notes.push(format!("With all: {}.", self.changes(&self.chosen_with_all)));
+        }
+        let without = chosen
+            .iter()
+            .map(|(values, rooms)| format!("Without {}: {values}.", rooms.join(", without ")));
+        notes.extend(without);
+        notes.extend(self.skipped.iter().map(|s| format!("Not read: {}: {}.", s.log, s.why)));
+        notes
+    }
+
+    /// Formats the values that differ from those of the config.
+    fn changes(&self, values: &Values) -> String {
+        let changed = values.iter().filter(|(key, value)| self.shipped.get(*key) != Some(*value));
+        let words: Vec<String> = changed
+            .map(|(key, value)| format!("`{key}` = {}", super::contest::shown(value)))
+            .collect();
+        if words.is_empty() { "as shipped".to_owned() } else { words.join(", ") }
+    }
+}
+
+/// Returns the columns of all tables.
+fn columns() -> impl Iterator<Item = String> {
+    [
+        "HOTA w/o",
+        "all",
+        "gap",
+        "as is",
+        "IDF1 w/o",
+        "all",
+        "as is",
+        "MOTA w/o",
+        "all",
+        "as is",
+        "false w/o",
+        "all",
+        "as is",
+        "recall w/o",
+        "all",
+        "as is",
+    ]
+    .into_iter()
+    .map(String::from)
+}
+
+fn cells(room: &InRoom) -> Vec<Cell> {
+    let InRoom { without, with_all, shipped, .. } = room;
+    let all = |figure: fn(&Figures) -> f64| [without, with_all, shipped].map(figure);
+    let [hota, hota_all, hota_shipped] = all(|f| f.hota);
+    let first = [hota, hota_all, hota_all - hota, hota_shipped];
+    let others = [all(|f| f.idf1), all(|f| f.mota), all(|f| f.false_a_frame), all(|f| f.recall)];
+    let figures = first.into_iter().chain(others.into_iter().flatten());
+    figures.map(|figure| Cell::number(figure, 3)).collect()
+}

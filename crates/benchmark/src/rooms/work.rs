@@ -1,0 +1,270 @@
+//! Runs all settings of all pipelines over all logs. Runs that see the same frames go over a log
+//! side by side and share their findings.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use indicatif::ProgressBar;
+use serde::{Deserialize, Serialize};
+use tagalong_app::outcome::Failure;
+use tagalong_app::signals::Signals;
+use tagalong_config::Registry;
+use tagalong_report::TaskResult;
+use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
+use tagalong_tuning::Figures;
+
+use super::contest::Contestant;
+use crate::plan::{self, Annotated, version};
+use crate::store::Store;
+use crate::work::{Lane, bar, spread};
+
+/// Most pipelines side by side; a signal loses at most one pass of these per job.
+const LANES: usize = 48;
+
+/// Setting of a contestant on a log, by their places in the lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Run {
+    pub contestant: usize,
+    pub setting: usize,
+    pub log: usize,
+}
+
+/// Stored result of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoomResult {
+    /// Figures of the run.
+    pub figures: Figures,
+    /// True if part of the log was lost.
+    pub data_lost: bool,
+}
+
+/// Summary of the runs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunSummary {
+    pub asked: usize,
+    pub ran: usize,
+    pub lost: bool,
+    pub signal: Option<u8>,
+}
+
+/// State that all jobs share.
+pub struct Desk<'a> {
+    store: &'a Store,
+    registry: &'a Registry,
+    contestants: &'a [Contestant],
+    logs: &'a [&'a Annotated],
+    version: String,
+    /// Reasons for which a contestant cannot run on a log.
+    skips: BTreeMap<(usize, usize), String>,
+}
+
+impl<'a> Desk<'a> {
+    /// Tries every pipeline on every log.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn new(
+        store: &'a Store,
+        registry: &'a Registry,
+        contestants: &'a [Contestant],
+        logs: &'a [&'a Annotated],
+    ) -> Result<Self, Failure> {
+        let (mut skips, mut tried) = (BTreeMap::new(), BTreeMap::new());
+        for (contestant, about) in contestants.iter().enumerate() {
+            for (log, annotated) in logs.iter().enumerate() {
+                let key = (log, about.config.reading());
+                let why = match tried.get(&key) {
+                    Some(known) => Option::clone(known),
+                    None => plan::why_not(&about.config, annotated)?,
+                };
+                tried.insert(key, why.clone());
+                skips.extend(why.map(|why| ((contestant, log), why)));
+            }
+        }
+        Ok(Self { store, registry, contestants, logs, version: version()?, skips })
+    }
+
+    /// Returns the reason for which a contestant cannot run on a log, if there is one.
+    pub fn skip(&self, contestant: usize, log: usize) -> Option<&str> {
+        self.skips.get(&(contestant, log)).map(String::as_str)
+    }
+
+    /// Returns the result of a run, if it exists.
+    pub fn result(&self, run: Run) -> Option<RoomResult> {
+        self.store.get(&self.name(run))
+    }
+
+    fn name(&self, run: Run) -> String {
+        let setting = &self.contestants[run.contestant].settings[run.setting];
+        format!("rooms/{}.json", setting.run_hash(self.logs[run.log], &self.version))
+    }
+
+    /// Does the runs that have no result yet.
+    ///
+    /// # Errors
+    /// Runs that fail, after all others are done; a disk that fails, at once.
+    pub fn work(&self, jobs: usize) -> Result<RunSummary, Failure> {
+        let signals = Signals::listen()?;
+        let asked = self.runs();
+        let due: Vec<Run> =
+            asked.iter().copied().filter(|run| self.result(*run).is_none()).collect();
+        let bar = bar(due.len());
+        let ran = due.len();
+        let shift = Shift {
+            desk: self,
+            signals: &signals,
+            bar: &bar,
+            stop: AtomicBool::new(false),
+            failed: Mutex::default(),
+        };
+        shift.run_all(self.passes(due, jobs), jobs);
+        bar.finish_and_clear();
+        shift.verdict()?;
+        let lost = |run: &Run| self.result(*run).is_some_and(|result| result.data_lost);
+        let lost = asked.iter().any(lost);
+        Ok(RunSummary { asked: asked.len(), ran, lost, signal: signals.received() })
+    }
+
+    fn runs(&self) -> Vec<Run> {
+        let mut runs = Vec::new();
+        for log in 0..self.logs.len() {
+            for (contestant, about) in self.contestants.iter().enumerate() {
+                if self.skip(contestant, log).is_none() {
+                    let settings = 0..about.settings.len();
+                    runs.extend(settings.map(|setting| Run { contestant, setting, log }));
+                }
+            }
+        }
+        runs
+    }
+
+    /// Groups the runs that see the same frames: of one log, read the same way.
+    fn passes(&self, due: Vec<Run>, jobs: usize) -> VecDeque<Vec<Run>> {
+        let mut groups: BTreeMap<(usize, String), Vec<Run>> = BTreeMap::new();
+        for run in due {
+            let reading = self.contestants[run.contestant].config.reading();
+            groups.entry((run.log, reading)).or_default().push(run);
+        }
+        let passes = groups.values().flat_map(|group| group.chunks(LANES)).map(<[Run]>::to_vec);
+        spread(passes.collect(), jobs)
+    }
+}
+
+/// Jobs at work.
+struct Shift<'a> {
+    desk: &'a Desk<'a>,
+    signals: &'a Signals,
+    bar: &'a ProgressBar,
+    /// Set when it is useless to go on.
+    stop: AtomicBool,
+    /// Errors by run, so that the same one is reported first for any number of jobs.
+    failed: Mutex<BTreeMap<Run, String>>,
+}
+
+impl Shift<'_> {
+    fn run_all(&self, passes: VecDeque<Vec<Run>>, jobs: usize) {
+        let queue = Mutex::new(passes);
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+        let work = || {
+            while let Some(pass) = next() {
+                if self.has_to_stop() {
+                    return;
+                }
+                if let Err(failure) = self.pass(&pass) {
+                    pass.iter().for_each(|run| self.fail(*run, failure.message.clone()));
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            // One job fewer: the calling thread works, too.
+            for _ in 1..jobs {
+                scope.spawn(work);
+            }
+            work();
+        });
+    }
+
+    fn has_to_stop(&self) -> bool {
+        self.signals.received().is_some() || self.stop.load(Ordering::Relaxed)
+    }
+
+    fn fail(&self, run: Run, why: String) {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner).entry(run).or_insert(why);
+    }
+
+    /// Goes over a log once, with all pipelines of the pass. A failed pipeline does not affect the
+    /// others.
+    fn pass(&self, pass: &[Run]) -> Result<(), Failure> {
+        let Some(first) = pass.first() else { return Ok(()) };
+        let Desk { contestants, logs, .. } = self.desk;
+        let log = logs[first.log];
+        self.bar.set_message(log.name.clone());
+        let options = TruthOptions { upper_body: log.whole_bodies, ..TruthOptions::default() };
+        let truth = TruthFile::read(&log.truth, options)?;
+        let mut source = contestants[first.contestant].config.open(&log.log)?;
+        let mut lanes: Vec<Lane> =
+            pass.iter().map(|run| Lane::new(|| self.pipeline(*run))).collect();
+        let mut shots = Shots::default();
+        while let Some(item) = source.next_frame() {
+            // Partial results are discarded: a stored result is always one of a whole log.
+            if self.has_to_stop() {
+                return Ok(());
+            }
+            shots.push(Shot::of(&item));
+            lanes.iter_mut().for_each(|lane| lane.step(&item));
+        }
+        let data_lost = source.data_lost();
+        for (run, lane) in pass.iter().zip(lanes) {
+            match figures(lane, log, &truth, &shots) {
+                Ok(figures) => self.keep(*run, &RoomResult { figures, data_lost })?,
+                Err(why) => self.fail(*run, why),
+            }
+            self.bar.inc(1);
+        }
+        Ok(())
+    }
+
+    fn pipeline(&self, run: Run) -> Result<tagalong_pipeline::Pipeline, Failure> {
+        let setting = &self.desk.contestants[run.contestant].settings[run.setting];
+        let (mut pipeline, _) = setting.file.pipeline(self.desk.registry, None)?;
+        // The settings of a pass differ mostly behind the detectors, so detections can be shared.
+        pipeline.share_findings();
+        Ok(pipeline)
+    }
+
+    /// Stores a result. A disk that fails stops all jobs, as it would fail for every run.
+    fn keep(&self, run: Run, result: &RoomResult) -> Result<(), Failure> {
+        let json = serde_json::to_vec(result).map_err(Failure::failed)?;
+        let kept = self.desk.store.put(&self.desk.name(run), &json);
+        kept.inspect_err(|_| self.stop.store(true, Ordering::Relaxed))
+    }
+
+    /// Returns the error of the first run that failed.
+    fn verdict(&self) -> Result<(), Failure> {
+        let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some((run, why)) = failed.first_key_value() else { return Ok(()) };
+        let contestant = &self.desk.contestants[run.contestant];
+        Err(Failure::failed(format!(
+            "{} runs failed; the first is {} on {}, with {}: {why}",
+            failed.len(),
+            contestant.name(),
+            self.desk.logs[run.log].name,
+            contestant.words(run.setting)
+        )))
+    }
+}
+
+/// Returns the figures of boxes where the truth has them, otherwise of positions.
+fn figures(
+    lane: Lane,
+    log: &Annotated,
+    truth: &TruthFile,
+    shots: &Shots,
+) -> Result<Figures, String> {
+    lane.pipeline?;
+    let blank = TaskResult { log: log.name.clone(), ..TaskResult::default() };
+    let (result, _) = lane.watch.score(truth, shots, blank)?;
+    let scores = result.image.or(result.metres).ok_or("its truth cannot be compared")?;
+    Figures::of(&scores).ok_or_else(|| "its truth has nobody to find".to_owned())
+}

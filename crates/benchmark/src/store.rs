@@ -1,0 +1,148 @@
+//! Files in the folder of a benchmark.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use tagalong_app::outcome::{Failure, make_room_for};
+use tagalong_eval::Sequence;
+use tagalong_report::{TaskResult, TaskTiming};
+
+use super::plan::Task;
+
+/// Folder of a benchmark.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// One result file.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Stored {
+    /// Content for the report.
+    pub result: TaskResult,
+    /// Scored sequence, for other evaluators; absent if the task failed.
+    pub recording: Option<Recording>,
+}
+
+/// Scored sequence, with the facts that the formats need beside it.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Recording {
+    /// Truth and reports of all frames.
+    pub sequence: Sequence,
+    /// Frames per second.
+    pub rate_hz: f64,
+    /// Columns of the images.
+    pub width: u32,
+    /// Rows of the images.
+    pub height: u32,
+}
+
+/// One file of times.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct StoredTiming {
+    /// Description of the machine.
+    pub machine: String,
+    /// Its times.
+    pub timing: TaskTiming,
+}
+
+impl Store {
+    /// Returns the store of a folder, which need not exist yet.
+    pub fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned() }
+    }
+
+    /// Returns the path of a file of the benchmark.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Writes a file whole or not at all.
+    ///
+    /// # Errors
+    /// A disk that fails.
+    pub fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        put(&self.path(name), bytes)
+    }
+
+    /// Returns the plan.
+    ///
+    /// # Errors
+    /// If there is none, or it is damaged.
+    pub fn plan(&self) -> Result<Vec<Task>, Failure> {
+        let path = self.path("plan.jsonl");
+        let shown = path.display();
+        let text = fs::read_to_string(&path).map_err(|error| {
+            Failure::usage(format!("cannot read {shown}: {error}; `tagalong bench plan` writes it"))
+        })?;
+        let line = |(index, line): (usize, &str)| {
+            serde_json::from_str(line).map_err(|error| {
+                Failure::failed(format!("{shown}, line {}: {error}; plan again", index + 1))
+            })
+        };
+        text.lines().enumerate().map(line).collect()
+    }
+
+    /// Returns the result of a task, if it exists and is whole.
+    pub fn result(&self, hash: &str) -> Option<Stored> {
+        self.get(&result_name(hash))
+    }
+
+    /// Returns true if there is a result.
+    pub fn has_result(&self, hash: &str) -> bool {
+        self.path(&result_name(hash)).is_file()
+    }
+
+    /// Stores a result.
+    ///
+    /// # Errors
+    /// A disk that fails.
+    pub fn put_result(&self, hash: &str, stored: &Stored) -> Result<(), Failure> {
+        let json = serde_json::to_vec(stored).map_err(Failure::failed)?;
+        self.put(&result_name(hash), &json)
+    }
+
+    /// Returns the times of a task, if they were taken.
+    pub fn timing(&self, hash: &str) -> Option<StoredTiming> {
+        self.get(&timing_name(hash))
+    }
+
+    /// Stores times.
+    ///
+    /// # Errors
+    /// A disk that fails.
+    pub fn put_timing(&self, hash: &str, timing: &StoredTiming) -> Result<(), Failure> {
+        let json = serde_json::to_vec_pretty(timing).map_err(Failure::failed)?;
+        self.put(&timing_name(hash), &json)
+    }
+
+    /// Returns a file of the benchmark as JSON, if it exists and is whole.
+    pub fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
+        // A damaged file counts as missing.
+        serde_json::from_slice(&fs::read(self.path(name)).ok()?).ok()
+    }
+}
+
+fn result_name(hash: &str) -> String {
+    format!("results/{hash}.json")
+}
+
+fn timing_name(hash: &str) -> String {
+    format!("timings/{hash}.json")
+}
+
+/// Writes under a name of this process and renames: several processes may write the same result,
+/// and all of them are right.
+///
+/// # Errors
+/// A disk that fails.
+pub fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
+    make_room_for(path)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial = path.with_file_name(format!("{name}.{}.partial", std::process::id()));
+    fs::write(&partial, bytes).map_err(failed)?;
+    fs::rename(&partial, path).map_err(failed)
+}

@@ -1,0 +1,188 @@
+//! Reports of one pipeline on the frames of one log.
+
+use std::collections::BTreeMap;
+
+use tagalong_app::timings::Timings;
+use tagalong_core::{Funnel, Track};
+use tagalong_eval::{
+    Clear, Consistency, Event, Prepared, Role, Scores, Sequence, SetDistance, Similarity, Tally,
+    events,
+};
+use tagalong_log::LogFrame;
+use tagalong_pipeline::FrameReport;
+use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
+use tagalong_scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region};
+
+use super::store::Recording;
+
+/// Confidence of the bounds on the normalised innovation squared.
+const CONFIDENCE: f64 = 0.95;
+
+/// Name under which the time of a whole frame is kept.
+const WHOLE_FRAME: &str = "frame";
+
+/// Collector of a pipeline's reports, frame by frame.
+#[derive(Default)]
+pub struct Watch {
+    reports: Reports,
+    paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>,
+    funnel: Funnel,
+    nis: Vec<(f64, u32)>,
+    frames: u64,
+    times: Timings,
+    stages: Vec<&'static str>,
+}
+
+impl Watch {
+    /// Adds the report of a frame.
+    pub fn take(&mut self, item: &LogFrame, report: &FrameReport) {
+        self.funnel.merge(&report.funnel);
+        self.nis.extend(report.nis.iter().map(|(_, nis, freedom)| (*nis, *freedom)));
+        self.time(report);
+        // A duplicate or late frame has no tracks of its own to score.
+        if !report.outcome.is_processed() {
+            return;
+        }
+        self.frames += 1;
+        let number = u32::try_from(report.index).unwrap_or(u32::MAX);
+        // A track that is only predicted has no box that could be scored.
+        for track in report.tracks.iter().filter(|track| track.confirmed && track.seen) {
+            self.track(item, number, track);
+        }
+    }
+
+    fn track(&mut self, item: &LogFrame, number: u32, track: &Track) {
+        let camera = &item.frame.camera;
+        let visible = track.estimate.region.clipped(camera.width, camera.height);
+        let head = track.estimate.person.position.xy();
+        let id = i64::from(track.id.0);
+        self.reports.entry(number).or_default().push(tagalong_eval::Report {
+            id,
+            region: (visible.area() > 0.0).then(|| region(&visible)),
+            floor_m: Some([head.x, head.y]),
+            score: track.score,
+        });
+        let in_odom = item.odom_from_robot * head;
+        self.paths.entry(id).or_default().push((number, [in_odom.x, in_odom.y]));
+    }
+
+    fn time(&mut self, report: &FrameReport) {
+        for (stage, ms) in &report.timings {
+            if !self.stages.contains(stage) {
+                self.stages.push(stage);
+            }
+            self.times.add(stage, *ms);
+        }
+        self.times.add(WHOLE_FRAME, report.timings.iter().map(|(_, ms)| ms).sum());
+    }
+
+    /// Returns the times of the frames.
+    pub fn timing(&self) -> TaskTiming {
+        let all = self.times.summary();
+        let of = |stage: &str| all.get(stage).map_or((0.0, 0.0), |t| (t.p50_ms, t.p95_ms));
+        let (frame_ms_p50, frame_ms_p95) = of(WHOLE_FRAME);
+        let stages = self.stages.iter().map(|stage| {
+            let (p50_ms, p95_ms) = of(stage);
+            StageTiming { stage: (*stage).to_owned(), p50_ms, p95_ms }
+        });
+        TaskTiming { frame_ms_p50, frame_ms_p95, stages: stages.collect() }
+    }
+
+    /// Scores everything. `result` already names the task.
+    ///
+    /// # Errors
+    /// Truth that contradicts itself, in a sentence.
+    pub fn score(
+        self,
+        truth: &TruthFile,
+        shots: &Shots,
+        mut result: TaskResult,
+    ) -> Result<(TaskResult, Recording), String> {
+        result.frames = self.frames;
+        result.duration_s = shots.duration_s();
+        result.nis = consistency(&self.nis);
+        let dropped = self.funnel.entries().iter();
+        result.funnel =
+            dropped.map(|d| Dropped { test: d.test.to_owned(), count: d.count }).collect();
+        result.tracks = paths(self.paths, shots);
+        let sequence = assemble(&result.log, truth, shots, self.reports, Rate(1.0));
+        result.truth = truth_paths(&sequence, shots);
+        score(&sequence, truth, &mut result)?;
+        let size = shots.at(1).map_or((0, 0), |shot| shot.size);
+        let (width, height) = (size.0 as u32, size.1 as u32);
+        Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
+    }
+}
+
+/// Fills in figures and events, by boxes and by positions as far as the truth has them; the events
+/// are those of the boxes if it has both.
+fn score(sequence: &Sequence, truth: &TruthFile, result: &mut TaskResult) -> Result<(), String> {
+    let measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
+        let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
+        let comparison = comparison(truth, similarity);
+        let in_words = |error: tagalong_eval::EvalError| error.to_string();
+        let prepared = Prepared::new(&sequence, &comparison).map_err(in_words)?;
+        let (_, matches) = Clear::measure(&prepared);
+        let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
+        Ok(Some((tally.map_err(in_words)?, events(&prepared, &matches))))
+    };
+    let image = measured(Similarity::Iou)?;
+    let metres = measured(Similarity::Metres)?;
+    let scores = |side: &Option<(Tally, Vec<Event>)>| -> Option<Scores> {
+        side.as_ref().map(|(tally, _)| tally.scores())
+    };
+    (result.image, result.metres) = (scores(&image), scores(&metres));
+    if let Some((tally, _)) = &image {
+        result.lamr_curve = tally.detections.curve();
+    }
+    let happened = image.or(metres).map(|(_, events)| events).unwrap_or_default();
+    result.events = happened.iter().map(|event| EventRow::new(event, 0)).collect();
+    Ok(())
+}
+
+/// Judges the values with the most frequent number of degrees of freedom.
+fn consistency(nis: &[(f64, u32)]) -> Option<Consistency> {
+    // Bounds exist for one number of degrees of freedom only, so the rare others are left out.
+    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+    nis.iter().for_each(|(_, freedom)| *counts.entry(*freedom).or_default() += 1);
+    let (&freedom, _) = counts.iter().max_by_key(|(_, count)| **count)?;
+    let values: Vec<f64> = nis.iter().filter(|(_, f)| *f == freedom).map(|(v, _)| *v).collect();
+    Consistency::of(&values, freedom, CONFIDENCE)
+}
+
+fn paths(paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>, shots: &Shots) -> Vec<Trajectory> {
+    let point = |(number, at): &(u32, [f64; 2])| point(*number, *at, shots);
+    paths
+        .into_iter()
+        .map(|(id, places)| Trajectory { id, points: places.iter().map(point).collect() })
+        .collect()
+}
+
+/// Returns the trajectories of the people that count, in the odometry frame.
+fn truth_paths(sequence: &Sequence, shots: &Shots) -> Vec<Trajectory> {
+    let mut paths: BTreeMap<i64, Vec<(u32, [f64; 2])>> = BTreeMap::new();
+    for (number, frame) in (1..).zip(&sequence.frames) {
+        for truth in frame.truths.iter().filter(|truth| truth.role == Role::Counts) {
+            let (Some([x, y]), Some(shot)) = (truth.floor_m, shots.at(number)) else { continue };
+            let at = shot.odom_from_robot * nalgebra::Point2::new(x, y);
+            paths.entry(truth.id).or_default().push((number, [at.x, at.y]));
+        }
+    }
+    self::paths(paths, shots)
+}
+
+/// Rounds to millimetres and milliseconds, which are enough for a plot.
+fn point(number: u32, [x, y]: [f64; 2], shots: &Shots) -> [f64; 3] {
+    let seconds = shots.stamp_ns(number, Rate(1.0)) as f64 * 1e-9;
+    [seconds, x, y].map(|value| (value * 1e3).round() / 1e3)
+}
+
+/// Returns the rank of a kind of event, 0 first: identity errors, false tracks, misses, all others.
+pub fn importance(kind: &str) -> u8 {
+    match kind {
+        "switch" | "wrong-person" => 0,
+        "false-track" => 1,
+        "miss" => 2,
+        _ => 3,
+    }
+}

@@ -1,0 +1,337 @@
+//! Runs tasks. Those that see the same frames share one pass over their log.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::outcome::{Failure, say};
+use tagalong_app::signals::Signals;
+use tagalong_config::Registry;
+use tagalong_log::{FrameSource, Input, Inputs};
+use tagalong_pipeline::Pipeline;
+use tagalong_report::{Outcome, TaskResult};
+use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
+
+use super::args::RunArgs;
+use super::pictures::Wanted;
+use super::plan::{PlannedConfig, Task, reread, version};
+use super::store::{Store, Stored, StoredTiming};
+use super::watch::Watch;
+
+/// Summary of the tasks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Tasks that were requested and can run.
+    pub asked: usize,
+    /// Of these, tasks that were run now.
+    pub ran: usize,
+    /// Tasks that failed, by their results.
+    pub failed: usize,
+    /// True if part of some log was lost.
+    pub lost: bool,
+    /// Signal that asked to stop.
+    pub signal: Option<u8>,
+}
+
+/// Task with its config.
+struct Ready {
+    task: Task,
+    config: PlannedConfig,
+}
+
+/// Tasks that share a pass over a log.
+type Group = Vec<Ready>;
+
+/// Runs the tasks that have no result yet.
+///
+/// # Errors
+/// A plan of another program, a task that is not in it, a disk that fails. A pipeline that fails is
+/// no error: its result says so.
+pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally, Failure> {
+    let signals = Signals::listen()?;
+    let asked = asked(args, store)?;
+    let due = |task: &&Task| is_due(args, store, task);
+    let pending: Vec<Task> = asked.iter().filter(due).cloned().collect();
+    let ran = pending.len();
+    let jobs = jobs(args);
+    let groups = groups(pending, registry, args.timing, jobs)?;
+    let bar = bar(ran);
+    let desk = Desk { store, registry, signals: &signals, bar: &bar, timing: args.timing };
+    run_all(groups, jobs, &desk)?;
+    bar.finish_and_clear();
+    let mut tally =
+        Tally { asked: asked.len(), ran, signal: signals.received(), ..Tally::default() };
+    for stored in asked.iter().filter_map(|task| store.result(&task.hash)) {
+        tally.failed += usize::from(matches!(stored.result.outcome, Outcome::Failed { .. }));
+        tally.lost |= stored.result.data_lost;
+    }
+    Ok(tally)
+}
+
+fn jobs(args: &RunArgs) -> usize {
+    if args.timing && args.jobs > 1 {
+        say("note: --timing runs one task at a time; --jobs is passed over");
+    }
+    if args.timing { 1 } else { usize::from(args.jobs) }
+}
+
+/// Returns the tasks that were requested and can run.
+fn asked(args: &RunArgs, store: &Store) -> Result<Vec<Task>, Failure> {
+    let mut tasks = store.plan()?;
+    // Another program may give other results under the hashes of this plan.
+    let program = version()?;
+    if let Some(task) = tasks.iter().find(|task| task.version != program) {
+        let planned = &task.version;
+        return Err(Failure::usage(format!(
+            "the plan is of program {planned}, and this is {program}; plan again"
+        )));
+    }
+    if let Some(wanted) = &args.task {
+        let count = tasks.len();
+        tasks.retain(|task| task.k.to_string() == *wanted || task.hash == *wanted);
+        if tasks.is_empty() {
+            return Err(Failure::usage(format!(
+                "no task `{wanted}`; the plan has the numbers 1 to {count}, and their hashes"
+            )));
+        }
+    }
+    tasks.retain(|task| task.skip.is_none());
+    Ok(tasks)
+}
+
+fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {
+    let failed = |stored: Stored| matches!(stored.result.outcome, Outcome::Failed { .. });
+    !store.has_result(&task.hash)
+        || args.retry_failed && store.result(&task.hash).is_none_or(failed)
+        || args.timing && store.timing(&task.hash).is_none()
+}
+
+/// Groups the tasks that see the same frames: of one log, read the same way. Tasks with other
+/// inputs are kept apart, or a result would depend on the company of its task.
+fn groups(
+    tasks: Vec<Task>,
+    registry: &Registry,
+    alone: bool,
+    jobs: usize,
+) -> Result<VecDeque<Group>, Failure> {
+    let mut groups: BTreeMap<String, Group> = BTreeMap::new();
+    for task in tasks {
+        let config = reread(&task, registry)?;
+        let outer = &config.outer;
+        let mut key = format!("{:?}", (&task.log, &outer.input, &outer.limits, config.inputs));
+        // For times, each task has the machine to itself.
+        if alone {
+            key += &task.hash;
+        }
+        groups.entry(key).or_default().push(Ready { task, config });
+    }
+    Ok(spread(groups.into_values().collect(), jobs))
+}
+
+/// Halves the largest groups until every job has one.
+pub fn spread<T>(mut groups: Vec<Vec<T>>, jobs: usize) -> VecDeque<Vec<T>> {
+    while groups.len() < jobs {
+        let Some(largest) = groups.iter_mut().max_by_key(|group| group.len()) else { break };
+        if largest.len() < 2 {
+            break;
+        }
+        let half = largest.split_off(largest.len() / 2);
+        groups.push(half);
+    }
+    groups.into()
+}
+
+/// Returns a progress bar for tasks, visible on a terminal.
+pub fn bar(tasks: usize) -> ProgressBar {
+    let bar = ProgressBar::new(tasks as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} tasks {msg} {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// State that all jobs share.
+struct Desk<'a> {
+    store: &'a Store,
+    registry: &'a Registry,
+    signals: &'a Signals,
+    bar: &'a ProgressBar,
+    timing: bool,
+}
+
+fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), Failure> {
+    let queue = Mutex::new(groups);
+    let trouble = Mutex::new(None);
+    let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+    let work = || {
+        while let Some(group) = next() {
+            if desk.signals.received().is_some() {
+                return;
+            }
+            if let Err(failure) = desk.run(group) {
+                // The disk fails for every job: let the others end, too.
+                queue.lock().unwrap_or_else(PoisonError::into_inner).clear();
+                *trouble.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..jobs {
+            scope.spawn(work);
+        }
+        work();
+    });
+    trouble.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+}
+
+impl Desk<'_> {
+    /// Runs a group and stores its results. A log that cannot be read fails its tasks and nothing
+    /// else.
+    fn run(&self, group: Group) -> Result<(), Failure> {
+        self.bar.set_message(group[0].task.log_name.clone());
+        // A panic while reading or scoring fails this group; the other groups go on.
+        let done = catch_unwind(AssertUnwindSafe(|| self.results(&group)));
+        let all = match done {
+            Ok(Ok(Some(all))) => all,
+            Ok(Ok(None)) => return Ok(()),
+            Ok(Err(why)) => group.iter().map(|ready| failed(&ready.task, &why)).collect(),
+            Err(_) => {
+                let why = "internal error while the log was read or scored; please report it";
+                group.iter().map(|ready| failed(&ready.task, why)).collect()
+            }
+        };
+        for (ready, (stored, timing)) in group.iter().zip(all) {
+            self.store.put_result(&ready.task.hash, &stored)?;
+            if let (true, Some(timing)) = (self.timing, timing) {
+                self.store.put_timing(&ready.task.hash, &timing)?;
+            }
+            self.bar.inc(1);
+        }
+        Ok(())
+    }
+
+    /// Returns the results of a group, in its order; `None` after a stop signal.
+    fn results(&self, group: &Group) -> Result<Option<Vec<Kept>>, String> {
+        let first = &group[0].task;
+        let options = TruthOptions { upper_body: first.whole_bodies, ..TruthOptions::default() };
+        let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
+        truth.notes.iter().for_each(|note| say(&format!("note: {note}")));
+        let mut source = open(&group[0], group[0].config.inputs)?;
+        let build = |ready: &Ready| {
+            ready.config.file.pipeline(self.registry, Some(ready.task.seed)).map(|built| built.0)
+        };
+        let mut lanes: Vec<Lane> = group.iter().map(|ready| Lane::new(|| build(ready))).collect();
+        let mut shots = Shots::default();
+        while let Some(item) = source.next_frame() {
+            if self.signals.received().is_some() {
+                return Ok(None);
+            }
+            shots.push(Shot::of(&item));
+            lanes.iter_mut().for_each(|lane| lane.step(&item));
+        }
+        let lost = source.data_lost();
+        let finish = |(ready, lane): (&Ready, Lane)| lane.finish(&ready.task, &truth, &shots, lost);
+        let (mut stored, timings): (Vec<_>, Vec<_>) = group.iter().zip(lanes).map(finish).unzip();
+        illustrate(&group[0], &mut stored)?;
+        Ok(Some(stored.into_iter().zip(timings).collect()))
+    }
+}
+
+/// Result, and the times if the task succeeded.
+type Kept = (Stored, Option<StoredTiming>);
+
+fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
+    let outer = &ready.config.outer;
+    let source = FrameSource::open(&ready.task.log, &outer.input, &outer.limits, inputs)
+        .map_err(|error| error.to_string())?;
+    // The hash of the task covers the log, so a changed log must not be scored under it.
+    if ready.task.inputs.get("log") != Some(&source.facts().sha256) {
+        return Err("the log changed since the task was planned; plan again".into());
+    }
+    Ok(source)
+}
+
+/// One pipeline on its way through the frames.
+pub struct Lane {
+    /// The pipeline, or the error that ended it.
+    pub pipeline: Result<Pipeline, String>,
+    /// Its reports so far.
+    pub watch: Watch,
+}
+
+impl Lane {
+    /// Takes the pipeline that `build` makes.
+    pub fn new(build: impl FnOnce() -> Result<Pipeline, Failure>) -> Self {
+        let pipeline = match catch_unwind(AssertUnwindSafe(build)) {
+            Ok(Ok(pipeline)) => Ok(pipeline),
+            Ok(Err(failure)) => Err(failure.message),
+            Err(_) => Err("a plugin panicked while the pipeline was built".into()),
+        };
+        Self { pipeline, watch: Watch::default() }
+    }
+
+    /// Passes it the next frame. A pipeline that failed takes no more of them.
+    pub fn step(&mut self, item: &tagalong_log::LogFrame) {
+        let Ok(pipeline) = &mut self.pipeline else { return };
+        match pipeline.step(&item.frame) {
+            Ok(report) => self.watch.take(item, &report),
+            Err(error) => self.pipeline = Err(error.to_string()),
+        }
+    }
+
+    fn finish(self, task: &Task, truth: &TruthFile, shots: &Shots, lost: bool) -> Kept {
+        if let Err(why) = &self.pipeline {
+            return failed(task, why);
+        }
+        let timing = StoredTiming { machine: machine(), timing: self.watch.timing() };
+        let blank = TaskResult { data_lost: lost, ..blank(task) };
+        match self.watch.score(truth, shots, blank) {
+            Ok((result, recording)) => {
+                (Stored { result, recording: Some(recording) }, Some(timing))
+            }
+            Err(why) => failed(task, &why),
+        }
+    }
+}
+
+/// Returns the result of a task before it runs.
+pub fn blank(task: &Task) -> TaskResult {
+    TaskResult {
+        pipeline: task.pipeline.clone(),
+        log: task.log_name.clone(),
+        seed: task.seed,
+        hash: task.hash.clone(),
+        inputs: task.inputs.clone(),
+        ..TaskResult::default()
+    }
+}
+
+fn failed(task: &Task, why: &str) -> Kept {
+    let outcome = Outcome::Failed { why: why.to_owned() };
+    (Stored { result: TaskResult { outcome, ..blank(task) }, recording: None }, None)
+}
+
+/// Goes through the log once more for the pictures of the events.
+// A second pass, because the important events are known only after the scoring.
+fn illustrate(ready: &Ready, stored: &mut [Stored]) -> Result<(), String> {
+    let wanted = Wanted::of(stored);
+    let Some(last) = wanted.last() else { return Ok(()) };
+    let mut source = open(ready, ready.config.inputs.accept(Input::Colour))?;
+    while let Some(item) = source.next_frame() {
+        if item.frame.index > last {
+            break;
+        }
+        wanted.cut(item.frame.index, item.frame.images(), stored);
+    }
+    Ok(())
+}
+
+/// Returns a description of the processor.
+fn machine() -> String {
+    let about = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = about.lines().find_map(|line| line.strip_prefix("model name"));
+    let processor = line.map_or("processor not known", |l| l.trim_start_matches([' ', '\t', ':']));
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{processor}, {threads} threads, {}", std::env::consts::OS)
+}

@@ -1,0 +1,160 @@
+//! Short run of the pipeline: people that it finds, and candidates that each test drops.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tagalong_core::{Frame, Funnel, RgbImage};
+use tagalong_geometry::Rect;
+use tagalong_pipeline::{Fate, FrameReport, Pipeline};
+use tagalong_render::background;
+
+/// Most pictures of one test.
+const EXAMPLES: usize = 16;
+
+/// Picture of a dropped candidate.
+pub struct Example {
+    /// Index of the frame.
+    pub frame: u64,
+    /// Region that was dropped, with its surroundings.
+    pub picture: RgbImage,
+}
+
+/// Result of the pipeline on the frames.
+#[derive(Default)]
+pub struct Trial {
+    /// Number of frames that it was given.
+    pub frames: u64,
+    /// Number of frames in which a confirmed person was seen.
+    pub with_people: u64,
+    /// Confirmed persons.
+    pub people: BTreeSet<u32>,
+    /// Number of drops per test.
+    pub funnel: Funnel,
+    /// Example pictures, by test.
+    pub examples: BTreeMap<&'static str, Spread<Example>>,
+    /// Error of the plugin that ended it.
+    pub failure: Option<String>,
+}
+
+impl Trial {
+    /// Passes a frame to the pipeline; does nothing after the error of a plugin.
+    pub fn step(&mut self, pipeline: &mut Pipeline, frame: &Frame, with_pictures: bool) {
+        if self.failure.is_some() {
+            return;
+        }
+        self.frames += 1;
+        match pipeline.step(frame) {
+            Ok(report) => self.take(frame, &report, with_pictures),
+            Err(error) => self.failure = Some(error.to_string()),
+        }
+    }
+
+    fn take(&mut self, frame: &Frame, report: &FrameReport, with_pictures: bool) {
+        let seen = report.tracks.iter().filter(|track| track.confirmed && track.seen);
+        let people: Vec<u32> = seen.map(|track| track.id.0).collect();
+        self.with_people += u64::from(!people.is_empty());
+        self.people.extend(people);
+        self.funnel.merge(&report.funnel);
+        if !with_pictures {
+            return;
+        }
+        for (test, place) in dropped(report) {
+            let picture = || picture(frame, &place);
+            self.examples
+                .entry(test)
+                .or_default()
+                .offer(|| Some(Example { frame: frame.index, picture: picture()? }));
+        }
+    }
+}
+
+/// Returns one dropped region per test.
+fn dropped(report: &FrameReport) -> BTreeMap<&'static str, Rect> {
+    let examples = report.funnel.entries().iter().filter_map(|e| Some((e.test, e.example?)));
+    let candidates = report.candidates.iter().filter_map(|candidate| match candidate.fate {
+        Fate::Dropped(test) => Some((test, candidate.detection.region)),
+        _ => None,
+    });
+    // Candidates come last and replace the funnel's example of the same test.
+    examples.chain(candidates).filter(|(_, place)| place.area() > 0.0).collect()
+}
+
+/// Side of a picture, pixels, and the part of it that the region takes.
+const SIDE_PX: usize = 144;
+const PART: f64 = 0.6;
+
+/// Returns the region of the image, enlarged or reduced to one size.
+fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
+    let image = background(frame.images())?;
+    let scale = place.width.max(place.height) / (PART * SIDE_PX as f64);
+    let centre = place.centre();
+    let half = 0.5 * SIDE_PX as f64;
+    Some(RgbImage::from_fn(SIDE_PX, SIDE_PX, |x, y| {
+        let (dx, dy) = (x as f64 - half, y as f64 - half);
+        let at = [centre.x + scale * dx, centre.y + scale * dy].map(|v| v.floor() as i64);
+        let edge = |d: f64, side: f64| ((d.abs() * scale) - 0.5 * side).abs() < 0.5 * scale;
+        let inside = |d: f64, side: f64| d.abs() * scale <= 0.5 * side + 0.5 * scale;
+        let on_frame = edge(dx, place.width) && inside(dy, place.height)
+            || edge(dy, place.height) && inside(dx, place.width);
+        if on_frame { [255, 220, 0] } else { image.get(at[0], at[1]).unwrap_or([24, 24, 28]) }
+    }))
+}
+
+/// Collection that keeps a few of many items, spread evenly over all.
+pub struct Spread<T> {
+    kept: Vec<T>,
+    every: u64,
+    offered: u64,
+}
+
+impl<T> Default for Spread<T> {
+    fn default() -> Self {
+        Self { kept: Vec::new(), every: 1, offered: 0 }
+    }
+}
+
+impl<T> Spread<T> {
+    /// Takes an item if it is its turn.
+    pub fn offer(&mut self, make: impl FnOnce() -> Option<T>) {
+        let is_due = self.offered.is_multiple_of(self.every);
+        self.offered += 1;
+        if !is_due {
+            return;
+        }
+        // When it is full, every other item goes and the stride doubles, so that the rest stays
+        // even.
+        if self.kept.len() == EXAMPLES {
+            let mut number = 0;
+            self.kept.retain(|_| {
+                number += 1;
+                number % 2 == 1
+            });
+            self.every *= 2;
+            // With the doubled stride this item may no longer be due.
+            if !(self.offered - 1).is_multiple_of(self.every) {
+                return;
+            }
+        }
+        self.kept.extend(make());
+    }
+
+    /// Returns the kept items.
+    pub fn kept(&self) -> &[T] {
+        &self.kept
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_are_kept_and_they_are_spread() {
+        let mut spread = Spread::default();
+        (0..1000).for_each(|i| spread.offer(|| Some(i)));
+        let kept = spread.kept();
+        assert!((EXAMPLES / 2..=EXAMPLES).contains(&kept.len()), "{kept:?}");
+        assert!(kept[0] == 0 && *kept.last().unwrap() > 800, "{kept:?}");
+        let steps: BTreeSet<i32> = kept.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert_eq!(steps.len(), 1, "{kept:?}");
+    }
+}

@@ -1,0 +1,108 @@
+use tagalong_app::outcome::Failure;
+use tagalong_app::serialize::to_toml;
+use tagalong_learn::{Example, logistic};
+use tagalong_pipeline::{Differences, LooksSettings};
+
+use super::Followed;
+
+/// Ridge penalty on the squared weights, equal to one example.
+const RIDGE: f64 = 1.0;
+/// Smallest weight that is divided by.
+const LEAST: f64 = 1e-3;
+/// A weight and an offset for each of torso, legs, texture and height, and a weight for the rivals.
+const FEATURES: usize = 9;
+
+/// Fits the settings of the lock's probabilities to the true identities.
+pub fn looks(results: &[Followed]) -> LooksSettings {
+    let sightings = results.iter().flat_map(|followed| &followed.ridden.likeness);
+    let examples: Vec<Example<FEATURES>> = sightings
+        .map(|(like, same)| Example {
+            features: features(&like.differences),
+            target: f64::from(u8::from(*same)),
+            weight: 1.0,
+        })
+        .collect();
+    let [torso, torso_0, legs, legs_0, texture, texture_0, height, height_0, rivals] =
+        logistic(&examples, RIDGE);
+    LooksSettings {
+        torso: term(torso, torso_0),
+        legs: term(legs, legs_0),
+        texture: term(texture, texture_0),
+        height: term(height, height_0),
+        rivals: rounded(rivals),
+    }
+}
+
+/// Returns the features of an example; an unknown difference has no weight and no offset.
+fn features(differences: &Differences) -> [f64; FEATURES] {
+    let of = |difference: Option<f64>| difference.map_or([0.0; 2], |d| [-d, 1.0]);
+    let [torso, legs, texture] = [differences.torso, differences.legs, differences.texture].map(of);
+    let height = [-differences.height_m, 1.0];
+    let rivals = differences.rivals.unwrap_or(0.0);
+    let mut all = [rivals; FEATURES];
+    all[..FEATURES - 1].copy_from_slice([torso, legs, texture, height].as_flattened());
+    all
+}
+
+/// Converts `offset - weight * difference` to `weight * (even - difference)`.
+fn term(weight: f64, offset: f64) -> [f64; 2] {
+    // Keeps the quotient finite where the fit finds no evidence.
+    let weight = if weight.abs() < LEAST { LEAST } else { weight };
+    [rounded(offset / weight), rounded(weight)]
+}
+
+fn rounded(value: f64) -> f64 {
+    (1e3 * value).round() * 1e-3
+}
+
+/// Returns the settings as lines for a config.
+///
+/// # Errors
+/// As for [`to_toml`].
+pub fn toml(looks: &LooksSettings) -> Result<String, Failure> {
+    let body = to_toml("the settings [target.looks]", looks)?;
+    Ok(format!("\n# Fitted to these rides:\n[target.looks]\n{body}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::TrackId;
+    use tagalong_pipeline::Likeness;
+    use tagalong_trials::Ridden;
+
+    use super::*;
+
+    fn followed(likeness: Vec<(Likeness, bool)>) -> Followed {
+        let ridden = Ridden { likeness, ..Ridden::default() };
+        let (suite, pipeline) = ("scene".into(), "config".into());
+        Followed { suite, pipeline, ridden, took_ms: Vec::new(), story: Vec::new() }
+    }
+
+    /// The odds that a track is the person depend on the upper body alone, and in every fourth
+    /// example it is not visible.
+    #[test]
+    fn what_tells_people_apart_gets_the_weight() {
+        let mut likeness = Vec::new();
+        for k in 0..400_u32 {
+            let torso = (k % 4 > 0).then_some(f64::from(k % 20) / 40.0);
+            let odds = torso.map_or(0.0, |d| 10.0 * (0.25 - d));
+            let differences = Differences {
+                torso,
+                legs: Some(f64::from(k % 7) / 10.0),
+                texture: None,
+                height_m: 0.02 * f64::from(k % 3),
+                rivals: None,
+            };
+            let people = (20.0 / (1.0 + (-odds).exp())).round() as usize;
+            let like = Likeness { track: TrackId(1), probability: 0.5, differences };
+            likeness.extend((0..20).map(|n| (like, n < people)));
+        }
+        let found = looks(&[followed(likeness)]);
+        let [even, weight] = found.torso;
+        assert!((even - 0.25).abs() < 0.03 && (weight - 10.0).abs() < 0.5, "{found:?}");
+        assert!(found.legs[1].abs() < 0.3 && found.rivals == 0.0, "{found:?}");
+        let text = toml(&found).unwrap();
+        let read: toml::Table = toml::from_str(&text).unwrap();
+        assert!(read["target"]["looks"]["torso"].is_array(), "{text}");
+    }
+}

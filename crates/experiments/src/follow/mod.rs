@@ -1,0 +1,274 @@
+//! `tagalong follow`: a pipeline steers the simulated robot through scenes.
+
+mod fit;
+mod log;
+mod story;
+mod table;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use log::RideLog;
+use serde::Serialize;
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::serialize::to_json;
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
+use tagalong_config::Registry;
+use tagalong_pipeline::LooksSettings;
+use tagalong_reproduce::Table;
+use tagalong_sim::{Scene, Seeds, Split, Variant};
+use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
+
+use crate::contender::contender;
+
+/// Folder and name prefix of the default scenes.
+const SCENES: (&str, &str) = ("configs/scenes", "follow-");
+
+/// Arguments of `tagalong follow`.
+#[derive(Args, Debug)]
+pub struct FollowArgs {
+    /// The pipeline; it needs a [controller].
+    #[arg(default_value = "configs/follow-best.toml")]
+    pub config: PathBuf,
+    /// The scenes; their first person is the one to follow [default: all
+    /// follow-*.toml of configs/scenes].
+    pub scenes: Vec<PathBuf>,
+    /// More pipelines, which ride the same scenes.
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub against: Vec<PathBuf>,
+    /// Ride each scene with this many seeds ...
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub seeds: u64,
+    /// ... starting with this one of the split.
+    #[arg(long, alias = "seed", value_name = "N", default_value_t = 0)]
+    pub first_seed: u64,
+    /// The split that the seeds belong to; settings are chosen on `validation`.
+    #[arg(long, value_name = "SPLIT", default_value = "test")]
+    pub split: Split,
+    /// Delay from a command to the motion of the wheels, ms, instead of the scene's.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(0..=2000))]
+    pub latency_ms: Option<u16>,
+    /// Lose this fraction of the images, instead of the scene's.
+    #[arg(long, value_name = "FRACTION", value_parser = fraction)]
+    pub drop: Option<f64>,
+    /// Replace a value in each scene: a dotted key, like `crowd=5`.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
+    pub set: Vec<(String, String)>,
+    /// Rides at once; the results are the same [default: as many as there are
+    /// cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub jobs: Option<u8>,
+    /// Write the log of every ride (images, truth, commands, reasons), and the
+    /// tables, to this folder.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Print the settings [target.looks] that fit these rides best; use the split `train`.
+    #[arg(long)]
+    pub fit: bool,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: TableFormat,
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
+    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("must be in 0 to 1".into()) }
+}
+
+/// One pipeline on one random variant of a scene.
+struct Job {
+    suite: String,
+    scene: Scene,
+    contender: Contender,
+}
+
+/// Result of a job.
+#[derive(Clone, Debug, Serialize)]
+pub struct Followed {
+    /// Name of the scene.
+    pub suite: String,
+    /// Name of the pipeline.
+    pub pipeline: String,
+    /// Scores of the ride.
+    #[serde(flatten)]
+    pub ridden: Ridden,
+    /// Time for each frame, ms.
+    #[serde(skip)]
+    pub took_ms: Vec<f64>,
+    /// Events of the ride, as text.
+    #[serde(skip)]
+    pub story: Vec<String>,
+}
+
+/// Content of the JSON output.
+#[derive(Serialize)]
+struct Findings<'a> {
+    seeds: Seeds,
+    tables: &'a [Table],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    looks: Option<&'a LooksSettings>,
+    rides: &'a [Followed],
+}
+
+/// Runs the rides and prints the scores.
+///
+/// # Errors
+/// Scenes and configs that cannot be used are exit code 2; plugins that fail and files that cannot
+/// be written are 1.
+pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
+    let signals = Signals::listen()?;
+    let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
+    let jobs = jobs(args, seeds, registry)?;
+    if let Some(folder) = &args.output {
+        make_folder(folder)?;
+    }
+    let bar = bar(jobs.len());
+    let threads = threads(args.jobs);
+    let ride = |job: &Job| ride(job, args, registry, &signals);
+    let results = in_order(&jobs, threads, ride, |_| bar.inc(1)).map_err(failure)?;
+    bar.finish_and_clear();
+    if let Some(signal) = signals.received() {
+        say("stopped; the logs that were written are whole, but end early");
+        return Ok(Ended::BySignal(signal));
+    }
+    report(args, seeds, &results)?;
+    Ok(Ended::Well)
+}
+
+fn failure(error: TrialError) -> Failure {
+    match error {
+        TrialError::Config(_) => Failure::usage(error),
+        _ => Failure::failed(error),
+    }
+}
+
+/// Returns every pipeline on every seed of every scene.
+fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>, Failure> {
+    let mut jobs = Vec::new();
+    let contenders = contenders(args, registry)?;
+    for path in scenes(args)? {
+        let suite = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        for contender in &contenders {
+            for seed in seeds.numbers() {
+                let scene = tagalong_simulate::read(&path, &variant(args, seed))?;
+                jobs.push(Job { suite: suite.clone(), scene, contender: contender.clone() });
+            }
+        }
+    }
+    Ok(jobs)
+}
+
+fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, Failure> {
+    let read = |path: &PathBuf| {
+        let file = ConfigFile::read(path)?;
+        let (pipeline, _) = file.pipeline(registry, None)?;
+        if pipeline.has_controller() {
+            return Ok(contender(&file));
+        }
+        let shown = path.display();
+        Err(Failure::usage(format!("{shown} has no [controller]: it steers no robot")))
+    };
+    std::iter::once(&args.config).chain(&args.against).map(read).collect()
+}
+
+/// Returns the named scenes, or all default ones.
+fn scenes(args: &FollowArgs) -> Result<Vec<PathBuf>, Failure> {
+    if !args.scenes.is_empty() {
+        return Ok(args.scenes.clone());
+    }
+    let (folder, prefix) = SCENES;
+    let found = fs::read_dir(folder)
+        .map_err(|error| Failure::usage(format!("cannot read {folder}: {error}; name a scene")))?;
+    let mut paths: Vec<PathBuf> = found
+        .flatten()
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix))
+        .map(|entry| entry.path())
+        .collect();
+    paths.sort();
+    Ok(paths)
+}
+
+fn variant(args: &FollowArgs, seed: u64) -> Variant {
+    let latency = args.latency_ms.map(|ms| f64::from(ms) * 1e-3);
+    let faults = [("robot.latency_s", latency), ("faults.dropped", args.drop)];
+    let faults = faults
+        .into_iter()
+        // Debug formatting keeps the point of whole numbers, which TOML needs for a float.
+        .filter_map(|(key, value)| Some((key.to_owned(), format!("{:?}", value?))));
+    let set = args.set.iter().cloned().chain(faults).collect();
+    Variant { seed: Some(seed), split: Some(args.split), set }
+}
+
+fn ride(
+    job: &Job,
+    args: &FollowArgs,
+    registry: &Registry,
+    signals: &Signals,
+) -> Result<Followed, TrialError> {
+    let Job { suite, scene, contender } = job;
+    let file = args.output.as_deref().map(|folder| log_file(folder, job));
+    let mut log = RideLog::new(file.as_deref(), scene, signals.clone());
+    let ride = Ride::new(scene, contender, registry, &mut log)?;
+    log.finish()?;
+    Ok(Followed {
+        suite: suite.clone(),
+        pipeline: contender.name.clone(),
+        ridden: RideJudge::default().judge(&ride),
+        story: story::story(&ride),
+        took_ms: ride.took_ms,
+    })
+}
+
+fn log_file(folder: &Path, job: &Job) -> PathBuf {
+    folder.join(format!("{}-{}-{}.mcap", job.suite, job.contender.name, job.scene.seed))
+}
+
+fn bar(rides: usize) -> ProgressBar {
+    let bar = ProgressBar::new(rides as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} rides {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), Failure> {
+    let tables = table::tables(results, seeds);
+    let looks = args.fit.then(|| fit::looks(results));
+    let findings = Findings { seeds, tables: &tables, looks: looks.as_ref(), rides: results };
+    let json = to_json("the scores of the rides", &findings)?;
+    let joined = |show: fn(&Table) -> String| -> String {
+        tables.iter().map(show).collect::<Vec<_>>().join("\n")
+    };
+    match args.format {
+        TableFormat::Json => print(&json)?,
+        TableFormat::Markdown => print(&joined(Table::markdown))?,
+        TableFormat::Text => {
+            // The course of events is readable for a single ride only.
+            if let [one] = results {
+                print(&(one.story.join("\n") + "\n\n"))?;
+            }
+            print(&joined(Table::text))?;
+        }
+    }
+    if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
+        print(&fit::toml(&looks)?)?;
+    }
+    let Some(folder) = &args.output else { return Ok(()) };
+    let markdown = joined(Table::markdown);
+    let likeness = table::likeness_csv(results);
+    for (name, text) in
+        [("follow.json", &json), ("follow.md", &markdown), ("likeness.csv", &likeness)]
+    {
+        let path = folder.join(name);
+        let why = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
+        fs::write(&path, text).map_err(why)?;
+    }
+    say(&format!("the logs and tables are in {}", folder.display()));
+    Ok(())
+}

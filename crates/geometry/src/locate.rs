@@ -1,0 +1,137 @@
+//! From pixels and depths to positions with covariances: the last step of every detector.
+
+use nalgebra::{Matrix3, Point2, Point3};
+
+use crate::{Camera, HEAD_RADIUS_M, Rect};
+
+/// Position in the robot frame, m, with its covariance, m².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointEstimate {
+    /// Mean.
+    pub position: Point3<f64>,
+    /// Covariance.
+    pub covariance: Matrix3<f64>,
+}
+
+/// Depth of the surface of a face, m, with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceDepth {
+    /// Depth of the surface, m.
+    pub depth_m: f64,
+    /// Standard deviation, m.
+    pub sigma_m: f64,
+}
+
+impl FaceDepth {
+    /// Returns the depth at which a part of a person that is `size_m` wide appears `size_px` wide,
+    /// with a standard deviation that is this fraction of it: people differ in size.
+    pub fn by_size(camera: &Camera, size_m: f64, size_px: f64, sigma_fraction: f64) -> Self {
+        let depth_m = camera.focal_px() * size_m / size_px;
+        Self { depth_m, sigma_m: depth_m * sigma_fraction }
+    }
+
+    /// Returns the measured depth with this standard deviation, m, or itself without a measurement.
+    #[must_use]
+    pub fn or_measured(self, measured_m: Option<f64>, sigma_m: f64) -> Self {
+        measured_m.map_or(self, |depth_m| Self { depth_m, sigma_m })
+    }
+
+    /// Returns the depth of the centre of the head, m: the surface lies before it.
+    pub fn head_m(&self) -> f64 {
+        self.depth_m + HEAD_RADIUS_M
+    }
+}
+
+impl Camera {
+    /// Returns the point at `depth_m` on the viewing ray of a pixel, for the given standard
+    /// deviations of the pixel and of the depth.
+    pub fn locate(
+        &self,
+        pixel: Point2<f64>,
+        depth_m: f64,
+        sigma_px: f64,
+        sigma_depth_m: f64,
+    ) -> PointEstimate {
+        PointEstimate {
+            position: self.back_project(pixel, depth_m),
+            covariance: self.covariance(pixel, depth_m, sigma_px, sigma_depth_m),
+        }
+    }
+
+    /// Returns the centre of the head of the person in an upper-body square, as
+    /// [`Camera::head_of`], with the covariance at the centre of the square.
+    ///
+    /// ```
+    /// use nalgebra::Point3;
+    /// use tagalong_geometry::{Camera, Distortion, FaceDepth, Pinhole, UPPER_BODY_SIDE_M};
+    ///
+    /// let lens =
+    ///     Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+    /// let camera = Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0);
+    /// let square = camera.upper_body(&Point3::new(3.0, 0.2, 1.6));
+    /// let face = FaceDepth::by_size(&camera, UPPER_BODY_SIDE_M, square.width, 0.1)
+    ///     .or_measured(Some(2.92), 0.05);
+    /// let head = camera.locate_head(&square, face, 3.0);
+    /// assert!((head.position - Point3::new(3.0, 0.2, 1.6)).norm() < 0.01);
+    /// ```
+    pub fn locate_head(&self, upper_body: &Rect, face: FaceDepth, sigma_px: f64) -> PointEstimate {
+        PointEstimate {
+            position: self.head_of(upper_body, face.depth_m),
+            covariance: self.covariance(upper_body.centre(), face.head_m(), sigma_px, face.sigma_m),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{Distortion, Pinhole, UPPER_BODY_SIDE_M};
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 400.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.2, 0.1, 0.0)
+    }
+
+    proptest! {
+        #[test]
+        fn a_located_head_is_that_of_its_square(
+            x in 1.5..6.0f64, y in -0.6..0.6f64, z in 1.2..1.9f64, sigma_m in 0.01..0.5f64,
+        ) {
+            let (camera, head) = (camera(), Point3::new(x, y, z));
+            let square = camera.upper_body(&head);
+            let face = FaceDepth { depth_m: camera.depth_of(&head) - HEAD_RADIUS_M, sigma_m };
+            let found = camera.locate_head(&square, face, 2.0);
+            prop_assert!((found.position - head).norm() < 0.002);
+            // Along the ray the error is that of the depth.
+            let along = camera.back_project(square.centre(), face.head_m() + 1.0)
+                - camera.back_project(square.centre(), face.head_m());
+            let information = found.covariance.try_inverse().unwrap();
+            let variance = 1.0 / (along.transpose() * information * along)[0];
+            prop_assert!((variance - sigma_m * sigma_m).abs() < 1e-9 + 1e-6 * variance);
+        }
+    }
+
+    #[test]
+    fn a_measured_depth_replaces_that_by_size() {
+        let camera = camera();
+        let by_size = FaceDepth::by_size(&camera, UPPER_BODY_SIDE_M, 57.0, 0.2);
+        assert!((by_size.depth_m - 0.01 * camera.focal_px()).abs() < 1e-9, "{by_size:?}");
+        assert!((by_size.sigma_m - 0.2 * by_size.depth_m).abs() < 1e-9);
+        assert_eq!(by_size.or_measured(None, 0.05), by_size);
+        let measured = by_size.or_measured(Some(3.0), 0.05);
+        assert_eq!((measured.depth_m, measured.sigma_m), (3.0, 0.05));
+        assert_eq!(measured.head_m(), 3.0 + HEAD_RADIUS_M);
+    }
+
+    #[test]
+    fn a_located_point_lies_on_the_ray_of_its_pixel() {
+        let (camera, pixel) = (camera(), Point2::new(200.0, 100.0));
+        let found = camera.locate(pixel, 4.0, 2.0, 0.3);
+        assert!((camera.project(&found.position).unwrap() - pixel).norm() < 1e-9);
+        assert!((camera.depth_of(&found.position) - 4.0).abs() < 1e-9);
+        assert_eq!(found.covariance, camera.covariance(pixel, 4.0, 2.0, 0.3));
+    }
+}

@@ -1,0 +1,93 @@
+//! Folders of images, plain or in the layout of the MOTChallenge.
+
+use std::fs;
+use std::path::PathBuf;
+
+use tagalong_app::outcome::Failure;
+use tagalong_geometry::{Camera, Distortion, Pinhole};
+
+use super::ImportArgs;
+use super::sequence::{Eye, Sequence, pictures, size, steady, text};
+
+/// Reads a folder of images, with one of depth if the options say so.
+///
+/// # Errors
+/// Folders that cannot be read, or do not hold the same number of images.
+pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
+    let mut sequence = of_files(args, pictures(&args.path)?, args.fps)?;
+    let Some(folder) = &args.depth else { return Ok(sequence) };
+    let depth = pictures(folder)?;
+    // Images are paired by their order, so the counts must agree.
+    if depth.len() != sequence.moments.len() {
+        return Err(Failure::failed(format!(
+            "{} holds {} images and {} holds {}; there must be one for each",
+            folder.display(),
+            depth.len(),
+            args.path.display(),
+            sequence.moments.len()
+        )));
+    }
+    sequence.depth_unit_m = args.depth_unit;
+    sequence.moments.extend(steady(depth, Eye::Depth, args.fps));
+    // The log is written in the order of time, colour before depth.
+    sequence.moments.sort_by_key(|moment| (moment.stamp, moment.eye));
+    Ok(sequence)
+}
+
+/// Reads a sequence of the MOTChallenge: its images, and its truth where it is there.
+///
+/// # Errors
+/// Files that are missing or wrong.
+pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
+    let ini = args.path.join("seqinfo.ini");
+    let about = text(&ini, "a folder of the MOTChallenge, with seqinfo.ini and img1")?;
+    let value = |key: &str| {
+        let lines = about.lines().filter_map(|line| line.split_once('='));
+        lines.map(|(name, value)| (name.trim(), value.trim())).find(|(name, _)| *name == key)
+    };
+    let fps = value("frameRate").and_then(|(_, hz)| hz.parse::<f64>().ok()).filter(|hz| *hz > 0.0);
+    let Some(fps) = fps else {
+        let message = format!("{}: there is no `frameRate` above 0", ini.display());
+        return Err(Failure::failed(message));
+    };
+    let folder = args.path.join(value("imDir").map_or("img1", |(_, name)| name));
+    let mut sequence = of_files(args, pictures(&folder)?, fps)?;
+    if let Ok(truth) = fs::read_to_string(args.path.join("gt/gt.txt")) {
+        sequence.beside.push(("boxes.csv", truth));
+    }
+    let detections = args.path.join("det/det.txt");
+    if detections.exists() {
+        sequence.notes.push(format!(
+            "the detections of the sequence can be tracked: configs/recorded.toml with \
+             [[detectors]] config = {{ path = \"{}\" }}",
+            detections.display()
+        ));
+    }
+    Ok(sequence)
+}
+
+/// Reads images at a steady rate, with the camera of the options.
+fn of_files(args: &ImportArgs, files: Vec<PathBuf>, fps: f64) -> Result<Sequence, Failure> {
+    let columns = match files.first() {
+        Some(first) => size(first)?.0,
+        None => 0,
+    };
+    let mut sequence = Sequence {
+        calibration: args.calibration(columns),
+        moments: steady(files, Eye::Left, fps).collect(),
+        mount: args.height.map(|height| level(height, args.tilt)),
+        ..Sequence::default()
+    };
+    // Without a focal length the image still serves trackers that work in pixels.
+    if sequence.calibration.is_none() {
+        sequence.notes.push("no --focal and no --view: places in metres will be guesses".into());
+    }
+    Ok(sequence)
+}
+
+/// Returns the pose of a camera at a height above the floor that looks ahead, and down by an angle.
+pub fn level(height_m: f64, down_deg: f64) -> nalgebra::Isometry3<f64> {
+    // The lens does not matter for the pose; any valid one will do.
+    let lens = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Distortion::None };
+    Camera::mounted(lens, 1, 1, height_m, down_deg.to_radians(), 0.0).robot_from_camera
+}

@@ -1,0 +1,182 @@
+//! `tagalong import`: data sets and folders of images become logs.
+//!
+//! Each kind is a module that reads its layout into a [`Sequence`]; one writer makes a log of it.
+//! No other part of Tagalong knows these layouts.
+
+mod folders;
+mod kitti;
+mod sequence;
+mod tum;
+mod writer;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
+use tagalong_app::signals::Signals;
+use tagalong_app::suggest::converter;
+
+use self::sequence::Sequence;
+
+/// Layout of the imported data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// A folder of the TUM RGB-D benchmark: rgb.txt, depth.txt, groundtruth.txt.
+    Tum,
+    /// The `training` or `testing` folder of KITTI tracking; one --sequence.
+    Kitti,
+    /// A sequence of the MOTChallenge: seqinfo.ini and its images.
+    Mot,
+    /// A folder of JPEG or PNG images, in the order of their names.
+    Images,
+    /// A ROS 1 bag, or a ROS 2 bag in SQLite: prints the command that converts it.
+    Bag,
+}
+
+/// Arguments of `tagalong import`.
+#[derive(Args, Debug)]
+pub struct ImportArgs {
+    /// Layout of the data.
+    #[arg(value_enum)]
+    pub kind: Kind,
+    /// File or folder to import.
+    pub path: PathBuf,
+    /// The log to write [default: runs/<name>.mcap].
+    #[arg(short, long, value_name = "LOG")]
+    pub output: Option<PathBuf>,
+    /// Replace the log if it exists.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// kitti: number of the sequence.
+    #[arg(long, value_name = "NUMBER", default_value = "0000")]
+    pub sequence: String,
+    /// images: images per second.
+    #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = positive)]
+    pub fps: f64,
+    /// Focal length, pixels; positions in metres need it, or --view.
+    #[arg(long, value_name = "PX", value_parser = positive)]
+    pub focal: Option<f64>,
+    /// Horizontal field of view, degrees; an alternative to --focal.
+    #[arg(long, value_name = "DEG", conflicts_with = "focal", value_parser = angle)]
+    pub view: Option<f64>,
+    /// Height of the camera above the floor, m.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    pub height: Option<f64>,
+    /// Downward tilt of the camera, degrees.
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        requires = "height",
+        allow_negative_numbers = true
+    )]
+    pub tilt: f64,
+    /// images: folder of 16-bit PNG depth images, one for each image.
+    #[arg(long, value_name = "DIR")]
+    pub depth: Option<PathBuf>,
+    /// images: metres per unit of depth.
+    #[arg(long, value_name = "M", default_value_t = 0.001, requires = "depth", value_parser = positive)]
+    pub depth_unit: f64,
+    /// Output format of the result.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("must be positive".into()) }
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    // The focal length goes to zero as the view approaches 180 degrees.
+    positive(text).and_then(|v| if v < 175.0 { Ok(v) } else { Err("must be below 175".into()) })
+}
+
+/// Imports a data set.
+///
+/// # Errors
+/// A path with unexpected content, or a file in it that cannot be read: exit code 1; a log that
+/// exists or cannot be written: 2.
+pub fn import(args: &ImportArgs) -> Outcome {
+    let path = &args.path;
+    if !path.exists() {
+        return Err(Failure::failed(format!("{}: no such file or folder", path.display())));
+    }
+    // A bag is not converted here, so it needs no output file.
+    if args.kind == Kind::Bag {
+        return converted(path, args.format);
+    }
+    let log = args.output.clone().unwrap_or_else(|| default_log(args));
+    let signals = Signals::listen()?;
+    spare(&log, args.overwrite)?;
+    if !path.is_dir() {
+        let message =
+            format!("{} is a file; give the folder that holds the sequence", path.display());
+        return Err(Failure::failed(message));
+    }
+    let sequence = read(args)?;
+    make_room_for(&log)?;
+    writer::write(&sequence, &log, &signals)?;
+    beside(&sequence, &log)?;
+    if let Some(signal) = signals.received() {
+        say(CUT_SHORT);
+        return Ok(Ended::BySignal(signal));
+    }
+    sequence.notes.iter().for_each(|note| say(&format!("note: {note}")));
+    let images = sequence.moments.len();
+    print(&match args.format {
+        Format::Text => format!("{images} images are in {}\n", log.display()),
+        Format::Json => format!("{:#}\n", serde_json::json!({ "log": log, "images": images })),
+    })?;
+    Ok(Ended::Well)
+}
+
+/// Prints the command that converts a bag.
+fn converted(bag: &Path, format: Format) -> Outcome {
+    let commands = converter(bag);
+    print(&match format {
+        Format::Text => format!("{commands}\n"),
+        Format::Json => {
+            let lines: Vec<&str> = commands.lines().map(str::trim).collect();
+            format!("{:#}\n", serde_json::json!({ "commands": lines }))
+        }
+    })?;
+    Ok(Ended::Well)
+}
+
+fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
+    let sequence = match args.kind {
+        Kind::Tum => tum::read(args)?,
+        Kind::Kitti => kitti::read(args)?,
+        Kind::Mot => folders::mot(args)?,
+        Kind::Images | Kind::Bag => folders::images(args)?,
+    };
+    if sequence.moments.is_empty() {
+        return Err(Failure::failed(format!("{} has no images", args.path.display())));
+    }
+    Ok(sequence)
+}
+
+/// Writes the truth beside the log, where `eval` and `bench` look for it.
+fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
+    for (ending, text) in &sequence.beside {
+        let path = log.with_extension(ending);
+        std::fs::write(&path, text).map_err(|error| {
+            Failure::failed(format!("cannot write {}: {error}", path.display()))
+        })?;
+        say(&format!("truth is in {}", path.display()));
+    }
+    Ok(())
+}
+
+fn default_log(args: &ImportArgs) -> PathBuf {
+    let name = match args.kind {
+        Kind::Kitti => format!("kitti-{}", args.sequence),
+        _ => {
+            let whole = args.path.canonicalize().unwrap_or_else(|_| args.path.clone());
+            whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        }
+    };
+    Path::new("runs").join(name + ".mcap")
+}

@@ -1,0 +1,149 @@
+//! Common form of all layouts.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Isometry3;
+use tagalong_app::outcome::Failure;
+use tagalong_core::Stamp;
+
+use super::ImportArgs;
+
+/// Start time of a sequence without a clock.
+pub const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
+
+/// Focal lengths in both directions and the centre, pixels, and the distortion by `plumb_bob`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// Focal lengths, pixels.
+    pub focal: [f64; 2],
+    /// Centre, pixels; `None`: that of the image.
+    pub centre: Option<[f64; 2]>,
+    /// Distortion.
+    pub distortion: [f64; 5],
+}
+
+/// Kind of an image of a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Eye {
+    /// Colour image, or the left one of a pair.
+    Left,
+    /// Right image of a pair.
+    Right,
+    /// Depth image.
+    Depth,
+}
+
+/// Image file with its capture time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Capture time.
+    pub stamp: Stamp,
+    /// Kind of the image.
+    pub eye: Eye,
+    /// Path of the file.
+    pub file: PathBuf,
+}
+
+/// Pose at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Time of the pose.
+    pub stamp: Stamp,
+    /// Pose of the robot, on the floor, in the odometry frame.
+    pub odom_from_robot: Isometry3<f64>,
+    /// Pose of the camera on it; `None` if it does not move.
+    pub robot_from_camera: Option<Isometry3<f64>>,
+}
+
+/// Sequence of images, independent of the layout.
+#[derive(Default)]
+pub struct Sequence {
+    /// Images, in the order of time.
+    pub moments: Vec<Moment>,
+    /// Lens, if it is known.
+    pub calibration: Option<Calibration>,
+    /// Distance of the right camera from the left one, m.
+    pub baseline_m: f64,
+    /// Metres per unit of depth.
+    pub depth_unit_m: f64,
+    /// Pose of the camera on the robot, where it does not move.
+    pub mount: Option<Isometry3<f64>>,
+    /// Poses of the robot.
+    pub placed: Vec<Placed>,
+    /// Files that go beside the log: their ending, and their text.
+    pub beside: Vec<(&'static str, String)>,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+}
+
+/// Reads a text file of a layout.
+///
+/// # Errors
+/// A missing file: the folder is not of that layout.
+pub fn text(path: &Path, layout: &str) -> Result<String, Failure> {
+    fs::read_to_string(path).map_err(|error| {
+        let shown = path.display();
+        Failure::failed(format!("cannot read {shown}: {error}; is this {layout}?"))
+    })
+}
+
+/// Returns the blank-separated numbers of a line.
+///
+/// # Errors
+/// A word that is no number, with the file and the line.
+pub fn numbers<'a>(
+    words: impl Iterator<Item = &'a str>,
+    path: &Path,
+    line: usize,
+) -> Result<Vec<f64>, Failure> {
+    words
+        .map(|word| match word.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(Failure::failed(format!("{}:{line}: `{word}` is no number", path.display()))),
+        })
+        .collect()
+}
+
+/// Returns the JPEG and PNG files of a folder, by name.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn pictures(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let entries = fs::read_dir(folder)
+        .map_err(|error| Failure::failed(format!("cannot read {}: {error}", folder.display())))?;
+    let is_picture = |path: &PathBuf| {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        ["jpg", "jpeg", "png"].contains(&extension.to_lowercase().as_str())
+    };
+    let mut files: Vec<_> =
+        entries.flatten().map(|entry| entry.path()).filter(is_picture).collect();
+    // The order of a directory depends on the file system.
+    files.sort();
+    Ok(files)
+}
+
+/// Returns files at a steady rate.
+pub fn steady(files: Vec<PathBuf>, eye: Eye, hz: f64) -> impl Iterator<Item = Moment> {
+    let at = move |index: usize| EPOCH.plus_seconds(index as f64 / hz);
+    files.into_iter().enumerate().map(move |(i, file)| Moment { stamp: at(i), eye, file })
+}
+
+impl ImportArgs {
+    /// Returns the lens of the options, for images of so many columns.
+    pub fn calibration(&self, columns: u32) -> Option<Calibration> {
+        let half = 0.5 * f64::from(columns);
+        let by_view = self.view.map(|view| half / (0.5 * view.to_radians()).tan());
+        let focal = self.focal.or(by_view)?;
+        Some(Calibration { focal: [focal; 2], centre: None, distortion: [0.0; 5] })
+    }
+}
+
+/// Returns the columns and rows of an image file.
+///
+/// # Errors
+/// A file that is no image.
+pub fn size(file: &Path) -> Result<(u32, u32), Failure> {
+    image::image_dimensions(file)
+        .map_err(|error| Failure::failed(format!("cannot read {}: {error}", file.display())))
+}

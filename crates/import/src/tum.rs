@@ -1,0 +1,149 @@
+//! Folders of the TUM RGB-D benchmark (Sturm et al., IROS 2012): `rgb.txt` and `depth.txt` list
+//! images with their times, `groundtruth.txt` the poses of the camera in a room with the floor at z
+//! = 0; depth has 5000 units per metre.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use tagalong_app::outcome::Failure;
+use tagalong_core::Stamp;
+
+use super::ImportArgs;
+use super::folders::level;
+use super::sequence::{Calibration, Eye, Moment, Placed, Sequence, numbers, text};
+
+const LAYOUT: &str = "a folder of the TUM RGB-D benchmark";
+const DEPTH_UNIT_M: f64 = 1.0 / 5000.0;
+
+/// Reads the folder.
+///
+/// # Errors
+/// Files that are missing or wrong.
+pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
+    let folder = &args.path;
+    let mut moments = images(folder, "rgb.txt", Eye::Left)?;
+    moments.extend(images(folder, "depth.txt", Eye::Depth)?);
+    moments.sort_by_key(|moment| (moment.stamp, moment.eye));
+    let truth = folder.join("groundtruth.txt");
+    let placed = if truth.exists() { poses(&truth)? } else { Vec::new() };
+    let mut notes = Vec::new();
+    let columns = 640;
+    let calibration = args.calibration(columns).unwrap_or_else(|| calibration(folder, &mut notes));
+    // True poses of the camera take precedence over a constant mount.
+    let mount = args.height.filter(|_| placed.is_empty()).map(|height| level(height, args.tilt));
+    let calibration = Some(calibration);
+    Ok(Sequence {
+        moments,
+        calibration,
+        depth_unit_m: DEPTH_UNIT_M,
+        mount,
+        placed,
+        notes,
+        ..Sequence::default()
+    })
+}
+
+/// Returns the colour camera as the benchmark publishes it, by the name of the folder.
+fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
+    let name = folder.to_string_lossy();
+    let of = |focal, centre, distortion| Calibration { focal, centre: Some(centre), distortion };
+    if name.contains("freiburg1") {
+        let distortion = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633];
+        return of([517.3, 516.5], [318.6, 255.3], distortion);
+    }
+    if name.contains("freiburg2") {
+        let distortion = [0.2312, -0.7849, -0.0033, -0.0001, 0.9172];
+        return of([520.9, 521.0], [325.1, 249.7], distortion);
+    }
+    if name.contains("freiburg3") {
+        return of([535.4, 539.2], [320.1, 247.6], [0.0; 5]);
+    }
+    notes.push(
+        "not freiburg1 to 3 by its name: the usual 525 pixels of focal length are taken".into(),
+    );
+    of([525.0, 525.0], [319.5, 239.5], [0.0; 5])
+}
+
+/// Returns the lines of a list that are no comments, with their numbers.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = (1..).zip(text.lines().map(str::trim));
+    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+fn images(folder: &Path, list: &str, eye: Eye) -> Result<Vec<Moment>, Failure> {
+    let path = folder.join(list);
+    let text = text(&path, LAYOUT)?;
+    lines(&text)
+        .map(|(number, line)| {
+            let mut words = line.split_whitespace();
+            let stamp = stamp(words.next().unwrap_or_default(), &path, number)?;
+            let Some(file) = words.next() else {
+                let message = format!("{}:{number}: no file after the time", path.display());
+                return Err(Failure::failed(message));
+            };
+            Ok(Moment { stamp, eye, file: folder.join(file) })
+        })
+        .collect()
+}
+
+/// Parses seconds with a fraction, without rounding them.
+fn stamp(word: &str, path: &Path, line: usize) -> Result<Stamp, Failure> {
+    let wrong = || Failure::failed(format!("{}:{line}: `{word}` is no time", path.display()));
+    // A double cannot hold nanoseconds of today's times, so the digits are parsed as integers.
+    let (seconds, fraction) = word.split_once('.').unwrap_or((word, "0"));
+    let nanos = format!("{fraction:0<9}");
+    let seconds: u64 = seconds.parse().map_err(|_| wrong())?;
+    let nanos: u64 = nanos.get(..9).and_then(|digits| digits.parse().ok()).ok_or_else(wrong)?;
+    let all = seconds.checked_mul(1_000_000_000).and_then(|all| all.checked_add(nanos));
+    all.map(Stamp::from_nanos).ok_or_else(wrong)
+}
+
+/// Returns the poses of the robot: the point on the floor below the camera, heading where it looks.
+fn poses(path: &Path) -> Result<Vec<Placed>, Failure> {
+    let text = text(path, LAYOUT)?;
+    lines(&text)
+        .map(|(line, words)| {
+            let mut words = words.split_whitespace();
+            let stamp = stamp(words.next().unwrap_or_default(), path, line)?;
+            let &[x, y, z, qx, qy, qz, qw] = &numbers(words, path, line)?[..] else {
+                let message = format!("{}:{line}: not `time x y z qx qy qz qw`", path.display());
+                return Err(Failure::failed(message));
+            };
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
+            Ok(below(stamp, &Isometry3::from_parts(Translation3::new(x, y, z), turn)))
+        })
+        .collect()
+}
+
+fn below(stamp: Stamp, room_from_camera: &Isometry3<f64>) -> Placed {
+    let at = room_from_camera.translation;
+    let ahead = room_from_camera.rotation * Vector3::z();
+    let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x));
+    let odom_from_robot = Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), heading);
+    let robot_from_camera = Some(odom_from_robot.inverse() * room_from_camera);
+    Placed { stamp, odom_from_robot, robot_from_camera }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_keep_every_digit() {
+        let at = |word| stamp(word, Path::new("rgb.txt"), 1).map(Stamp::nanos);
+        assert_eq!(at("1305031102.175304"), Ok(1_305_031_102_175_304_000));
+        assert_eq!(at("7"), Ok(7_000_000_000));
+        assert!(at("x.5").is_err() && at("1.x").is_err() && at("").is_err());
+    }
+
+    #[test]
+    fn the_robot_is_below_the_camera_and_looks_where_it_looks() {
+        let camera = level(1.4, 10.0);
+        let robot = Isometry3::new(Vector3::new(2.0, -1.0, 0.0), Vector3::new(0.0, 0.0, 0.7));
+        let placed = below(Stamp::default(), &(robot * camera));
+        let off = placed.odom_from_robot.to_homogeneous() - robot.to_homogeneous();
+        assert!(off.norm() < 1e-9, "{off}");
+        let off = placed.robot_from_camera.unwrap().to_homogeneous() - camera.to_homogeneous();
+        assert!(off.norm() < 1e-9, "{off}");
+    }
+}

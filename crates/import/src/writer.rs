@@ -1,0 +1,145 @@
+//! Writes a sequence as a log with the topics that robots use.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::Isometry3;
+use tagalong_app::outcome::Failure;
+use tagalong_app::signals::Signals;
+use tagalong_core::Stamp;
+use tagalong_geometry::{Distortion, Pinhole};
+use tagalong_log::msgs::{
+    CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, TransformStamped,
+};
+use tagalong_log::write::{MessageLog, WriteError};
+
+use super::sequence::{Eye, Moment, Placed, Sequence, size};
+
+const CAMERA_FRAME: &str = "camera_optical_frame";
+const RIGHT_FRAME: &str = "camera_right_optical_frame";
+const ROBOT_FRAME: &str = "base_link";
+const ODOM_FRAME: &str = "odom";
+
+/// Writes the log, until a signal comes.
+///
+/// # Errors
+/// An image that cannot be read is exit code 1, a log that cannot be written 2.
+pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), Failure> {
+    let mut log = MessageLog::create(path).map_err(Failure::usage)?;
+    let start = sequence.moments.first().map_or(Stamp::default(), |moment| moment.stamp);
+    if let Some(mount) = &sequence.mount {
+        let tf = transforms(start, [(ROBOT_FRAME, CAMERA_FRAME, mount)]);
+        log.send("/tf_static", start, &tf).map_err(Failure::failed)?;
+    }
+    let mut places = sequence.placed.iter().peekable();
+    for moment in sequence.moments.iter().take_while(|_| signals.received().is_none()) {
+        // A pose goes before the image that it is for.
+        while let Some(placed) = places.next_if(|placed| placed.stamp <= moment.stamp) {
+            place(&mut log, placed).map_err(Failure::failed)?;
+        }
+        picture(&mut log, sequence, moment)?;
+    }
+    for placed in places {
+        place(&mut log, placed).map_err(Failure::failed)?;
+    }
+    log.finish().map_err(Failure::failed)
+}
+
+fn place(log: &mut MessageLog, placed: &Placed) -> Result<(), WriteError> {
+    if let Some(camera) = &placed.robot_from_camera {
+        let tf = transforms(placed.stamp, [(ROBOT_FRAME, CAMERA_FRAME, camera)]);
+        log.send("/tf", placed.stamp, &tf)?;
+    }
+    let mut odometry = Odometry {
+        header: Header::new(placed.stamp, ODOM_FRAME),
+        child_frame_id: ROBOT_FRAME.into(),
+        ..Odometry::default()
+    };
+    odometry.pose.pose = (&placed.odom_from_robot).into();
+    log.send("/odom", placed.stamp, &odometry)
+}
+
+fn transforms<'a>(
+    at: Stamp,
+    links: impl IntoIterator<Item = (&'a str, &'a str, &'a Isometry3<f64>)>,
+) -> TFMessage {
+    let stamped = |(parent, child, pose): (&str, &str, &Isometry3<f64>)| TransformStamped {
+        header: Header::new(at, parent),
+        child_frame_id: child.to_owned(),
+        transform: pose.into(),
+    };
+    TFMessage { transforms: links.into_iter().map(stamped).collect() }
+}
+
+/// Writes one image with its calibration.
+fn picture(log: &mut MessageLog, sequence: &Sequence, moment: &Moment) -> Result<(), Failure> {
+    let is_pair = sequence.baseline_m > 0.0;
+    let (camera, frame, aside_m) = match moment.eye {
+        Eye::Left if is_pair => ("/stereo/left", CAMERA_FRAME, 0.0),
+        Eye::Left => ("/camera/color", CAMERA_FRAME, 0.0),
+        Eye::Right => ("/stereo/right", RIGHT_FRAME, sequence.baseline_m),
+        Eye::Depth => ("/camera/aligned_depth_to_color", CAMERA_FRAME, 0.0),
+    };
+    let header = Header::new(moment.stamp, frame);
+    if let Some(info) = info(sequence, &header, size(&moment.file)?, aside_m) {
+        log.send(&format!("{camera}/camera_info"), moment.stamp, &info).map_err(Failure::failed)?;
+    }
+    if moment.eye == Eye::Depth {
+        return depth(log, sequence.depth_unit_m, moment, header);
+    }
+    let data = fs::read(&moment.file).map_err(|error| {
+        Failure::failed(format!("cannot read {}: {error}", moment.file.display()))
+    })?;
+    // By content: file endings in data sets are not reliable.
+    let format = if data.starts_with(b"\x89PNG") { "png" } else { "jpeg" }.to_owned();
+    let image = if is_pair { "image_rect_color" } else { "image_raw" };
+    let message = CompressedImage { header, format, data: &data };
+    log.send(&format!("{camera}/{image}/compressed"), moment.stamp, &message)
+        .map_err(Failure::failed)
+}
+
+fn info(
+    sequence: &Sequence,
+    header: &Header,
+    (width, height): (u32, u32),
+    aside_m: f64,
+) -> Option<CameraInfo> {
+    let lens = sequence.calibration?;
+    let [fx, fy] = lens.focal;
+    // Pixel centres have whole coordinates, so the middle of the image is half a pixel less.
+    let middle = [width, height].map(|side| 0.5 * (f64::from(side) - 1.0));
+    let [cx, cy] = lens.centre.unwrap_or(middle);
+    let distortion = Distortion::PlumbBob(lens.distortion);
+    let lens = Pinhole { fx, fy, cx, cy, distortion };
+    Some(CameraInfo::of_lens(header, &lens, (width as usize, height as usize), aside_m))
+}
+
+/// Writes a 16-bit PNG as millimetres.
+fn depth(
+    log: &mut MessageLog,
+    unit_m: f64,
+    moment: &Moment,
+    header: Header,
+) -> Result<(), Failure> {
+    let shown = moment.file.display();
+    let unusable =
+        |why: &dyn std::fmt::Display| Failure::failed(format!("cannot use {shown}: {why}"));
+    let image = match image::open(&moment.file).map_err(|error| unusable(&error))? {
+        image::DynamicImage::ImageLuma16(image) => image,
+        other => {
+            return Err(unusable(&format!(
+                "depth is a 16-bit grey PNG, this is {:?}",
+                other.color()
+            )));
+        }
+    };
+    // Saturates at 65.535 m, the largest value of 16 bits in millimetres.
+    let millimetres = |value: &u16| (f64::from(*value) * unit_m * 1e3).round().min(65535.0) as u16;
+    let data: Vec<u8> = image.as_raw().iter().flat_map(|v| millimetres(v).to_le_bytes()).collect();
+    let (width, height) = image.dimensions();
+    let encoding = "16UC1".to_owned();
+    let message =
+        Image { header, height, width, encoding, is_bigendian: 0, step: 2 * width, data: &data };
+    log.send("/camera/aligned_depth_to_color/image_raw", moment.stamp, &message)
+        .map_err(Failure::failed)
+}

@@ -1,0 +1,157 @@
+//! Log of one file, or of several: a rosbag2 folder, whose recorder started a new file now and
+//! then. Its parts are read one after the other, as one log.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use crate::LogError;
+
+/// File of a rosbag2 folder that lists its parts.
+const METADATA: &str = "metadata.yaml";
+/// Largest part of the metadata that is read, bytes. A list of 10,000 parts fits.
+const MAX_METADATA: u64 = 1 << 20;
+
+/// Files of one log, in the order of recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogFiles {
+    parts: Vec<PathBuf>,
+    missing: Vec<String>,
+}
+
+impl LogFiles {
+    /// Finds the files of a log: a file itself, or the parts of a folder. A folder is one log if it
+    /// holds a `metadata.yaml`, a single MCAP file, or files `NAME_0.mcap`, `NAME_1.mcap`, ... of
+    /// one name.
+    ///
+    /// # Errors
+    /// [`LogError::Open`] for a path that cannot be read; [`LogError::NotAFile`] for a pipe, a
+    /// device, or a folder that is not one log.
+    pub fn of(path: &Path) -> Result<Self, LogError> {
+        let failed = |source| LogError::Open { path: path.to_owned(), source };
+        if !std::fs::metadata(path).map_err(failed)?.is_dir() {
+            return Ok(Self { parts: vec![path.to_owned()], missing: Vec::new() });
+        }
+        let mut parts = mcap_files(path).map_err(failed)?;
+        parts.sort_by_key(|part| part_number(part));
+        let listed = listed_parts(&path.join(METADATA));
+        // Split by the recorder: one name, and a number.
+        let names: Vec<&str> = parts.iter().map(|part| part_name(part)).collect();
+        let is_split = names.windows(2).all(|pair| pair[0] == pair[1]);
+        if parts.is_empty() || (listed.is_none() && !is_split) {
+            return Err(LogError::NotAFile {
+                path: path.to_owned(),
+                kind: "a folder, and not one log",
+                remedy: if parts.is_empty() { ": it holds no .mcap" } else { " of those in it" },
+            });
+        }
+        let present = |name: &String| parts.iter().any(|part| part.ends_with(name));
+        let missing = listed.unwrap_or_default().into_iter().filter(|name| !present(name));
+        Ok(Self { missing: missing.collect(), parts })
+    }
+
+    /// Returns the files.
+    pub fn parts(&self) -> &[PathBuf] {
+        &self.parts
+    }
+
+    /// Returns the names of the files that the metadata lists and that are not there.
+    pub fn missing(&self) -> &[String] {
+        &self.missing
+    }
+}
+
+/// Opens one file of a log.
+///
+/// # Errors
+/// [`LogError::Open`], [`LogError::NotAFile`].
+pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
+    let failed = |source| LogError::Open { path: path.to_owned(), source };
+    let kind = std::fs::metadata(path).map_err(failed)?;
+    let refused = |kind, remedy| LogError::NotAFile { path: path.to_owned(), kind, remedy };
+    if kind.is_dir() {
+        return Err(refused("a directory", " (the .mcap in it)"));
+    }
+    if !kind.is_file() {
+        return Err(refused("a pipe or a device", "; a pipe can be written to a file first"));
+    }
+    File::open(path).map_err(failed)
+}
+
+fn mcap_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
+    Ok(files.filter(|path| path.extension().is_some_and(|it| it == "mcap")).collect())
+}
+
+/// Splits `NAME_12.mcap` into its name and its number; a name without a number is number 0.
+fn name_and_number(part: &Path) -> (&str, u64) {
+    let stem = part.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let split = stem.rsplit_once('_').and_then(|(name, n)| Some((name, n.parse().ok()?)));
+    split.unwrap_or((stem, 0))
+}
+
+fn part_name(part: &Path) -> &str {
+    name_and_number(part).0
+}
+
+/// Returns the key of the order of recording: by number, because `_10` comes after `_9`.
+fn part_number(part: &Path) -> (u64, PathBuf) {
+    (name_and_number(part).1, part.to_owned())
+}
+
+/// Returns the MCAP files that the metadata lists under `relative_file_paths`; `None` without
+/// metadata. A list of names is all that is read of it, so this is no YAML parser.
+fn listed_parts(metadata: &Path) -> Option<Vec<String>> {
+    let mut text = String::new();
+    open_file(metadata).ok()?.take(MAX_METADATA).read_to_string(&mut text).ok()?;
+    let lines = text.lines().map(str::trim).skip_while(|line| *line != "relative_file_paths:");
+    let items = lines.skip(1).map_while(|line| line.strip_prefix("- "));
+    // Older recorders write the folder before the name.
+    let names = items.filter_map(|item| item.trim_matches(['"', '\'']).rsplit('/').next());
+    Some(names.filter(|name| name.ends_with(".mcap")).map(str::to_owned).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn folder(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        files.iter().for_each(|file| fs::write(folder.path().join(file), "x").unwrap());
+        folder
+    }
+
+    fn names(files: &LogFiles) -> Vec<&str> {
+        files.parts.iter().map(|part| part.file_name().unwrap().to_str().unwrap()).collect()
+    }
+
+    #[test]
+    fn parts_come_in_the_order_of_their_numbers() {
+        let bag = folder(&["walk_10.mcap", "walk_9.mcap", "walk_0.mcap", "notes.txt"]);
+        let files = LogFiles::of(bag.path()).unwrap();
+        assert_eq!(names(&files), ["walk_0.mcap", "walk_9.mcap", "walk_10.mcap"]);
+        assert!(files.missing().is_empty());
+    }
+
+    #[test]
+    fn a_part_that_the_metadata_lists_and_that_is_not_there_is_named() {
+        let bag = folder(&["walk_0.mcap", "other.mcap"]);
+        let text = "rosbag2_bagfile_information:\n  relative_file_paths:\n    - bag/walk_0.mcap\n    \
+                    - \"walk_1.mcap\"\n  duration:\n    - walk_2.mcap\n";
+        fs::write(bag.path().join(METADATA), text).unwrap();
+        let files = LogFiles::of(bag.path()).unwrap();
+        assert_eq!(files.missing(), ["walk_1.mcap"]);
+        assert_eq!(files.parts().len(), 2);
+    }
+
+    #[test]
+    fn a_folder_of_different_logs_is_not_one_log() {
+        let logs = folder(&["kitchen.mcap", "hall.mcap"]);
+        let error = LogFiles::of(logs.path()).unwrap_err().to_string();
+        assert!(error.contains("not one log") && error.contains("of those in it"), "{error}");
+        let error = LogFiles::of(folder(&["a.txt"]).path()).unwrap_err().to_string();
+        assert!(error.contains("holds no .mcap"), "{error}");
+    }
+}

@@ -1,0 +1,139 @@
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Point2;
+use tagalong_app::outcome::{Failure, make_folder, say};
+use tagalong_core::{DepthImage, Images, RgbImage};
+use tagalong_geometry::Rect;
+use tagalong_render::canvas::{Canvas, Ink};
+use tagalong_render::write_png;
+use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+use tagalong_vision::Unwrapper;
+
+/// Pictures of one scene.
+const PICTURES: u64 = 6;
+/// Depth that is rendered black, m.
+const FAR_M: f32 = 8.0;
+
+/// Renders some moments of a scene, evenly spread, with the truth on them: the image on the left,
+/// depth or the right image beside it; of a mirror the unwrapped image and the raw one. Images of
+/// cameras in the room go to a separate picture.
+pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result<(), Failure> {
+    make_folder(folder)?;
+    let mut unwrapping = Unwrapping::of(&simulation)?;
+    let mut webcams: Vec<Arc<RgbImage>> = simulation.webcams().map(|_| Arc::default()).collect();
+    let every_ns = (scene.duration_s * 1e9) as u64 / PICTURES;
+    let mut drawn = 0;
+    while let Some(event) = simulation.next_event() {
+        let shot = match event {
+            Event::Shot(shot) => shot,
+            Event::Webcam(shot) => {
+                webcams[shot.webcam] = shot.image;
+                continue;
+            }
+            Event::Odometry(_) => continue,
+        };
+        // Half an interval in: the pictures then lie in the middle of equal parts of the scene.
+        if shot.captured_ns < drawn * every_ns + every_ns / 2 {
+            continue;
+        }
+        drawn += 1;
+        let name = format!("{:06}ms", shot.captured_ns / 1_000_000);
+        save(&folder.join(format!("{name}.png")), &picture(&shot, unwrapping.as_mut())?)?;
+        if !webcams.is_empty() {
+            save(&folder.join(format!("{name}-webcams.png")), &beside(&webcams))?;
+        }
+    }
+    say(&format!("{drawn} pictures are in {}", folder.display()));
+    Ok(())
+}
+
+fn save(path: &Path, image: &RgbImage) -> Result<(), Failure> {
+    write_png(path, image)
+        .map_err(|why| Failure::failed(format!("cannot write {}: {why}", path.display())))
+}
+
+/// Converter from the circular image of a mirror to the panorama that the truth refers to.
+struct Unwrapping {
+    unwrapper: Unwrapper<[u8; 3]>,
+    unwrapped: RgbImage,
+}
+
+impl Unwrapping {
+    /// Returns `None` for a camera without a mirror.
+    fn of(simulation: &Simulation) -> Result<Option<Self>, Failure> {
+        let Some(panorama) = simulation.panorama() else { return Ok(None) };
+        let camera = simulation.camera();
+        let unwrapper =
+            Unwrapper::new(panorama, camera.width, camera.height).map_err(Failure::failed)?;
+        Ok(Some(Self { unwrapper, unwrapped: RgbImage::default() }))
+    }
+}
+
+fn picture(shot: &Shot, unwrapping: Option<&mut Unwrapping>) -> Result<RgbImage, Failure> {
+    let (first, second) = side_by_side(&shot.images);
+    let Some(Unwrapping { unwrapper, unwrapped }) = unwrapping else {
+        return Ok(beside(&[Arc::new(annotated(&first, &shot.truth)), Arc::new(second)]));
+    };
+    unwrapper.apply(&first, unwrapped).map_err(Failure::failed)?;
+    Ok(beside(&[Arc::new(annotated(unwrapped, &shot.truth)), Arc::new(first)]))
+}
+
+/// Joins pictures in a row.
+fn beside(pictures: &[Arc<RgbImage>]) -> RgbImage {
+    let width = pictures.iter().map(|p| p.width()).sum();
+    let height = pictures.iter().map(|p| p.height()).max().unwrap_or(0);
+    let mut canvas = Canvas::new(width, height, [0; 3]);
+    let mut left = 0;
+    for picture in pictures {
+        canvas.paste(picture, left, 0);
+        left += picture.width();
+    }
+    canvas.into_image()
+}
+
+fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
+    let width = image.width() as f64;
+    let mut canvas = Canvas::new(image.width(), image.height(), [0; 3]);
+    canvas.paste(image, 0, 0);
+    for person in truth {
+        let ink = Ink::solid(if person.ignore { [150; 3] } else { [255, 220, 0] });
+        if let Some(whole) = &person.upper_body {
+            outline(&mut canvas, whole, width, ink);
+            let hidden = person.occluder.map_or(String::new(), |id| format!("<{id}"));
+            let text = format!("{} {:.0}%{hidden}", person.id, 100.0 * person.visible_fraction);
+            canvas.text(Point2::new(whole.x, whole.y - 10.0), &text, ink);
+        }
+        if let Some(visible) = &person.visible {
+            outline(&mut canvas, visible, width, Ink::solid([0, 200, 255]).faint(0.7));
+        }
+    }
+    canvas.into_image()
+}
+
+/// Outlines a rectangle. Beyond the right edge of a panorama it goes on at the left.
+fn outline(canvas: &mut Canvas, rect: &Rect, width: f64, ink: Ink) {
+    canvas.outline(rect, 1, ink);
+    if rect.right() > width {
+        canvas.outline(&Rect { x: rect.x - width, ..*rect }, 1, ink);
+    }
+}
+
+fn side_by_side(images: &Images) -> (RgbImage, RgbImage) {
+    let grey = |image: &tagalong_core::GreyImage| image.map(|v| [v; 3]);
+    let first = images.colour.as_deref().cloned().or(images.grey.as_deref().map(grey));
+    let second = images
+        .depth
+        .as_deref()
+        .map(shades)
+        .or(images.right.as_deref().map(|right| grey(&right.image)));
+    (first.unwrap_or_default(), second.unwrap_or_default())
+}
+
+/// Shades depth: near is bright, no reading is red.
+fn shades(depth: &DepthImage) -> RgbImage {
+    depth.map(|z| {
+        let shade = (255.0 * (1.0 - z / FAR_M)).clamp(0.0, 255.0) as u8;
+        if z.is_nan() { [90, 0, 0] } else { [shade; 3] }
+    })
+}

@@ -1,0 +1,222 @@
+//! `tagalong simulate`: renders a scene to a log or to pictures.
+
+mod gallery;
+mod realism;
+mod record;
+pub mod sample;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::ProgressBar;
+pub use record::Recorder;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
+use tagalong_config::Registry;
+use tagalong_log::write::WriteError;
+use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
+
+use crate::realism::realism;
+
+/// Arguments of `tagalong simulate`.
+#[derive(Args, Debug)]
+pub struct SimulateArgs {
+    /// The scene, a TOML file.
+    #[arg(required_unless_present = "realism")]
+    pub scene: Option<PathBuf>,
+    /// The log to write [default: runs/<scene>.mcap].
+    #[arg(short, long, value_name = "LOG")]
+    pub output: Option<PathBuf>,
+    /// Use this seed instead of the scene's: counted within --split if given.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Take seed, people and rooms from train, validation or test.
+    #[arg(long, value_name = "SPLIT")]
+    pub split: Option<Split>,
+    /// Set a value of the scene, like camera.kind=stereo or people.0.speed_mps=0.8.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub set: Vec<(String, String)>,
+    /// Render pictures with the truth into this folder instead of writing a log.
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    pub gallery: Option<PathBuf>,
+    /// Threads that render; the log is the same [default: as many as there are].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub threads: Option<u8>,
+    /// Simulate no scene, but check how realistic simulated worlds are, and print it.
+    #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "split", "set", "threads"])]
+    pub realism: bool,
+    /// Random variants of each random scene of the checks.
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
+          value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// Replace the log if it is there.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Output format of the result.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Simulates the scene.
+///
+/// # Errors
+/// A scene that cannot be read or is wrong, and an output path that cannot be written, are exit
+/// code 2; a disk that fails is 1.
+pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
+    let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
+    let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
+    let scene = read(path, &variant)?;
+    let simulation = Simulation::new(&scene, threads(args.threads));
+    match &args.gallery {
+        Some(folder) => gallery::paint(simulation, &scene, folder)?,
+        None => {
+            let log = args.output.clone().unwrap_or_else(|| default_log(path));
+            spare(&log, args.overwrite)?;
+            make_room_for(&log)?;
+            return write(simulation, &scene, &log, args.format);
+        }
+    }
+    Ok(Ended::Well)
+}
+
+fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> Outcome {
+    let signals = Signals::listen()?;
+    let goes_on = || signals.received().is_none();
+    let images = record(simulation, scene, log, &goes_on).map_err(Failure::failed)?;
+    if let Some(signal) = signals.received() {
+        say(CUT_SHORT);
+        return Ok(Ended::BySignal(signal));
+    }
+    match format {
+        Format::Text => say(&format!("{images} images and the truth are in {}", log.display())),
+        Format::Json => {
+            let told = serde_json::json!({ "log": log, "images": images });
+            print(&format!("{told:#}\n"))?;
+        }
+    }
+    Ok(Ended::Well)
+}
+
+/// Splits `KEY=VALUE`.
+///
+/// # Errors
+/// An argument without the sign.
+pub fn key_and_value(argument: &str) -> Result<(String, String), String> {
+    let (key, value) = argument.split_once('=').ok_or("write KEY=VALUE, like crowd=5")?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
+/// Reads a scene.
+///
+/// # Errors
+/// A file that cannot be read, or a mistake in it with its place: exit code 2.
+pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
+    let shown = path.display();
+    let text = fs::read_to_string(path)
+        .map_err(|error| Failure::usage(format!("cannot read scene {shown}: {error}")))?;
+    Scene::parse_with(&text, variant)
+        .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))
+}
+
+fn default_log(scene: &Path) -> PathBuf {
+    Path::new("runs").join(scene.file_stem().unwrap_or_default()).with_extension("mcap")
+}
+
+/// Writes everything that the robot records, as long as it `goes_on`; returns the number of images.
+///
+/// # Errors
+/// [`WriteError`] if the file cannot be written.
+pub fn record(
+    mut simulation: Simulation,
+    scene: &Scene,
+    path: &Path,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<u64, WriteError> {
+    let mut recorder = Recorder::create(path, scene, &simulation)?;
+    let bar = ProgressBar::new((scene.duration_s * 10.0) as u64);
+    let mut images = 0;
+    while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
+        if let Event::Shot(shot) = &event {
+            images += 1;
+            bar.set_position(shot.captured_ns / 100_000_000);
+        }
+        recorder.write(&event)?;
+    }
+    bar.finish_and_clear();
+    recorder.finish()?;
+    Ok(images)
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, inspect};
+    use tagalong_trials::Draw;
+
+    use super::*;
+
+    const SCENE: &str = "seed = 3\nduration_s = 3.0\n[laser]\nrays = 90\n[camera]\nwidth = 64\nheight = 48\n\
+        rate_hz = 20.0\ndepth_offset_s = 0.015\nrolling_shutter_s = 0.015\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.1\n\
+        [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+
+    #[test]
+    fn a_log_has_encoders_commands_and_the_time_of_its_depth() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.mcap");
+        let scene = Scene::parse(SCENE).unwrap();
+        record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
+        let seen = inspect(&path, &InputSettings::default(), &Limits::default()).unwrap();
+        for (topic, schema) in [
+            ("/joint_states", "sensor_msgs/msg/JointState"),
+            ("/cmd_vel", "geometry_msgs/msg/TwistStamped"),
+            ("/odom", "nav_msgs/msg/Odometry"),
+        ] {
+            let found = seen.topics.iter().find(|t| t.topic == topic).unwrap();
+            assert_eq!((found.schema.as_str(), found.count, found.undecodable), (schema, 150, 0));
+        }
+        assert!((seen.skew.unwrap().median_s - 0.015).abs() < 1e-6, "{:?}", seen.skew);
+    }
+
+    /// Trials skip the log; they must give the same frames as a pipeline that reads it.
+    #[test]
+    fn a_recorded_scene_gives_the_frames_of_a_trial() {
+        let scene = Scene::parse(SCENE).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.mcap");
+        record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
+        let inputs = Inputs::ANY.require(Input::Depth);
+        let mut source =
+            FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs)
+                .unwrap();
+        let mut draw = Draw::new(&scene, 1);
+        let mut frames = 0;
+        while let Some(logged) = source.next_frame() {
+            let drawn = draw.next_frame().unwrap().frame;
+            let (a, b) = (logged.frame.motion, drawn.motion);
+            let differences =
+                [a.forward - b.forward, a.left - b.left, a.turn - b.turn, a.dt - b.dt];
+            assert!(differences.iter().all(|d| d.abs() < 1e-9), "{a:?} {b:?}");
+            assert!((a.covariance - b.covariance).norm() < 1e-9, "{a:?} {b:?}");
+            assert_eq!(logged.frame.index, drawn.index);
+            let pose = |frame: &tagalong_core::Frame| frame.camera.robot_from_camera;
+            let off = pose(&logged.frame).inverse() * pose(&drawn);
+            assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9);
+            let (a, b) = (logged.frame.depth().unwrap(), drawn.depth().unwrap());
+            let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
+            assert!(a.pixels().iter().zip(b.pixels()).all(same));
+            let (a, b) = (&logged.frame.laser().unwrap().points, &drawn.laser().unwrap().points);
+            assert_eq!(a.len(), b.len());
+            assert!(a.len() > 60, "most rays meet something: {}", a.len());
+            assert!(
+                a.iter().zip(b.iter()).all(|(a, b)| (a - b).norm() < 1e-5),
+                "{:?} {:?}",
+                a[0],
+                b[0]
+            );
+            frames += 1;
+        }
+        assert!(frames > 40 && draw.next_frame().is_none(), "{frames}");
+    }
+}

@@ -1,0 +1,329 @@
+use std::io;
+use std::path::Path;
+
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::Serialize;
+use tagalong_core::{DepthImage, GreyImage, RgbImage, Stamp};
+use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
+use tagalong_log::msgs::{
+    CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry, PoseStamped,
+    StringMsg, TFMessage, TransformStamped, TwistStamped,
+};
+use tagalong_log::write::{MessageLog, WriteError};
+use tagalong_log::{TruthFrame, TruthPerson};
+use tagalong_sim::{
+    Event, LaserSettings, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot,
+};
+
+/// Start time of every simulated log.
+const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
+const LASER_FRAME: &str = "laser";
+const CAMERA_FRAME: &str = "camera_color_optical_frame";
+/// Joints of the wheel encoders, left and right.
+const WHEEL_JOINTS: [&str; 2] = ["left_wheel_joint", "right_wheel_joint"];
+/// JPEG quality that cameras of robots use.
+const JPEG_QUALITY: u8 = 85;
+/// Topic of the scene itself.
+const SCENE_TOPIC: &str = "/simulation/scene";
+/// Topic of a driving pipeline's reports, one per image.
+const PURSUIT_TOPIC: &str = "/follow/frames";
+/// Topic of the robot's true pose in the room. Topics under `/truth` are not for trackers.
+const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
+/// Topic of the webcams' true poses in the room; `tagalong triangulate` has to measure them.
+const TRUE_WEBCAMS_TOPIC: &str = "/truth/tf_static";
+/// Frame of the room's coordinates.
+const WORLD_FRAME: &str = "world";
+
+/// Writer of the robot's recordings, under the topics that robots use.
+pub struct Recorder {
+    log: MessageLog,
+    camera: Camera,
+    mirror: Option<ConicalMirror>,
+    laser: Option<LaserSettings>,
+    webcams: Vec<Camera>,
+}
+
+impl Recorder {
+    /// Starts a log with the scene and the mount of its cameras.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written.
+    pub fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, WriteError> {
+        let mut log = MessageLog::create(path)?;
+        let text = toml::to_string(scene).map_err(|why| WriteError::Io {
+            path: path.to_owned(),
+            source: io::Error::other(format!("the scene as TOML: {why}")),
+        })?;
+        log.send(SCENE_TOPIC, EPOCH, &StringMsg { data: text })?;
+        let camera = simulation.camera().clone();
+        log.send(
+            "/tf_static",
+            EPOCH,
+            &mount("base_link", [(CAMERA_FRAME.into(), camera.robot_from_camera)]),
+        )?;
+        if let Some(laser) = simulation.laser() {
+            let above = Isometry3::translation(0.0, 0.0, laser.height_m);
+            log.send("/tf_static", EPOCH, &mount("base_link", [(LASER_FRAME.into(), above)]))?;
+        }
+        let webcams: Vec<Camera> = simulation.webcams().cloned().collect();
+        if !webcams.is_empty() {
+            let poses = webcams.iter().map(|camera| camera.robot_from_camera);
+            let named = poses.enumerate().map(|(i, pose)| (webcam_frame(i), pose));
+            log.send(TRUE_WEBCAMS_TOPIC, EPOCH, &mount(WORLD_FRAME, named))?;
+        }
+        let mirror = simulation.panorama().map(|panorama: &Panorama| panorama.mirror);
+        Ok(Self { log, camera, mirror, laser: simulation.laser().cloned(), webcams })
+    }
+
+    /// Writes one event.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written.
+    pub fn write(&mut self, event: &Event) -> Result<(), WriteError> {
+        match event {
+            Event::Odometry(reading) => self.odometry(reading),
+            Event::Shot(shot) => self.shot(shot),
+            Event::Webcam(shot) => self.webcam(shot),
+        }
+    }
+
+    /// Writes a pipeline's report of an image, with the command, by the capture time since the
+    /// start.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written.
+    pub fn pursuit<T: Serialize>(
+        &mut self,
+        captured_ns: u64,
+        report: &T,
+    ) -> Result<(), WriteError> {
+        self.log.send_json(PURSUIT_TOPIC, after(captured_ns), report)
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written.
+    pub fn finish(self) -> Result<(), WriteError> {
+        self.log.finish()
+    }
+
+    fn odometry(&mut self, reading: &OdometryReading) -> Result<(), WriteError> {
+        let at = after(reading.at_ns);
+        self.log.send("/cmd_vel", at, &command(reading))?;
+        self.log.send("/joint_states", at, &wheels(reading))?;
+        self.log.send("/odom", at, &odometry(reading))
+    }
+
+    fn shot(&mut self, shot: &Shot) -> Result<(), WriteError> {
+        let (captured, recorded) = (after(shot.captured_ns), after(shot.recorded_ns));
+        let header = Header::new(captured, CAMERA_FRAME);
+        let images = &shot.images;
+        if let Some((laser, ranges)) = self.laser.as_ref().zip(shot.laser.as_ref()) {
+            self.log.send("/scan", recorded, &scan(captured, laser, ranges))?;
+        }
+        if let Some(colour) = &images.colour {
+            self.info("color", recorded, &header, 0.0)?;
+            self.colour("/camera/color", recorded, &header, colour)?;
+        }
+        if let Some(depth) = &images.depth {
+            // Depth has a capture time of its own, and cannot be recorded before it.
+            let (header, recorded) = (
+                Header::new(after(shot.depth_ns), CAMERA_FRAME),
+                recorded.max(after(shot.depth_ns)),
+            );
+            self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
+            self.depth(recorded, &header, depth)?;
+        }
+        let left = images.grey.as_deref().map(|image| ("left", image, 0.0));
+        let right = images.right.as_deref().map(|right| ("right", &right.image, right.baseline_m));
+        for (side, image, aside_m) in left.into_iter().chain(right) {
+            self.info(side, recorded, &header, aside_m)?;
+            self.grey(side, recorded, &header, image)?;
+        }
+        self.log.send(TRUE_ROBOT_TOPIC, recorded, &true_robot(captured, &shot.world_from_robot))?;
+        self.log.send_truth(recorded, &truth(captured, &shot.truth))
+    }
+
+    fn webcam(&mut self, shot: &WebcamShot) -> Result<(), WriteError> {
+        let Some(camera) = self.webcams.get(shot.webcam) else { return Ok(()) };
+        let at = after(shot.captured_ns);
+        let header = Header::new(at, webcam_frame(shot.webcam));
+        let topic = format!("/webcam_{}", shot.webcam + 1);
+        if let Some(info) = info(camera, &header, 0.0) {
+            self.log.send(&format!("{topic}/camera_info"), at, &info)?;
+        }
+        self.colour(&topic, at, &header, &shot.image)
+    }
+
+    fn colour(
+        &mut self,
+        camera: &str,
+        at: Stamp,
+        header: &Header,
+        image: &RgbImage,
+    ) -> Result<(), WriteError> {
+        let data = jpeg(image);
+        let format = "rgb8; jpeg compressed bgr8".into();
+        let message = CompressedImage { header: header.clone(), format, data: &data };
+        self.log.send(&format!("{camera}/image_raw/compressed"), at, &message)
+    }
+
+    fn depth(&mut self, at: Stamp, header: &Header, depth: &DepthImage) -> Result<(), WriteError> {
+        let data: Vec<u8> = depth.pixels().iter().flat_map(|z| millimetres(*z)).collect();
+        let message = self.raw(header, "16UC1", 2, &data);
+        self.log.send("/camera/aligned_depth_to_color/image_raw", at, &message)
+    }
+
+    fn grey(
+        &mut self,
+        side: &str,
+        at: Stamp,
+        header: &Header,
+        image: &GreyImage,
+    ) -> Result<(), WriteError> {
+        let message = self.raw(header, "mono8", 1, image.pixels());
+        self.log.send(&format!("/camera/{side}/image_rect"), at, &message)
+    }
+
+    fn raw<'a>(&self, header: &Header, encoding: &str, bytes: u32, data: &'a [u8]) -> Image<'a> {
+        let (width, height) = (self.camera.width as u32, self.camera.height as u32);
+        let encoding = encoding.into();
+        let step = bytes * width;
+        Image { header: header.clone(), height, width, encoding, is_bigendian: 0, step, data }
+    }
+
+    /// Writes the calibration of a camera that stands `aside_m` to the right.
+    fn info(
+        &mut self,
+        name: &str,
+        at: Stamp,
+        header: &Header,
+        aside_m: f64,
+    ) -> Result<(), WriteError> {
+        let Some(mut info) = info(&self.camera, header, aside_m) else { return Ok(()) };
+        if let Some(mirror) = &self.mirror {
+            info.distortion_model = ConicalMirror::MODEL.into();
+            info.d = mirror.coefficients().to_vec();
+        }
+        self.log.send(&format!("/camera/{name}/camera_info"), at, &info)
+    }
+}
+
+fn info(camera: &Camera, header: &Header, aside_m: f64) -> Option<CameraInfo> {
+    let Lens::Pinhole(lens) = camera.lens else { return None };
+    let size = (camera.width, camera.height);
+    Some(CameraInfo::of_lens(header, &lens, size, aside_m))
+}
+
+fn webcam_frame(index: usize) -> String {
+    format!("webcam_{}_optical_frame", index + 1)
+}
+
+fn after(start_ns: u64) -> Stamp {
+    Stamp::from_nanos(EPOCH.nanos() + start_ns)
+}
+
+fn jpeg(image: &RgbImage) -> Vec<u8> {
+    let mut out = Vec::new();
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let written = JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY).encode(
+        image.pixels().as_flattened(),
+        width,
+        height,
+        ExtendedColorType::Rgb8,
+    );
+    debug_assert!(written.is_ok(), "scenes have at most 4096 columns and rows");
+    out
+}
+
+/// Converts to millimetres; 0 is "no reading", as in REP 118.
+fn millimetres(depth_m: f32) -> [u8; 2] {
+    let millimetres = if depth_m.is_finite() { (1000.0 * depth_m).round() as u16 } else { 0 };
+    millimetres.to_le_bytes()
+}
+
+/// Returns static transforms to sensors from the frame of their poses.
+fn mount(parent: &str, sensors: impl IntoIterator<Item = (String, Isometry3<f64>)>) -> TFMessage {
+    let transform = |(child_frame_id, pose): (String, Isometry3<f64>)| TransformStamped {
+        header: Header::new(EPOCH, parent),
+        child_frame_id,
+        transform: (&pose).into(),
+    };
+    TFMessage { transforms: sensors.into_iter().map(transform).collect() }
+}
+
+fn scan(captured: Stamp, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
+    let (first, step) = (laser.first_rad(), laser.step_rad());
+    LaserScan {
+        header: Header::new(captured, LASER_FRAME),
+        angle_min: first as f32,
+        angle_max: (first + step * (laser.rays - 1) as f64) as f32,
+        angle_increment: step as f32,
+        range_min: laser.min_range_m as f32,
+        range_max: laser.max_range_m as f32,
+        ranges: ranges.to_vec(),
+        ..LaserScan::default()
+    }
+}
+
+/// Returns a pose on the floor.
+fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
+    let at = Translation3::new(planar.translation.x, planar.translation.y, 0.0);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
+    Isometry3::from_parts(at, turn)
+}
+
+fn true_robot(captured: Stamp, world_from_robot: &Isometry2<f64>) -> PoseStamped {
+    let pose = (&spatial(world_from_robot)).into();
+    PoseStamped { header: Header::new(captured, WORLD_FRAME), pose }
+}
+
+fn odometry(reading: &OdometryReading) -> Odometry {
+    let mut odometry = Odometry {
+        header: Header::new(after(reading.at_ns), "odom"),
+        child_frame_id: "base_link".into(),
+        ..Odometry::default()
+    };
+    odometry.pose.pose = (&spatial(&reading.odom_from_robot)).into();
+    odometry.twist.twist.linear.x = reading.speed_mps;
+    odometry.twist.twist.angular.z = reading.turn_rate;
+    odometry
+}
+
+fn wheels(reading: &OdometryReading) -> JointState {
+    JointState {
+        header: Header::new(after(reading.at_ns), "base_link"),
+        name: WHEEL_JOINTS.map(String::from).to_vec(),
+        position: reading.encoders.map(|encoder| encoder.angle_rad).to_vec(),
+        velocity: reading.encoders.map(|encoder| encoder.rate_rad_s).to_vec(),
+        effort: Vec::new(),
+    }
+}
+
+fn command(reading: &OdometryReading) -> TwistStamped {
+    let mut command = TwistStamped {
+        header: Header::new(after(reading.at_ns), "base_link"),
+        ..TwistStamped::default()
+    };
+    command.twist.linear.x = reading.commanded_mps;
+    command.twist.angular.z = reading.commanded_turn_rate;
+    command
+}
+
+fn truth(captured: Stamp, people: &[Truth]) -> TruthFrame {
+    let corners = |rect: Rect| [rect.x, rect.y, rect.width, rect.height];
+    let person = |truth: &Truth| TruthPerson {
+        id: i64::from(truth.id),
+        head_in_robot_m: Some(truth.head_in_robot.coords.into()),
+        torso_in_robot_m: Some(truth.torso_in_robot.coords.into()),
+        upper_body_px: truth.upper_body.map(corners),
+        visible_px: truth.visible.map(corners),
+        visible: truth.visible_fraction,
+        occluder: truth.occluder.map(i64::from),
+        ignore: truth.ignore,
+    };
+    TruthFrame { stamp_ns: captured.nanos(), people: people.iter().map(person).collect() }
+}

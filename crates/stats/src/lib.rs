@@ -1,0 +1,20 @@
+//! Random numbers and statistics, in one place for the whole workspace.
+//!
+//! * [`SplitMix64`], [`ChaCha`], [`XorShift64`]: seeded generators with the same numbers on every
+//!   machine; [`RandomSource`] has the distributions. [`mix`] and [`number_at`] turn keys into
+//!   numbers without a state, for threads that work in any order.
+//! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
+//! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`]: how far a figure can
+//!   be trusted; [`paired_gain`], [`sign_flip`], [`holm`]: how far a difference can.
+//!
+//! There is no clock and no global generator: the same seed gives the same bytes.
+
+mod intervals;
+mod random;
+mod significance;
+mod summary;
+
+pub use intervals::{CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, wilson};
+pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, mix, number_at};
+pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
+pub use summary::{mean, mean_and_deviation, median, percentile};

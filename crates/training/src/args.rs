@@ -1,0 +1,39 @@
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// Arguments of `tagalong train`.
+#[derive(Args, Debug)]
+pub struct TrainArgs {
+    /// The plugin to train, for example `svm-patch`; `omni-distance` is the model
+    /// of the detector `omni-appearance`, `cascade` that of `face-rgbd`.
+    pub plugin: String,
+    /// Output file of the model; its card is written beside it [default:
+    /// configs/models/<plugin>.toml].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// A folder of real data (logs, people, negatives); without it, only simulated rooms are used.
+    #[arg(long, value_name = "DIR")]
+    pub data: Option<PathBuf>,
+    /// Settings of the plugin, a TOML file.
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
+    /// A quick training, to see that it works; the model is poor.
+    #[arg(long)]
+    pub quick: bool,
+    /// Scenes that are simulated for the first round of a verifier [default: 256]; more of them
+    /// take longer, and help a large model.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(4..=900))]
+    pub scenes: Option<u64>,
+    /// Further rounds of a verifier, each of which adds the model's mistakes to the training data
+    /// [default: 2].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=8))]
+    pub rounds: Option<u64>,
+    /// A config with the detector that proposes the candidates of a verifier, as it is, instead of
+    /// those of `depth-ekf` and `stereo-best` with low thresholds.
+    #[arg(long, value_name = "CONFIG")]
+    pub proposes: Option<PathBuf>,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}

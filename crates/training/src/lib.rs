@@ -1,0 +1,70 @@
+//! `tagalong train`: trains the model file of a plugin on simulated rooms, annotated logs and
+//! photographs, and writes a card with its origin and its scores.
+//!
+//! A verifier is trained on the proposals of the detector, since these are its later inputs. The
+//! first model is then applied to new rooms, and candidates that it judges wrongly or with a small
+//! margin are added before the next fit.
+
+mod args;
+mod card;
+mod faces;
+mod held_out;
+mod in_use;
+#[cfg(test)]
+mod overlap;
+mod panorama;
+mod photos;
+mod plan;
+mod rooms;
+mod seen;
+mod session;
+mod windows;
+
+pub use args::TrainArgs;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_config::{Kind, Registry};
+use tagalong_core::Verifier;
+
+use self::card::Card;
+use self::session::{Session, write};
+
+/// Runs `tagalong train`.
+///
+/// # Errors
+/// A plugin that cannot be trained and wrong settings are exit code 2; files that cannot be read or
+/// written are 1.
+pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
+    let session = Session::new(args, registry)?;
+    // Its samples come from the truth and not from proposals, so it skips the rounds below.
+    if args.plugin == panorama::NAME {
+        return panorama::train(&session, args);
+    }
+    let mut trainer = session.trainer()?;
+    let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
+    if is_detector || args.plugin == faces::NAME {
+        return windows::train(&session, trainer.as_mut());
+    }
+    let mut card = Card::new(args, session.plan.scenes[0], session.sources());
+    let mut doubter: Option<Box<dyn Verifier>> = None;
+    for round in 0..=session.plan.rounds {
+        let counts = session.collect_hard_negatives(round, trainer.as_mut(), doubter)?;
+        session.tell(round, "fitting");
+        session.bar.set_length(1000);
+        let fitted = trainer
+            .fit(&mut |part| session.bar.set_position((1000.0 * part) as u64))
+            .map_err(Failure::failed)?;
+        // Written first: the verifier loads the model from its file.
+        write(&session.model, &fitted.model)?;
+        doubter = Some(session.verifier()?);
+        card.rounds.push(counts);
+        card.fit = fitted.figures;
+    }
+    card.held_out_rooms = session.try_rooms()?;
+    card.held_out_logs = session.try_logs()?;
+    session.bar.finish_and_clear();
+    let path = session.model.with_extension("card.toml");
+    write(&path, &card.to_text()?)?;
+    print(&card.summary())?;
+    say(&format!("{} and {}", session.model.display(), path.display()));
+    Ok(Ended::Well)
+}

@@ -1,0 +1,175 @@
+//! Frames with the truth beside them, from simulated rooms and from annotated logs.
+
+use std::path::Path;
+
+use nalgebra::Point2;
+use tagalong_app::outcome::Failure;
+use tagalong_core::{Detection, Frame, Funnel};
+use tagalong_eval::{Role, Truth};
+use tagalong_geometry::Rect;
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
+use tagalong_scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
+use tagalong_sim::Scene;
+use tagalong_stereo::{StereoDepth, StereoSettings};
+use tagalong_trials::Draw;
+
+/// Frame with the people in it.
+pub struct AnnotatedFrame {
+    /// The frame.
+    pub frame: Frame,
+    /// All people, also those that do not count.
+    pub people: Vec<Known>,
+}
+
+/// True position of a person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// Number of the person.
+    pub id: i64,
+    /// Position below the head, on the floor of the robot frame, m.
+    pub floor: Point2<f64>,
+    /// Upper body in the image.
+    pub region: Option<Rect>,
+    /// True if neither a miss nor a false alarm.
+    pub ignore: bool,
+}
+
+/// Label of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Label {
+    /// Head and shoulders of this person.
+    Person(i64),
+    /// Another part of a person: a backpack, an arm.
+    Part,
+    /// Too near to a person for a clear label.
+    Unclear,
+    /// No person is there.
+    Nobody,
+}
+
+/// Distance on the floor within which a candidate is a person's head, m ...
+const SAME_M: f64 = 0.4;
+/// ... with at least this overlap of the squares.
+const SAME_OVERLAP: f64 = 0.4;
+/// Distance to the nearest person beyond which a candidate is a clear negative, m.
+const NOBODY_M: f64 = 0.9;
+
+/// Returns the label of a candidate, by the truth.
+pub fn label(candidate: &Detection, people: &[Known]) -> Label {
+    let at = candidate.position.xy();
+    let off = |known: &&Known| (known.floor - at).norm();
+    let Some(nearest) = people.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
+        return Label::Nobody;
+    };
+    let overlap = |known: &Known| known.region.map_or(0.0, |r| r.iou(&candidate.region));
+    let covers_nobody = people.iter().all(|known| overlap(known) < 0.2);
+    match off(&nearest) {
+        _ if nearest.ignore && off(&nearest) <= NOBODY_M => Label::Unclear,
+        m if m <= SAME_M && overlap(nearest) >= SAME_OVERLAP => Label::Person(nearest.id),
+        m if m <= SAME_M => Label::Part,
+        m if m > NOBODY_M && covers_nobody => Label::Nobody,
+        _ => Label::Unclear,
+    }
+}
+
+/// Callback for each frame.
+pub type See<'a> = &'a mut dyn FnMut(&AnnotatedFrame) -> Result<(), Failure>;
+
+/// Goes through a simulated scene. A stereo pair is matched, as a pipeline would.
+///
+/// # Errors
+/// Invalid settings, and those of `see`.
+pub fn in_scene(
+    scene: &Scene,
+    threads: usize,
+    stereo: StereoSettings,
+    see: See<'_>,
+) -> Result<(), Failure> {
+    let mut draw = Draw::new(scene, threads);
+    let mut stereo = StereoDepth::new(stereo).map_err(Failure::failed)?;
+    while let Some(drawn) = draw.next_frame() {
+        let people = drawn.truth.iter().map(known).collect();
+        let frame = match drawn.frame.depth() {
+            Ok(_) => drawn.frame,
+            Err(_) => with_depth(drawn.frame, &mut stereo)?,
+        };
+        see(&AnnotatedFrame { frame, people })?;
+    }
+    Ok(())
+}
+
+fn with_depth(frame: Frame, stereo: &mut StereoDepth) -> Result<Frame, Failure> {
+    let depth = stereo.depth(&frame, &mut Funnel::default()).map_err(Failure::failed)?;
+    Ok(frame.with_depth(depth))
+}
+
+fn known(truth: &tagalong_sim::Truth) -> Known {
+    Known {
+        id: i64::from(truth.id),
+        floor: truth.head_in_robot.xy(),
+        region: truth.upper_body,
+        ignore: truth.ignore || truth.upper_body.is_none(),
+    }
+}
+
+/// Goes through an annotated log.
+///
+/// # Errors
+/// A log or a truth that cannot be used, and those of `see`.
+pub fn in_log(log: &Path, truth: &Path, see: See<'_>) -> Result<(), Failure> {
+    let (input, limits) = (InputSettings::default(), Limits::default());
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+    let truth = TruthFile::read(truth, TruthOptions::default())?;
+    let shots = Shots::read(log, &input, &limits)?;
+    let mut people = truth.frames(&shots);
+    let mut source = FrameSource::open(log, &input, &limits, inputs)?;
+    while let Some(item) = source.next_frame() {
+        let (truths, _) = people.remove(&LogShot::of(&item).number).unwrap_or_default();
+        let people = truths.iter().filter_map(annotated).collect();
+        see(&AnnotatedFrame { frame: item.frame, people })?;
+    }
+    Ok(())
+}
+
+fn annotated(truth: &Truth) -> Option<Known> {
+    Some(Known {
+        id: truth.id,
+        floor: truth.floor_m?.into(),
+        region: truth.region.map(|r| Rect::new(r.x, r.y, r.width, r.height)),
+        ignore: truth.role != Role::Counts,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3};
+
+    use super::*;
+
+    fn known(x: f64, ignore: bool) -> Known {
+        let region = Some(Rect::new(100.0, 50.0, 60.0, 60.0));
+        Known { id: 7, floor: Point2::new(x, 0.0), region, ignore }
+    }
+
+    fn at(x: f64, left: f64) -> Detection {
+        Detection {
+            region: Rect::new(left, 50.0, 60.0, 60.0),
+            position: Point3::new(x, 0.0, 1.6),
+            covariance: Matrix3::identity(),
+            score: 0.0,
+            source: "test",
+        }
+    }
+
+    #[test]
+    fn candidates_are_labelled_by_place_and_overlap() {
+        let people = [known(3.0, false)];
+        assert_eq!(label(&at(3.1, 105.0), &people), Label::Person(7));
+        assert_eq!(label(&at(3.1, 145.0), &people), Label::Part);
+        assert_eq!(label(&at(3.7, 300.0), &people), Label::Unclear);
+        assert_eq!(label(&at(5.0, 300.0), &people), Label::Nobody);
+        assert_eq!(label(&at(5.0, 110.0), &people), Label::Unclear);
+        assert_eq!(label(&at(5.0, 110.0), &[]), Label::Nobody);
+        assert_eq!(label(&at(3.1, 105.0), &[known(3.0, true)]), Label::Unclear);
+    }
+}

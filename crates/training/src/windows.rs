@@ -1,0 +1,55 @@
+//! Training of window detectors on photographs of people; they search pictures without people for
+//! their own false positives.
+
+use std::path::Path;
+
+use super::card::WindowCard;
+use super::faces;
+use super::photos::{Take, photos};
+use super::session::{Session, write};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_config::{Example, Trainer};
+use tagalong_core::{Detection, Frame};
+
+/// Folders of the data that are read.
+const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
+
+/// Passes all photographs to the trainer, which holds out some of them by itself.
+pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
+    let Some(data) = &session.args.data else {
+        let why = "is trained on photographs: name their folder with --data";
+        return Err(Failure::usage(format!("`{}` {why}", session.args.plugin)));
+    };
+    let share = if session.args.quick { 8 } else { 1 };
+    session.bar.set_message("reading photographs");
+    let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
+        trainer.add(frame, candidate, example).map_err(Failure::failed)
+    };
+    let (folders, shown) = match session.args.plugin.as_str() {
+        faces::NAME => (&faces::FOLDERS[..], faces::visit(data, share, &mut show)?),
+        _ => (&FOLDERS[..], visit(data, share, &mut show)?),
+    };
+    session.bar.set_message("fitting");
+    session.bar.set_position(0);
+    session.bar.set_length(1000);
+    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
+    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    session.bar.finish_and_clear();
+    write(&session.model, &fitted.model)?;
+    let path = session.model.with_extension("card.toml");
+    let card = WindowCard::new(session.args, folders, shown, fitted.figures);
+    let text = card.to_text()?;
+    write(&path, &text)?;
+    print(&text)?;
+    say(&format!("{} and {}", session.model.display(), path.display()));
+    Ok(Ended::Well)
+}
+
+/// Passes all photographs with and without people, or one in `share`.
+fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
+    let mut all = photos(data, false);
+    all.extend(photos(data, true));
+    all.retain(|photo| photo.group / 5 % share == 0);
+    all.iter().try_for_each(|photo| photo.visit(0, take))?;
+    Ok(all.len())
+}
