@@ -89,7 +89,7 @@ impl Default for Config {
             start_log_odds: 0.0,
             confirm_log_odds: 4.6,
             end_log_odds: -2.0,
-            max_log_odds: 12.0,
+            max_log_odds: 8.0,
             max_look: 10.0,
             new_look_m: 0.25,
             repeated: 2.0,

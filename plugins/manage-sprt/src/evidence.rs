@@ -40,7 +40,7 @@ impl Evidence {
     /// Starts with a first look at a place for which there is evidence against a person.
     pub(crate) fn new(look: f64, at: Point2<f64>, clutter: f64, config: &Config) -> Self {
         let mut looks = Looks::default();
-        looks.add(at, look, config.new_look_m);
+        looks.add(at, look, config);
         let mut new = Self {
             confirmed: false,
             moved: false,
@@ -87,9 +87,9 @@ impl Evidence {
     }
 
     /// Moves what is remembered into the robot's new frame.
-    pub(crate) fn predict(&mut self, motion: &EgoMotion) {
+    pub(crate) fn predict(&mut self, motion: &EgoMotion, config: &Config) {
         self.start = motion.apply_to_point(self.start);
-        self.looks.predict(motion);
+        self.looks.predict(motion, config);
         self.age_s += motion.dt;
     }
 
@@ -107,7 +107,7 @@ impl Evidence {
                 self.clear_misses();
                 self.unverified_s = 0.0;
                 let at = track.estimate.person.position.xy();
-                self.looks.add(at, log_odds - clutter, config.new_look_m);
+                self.looks.add(at, log_odds - clutter, config);
             }
             Observation::Updated => {
                 self.clear_misses();

@@ -48,7 +48,8 @@ impl TrackManager for Sprt {
     fn predict(&mut self, motion: &EgoMotion) {
         self.dt_s = motion.dt;
         self.clutter.predict(motion, self.config.clutter_s);
-        self.evidence.values_mut().for_each(|evidence| evidence.predict(motion));
+        let config = &self.config;
+        self.evidence.values_mut().for_each(|evidence| evidence.predict(motion, config));
     }
 
     fn initiate(&mut self, id: TrackId, candidate: &Unassociated<'_>) -> Initiation {
