@@ -152,3 +152,22 @@ fn every_log_with_depth_runs() {
         assert_eq!(run.frames, frames, "{name}");
     }
 }
+
+/// The blanket on the desk is found in most frames.
+#[test]
+fn a_blanket_that_never_moves_is_no_person_and_the_people_who_pass_are() {
+    let Some((run, score)) = scored_with("lab2-camera1", "depth-verified") else { return };
+    for frame in 1..=12 {
+        assert!(!run.confirmed.contains_key(&frame), "frame {frame}: {:?}", run.confirmed[&frame]);
+    }
+    assert!(score.false_boxes <= 3, "{score:?}");
+    assert!(score.covered * 10 >= score.rows * 3, "{score:?}");
+}
+
+#[test]
+fn the_wall_of_a_corridor_is_no_person_and_two_people_keep_few_numbers() {
+    let Some((_, score)) = scored_with("corredor1-camera1", "depth-verified") else { return };
+    assert!(score.false_boxes <= 10, "{score:?}");
+    assert!(score.covered * 10 >= score.rows * 7, "{score:?}");
+    assert!(surplus(&score) <= 6, "{score:?}");
+}

@@ -18,6 +18,15 @@ use crate::suggest::config_hint;
 /// Longest config that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
+/// Configs that need no file. None of them extends another one, which would be a file.
+const BUILT_IN: [(&str, &str); 5] = [
+    ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
+    ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
+    ("stereo-best", include_str!("../../../configs/stereo-best.toml")),
+    ("omni-best", include_str!("../../../configs/omni-best.toml")),
+    ("mono", include_str!("../../../configs/mono.toml")),
+];
+
 /// Text of a config file, with its path.
 pub struct ConfigFile {
     path: PathBuf,
@@ -37,7 +46,7 @@ pub struct OuterSettings {
 }
 
 impl ConfigFile {
-    /// Reads a config.
+    /// Reads a config: a file, or the name of a built-in one.
     ///
     /// # Errors
     /// A file that is missing, unreadable, too long or no text: exit code 2.
@@ -51,6 +60,9 @@ impl ConfigFile {
             }
             Ok(about) => about.len(),
             Err(error) => {
+                if let Some(built_in) = path.to_str().and_then(Self::named) {
+                    return Ok(built_in);
+                }
                 let message = format!("cannot read config {shown}: {error}");
                 return Err(Failure::usage(message + &config_hint(path)));
             }
@@ -67,10 +79,19 @@ impl ConfigFile {
         Ok(Self { path: path.to_owned(), text })
     }
 
-    /// Returns the config that is used where none is given.
+    /// Returns the config that is used where neither a config nor a log is given.
     pub fn built_in() -> Self {
-        let text = include_str!("../../../configs/depth-ekf.toml").to_owned();
-        Self { path: "configs/depth-ekf.toml".into(), text }
+        Self::new("depth-ekf", include_str!("../../../configs/depth-ekf.toml"))
+    }
+
+    /// Returns the built-in config of a name; `None` if there is none.
+    pub fn named(name: &str) -> Option<Self> {
+        let (name, text) = BUILT_IN.iter().find(|(built_in, _)| *built_in == name)?;
+        Some(Self::new(name, text))
+    }
+
+    fn new(name: &str, text: &str) -> Self {
+        Self { path: format!("configs/{name}.toml").into(), text: text.to_owned() }
     }
 
     /// Returns its name without folder and extension.

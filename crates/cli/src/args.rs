@@ -211,6 +211,8 @@ overlay/000001.png and so on.
 
 Examples:
   tagalong run --overlay --overwrite       (built-in config, drawn log)
+  tagalong run robot.mcap                  (the pipeline for what the log has)
+  tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
   tagalong run configs/depth-ekf.toml robot.mcap
   tagalong run configs/depth-ekf.toml robot.mcap -o out --overlay --overwrite
   tagalong run configs/depth-ekf.toml robot.mcap --format json | jq .funnel";

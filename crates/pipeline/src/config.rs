@@ -34,7 +34,7 @@ use inputs::{Declared, declared_inputs};
 use resolve::resolve;
 pub use tune::{Tunable, check_tuning, with_values};
 
-const OWN: [&str; 11] = [
+const OWN: [&str; 12] = [
     "seed",
     "without",
     "robot",
@@ -43,6 +43,7 @@ const OWN: [&str; 11] = [
     "clock",
     "merge",
     "occlusion",
+    "reidentification",
     "target",
     "command_limiter",
     "collision_monitor",

@@ -7,7 +7,9 @@ use tagalong_following::{
 use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 
-use tagalong_tracking::{ClockSettings, MergeSettings, OcclusionSettings, TrackerSettings};
+use tagalong_tracking::{
+    ClockSettings, MergeSettings, OcclusionSettings, ReidentificationSettings, TrackerSettings,
+};
 
 /// Keys of the pipeline itself. Beside them a config has the plugin sections `[[detectors]]`,
 /// `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` and `[controller]`, each with the name
@@ -36,6 +38,8 @@ pub struct PipelineSettings {
     pub merge: MergeSettings,
     /// Test for people hidden behind others.
     pub occlusion: OcclusionSettings,
+    /// Recognition of people by their appearance.
+    pub reidentification: ReidentificationSettings,
     /// Choice and confirmation of the person to follow.
     pub target: TargetSettings,
     /// Limits on the robot's motion, for any wish of the controller.
@@ -53,8 +57,8 @@ impl PipelineSettings {
 
     /// Returns the settings of the tracker.
     pub(crate) fn tracker(&self) -> TrackerSettings {
-        let Self { clock, merge, occlusion, .. } = self.clone();
-        TrackerSettings { clock, merge, occlusion }
+        let Self { clock, merge, occlusion, reidentification, .. } = self.clone();
+        TrackerSettings { clock, merge, occlusion, reidentification }
     }
 }
 

@@ -14,6 +14,7 @@
 //! | filter updated | | the filter |
 //! | tracks started, confirmed, ended | `table` | the track manager |
 //! | tracks of one person merged | `duplicates` | [`MergeSettings`] |
+//! | people recognised across tracks | `reidentification` | [`ReidentificationSettings`] |
 //!
 //! The tracker itself decides nothing about people: it calls the plugins in this order, checks
 //! their results, and counts the candidates that they drop.
@@ -21,7 +22,8 @@
 //! # Invariants
 //!
 //! * Time never runs backwards for a plugin.
-//! * The number of a track is never used twice, not even after a reset.
+//! * The number of a track is never used twice, not even after a reset. A report gives a person who
+//!   was recognised the earlier number ([`ReidentificationSettings`]).
 //! * Nothing is dropped silently: each loss is counted in the funnel.
 //! * No number that is not finite leaves the tracker.
 //! * Coasting is no separate mode: a predicted occlusion, a wrong rejection by a verifier and a
@@ -36,6 +38,7 @@ mod half_hidden;
 mod memo;
 mod occlusion;
 mod preprocess;
+mod reidentification;
 mod report;
 mod search;
 mod settings;
@@ -47,6 +50,7 @@ mod weighing;
 pub use guarded::{Guarded, StepError};
 pub use memo::Identities;
 pub use preprocess::{Preprocessed, Preprocessor};
+pub use reidentification::ReidentificationSettings;
 pub use report::{Candidate, Fate, Outcome, TrackingReport};
 pub use search::DetectorSlot;
 pub use settings::{

@@ -1,6 +1,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::ReidentificationSettings;
+
 /// Handling of stamps that jump.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -69,6 +71,8 @@ pub struct TrackerSettings {
     pub merge: MergeSettings,
     /// Occlusion of tracks by nearer ones.
     pub occlusion: OcclusionSettings,
+    /// Recognition of people by their appearance.
+    pub reidentification: ReidentificationSettings,
 }
 
 /// Occlusion of people by nearer ones.

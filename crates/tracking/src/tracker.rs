@@ -17,6 +17,7 @@ use crate::occlusion::{
     Occluder, Visibility, occluder_of_detection, occluder_of_estimate, visibility,
 };
 use crate::preprocess::preprocess;
+use crate::reidentification::Reidentifier;
 use crate::search::SearchStage;
 use crate::stage::StageLog;
 use crate::table::TrackTable;
@@ -56,6 +57,7 @@ pub struct Tracker {
     clock: Clock,
     table: TrackTable,
     duplicates: DuplicateFinder,
+    reidentifier: Reidentifier,
     /// The tracks after the last processed frame, in the robot frame of that time.
     last: Vec<Track>,
     /// Processed frames.
@@ -84,6 +86,7 @@ impl Tracker {
         let requires_box = filter.plugin().requirements().image_box;
         Self {
             clock: Clock::new(settings.clock.clone()),
+            reidentifier: Reidentifier::new(settings.reidentification.clone()),
             settings,
             preprocessors,
             search: SearchStage { detectors, verifiers, requires_box, shared: None },
@@ -131,12 +134,14 @@ impl Tracker {
         let tracks = self.manage(frame, &due, posterior, &mut detections, &mut log)?;
         report.tracks = log.timed(STAGES[6], tracks);
         self.learn(frame, &report.tracks)?;
+        report.motion = motion.unwrap_or(report.motion);
+        let people = self.reidentifier.update(frame, &report.motion, &report.tracks);
         log.timed(STAGES[7], ());
         self.frames += 1;
         self.last.clone_from(&report.tracks);
         report.outcome = outcome;
-        report.motion = motion.unwrap_or(report.motion);
-        let report = self.finish(report, detections, log);
+        let mut report = self.finish(report, detections, log);
+        people.renumber(&mut report);
         Ok(Tracked { report, completed })
     }
 
@@ -184,8 +189,14 @@ impl Tracker {
         log: &mut StageLog,
     ) -> Result<(), StepError> {
         let (ids, test) = match outcome {
-            Outcome::ResetBackward { .. } => (self.table.ids(), "track: clock set back"),
-            Outcome::ResetForward { .. } => (self.table.ids(), "track: clock jumped ahead"),
+            Outcome::ResetBackward { .. } => {
+                self.reidentifier.reset(0.0);
+                (self.table.ids(), "track: clock set back")
+            }
+            Outcome::ResetForward { by_s } => {
+                self.reidentifier.reset(by_s);
+                (self.table.ids(), "track: clock jumped ahead")
+            }
             Outcome::Gap { .. } => (self.table.tentative_ids(), "track: gap in the log"),
             Outcome::Tracked | Outcome::Duplicate | Outcome::OutOfOrder => return Ok(()),
         };

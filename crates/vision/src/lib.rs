@@ -2,6 +2,8 @@
 //!
 //! Each fast kernel has a slow, obvious reference in its tests.
 
+mod appearance;
+mod gallery;
 pub mod ground;
 mod integral;
 mod islands;
@@ -11,6 +13,8 @@ pub mod registration;
 mod row_sums;
 mod upright;
 
+pub use appearance::{Appearance, AppearanceDifference};
+pub use gallery::Gallery;
 pub use integral::Integral;
 pub use islands::islands;
 pub use panorama::{Blend, Unwrapper, Unwrapping};

@@ -20,15 +20,33 @@ pub struct Config {
     /// One detection says no more than this, for or against, log-odds.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub max_look: f64,
-    /// Weight of an observation that is the same as the last one, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub same_look: f64,
-    /// A look is a new one after the track, or the robot that sees it, moved so far, m.
+    /// A look is a new one where the track is so far from where it was looked at before, m, or the
+    /// robot from where it looked.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub new_look_m: f64,
-    /// Evidence of a miss, log-odds.
+    /// Repeated looks count up to this times their mean: more where a single look says little, 1
+    /// where verifiers are sure at once, and things must not gain by standing there.
+    #[schemars(range(min = 1.0, max = 1e6))]
+    pub repeated: f64,
+    /// Looks fade with this time constant, s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub look_s: f64,
+    /// A track that moved and then stays must look like before: this part of its usual log-odds is
+    /// taken off within `undecided_s`.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub usual: f64,
+    /// Evidence of each of several misses in a row, log-odds.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub miss_log_odds: f64,
+    /// Evidence of a second in which the filter alone supports the track, log-odds per second.
+    #[schemars(range(min = -1e6, max = 0.0))]
+    pub unverified_log_odds: f64,
+    /// Evidence of a second in which a track is seen and has not moved, log-odds per second ...
+    #[schemars(range(min = -1e6, max = 0.0))]
+    pub still_log_odds: f64,
+    /// ... and at most.
+    #[schemars(range(min = -1e6, max = 0.0))]
+    pub max_still: f64,
     /// Evidence of the track's motion, log-odds.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub moved_log_odds: f64,
@@ -45,7 +63,10 @@ pub struct Config {
     /// Clutter is at a place within this, m.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub clutter_m: f64,
-    /// No place counts for more clutter than this, log-odds.
+    /// Clutter outweighs what was seen of it by this, log-odds ...
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_clutter: f64,
+    /// ... but no place counts for more clutter than this.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub max_clutter: f64,
     /// A track that is not confirmed ends after this many misses in a row.
@@ -69,16 +90,22 @@ impl Default for Config {
             confirm_log_odds: 4.6,
             end_log_odds: -2.0,
             max_log_odds: 8.0,
-            max_look: 3.0,
-            same_look: 0.1,
-            new_look_m: 0.15,
+            max_look: 10.0,
+            new_look_m: 0.25,
+            repeated: 2.0,
+            look_s: 4.0,
+            usual: 0.5,
             miss_log_odds: -0.5,
+            unverified_log_odds: -1.0,
+            still_log_odds: -0.75,
+            max_still: -1.5,
             moved_log_odds: 3.0,
-            moved_m: 0.4,
+            moved_m: 0.5,
             undecided_s: 2.0,
             clutter_s: 60.0,
             clutter_m: 0.3,
-            max_clutter: 6.0,
+            min_clutter: 3.0,
+            max_clutter: 10.0,
             tentative_misses: 2,
             drop_after_s: 1.0,
             left_drop_after_s: 2.0,

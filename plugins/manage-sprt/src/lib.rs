@@ -4,16 +4,18 @@
 //! The log-odds that a track is a person add up over its detections and misses until they pass
 //! one bound or the other. Two things keep furniture from gathering belief:
 //!
-//! * Looks at a thing that stands still before a camera that stands still are one look,
-//!   repeated: they count for a fraction. A look counts in full again when the track has moved
-//!   or the robot sees it from elsewhere.
-//! * Persons move. A track that has moved further than its uncertainty explains gains belief
-//!   once; one that never moved, and that repeated looks did not prove, ends, and its place is
-//!   remembered as clutter, in the frame of the world.
+//! * Looks at a thing that stands still before a camera that stands still are one look, repeated,
+//!   and count little more than their mean. A look counts for itself when the track is at a new place, or
+//!   the robot sees it from elsewhere.
+//! * Persons move. Each second in which a track is seen and did not move speaks against it, up to a
+//!   bound that only sure looks of verifiers outweigh. A track that has moved further than its
+//!   uncertainty explains gains belief once, and may stand still from then on. One that never moved
+//!   and was not proven ends, and its places are remembered as clutter, in the frame of the world.
 
 mod clutter;
 mod config;
 mod evidence;
+mod looks;
 mod manage;
 #[cfg(test)]
 mod tests;

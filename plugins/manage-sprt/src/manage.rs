@@ -1,8 +1,8 @@
 use std::collections::BTreeMap;
 
 use tagalong_core::{
-    EgoMotion, Initiation, ObservedTrack, Result, Track, TrackChanges, TrackHealth, TrackId,
-    TrackManager, Unassociated,
+    EgoMotion, Initiation, ObservedTrack, Result, TrackChanges, TrackHealth, TrackId, TrackManager,
+    Unassociated,
 };
 
 use crate::Config;
@@ -29,16 +29,14 @@ impl Sprt {
         Ok(Self { config, evidence, clutter, dt_s: 0.0 })
     }
 
-    /// Remembers the place of an ended track as clutter, as far as it was disproved.
-    fn add_clutter(&mut self, track: &Track, test: &str) {
-        let Config { clutter_m, max_clutter, max_look, end_log_odds, .. } = self.config;
-        let against = match test {
-            NEVER_MOVED => max_look,
-            "track: evidence" => -end_log_odds,
-            _ => return,
-        };
-        let at = track.estimate.person.position.xy();
-        self.clutter.add(at, against, clutter_m, max_clutter);
+    /// Remembers as clutter the places of a track that never moved: what it showed there is no
+    /// evidence for a person.
+    fn add_clutter(&mut self, evidence: &Evidence) {
+        let Config { clutter_m, min_clutter, max_clutter, .. } = self.config;
+        for (at, look) in evidence.looks().by_place() {
+            let against = (look + min_clutter).clamp(min_clutter, max_clutter);
+            self.clutter.add(at, against, clutter_m);
+        }
     }
 }
 
@@ -50,7 +48,8 @@ impl TrackManager for Sprt {
     fn predict(&mut self, motion: &EgoMotion) {
         self.dt_s = motion.dt;
         self.clutter.predict(motion, self.config.clutter_s);
-        self.evidence.values_mut().for_each(|evidence| evidence.predict(motion));
+        let config = &self.config;
+        self.evidence.values_mut().for_each(|evidence| evidence.predict(motion, config));
     }
 
     fn initiate(&mut self, id: TrackId, candidate: &Unassociated<'_>) -> Initiation {
@@ -65,12 +64,12 @@ impl TrackManager for Sprt {
         }
         let at = detection.position.xy();
         let against = self.clutter.against(&at, self.config.clutter_m);
-        let look = detection.score.min(self.config.max_look);
-        if look - against < start_log_odds {
+        if detection.score - against < start_log_odds {
+            self.clutter.renew(&at, self.config.clutter_m);
             return Initiation::Drop("clutter");
         }
-        let evidence = Evidence::new(look - against, at, &self.config);
-        let health = evidence.health();
+        let evidence = Evidence::new(detection.score, at, against, &self.config);
+        let health = evidence.health(&self.config);
         self.evidence.insert(id, evidence);
         Initiation::Start(health)
     }
@@ -78,13 +77,17 @@ impl TrackManager for Sprt {
     fn manage(&mut self, tracks: &[ObservedTrack<'_>]) -> TrackChanges {
         let mut changes = TrackChanges::default();
         for ObservedTrack { track, observation } in tracks {
+            let at = track.estimate.person.position.xy();
+            let clutter = self.clutter.against(&at, self.config.clutter_m);
             let Some(evidence) = self.evidence.get_mut(&track.id) else { continue };
-            evidence.add(track, *observation, self.dt_s, &self.config);
-            changes.health.push((track.id, evidence.health()));
+            evidence.add(track, *observation, clutter, self.dt_s, &self.config);
+            changes.health.push((track.id, evidence.health(&self.config)));
             let test = evidence.end_test(*observation, track.unseen_s, &self.config);
-            if let Some(test) = test {
-                changes.ends.push((track.id, test));
-                self.add_clutter(track, test);
+            let Some(test) = test else { continue };
+            changes.ends.push((track.id, test));
+            if test == NEVER_MOVED {
+                let evidence = evidence.clone();
+                self.add_clutter(&evidence);
             }
         }
         changes
@@ -96,7 +99,7 @@ impl TrackManager for Sprt {
         let older = self.evidence.get_mut(&kept)?;
         older.confirmed |= younger.confirmed;
         older.moved |= younger.moved;
-        Some(older.health())
+        Some(older.health(&self.config))
     }
 
     fn stop(&mut self, id: TrackId) {

@@ -202,10 +202,65 @@ fn settings_that_cannot_work_are_refused() {
         Config { confirm_log_odds: -1.0, ..Config::default() },
         Config { end_log_odds: 0.5, ..Config::default() },
         Config { max_log_odds: 1.0, ..Config::default() },
-        Config { same_look: 1.1, ..Config::default() },
+        Config { usual: 1.1, ..Config::default() },
         Config { miss_log_odds: 0.1, ..Config::default() },
         Config { clutter_s: f64::NAN, ..Config::default() },
     ] {
         assert!(Sprt::new(config.clone()).is_err(), "{config:?}");
     }
+}
+
+/// The settings for verifiers that are sure at the first look.
+fn verified() -> Config {
+    Config { repeated: 1.0, still_log_odds: -4.5, max_still: -9.0, ..Config::default() }
+}
+
+/// The detector finds now one end of a blanket and now the other, and verifiers half believe it.
+#[test]
+fn a_thing_that_is_found_at_two_places_has_not_moved() {
+    let mut scene = Scene::new(verified());
+    for i in 0..300 {
+        let x = if i / 7 % 2 == 0 { 3.0 } else { 3.55 };
+        scene.frame(still(), Some(detection(x, 6.0)));
+    }
+    assert!(scene.ends[0].0 < 2.3, "{:?}", scene.ends);
+    assert!(scene.confirmed_s < 2.3 && scene.ends.len() == 1, "{:?}", scene.ends);
+}
+
+#[test]
+fn verifiers_keep_a_person_who_stands_from_the_first_frame_and_no_thing() {
+    let confirmed_s = |score: f64| {
+        let mut scene = Scene::new(verified());
+        (0..300).for_each(|_| scene.frame(still(), Some(detection(3.0, score))));
+        scene.confirmed_s
+    };
+    assert!(confirmed_s(10.0) > 29.0 && confirmed_s(6.0) < 2.3);
+}
+
+/// A person walks to a wall and out of sight, and the detector finds a little in the wall.
+#[test]
+fn a_track_that_changes_over_to_a_thing_ends() {
+    let confirmed_s = |score: f64| {
+        let mut scene = Scene::new(verified());
+        for i in 0..200 {
+            let x = 5.0 - 0.1 * f64::from(i.min(20));
+            let score = if i <= 20 { 10.0 } else { score };
+            scene.frame(still(), Some(detection(x, score)));
+        }
+        scene.confirmed_s
+    };
+    assert!(confirmed_s(0.3) < 7.0, "{}", confirmed_s(0.3));
+    assert!(confirmed_s(6.0) > 19.0, "a person who stops is less clear, and stays");
+}
+
+/// Past looks are bounded, so that a few bad ones count.
+#[test]
+fn looks_against_a_person_end_a_track_in_time() {
+    let mut scene = Scene::new(verified());
+    for i in 0..60 {
+        let x = 9.0 - 0.1 * f64::from(i);
+        scene.frame(still(), Some(detection(x, if i < 40 { 10.0 } else { -5.0 })));
+    }
+    let (ended_s, test) = scene.ends[0];
+    assert!(ended_s < 5.5 && test == "track: evidence", "{:?}", scene.ends);
 }

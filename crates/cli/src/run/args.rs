@@ -6,7 +6,8 @@ use tagalong_app::format::Format;
 /// Arguments of `tagalong run`.
 #[derive(Args, Debug)]
 pub struct RunArgs {
-    /// The pipeline, a TOML file [default: depth-ekf, built in].
+    /// The pipeline, a TOML file or the name of a built-in one: depth-verified, depth-ekf,
+    /// stereo-best, omni-best, mono [default: the one for what the log has].
     pub config: Option<PathBuf>,
     /// The log, an MCAP file with ROS 2 messages [default: a short simulated one, written to
     /// runs/sample.mcap].
@@ -39,10 +40,27 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
-    /// Returns the path of the log.
+    /// Returns the path of the log: a single path is that of the log if it looks like one.
     pub fn log(&self) -> &Path {
-        self.log.as_deref().unwrap_or(Path::new(SAMPLE))
+        let single = self.config.as_deref().filter(|path| is_log(path));
+        self.log.as_deref().or(single).unwrap_or(Path::new(SAMPLE))
     }
+
+    /// Returns true if a log is given.
+    pub fn has_log(&self) -> bool {
+        self.log.is_some() || self.config.as_deref().is_some_and(is_log)
+    }
+
+    /// Returns the config, if one is given.
+    pub fn config(&self) -> Option<&Path> {
+        self.config.as_deref().filter(|path| self.log.is_some() || !is_log(path))
+    }
+}
+
+/// Returns true for the path of a log, as opposed to that of a config: an MCAP file, or a folder
+/// with one.
+fn is_log(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "mcap") || path.is_dir()
 }
 
 /// Path of the simulated log that stands in for a real one.

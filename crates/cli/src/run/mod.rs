@@ -1,6 +1,7 @@
 //! `tagalong run`: reads a log and a config, writes a directory of results.
 
 mod args;
+mod choice;
 mod frames;
 mod pictures;
 mod report;
@@ -37,7 +38,7 @@ use tagalong_simulate::sample;
 /// that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
-    if args.log.is_none() {
+    if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
         say(&format!("no log given: two drawn people walk through {}", args.log().display()));
     }
@@ -68,8 +69,11 @@ struct Job {
 
 impl Job {
     fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
-        let config =
-            args.config.as_deref().map_or_else(|| Ok(ConfigFile::built_in()), ConfigFile::read)?;
+        let config = match args.config() {
+            Some(config) => ConfigFile::read(config)?,
+            None if !args.has_log() => ConfigFile::built_in(),
+            None => choice::choose(args.log(), registry)?,
+        };
         let (pipeline, settings) = config.pipeline(registry, args.seed)?;
         let outer = config.outer()?;
         check_log_path(args.log())?;

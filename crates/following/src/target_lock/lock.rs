@@ -2,8 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point2, Vector2};
 use tagalong_core::{EgoMotion, Frame, Person, Track, TrackId};
+use tagalong_vision::Appearance;
 
-use super::looks::Looks;
 use super::memory::{Differences, Memory};
 use super::settings::TargetSettings;
 
@@ -242,15 +242,15 @@ impl TargetLock {
     }
 
     /// Returns the appearance of all tracks that are seen whole.
-    fn looks(&self, frame: &Frame, tracks: &[Track]) -> BTreeMap<TrackId, Looks> {
+    fn looks(&self, frame: &Frame, tracks: &[Track]) -> BTreeMap<TrackId, Appearance> {
         let whole = |track: &&Track| track.confirmed && track.seen && !track.occluded;
         let all = tracks.iter().filter(|track| self.settings.remember && whole(track));
-        all.map(|track| (track.id, Looks::of(track, frame))).collect()
+        all.map(|track| (track.id, Appearance::of(&track.estimate, frame))).collect()
     }
 
     /// Returns the similarity of all tracks to the person, with the log-odds.
-    fn likeness(&self, looks: &BTreeMap<TrackId, Looks>) -> Vec<(Likeness, f64)> {
-        let of = |(track, looks): (&TrackId, &Looks)| {
+    fn likeness(&self, looks: &BTreeMap<TrackId, Appearance>) -> Vec<(Likeness, f64)> {
+        let of = |(track, looks): (&TrackId, &Appearance)| {
             let differences = self.memory.differences(looks)?;
             // The clamp keeps one frame of unusual light from outweighing all others.
             let odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
@@ -470,7 +470,7 @@ impl TargetLock {
     }
 
     /// Learns the appearance of the person, and of others, while that is certain.
-    fn learn(&mut self, tracks: &[Track], mut looks: BTreeMap<TrackId, Looks>) {
+    fn learn(&mut self, tracks: &[Track], mut looks: BTreeMap<TrackId, Appearance>) {
         let certain = matches!(self.state, LockState::Training | LockState::Locked);
         if !certain || self.doubtful {
             return;

@@ -1,40 +1,35 @@
-use std::collections::VecDeque;
+use tagalong_vision::{Appearance, Gallery};
 
-use super::looks::{Difference, Looks};
 use super::settings::LooksSettings;
 
-/// Most remembered appearances of the person, and of others.
-const MOST: usize = 24;
 /// Number of first appearances that are never forgotten: they are certain.
 const KEPT: usize = 8;
-/// Mean difference from the known appearances below which a new one is not stored.
-const NEWS: f64 = 0.06;
 
 /// Memory of the appearance of the person, and of others.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
-    own: VecDeque<Looks>,
-    others: VecDeque<Looks>,
+    own: Gallery,
+    others: Gallery,
     /// Sum of the heights of the head, m, and their number.
     heights: (f64, f64),
 }
 
 impl Memory {
     /// Learns an appearance of the person.
-    pub(crate) fn learn(&mut self, looks: Looks) {
+    pub(crate) fn learn(&mut self, looks: Appearance) {
         self.heights = (self.heights.0 + looks.height_m, self.heights.1 + 1.0);
-        remember(&mut self.own, looks, KEPT);
+        self.own.add(looks, KEPT);
     }
 
     /// Learns an appearance of another person.
-    pub(crate) fn learn_other(&mut self, looks: Looks) {
-        remember(&mut self.others, looks, 0);
+    pub(crate) fn learn_other(&mut self, looks: Appearance) {
+        self.others.add(looks, 0);
     }
 
     /// Returns the differences of an appearance from the person's; `None` without a memory.
-    pub(crate) fn differences(&self, looks: &Looks) -> Option<Differences> {
-        let own = nearest(&self.own, looks)?;
-        let other = nearest(&self.others, looks);
+    pub(crate) fn differences(&self, looks: &Appearance) -> Option<Differences> {
+        let own = self.own.nearest(looks)?;
+        let other = self.others.nearest(looks);
         let height_m = self.heights.0 / self.heights.1;
         Some(Differences {
             torso: own.torso,
@@ -76,32 +71,13 @@ impl Differences {
     }
 }
 
-/// Adds an appearance that is new; the oldest that is not among the first `kept` goes.
-fn remember(all: &mut VecDeque<Looks>, looks: Looks, kept: usize) {
-    let differs = |known: &Looks| looks.difference(known).mean().is_some_and(|d| d > NEWS);
-    if !all.is_empty() && !all.iter().all(differs) {
-        return;
-    }
-    if all.len() == MOST {
-        all.remove(kept);
-    }
-    all.push_back(looks);
-}
-
-/// Returns the difference from the most similar of several appearances.
-fn nearest(all: &VecDeque<Looks>, looks: &Looks) -> Option<Difference> {
-    let differences = all.iter().map(|known| looks.difference(known));
-    let mean = |d: &Difference| d.mean().unwrap_or(0.0);
-    differences.min_by(|a, b| mean(a).total_cmp(&mean(b)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// An appearance with a height, and a shirt of this colour.
-    fn looks(height_m: f64, colour: Option<usize>) -> Looks {
-        Looks::in_one_colour(height_m, colour)
+    fn looks(height_m: f64, colour: Option<usize>) -> Appearance {
+        Appearance::in_one_colour(height_m, colour)
     }
 
     #[test]
@@ -131,20 +107,6 @@ mod tests {
         memory.learn_other(looks(1.6, Some(2)));
         let rivals = |colour| memory.differences(&looks(1.6, Some(colour))).unwrap().rivals;
         assert_eq!([1, 2, 3].map(rivals), [Some(1.0), Some(-1.0), Some(0.0)]);
-    }
-
-    #[test]
-    fn only_news_are_remembered_and_the_first_looks_are_never_forgotten() {
-        let mut all = VecDeque::new();
-        for colour in [1, 1, 2, 1, 2] {
-            remember(&mut all, looks(1.6, Some(colour)), KEPT);
-        }
-        assert_eq!(all.len(), 2);
-        let mut all = VecDeque::new();
-        (0..26).for_each(|colour| remember(&mut all, looks(1.6, Some(colour)), KEPT));
-        assert_eq!(all.len(), MOST);
-        let known = |colour| all.contains(&looks(1.6, Some(colour)));
-        assert!((0..8).all(known) && !known(8) && !known(9) && (10..26).all(known));
     }
 
     #[test]

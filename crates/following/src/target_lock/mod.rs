@@ -7,7 +7,6 @@
 //! one that was seen at the same time as the person, nor to one that stands where such a one stood.
 
 mod lock;
-mod looks;
 mod memory;
 mod search;
 mod settings;

@@ -12,6 +12,8 @@ const STEERING: Inputs =
     Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
 /// Inputs of `[odometry]`.
 const ODOMETRY: Inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+/// Inputs of `[reidentification]`.
+const REIDENTIFICATION: Inputs = Inputs::NONE.accept(Input::Colour).accept(Input::Depth);
 /// Inputs of `[stereo]`, which leaves a frame with depth unchanged.
 const STEREO: Inputs =
     Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
@@ -31,8 +33,10 @@ pub(super) fn declared_inputs(
 ) -> Result<Inputs, ConfigError> {
     let odometry = settings.odometry.is_some().then_some(("[odometry]", ODOMETRY));
     let steering = has_controller.then_some(("[collision_monitor]", STEERING));
+    let remembers = settings.reidentification.remember_s > 0.0;
+    let people = remembers.then_some(("[reidentification]", REIDENTIFICATION));
     let users: Vec<Declared<'_>> =
-        plugins.iter().copied().chain(odometry).chain(steering).collect();
+        plugins.iter().copied().chain(odometry).chain(steering).chain(people).collect();
     // The pipeline computes depth from the pair; that of the log is used where it is there.
     let has_stereo = settings.stereo.is_some();
     let of_log = |inputs: Inputs| if has_stereo { inputs.relax(Input::Depth) } else { inputs };

@@ -1,4 +1,6 @@
-use tagalong_core::{Frame, Track};
+//! Appearance of a person: colours of upper body and legs, and directions of edges.
+
+use tagalong_core::{Estimate, Frame};
 use tagalong_geometry::{HEAD_BELOW_TOP_M, Rect, UPPER_BODY_SIDE_M};
 
 /// Bins of hues.
@@ -27,10 +29,13 @@ const LEGS: [f64; 3] = [0.9, 1.3, 0.15];
 type Histogram<const N: usize> = [f64; N];
 
 /// Appearance of a person in one frame; parts that the images do not show are missing.
+///
+/// Hues are weighted by saturation and shared between neighbouring bins, so that a change of the
+/// light moves little of a histogram.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Looks {
+pub struct Appearance {
     /// Height of the centre of the head, m.
-    pub(crate) height_m: f64,
+    pub height_m: f64,
     torso: Option<Histogram<COLOURS>>,
     legs: Option<Histogram<COLOURS>>,
     texture: Option<Histogram<EDGES>>,
@@ -38,15 +43,18 @@ pub(crate) struct Looks {
 
 /// Hellinger distances between two appearances, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Difference {
-    pub(crate) torso: Option<f64>,
-    pub(crate) legs: Option<f64>,
-    pub(crate) texture: Option<f64>,
+pub struct AppearanceDifference {
+    /// Colours of the upper body.
+    pub torso: Option<f64>,
+    /// Colours of the legs.
+    pub legs: Option<f64>,
+    /// Directions of edges on the upper body.
+    pub texture: Option<f64>,
 }
 
-impl Difference {
+impl AppearanceDifference {
     /// Returns the mean of the known parts; `None` if there are none.
-    pub(crate) fn mean(&self) -> Option<f64> {
+    pub fn mean(&self) -> Option<f64> {
         let known = [self.torso, self.legs, self.texture];
         let (sum, count) =
             known.iter().flatten().fold((0.0, 0), |(sum, count), d| (sum + d, count + 1));
@@ -54,28 +62,29 @@ impl Difference {
     }
 }
 
-impl Looks {
-    /// Returns the appearance of the person of a track.
-    pub(crate) fn of(track: &Track, frame: &Frame) -> Self {
-        let height_m = track.estimate.person.position.z;
-        let torso = Patch::of(track, frame, TORSO);
+impl Appearance {
+    /// Returns the appearance of a tracked person.
+    pub fn of(estimate: &Estimate, frame: &Frame) -> Self {
+        let height_m = estimate.person.position.z;
+        let torso = Patch::of(estimate, frame, TORSO);
         Self {
             height_m,
             torso: torso.colours(),
-            legs: Patch::of(track, frame, LEGS).colours(),
+            legs: Patch::of(estimate, frame, LEGS).colours(),
             texture: torso.edges(),
         }
     }
 
-    /// Returns the appearance of a person whose upper body has one colour of the histogram's.
-    #[cfg(test)]
-    pub(crate) fn in_one_colour(height_m: f64, colour: Option<usize>) -> Self {
+    /// Returns the appearance of a person whose upper body has the colour of one bin, or of none:
+    /// for tests of what remembers appearances.
+    pub fn in_one_colour(height_m: f64, colour: Option<usize>) -> Self {
         let torso = colour.map(|bin| std::array::from_fn(|i| f64::from(i == bin)));
         Self { height_m, torso, legs: None, texture: None }
     }
 
-    pub(crate) fn difference(&self, other: &Self) -> Difference {
-        Difference {
+    /// Returns the distances to another appearance; of parts that one of them lacks, `None`.
+    pub fn difference(&self, other: &Self) -> AppearanceDifference {
+        AppearanceDifference {
             torso: both(&self.torso, &other.torso),
             legs: both(&self.legs, &other.legs),
             texture: both(&self.texture, &other.texture),
@@ -102,8 +111,8 @@ struct Patch<'f> {
 }
 
 impl<'f> Patch<'f> {
-    fn of(track: &Track, frame: &'f Frame, [from_m, to_m, half_m]: [f64; 3]) -> Self {
-        let region = &track.estimate.region;
+    fn of(estimate: &Estimate, frame: &'f Frame, [from_m, to_m, half_m]: [f64; 3]) -> Self {
+        let region = &estimate.region;
         let px = region.height / UPPER_BODY_SIDE_M;
         let (centre, head_y) = (region.centre().x, region.y + HEAD_BELOW_TOP_M * px);
         let whole = Rect::new(
@@ -119,7 +128,7 @@ impl<'f> Patch<'f> {
         Self {
             frame,
             area: if is_most { area } else { Rect::default() },
-            depth_m: camera.depth_of(&track.estimate.person.position),
+            depth_m: camera.depth_of(&estimate.person.position),
         }
     }
 
@@ -323,11 +332,11 @@ mod tests {
 
     #[test]
     fn the_mean_difference_is_that_of_what_is_known() {
-        let none = Difference::default();
+        let none = AppearanceDifference::default();
         assert_eq!(none.mean(), None);
-        let some = Difference { torso: Some(0.2), texture: Some(0.6), ..none };
+        let some = AppearanceDifference { torso: Some(0.2), texture: Some(0.6), ..none };
         assert!((some.mean().unwrap() - 0.4).abs() < 1e-12);
-        assert_eq!(Difference { legs: Some(0.3), ..none }.mean(), Some(0.3));
+        assert_eq!(AppearanceDifference { legs: Some(0.3), ..none }.mean(), Some(0.3));
     }
 
     mod pictures {
@@ -352,11 +361,11 @@ mod tests {
 
         /// A person whose face is 2 m away, where a metre is 100 pixels: a head at row 60, a shirt
         /// from row 85 to 125, trousers from row 150 to 190.
-        fn somebody(y_m: f64) -> Track {
+        fn person(y_m: f64) -> Estimate {
             let mut track = target(2.08, y_m, Vector2::zeros());
             track.estimate.person.position = Point3::new(2.08, y_m, 1.6);
             track.estimate.region = camera().upper_body(&track.estimate.person.position);
-            track
+            track.estimate
         }
 
         fn frame(colour: impl Fn(usize, usize) -> [u8; 3], depth: Option<DepthImage>) -> Frame {
@@ -384,7 +393,7 @@ mod tests {
 
         #[test]
         fn a_shirt_and_trousers_are_looked_at_and_nothing_beside_them() {
-            let looks = Looks::of(&somebody(0.0), &frame(dressed, None));
+            let looks = Appearance::of(&person(0.0), &frame(dressed, None));
             assert!((share(&looks.torso, 0) - 1.0).abs() < 1e-9, "{looks:?}");
             assert!((share(&looks.legs, 8) - 1.0).abs() < 1e-9, "{looks:?}");
             assert_eq!(looks.height_m, 1.6);
@@ -392,7 +401,7 @@ mod tests {
                 (144..=175, 86..124) | (146..=173, 151..189) => GREEN,
                 _ => RED,
             };
-            let looks = Looks::of(&somebody(0.0), &frame(naked, None));
+            let looks = Appearance::of(&person(0.0), &frame(naked, None));
             let part = share(&looks.torso, 0);
             assert!((0.01..0.3).contains(&part), "nor is less looked at: {part}");
             let part = share(&looks.legs, 0);
@@ -410,7 +419,7 @@ mod tests {
                 })
             };
             let striped = |x: usize, _: usize| if (155..165).contains(&x) { RED } else { GREEN };
-            let looks = |metres| Looks::of(&somebody(0.0), &frame(striped, Some(depth(metres))));
+            let looks = |metres| Appearance::of(&person(0.0), &frame(striped, Some(depth(metres))));
             assert!((share(&looks(2.0).torso, 0) - 1.0).abs() < 1e-9);
             assert!(looks(2.4).torso.is_some() && looks(1.75).torso.is_some());
             assert!(looks(2.45).torso.is_none() && looks(1.7).torso.is_none());
@@ -421,12 +430,12 @@ mod tests {
         fn who_is_half_outside_of_the_image_is_not_looked_at() {
             let plain = frame(|_, _| RED, None);
             // A metre to the left is 96 pixels: the shirt reaches 17 to both sides.
-            assert!(Looks::of(&somebody(1.6), &plain).torso.is_some());
-            assert!(Looks::of(&somebody(1.7), &plain).torso.is_none());
-            let seen = Looks::of(&somebody(0.0), &plain);
+            assert!(Appearance::of(&person(1.6), &plain).torso.is_some());
+            assert!(Appearance::of(&person(1.7), &plain).torso.is_none());
+            let seen = Appearance::of(&person(0.0), &plain);
             assert_eq!(
                 seen.difference(&seen),
-                Difference { torso: Some(0.0), legs: Some(0.0), texture: Some(0.0) }
+                AppearanceDifference { torso: Some(0.0), legs: Some(0.0), texture: Some(0.0) }
             );
         }
 
@@ -436,7 +445,7 @@ mod tests {
             let across = frame(|x, _| grey(16 * (x % 8)), None);
             let down = frame(|_, y| grey(16 * (y % 8)), None);
             let [across, down, even] = [across, down, frame(|_, _| GREEN, None)]
-                .map(|frame| Looks::of(&somebody(0.0), &frame).texture.unwrap());
+                .map(|frame| Appearance::of(&person(0.0), &frame).texture.unwrap());
             assert!(across[0] > 0.99, "{across:?}");
             assert!(down[4] > 0.99, "{down:?}");
             assert!(even[EDGES - 1] > 0.99, "{even:?}");
@@ -451,7 +460,7 @@ mod tests {
                 EgoMotion::at_rest(0.1),
                 Images::default(),
             );
-            let looks = Looks::of(&somebody(0.0), &bare);
+            let looks = Appearance::of(&person(0.0), &bare);
             assert_eq!((looks.torso, looks.legs, looks.texture), (None, None, None));
         }
     }

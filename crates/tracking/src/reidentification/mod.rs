@@ -1,0 +1,296 @@
+//! Numbers of people across tracks.
+//!
+//! A track is not a person: one who leaves and comes back gets another track, and behind another
+//! person a track may change over. This stage remembers the appearance of each person, and decides
+//! which number a track is reported with. It changes nothing else: detection, association and
+//! filter work on tracks.
+//!
+//! A number is taken over only if the appearance is similar, every other remembered person is
+//! clearly less similar, and the person can have got there: a wrong number is worse than a new one.
+
+mod person;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Point2;
+use tagalong_core::{EgoMotion, Frame, Track, TrackId};
+use tagalong_vision::Appearance;
+
+use person::{Identity, Person};
+pub use settings::ReidentificationSettings;
+
+use crate::{Fate, TrackingReport};
+
+/// Numbers of the people of one frame.
+#[derive(Default)]
+pub(crate) struct People {
+    /// Numbers by track, where they are not the track's own.
+    numbers: BTreeMap<TrackId, TrackId>,
+    /// Numbers that were reported and belong to no person any more.
+    given_up: Vec<TrackId>,
+}
+
+impl People {
+    /// Puts the numbers of the people in place of those of the tracks.
+    pub(crate) fn renumber(self, report: &mut TrackingReport) {
+        if self.numbers.is_empty() && self.given_up.is_empty() {
+            return;
+        }
+        let number = |id: &mut TrackId| *id = self.numbers.get(id).copied().unwrap_or(*id);
+        report.tracks.iter_mut().for_each(|track| number(&mut track.id));
+        report.nis.iter_mut().for_each(|(id, ..)| number(id));
+        for candidate in &mut report.candidates {
+            if let Fate::Matched(id) | Fate::Started(id) = &mut candidate.fate {
+                number(id);
+            }
+        }
+        report.ended.extend(self.given_up);
+    }
+}
+
+/// The stage.
+pub(crate) struct Reidentifier {
+    settings: ReidentificationSettings,
+    /// Identity of each track.
+    tracks: BTreeMap<TrackId, Identity>,
+    /// People without a track.
+    absent: Vec<Person>,
+}
+
+impl Reidentifier {
+    pub(crate) fn new(settings: ReidentificationSettings) -> Self {
+        Self { settings, tracks: BTreeMap::new(), absent: Vec::new() }
+    }
+
+    /// Takes in a frame, and returns the numbers of the people.
+    pub(crate) fn update(&mut self, frame: &Frame, motion: &EgoMotion, tracks: &[Track]) -> People {
+        if self.settings.remember_s == 0.0 {
+            return People::default();
+        }
+        self.predict(motion);
+        self.release_ended(tracks);
+        self.note_rivals(tracks);
+        self.add_appearances(frame, tracks);
+        self.tell_apart(tracks);
+        let given_up = self.recognise(tracks);
+        self.note_reported(tracks);
+        let numbers = self.tracks.iter().map(|(id, identity)| (*id, identity.person.number));
+        let numbers = numbers.filter(|(id, number)| id != number).collect();
+        People { numbers, given_up }
+    }
+
+    /// Takes in a jump of the clock, which ended all tracks.
+    pub(crate) fn reset(&mut self, pause_s: f64) {
+        self.release_ended(&[]);
+        self.absent.iter_mut().for_each(|person| person.lose_place(pause_s));
+    }
+
+    /// Moves all memories into the robot's new frame, and forgets people who are long gone.
+    fn predict(&mut self, motion: &EgoMotion) {
+        for identity in self.tracks.values_mut() {
+            identity.person.predict(motion);
+            identity.age_s += motion.dt;
+        }
+        self.absent.iter_mut().for_each(|person| person.predict(motion));
+        let settings = &self.settings;
+        self.absent.retain(|person| !person.is_forgotten(settings));
+    }
+
+    /// Keeps the people whose tracks ended.
+    fn release_ended(&mut self, tracks: &[Track]) {
+        let alive: BTreeSet<TrackId> = tracks.iter().map(|track| track.id).collect();
+        let ended: Vec<TrackId> =
+            self.tracks.keys().copied().filter(|id| !alive.contains(id)).collect();
+        for mut identity in ended.into_iter().filter_map(|id| self.tracks.remove(&id)) {
+            // Appearances after a contact may be of another person.
+            if identity.rivals.is_empty() {
+                identity.settle();
+            }
+            if identity.reported && identity.person.is_known() {
+                self.absent.push(identity.person);
+            }
+        }
+    }
+
+    /// Notes new tracks, and which tracks may change over.
+    fn note_rivals(&mut self, tracks: &[Track]) {
+        for track in tracks {
+            let new = || Identity::new(track.id, place(track));
+            self.tracks.entry(track.id).or_insert_with(new);
+        }
+        for (index, a) in tracks.iter().enumerate() {
+            for b in &tracks[index + 1..] {
+                let are_near = (place(a) - place(b)).norm() < self.settings.alone_m;
+                if are_near && a.confirmed && b.confirmed {
+                    self.add_rivals(a.id, b.id);
+                }
+            }
+        }
+    }
+
+    fn add_rivals(&mut self, a: TrackId, b: TrackId) {
+        let number = |id| self.tracks.get(&id).map(|identity| identity.person.number);
+        let (Some(first), Some(second)) = (number(a), number(b)) else { return };
+        for (id, rival) in [(a, second), (b, first)] {
+            if let Some(identity) = self.tracks.get_mut(&id) {
+                identity.rivals.insert(rival);
+                if !identity.is_new {
+                    identity.unsure.clear();
+                }
+            }
+        }
+    }
+
+    /// Adds the appearances of this frame of all tracks that are seen, and near to no other.
+    fn add_appearances(&mut self, frame: &Frame, tracks: &[Track]) {
+        for track in tracks.iter().filter(|track| track.seen && !track.occluded) {
+            let is_near = |other: &Track| {
+                other.id != track.id && (place(other) - place(track)).norm() < self.settings.alone_m
+            };
+            let covered = tracks.iter().any(|other| other.seen && covers(other, track));
+            let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
+            identity.person.see(place(track));
+            if covered || tracks.iter().any(is_near) {
+                continue;
+            }
+            let appearance = Appearance::of(&track.estimate, frame);
+            if appearance.difference(&appearance).mean().is_some() {
+                identity.add(appearance);
+            }
+        }
+    }
+
+    /// Decides who is who among tracks that were near to each other.
+    fn tell_apart(&mut self, tracks: &[Track]) {
+        for track in tracks {
+            let Some(identity) = self.tracks.get(&track.id) else { continue };
+            let enough = identity.unsure.len() >= self.settings.appearances as usize;
+            if identity.is_new || identity.rivals.is_empty() || !enough {
+                continue;
+            }
+            match self.better_rival(identity) {
+                Some(number) => self.change_over(track.id, number),
+                None => self.settle(track.id),
+            }
+        }
+    }
+
+    fn settle(&mut self, id: TrackId) {
+        if let Some(identity) = self.tracks.get_mut(&id) {
+            identity.settle();
+        }
+    }
+
+    /// Returns the number of the rival to whom the appearances after a contact belong.
+    fn better_rival(&self, identity: &Identity) -> Option<TrackId> {
+        let ReidentificationSettings { max_difference, margin, .. } = self.settings;
+        let unsure = &identity.unsure;
+        let own = identity.person.difference(unsure)?;
+        let rivals = identity.rivals.iter().filter_map(|number| self.person(*number));
+        let differences = rivals.filter_map(|person| Some((person, person.difference(unsure)?)));
+        let (best, difference) = differences.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let fits = difference <= max_difference
+            && difference + margin < own
+            && best.fits_height(unsure, &self.settings);
+        (fits && self.agrees(identity, best, own - difference)).then_some(best.number)
+    }
+
+    /// Returns true unless the rival's track, seen after the contact, speaks against the change by
+    /// more than the gain of this one.
+    fn agrees(&self, identity: &Identity, rival: &Person, gain: f64) -> bool {
+        let holder = self.tracks.values().find(|other| other.person.number == rival.number);
+        let Some(holder) = holder.filter(|holder| !holder.unsure.is_empty()) else { return true };
+        let (stays, changes) =
+            (rival.difference(&holder.unsure), identity.person.difference(&holder.unsure));
+        stays.zip(changes).is_none_or(|(stays, changes)| stays + gain > changes)
+    }
+
+    /// Returns the person with a number, with a track or without.
+    fn person(&self, number: TrackId) -> Option<&Person> {
+        let present = self.tracks.values().map(|identity| &identity.person);
+        present.chain(&self.absent).find(|person| person.number == number)
+    }
+
+    /// Gives a track to another person, and that person's track, if any, to the first one.
+    fn change_over(&mut self, id: TrackId, number: TrackId) {
+        let holder = self.tracks.iter().find(|(_, identity)| identity.person.number == number);
+        let holder = holder.map(|(holder, _)| *holder);
+        let Some(mut identity) = self.tracks.remove(&id) else { return };
+        if let Some(other) = holder.and_then(|holder| self.tracks.get_mut(&holder)) {
+            std::mem::swap(&mut identity.person, &mut other.person);
+            other.settle();
+        } else if let Some(index) = self.absent.iter().position(|person| person.number == number) {
+            std::mem::swap(&mut identity.person, &mut self.absent[index]);
+        }
+        identity.settle();
+        self.tracks.insert(id, identity);
+    }
+
+    /// Recognises people who came back, and returns the numbers that were given up for that.
+    fn recognise(&mut self, tracks: &[Track]) -> Vec<TrackId> {
+        let mut given_up = Vec::new();
+        for track in tracks.iter().filter(|track| track.confirmed) {
+            let Some(identity) = self.tracks.get(&track.id) else { continue };
+            if !identity.is_new {
+                continue;
+            }
+            let (reported, too_late) = (identity.reported, identity.age_s > self.settings.decide_s);
+            let returned = self.returned(identity, track);
+            let returned = returned.map(|index| self.absent.remove(index));
+            let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
+            match returned {
+                Some(person) => {
+                    given_up.extend(reported.then_some(identity.person.number));
+                    identity.person = person;
+                    identity.person.see(place(track));
+                    identity.settle();
+                }
+                None if too_late => identity.settle(),
+                None => {}
+            }
+        }
+        given_up
+    }
+
+    /// Returns the index of the absent person whose track this is.
+    fn returned(&self, identity: &Identity, track: &Track) -> Option<usize> {
+        let ReidentificationSettings { max_difference, margin, .. } = self.settings;
+        let seen = &identity.unsure;
+        let differences = self.absent.iter().enumerate().filter(|(_, person)| {
+            person.fits_height(seen, &self.settings) && person.reaches(place(track), &self.settings)
+        });
+        let differences = differences.filter_map(|(i, p)| Some((i, p.difference(seen)?)));
+        let (best, difference) = differences.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let present = self.tracks.values().filter(|other| !other.is_new).map(|other| &other.person);
+        let absent = self.absent.iter().enumerate().filter(|(i, _)| *i != best);
+        let mut others = present.chain(absent.map(|(_, person)| person));
+        let is_clear = others
+            .all(|person| person.difference(seen).is_none_or(|other| other >= difference + margin));
+        (difference <= max_difference && is_clear).then_some(best)
+    }
+
+    fn note_reported(&mut self, tracks: &[Track]) {
+        for track in tracks.iter().filter(|track| track.confirmed) {
+            if let Some(identity) = self.tracks.get_mut(&track.id) {
+                identity.reported = true;
+            }
+        }
+    }
+}
+
+fn place(track: &Track) -> Point2<f64> {
+    track.estimate.person.position.xy()
+}
+
+/// Returns true if a nearer person hides part of another one in the image.
+fn covers(near: &Track, far: &Track) -> bool {
+    let range = |track: &Track| place(track).coords.norm();
+    let overlap = near.estimate.region.iou(&far.estimate.region);
+    near.id != far.id && range(near) < range(far) && overlap > COVERED
+}
+
+/// Overlap in the image from which on the pixels of a person may be another one's.
+const COVERED: f64 = 0.1;

@@ -1,0 +1,134 @@
+use std::sync::Arc;
+
+use nalgebra::{Point3, SMatrix, Vector2};
+use tagalong_core::{Estimate, Images, Person, RgbImage, Stamp};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
+
+use super::*;
+
+const DT_S: f64 = 0.1;
+const RED: [u8; 3] = [200, 20, 20];
+const BLUE: [u8; 3] = [20, 20, 200];
+
+fn camera() -> Camera {
+    let lens = Pinhole { fx: 200.0, fy: 200.0, cx: 160.0, cy: 60.0, distortion: Distortion::None };
+    Camera::mounted(lens, 320, 240, 1.6, 0.0, 0.0)
+}
+
+/// A confirmed track 3 m ahead; of people 0.3 m to the left and more, the left half of the image.
+fn track(id: u32, y_m: f64, height_m: f64) -> Track {
+    let person = Person { position: Point3::new(3.0, y_m, height_m), velocity: Vector2::zeros() };
+    let region = camera().upper_body(&person.position);
+    Track {
+        id: TrackId(id),
+        estimate: Estimate { person, covariance: SMatrix::identity() * 0.001, region },
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 9,
+        unseen_s: 0.0,
+        score: 5.0,
+    }
+}
+
+/// An image whose left and right half have one colour each.
+fn frame(left: [u8; 3], right: [u8; 3]) -> Frame {
+    let colour = RgbImage::from_fn(320, 240, |x, _| if x < 160 { left } else { right });
+    let images = Images { colour: Some(Arc::new(colour)), ..Images::default() };
+    Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(DT_S), images)
+}
+
+struct Scene {
+    stage: Reidentifier,
+}
+
+impl Scene {
+    fn new() -> Self {
+        let settings = ReidentificationSettings { remember_s: 30.0, ..Default::default() };
+        Self { stage: Reidentifier::new(settings) }
+    }
+
+    /// Shows some frames, and returns the numbers of the tracks in the last one.
+    fn show(&mut self, frames: usize, image: &Frame, tracks: &[Track]) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        for _ in 0..frames {
+            let people = self.stage.update(image, &EgoMotion::at_rest(DT_S), tracks);
+            let number = |id| people.numbers.get(id).unwrap_or(id).0;
+            numbers = tracks.iter().map(|track| number(&track.id)).collect();
+        }
+        numbers
+    }
+}
+
+#[test]
+fn a_person_who_returns_keeps_the_number() {
+    let (mut scene, red) = (Scene::new(), frame(RED, BLUE));
+    assert_eq!(scene.show(30, &red, &[track(1, 0.8, 1.6)]), [1]);
+    scene.show(50, &red, &[]);
+    assert_eq!(scene.show(1, &red, &[track(2, 0.8, 1.6)]), [1]);
+    assert_eq!(scene.show(30, &red, &[track(2, 0.8, 1.6)]), [1]);
+}
+
+#[test]
+fn a_person_in_other_clothes_or_of_another_height_gets_a_new_number() {
+    let mut scene = Scene::new();
+    scene.show(30, &frame(RED, BLUE), &[track(1, 0.8, 1.6)]);
+    scene.show(50, &frame(RED, BLUE), &[]);
+    assert_eq!(scene.show(30, &frame(BLUE, RED), &[track(2, 0.8, 1.6)]), [2]);
+    assert_eq!(scene.show(30, &frame(RED, RED), &[track(3, -0.8, 1.8)]), [3]);
+}
+
+/// Both were in red, so that it may be either.
+#[test]
+fn one_who_may_be_either_of_two_gets_a_new_number() {
+    let (mut scene, red) = (Scene::new(), frame(RED, RED));
+    scene.show(30, &red, &[track(1, 0.8, 1.6), track(2, -0.8, 1.6)]);
+    scene.show(50, &red, &[track(2, -0.8, 1.6)]);
+    assert_eq!(scene.show(30, &red, &[track(2, -0.8, 1.6), track(3, 0.8, 1.6)]), [2, 3]);
+}
+
+#[test]
+fn a_person_who_is_long_gone_or_far_away_gets_a_new_number() {
+    let (mut scene, red) = (Scene::new(), frame(RED, BLUE));
+    scene.show(30, &red, &[track(1, 0.8, 1.6)]);
+    scene.show(310, &red, &[]);
+    assert_eq!(scene.show(30, &red, &[track(2, 0.8, 1.6)]), [2]);
+    scene.show(1, &red, &[]);
+    let mut far = track(3, 2.5, 1.6);
+    far.estimate.person.position.x = 5.0;
+    assert_eq!(scene.show(1, &red, &[far]), [3], "3 m in a tenth of a second");
+}
+
+/// Track 1 went behind track 2, and each went on with the other person.
+#[test]
+fn tracks_that_changed_over_change_their_numbers_back() {
+    let mut scene = Scene::new();
+    let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
+    assert_eq!(scene.show(30, &frame(RED, BLUE), &apart), [1, 2]);
+    scene.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
+    assert_eq!(scene.show(10, &frame(BLUE, RED), &apart), [2, 1]);
+    scene.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
+    assert_eq!(scene.show(10, &frame(BLUE, RED), &apart), [2, 1], "and each stays");
+}
+
+#[test]
+fn without_memory_each_track_has_its_number() {
+    let mut scene = Scene { stage: Reidentifier::new(ReidentificationSettings::default()) };
+    let red = frame(RED, BLUE);
+    scene.show(30, &red, &[track(1, 0.8, 1.6)]);
+    scene.show(50, &red, &[]);
+    assert_eq!(scene.show(30, &red, &[track(2, 0.8, 1.6)]), [2]);
+}
+
+/// The pause of a jump counts, the place does not.
+#[test]
+fn after_a_jump_of_the_clock_the_appearance_is_remembered() {
+    let red = frame(RED, RED);
+    let numbers = [5.0, 40.0].map(|pause_s| {
+        let mut scene = Scene::new();
+        scene.show(30, &red, &[track(1, 0.8, 1.6)]);
+        scene.stage.reset(pause_s);
+        scene.show(1, &red, &[track(2, -2.0, 1.6)])[0]
+    });
+    assert_eq!(numbers, [1, 2]);
+}

@@ -1,0 +1,64 @@
+use std::collections::VecDeque;
+
+use crate::{Appearance, AppearanceDifference};
+
+/// Most remembered appearances.
+const MOST: usize = 24;
+/// Mean difference from the known appearances below which a new one is not stored.
+const NEWS: f64 = 0.06;
+
+/// Appearances of one person, or of several.
+#[derive(Clone, Debug, Default)]
+pub struct Gallery {
+    all: VecDeque<Appearance>,
+}
+
+impl Gallery {
+    /// Returns true if nothing is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Adds an appearance that is new. The oldest one that is not among the first `kept` makes
+    /// place for it.
+    pub fn add(&mut self, appearance: Appearance, kept: usize) {
+        let is_new =
+            |known: &Appearance| appearance.difference(known).mean().is_some_and(|d| d > NEWS);
+        if !self.all.is_empty() && !self.all.iter().all(is_new) {
+            return;
+        }
+        if self.all.len() == MOST {
+            self.all.remove(kept);
+        }
+        self.all.push_back(appearance);
+    }
+
+    /// Returns the difference from the most similar remembered appearance; `None` without one.
+    pub fn nearest(&self, appearance: &Appearance) -> Option<AppearanceDifference> {
+        let differences = self.all.iter().map(|known| appearance.difference(known));
+        let mean = |d: &AppearanceDifference| d.mean().unwrap_or(0.0);
+        differences.min_by(|a, b| mean(a).total_cmp(&mean(b)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KEPT: usize = 8;
+
+    #[test]
+    fn only_new_appearances_are_remembered_and_the_first_ones_are_never_forgotten() {
+        let in_colour = |colour| Appearance::in_one_colour(1.6, Some(colour));
+        let mut gallery = Gallery::default();
+        for colour in [1, 1, 2, 1, 2] {
+            gallery.add(in_colour(colour), KEPT);
+        }
+        assert_eq!(gallery.all.len(), 2);
+        let mut gallery = Gallery::default();
+        (0..26).for_each(|colour| gallery.add(in_colour(colour), KEPT));
+        assert_eq!(gallery.all.len(), MOST);
+        let known = |colour| gallery.all.contains(&in_colour(colour));
+        assert!((0..8).all(known) && !known(8) && !known(9) && (10..26).all(known));
+    }
+}
