@@ -1,4 +1,4 @@
-//! How good answers are.
+//! Scores of answers: recall, false people per frame, distance from the truth.
 
 use super::Sample;
 use super::targets::surfaces_m2;

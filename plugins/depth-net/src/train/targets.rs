@@ -102,7 +102,7 @@ impl Targets {
             }
             match target {
                 Target::Any => {}
-                Target::Empty => slope[0] = DOUBT * focal(-answer[0]) * -1.0,
+                Target::Empty => slope[0] = -DOUBT * focal(-answer[0]),
                 Target::Person(right) => {
                     people += 1.0;
                     slope[0] = DOUBT * focal(answer[0]);
