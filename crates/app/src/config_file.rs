@@ -19,10 +19,11 @@ use crate::suggest::config_hint;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 5] = [
+const BUILT_IN: [(&str, &str); 6] = [
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
     ("stereo-best", include_str!("../../../configs/stereo-best.toml")),
+    ("stereo-street", include_str!("../../../configs/stereo-street.toml")),
     ("omni-best", include_str!("../../../configs/omni-best.toml")),
     ("mono", include_str!("../../../configs/mono.toml")),
 ];

@@ -21,7 +21,7 @@ struct Choice {
 
 /// The pipelines, the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
-const CHOICES: [Choice; 5] = [
+const CHOICES: [Choice; 6] = [
     Choice {
         config: "depth-verified",
         has: "colour and depth",
@@ -32,10 +32,11 @@ const CHOICES: [Choice; 5] = [
         has: "depth without colour",
         reason: "no verifier can judge what it finds, so expect furniture among the people",
     },
+    Choice { config: "stereo-best", has: "a stereo pair", reason: "verifiers judge what it finds" },
     Choice {
-        config: "stereo-best",
-        has: "a stereo pair",
-        reason: "it is the one with verifiers among those that need no depth image",
+        config: "stereo-street",
+        has: "a stereo pair with a long base",
+        reason: "stereo-best looks for smaller disparities than such a pair has",
     },
     Choice {
         config: PANORAMIC,
