@@ -3,7 +3,7 @@ use tagalong_config::{Context, check_settings};
 use tagalong_core::{
     Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result, Track,
 };
-use tagalong_geometry::Camera;
+use tagalong_geometry::{Camera, ImageBox};
 
 use crate::{BUILT_IN, Config, Model, NAME, Peak, peaks};
 
@@ -32,15 +32,16 @@ impl DepthNet {
             false => config.sigma_unseen_height_m,
         };
         let sigmas = Vector3::new(config.sigma_m, config.sigma_m, sigma_height_m);
+        let region = camera.upper_body(&peak.head);
         let detection = Detection {
-            region: camera.upper_body(&peak.head),
+            image: Some(ImageBox::upper_body(region)),
             position: peak.head,
             covariance: Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
             score: self.model.log_odds(peak.logit).min(config.max_score),
             source: NAME,
         };
         // A head behind the camera has no region.
-        (detection.is_sane() && detection.region.width > 0.0).then_some(detection)
+        (detection.is_sane() && region.width > 0.0).then_some(detection)
     }
 
     /// Returns the likeliest peak near a track; ties go to the nearer one.
