@@ -217,11 +217,14 @@ impl FloorClear {
 mod tests {
     use super::*;
 
-    fn points(of: &[(i64, f64)]) -> Vec<FloorPoint> {
+    /// Numbers with their places along a line, m.
+    type Line<'a> = &'a [(i64, f64)];
+
+    fn points(of: Line<'_>) -> Vec<FloorPoint> {
         of.iter().map(|&(id, x)| FloorPoint { id, at_m: [x, 1.0] }).collect()
     }
 
-    fn tally(scans: &[(&[(i64, f64)], &[(i64, f64)])]) -> FloorClear {
+    fn tally(scans: &[(Line<'_>, Line<'_>)]) -> FloorClear {
         let mut tally = FloorTally::new(0.75);
         for (people, estimates) in scans {
             let (people, estimates) = (points(people), points(estimates));
@@ -276,7 +279,7 @@ mod tests {
 
     #[test]
     fn rates_count_scans_and_seconds() {
-        let scan: (&[(i64, f64)], &[(i64, f64)]) = (&[(1, 0.0)], &[(7, 0.0), (8, 5.0)]);
+        let scan: (Line<'_>, Line<'_>) = (&[(1, 0.0)], &[(7, 0.0), (8, 5.0)]);
         let clear = tally(&[scan; 6]);
         assert_eq!(clear.estimates_per_scan(), 2.0);
         assert!((clear.false_per_minute(2, 0.1).unwrap().estimate - 600.0).abs() < 1e-9);

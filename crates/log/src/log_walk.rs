@@ -34,10 +34,10 @@ impl<R: Read> LogWalker<R> {
         let mut source = Source::new(reader);
         let mut magic = [0; 13];
         let got = source.fill(&mut magic[..8]);
-        if magic[..got] == bag_walk::MAGIC[..8] && source.fill(&mut magic[8..]) == 5 {
-            if magic[..] == *bag_walk::MAGIC {
-                return Ok(Self::Bag(Box::new(BagWalker::new(source, limits))));
-            }
+        // The magic of a bag is longer than that of MCAP, and no more may be read of the latter.
+        let may_be_bag = magic[..got] == bag_walk::MAGIC[..8];
+        if may_be_bag && source.fill(&mut magic[8..]) == 5 && magic[..] == *bag_walk::MAGIC {
+            return Ok(Self::Bag(Box::new(BagWalker::new(source, limits))));
         }
         Walker::behind(source, &magic[..got], limits).map(|walker| Self::Mcap(Box::new(walker)))
     }

@@ -88,6 +88,9 @@ struct Tracked {
     first: Option<u32>,
 }
 
+/// Time of coasting, counts, and number of the first scan with an estimate of an annotated person.
+type Counted = (f64, FloorClear, Option<u32>);
+
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let tracked = MOVING.track_all(lab)?;
     if tracked.is_empty() {
@@ -204,7 +207,7 @@ impl Log {
         lab.progress.begin(CONFIGS.len(), self.name);
         let mut all = Vec::new();
         for (config, chosen_on) in CONFIGS {
-            for (coasting_s, (clear, first)) in self.track(lab, &log, &truth, config)? {
+            for (coasting_s, clear, first) in self.track(lab, &log, &truth, config)? {
                 let is_chosen_here = chosen_on == self.name;
                 all.push(Tracked { config, is_chosen_here, coasting_s, clear, first });
             }
@@ -220,7 +223,7 @@ impl Log {
         log: &Path,
         truth: &BTreeMap<u32, Vec<TruthRow>>,
         config: &str,
-    ) -> Result<[(f64, (FloorClear, Option<u32>)); 2], ReproduceError> {
+    ) -> Result<[Counted; 2], ReproduceError> {
         let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline = lab.contender(config)?.pipeline(lab.registry, 1)?;
         let (input, limits) = (InputSettings::default(), Limits::default());
@@ -241,7 +244,7 @@ impl Log {
             }
             number += 1;
         }
-        Ok(tallies.map(|(coasting_s, tally, first)| (coasting_s, (tally.finish(), first))))
+        Ok(tallies.map(|(coasting_s, tally, first)| (coasting_s, tally.finish(), first)))
     }
 
     /// Returns the people and the estimates of a scan that count, in the frame of the laser.

@@ -93,7 +93,7 @@ impl Model {
         if file.features != FEATURES {
             return Err(format!("it is not made of the features {FEATURES:?}"));
         }
-        if !file.trees.iter().all(|tree| is_sound(tree)) {
+        if !file.trees.iter().all(is_sound) {
             return Err("its trees do not hang together or are not finite".into());
         }
         if ![file.slope, file.offset].into_iter().all(f64::is_finite) {
@@ -120,7 +120,8 @@ fn value(tree: &Tree, features: &Features) -> f32 {
     let mut node = &tree[0];
     loop {
         // A value that is not a number takes the second way.
-        let way = usize::from(!(features[node.feature] < node.below));
+        let is_below = features[node.feature] < node.below;
+        let way = usize::from(!is_below);
         match node.next[way] {
             0 => return node.leaves[way],
             next => node = &tree[next],

@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn errors_name_the_line_and_the_column() {
-        let error = parse("scan,id\n", "a.csv").unwrap_err().to_string();
+        let error = parse("scan,id,ignore,source\n", "a.csv").unwrap_err().to_string();
         assert!(error.contains("x_laser_m"), "{error}");
         let text = format!("{HEADER}\n1.5,3,1,near,0,,,0,annotated\n");
         let error = parse(&text, "a.csv").unwrap_err().to_string();
