@@ -41,6 +41,8 @@ fn lay_out(home: &Path) {
     write("full/precious.txt", "keep me");
     fs::create_dir_all(home.join("logs")).unwrap();
     Drawn::of(2).write(&home.join("logs/inside.mcap"));
+    // Two different logs in a folder are not the parts of one.
+    fs::write(home.join("logs/other.mcap"), "x").unwrap();
 }
 
 fn mistakes() -> Vec<Mistake> {
