@@ -370,7 +370,7 @@ fn what_is_no_file_is_refused() {
             .unwrap()
             .to_string()
     };
-    assert!(open(folder.path()).contains("is a directory"));
+    assert!(open(folder.path()).contains("holds no .mcap"));
     assert!(open(&folder.path().join("absent.mcap")).contains("absent.mcap"));
     if cfg!(unix) {
         assert!(open(std::path::Path::new("/dev/zero")).contains("a pipe or a device"));
