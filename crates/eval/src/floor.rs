@@ -94,6 +94,7 @@ impl FloorTally {
         for person in &scan.people {
             clear.people.entry(person.id).or_default()[1] += 1;
         }
+        // An estimate near an ignored person is neither right nor wrong.
         let is_free = |index: usize| pairs.iter().all(|(_, estimate)| *estimate != index);
         let is_false = |(index, estimate): &(usize, &FloorPoint)| {
             let near = |point: &FloorPoint| apart(point, estimate) <= self.cut_m;
@@ -120,6 +121,7 @@ impl FloorTally {
         let pair = |(index, person): (usize, &FloorPoint)| {
             let last = self.estimate_of.get(&person.id)?;
             let estimate = scan.estimates.iter().position(|e| e.id == *last)?;
+            // A pair that one side has left since would undo a later match.
             let is_mutual = self.person_of.get(last) == Some(&person.id);
             let is_near = apart(person, &scan.estimates[estimate]) <= self.cut_m;
             (is_mutual && is_near).then_some((index, estimate))
@@ -136,6 +138,7 @@ impl FloorTally {
         for (row, person) in scan.people.iter().enumerate() {
             for (col, estimate) in scan.estimates.iter().enumerate() {
                 if is_open(row, col) {
+                    // The matcher maximises, and distances are to be small.
                     let weight = FAR_M - apart(person, estimate);
                     edges.push(Edge { row: row as u32, col: col as u32, weight });
                 }

@@ -33,6 +33,7 @@ impl LogFiles {
             return Ok(Self { parts: vec![path.to_owned()], missing: Vec::new() });
         }
         let mut parts = mcap_files(path).map_err(failed)?;
+        // The order of a directory depends on the file system.
         parts.sort_by_key(|part| part_number(part));
         let listed = listed_parts(&path.join(METADATA));
         // Split by the recorder: one name, and a number.
@@ -45,6 +46,7 @@ impl LogFiles {
                 remedy: if parts.is_empty() { ": it holds no .mcap" } else { " of those in it" },
             });
         }
+        // Only names count: metadata may come from another machine.
         let present = |name: &String| parts.iter().any(|part| part.ends_with(name));
         let missing = listed.unwrap_or_default().into_iter().filter(|name| !present(name));
         Ok(Self { missing: missing.collect(), parts })

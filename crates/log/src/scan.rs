@@ -180,6 +180,7 @@ impl Scan {
         let channels = walker.channels().cloned().collect();
         self.parts.push(LogPart { path: part.path.clone(), channels });
         for (name, count) in walker.counters() {
+            // Sums over the files, because the report names one log.
             *self.counters.entry(name).or_default() += count;
         }
         let file = part.path.file_name().unwrap_or_default().display();

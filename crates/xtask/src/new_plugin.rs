@@ -227,7 +227,7 @@ mod tests {
             ("3d", "lower-case"),
             ("", "lower-case"),
             ("b", "exists already"),
-            ("catalog", "a room of the workspace"),
+            ("catalog", "a crate or command of the workspace"),
         ] {
             let error = create(&workspace, Kind::Detector, name).unwrap_err().to_string();
             assert!(error.contains(why), "{name}: {error}");

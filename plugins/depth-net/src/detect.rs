@@ -78,6 +78,7 @@ impl Detector for DepthNet {
     ) -> Result<Vec<Detection>> {
         let (map, pass) = self.model.look(frame)?;
         let Config { discover_score, track_score, separation_m, .. } = self.config;
+        // A track lowers the threshold only once it is believed: a peak must not feed itself.
         let least = match search {
             Query::Track(track) if track.confirmed => track_score,
             _ => discover_score,
@@ -95,6 +96,7 @@ impl Detector for DepthNet {
                 .into_iter()
                 .collect(),
             Query::Discover { .. } => {
+                // People who are tracked already would be discovered twice.
                 let free =
                     found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
                 free.filter_map(|peak| self.detection(camera, peak)).collect()

@@ -41,6 +41,7 @@ impl PastScans {
             let at = Point2::from(scan.now_from_then.translation.vector);
             let ahead = scan.now_from_then * Point2::new(1.0, 0.0);
             let (at, ahead) = (motion.apply_to_point(at), motion.apply_to_point(ahead));
+            // The heading from two points, because the motion maps points.
             let ahead = ahead - at;
             scan.now_from_then = Isometry2::new(at.coords, ahead.y.atan2(ahead.x));
             scan.age_s += motion.dt;
@@ -53,10 +54,12 @@ impl PastScans {
         let bearing = |point: &Point2<f64>| point.y.atan2(point.x);
         let both = beams.points.iter().map(bearing).zip(beams.ranges.iter().copied());
         let mut bearings: Vec<(f64, f64)> = both.collect();
+        // Sorted once, so that each question is a binary search.
         bearings.sort_by(|a, b| a.0.total_cmp(&b.0));
         let now_from_then = Isometry2::new(scanner, 0.0);
         let step_rad = beams.step_rad;
         self.scans.push_back(PastScan { age_s: 0.0, now_from_then, bearings, step_rad });
+        // A scanner of 40 Hz would keep more than the memory needs.
         if self.scans.len() > KEPT {
             self.scans.pop_front();
         }

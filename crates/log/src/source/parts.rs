@@ -63,6 +63,7 @@ impl PartsWalker {
     /// first pass is a fault, and the walk goes on behind it.
     fn open_next(&mut self) -> bool {
         let Some(part) = self.scan.parts.get(self.opened) else { return false };
+        // Counted before it is opened, so that a file that fails is not tried again.
         self.opened += 1;
         match open_part(part, &self.limits) {
             Ok(walker) => {
@@ -80,6 +81,7 @@ impl PartsWalker {
 
 impl Messages for PartsWalker {
     fn next_message(&mut self) -> Option<Message<'_>> {
+        // An empty file is no end of the log.
         while !self.walker.advance() && self.open_next() {}
         self.walker.message()
     }

@@ -123,6 +123,7 @@ impl Reidentifier {
         }
         for (index, a) in tracks.iter().enumerate() {
             for b in &tracks[index + 1..] {
+                // Tentative tracks are left out: clutter beside a person is no rival.
                 let are_near = (place(a) - place(b)).norm() < self.settings.alone_m;
                 if are_near && a.confirmed && b.confirmed {
                     self.add_rivals(a.id, b.id);
@@ -136,7 +137,9 @@ impl Reidentifier {
         let (Some(first), Some(second)) = (number(a), number(b)) else { return };
         for (id, rival) in [(a, second), (b, first)] {
             if let Some(identity) = self.tracks.get_mut(&id) {
+                // Both directions, because either track may have taken the other's detections.
                 identity.rivals.insert(rival);
+                // Appearances before this contact cannot tell which person left it.
                 if !identity.is_new {
                     identity.unsure.clear();
                 }
@@ -152,11 +155,13 @@ impl Reidentifier {
             };
             let covered = tracks.iter().any(|other| other.seen && covers(other, track));
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
+            // The position counts also where the appearance does not: it bounds how far a person can walk.
             identity.person.see(place(track));
             if covered || tracks.iter().any(is_near) {
                 continue;
             }
             let appearance = Appearance::of(&track.estimate, frame);
+            // An appearance without pixels differs from nothing, so that any person would fit it.
             if appearance.difference(&appearance).mean().is_some() {
                 identity.add(appearance);
             }
@@ -192,6 +197,7 @@ impl Reidentifier {
         let rivals = identity.rivals.iter().filter_map(|number| self.person(*number));
         let differences = rivals.filter_map(|person| Some((person, person.difference(unsure)?)));
         let (best, difference) = differences.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        // All three tests, because a wrong number costs more than a new one.
         let fits = difference <= max_difference
             && difference + margin < own
             && best.fits_height(unsure, &self.settings);
@@ -203,6 +209,7 @@ impl Reidentifier {
     fn agrees(&self, identity: &Identity, rival: &Person, gain: f64) -> bool {
         let holder = self.tracks.values().find(|other| other.person.number == rival.number);
         let Some(holder) = holder.filter(|holder| !holder.unsure.is_empty()) else { return true };
+        // The exchange must be right for both tracks taken together.
         let (stays, changes) =
             (rival.difference(&holder.unsure), identity.person.difference(&holder.unsure));
         stays.zip(changes).is_none_or(|(stays, changes)| stays + gain > changes)
@@ -210,6 +217,7 @@ impl Reidentifier {
 
     /// Returns the person with a number, with a track or without.
     fn person(&self, number: TrackId) -> Option<&Person> {
+        // People with a track first: they are few, and the common case.
         let present = self.tracks.values().map(|identity| &identity.person);
         present.chain(&self.absent).find(|person| person.number == number)
     }
@@ -220,6 +228,7 @@ impl Reidentifier {
         let holder = holder.map(|(holder, _)| *holder);
         let Some(mut identity) = self.tracks.remove(&id) else { return };
         if let Some(other) = holder.and_then(|holder| self.tracks.get_mut(&holder)) {
+            // A swap, so that no number is given twice.
             std::mem::swap(&mut identity.person, &mut other.person);
             other.settle();
         } else if let Some(index) = self.absent.iter().position(|person| person.number == number) {

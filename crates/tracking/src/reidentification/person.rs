@@ -89,7 +89,7 @@ impl Person {
     }
 }
 
-/// What is known of a track beside the person that it is taken for.
+/// Knowledge of a track beside the person that it is taken for.
 #[derive(Clone, Debug)]
 pub(crate) struct Identity {
     pub(crate) person: Person,

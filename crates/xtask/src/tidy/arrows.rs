@@ -42,6 +42,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "triangulate",
             "plugins",
             "learn",
+            "tracking",
         ],
     ),
     ("conformance", &[]),
@@ -151,7 +152,9 @@ fn may(folder: &str, allowed: Option<&[&str]>, target: &str, dev: bool) -> bool 
         Some((_, room)) => room,
         None => target,
     };
-    let free_tests = dev && (FOR_TESTS.contains(&room) || folder == "crates/cli");
+    // Plugins stand alone, in their tests, too.
+    let other_plugin = room == "plugins" && folder.starts_with("plugins/");
+    let free_tests = dev && !other_plugin && (FOR_TESTS.contains(&room) || folder == "crates/cli");
     target == folder || is_word(folder, room) || allowed.contains(&room) || free_tests
 }
 
