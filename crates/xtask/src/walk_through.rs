@@ -23,7 +23,7 @@ pub fn walk(workspace: &Workspace) -> Result<()> {
     edit(workspace, "config.rs", |text| {
         // The guide shows the changed parts only; the template has the rest.
         let text =
-            replace_between(text, "    /// Added to every margin", "pub bias: f64,\n", &field)?;
+            replace_between(text, "    /// Added to all log-odds", "pub bias: f64,\n", &field)?;
         Some(text.replace("bias: 0.0", default))
     })?;
     edit(workspace, "verify.rs", |text| {

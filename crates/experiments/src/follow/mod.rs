@@ -32,7 +32,7 @@ const SCENES: (&str, &str) = ("configs/scenes", "follow-");
 /// Arguments of `tagalong follow`.
 #[derive(Args, Debug)]
 pub struct FollowArgs {
-    /// The pipeline; it needs a [controller].
+    /// The pipeline; it needs a `[controller]`.
     #[arg(default_value = "configs/follow-best.toml")]
     pub config: PathBuf,
     /// The scenes; their first person is the one to follow [default: all
