@@ -19,10 +19,10 @@
 //!   103). **Camera frame**: x right, y down, z forward.
 //! * Depth is the coordinate along the optical axis, in metres; NaN is "no reading". It is never
 //!   the Euclidean range.
-//! * The position of a person is the **centre of the head** ([`HEAD_RADIUS_M`] behind the surface
+//! * The position of a person is the **centre of the head** (`HEAD_RADIUS_M` behind the surface
 //!   that a depth camera measures).
 //! * No clocks and no global randomness in plugins: time comes from the frame, seeds from
-//!   [`Context`]. Same log, same config, same seed: same bytes.
+//!   `Context`. Same log, same config, same seed: same bytes.
 
 mod associator;
 mod command_history;

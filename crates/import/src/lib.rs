@@ -1,6 +1,6 @@
 //! `tagalong import`: data sets and folders of images become logs.
 //!
-//! Each kind is a module that reads its layout into a [`Sequence`]; one writer makes a log of it.
+//! Each kind is a module that reads its layout into a `Sequence`; one writer makes a log of it.
 //! No other part of Tagalong knows these layouts.
 
 mod folders;
@@ -42,7 +42,7 @@ pub struct ImportArgs {
     pub kind: Kind,
     /// File or folder to import.
     pub path: PathBuf,
-    /// The log to write [default: runs/<name>.mcap].
+    /// The log to write [default: runs/NAME.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
     /// Replace the log if it exists.

@@ -27,7 +27,7 @@ pub struct SimulateArgs {
     /// The scene, a TOML file.
     #[arg(required_unless_present = "realism")]
     pub scene: Option<PathBuf>,
-    /// The log to write [default: runs/<scene>.mcap].
+    /// The log to write [default: runs/SCENE.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
     /// Use this seed instead of the scene's: counted within --split if given.

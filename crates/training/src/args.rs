@@ -10,7 +10,7 @@ pub struct TrainArgs {
     /// trained on bags of laser scans.
     pub plugin: String,
     /// Output file of the model; its card is written beside it [default:
-    /// configs/models/<plugin>.toml].
+    /// configs/models/PLUGIN.toml].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// A folder of real data (logs, people, negatives); without it, only simulated rooms are used.
