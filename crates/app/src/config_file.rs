@@ -19,13 +19,15 @@ use crate::suggest::config_hint;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 6] = [
+const BUILT_IN: [(&str, &str); 8] = [
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
     ("stereo-best", include_str!("../../../configs/stereo-best.toml")),
     ("stereo-street", include_str!("../../../configs/stereo-street.toml")),
     ("omni-best", include_str!("../../../configs/omni-best.toml")),
     ("mono", include_str!("../../../configs/mono.toml")),
+    ("laser-legs", include_str!("../../../configs/laser-legs.toml")),
+    ("laser-follow", include_str!("../../../configs/laser-follow.toml")),
 ];
 
 /// Text of a config file, with its path.

@@ -11,6 +11,9 @@ use tagalong_log::FrameSource;
 /// The config for a camera below a conical mirror.
 const PANORAMIC: &str = "omni-best";
 
+/// The config for laser scans that concludes from motion over ground.
+const BY_MOTION: &str = "laser-legs";
+
 /// A pipeline for logs of one kind.
 struct Choice {
     config: &'static str,
@@ -21,7 +24,7 @@ struct Choice {
 
 /// The pipelines, the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
-const CHOICES: [Choice; 6] = [
+const CHOICES: [Choice; 8] = [
     Choice {
         config: "depth-verified",
         has: "colour and depth",
@@ -47,6 +50,16 @@ const CHOICES: [Choice; 6] = [
         config: "mono",
         has: "colour or grey images alone",
         reason: "nothing else works without depth; places in metres are rough",
+    },
+    Choice {
+        config: BY_MOTION,
+        has: "laser scans and odometry",
+        reason: "it believes in what moves where nothing was; people who stand may be missed",
+    },
+    Choice {
+        config: "laser-follow",
+        has: "laser scans without odometry",
+        reason: "nothing can be concluded from motion over ground",
     },
 ];
 
@@ -82,6 +95,10 @@ fn try_config(config: &ConfigFile, log: &Path, registry: &Registry) -> Result<()
     // Any colour image passes for a panorama, and a panorama for any image.
     if item.frame.camera.panorama().is_some() != (config.stem() == PANORAMIC) {
         return Err(Failure::failed("another kind of camera"));
+    }
+    // Without odometry the robot is taken to be at rest, and all things seem to move.
+    if config.stem() == BY_MOTION && source.facts().odometry_topic.is_none() {
+        return Err(Failure::failed("no odometry"));
     }
     pipeline.step(&item.frame).map_err(Failure::failed)?;
     Ok(())

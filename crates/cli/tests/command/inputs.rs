@@ -130,3 +130,19 @@ fn check_says_what_is_needed_and_what_is_used() {
     let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-best")));
     assert!(refused.contains("`depth-template` requires depth images"), "{refused}");
 }
+
+#[test]
+fn a_log_of_a_scanner_alone_gets_a_pipeline_by_its_odometry() {
+    for (log, expected) in [("laser-moving", "laser-legs"), ("laser-following", "laser-follow")] {
+        let Some(path) = tagalong_testdata::find(&format!("laser/{log}.mcap")) else { return };
+        let home = tempfile::tempdir().unwrap();
+        let output =
+            tagalong().arg("run").arg(path).args(["-o", "out"]).current_dir(&home).output();
+        let output = output.unwrap();
+        let told = text(&output.stderr);
+        assert_eq!(code(&output), 0, "{told}");
+        assert!(told.contains(&format!("taking {expected}, because")), "{told}");
+        let tracks = fs::read_to_string(home.path().join("out/tracks-metres.csv")).unwrap();
+        assert!(tracks.lines().count() > 300, "{} lines", tracks.lines().count());
+    }
+}
