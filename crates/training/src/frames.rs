@@ -1,11 +1,11 @@
 //! Training of detectors on whole frames: simulated depth, and annotated logs of real rooms, each
 //! of which is left out once.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point2, Point3};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::serialize::to_toml;
 use tagalong_app::threads::threads;
 use tagalong_config::{AnnotatedPerson, Trainer};
 use tagalong_core::Frame;
@@ -69,7 +69,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     session.bar.finish_and_clear();
     write(&session.model, &fitted.model)?;
     let path = session.model.with_extension("card.toml");
-    let card = card(args, scenes, &fitted.figures);
+    let card = card(args, scenes, &fitted.figures)?;
     write(&path, &card)?;
     print(&card)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
@@ -176,7 +176,7 @@ fn of_box(region: &Region, frame: &Frame) -> Option<AnnotatedPerson> {
 }
 
 /// Returns the card: the origin of the model, and a table of its scores.
-fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> String {
+fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> Result<String, Failure> {
     let mut sources = vec![format!("{scenes} simulated rooms")];
     if args.data.is_some() {
         sources.extend(ROOMS.map(|(_, log)| format!("logs/{log}.mcap")));
@@ -186,14 +186,12 @@ fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> String {
     card.insert("quick".into(), args.quick.into());
     card.insert("seed".into(), (args.seed as i64).into());
     card.insert("trained_on".into(), sources.into());
-    let mut text = format!(
+    let figures = to_toml("the scores", &with_key("figures", figures))?;
+    Ok(format!(
         "# Single frames. People within 5 m with at least half the upper body visible; false\n\
          # people are more than 0.6 m from anybody. `left out`: trained on simulated rooms and the\n\
-         # other real ones; `simulation only`: on no real room. The model itself has seen all.\n{card}"
-    );
-    let _ =
-        write!(text, "\n{}", toml::to_string(&with_key("figures", figures)).unwrap_or_default());
-    text
+         # other real ones; `simulation only`: on no real room. The model itself has seen all.\n{card}\n{figures}"
+    ))
 }
 
 fn with_key(key: &str, table: &toml::Table) -> toml::Table {

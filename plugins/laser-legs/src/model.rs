@@ -70,7 +70,10 @@ impl Model {
     }
 
     /// Formats the model file.
-    pub fn to_text(&self) -> String {
+    ///
+    /// # Errors
+    /// Numbers that TOML cannot express.
+    pub fn to_text(&self) -> Result<String, String> {
         let file = File {
             format: FORMAT.into(),
             features: FEATURES.map(String::from).to_vec(),
@@ -78,7 +81,8 @@ impl Model {
             offset: self.offset,
             trees: self.trees.clone(),
         };
-        toml::to_string(&file).unwrap_or_default().replace("]], [", "]],\n  [")
+        let text = toml::to_string(&file).map_err(|why| format!("the model is no TOML: {why}"))?;
+        Ok(text.replace("]], [", "]],\n  ["))
     }
 
     /// Parses a model file.

@@ -147,7 +147,7 @@ fn a_model_survives_its_file_and_a_broken_one_is_refused() {
     let leaf = |value: f32| Node { feature: 3, below: 0.5, next: [0, 0], leaves: [value, -value] };
     let root = Node { feature: 0, below: 0.25, next: [1, 0], leaves: [0.0, -1.0] };
     let model = Model { trees: vec![vec![root, leaf(0.75)]], slope: 2.0, offset: -0.5 };
-    let text = model.to_text();
+    let text = model.to_text().unwrap();
     assert_eq!(Model::from_text(&text).unwrap(), model);
     let mut values = [0.0; COUNT];
     assert_eq!(model.log_odds(&values), 1.0);

@@ -147,7 +147,8 @@ impl Trainer for LegTrainer {
         let Line { slope, offset } = platt(&best.held_out);
         let model = Model { trees: self.grow(best.trees, |_| true), slope, offset };
         progress(1.0);
-        Ok(Fitted { figures: self.figures(&trials, &model), model: model.to_text() })
+        let text = model.to_text().map_err(Error::Other)?;
+        Ok(Fitted { figures: self.figures(&trials, &model), model: text })
     }
 }
 
