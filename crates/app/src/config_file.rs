@@ -19,7 +19,8 @@ use crate::suggest::config_hint;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 8] = [
+const BUILT_IN: [(&str, &str); 9] = [
+    ("depth-alone", include_str!("../../../configs/depth-alone.toml")),
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
     ("stereo-best", include_str!("../../../configs/stereo-best.toml")),

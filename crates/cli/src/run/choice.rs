@@ -31,9 +31,10 @@ const CHOICES: [Choice; 8] = [
         reason: "it has the best HOTA in rooms that no setting was chosen on",
     },
     Choice {
-        config: "depth-ekf",
+        config: "depth-alone",
         has: "depth without colour",
-        reason: "no verifier can judge what it finds, so expect furniture among the people",
+        reason: "of those that need no colour it has the best HOTA in rooms that no setting was \
+                 chosen on; one verifier judges what it finds, so expect some furniture",
     },
     Choice { config: "stereo-best", has: "a stereo pair", reason: "verifiers judge what it finds" },
     Choice {
