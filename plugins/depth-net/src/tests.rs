@@ -193,6 +193,25 @@ mod training {
         assert_eq!(first, second);
     }
 
+    #[test]
+    fn each_real_room_gets_a_model_that_does_not_depend_on_it() {
+        let short = Training { steps: 2, real_steps: 2, batch: 4, ..Training::default() };
+        let fitted = |changed: bool| {
+            let mut trainer = trainer(short.clone());
+            let other = if changed { "" } else { NEAR_AND_FAR };
+            let (frame, truth) = room(1.2, other);
+            trainer.add_frame(&frame, &people(&truth), Some("third"), 0).unwrap();
+            trainer.fit(&mut |_| {}).unwrap()
+        };
+        let (before, after) = (fitted(false), fitted(true));
+        let rooms: Vec<&str> = before.without.iter().map(|(room, _)| room.as_str()).collect();
+        assert_eq!(rooms, ["another", "third"]);
+        let net = |text: &str| Model::from_text(text).unwrap().net;
+        assert_eq!(net(&before.without[1].1), net(&after.without[1].1), "it has not seen the room");
+        assert_ne!(net(&before.without[0].1), net(&after.without[0].1), "this one has");
+        assert_ne!(net(&before.model), net(&after.model), "and so has the shipped one");
+    }
+
     /// Each part of the network a little larger and smaller.
     #[test]
     fn the_gradient_is_that_of_small_steps() {

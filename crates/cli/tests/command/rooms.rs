@@ -208,6 +208,8 @@ fn mistakes_are_told_with_file_and_line() {
     tell(2, &["rooms.toml:5:9", "c.mcap"]);
     Drawn::of(3).write(&home.path("logs/c.mcap"));
     tell(2, &["rooms.toml:5:9", "has no truth"]);
+    home.write("rooms.toml", &format!("{rooms}[rooms.B.models]\nown = 'none.toml'\n"));
+    tell(2, &["rooms.toml:7:7", "there is no model none.toml"]);
     home.write("rooms.toml", "[rooms.A]\nlogs = [\"logs/a.mcap\"]\n");
     tell(2, &["rooms.toml:1:", "two are needed"]);
     fs::remove_file(home.path("rooms.toml")).unwrap();
