@@ -117,7 +117,8 @@ mod tests {
     #[test]
     fn appearance_decides_between_detections_that_fit_equally_well() {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
-        let tracks = [0.1, -0.1].map(|y| track(Point3::new(3.0, y, 1.6), SMatrix::identity() * 0.02));
+        let tracks =
+            [0.1, -0.1].map(|y| track(Point3::new(3.0, y, 1.6), SMatrix::identity() * 0.02));
         let seen = [person(3.0, 0.11), person(3.0, -0.11)];
         let mut given = |appearance: &[Vec<f64>]| {
             let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });

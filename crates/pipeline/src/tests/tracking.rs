@@ -1,6 +1,8 @@
-use tagalong_core::{Detection, TrackId};
+use std::sync::Arc;
 
-use super::doubles::{PLAIN, World, person, scored};
+use tagalong_core::{Detection, Frame, Images, RgbImage, TrackId};
+
+use super::doubles::{PLAIN, World, frame, person, scored};
 use crate::{Candidate, Fate, FrameReport, Weighing};
 
 fn ids(report: &FrameReport) -> Vec<u32> {
@@ -54,6 +56,37 @@ fn a_filter_of_boxes_receives_no_detection_without_one() {
     assert_eq!(ids(&reports[0]), [1]);
     assert_eq!(reports[0].candidates.len(), 1);
     assert_eq!(reports[0].funnel.count("no image box"), 1);
+}
+
+/// Frame 9 shows one person between two who are known, nearer to the right one, in the colour of
+/// the left one.
+#[test]
+fn appearance_says_whose_detection_it_is_where_places_do_not() {
+    let seen = |weight: f64| {
+        let both = (0..8).map(|_| vec![person(3.0, 0.5), person(3.0, -0.5)]);
+        let world = World::of(both.chain([vec![person(3.0, -0.1)]]));
+        let config = format!(
+            "associator.config.gate = 1e3\nassociator.config.gate_m = 2.0\n{PLAIN}\
+             [reidentification]\nremember_s = 9.0\nassociation_weight = {weight:?}\n"
+        );
+        let mut pipeline = world.pipeline(&config);
+        let reports = (1..=9).map(|index| {
+            let colour = |x: usize, _| {
+                if x < 320 || index == 9 { [200, 20, 20] } else { [20, 20, 200] }
+            };
+            let colour = Arc::new(RgbImage::from_fn(640, 480, colour));
+            let images = Images { colour: Some(colour), ..Images::default() };
+            let blank = frame(index, index as f64 * 0.1);
+            let frame = Frame::new(index, blank.stamp, blank.camera, blank.motion, images);
+            pipeline.step(&frame).unwrap()
+        });
+        let last = reports.last().unwrap();
+        let is_seen = last.tracks.iter().filter(|track| track.seen);
+        is_seen.map(|track| track.id.0).collect::<Vec<_>>()
+    };
+    let [left, right] = [1, 2];
+    assert_eq!(seen(0.0), [right]);
+    assert_eq!(seen(50.0), [left]);
 }
 
 #[test]

@@ -93,7 +93,10 @@ impl Reidentifier {
     ) -> Vec<Vec<f64>> {
         let weight = self.settings.association_weight;
         // Between one track and one detection there is nothing to choose.
-        if weight == 0.0 || self.settings.remember_s == 0.0 || tracks.len().max(detections.len()) < 2 {
+        if weight == 0.0
+            || self.settings.remember_s == 0.0
+            || tracks.len().max(detections.len()) < 2
+        {
             return Vec::new();
         }
         let seen: Vec<Option<Appearance>> = detections
@@ -102,7 +105,8 @@ impl Reidentifier {
             .map(|at| at.map(|(region, head)| Appearance::at(region, head, frame)))
             .collect();
         let ratio = |known: Option<&Identity>, seen: &Option<Appearance>| {
-            let difference = known.zip(seen.as_ref()).and_then(|(known, seen)| known.difference(seen));
+            let difference =
+                known.zip(seen.as_ref()).and_then(|(known, seen)| known.difference(seen));
             let fit = |difference: f64| 1.0 - difference / self.settings.max_difference.max(1e-3);
             difference.map_or(0.0, |difference| weight * fit(difference).max(-1.0))
         };
