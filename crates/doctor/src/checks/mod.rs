@@ -2,12 +2,20 @@
 //! example depth.
 
 mod camera;
+mod heads;
 mod images;
+mod laser;
+mod missed;
 mod people;
+mod reading;
+mod still;
+mod suits;
 mod times;
 
+use super::alternatives::Alternative;
+use super::coverage::Coverage;
 use super::evidence::Evidence;
-use super::finding::Finding;
+use super::finding::{Finding, Severity};
 
 /// Function that checks one aspect.
 pub type Check = fn(&Evidence) -> Option<Finding>;
@@ -16,6 +24,7 @@ pub type Check = fn(&Evidence) -> Option<Finding>;
 pub const ALL: &[Check] = &[
     people::needs,
     people::damage,
+    reading::reading,
     camera::intrinsics,
     camera::frames,
     times::rate,
@@ -26,6 +35,31 @@ pub const ALL: &[Check] = &[
     images::registration,
     camera::floor,
     camera::mount,
+    heads::heads,
+    suits::suits,
+    laser::laser,
     times::odometry,
     people::people,
+    still::still,
+    missed::missed,
 ];
+
+/// Returns true if tracks and things that come and go do not agree, so that other settings should
+/// be tried.
+pub fn asks_for_settings(evidence: &Evidence) -> bool {
+    let asking = [still::still(evidence), missed::missed(evidence)];
+    asking.iter().flatten().any(|finding| finding.severity >= Severity::Warn)
+}
+
+/// Gain of a setting below which it is not recommended.
+const MIN_GAIN: f64 = 0.02;
+
+/// Returns the best other setting that was tried on this log, if it is better than the present one
+/// and fulfils a condition.
+fn better(evidence: &Evidence, fits: impl Fn(&Coverage) -> bool) -> Option<&Alternative> {
+    let now = evidence.coverage.worth();
+    // The best comes first.
+    let mut better =
+        evidence.alternatives.iter().take_while(|other| other.coverage.worth() > now + MIN_GAIN);
+    better.find(|other| fits(&other.coverage))
+}

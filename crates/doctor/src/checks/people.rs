@@ -13,8 +13,11 @@ pub fn needs(evidence: &Evidence) -> Option<Finding> {
         return Some(Finding::new("needs", Severity::Ok, measured));
     };
     let hint = hint.trim_start_matches("; ");
-    let other = "or take a config that does without, see the column `needs` in configs/README.md";
-    let remedy = if hint.is_empty() { other.to_owned() } else { format!("{hint};\n{other}") };
+    let other = match &evidence.fitting[..] {
+        [] => "take another config, see the column `needs` in configs/README.md".to_owned(),
+        fitting => format!("take a config that fits this log: {}", fitting.join(", ")),
+    };
+    let remedy = if hint.is_empty() { other } else { format!("{hint};\nor {other}") };
     let measured = format!(
         "the log has no {wanted}; it has {}",
         if usable.is_empty() { "nothing usable" } else { &usable }
@@ -59,8 +62,10 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
             .why("a plugin does not go on after a frame that it cannot use");
         return Some(finding.remedy("see the findings above; else this is a defect of the plugin"));
     }
-    let (frames, with) = (trial.frames, trial.with_people);
-    let measured = format!("{} found, somebody in {with} of {frames} frames", trial.people.len());
+    let coverage = &evidence.coverage;
+    let tracks = coverage.moving + coverage.still + coverage.unclear;
+    let (frames, with) = (trial.frames, coverage.frames_with_people);
+    let measured = format!("{tracks} tracks, seen in {with} of {frames} frames");
     let severity = match (frames, with) {
         (0, _) => Severity::Bad,
         (_, 1..) => Severity::Ok,
@@ -75,7 +80,7 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
         }
     };
     let finding = Finding::new("people", severity, measured)
-        .figure("people", trial.people.len() as f64)
+        .figure("people", tracks as f64)
         .figure("frames_with_people", with as f64)
         .why(if frames == 0 { "no frame can be made" } else { "nobody is detected" });
     Some(finding.remedy(remedy))

@@ -1,0 +1,57 @@
+use super::super::coverage::STILL_S;
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+use super::{Alternative, better};
+
+/// Boxes below which shares mean little.
+const FEW_BOXES: usize = 5;
+
+/// Checks that tracks are not of things: they move at some time, or something stirs where they are.
+pub fn still(evidence: &Evidence) -> Option<Finding> {
+    let coverage = &evidence.coverage;
+    if coverage.boxes == 0 {
+        return None;
+    }
+    let tracks = coverage.moving + coverage.still + coverage.unclear;
+    let still_share = coverage.still_boxes as f64 / coverage.boxes as f64;
+    let idle_share = coverage.idle();
+    let mut severity = Severity::beyond(idle_share, 0.1, 0.5);
+    if coverage.boxes < FEW_BOXES {
+        severity = severity.min(Severity::Warn);
+    }
+    let mut measured = match coverage.still {
+        0 => format!("each of {tracks} tracks moved or lived less than {STILL_S:.0} s"),
+        still => format!(
+            "{still} of {tracks} tracks never moved; they fill {:.0} % of the boxes",
+            100.0 * still_share
+        ),
+    };
+    if coverage.judged_boxes > 0 {
+        measured += &format!(
+            "; in {:.0} % of the boxes nothing ever comes or goes in depth",
+            100.0 * idle_share
+        );
+    }
+    let finding = Finding::new("still", severity, measured)
+        .figure("tracks", tracks as f64)
+        .figure("still_tracks", coverage.still as f64)
+        .figure("still_boxes_share", still_share)
+        .figure("idle_boxes_share", idle_share)
+        .why("people move at some time: these are things, or people who sit or stand throughout");
+    Some(finding.remedy(remedy(evidence)))
+}
+
+/// Returns the change that helped most on this log, else a general one.
+fn remedy(evidence: &Evidence) -> String {
+    let now = &evidence.coverage;
+    match better(evidence, |other| other.idle() < now.idle() - 0.02 || other.boxes < now.boxes) {
+        Some(Alternative { change, coverage }) => format!(
+            "look at the pictures (-o DIR); tried on this log, nothing moves in {:.0} % of the boxes \
+             with\n{change}",
+            100.0 * coverage.idle()
+        ),
+        None => "look at the pictures (-o DIR); where they are things, take depth-verified, or\n\
+                 [manager] plugin = \"manage-sprt\""
+            .to_owned(),
+    }
+}

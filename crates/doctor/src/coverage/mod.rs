@@ -1,0 +1,159 @@
+//! Coverage: what comes and goes in a log, against the tracks of a pipeline.
+
+mod course;
+
+use nalgebra::Point2;
+use serde::Serialize;
+
+pub use course::{Course, Life, STILL_S};
+use course::{Moment, Placed};
+
+use super::scenery::{self, Scenery};
+
+/// Distance of a track from the people-sized blob that it explains, m.
+const EXPLAINS_M: f64 = 0.5;
+
+/// Distance around a track within which something has to come or go, m, and the share of the points
+/// there that have to.
+const STIRS_M: f64 = 0.4;
+const STIRS_SHARE: f64 = 0.15;
+
+/// Figures of a pipeline on a log, without any truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Frames that the pipeline was given.
+    pub frames: usize,
+    /// Frames in which a confirmed track was seen.
+    pub frames_with_people: usize,
+    /// Confirmed tracks that left their place.
+    pub moving: usize,
+    /// Confirmed tracks that never did.
+    pub still: usize,
+    /// Confirmed tracks of which that cannot be told.
+    pub unclear: usize,
+    /// Boxes: confirmed tracks that were seen, over all frames.
+    pub boxes: usize,
+    /// Boxes of tracks that never moved.
+    pub still_boxes: usize,
+    /// Boxes in frames with depth at places that were visible.
+    pub judged_boxes: usize,
+    /// Those of them at places where nothing ever comes or goes.
+    pub idle_boxes: usize,
+    /// People-sized blobs that come and go, over all frames with depth.
+    pub blobs: usize,
+    /// Those of them without a track.
+    pub unexplained: usize,
+    /// Frames with an unexplained blob.
+    pub frames_unexplained: usize,
+    /// Example of an unexplained blob.
+    pub example: Option<Example>,
+    /// Frames with unexplained blobs, those with the most first.
+    #[serde(skip)]
+    pub missed_frames: Vec<u64>,
+    /// Mean time of a frame, ms.
+    #[serde(skip)]
+    pub frame_ms: f64,
+}
+
+/// Place of an unexplained blob.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Example {
+    /// Index of the frame.
+    pub frame: u64,
+    /// Distance from the camera on the floor, m.
+    pub range_m: f64,
+    /// Bearing, positive to the left, degrees.
+    pub bearing_deg: f64,
+    /// Height of its highest point, m.
+    pub top_m: f64,
+}
+
+impl Coverage {
+    /// Compares the tracks of a pipeline with what comes and goes.
+    pub fn of(course: &Course, scenery: &Scenery) -> Self {
+        let mut out = Self { frames: course.moments.len(), ..Self::default() };
+        out.frame_ms = course.spent_ms / out.frames.max(1) as f64;
+        out.add_lives(course);
+        let mut missed: Vec<(usize, u64)> = Vec::new();
+        for moment in &course.moments {
+            if let Some(seen) = scenery.moment(moment.index) {
+                missed.push((out.add_moment(moment, seen), moment.index));
+            }
+        }
+        missed.retain(|(count, _)| *count > 0);
+        // Stable: of equal ones the earlier frame comes first.
+        missed.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+        out.frames_unexplained = missed.len();
+        out.missed_frames = missed.into_iter().map(|(_, index)| index).collect();
+        out
+    }
+
+    /// Counts tracks and boxes by the motion of the tracks.
+    fn add_lives(&mut self, course: &Course) {
+        let lives = course.lives();
+        let count = |life: Life| lives.values().filter(|other| **other == life).count();
+        self.moving = count(Life::Moved);
+        self.still = count(Life::Still);
+        self.unclear = count(Life::Unclear);
+        for moment in &course.moments {
+            let seen = || moment.tracks.iter().filter(|track| track.seen);
+            self.frames_with_people += usize::from(seen().next().is_some());
+            self.boxes += seen().count();
+            self.still_boxes +=
+                seen().filter(|track| lives.get(&track.id) == Some(&Life::Still)).count();
+        }
+    }
+
+    /// Compares the tracks of a frame with its depth image; returns the number of blobs without one.
+    fn add_moment(&mut self, moment: &Moment, seen: &scenery::Moment) -> usize {
+        for track in moment.tracks.iter().filter(|track| track.seen) {
+            let share = seen.plan.changed_share(track.place, STIRS_M);
+            self.judged_boxes += usize::from(share.is_some());
+            self.idle_boxes += usize::from(share.is_some_and(|share| share < STIRS_SHARE));
+        }
+        self.blobs += seen.blobs.len();
+        let missed: Vec<_> =
+            seen.blobs.iter().filter(|blob| !is_explained(blob.place, &moment.tracks)).collect();
+        self.unexplained += missed.len();
+        let examples = missed.iter().map(|blob| {
+            let (range_m, bearing_deg) = seen.bearing_of(blob.place);
+            Example { frame: moment.index, range_m, bearing_deg, top_m: blob.top_m }
+        });
+        // The nearest one is the easiest to see in the picture of its frame.
+        let nearer = |a: &Example, b: &Example| a.range_m.total_cmp(&b.range_m);
+        self.example = self.example.into_iter().chain(examples).min_by(nearer);
+        missed.len()
+    }
+
+    /// Returns the share of the blobs that a track explains; `None` without blobs.
+    pub fn found(&self) -> Option<f64> {
+        (self.blobs > 0).then(|| 1.0 - self.unexplained as f64 / self.blobs as f64)
+    }
+
+    /// Returns the share of the boxes where nothing ever comes or goes; without depth that of tracks
+    /// that never moved.
+    pub fn idle(&self) -> f64 {
+        match self.judged_boxes {
+            0 => self.still_boxes as f64 / self.boxes.max(1) as f64,
+            judged => self.idle_boxes as f64 / judged as f64,
+        }
+    }
+
+    /// Returns a figure by which settings can be ranked, 0 to 1: the F1 measure with blobs that come
+    /// and go in place of people, and boxes where nothing ever does in place of false ones. It is no
+    /// truth: people who never stir count as false.
+    pub fn worth(&self) -> f64 {
+        let found = (self.blobs - self.unexplained) as f64;
+        let wrong = (self.unexplained + self.idle_boxes) as f64;
+        2.0 * found / (2.0 * found + wrong).max(1.0)
+    }
+
+    /// Returns the boxes of a frame on average.
+    pub fn boxes_a_frame(&self) -> f64 {
+        self.boxes as f64 / self.frames.max(1) as f64
+    }
+}
+
+fn is_explained(blob: Point2<f64>, tracks: &[Placed]) -> bool {
+    tracks.iter().any(|track| (track.place - blob).norm() <= EXPLAINS_M)
+}
