@@ -27,7 +27,7 @@ pub struct Choice {
 
 /// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
-pub const CHOICES: [Choice; 8] = [
+pub const CHOICES: [Choice; 9] = [
     Choice {
         config: "depth-verified",
         has: "colour and depth",
@@ -37,6 +37,11 @@ pub const CHOICES: [Choice; 8] = [
         config: "depth-ekf",
         has: "depth without colour",
         reason: "no verifier can judge what it finds, so expect furniture among the people",
+    },
+    Choice {
+        config: "depth-net-ekf",
+        has: "depth of a camera at an unusual height",
+        reason: "it needs no heads, and no settings for the height of the camera",
     },
     Choice { config: "stereo-best", has: "a stereo pair", reason: "verifiers judge what it finds" },
     Choice {

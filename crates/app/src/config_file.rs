@@ -19,9 +19,10 @@ use crate::suggest::config_hint;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 8] = [
+const BUILT_IN: [(&str, &str); 9] = [
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
+    ("depth-net-ekf", include_str!("../../../configs/depth-net-ekf.toml")),
     ("stereo-best", include_str!("../../../configs/stereo-best.toml")),
     ("stereo-street", include_str!("../../../configs/stereo-street.toml")),
     ("omni-best", include_str!("../../../configs/omni-best.toml")),

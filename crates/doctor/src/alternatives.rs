@@ -15,7 +15,7 @@ use super::remedies::{self, Change, is_present};
 use super::visit::{Scope, Visit};
 
 /// Most built-in configs that are tried beside the one of the user.
-const MOST_CONFIGS: usize = 3;
+const MOST_CONFIGS: usize = 4;
 
 /// Other setting, and its figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -53,10 +53,14 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
         change: runner.change,
         coverage: Coverage::of(&runner.course, &visit.scenery),
     });
-    let mut judged: Vec<Alternative> = judged.collect();
-    // Stable: of equal ones the order of the config stays.
-    judged.sort_by(|a, b| b.coverage.worth().total_cmp(&a.coverage.worth()));
-    judged
+    ranked(judged)
+}
+
+/// Returns alternatives, the best first; of equal ones the order stays.
+pub fn ranked(alternatives: impl Iterator<Item = Alternative>) -> Vec<Alternative> {
+    let mut ranked: Vec<Alternative> = alternatives.collect();
+    ranked.sort_by(|a, b| b.coverage.worth().total_cmp(&a.coverage.worth()));
+    ranked
 }
 
 impl Runner {
@@ -104,6 +108,11 @@ fn changes(visit: &Visit, resolved: &str) -> Vec<Change> {
     changes
 }
 
+/// Names another config as a change.
+pub fn another(config: &str) -> String {
+    format!("{config} (another config)")
+}
+
 /// Returns the built-in configs that fit the log.
 fn others(config: &ConfigFile, scope: Scope, registry: &Registry) -> Vec<Runner> {
     let found = fitting(scope.log, registry, MOST_CONFIGS).fitting;
@@ -111,7 +120,7 @@ fn others(config: &ConfigFile, scope: Scope, registry: &Registry) -> Vec<Runner>
     others
         .filter_map(|other| {
             let (pipeline, _) = other.config.pipeline(registry, None).ok()?;
-            Some(Runner::new(format!("the config {}", other.choice.config), pipeline))
+            Some(Runner::new(another(other.choice.config), pipeline))
         })
         .collect()
 }

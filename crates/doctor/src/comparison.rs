@@ -1,14 +1,16 @@
 //! All built-in pipelines that fit a log, side by side.
 
 use serde::Serialize;
-use tagalong_app::choice::{CHOICES, fitting};
+use tagalong_app::choice::{CHOICES, Choice, Fitting, fitting};
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
 
+use super::alternatives::Alternative;
 use super::coverage::Coverage;
 use super::diagnosis::Diagnosis;
+use super::evidence::Evidence;
 use super::visit::{Scope, Visit};
-use super::{DoctorArgs, Trying, snapshots};
+use super::{DoctorArgs, Trying, alternatives, snapshots};
 
 /// Pipeline in the comparison.
 #[derive(Debug, Serialize)]
@@ -38,29 +40,42 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
         return Err(found.none_fits(scope.log));
     }
     let (mut rows, mut first) = (Vec::new(), None);
-    for fitting in found.fitting {
-        let choice = fitting.choice;
-        let folder = args.output.as_ref().map(|folder| folder.join(choice.config));
-        let mut visit = Visit::make(fitting.config, scope, registry)?;
-        if let Some(folder) = &folder {
-            snapshots::write(&visit, scope, folder)?;
+    for Fitting { choice, config } in found.fitting {
+        let visit = Visit::make(config, scope, registry)?;
+        if let Some(folder) = &args.output {
+            snapshots::write(&visit, scope, &folder.join(choice.config))?;
         }
-        rows.push(Row {
+        rows.push(Row::of(choice, &visit.evidence, first.is_none()));
+        first.get_or_insert(visit);
+    }
+    let (Some(mut visit), Some(taken)) = (first, rows.first()) else {
+        return Err(Failure::failed("no pipeline was tried"));
+    };
+    let name = taken.config;
+    if args.settings == Trying::Always {
+        visit.ask_further(args.settings, scope, registry);
+    }
+    // The other pipelines are alternatives, too, and have been tried already.
+    let shown = std::mem::take(&mut visit.evidence.alternatives);
+    visit.evidence.alternatives = alternatives::ranked(rows.iter().skip(1).map(Row::alternative));
+    let folder = args.output.as_ref().map(|folder| folder.join(name));
+    let first = Diagnosis::of(&visit, name.into(), args, folder.as_deref())?;
+    Ok(Diagnosis { pipelines: rows, alternatives: shown, ..first })
+}
+
+impl Row {
+    fn of(choice: Choice, evidence: &Evidence, taken: bool) -> Self {
+        Self {
             config: choice.config,
-            taken: first.is_none(),
+            taken,
             reason: choice.reason,
-            coverage: visit.evidence.coverage.clone(),
-            frame_ms: visit.evidence.coverage.frame_ms,
-            failure: visit.evidence.trial.failure.clone(),
-        });
-        if first.is_none() {
-            // The other pipelines are tried anyway; settings only where that is asked for.
-            if args.settings == Trying::Always {
-                visit.ask_further(args.settings, scope, registry);
-            }
-            first = Some(Diagnosis::of(&visit, choice.config.into(), args, folder.as_deref())?);
+            coverage: evidence.coverage.clone(),
+            frame_ms: evidence.coverage.frame_ms,
+            failure: evidence.trial.failure.clone(),
         }
     }
-    let first = first.ok_or_else(|| Failure::failed("no pipeline was tried"))?;
-    Ok(Diagnosis { pipelines: rows, ..first })
+
+    fn alternative(&self) -> Alternative {
+        Alternative { change: alternatives::another(self.config), coverage: self.coverage.clone() }
+    }
 }

@@ -22,6 +22,8 @@ const KEPT_DEPTHS: usize = 8;
 
 /// Facts about a config and a log.
 pub struct Evidence {
+    /// Name of the config.
+    pub config: String,
     /// Contents of the log.
     pub inspection: Inspection,
     /// Reason for which the pipeline lacks an input that it requires.

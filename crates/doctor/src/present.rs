@@ -3,7 +3,8 @@
 use toml::{Table, Value};
 
 /// Words that lead to a setting, and lead nowhere without one.
-const LEADS: [&str; 6] = ["; else", "; until then", ", or", "; or", "else", "or"];
+const LEADS: &[&str] =
+    &["; else", "; until then", ", believe tracks by evidence", ", or", "; or", "else", "or"];
 
 /// Removes the lines of a remedy that set what a resolved config has already, or what the plugin of
 /// a section does not know. Returns `None` if nothing is left.

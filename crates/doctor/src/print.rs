@@ -43,7 +43,7 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         let failure = failure.iter().map(|why| format!(": failed, {why}")).collect::<String>();
         let _ = writeln!(out, "  {}  {frame_ms:>7.1}  {config}{mark}{failure}", figures(coverage));
     }
-    let _ = writeln!(out, "{}", legend("  "));
+    let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
         let _ =
             writeln!(out, "\n`tagalong run` takes {}, because {}\n", taken.config, taken.reason);
@@ -66,7 +66,7 @@ fn settings(out: &mut String, diagnosis: &Diagnosis) {
         let _ = writeln!(out, "  and {more} more, see --format json");
     }
     if diagnosis.pipelines.is_empty() {
-        let _ = writeln!(out, "{}", legend("  "));
+        let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
     }
 }
 
@@ -90,12 +90,15 @@ fn percent(part: f64) -> String {
     format!("{:.0} %", 100.0 * part)
 }
 
-fn legend(lead: &str) -> String {
-    format!(
-        "{lead}moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes \
-         where\n{lead}nothing comes or goes; missed: person-sized shapes that come and go without a \
-         track"
-    )
+/// Returns the meaning of the columns, by what the log has.
+fn legend(coverage: &Coverage) -> &'static str {
+    if coverage.has_depth {
+        "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes where\n  \
+         nothing comes or goes; missed: person-sized shapes that come and go without a track"
+    } else {
+        "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes of\n  \
+         those that never did; missed: not measured without depth"
+    }
 }
 
 fn finding(out: &mut String, finding: &Finding) {

@@ -262,15 +262,16 @@ mod tests {
     fn no_change_is_to_the_present_value() {
         let resolved: Table = toml::from_str(
             "[manager]\nplugin = 'manage-sprt'\n[manager.config]\nend_log_odds = -2.0\n\
-             [[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_height_m = 1\n",
+             [[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_height_m = 1\ndiscover_cost = 0.2\n",
         )
         .unwrap();
         let lines: Vec<String> = offered(&resolved).into_iter().map(|change| change.line).collect();
         assert!(!lines.iter().any(|line| line.contains("manage-sprt")), "{lines:?}");
-        let height = "[[detectors]] plugin = \"depth-template\", config = { min_head_height_m = ";
-        let heights: Vec<&String> = lines.iter().filter(|line| line.starts_with(height)).collect();
-        assert!(!heights.is_empty(), "{lines:?}");
-        assert!(!heights.iter().any(|line| line.contains("= 1.0 ")), "{heights:?}");
+        assert!(!lines.iter().any(|line| line.contains("min_head_height_m")), "{lines:?}");
+        let costs: Vec<&String> =
+            lines.iter().filter(|line| line.contains("discover_cost")).collect();
+        assert!(!costs.is_empty(), "{lines:?}");
+        assert!(!costs.iter().any(|line| line.contains("= 0.2 ")), "{costs:?}");
     }
 
     #[test]

@@ -58,6 +58,7 @@ impl Visit {
         let found = examine(scope.log, &outer.input, &outer.limits, read)?;
         let expected = expected_frames(&found.inspection).min(scope.frames);
         let mut evidence = Evidence {
+            config: config.stem(),
             samples: Samples::of(expected),
             inspection: found.inspection,
             refusal: found.refusal,

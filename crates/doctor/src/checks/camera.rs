@@ -62,7 +62,8 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
         return ok("the pose of the camera comes from [input.camera]".into());
     }
     if tf.is_empty() {
-        return ok(format!("no tf; the pose of the camera comes from {}", facts.camera_source));
+        let sensor = if camera.is_blind() { "scanner" } else { "camera" };
+        return ok(format!("no tf; the pose of the {sensor} comes from {}", facts.camera_source));
     }
     if !facts.camera_source.starts_with("tf") {
         return Some(cut(evidence, &name));

@@ -15,7 +15,7 @@ const STEP_M: f64 = 0.05;
 const STEPS: usize = 155;
 
 /// Distance up to which people are wanted whole, m, and beyond which nobody misses them.
-const NEAR_M: f64 = 1.2;
+const NEAR_M: f64 = 1.5;
 const BAD_NEAR_M: f64 = 2.5;
 const FAR_M: f64 = 4.0;
 
@@ -44,7 +44,8 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
     measured += &format!(
         " (camera {:.2} m high, {:.0} degrees down)",
         camera.height_m(),
-        camera.pitch_down_rad().to_degrees()
+        // Adding 0 turns a negative zero into a positive one.
+        camera.pitch_down_rad().to_degrees().round() + 0.0
     );
     let finding = Finding::new("heads", severity, measured)
         .figure("nearest_head_m", near)
@@ -121,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_remedy_says_by_how_much_to_look_up() {
-        assert!(remedy(&camera(0.8, 10.0)).starts_with("tilt the camera up by 24 degrees"));
+        assert!(remedy(&camera(0.8, 10.0)).starts_with("tilt the camera up by 18 degrees"));
         assert!(remedy(&camera(1.75, 90.0)).starts_with("mount the camera"));
     }
 }

@@ -62,6 +62,11 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
             .why("a plugin does not go on after a frame that it cannot use");
         return Some(finding.remedy("see the findings above; else this is a defect of the plugin"));
     }
+    if evidence.refusal.is_some() {
+        let finding = Finding::new("people", Severity::Bad, "the pipeline did not run")
+            .why("an input that it requires is missing");
+        return Some(finding.remedy("see the findings above"));
+    }
     let coverage = &evidence.coverage;
     let tracks = coverage.moving + coverage.still + coverage.unclear;
     let (frames, with) = (trial.frames, coverage.frames_with_people);

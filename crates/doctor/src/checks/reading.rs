@@ -26,7 +26,9 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
         0 => Severity::Bad,
         _ => Severity::beyond(lost, 0.05, 0.5),
     };
-    let measured = format!("{made} frames of {wanted} images or scans{}", reasons(evidence, lost));
+    let is_of_scans = evidence.samples.camera.as_ref().is_some_and(|camera| camera.is_blind());
+    let sources = if is_of_scans { "scans" } else { "images" };
+    let measured = format!("{made} frames of {wanted} {sources}{}", reasons(evidence, lost));
     let finding = Finding::new("frames-read", severity, measured)
         .figure("frames", made as f64)
         .figure("wanted", wanted as f64)

@@ -161,7 +161,11 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
         }
         (Some(topic), _) => (Severity::Ok, format!("{topic}: {way}")),
         (None, _) if !stands => (Severity::Ok, format!("from tf: {way}")),
-        (None, _) => (Severity::Ok, "none: right for a robot that stands still".to_owned()),
+        (None, _) => match evidence.changed {
+            Some(_) => (Severity::Ok, "none, and the camera stands still".to_owned()),
+            // A scanner alone cannot tell, so nothing is said about how right that is.
+            None => (Severity::Unknown, "none: the robot is taken to stand still".to_owned()),
+        },
     };
     let finding = Finding::new("odometry", severity, measured)
         .figure("driven_m", metres)

@@ -21,6 +21,8 @@ const STIRS_SHARE: f64 = 0.15;
 /// Figures of a pipeline on a log, without any truth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Coverage {
+    /// True if there are depth images to compare with.
+    pub has_depth: bool,
     /// Frames that the pipeline was given.
     pub frames: usize,
     /// Frames in which a confirmed track was seen.
@@ -71,7 +73,8 @@ pub struct Example {
 impl Coverage {
     /// Compares the tracks of a pipeline with what comes and goes.
     pub fn of(course: &Course, scenery: &Scenery) -> Self {
-        let mut out = Self { frames: course.moments.len(), ..Self::default() };
+        let has_depth = !scenery.moments.is_empty();
+        let mut out = Self { has_depth, frames: course.moments.len(), ..Self::default() };
         out.frame_ms = course.spent_ms / out.frames.max(1) as f64;
         out.add_lives(course);
         let mut missed: Vec<(usize, u64)> = Vec::new();
@@ -156,4 +159,70 @@ impl Coverage {
 
 fn is_explained(blob: Point2<f64>, tracks: &[Placed]) -> bool {
     tracks.iter().any(|track| (track.place - blob).norm() <= EXPLAINS_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::Stamp;
+
+    use super::*;
+    use crate::scenery::testing::{PILLAR, Room, Thing};
+
+    const FRAMES: u64 = 40;
+
+    /// Tracks at places by the time, in all frames.
+    fn course(tracks: &[&dyn Fn(f64) -> Point2<f64>]) -> Course {
+        let moment = |number: u64| {
+            let seconds = 0.1 * number as f64;
+            let placed = |(id, place): (u32, &&dyn Fn(f64) -> Point2<f64>)| {
+                let place = place(seconds);
+                Placed { id, place, range_m: place.coords.norm(), sigma_m: 0.05, seen: true }
+            };
+            let stamp = Stamp::default().plus_seconds(seconds);
+            let tracks = (1..).zip(tracks).map(placed).collect();
+            Moment { index: number + 1, stamp, tracks }
+        };
+        Course { moments: (0..FRAMES).map(moment).collect(), spent_ms: 80.0 }
+    }
+
+    fn scenery() -> Scenery {
+        Room::default().with(Thing::walking()).seen(FRAMES, 0.0).judge()
+    }
+
+    #[test]
+    fn a_tracked_pillar_and_an_untracked_walker_are_told() {
+        let found = Coverage::of(&course(&[&|_| PILLAR]), &scenery());
+        assert_eq!((found.moving, found.still, found.unclear), (0, 1, 0));
+        assert_eq!((found.boxes, found.still_boxes), (40, 40));
+        assert_eq!((found.frames, found.frames_with_people), (40, 40));
+        assert!(found.idle() > 0.8, "{found:?}");
+        assert!(found.found().unwrap() < 0.2, "{found:?}");
+        assert!(found.worth() < 0.2, "{found:?}");
+        assert_eq!(found.frames_unexplained, found.missed_frames.len());
+        assert_eq!(found.frame_ms, 2.0);
+        let example = found.example.unwrap();
+        assert!((example.range_m - 3.0).abs() < 0.3, "{example:?}");
+        // Frames count from one, and the walker crosses the middle after 1.8 s.
+        let side = 0.9 - 0.05 * (example.frame - 1) as f64;
+        assert_eq!(example.bearing_deg > 0.0, side > 0.0, "{example:?}");
+    }
+
+    #[test]
+    fn a_track_of_the_walker_explains_it() {
+        let walker = Thing::walking();
+        let found = Coverage::of(&course(&[&|seconds| walker.place(seconds)]), &scenery());
+        assert_eq!((found.moving, found.still), (1, 0));
+        assert!(found.found().unwrap() > 0.95 && found.idle() < 0.05, "{found:?}");
+        assert!(found.worth() > 0.95, "{found:?}");
+        let beside = |seconds| walker.place(seconds) + nalgebra::Vector2::new(0.0, 0.8);
+        let found = Coverage::of(&course(&[&beside]), &scenery());
+        assert!(found.found().unwrap() < 0.2, "a track 0.8 m beside explains nothing: {found:?}");
+    }
+
+    #[test]
+    fn without_depth_the_motion_of_tracks_is_all_there_is() {
+        let found = Coverage::of(&course(&[&|_| PILLAR]), &Scenery::default());
+        assert_eq!((found.found(), found.idle()), (None, 1.0));
+        assert!(!found.has_depth && found.boxes_a_frame() == 1.0);
+    }
 }

@@ -5,6 +5,8 @@
 //! by the odometry, so that a driven log can be judged, too.
 
 mod plan;
+#[cfg(test)]
+pub mod testing;
 mod view;
 
 use std::ops::RangeInclusive;
@@ -135,4 +137,71 @@ fn has_changed(point: &Point3<f64>, others: &[&View]) -> bool {
         }
     }
     through >= MIN_THROUGH && f64::from(through) >= MIN_SHARE * f64::from(through + onto)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{PILLAR, Room, Thing};
+    use super::*;
+
+    fn blobs(scenery: &Scenery) -> usize {
+        scenery.moments.iter().map(|moment| moment.blobs.len()).sum()
+    }
+
+    #[test]
+    fn walkers_come_and_go_and_pillars_do_not() {
+        let scenery = Room::default().with(Thing::walking()).seen(40, 0.0).judge();
+        let found = blobs(&scenery);
+        assert!((35..=42).contains(&found), "{found}");
+        for moment in &scenery.moments {
+            for blob in &moment.blobs {
+                assert!((blob.place.x - 3.0).abs() < 0.3, "the walker is 3 m away: {blob:?}");
+                assert!((1.4..1.85).contains(&blob.top_m), "{blob:?}");
+            }
+        }
+        assert_eq!(blobs(&Room::default().seen(40, 0.0).judge()), 0);
+        assert!(scenery.changed < 0.3, "{}", scenery.changed);
+    }
+
+    #[test]
+    fn the_place_of_a_pillar_is_idle_and_that_of_a_walker_is_not() {
+        let scenery = Room::default().with(Thing::walking()).seen(40, 0.0).judge();
+        let (first, walker) = (&scenery.moments[2], Thing::walking().place(0.2));
+        let share = |place| first.plan.changed_share(place, 0.4).unwrap();
+        assert!(share(PILLAR) < 0.05, "{}", share(PILLAR));
+        assert!(share(walker) > 0.5, "{}", share(walker));
+        assert_eq!(first.plan.changed_share(Point2::new(1.5, 6.0), 0.4), None, "out of view");
+    }
+
+    /// With the odometry the pillar stays where it is; without it everything seems to move.
+    #[test]
+    fn ego_motion_is_taken_out() {
+        let known = Room::default().seen(40, 0.3).judge();
+        assert!(known.changed < 0.05, "{}", known.changed);
+        assert_eq!(blobs(&known), 0);
+        let unknown = Room { odometry: false, ..Room::default() }.seen(40, 0.3).judge();
+        assert!(unknown.changed > 0.2, "{}", unknown.changed);
+    }
+
+    #[test]
+    fn things_of_another_size_are_no_people() {
+        for (width_m, top_m) in [(1.6, 1.7), (0.1, 1.7), (0.5, 0.9)] {
+            // Fast, because the middle of a slow wide board hides the wall nearly all the time.
+            let start = Point2::new(3.0, 4.0);
+            let thing = Thing { start, speed_mps: 2.0, width_m, top_m };
+            let scenery = Room::default().with(thing).seen(40, 0.0).judge();
+            // Cut by the image border, a wide board is as narrow as a person.
+            let place = |moment: &Moment| thing.place(0.1 * (moment.index - 1) as f64);
+            let whole = |moment: &&Moment| place(moment).y.abs() < 0.9;
+            let count: usize = scenery.moments.iter().filter(whole).map(|m| m.blobs.len()).sum();
+            assert_eq!(count, 0, "{thing:?}");
+        }
+    }
+
+    #[test]
+    fn of_many_frames_some_are_kept() {
+        let mut views = Views::of(MOST_VIEWS * 3);
+        (0..9).for_each(|number| views.take(number, &Room::default().frame(number, 0.0)));
+        assert_eq!(views.judge().moments.len(), 3);
+    }
 }
