@@ -30,11 +30,9 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
             100.0 * still_share
         ),
     };
-    if coverage.judged_boxes > 0 {
-        measured += &format!(
-            "; in {:.0} % of the boxes nothing ever comes or goes in depth",
-            100.0 * idle_share
-        );
+    if coverage.has_depth {
+        measured +=
+            &format!("; in {:.0} % of the boxes nothing ever comes or goes", 100.0 * idle_share);
     }
     let finding = Finding::new("still", severity, measured)
         .figure("tracks", tracks as f64)

@@ -52,6 +52,9 @@ pub enum Life {
     Unclear,
 }
 
+/// Lives of the tracks, by their numbers.
+pub type Lives = BTreeMap<u32, Life>;
+
 /// Life of a track that never left its place, at least, s.
 pub const STILL_S: f64 = 3.0;
 
@@ -90,7 +93,7 @@ impl Course {
     }
 
     /// Returns the life of each track.
-    pub fn lives(&self) -> BTreeMap<u32, Life> {
+    pub fn lives(&self) -> Lives {
         let mut seen: BTreeMap<u32, Vec<(Stamp, Placed)>> = BTreeMap::new();
         for moment in &self.moments {
             for track in moment.tracks.iter().filter(|track| track.seen) {

@@ -5,8 +5,8 @@ mod course;
 use nalgebra::Point2;
 use serde::Serialize;
 
-pub use course::{Course, Life, STILL_S};
-use course::{Moment, Placed};
+pub use course::{Course, STILL_S};
+use course::{Life, Lives, Moment, Placed};
 
 use super::scenery::{self, Scenery};
 
@@ -37,9 +37,8 @@ pub struct Coverage {
     pub boxes: usize,
     /// Boxes of tracks that never moved.
     pub still_boxes: usize,
-    /// Boxes in frames with depth at places that were visible.
-    pub judged_boxes: usize,
-    /// Those of them at places where nothing ever comes or goes.
+    /// Boxes at places where nothing ever comes or goes; where the depth image does not show the
+    /// place, boxes of tracks that never moved.
     pub idle_boxes: usize,
     /// People-sized blobs that come and go, over all frames with depth.
     pub blobs: usize,
@@ -76,12 +75,13 @@ impl Coverage {
         let has_depth = !scenery.moments.is_empty();
         let mut out = Self { has_depth, frames: course.moments.len(), ..Self::default() };
         out.frame_ms = course.spent_ms / out.frames.max(1) as f64;
-        out.add_lives(course);
+        let lives = course.lives();
+        out.add_tracks(&lives);
         let mut missed: Vec<(usize, u64)> = Vec::new();
         for moment in &course.moments {
-            if let Some(seen) = scenery.moment(moment.index) {
-                missed.push((out.add_moment(moment, seen), moment.index));
-            }
+            let seen = scenery.moment(moment.index);
+            out.add_boxes(moment, &lives, seen);
+            missed.extend(seen.map(|seen| (out.add_blobs(moment, seen), moment.index)));
         }
         missed.retain(|(count, _)| *count > 0);
         // Stable: of equal ones the earlier frame comes first.
@@ -91,29 +91,31 @@ impl Coverage {
         out
     }
 
-    /// Counts tracks and boxes by the motion of the tracks.
-    fn add_lives(&mut self, course: &Course) {
-        let lives = course.lives();
+    /// Counts the tracks by their motion.
+    fn add_tracks(&mut self, lives: &Lives) {
         let count = |life: Life| lives.values().filter(|other| **other == life).count();
         self.moving = count(Life::Moved);
         self.still = count(Life::Still);
         self.unclear = count(Life::Unclear);
-        for moment in &course.moments {
-            let seen = || moment.tracks.iter().filter(|track| track.seen);
-            self.frames_with_people += usize::from(seen().next().is_some());
-            self.boxes += seen().count();
-            self.still_boxes +=
-                seen().filter(|track| lives.get(&track.id) == Some(&Life::Still)).count();
-        }
     }
 
-    /// Compares the tracks of a frame with its depth image; returns the number of blobs without one.
-    fn add_moment(&mut self, moment: &Moment, seen: &scenery::Moment) -> usize {
+    /// Counts the boxes of a frame: of tracks that never moved, and at idle places.
+    fn add_boxes(&mut self, moment: &Moment, lives: &Lives, seen: Option<&scenery::Moment>) {
+        let boxes = self.boxes;
         for track in moment.tracks.iter().filter(|track| track.seen) {
-            let share = seen.plan.changed_share(track.place, STIRS_M);
-            self.judged_boxes += usize::from(share.is_some());
-            self.idle_boxes += usize::from(share.is_some_and(|share| share < STIRS_SHARE));
+            let is_still = lives.get(&track.id) == Some(&Life::Still);
+            let share = seen.and_then(|seen| seen.plan.changed_share(track.place, STIRS_M));
+            let is_idle = share.map_or(is_still, |share| share < STIRS_SHARE);
+            self.boxes += 1;
+            self.still_boxes += usize::from(is_still);
+            self.idle_boxes += usize::from(is_idle);
         }
+        self.frames_with_people += usize::from(self.boxes > boxes);
+    }
+
+    /// Compares the tracks of a frame with the blobs in its depth image; returns the number of blobs
+    /// without a track.
+    fn add_blobs(&mut self, moment: &Moment, seen: &scenery::Moment) -> usize {
         self.blobs += seen.blobs.len();
         let missed: Vec<_> =
             seen.blobs.iter().filter(|blob| !is_explained(blob.place, &moment.tracks)).collect();
@@ -133,13 +135,9 @@ impl Coverage {
         (self.blobs > 0).then(|| 1.0 - self.unexplained as f64 / self.blobs as f64)
     }
 
-    /// Returns the share of the boxes where nothing ever comes or goes; without depth that of tracks
-    /// that never moved.
+    /// Returns the share of the boxes where nothing ever comes or goes.
     pub fn idle(&self) -> f64 {
-        match self.judged_boxes {
-            0 => self.still_boxes as f64 / self.boxes.max(1) as f64,
-            judged => self.idle_boxes as f64 / judged as f64,
-        }
+        self.idle_boxes as f64 / self.boxes.max(1) as f64
     }
 
     /// Returns a figure by which settings can be ranked, 0 to 1: the F1 measure with blobs that come
