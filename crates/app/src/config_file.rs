@@ -47,19 +47,6 @@ pub struct OuterSettings {
     pub limits: Limits,
     /// `[output]`: contents of the output files.
     pub output: OutputSettings,
-    /// `[suits]`: cameras that the config was fitted to and tried on.
-    pub suits: Suits,
-}
-
-/// Cameras that a config was fitted to and tried on. A run takes no notice of it; `tagalong doctor`
-/// warns of others.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Suits {
-    /// Lowest and highest camera above the floor, m.
-    pub camera_height_m: Option<[f64; 2]>,
-    /// Least and greatest angle of the optical axis below the horizon, degrees.
-    pub pitch_down_deg: Option<[f64; 2]>,
 }
 
 impl ConfigFile {
@@ -202,7 +189,6 @@ impl ConfigFile {
                 input: self.table("input")?,
                 limits: self.table("limits")?,
                 output: self.table("output")?,
-                suits: self.table("suits")?,
             })
         };
         read().map_err(|error| self.mistake(&error))
@@ -240,13 +226,13 @@ fn strings(value: &toml::Value, out: &mut Vec<String>) {
 
 impl OuterSettings {
     /// Names of the tables.
-    const TABLES: [&str; 4] = ["input", "limits", "output", "suits"];
+    const TABLES: [&str; 3] = ["input", "limits", "output"];
 
     /// Returns the tables as TOML, to be appended to the pipeline's resolved config.
     ///
     /// # Errors
     /// As for [`to_toml`].
     pub fn resolved(&self) -> Result<String, Failure> {
-        to_toml("the tables [input], [limits], [output] and [suits]", self)
+        to_toml("the tables [input], [limits] and [output]", self)
     }
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use tagalong_app::config_file::Suits;
 use tagalong_core::{DepthImage, Frame, LaserScan};
 use tagalong_geometry::Camera;
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
+use tagalong_pipeline::Suits;
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tagalong_vision::quality::Exposure;
 use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};

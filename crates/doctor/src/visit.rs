@@ -63,7 +63,7 @@ impl Visit {
             inspection: found.inspection,
             refusal: found.refusal,
             input: outer.input.clone(),
-            suits: outer.suits,
+            suits: settings.suits,
             inputs,
             reading: Reading::default(),
             driven: Driven::default(),

@@ -238,7 +238,7 @@ fn what_was_broken_is_found() {
     let mut missed = Vec::new();
     for Case { name, changes, id, severity, remedy } in cases() {
         broken::write(good(), &log, &changes);
-        let (code, said) = doctor(&config(), &log, &["--frames", "24"]);
+        let (code, said) = doctor(&config(), &log, &["--frames", "24", "--settings", "never"]);
         let found = finding(&said, id);
         let told = found["remedy"].as_str().unwrap_or_default();
         if found["severity"] != severity || !told.contains(remedy) {
