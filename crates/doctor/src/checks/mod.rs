@@ -1,16 +1,27 @@
-//! One small function for each possible problem. `None`: the log lacks the data to check, for
+//! One file for each possible problem. `None`: the log lacks the data to check, for
 //! example depth.
 
-mod camera;
+mod damage;
+mod depth;
+mod exposure;
+mod floor;
+mod frames;
 mod heads;
-mod images;
+mod intrinsics;
 mod laser;
 mod missed;
+mod mount;
+mod needs;
+mod odometry;
 mod people;
+mod pose;
+mod rate;
 mod reading;
+mod registration;
+mod skew;
+mod stamps;
 mod still;
 mod suits;
-mod times;
 
 use super::alternatives::Alternative;
 use super::coverage::Coverage;
@@ -22,23 +33,23 @@ pub type Check = fn(&Evidence) -> Option<Finding>;
 
 /// All checks, causes before their consequences.
 pub const ALL: &[Check] = &[
-    people::needs,
-    people::damage,
+    needs::needs,
+    damage::damage,
     reading::reading,
-    camera::intrinsics,
-    camera::frames,
-    times::rate,
-    times::stamps,
-    times::skew,
-    images::exposure,
-    images::depth,
-    images::registration,
-    camera::floor,
-    camera::mount,
+    intrinsics::intrinsics,
+    frames::frames,
+    rate::rate,
+    stamps::stamps,
+    skew::skew,
+    exposure::exposure,
+    depth::depth,
+    registration::registration,
+    floor::floor,
+    mount::mount,
     heads::heads,
     suits::suits,
     laser::laser,
-    times::odometry,
+    odometry::odometry,
     people::people,
     still::still,
     missed::missed,
