@@ -60,7 +60,8 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     visit.evidence.alternatives = alternatives::ranked(rows.iter().skip(1).map(Row::alternative));
     let folder = args.output.as_ref().map(|folder| folder.join(name));
     let first = Diagnosis::of(&visit, name.into(), args, folder.as_deref())?;
-    Ok(Diagnosis { pipelines: rows, alternatives: shown, ..first })
+    let pictures = args.output.clone();
+    Ok(Diagnosis { pipelines: rows, alternatives: shown, pictures, ..first })
 }
 
 impl Row {

@@ -30,6 +30,8 @@ pub struct Diagnosis {
     pub coverage: Coverage,
     /// Other settings, tried on the log.
     pub alternatives: Vec<Alternative>,
+    /// Folder of the pictures of frames, or of a folder for each pipeline.
+    pub pictures: Option<PathBuf>,
     /// Tests of the rejection funnel.
     pub funnel: Vec<Drop>,
 }
@@ -76,6 +78,7 @@ impl Diagnosis {
             findings: findings.collect(),
             coverage: evidence.coverage.clone(),
             alternatives: evidence.alternatives.clone(),
+            pictures: None,
             funnel: funnel(visit, &resolved, folder)?,
         })
     }

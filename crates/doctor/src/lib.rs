@@ -114,9 +114,11 @@ fn diagnose(
 ) -> Result<Diagnosis, Failure> {
     let mut visit = Visit::make(config, scope, registry)?;
     visit.ask_further(args.settings, scope, registry);
-    if let Some(folder) = &args.output {
-        snapshots::write(&visit, scope, &folder.join("frames"))?;
+    let pictures = args.output.as_ref().map(|folder| folder.join("frames"));
+    if let Some(folder) = &pictures {
+        snapshots::write(&visit, scope, folder)?;
     }
     let path = args.config.clone().unwrap_or_default();
-    Diagnosis::of(&visit, path, args, args.output.as_deref())
+    let diagnosis = Diagnosis::of(&visit, path, args, args.output.as_deref())?;
+    Ok(Diagnosis { pictures, ..diagnosis })
 }

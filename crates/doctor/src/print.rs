@@ -21,6 +21,9 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     out.push('\n');
     diagnosis.findings.iter().for_each(|found| finding(&mut out, found));
     settings(&mut out, diagnosis);
+    if let Some(folder) = &diagnosis.pictures {
+        let _ = writeln!(out, "\npictures of frames with their tracks: {}", folder.display());
+    }
     if !diagnosis.funnel.is_empty() {
         let _ =
             writeln!(out, "\nwhat the pipeline dropped, and the settings that decide it (now):");
@@ -45,8 +48,22 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
-        let _ =
-            writeln!(out, "\n`tagalong run` takes {}, because {}\n", taken.config, taken.reason);
+        let _ = writeln!(out, "\n`tagalong run` takes {}, because {}", taken.config, taken.reason);
+        better(out, taken, &diagnosis.pipelines);
+        out.push('\n');
+    }
+}
+
+/// Gain of a pipeline over the one that is taken, below which it is not told.
+const MIN_GAIN: f64 = 0.03;
+
+/// Writes which pipeline does better on this log than the one that is taken.
+fn better(out: &mut String, taken: &Row, rows: &[Row]) {
+    let worth = |row: &Row| row.coverage.worth();
+    let best = rows.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)));
+    if let Some(best) = best.filter(|best| worth(best) > worth(taken) + MIN_GAIN) {
+        let name = best.config;
+        let _ = writeln!(out, "by this table {name} does better here: `tagalong run {name} LOG`");
     }
 }
 

@@ -23,7 +23,7 @@ pub(super) fn read(table: Option<Value<'_>>) -> Result<Suits, ConfigError> {
     for (key, range) in
         [("camera_height_m", suits.camera_height_m), ("pitch_down_deg", suits.pitch_down_deg)]
     {
-        if range.is_some_and(|[low, high]| !(low <= high)) {
+        if range.is_some_and(|[low, high]| low.is_nan() || high.is_nan() || low > high) {
             let message = format!("`{key}` is the lowest and the highest value, in this order");
             return Err(ConfigError { message, span: place });
         }
