@@ -91,8 +91,9 @@ pub struct Fittings {
 impl Fittings {
     /// Returns the failure of a log that no pipeline fits.
     pub fn none_fits(&self, log: &Path) -> Failure {
-        let message = format!("{}: no built-in pipeline fits:{}", log.display(), self.refusals);
-        Failure::failed(message)
+        let (log, refusals) = (log.display(), &self.refusals);
+        let hint = format!("`tagalong inspect {log}` lists its topics");
+        Failure::failed(format!("{log}: no built-in pipeline fits:{refusals}\n{hint}"))
     }
 }
 
@@ -106,10 +107,18 @@ pub fn fitting(log: &Path, registry: &Registry, most: usize) -> Fittings {
         }
         match try_config(&config, log, registry) {
             Ok(()) => found.fitting.push(Fitting { choice, config }),
-            Err(why) => found.refusals += &format!("\n  {}: {}", choice.config, why.message),
+            Err(why) => found.refusals += &refusal(choice.config, log, &why),
         }
     }
     found
+}
+
+/// Returns a line that says why a config does not fit: without the path of the log and the list of
+/// its topics, which would be the same in each.
+fn refusal(config: &str, log: &Path, why: &Failure) -> String {
+    let reason = why.message.lines().next().unwrap_or_default();
+    let reason = reason.replacen(&format!("`{}` ", log.display()), "the log ", 1);
+    format!("\n  {config}: {reason}")
 }
 
 /// Takes the first frame of a log through a pipeline.

@@ -35,8 +35,17 @@ impl Progress {
 
     /// Shows the progress of the run.
     pub fn show(&self, fraction: f64, frame: u64, people: usize) {
+        self.tell(fraction, format!("{}frame {frame}, {people} in view", self.title));
+    }
+
+    /// Shows the progress of a pass of several pipelines, or of none.
+    pub fn advance(&self, fraction: f64, frame: u64) {
+        self.tell(fraction, format!("{}frame {frame}", self.title));
+    }
+
+    fn tell(&self, fraction: f64, message: String) {
         self.bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
-        self.bar.set_message(format!("{}frame {frame}, {people} in view", self.title));
+        self.bar.set_message(message);
     }
 }
 

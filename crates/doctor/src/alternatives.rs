@@ -42,12 +42,12 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
     let Ok(mut frames) = FrameSource::open(scope.log, input, limits, inputs) else {
         return Vec::new();
     };
-    let progress = Progress::titled("other settings");
+    let progress = Progress::titled(&format!("{} other settings", runners.len()));
     for number in 0..scope.frames {
         let Some(item) = frames.next_frame() else { break };
         // A pipeline that fails on this log is no alternative.
         runners.retain_mut(|runner| runner.step(&item));
-        progress.show(frames.progress(), number, runners.len());
+        progress.advance(frames.progress(), number);
     }
     let judged = runners.into_iter().map(|runner| Alternative {
         change: runner.change,

@@ -52,6 +52,13 @@ pub struct Evidence {
     pub alternatives: Vec<Alternative>,
 }
 
+impl Evidence {
+    /// Returns true if height and tilt of the camera are a mere assumption.
+    pub fn is_pose_assumed(&self) -> bool {
+        self.inspection.facts.camera_source.starts_with("an assumption")
+    }
+}
+
 /// Numbers of frames of a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reading {

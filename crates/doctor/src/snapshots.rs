@@ -34,7 +34,7 @@ pub fn write(visit: &Visit, scope: Scope, folder: &Path) -> Result<(), Failure> 
     let progress = Progress::titled("pictures");
     for report in reports {
         let Some(item) = frames.next_frame() else { break };
-        progress.show(frames.progress(), report.index, report.tracks.len());
+        progress.advance(frames.progress(), report.index);
         // A frame without an image has no picture.
         if !wanted.contains(&report.index) || item.frame.camera.is_blind() {
             continue;

@@ -26,6 +26,10 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
     if camera.panorama().is_some() || camera.is_blind() || camera.height_m() <= 0.0 {
         return None;
     }
+    if evidence.is_pose_assumed() {
+        let measured = "not known: height and tilt of the camera are assumed";
+        return Some(Finding::new("heads", Severity::Unknown, measured));
+    }
     let Some(range) = head_range(camera) else {
         let measured = format!("no head ({TOP_M} m) is in the image at any distance up to 8 m");
         let finding = Finding::new("heads", Severity::Bad, measured);

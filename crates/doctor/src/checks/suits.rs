@@ -12,7 +12,8 @@ pub fn suits(evidence: &Evidence) -> Option<Finding> {
     let stated = &evidence.suits;
     let height = stated.camera_height_m.map(|range| (camera.height_m(), range));
     let pitch = stated.pitch_down_deg.map(|range| (camera.pitch_down_rad().to_degrees(), range));
-    if camera.is_blind() || height.is_none() && pitch.is_none() {
+    let is_stated = height.is_some() || pitch.is_some();
+    if camera.is_blind() || evidence.is_pose_assumed() || !is_stated {
         return None;
     }
     let by = |value: Option<(f64, [f64; 2])>| value.map_or(0.0, |(now, range)| beyond(now, range));
