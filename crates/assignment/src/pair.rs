@@ -70,6 +70,14 @@ impl PairCost {
         }
     }
 
+    /// Adds the log-likelihood ratio of the appearances to the cost of a pair, in the unit of the
+    /// cost. Positions alone decide about the gate.
+    pub fn with_appearance(&self, fit: Fit, log_ratio: f64) -> Fit {
+        // d² + ln |S| is twice a negative log-likelihood.
+        let unit = if self.cost == Cost::Mahalanobis { 2.0 } else { 1.0 };
+        Fit { cost: fit.cost - unit * log_ratio, ..fit }
+    }
+
     /// Returns the largest cost within the gate.
     pub fn at_gate(&self) -> f64 {
         match self.cost {
@@ -143,6 +151,14 @@ mod tests {
         min_overlap: 0.3,
         overlap: Overlap::Iou,
     };
+
+    #[test]
+    fn appearance_counts_in_the_unit_of_the_cost() {
+        let fit = Fit { cost: 3.0, log_volume: -1.0 };
+        let overlap = PairCost { cost: Cost::Overlap, ..DEFAULT };
+        assert_eq!(DEFAULT.with_appearance(fit, 0.5), Fit { cost: 2.0, ..fit });
+        assert_eq!(overlap.with_appearance(fit, 0.5), Fit { cost: 2.5, ..fit });
+    }
 
     fn fit(track: &Track, detection: &Detection, dt_s: f64, settings: &PairCost) -> Option<Fit> {
         settings.fit(track, detection, dt_s)

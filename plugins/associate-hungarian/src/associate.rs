@@ -38,12 +38,16 @@ impl Associator for Hungarian {
         detections: &[Detection],
         gate: &Gate,
     ) -> Associations {
-        let fit = |track: &Track, detection: &Detection| {
-            gate.admits(track, detection).then(|| self.fit(track, detection, gate)).flatten()
+        let pair_cost = self.config.pair_cost();
+        let fit = |row: usize, column: usize| {
+            let (track, detection) = (&tracks[row], &detections[column]);
+            let fit = gate.admits(track, detection).then(|| self.fit(track, detection, gate));
+            let look = gate.appearance_of(row, column);
+            fit.flatten().map(|fit| pair_cost.with_appearance(fit, look))
         };
-        let row = |track| detections.iter().map(|detection| fit(track, detection)).collect();
-        let fits: Vec<Vec<Option<Fit>>> = tracks.iter().map(row).collect();
-        let at_gate = self.config.pair_cost().at_gate();
+        let row = |row| (0..detections.len()).map(|column| fit(row, column)).collect();
+        let fits: Vec<Vec<Option<Fit>>> = (0..tracks.len()).map(row).collect();
+        let at_gate = pair_cost.at_gate();
         let given = assign_fits(&fits, detections.len(), at_gate, self.config.miss_factor);
         Associations::one_to_one(given)
     }
@@ -88,7 +92,7 @@ mod tests {
         }
     }
 
-    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     #[test]
     fn the_promises_of_associators_are_kept() {
@@ -108,6 +112,20 @@ mod tests {
             hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
         };
         assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");
+    }
+
+    #[test]
+    fn appearance_decides_between_detections_that_fit_equally_well() {
+        let mut hungarian = Hungarian::new(Config::default()).unwrap();
+        let tracks = [0.1, -0.1].map(|y| track(Point3::new(3.0, y, 1.6), SMatrix::identity() * 0.02));
+        let seen = [person(3.0, 0.11), person(3.0, -0.11)];
+        let mut given = |appearance: &[Vec<f64>]| {
+            let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });
+            answer.pairs.iter().map(|pair| pair.detection).collect::<Vec<_>>()
+        };
+        assert_eq!(given(&[]), [0, 1]);
+        assert_eq!(given(&[vec![-4.0, 4.0], vec![4.0, -4.0]]), [1, 0]);
+        assert_eq!(given(&[vec![-0.1, 0.1], vec![0.1, -0.1]]), [0, 1], "places still count");
     }
 
     #[test]

@@ -76,13 +76,16 @@ impl Associator for Jpda {
         gate: &Gate,
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
-        let ratio = |track: &Track, detection: &Detection| {
+        let ratio = |row: usize, column: usize| {
+            let (track, detection) = (&tracks[row], &detections[column]);
             let admitted = gate.admits(track, detection);
             let fit = admitted.then(|| pair_cost.fit(track, detection, gate.dt_s)).flatten();
+            let look = gate.appearance_of(row, column);
+            let fit = fit.map(|fit| pair_cost.with_appearance(fit, look));
             fit.map_or(0.0, |fit| self.likelihood_ratio(&fit))
         };
-        let row = |track| detections.iter().map(|detection| ratio(track, detection)).collect();
-        let ratios: Vec<Vec<f64>> = tracks.iter().map(row).collect();
+        let row = |row| (0..detections.len()).map(|column| ratio(row, column)).collect();
+        let ratios: Vec<Vec<f64>> = (0..tracks.len()).map(row).collect();
         let together = clusters(tracks.len(), detections.len(), |t, d| ratios[t][d] > 0.0);
         let pairs = together.iter().flat_map(|cluster| self.weigh_cluster(cluster, &ratios));
         Associations { pairs: pairs.collect(), spent: Vec::new() }
@@ -98,7 +101,7 @@ mod tests {
 
     use super::*;
 
-    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     fn detection(y: f64) -> Detection {
         Detection {

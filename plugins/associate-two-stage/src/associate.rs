@@ -44,7 +44,9 @@ impl TwoStage {
             (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
         let fit = |row: usize, column: usize| {
             let (track, detection) = (&tracks[row], &detections[column]);
-            gate.admits(track, detection).then(|| self.fit(track, detection, gate)).flatten()
+            let fit = gate.admits(track, detection).then(|| self.fit(track, detection, gate));
+            let look = gate.appearance_of(row, column);
+            fit.flatten().map(|fit| self.config.pair_cost().with_appearance(fit, look))
         };
         let fits: Vec<Vec<Option<Fit>>> = rows
             .iter()
@@ -88,7 +90,7 @@ mod tests {
 
     use super::*;
 
-    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     fn detection(y: f64, score: f64) -> Detection {
         Detection {

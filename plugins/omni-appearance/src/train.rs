@@ -400,6 +400,7 @@ impl Trainer for DistanceTrainer {
         Ok(Fitted {
             model: model.to_text(),
             figures: figures(&self.collector, &self.training, self.seed)?,
+            ..Fitted::default()
         })
     }
 }
