@@ -19,10 +19,11 @@ use crate::suggest::config_hint;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 9] = [
+const BUILT_IN: [(&str, &str); 10] = [
     ("depth-alone", include_str!("../../../configs/depth-alone.toml")),
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
+    ("depth-net-ekf", include_str!("../../../configs/depth-net-ekf.toml")),
     ("stereo-best", include_str!("../../../configs/stereo-best.toml")),
     ("stereo-street", include_str!("../../../configs/stereo-street.toml")),
     ("omni-best", include_str!("../../../configs/omni-best.toml")),
@@ -148,6 +149,16 @@ impl ConfigFile {
         let named = names.into_iter().map(|name| (folder.join(&name), name));
         // Plugins alone know which texts are paths; a text that names a file counts as one.
         named.filter(|(path, _)| path.is_file()).map(|(path, name)| (name, path)).collect()
+    }
+
+    /// Builds the pipeline of other text at the same path, for example of the resolved config with
+    /// another value.
+    ///
+    /// # Errors
+    /// A mistake in the text.
+    pub fn variant(&self, text: &str, registry: &Registry) -> Result<Pipeline, ConfigError> {
+        let built = Pipeline::from_toml_with(text, self.folder(), registry, &options(None));
+        built.map(|(pipeline, _)| pipeline)
     }
 
     /// Builds the pipeline.

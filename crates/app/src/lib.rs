@@ -1,9 +1,10 @@
 //! Shared parts of the applications behind the `tagalong` command: failures with their exit codes,
-//! output formats, config files, suggestions for mistyped paths, signals, progress and times.
+//! output formats, config files and the choice among them, suggestions for mistyped paths, signals, progress and times.
 //!
 //! An application takes its arguments and returns an [`outcome::Outcome`]; the command line turns
 //! that into an exit code and a message.
 
+pub mod choice;
 pub mod config_file;
 pub mod format;
 pub mod outcome;

@@ -143,12 +143,15 @@ Examples:
 
 const DOCTOR_HELP: &str = "\
 Measures intrinsics, stamps, frames, light, depth, its registration to colour, floor and mount; then
-runs the pipeline for a while and shows what each of its tests dropped. Each finding says what to
-change in the config. Exit code 3: something is bad.
+runs the pipeline for a while, compares its tracks with the person-sized shapes that come and go in
+depth, and shows what each of its tests dropped. Where tracks and depth do not agree it tries other
+settings on the log. Each finding says what to change in the config. Exit code 3: something is bad.
 
 Examples:
+  tagalong doctor robot.mcap
+  tagalong doctor robot.mcap -o checkup
   tagalong doctor configs/depth-ekf.toml robot.mcap
-  tagalong doctor configs/depth-ekf.toml robot.mcap -o checkup --frames 1000
+  tagalong doctor configs/depth-ekf.toml robot.mcap -o checkup --frames 1000 --settings always
   tagalong doctor configs/depth-ekf.toml robot.mcap --format json | jq '.findings[] | select(.severity == \"bad\")'";
 
 const IMPORT_HELP: &str = "\

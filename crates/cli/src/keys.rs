@@ -7,7 +7,7 @@ use schemars::schema_for;
 use serde_json::{Map, Value, json};
 use tagalong_app::config_file::OuterSettings;
 use tagalong_config::{PluginInfo, Registry};
-use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings};
+use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings, Suits};
 
 /// Returns the schemas of everything around the plugins.
 fn around() -> [Value; 2] {
@@ -23,6 +23,8 @@ pub fn around_schema() -> Value {
         properties.extend(part["properties"].as_object().cloned().unwrap_or_default());
     }
     properties.insert("tune".into(), tune_schema());
+    properties
+        .insert("suits".into(), lifted(schema_for!(Suits).to_value(), "suits", &mut definitions));
     properties.insert("extends".into(), extends_schema());
     json!({ "type": "object", "properties": properties, "$defs": definitions })
 }

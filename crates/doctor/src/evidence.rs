@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
-use tagalong_core::DepthImage;
+use tagalong_core::{DepthImage, Frame, LaserScan};
 use tagalong_geometry::Camera;
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
+use tagalong_pipeline::Suits;
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tagalong_vision::quality::Exposure;
 use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
 
+use super::alternatives::Alternative;
+use super::coverage::Coverage;
 use super::trial::Trial;
 
 /// Number of measured frames, spread over those that are read.
@@ -19,18 +22,102 @@ const KEPT_DEPTHS: usize = 8;
 
 /// Facts about a config and a log.
 pub struct Evidence {
+    /// Name of the config.
+    pub config: String,
     /// Contents of the log.
     pub inspection: Inspection,
     /// Reason for which the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
     /// `[input]` of the config.
     pub input: InputSettings,
+    /// `[suits]` of the config.
+    pub suits: Suits,
     /// Inputs of the pipeline.
     pub inputs: Inputs,
     /// Measurements in frames.
     pub samples: Samples,
+    /// Frames that could be made, and those that could not.
+    pub reading: Reading,
+    /// Way of the robot.
+    pub driven: Driven,
     /// Result of the pipeline.
     pub trial: Trial,
+    /// Tracks of the pipeline against things that come and go.
+    pub coverage: Coverage,
+    /// Share of the points in depth that come and go; `None` without depth.
+    pub changed: Option<f64>,
+    /// Built-in configs that fit the log, the best first; looked for where they are needed.
+    pub fitting: Vec<&'static str>,
+    /// Result of other settings, where they were tried.
+    pub alternatives: Vec<Alternative>,
+}
+
+impl Evidence {
+    /// Returns true if height and tilt of the camera are a mere assumption.
+    pub fn is_pose_assumed(&self) -> bool {
+        self.inspection.facts.camera_source.starts_with("an assumption")
+    }
+}
+
+/// Numbers of frames of a pass.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reading {
+    /// Frames that were made.
+    pub made: u64,
+    /// Images (or scans) until then that should have made a frame.
+    pub wanted: u64,
+}
+
+/// Way of the robot over the examined frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Driven {
+    /// Length of the way, m.
+    pub metres: f64,
+    /// Sum of all turns, rad.
+    pub turned_rad: f64,
+}
+
+impl Driven {
+    /// Adds the motion since the previous frame.
+    pub fn take(&mut self, frame: &Frame) {
+        self.metres += frame.motion.forward.hypot(frame.motion.left);
+        self.turned_rad += frame.motion.turn.abs();
+    }
+}
+
+/// Measurements of laser scans.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scans {
+    /// Number of scans.
+    pub count: usize,
+    /// Reflections in all of them.
+    pub readings: usize,
+    /// Highest number of a ray that was reflected, plus one.
+    pub rays: u32,
+    /// Angle between two rays, rad.
+    pub increment_rad: f64,
+    /// Distance of the farthest reflection from the scanner, m.
+    pub farthest_m: f64,
+    /// Height of the scanner above the floor, m.
+    pub height_m: f64,
+}
+
+impl Scans {
+    fn take(&mut self, scan: &LaserScan) {
+        let eye = scan.robot_from_scanner.translation.vector;
+        let ranges = scan.points.iter().map(|point| (point.coords - eye).norm());
+        self.count += 1;
+        self.readings += scan.points.len();
+        self.rays = self.rays.max(scan.rays.last().map_or(0, |ray| ray + 1));
+        self.increment_rad = scan.increment_rad.abs();
+        self.farthest_m = ranges.fold(self.farthest_m, f64::max);
+        self.height_m = eye.z;
+    }
+
+    /// Returns the share of rays that were reflected.
+    pub fn valid(&self) -> f64 {
+        self.readings as f64 / (self.count as f64 * f64::from(self.rays)).max(1.0)
+    }
 }
 
 /// Measurements of frames that are spread over the log.
@@ -48,6 +135,8 @@ pub struct Samples {
     pub overlap: EdgeOverlap,
     /// Floor in each frame where it was found, with the camera of that frame.
     pub floors: Vec<(Ground, Arc<Camera>)>,
+    /// Laser scans.
+    pub scans: Scans,
 }
 
 impl Samples {
@@ -61,11 +150,16 @@ impl Samples {
             depths: Vec::new(),
             overlap: EdgeOverlap::new(OverlapSettings::default()),
             floors: Vec::new(),
+            scans: Scans::default(),
         }
     }
 
     /// Measures the frame if it is its turn.
     pub fn take(&mut self, number: u64, item: &LogFrame) {
+        // Scans are cheap, and the number of rays is that of the longest one.
+        if let Some(scan) = item.frame.laser() {
+            self.scans.take(scan);
+        }
         if !number.is_multiple_of(self.every) {
             return;
         }

@@ -1,18 +1,29 @@
 use std::fmt::Write as _;
 
+use super::alternatives::Alternative;
+use super::comparison::Row;
+use super::coverage::Coverage;
+use super::diagnosis::{Diagnosis, Drop};
 use super::finding::{Finding, Severity};
-use super::{Diagnosis, Drop};
 
 /// Lines of the funnel that are shown.
 const FUNNEL_LINES: usize = 8;
+
+/// Settings that are shown.
+const SETTING_LINES: usize = 10;
 
 /// Returns the diagnosis, for a terminal.
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut out = String::new();
     let (config, log) = (diagnosis.config.display(), diagnosis.log.display());
+    pipelines(&mut out, diagnosis);
     let _ = writeln!(out, "{log} through {config}, {} frames", diagnosis.frames);
     out.push('\n');
     diagnosis.findings.iter().for_each(|found| finding(&mut out, found));
+    settings(&mut out, diagnosis);
+    if let Some(folder) = &diagnosis.pictures {
+        let _ = writeln!(out, "\npictures of frames with their tracks: {}", folder.display());
+    }
     if !diagnosis.funnel.is_empty() {
         let _ =
             writeln!(out, "\nwhat the pipeline dropped, and the settings that decide it (now):");
@@ -20,6 +31,91 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     diagnosis.funnel.iter().take(FUNNEL_LINES).for_each(|line| drop(&mut out, line));
     summary(&mut out, &diagnosis.findings);
     out
+}
+
+/// Writes the table of the pipelines, and names the one that is taken.
+fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
+    if diagnosis.pipelines.is_empty() {
+        return;
+    }
+    let frames = diagnosis.frames;
+    let _ = writeln!(out, "pipelines that fit {}, on {frames} frames:\n", diagnosis.log.display());
+    let _ = writeln!(out, "  {}  {:>7}  pipeline", heading(), "ms");
+    for Row { config, taken, coverage, frame_ms, failure, .. } in &diagnosis.pipelines {
+        let mark = if *taken { " (taken by `run`)" } else { "" };
+        let failure = failure.iter().map(|why| format!(": failed, {why}")).collect::<String>();
+        let _ = writeln!(out, "  {}  {frame_ms:>7.1}  {config}{mark}{failure}", figures(coverage));
+    }
+    let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
+    if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
+        let _ = writeln!(out, "\n`tagalong run` takes {}, because {}", taken.config, taken.reason);
+        better(out, taken, &diagnosis.pipelines);
+        out.push('\n');
+    }
+}
+
+/// Gain of a pipeline over the one that is taken, below which it is not told.
+const MIN_GAIN: f64 = 0.03;
+
+/// Writes which pipeline does better on this log than the one that is taken.
+fn better(out: &mut String, taken: &Row, rows: &[Row]) {
+    let worth = |row: &Row| row.coverage.worth();
+    let best = rows.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)));
+    if let Some(best) = best.filter(|best| worth(best) > worth(taken) + MIN_GAIN) {
+        let name = best.config;
+        let _ = writeln!(out, "by this table {name} does better here: `tagalong run {name} LOG`");
+    }
+}
+
+/// Writes the settings that were tried.
+fn settings(out: &mut String, diagnosis: &Diagnosis) {
+    if diagnosis.alternatives.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "\nwhat other settings change on this log, the best first:");
+    let _ = writeln!(out, "  {}  setting", heading());
+    let _ = writeln!(out, "  {}  (as it is)", figures(&diagnosis.coverage));
+    for Alternative { change, coverage } in diagnosis.alternatives.iter().take(SETTING_LINES) {
+        let _ = writeln!(out, "  {}  {change}", figures(coverage));
+    }
+    let more = diagnosis.alternatives.len().saturating_sub(SETTING_LINES);
+    if more > 0 {
+        let _ = writeln!(out, "  and {more} more, see --format json");
+    }
+    if diagnosis.pipelines.is_empty() {
+        let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
+    }
+}
+
+/// Returns the names of the columns of [`figures`].
+fn heading() -> String {
+    format!("{:>6} {:>6} {:>6} {:>6} {:>7}", "moving", "still", "boxes", "idle", "missed")
+}
+
+fn figures(coverage: &Coverage) -> String {
+    let missed = coverage.found().map_or_else(|| "-".into(), |part| percent(1.0 - part));
+    let idle = if coverage.boxes == 0 { "-".into() } else { percent(coverage.idle()) };
+    format!(
+        "{:>6} {:>6} {:>6.2} {idle:>6} {missed:>7}",
+        coverage.moving,
+        coverage.still,
+        coverage.boxes_a_frame(),
+    )
+}
+
+fn percent(part: f64) -> String {
+    format!("{:.0} %", 100.0 * part)
+}
+
+/// Returns the meaning of the columns, by what the log has.
+fn legend(coverage: &Coverage) -> &'static str {
+    if coverage.has_depth {
+        "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes where\n  \
+         nothing comes or goes; missed: person-sized shapes that come and go without a track"
+    } else {
+        "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes of\n  \
+         those that never did; missed: not measured without depth"
+    }
 }
 
 fn finding(out: &mut String, finding: &Finding) {

@@ -20,15 +20,134 @@ pub struct Remedy {
     pub look: String,
 }
 
+/// Setting that is worth a trial on any log.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Offer {
+    /// Plugin that has the setting; none for a section of the pipeline.
+    plugin: Option<String>,
+    /// Key of the setting, or name of the section.
+    setting: String,
+    /// Values to try.
+    values: Vec<Value>,
+}
+
+/// Other value of a setting.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// Dotted path in the resolved config.
+    pub key: String,
+    /// The value.
+    pub value: Value,
+    /// The line of a config that says so.
+    pub line: String,
+}
+
 #[derive(Deserialize)]
 struct File {
     drop: Vec<Remedy>,
+    offer: Vec<Offer>,
+}
+
+#[expect(clippy::expect_used, reason = "the table is part of the program, and a test reads it")]
+fn table() -> File {
+    toml::from_str::<File>(TABLE).expect("the built-in table is right")
 }
 
 /// Returns all remedies, in the order of the stages.
-#[expect(clippy::expect_used, reason = "the table is part of the program, and a test reads it")]
 pub fn all() -> Vec<Remedy> {
-    toml::from_str::<File>(TABLE).expect("the built-in table is right").drop
+    table().drop
+}
+
+/// Returns the changes of a resolved config that the table offers for its plugins; none of them has
+/// the present value.
+pub fn offered(resolved: &Table) -> Vec<Change> {
+    table().offer.iter().flat_map(|offer| offer.changes(resolved)).collect()
+}
+
+impl Offer {
+    fn changes(&self, resolved: &Table) -> Vec<Change> {
+        let keys = match &self.plugin {
+            Some(plugin) => keys_of(resolved, plugin, &self.setting),
+            None => vec![(self.setting.clone(), resolved.get(&self.setting))],
+        };
+        let with_values = keys.iter().filter_map(|(key, now)| Some((key, (*now)?)));
+        let pairs = with_values.flat_map(|(key, now)| {
+            let others = self.values.iter().filter(move |value| !is_present(value, now));
+            others.map(move |value| Change::of(resolved, key, value))
+        });
+        pairs.collect()
+    }
+}
+
+/// Returns the dotted paths of a setting of a plugin, with the present values.
+fn keys_of<'a>(
+    resolved: &'a Table,
+    plugin: &str,
+    setting: &str,
+) -> Vec<(String, Option<&'a Value>)> {
+    let mut keys = Vec::new();
+    let mut add = |path: String, section: &'a Value| {
+        let is_it = section.get("plugin").and_then(Value::as_str) == Some(plugin);
+        let now = section.get("config").and_then(|config| config.get(setting));
+        keys.extend(is_it.then(|| (format!("{path}.config.{setting}"), now)));
+    };
+    for (name, value) in resolved {
+        match value {
+            Value::Array(items) => {
+                items.iter().enumerate().for_each(|(at, item)| add(format!("{name}.{at}"), item));
+            }
+            value => add(name.clone(), value),
+        }
+    }
+    keys
+}
+
+/// Returns true if a value, or each part of it that is given, is the present one.
+pub fn is_present(value: &Value, now: &Value) -> bool {
+    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|v| v as f64));
+    match (value, now) {
+        (Value::Table(value), Value::Table(now)) => {
+            value.iter().all(|(key, value)| now.get(key).is_some_and(|now| is_present(value, now)))
+        }
+        (value, now) => match (number(value), number(now)) {
+            // Equal to more digits than a config is written with.
+            (Some(a), Some(b)) => (a - b).abs() <= 1e-9 * a.abs().max(1.0),
+            _ => value == now,
+        },
+    }
+}
+
+impl Change {
+    /// Describes another value of a setting by its dotted path in a resolved config.
+    pub fn of(resolved: &Table, key: &str, value: &Value) -> Self {
+        let line = line(resolved, key, value);
+        Self { key: key.to_owned(), value: value.clone(), line }
+    }
+}
+
+/// Returns the line of a config for a setting.
+fn line(resolved: &Table, key: &str, value: &Value) -> String {
+    let parts: Vec<&str> = key.split('.').collect();
+    match parts[..] {
+        // A section of a list is known by its plugin.
+        [section, at, "config", ref rest @ ..] if at.parse::<usize>().is_ok() => {
+            let item = at.parse::<usize>().ok().and_then(|at| resolved.get(section)?.get(at));
+            let plugin = item.and_then(|item| item.get("plugin")).and_then(Value::as_str);
+            let (plugin, rest) = (plugin.unwrap_or_default(), rest.join("."));
+            format!("[[{section}]] plugin = \"{plugin}\", config = {{ {rest} = {value} }}")
+        }
+        [section] => match value.as_table() {
+            Some(table) => {
+                let settings: Vec<String> =
+                    table.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+                format!("[{section}] {}", settings.join(", "))
+            }
+            None => format!("{section} = {value}"),
+        },
+        [ref sections @ .., setting] => format!("[{}] {setting} = {value}", sections.join(".")),
+        [] => String::new(),
+    }
 }
 
 /// Returns the table as Markdown.
@@ -121,6 +240,52 @@ mod tests {
                 assert!(registry.find(plugin).is_ok(), "{plugin}");
             }
         }
+    }
+
+    #[test]
+    fn every_offer_fits_its_plugin() {
+        let mut registry = tagalong_config::Registry::default();
+        tagalong_catalog::register(&mut registry);
+        for offer in table().offer {
+            let plugin = offer
+                .plugin
+                .as_deref()
+                .unwrap_or_else(|| offer.values[0].get("plugin").and_then(Value::as_str).unwrap());
+            let defaults = registry.find(plugin).unwrap().defaults();
+            if offer.plugin.is_some() {
+                assert!(defaults.contains(&format!("{} =", offer.setting)), "{offer:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_change_is_to_the_present_value() {
+        let resolved: Table = toml::from_str(
+            "[manager]\nplugin = 'manage-sprt'\n[manager.config]\nend_log_odds = -2.0\n\
+             [[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_height_m = 1\ndiscover_cost = 0.2\n",
+        )
+        .unwrap();
+        let lines: Vec<String> = offered(&resolved).into_iter().map(|change| change.line).collect();
+        assert!(!lines.iter().any(|line| line.contains("manage-sprt")), "{lines:?}");
+        assert!(!lines.iter().any(|line| line.contains("min_head_height_m")), "{lines:?}");
+        let costs: Vec<&String> =
+            lines.iter().filter(|line| line.contains("discover_cost")).collect();
+        assert!(!costs.is_empty(), "{lines:?}");
+        assert!(!costs.iter().any(|line| line.contains("= 0.2 ")), "{costs:?}");
+    }
+
+    #[test]
+    fn changes_are_lines_of_a_config() {
+        let resolved: Table =
+            toml::from_str("[manager]\nplugin = 'm'\n[[detectors]]\nplugin = 'd'\n").unwrap();
+        let line = |key, value: Value| Change::of(&resolved, key, &value).line;
+        assert_eq!(line("manager.config.hits", 3.into()), "[manager.config] hits = 3");
+        assert_eq!(
+            line("detectors.0.config.cost", 0.2.into()),
+            "[[detectors]] plugin = \"d\", config = { cost = 0.2 }"
+        );
+        let sprt = Value::Table(toml::from_str("plugin = 'manage-sprt'").unwrap());
+        assert_eq!(line("manager", sprt), "[manager] plugin = \"manage-sprt\"");
     }
 
     #[test]

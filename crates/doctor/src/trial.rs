@@ -1,11 +1,14 @@
 //! Short run of the pipeline: people that it finds, and candidates that each test drops.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use tagalong_core::{Frame, Funnel, RgbImage};
 use tagalong_geometry::Rect;
+use tagalong_log::LogFrame;
 use tagalong_pipeline::{Fate, FrameReport, Pipeline};
 use tagalong_render::background;
+
+use super::coverage::Course;
 
 /// Most pictures of one test.
 const EXAMPLES: usize = 16;
@@ -23,47 +26,52 @@ pub struct Example {
 pub struct Trial {
     /// Number of frames that it was given.
     pub frames: u64,
-    /// Number of frames in which a confirmed person was seen.
-    pub with_people: u64,
-    /// Confirmed persons.
-    pub people: BTreeSet<u32>,
+    /// Places of its tracks.
+    pub course: Course,
     /// Number of drops per test.
     pub funnel: Funnel,
     /// Example pictures, by test.
     pub examples: BTreeMap<&'static str, Spread<Example>>,
+    /// Reports of all frames, where pictures of them may be wanted.
+    pub reports: Vec<FrameReport>,
     /// Error of the plugin that ended it.
     pub failure: Option<String>,
 }
 
 impl Trial {
     /// Passes a frame to the pipeline; does nothing after the error of a plugin.
-    pub fn step(&mut self, pipeline: &mut Pipeline, frame: &Frame, with_pictures: bool) {
+    pub fn step(&mut self, pipeline: &mut Pipeline, item: &LogFrame, with_pictures: bool) {
         if self.failure.is_some() {
             return;
         }
         self.frames += 1;
-        match pipeline.step(frame) {
-            Ok(report) => self.take(frame, &report, with_pictures),
+        match pipeline.step(&item.frame) {
+            Ok(report) => self.take(item, report, with_pictures),
             Err(error) => self.failure = Some(error.to_string()),
         }
     }
 
-    fn take(&mut self, frame: &Frame, report: &FrameReport, with_pictures: bool) {
-        let seen = report.tracks.iter().filter(|track| track.confirmed && track.seen);
-        let people: Vec<u32> = seen.map(|track| track.id.0).collect();
-        self.with_people += u64::from(!people.is_empty());
-        self.people.extend(people);
+    /// Returns the number of confirmed tracks that were seen in the last frame.
+    pub fn in_view(&self) -> usize {
+        let last = self.course.moments.last();
+        last.map_or(0, |moment| moment.tracks.iter().filter(|track| track.seen).count())
+    }
+
+    fn take(&mut self, item: &LogFrame, report: FrameReport, with_pictures: bool) {
+        self.course.take(&report, &item.odom_from_robot);
         self.funnel.merge(&report.funnel);
         if !with_pictures {
             return;
         }
-        for (test, place) in dropped(report) {
+        let frame = &item.frame;
+        for (test, place) in dropped(&report) {
             let picture = || picture(frame, &place);
             self.examples
                 .entry(test)
                 .or_default()
                 .offer(|| Some(Example { frame: frame.index, picture: picture()? }));
         }
+        self.reports.push(report);
     }
 }
 
@@ -145,6 +153,8 @@ impl<T> Spread<T> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]

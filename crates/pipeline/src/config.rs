@@ -24,6 +24,7 @@ mod checks;
 mod document;
 mod inputs;
 mod resolve;
+mod suits;
 #[cfg(test)]
 mod tests;
 mod tune;
@@ -32,6 +33,7 @@ use checks::check;
 pub use document::{Document, flattened};
 use inputs::{Declared, declared_inputs};
 use resolve::resolve;
+pub use suits::Suits;
 pub use tune::{Tunable, check_tuning, with_values};
 
 const OWN: [&str; 12] = [
@@ -91,6 +93,8 @@ pub struct RunSettings {
     pub robot: RobotSettings,
     /// `[tune]`: the settings that may be fitted. A run ignores them.
     pub tune: Vec<Tunable>,
+    /// `[suits]`: the cameras that the config is for. A run ignores it.
+    pub suits: Suits,
     document: Document,
 }
 
@@ -165,12 +169,13 @@ impl Pipeline {
         let inputs = declared_inputs(&settings, &plugins, steering.is_some(), without_span)?;
         let resolved = resolve(document.table()?, &settings, registry)?;
         let tune = tune::read(root.remove(tune::TABLE), &resolved)?;
+        let suits = suits::read(root.remove(suits::TABLE))?;
         let resolved =
             toml::to_string(&resolved).map_err(|error| ConfigError::new(error.to_string()))?;
         let stereo = settings.stereo.clone().map(StereoDepth::new).transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let (seed, robot) = (settings.seed, settings.robot.clone());
-        let run = RunSettings { seed, robot, tune, document: document.clone() };
+        let run = RunSettings { seed, robot, tune, suits, document: document.clone() };
         let odometry = settings.odometry.clone().map(VisualOdometry::new);
         let preprocessors = preprocessors(stereo, odometry);
         let parts = Parts { preprocessors, detectors, verifiers, associator, filter, manager };
@@ -192,7 +197,7 @@ fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigErr
     let known: Vec<&str> = PLUGINS
         .into_iter()
         .chain(OWN)
-        .chain([tune::TABLE, document::EXTENDS])
+        .chain([tune::TABLE, suits::TABLE, document::EXTENDS])
         .chain(foreign)
         .collect();
     for key in root.keys() {

@@ -41,8 +41,8 @@ mod settings;
 mod tests;
 
 pub use config::{
-    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Tunable, check_tuning,
-    flattened, with_values,
+    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Suits, Tunable,
+    check_tuning, flattened, with_values,
 };
 pub use pipeline::Pipeline;
 pub use report::FrameReport;

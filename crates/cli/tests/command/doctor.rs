@@ -238,7 +238,7 @@ fn what_was_broken_is_found() {
     let mut missed = Vec::new();
     for Case { name, changes, id, severity, remedy } in cases() {
         broken::write(good(), &log, &changes);
-        let (code, said) = doctor(&config(), &log, &["--frames", "24"]);
+        let (code, said) = doctor(&config(), &log, &["--frames", "24", "--settings", "never"]);
         let found = finding(&said, id);
         let told = found["remedy"].as_str().unwrap_or_default();
         if found["severity"] != severity || !told.contains(remedy) {
@@ -319,4 +319,186 @@ fn real_logs_are_registered_and_moved_ones_are_not() {
     assert_eq!((code, found["severity"].as_str()), (3, Some("bad")), "{said:#}");
     let x = found["figures"]["offset_x_px"].as_f64().unwrap();
     assert!((x - 9.0).abs() <= 2.0, "{found:#}");
+}
+
+/// Simulates a scene, without the topics whose names have a part.
+fn simulated(home: &Path, scene: &str, without: &'static [&'static str]) -> PathBuf {
+    let [text, whole, log] = ["scene.toml", "whole.mcap", "scene.mcap"].map(|name| home.join(name));
+    std::fs::write(&text, scene).unwrap();
+    let drawn =
+        tagalong().arg("simulate").arg(&text).arg("-o").arg(&whole).arg("--overwrite").output();
+    let drawn = drawn.unwrap();
+    assert_eq!(code(&drawn), 0, "{}", text_of(&drawn));
+    broken::write(&whole, &log, &Changes { without, ..Changes::default() });
+    log
+}
+
+fn text_of(output: &std::process::Output) -> String {
+    text(&output.stderr)
+}
+
+/// A coat stand nearby, and a person who walks past behind it.
+const PASSING: &str = "
+seed = 3
+duration_s = 5.0
+[room]
+size_m = [8.0, 6.0]
+[camera]
+width = 320
+height = 240
+field_of_view_deg = 62.0
+[robot]
+start = [0.8, 3.0]
+[[furniture]]
+kind = 'coat-stand'
+at = [3.2, 3.6]
+heading_deg = 180.0
+[[people]]
+path = [[4.4, 4.6], [4.4, 1.2]]
+speed_mps = 0.7
+";
+
+/// `nearest-thing` tracks the coat stand and nothing else.
+#[test]
+fn a_tracked_thing_and_an_untracked_person_are_criticised() {
+    let home = tempfile::tempdir().unwrap();
+    let log = simulated(home.path(), PASSING, &[]);
+    let config = crate::common::config(home.path(), "");
+    let pictures = home.path().join("pictures");
+    let output = crate::common::own_plugin()
+        .args(["doctor", "--format", "json", "-o"])
+        .arg(&pictures)
+        .args([&config, &log])
+        .output()
+        .unwrap();
+    let said: Value = serde_json::from_slice(&output.stdout).expect("a diagnosis");
+    assert_eq!(code(&output), 3, "{said:#}");
+    let still = finding(&said, "still");
+    assert_eq!(still["severity"], "bad", "{still:#}");
+    assert_eq!(still["figures"]["still_tracks"], 1.0, "{still:#}");
+    assert!(still["measured"].as_str().unwrap().contains("1 of 1 tracks never moved"), "{still:#}");
+    let missed = finding(&said, "missed");
+    assert_eq!(missed["severity"], "bad", "{missed:#}");
+    assert!(missed["measured"].as_str().unwrap().contains("m away"), "{missed:#}");
+    // Other settings and configs were tried, and the best finds the walker.
+    let told = missed["remedy"].as_str().unwrap();
+    assert!(told.contains("(another config)"), "{told}");
+    let first = &said["alternatives"][0]["coverage"];
+    assert!(first["unexplained"].as_u64() < said["coverage"]["unexplained"].as_u64(), "{said:#}");
+    let frames = std::fs::read_dir(pictures.join("frames")).unwrap().count();
+    assert!((3..=13).contains(&frames), "{frames} pictures");
+}
+
+#[test]
+fn without_a_config_each_pipeline_that_fits_is_tried() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("checkup");
+    let doctor = || {
+        let mut command = tagalong();
+        command.arg("doctor").arg(good());
+        command
+    };
+    let output = doctor().args(["--format", "json", "-o"]).arg(&folder).output().unwrap();
+    let said: Value = serde_json::from_slice(&output.stdout).expect("a diagnosis");
+    let rows = said["pipelines"].as_array().unwrap();
+    let names: Vec<&str> = rows.iter().map(|row| row["config"].as_str().unwrap()).collect();
+    assert_eq!(names, ["depth-verified", "depth-ekf", "depth-net-ekf", "mono"]);
+    let taken: Vec<bool> = rows.iter().map(|row| row["taken"].as_bool().unwrap()).collect();
+    assert_eq!(taken, [true, false, false, false]);
+    assert_eq!(rows[0]["coverage"]["moving"], 2, "{said:#}");
+    for name in names {
+        let pictures = std::fs::read_dir(folder.join(name)).unwrap().count();
+        assert!(pictures >= 5, "{name}: {pictures} pictures");
+    }
+    let printed = text(&doctor().output().unwrap().stdout);
+    assert!(printed.contains("depth-verified (taken by `run`)"), "{printed}");
+    assert!(printed.contains("`tagalong run` takes depth-verified, because"), "{printed}");
+}
+
+/// Every setting that is tried differs from the present one.
+#[test]
+fn other_settings_are_tried_where_that_is_asked_for() {
+    let (_, said) = doctor(&config(), good(), &["--settings", "always"]);
+    let tried = said["alternatives"].as_array().unwrap();
+    let changes: Vec<&str> = tried.iter().map(|one| one["change"].as_str().unwrap()).collect();
+    assert!(changes.contains(&"[manager.config] confirm_hits = 3"), "{changes:?}");
+    assert!(changes.contains(&"[manager] plugin = \"manage-sprt\""), "{changes:?}");
+    assert!(changes.contains(&"depth-verified (another config)"), "{changes:?}");
+    for present in ["confirm_hits = 2", "discover_cost = 0.16 ", "depth-ekf (", "min_body = 0.7 "] {
+        assert!(!changes.iter().any(|change| change.contains(present)), "{changes:?}");
+    }
+    let (_, said) = doctor(&config(), good(), &["--settings", "never"]);
+    assert_eq!(said["alternatives"], Value::Array(vec![]));
+}
+
+/// A robot with a scanner alone, which drives.
+const SCANNER: &str = "
+seed = 5
+duration_s = 4.0
+[room]
+size_m = [9.0, 6.0]
+[camera]
+width = 64
+height = 48
+[robot]
+start = [0.8, 3.0]
+path = [[6.0, 3.0]]
+speed_mps = 0.5
+[laser]
+[[people]]
+path = [[4.0, 4.4], [4.0, 1.5]]
+speed_mps = 0.6
+";
+
+#[test]
+fn of_a_laser_log_lasers_are_spoken_of() {
+    let home = tempfile::tempdir().unwrap();
+    let log = simulated(home.path(), SCANNER, &["/camera"]);
+    let (code, said) = doctor(&config(), &log, &[]);
+    assert_eq!(code, 3, "{said:#}");
+    let needs = finding(&said, "needs")["remedy"].as_str().unwrap();
+    assert!(needs.contains("laser-legs"), "{needs}");
+    let driven = finding(&said, "odometry");
+    assert!(driven["measured"].as_str().unwrap().contains("m driven"), "{driven:#}");
+    let metres = driven["figures"]["driven_m"].as_f64().unwrap();
+    assert!((1.5..2.1).contains(&metres), "{driven:#}");
+    let (_, said) = doctor(&root().join("configs/laser-legs.toml"), &log, &[]);
+    let laser = finding(&said, "laser");
+    assert_eq!(laser["severity"], "ok", "{laser:#}");
+    assert!(laser["measured"].as_str().unwrap().contains("scans a second"), "{laser:#}");
+    let read = finding(&said, "frames-read")["measured"].as_str().unwrap();
+    assert!(read.contains("scans"), "{read}");
+}
+
+/// Images that are all skipped are no good log, whatever else is fine.
+#[test]
+fn images_that_make_no_frames_are_told() {
+    let home = tempfile::tempdir().unwrap();
+    let log = home.path().join("apart.mcap");
+    let apart = |_, at| at + 600_000_000_000;
+    broken::write(good(), &log, &Changes { depth_stamp: Some(apart), ..Changes::default() });
+    let (code, said) = doctor(&config(), &log, &[]);
+    let read = finding(&said, "frames-read");
+    assert_eq!((code, read["severity"].as_str()), (3, Some("bad")), "{said:#}");
+    let measured = read["measured"].as_str().unwrap();
+    assert!(measured.contains("0 frames of 32 images; colour without depth 32"), "{measured}");
+    assert!(!said["findings"].as_array().unwrap().iter().any(|f| f["id"] == "missed"), "{said:#}");
+}
+
+/// A config that states its cameras is not for another one.
+#[test]
+fn a_camera_outside_of_the_stated_range_is_told() {
+    let home = tempfile::tempdir().unwrap();
+    let stated = |range: &str| {
+        let path = home.path().join("stated.toml");
+        let text = "[[detectors]]\nplugin = 'depth-template'\nroles = ['track', 'discover']\n\
+                    [filter]\nplugin = 'ekf'\n[suits]\ncamera_height_m = ";
+        std::fs::write(&path, format!("{text}{range}\n")).unwrap();
+        let (_, said) = doctor(&path, good(), &["--settings", "never"]);
+        finding(&said, "suits").clone()
+    };
+    let low = stated("[0.2, 0.6]");
+    assert_eq!(low["severity"], "bad", "{low:#}");
+    assert!(low["measured"].as_str().unwrap().starts_with("not for this camera: 1.20 m high"));
+    assert_eq!(stated("[0.9, 2.4]")["severity"], "ok");
 }

@@ -1,31 +1,76 @@
-//! One small function for each possible problem. `None`: the log lacks the data to check, for
+//! One file for each possible problem. `None`: the log lacks the data to check, for
 //! example depth.
 
-mod camera;
-mod images;
+mod damage;
+mod depth;
+mod exposure;
+mod floor;
+mod frames;
+mod heads;
+mod intrinsics;
+mod laser;
+mod missed;
+mod mount;
+mod needs;
+mod odometry;
 mod people;
-mod times;
+mod pose;
+mod rate;
+mod reading;
+mod registration;
+mod skew;
+mod stamps;
+mod still;
+mod suits;
 
+use super::alternatives::Alternative;
+use super::coverage::Coverage;
 use super::evidence::Evidence;
-use super::finding::Finding;
+use super::finding::{Finding, Severity};
 
 /// Function that checks one aspect.
 pub type Check = fn(&Evidence) -> Option<Finding>;
 
 /// All checks, causes before their consequences.
 pub const ALL: &[Check] = &[
-    people::needs,
-    people::damage,
-    camera::intrinsics,
-    camera::frames,
-    times::rate,
-    times::stamps,
-    times::skew,
-    images::exposure,
-    images::depth,
-    images::registration,
-    camera::floor,
-    camera::mount,
-    times::odometry,
+    needs::needs,
+    damage::damage,
+    reading::reading,
+    intrinsics::intrinsics,
+    frames::frames,
+    rate::rate,
+    stamps::stamps,
+    skew::skew,
+    exposure::exposure,
+    depth::depth,
+    registration::registration,
+    floor::floor,
+    mount::mount,
+    heads::heads,
+    suits::suits,
+    laser::laser,
+    odometry::odometry,
     people::people,
+    still::still,
+    missed::missed,
 ];
+
+/// Returns true if tracks and things that come and go do not agree, so that other settings should
+/// be tried.
+pub fn asks_for_settings(evidence: &Evidence) -> bool {
+    let asking = [still::still(evidence), missed::missed(evidence)];
+    asking.iter().flatten().any(|finding| finding.severity >= Severity::Warn)
+}
+
+/// Gain of a setting below which it is not recommended.
+const MIN_GAIN: f64 = 0.02;
+
+/// Returns the best other setting that was tried on this log, if it is better than the present one
+/// and fulfils a condition.
+fn better(evidence: &Evidence, fits: impl Fn(&Coverage) -> bool) -> Option<&Alternative> {
+    let now = evidence.coverage.worth();
+    // The best comes first.
+    let mut better =
+        evidence.alternatives.iter().take_while(|other| other.coverage.worth() > now + MIN_GAIN);
+    better.find(|other| fits(&other.coverage))
+}

@@ -6,14 +6,15 @@ use tagalong_tracking::DetectorSettings;
 use super::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER};
 use crate::settings::PipelineSettings;
 
-/// Returns the config with every default filled in, also those of the plugins. `[tune]` is left
-/// out.
+/// Returns the config with every default filled in, also those of the plugins. `[tune]` and
+/// `[suits]` are left out.
 pub(super) fn resolve(
     mut root: Table,
     settings: &PipelineSettings,
     registry: &Registry,
 ) -> Result<Table, ConfigError> {
     root.remove(super::tune::TABLE);
+    root.remove(super::suits::TABLE);
     root.extend(table_of(settings)?);
     for (section, plugin) in [("associator", DEFAULT_ASSOCIATOR), ("manager", DEFAULT_MANAGER)] {
         let named = Table::from_iter([("plugin".to_owned(), Value::from(plugin))]);

@@ -23,6 +23,11 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
     let own = |line: &str| format!("{line}\n{FILTER}{SCRIPT}");
     let weighing = "filter = { plugin = 'odd', config = { how = 'weighs' } }\n";
     let cases: Vec<(String, &[&str])> = vec![
+        (
+            own("suits.camera_height_m = [2.0, 1.0]"),
+            &["a.toml:1:", "the lowest and the highest value"],
+        ),
+        (own("suits.heigth = [1.0, 2.0]"), &["a.toml:1:7", "unknown field `heigth`"]),
         (own("sed = 1"), &["a.toml:1:1", "unknown key `sed`", "did you mean `seed`?"]),
         (own("manager.config.confirm_hit = 1"), &["a.toml:1:16", "did you mean `confirm_hits`?"]),
         (own("associator.config.cost = 'overlapp'"), &["a.toml:1:26", "did you mean `overlap`?"]),
@@ -354,4 +359,19 @@ proptest! {
             prop_assert!(shown.starts_with("a.toml:"), "{shown}");
         }
     }
+}
+
+#[test]
+fn a_config_states_its_cameras_and_inherits_the_statement() {
+    let text = format!("{FILTER}{SCRIPT}[suits]\ncamera_height_m = [0.9, 2.4]\n");
+    let (pipeline, run) = build(&text).unwrap();
+    assert_eq!(run.suits.camera_height_m, Some([0.9, 2.4]));
+    assert_eq!(run.suits.pitch_down_deg, None);
+    let (plain, _) = build(&format!("{FILTER}{SCRIPT}")).unwrap();
+    assert_eq!(pipeline.resolved(), plain.resolved(), "a run takes no notice of it");
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("base.toml"), text).unwrap();
+    let registry = World::default().registry();
+    let (_, run) = Pipeline::from_toml("extends = 'base.toml'\n", home.path(), &registry).unwrap();
+    assert_eq!(run.suits.camera_height_m, Some([0.9, 2.4]));
 }

@@ -1,0 +1,126 @@
+//! Other settings, tried on the same frames: how the figures of a pipeline would have changed.
+
+use serde::Serialize;
+use tagalong_app::choice::fitting;
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::progress::Progress;
+use tagalong_config::Registry;
+use tagalong_core::Inputs;
+use tagalong_log::{FrameSource, LogFrame};
+use tagalong_pipeline::{Pipeline, with_values};
+use toml::Table;
+
+use super::coverage::{Course, Coverage};
+use super::remedies::{self, Change, is_present};
+use super::visit::{Scope, Visit};
+
+/// Most built-in configs that are tried beside the one of the user.
+const MOST_CONFIGS: usize = 4;
+
+/// Other setting, and its figures.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Line of a config, or the name of another config.
+    pub change: String,
+    /// Figures with it.
+    pub coverage: Coverage,
+}
+
+/// Pipeline with another setting, on its way over the log.
+struct Runner {
+    change: String,
+    pipeline: Pipeline,
+    course: Course,
+}
+
+/// Tries other settings on the frames of a visit, the best first.
+pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternative> {
+    let mut runners = runners(visit, scope, registry);
+    let inputs =
+        runners.iter().fold(Inputs::NONE, |all, runner| all.union(runner.pipeline.inputs()));
+    let (input, limits) = (&visit.outer.input, &visit.outer.limits);
+    let Ok(mut frames) = FrameSource::open(scope.log, input, limits, inputs) else {
+        return Vec::new();
+    };
+    let progress = Progress::titled(&format!("{} other settings", runners.len()));
+    for number in 0..scope.frames {
+        let Some(item) = frames.next_frame() else { break };
+        // A pipeline that fails on this log is no alternative.
+        runners.retain_mut(|runner| runner.step(&item));
+        progress.advance(frames.progress(), number);
+    }
+    let judged = runners.into_iter().map(|runner| Alternative {
+        change: runner.change,
+        coverage: Coverage::of(&runner.course, &visit.scenery),
+    });
+    ranked(judged)
+}
+
+/// Returns alternatives, the best first; of equal ones the order stays.
+pub fn ranked(alternatives: impl Iterator<Item = Alternative>) -> Vec<Alternative> {
+    let mut ranked: Vec<Alternative> = alternatives.collect();
+    ranked.sort_by(|a, b| b.coverage.worth().total_cmp(&a.coverage.worth()));
+    ranked
+}
+
+impl Runner {
+    fn new(change: String, mut pipeline: Pipeline) -> Self {
+        pipeline.share_findings();
+        Self { change, pipeline, course: Course::default() }
+    }
+
+    /// Passes a frame on; returns false after an error.
+    fn step(&mut self, item: &LogFrame) -> bool {
+        let report = self.pipeline.step(&item.frame);
+        report.is_ok_and(|report| {
+            self.course.take(&report, &item.odom_from_robot);
+            true
+        })
+    }
+}
+
+/// Returns a pipeline for each change of the config, and for other configs.
+fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
+    let resolved = visit.pipeline.resolved();
+    let changes = changes(visit, &resolved);
+    let built = changes.into_iter().filter_map(|change| {
+        let text = with_values(&resolved, &[(&change.key, &change.value)]).ok()?;
+        let pipeline = visit.config.variant(&text, registry).ok()?;
+        Some(Runner::new(change.line, pipeline))
+    });
+    built.chain(others(&visit.config, scope, registry)).collect()
+}
+
+/// Returns the changes that are tried: the values of `[tune]` and those that the table of remedies
+/// offers, none of them equal to the present one.
+fn changes(visit: &Visit, resolved: &str) -> Vec<Change> {
+    let table: Table = toml::from_str(resolved).unwrap_or_default();
+    let tuned = visit.tunables.iter().flat_map(|tunable| {
+        let others = tunable.values.iter().filter(|value| !is_present(value, &tunable.now));
+        others.map(|value| Change::of(&table, &tunable.key, value))
+    });
+    let mut changes: Vec<Change> = Vec::new();
+    for change in tuned.chain(remedies::offered(&table)) {
+        if !changes.iter().any(|other| other.line == change.line) {
+            changes.push(change);
+        }
+    }
+    changes
+}
+
+/// Names another config as a change.
+pub fn another(config: &str) -> String {
+    format!("{config} (another config)")
+}
+
+/// Returns the built-in configs that fit the log.
+fn others(config: &ConfigFile, scope: Scope, registry: &Registry) -> Vec<Runner> {
+    let found = fitting(scope.log, registry, MOST_CONFIGS).fitting;
+    let others = found.into_iter().filter(|other| other.config.stem() != config.stem());
+    others
+        .filter_map(|other| {
+            let (pipeline, _) = other.config.pipeline(registry, None).ok()?;
+            Some(Runner::new(another(other.choice.config), pipeline))
+        })
+        .collect()
+}

@@ -1,0 +1,61 @@
+use tagalong_vision::quality::DepthQuality;
+
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Plausible median of the depth readings of a robot's camera, m.
+const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.6..=15.0;
+
+/// Checks unit, scale, holes and steps of depth.
+pub fn depth(evidence: &Evidence) -> Option<Finding> {
+    evidence.inspection.facts.depth_topic.as_ref()?;
+    let images = &evidence.samples.depths;
+    if images.is_empty() {
+        return None;
+    }
+    let Some(quality) = DepthQuality::of(images.iter().map(AsRef::as_ref)) else {
+        let finding = Finding::new("depth", Severity::Bad, "not one pixel has a reading")
+            .why("without depth nobody has a place");
+        return Some(finding.remedy(
+            "is the depth camera switched on? which topic is it? [input] depth_topic = \"...\"",
+        ));
+    };
+    let far = !PLAUSIBLE_M.contains(&quality.median_m);
+    let step = quality.step_m.unwrap_or(0.0);
+    // The steps of stereo depth grow with the square of the distance.
+    let coarse = step / quality.median_m.powi(2).max(0.1);
+    let severity = Severity::beyond(if far { 1.0 } else { 0.0 }, 0.5, 0.5)
+        .max(Severity::beyond(quality.without, 0.6, 0.9))
+        .max(Severity::beyond(coarse, 0.02, 0.1));
+    let measured = format!(
+        "median {:.2} m, {:.0} % without a reading, steps of {:.1} mm",
+        quality.median_m,
+        100.0 * quality.without,
+        1e3 * step
+    );
+    let finding = Finding::new("depth", severity, measured)
+        .figure("median_m", quality.median_m)
+        .figure("without", quality.without)
+        .figure("step_m", step);
+    Some(if far {
+        finding
+            .why("people are looked for between half a metre and some metres: the unit is wrong")
+            .remedy(format!("[input] depth_unit_m = {}", better_unit(evidence, quality.median_m)))
+    } else {
+        finding
+            .why("people in holes, or between coarse steps, have no shape")
+            .remedy("dark or shiny surfaces, sunlight, the camera's own range: look at the pictures; a stereo config may do better")
+    })
+}
+
+/// Returns the unit by which the median would be some metres: a power of ten times the present one.
+fn better_unit(evidence: &Evidence, median_m: f64) -> f64 {
+    let topic = evidence.inspection.facts.depth_topic.as_ref();
+    let image = topic.and_then(|t| evidence.inspection.topic(t)).and_then(|t| t.image.as_ref());
+    let usual = if image.is_some_and(|image| image.pixels.contains("32FC1")) { 1.0 } else { 0.001 };
+    let unit = evidence.input.depth_unit_m.unwrap_or(usual);
+    let tens = (3.0 / median_m).log10().round();
+    let better = unit * 10f64.powf(tens);
+    // In the short form: 0.001, not 0.0010000000000000002.
+    format!("{better:.9}").parse().unwrap_or(better)
+}

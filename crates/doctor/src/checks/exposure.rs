@@ -1,0 +1,39 @@
+use tagalong_vision::quality::Exposure;
+
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Share of black, or of white, above which an image is useless.
+const BLIND: f64 = 0.9;
+
+/// Checks the exposure.
+pub fn exposure(evidence: &Evidence) -> Option<Finding> {
+    let all = &evidence.samples.exposures;
+    if all.is_empty() {
+        return None;
+    }
+    let count = all.len() as f64;
+    let mean = |value: fn(&Exposure) -> f64| all.iter().map(value).sum::<f64>() / count;
+    let blind = all.iter().filter(|e| e.black.max(e.white) > BLIND || e.contrast < 3.0).count();
+    let (black, white) = (mean(|e| e.black), mean(|e| e.white));
+    let severity = Severity::beyond(blind as f64 / count, 0.05, 0.5)
+        .max(Severity::beyond(black, 0.5, 0.8))
+        .max(Severity::beyond(white, 0.25, 0.6));
+    let measured = format!(
+        "{:.0} % black, {:.0} % saturated; {blind} of {} images show nothing",
+        100.0 * black,
+        100.0 * white,
+        all.len()
+    );
+    let finding = Finding::new("exposure", severity, measured)
+        .figure("black", black)
+        .figure("saturated", white)
+        .figure("blind_images", blind as f64)
+        .why("nobody can be seen where an image is black or white");
+    let remedy = if black >= white {
+        "expose longer: lens cap, driver, auto exposure?"
+    } else {
+        "expose shorter, or turn away from the light"
+    };
+    Some(finding.remedy(remedy))
+}

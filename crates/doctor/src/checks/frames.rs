@@ -1,0 +1,85 @@
+use std::collections::BTreeSet;
+
+use tagalong_config::nearest;
+
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+use super::pose::mount_lines;
+
+/// Checks that the frames of tf are connected, and that the camera's is an optical one.
+pub fn frames(evidence: &Evidence) -> Option<Finding> {
+    let (facts, tf) = (&evidence.inspection.facts, &evidence.inspection.transforms);
+    let camera = evidence.samples.camera.as_ref()?;
+    let name = facts.camera_frame.clone().unwrap_or_default();
+    let ok = |measured: String| Some(Finding::new("frames", Severity::Ok, measured));
+    if evidence.input.camera.is_some() {
+        return ok("the pose of the camera comes from [input.camera]".into());
+    }
+    if tf.is_empty() {
+        let sensor = if camera.is_blind() { "scanner" } else { "camera" };
+        return ok(format!("no tf; the pose of the {sensor} comes from {}", facts.camera_source));
+    }
+    if !facts.camera_source.starts_with("tf") {
+        return Some(cut(evidence, &name));
+    }
+    let (pitch, roll) = (camera.pitch_down_rad().to_degrees(), camera.roll_rad().to_degrees());
+    // A body frame in place of the optical one turns the camera by 90 degrees, far beyond these
+    // limits.
+    let upright = pitch.abs() <= 65.0 && roll.abs() <= 45.0;
+    if upright || camera.panorama().is_some() {
+        return ok(format!("{} hangs below {}", name, facts.robot_frame));
+    }
+    let measured =
+        format!("by tf the frame {name} looks {pitch:.0} degrees down, rolled by {roll:.0}");
+    let finding = Finding::new("frames", Severity::Bad, measured)
+        .figure("pitch_down_deg", pitch)
+        .figure("roll_deg", roll)
+        .why("images belong to an optical frame (REP 103: z forward, x right); this one is a body frame, or a rotation is missing");
+    Some(finding.remedy(format!(
+        "publish the images in the *_optical_frame, or give the pose:\n{}",
+        mount_lines(evidence)
+    )))
+}
+
+/// Reports that the camera's frame is not connected to the robot's.
+fn cut(evidence: &Evidence, camera: &str) -> Finding {
+    let (facts, tf) = (&evidence.inspection.facts, &evidence.inspection.transforms);
+    let names: BTreeSet<&str> = tf.iter().flat_map(|(a, b)| [a.as_str(), b.as_str()]).collect();
+    let roots: Vec<&str> = names.iter().copied().filter(|name| !tf.contains_key(*name)).collect();
+    let robot = facts.robot_frame.as_str();
+    let lost = if names.contains(camera) { robot } else { camera };
+    let hint = nearest(lost, names.iter().copied()).filter(|near| *near != lost);
+    let hint = hint.map(|near| format!(" (did you mean `{near}`?)")).unwrap_or_default();
+    let measured = if names.contains(lost) {
+        format!("tf falls apart into {} trees, below {}", roots.len(), roots.join(", "))
+    } else {
+        format!("tf does not know the frame `{lost}`{hint}; its roots are {}", roots.join(", "))
+    };
+    let stands_in = facts.camera_source.starts_with("the floor");
+    let severity = if stands_in { Severity::Warn } else { Severity::Bad };
+    let base =
+        if lost == robot && names.contains(camera) { root_of(evidence, camera) } else { None };
+    let remedy = match base {
+        Some(root) => format!(
+            "[input] base_frame = \"{root}\", if that frame is on the floor; else\n{}",
+            mount_lines(evidence)
+        ),
+        None => format!("publish the missing transform, or\n{}", mount_lines(evidence)),
+    };
+    Finding::new("frames", severity, format!("{measured}; {} stands in", facts.camera_source))
+        .figure("trees", roots.len() as f64)
+        .why("without the transform nobody knows how high the camera is, and how it is tilted")
+        .remedy(remedy)
+}
+
+/// Returns the topmost frame above one.
+fn root_of(evidence: &Evidence, frame: &str) -> Option<String> {
+    let tf = &evidence.inspection.transforms;
+    let mut at = frame;
+    // Bounded by the number of frames, because a broken tf may have a cycle.
+    for _ in 0..tf.len() {
+        let Some(parent) = tf.get(at) else { break };
+        at = parent;
+    }
+    (at != frame).then(|| at.to_owned())
+}

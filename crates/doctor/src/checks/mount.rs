@@ -1,0 +1,52 @@
+use tagalong_geometry::Camera;
+
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+use super::pose::{by_floor, mount_lines};
+
+/// Checks that height and tilt of the camera agree with the visible floor.
+pub fn mount(evidence: &Evidence) -> Option<Finding> {
+    let floors = &evidence.samples.floors;
+    // A pose that comes from the floor itself would always agree with it.
+    if evidence.inspection.facts.camera_source.starts_with("the floor")
+        || floors.len() < 3.min(evidence.samples.count)
+    {
+        return None;
+    }
+    let median = |value: &dyn Fn(&Camera, usize) -> f64| {
+        let mut values: Vec<f64> =
+            floors.iter().enumerate().map(|(i, (_, c))| value(c, i)).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let height = median(&|camera, i| floors[i].0.height_m - camera.height_m())?;
+    let pitch =
+        median(&|camera, i| (floors[i].0.pitch_down_rad() - camera.pitch_down_rad()).to_degrees())?;
+    let roll = median(&|camera, i| (floors[i].0.roll_rad() - camera.roll_rad()).to_degrees())?;
+    let [seen, ..] = by_floor(evidence)?;
+    let told = seen - height;
+    let severity = Severity::beyond(height.abs(), 0.12, 0.3)
+        .max(Severity::beyond(pitch.abs(), 3.0, 6.0))
+        .max(Severity::beyond(roll.abs(), 3.0, 6.0));
+    let measured = format!(
+        "{told:.2} m high by {}; by the floor {height:+.2} m, {pitch:+.1} degrees further down, {roll:+.1} of roll",
+        evidence.inspection.facts.camera_source
+    );
+    let finding = Finding::new("mount", severity, measured)
+        .figure("height_off_m", height)
+        .figure("pitch_off_deg", pitch)
+        .figure("roll_off_deg", roll)
+        .why("heads are looked for at the height of heads above the floor");
+    // A wrong unit of depth scales the height and leaves the angles as they are.
+    let scaled = pitch.abs() < 3.0 && roll.abs() < 3.0 && !(0.7..1.4).contains(&(seen / told));
+    Some(finding.remedy(if scaled {
+        format!(
+            "the tilt agrees and the height does not: depth may be in another unit, {:.3} of what is \
+             taken:\n[input] depth_unit_m = ...\nelse\n{}",
+            told / seen,
+            mount_lines(evidence)
+        )
+    } else {
+        mount_lines(evidence)
+    }))
+}

@@ -1,0 +1,30 @@
+use tagalong_log::{Inputs, LogError, Usage};
+
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Checks that the log has the inputs that the config needs.
+pub fn needs(evidence: &Evidence) -> Option<Finding> {
+    let usable = evidence.inspection.usable.join(", ");
+    let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
+        let measured = format!("the config needs {}; the log has {usable}", words(evidence.inputs));
+        return Some(Finding::new("needs", Severity::Ok, measured));
+    };
+    let hint = hint.trim_start_matches("; ");
+    let other = match &evidence.fitting[..] {
+        [] => "take another config, see the column `needs` in configs/README.md".to_owned(),
+        fitting => format!("take a config that fits this log: {}", fitting.join(", ")),
+    };
+    let remedy = if hint.is_empty() { other } else { format!("{hint};\nor {other}") };
+    let measured = format!(
+        "the log has no {wanted}; it has {}",
+        if usable.is_empty() { "nothing usable" } else { &usable }
+    );
+    let finding = Finding::new("needs", Severity::Bad, measured).remedy(remedy);
+    Some(finding.why("the pipeline cannot run on this log at all"))
+}
+
+fn words(inputs: Inputs) -> String {
+    let names: Vec<&str> = inputs.of(Usage::Required).map(|input| input.name()).collect();
+    if names.is_empty() { "any image".into() } else { names.join(", ") }
+}

@@ -1,0 +1,28 @@
+//! Pose of the camera by the visible floor, for several checks.
+
+use super::super::evidence::Evidence;
+
+/// Returns height, pitch and roll by the floor, each the median over the frames.
+pub fn by_floor(evidence: &Evidence) -> Option<[f64; 3]> {
+    let floors = &evidence.samples.floors;
+    let median = |value: &dyn Fn(usize) -> f64| {
+        let mut values: Vec<f64> = (0..floors.len()).map(value).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    Some([
+        median(&|i| floors[i].0.height_m)?,
+        median(&|i| floors[i].0.pitch_down_rad().to_degrees())?,
+        median(&|i| floors[i].0.roll_rad().to_degrees())?,
+    ])
+}
+
+/// Returns the settings for the camera's pose, by the floor where it is visible.
+pub fn mount_lines(evidence: &Evidence) -> String {
+    match by_floor(evidence) {
+        Some([height, pitch, roll]) => format!(
+            "[input.camera]\nheight_m = {height:.2}\npitch_down_deg = {pitch:.1}\nroll_deg = {roll:.1}"
+        ),
+        None => "[input.camera]\nheight_m = 1.2  # measure it\npitch_down_deg = 0.0".into(),
+    }
+}

@@ -1,0 +1,40 @@
+use tagalong_log::TopicFacts;
+
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Walking speed of people, m/s.
+const WALK_MPS: f64 = 1.4;
+
+impl Evidence {
+    /// Returns the topic that makes the frames.
+    fn primary(&self) -> Option<&TopicFacts> {
+        let facts = &self.inspection.facts;
+        let topic = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref())?;
+        self.inspection.topic(topic)
+    }
+}
+
+/// Checks the rate of the images.
+pub fn rate(evidence: &Evidence) -> Option<Finding> {
+    let topic = evidence.primary()?;
+    let Some(timing) = topic.timing else {
+        let measured = format!("{} has {} image", topic.topic, topic.count);
+        return Some(Finding::new("rate", Severity::Unknown, measured));
+    };
+    let hz = 1.0 / timing.median_period_s;
+    let walked = WALK_MPS * timing.median_period_s;
+    let finding = Finding::new(
+        "rate",
+        Severity::beyond(walked, 0.6, f64::INFINITY),
+        format!("{hz:.1} images a second: somebody walks {walked:.2} m between two"),
+    );
+    let finding = finding.figure("rate_hz", hz).why(
+        "a person who goes far between two images fits no track, and tracks are confirmed late",
+    );
+    Some(finding.remedy(format!(
+        "record 5 images a second or more; else\n[associator.config] gate_m = {:.1}\n[manager.config] \
+         confirm_hits = 2",
+        (1.0 + walked).min(3.0)
+    )))
+}

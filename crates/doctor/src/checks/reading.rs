@@ -1,0 +1,51 @@
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Counters of the reader that are no reason for a missing frame.
+const NO_REASON: [&str; 6] = [
+    "chunks_verified",
+    "frames",
+    "messages",
+    "depth_registered",
+    "odometry_gap_frames",
+    "odometry_jump_frames",
+];
+
+/// Checks that the images of the log became frames.
+pub fn reading(evidence: &Evidence) -> Option<Finding> {
+    let (made, wanted) =
+        (evidence.reading.made, evidence.reading.wanted.max(evidence.reading.made));
+    if wanted == 0 {
+        let why = evidence.inspection.unusable.as_deref().unwrap_or("no image and no scan");
+        let finding = Finding::new("frames-read", Severity::Bad, format!("no frame: {why}"))
+            .why("without frames nothing was checked");
+        return Some(finding.remedy("`tagalong inspect` lists the topics; name them in [input]"));
+    }
+    let lost = 1.0 - made as f64 / wanted as f64;
+    let severity = match made {
+        0 => Severity::Bad,
+        _ => Severity::beyond(lost, 0.05, 0.5),
+    };
+    let is_of_scans = evidence.samples.camera.as_ref().is_some_and(|camera| camera.is_blind());
+    let sources = if is_of_scans { "scans" } else { "images" };
+    let measured = format!("{made} frames of {wanted} {sources}{}", reasons(evidence, lost));
+    let finding = Finding::new("frames-read", severity, measured)
+        .figure("frames", made as f64)
+        .figure("wanted", wanted as f64)
+        .why("an image that makes no frame is not looked at by any pipeline");
+    Some(finding.remedy(
+        "the notes of `tagalong inspect` say why; a depth image far in time: the finding `skew`",
+    ))
+}
+
+/// Returns the counters that tell why frames are missing.
+fn reasons(evidence: &Evidence, lost: f64) -> String {
+    if lost <= 0.0 {
+        return String::new();
+    }
+    let counters = evidence.inspection.counters.iter();
+    let telling = counters.filter(|(name, count)| !NO_REASON.contains(name) && **count > 0);
+    let named: Vec<String> =
+        telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
+    if named.is_empty() { String::new() } else { format!("; {}", named.join(", ")) }
+}

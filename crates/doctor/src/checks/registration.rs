@@ -1,0 +1,54 @@
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Columns of the image that the limits on offsets refer to.
+const USUAL_COLUMNS: f64 = 640.0;
+
+/// Checks the registration of depth to colour.
+pub fn registration(evidence: &Evidence) -> Option<Finding> {
+    let camera = evidence.samples.camera.as_ref()?;
+    let facts = &evidence.inspection.facts;
+    if facts.depth_topic.is_none() || facts.colour_topic.is_none() || camera.panorama().is_some() {
+        return None;
+    }
+    let unknown = |why: &str| Some(Finding::new("registration", Severity::Unknown, why));
+    let Some(offset) = evidence.samples.overlap.offset() else {
+        return unknown("no outlines in depth to compare with colour");
+    };
+    let [dx, dy] = offset.px;
+    let error = offset.error_px[0].hypot(offset.error_px[1]);
+    let figures = |finding: Finding| {
+        finding
+            .figure("offset_x_px", f64::from(dx))
+            .figure("offset_y_px", f64::from(dy))
+            .figure("error_px", error)
+            .figure("gain", offset.gain)
+            .figure("contrast", offset.contrast)
+    };
+    let off = f64::from(dx).hypot(f64::from(dy));
+    let scale = (camera.width as f64 / USUAL_COLUMNS).clamp(0.5, 2.0);
+    // An offset within its own error is no evidence of a misregistration.
+    if offset.contrast < 0.25 || error > 0.5 * off.max(4.0 * scale) {
+        let measured = format!(
+            "outlines in depth and colour do not tell ({dx:+}, {dy:+} px, give or take {error:.1})"
+        );
+        return unknown(&measured).map(figures);
+    }
+    let limits = [3.0, 5.0].map(|px| px * scale);
+    // An offset without a gain in overlap is ignored.
+    let deviation = if offset.gain < 0.05 { 0.0 } else { off };
+    let measured = format!(
+        "depth has to be moved by {dx:+}, {dy:+} px (give or take {error:.1}) to lie on colour; {:.0} % more edges there",
+        100.0 * offset.gain
+    );
+    let severity = Severity::beyond(deviation, limits[0], limits[1]);
+    let finding = figures(Finding::new("registration", severity, measured)).why(
+        "people have the depth of what is beside them: their boxes slip, and narrow things vanish",
+    );
+    let [x, y] = evidence.input.depth_offset_px;
+    Some(finding.remedy(format!(
+        "calibrate depth to colour, or\n[input] depth_offset_px = [{}, {}]",
+        x + dx,
+        y + dy
+    )))
+}

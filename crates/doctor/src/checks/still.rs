@@ -1,0 +1,71 @@
+use super::super::coverage::STILL_S;
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+use super::{Alternative, better};
+
+/// Boxes below which shares mean little.
+const FEW_BOXES: usize = 5;
+
+/// Shares of idle boxes that are a warning, and a serious one: more than one person who sits among
+/// others.
+const IDLE: (f64, f64) = (0.1, 0.65);
+
+/// Checks that tracks are not of things: they move at some time, or something stirs where they are.
+pub fn still(evidence: &Evidence) -> Option<Finding> {
+    let coverage = &evidence.coverage;
+    if coverage.boxes == 0 {
+        return None;
+    }
+    let tracks = coverage.moving + coverage.still + coverage.unclear;
+    let still_share = coverage.still_boxes as f64 / coverage.boxes as f64;
+    let idle_share = coverage.idle();
+    let mut severity = Severity::beyond(idle_share, IDLE.0, IDLE.1);
+    if coverage.boxes < FEW_BOXES {
+        severity = severity.min(Severity::Warn);
+    }
+    let mut measured = match coverage.still {
+        0 => format!("each of {tracks} tracks moved or lived less than {STILL_S:.0} s"),
+        still => format!(
+            "{still} of {tracks} tracks never moved; they fill {:.0} % of the boxes",
+            100.0 * still_share
+        ),
+    };
+    if coverage.has_depth {
+        measured +=
+            &format!("; in {:.0} % of the boxes nothing ever comes or goes", 100.0 * idle_share);
+    }
+    let finding = Finding::new("still", severity, measured)
+        .figure("tracks", tracks as f64)
+        .figure("still_tracks", coverage.still as f64)
+        .figure("still_boxes_share", still_share)
+        .figure("idle_boxes_share", idle_share)
+        .why("people move at some time: these are things, or people who sit or stand throughout");
+    Some(finding.remedy(remedy(evidence)))
+}
+
+/// Returns the change that helped most on this log, else a general one.
+fn remedy(evidence: &Evidence) -> String {
+    let now = &evidence.coverage;
+    match better(evidence, |other| other.idle_boxes < now.idle_boxes) {
+        Some(Alternative { change, coverage }) => format!(
+            "look at the pictures (-o DIR); tried on this log, nothing moves in {:.0} % of the boxes \
+             with\n{change}",
+            100.0 * coverage.idle()
+        ),
+        None => format!(
+            "look at the pictures (-o DIR); where they are things, {}\n\
+             [manager] plugin = \"manage-sprt\"",
+            other_config(evidence)
+        ),
+    }
+}
+
+/// Returns advice on another config, unless it is taken already or cannot be taken.
+fn other_config(evidence: &Evidence) -> String {
+    let usable = |wanted| evidence.inspection.usable.contains(&wanted);
+    let fits = usable("colour") && usable("depth") && evidence.config != VERIFIED;
+    if fits { format!("take {VERIFIED}, or") } else { "believe tracks by evidence:".to_owned() }
+}
+
+/// Config whose verifiers drop things.
+const VERIFIED: &str = "depth-verified";

@@ -1,0 +1,56 @@
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Deviations from a stated range that are no matter, and those that are a serious one: of the
+/// height, m, and of the pitch, degrees.
+const HEIGHT_M: (f64, f64) = (0.1, 0.5);
+const PITCH_DEG: (f64, f64) = (3.0, 15.0);
+
+/// Checks that the camera is one of those that the config states (`[suits]`).
+pub fn suits(evidence: &Evidence) -> Option<Finding> {
+    let camera = evidence.samples.camera.as_ref()?;
+    let stated = &evidence.suits;
+    let height = stated.camera_height_m.map(|range| (camera.height_m(), range));
+    let pitch = stated.pitch_down_deg.map(|range| (camera.pitch_down_rad().to_degrees(), range));
+    let is_stated = height.is_some() || pitch.is_some();
+    if camera.is_blind() || evidence.is_pose_assumed() || !is_stated {
+        return None;
+    }
+    let by = |value: Option<(f64, [f64; 2])>| value.map_or(0.0, |(now, range)| beyond(now, range));
+    let severity = Severity::beyond(by(height), HEIGHT_M.0, HEIGHT_M.1).max(Severity::beyond(
+        by(pitch),
+        PITCH_DEG.0,
+        PITCH_DEG.1,
+    ));
+    let facts =
+        [height.map(|it| said("m high", 2, it)), pitch.map(|it| said("degrees down", 0, it))];
+    let facts: Vec<String> = facts.into_iter().flatten().collect();
+    let verdict = if severity >= Severity::Warn { "not for this camera: " } else { "" };
+    let finding = Finding::new("suits", severity, format!("{verdict}{}", facts.join("; ")))
+        .figure("camera_height_m", camera.height_m())
+        .figure("pitch_down_deg", camera.pitch_down_rad().to_degrees())
+        .why("settings and models were fitted to cameras in this range, and to no others");
+    Some(finding.remedy(
+        "take a config for this height, see the first table of configs/README.md (depth-net-ekf: any \
+         height); or try: `tagalong doctor LOG` compares those that fit",
+    ))
+}
+
+/// Returns the distance of a value from a range.
+fn beyond(value: f64, [low, high]: [f64; 2]) -> f64 {
+    (low - value).max(value - high).max(0.0)
+}
+
+fn said(unit: &str, digits: usize, (now, [low, high]): (f64, [f64; 2])) -> String {
+    format!("{now:.digits$} {unit}, the config is for {low} to {high}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deviations_count_on_both_sides() {
+        assert_eq!([0.3, 1.0, 2.5].map(|v| beyond(v, [0.9, 2.0])), [0.6000000000000001, 0.0, 0.5]);
+    }
+}

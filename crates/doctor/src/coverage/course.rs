@@ -1,0 +1,173 @@
+//! Course of a pipeline over a log: where its confirmed tracks were.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry2, Point2};
+use tagalong_core::Stamp;
+use tagalong_pipeline::FrameReport;
+
+/// Confirmed track in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Number of the track.
+    pub id: u32,
+    /// Place on the floor, odometry frame, m.
+    pub place: Point2<f64>,
+    /// Distance from the robot, m.
+    pub range_m: f64,
+    /// Standard deviation of the place, m.
+    pub sigma_m: f64,
+    /// True if evidence of this frame supports it.
+    pub seen: bool,
+}
+
+/// Confirmed tracks of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Index of the frame.
+    pub index: u64,
+    /// Time of the frame.
+    pub stamp: Stamp,
+    /// The tracks.
+    pub tracks: Vec<Placed>,
+}
+
+/// Confirmed tracks of all frames.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// The frames in their order.
+    pub moments: Vec<Moment>,
+    /// Time that the pipeline took, ms.
+    pub spent_ms: f64,
+}
+
+/// Motion of a track over its life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Life {
+    /// It left its place.
+    Moved,
+    /// It stayed within the noise for long enough to tell.
+    Still,
+    /// Too short, or places too uncertain, to tell.
+    Unclear,
+}
+
+/// Lives of the tracks, by their numbers.
+pub type Lives = BTreeMap<u32, Life>;
+
+/// Life of a track that never left its place, at least, s.
+pub const STILL_S: f64 = 3.0;
+
+/// Distance from its place that counts as motion, m, and its growth with the distance from the
+/// robot, as the noise of depth grows.
+const MOVED_M: f64 = 0.4;
+const MOVED_GROWTH: f64 = 0.03;
+
+/// Number of frames below which each of them counts.
+const SHORT: usize = 6;
+
+/// Uncertainty of a place beyond which motion cannot be told, m.
+const MAX_SIGMA_M: f64 = 0.5;
+
+impl Course {
+    /// Adds the report of a frame.
+    pub fn take(&mut self, report: &FrameReport, odom_from_robot: &Isometry2<f64>) {
+        self.spent_ms += report.timings.iter().map(|(_, ms)| ms).sum::<f64>();
+        let confirmed = report.tracks.iter().filter(|track| track.confirmed);
+        let placed = confirmed.map(|track| {
+            let in_robot = track.estimate.person.position.xy();
+            let covariance = &track.estimate.covariance;
+            Placed {
+                id: track.id.0,
+                place: odom_from_robot * in_robot,
+                range_m: in_robot.coords.norm(),
+                sigma_m: covariance[(0, 0)].max(covariance[(1, 1)]).max(0.0).sqrt(),
+                seen: track.seen,
+            }
+        });
+        self.moments.push(Moment {
+            index: report.index,
+            stamp: report.stamp,
+            tracks: placed.collect(),
+        });
+    }
+
+    /// Returns the life of each track.
+    pub fn lives(&self) -> Lives {
+        let mut seen: BTreeMap<u32, Vec<(Stamp, Placed)>> = BTreeMap::new();
+        for moment in &self.moments {
+            for track in moment.tracks.iter().filter(|track| track.seen) {
+                seen.entry(track.id).or_default().push((moment.stamp, *track));
+            }
+        }
+        seen.iter().map(|(id, track)| (*id, life(track))).collect()
+    }
+}
+
+/// Judges the motion of a track by the frames in which it was seen.
+fn life(seen: &[(Stamp, Placed)]) -> Life {
+    let middle = |value: &dyn Fn(&Placed) -> f64, part: &[(Stamp, Placed)]| {
+        let mut values: Vec<f64> = part.iter().map(|(_, placed)| value(placed)).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    };
+    let place = |part: &[(Stamp, Placed)]| {
+        Point2::new(middle(&|p| p.place.x, part), middle(&|p| p.place.y, part))
+    };
+    let noise_m = MOVED_M + MOVED_GROWTH * middle(&|p| p.range_m, seen);
+    let home = place(seen);
+    // The median of three frames in a row: a single wild detection is no motion. Short tracks of
+    // slow cameras have no frames to spare.
+    let length = if seen.len() < SHORT { 1 } else { 3 };
+    let farthest = seen.windows(length).map(|part| (place(part) - home).norm()).fold(0.0, f64::max);
+    let is_rough = middle(&|p| p.sigma_m, seen) > MAX_SIGMA_M;
+    let ends = seen.first().zip(seen.last());
+    let lasted_s = ends.map_or(0.0, |((first, _), (last, _))| last.seconds_since(*first));
+    match () {
+        () if is_rough => Life::Unclear,
+        () if farthest > noise_m => Life::Moved,
+        () if lasted_s >= STILL_S => Life::Still,
+        () => Life::Unclear,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A track seen ten times a second at these places along the x axis, m.
+    fn walk(places: &[f64]) -> Life {
+        let placed = |(i, x): (usize, &f64)| {
+            let stamp = Stamp::default().plus_seconds(0.1 * i as f64);
+            let place = Point2::new(*x, 1.0);
+            (stamp, Placed { id: 1, place, range_m: 3.0, sigma_m: 0.05, seen: true })
+        };
+        life(&places.iter().enumerate().map(placed).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_track_that_stays_within_the_noise_never_moved() {
+        let jitter: Vec<f64> = (0..60).map(|i| 3.0 + 0.1 * f64::from(i % 3 - 1)).collect();
+        assert_eq!(walk(&jitter), Life::Still);
+        assert_eq!(walk(&jitter[..20]), Life::Unclear, "two seconds are too short");
+        let mut wild = jitter.clone();
+        wild[30] = 5.0;
+        assert_eq!(walk(&wild), Life::Still, "one wild frame is no motion");
+    }
+
+    #[test]
+    fn a_track_that_goes_somewhere_at_some_time_moved() {
+        let steps: Vec<f64> = (0..60).map(|i| f64::from(i.min(10)) * 0.1).collect();
+        assert_eq!(walk(&steps), Life::Moved);
+        assert_eq!(walk(&[0.0, 0.7, 1.4]), Life::Moved, "however short");
+    }
+
+    #[test]
+    fn rough_places_tell_nothing() {
+        let rough =
+            Placed { id: 1, place: Point2::new(3.0, 0.0), range_m: 3.0, sigma_m: 2.0, seen: true };
+        let at = |i| Stamp::default().plus_seconds(f64::from(i));
+        let seen: Vec<_> = (0..20).map(|i| (at(i), rough)).collect();
+        assert_eq!(life(&seen), Life::Unclear);
+    }
+}

@@ -1,0 +1,226 @@
+//! Coverage: what comes and goes in a log, against the tracks of a pipeline.
+
+mod course;
+
+use nalgebra::Point2;
+use serde::Serialize;
+
+pub use course::{Course, STILL_S};
+use course::{Life, Lives, Moment, Placed};
+
+use super::scenery::{self, Scenery};
+
+/// Distance of a track from the people-sized blob that it explains, m.
+const EXPLAINS_M: f64 = 0.5;
+
+/// Distance around a track within which something has to come or go, m, and the share of the points
+/// there that have to.
+const STIRS_M: f64 = 0.4;
+const STIRS_SHARE: f64 = 0.15;
+
+/// Figures of a pipeline on a log, without any truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Coverage {
+    /// True if there are depth images to compare with.
+    pub has_depth: bool,
+    /// Frames that the pipeline was given.
+    pub frames: usize,
+    /// Frames in which a confirmed track was seen.
+    pub frames_with_people: usize,
+    /// Confirmed tracks that left their place.
+    pub moving: usize,
+    /// Confirmed tracks that never did.
+    pub still: usize,
+    /// Confirmed tracks of which that cannot be told.
+    pub unclear: usize,
+    /// Boxes: confirmed tracks that were seen, over all frames.
+    pub boxes: usize,
+    /// Boxes of tracks that never moved.
+    pub still_boxes: usize,
+    /// Boxes at places where nothing ever comes or goes; where the depth image does not show the
+    /// place, boxes of tracks that never moved.
+    pub idle_boxes: usize,
+    /// People-sized blobs that come and go, over all frames with depth.
+    pub blobs: usize,
+    /// Those of them without a track.
+    pub unexplained: usize,
+    /// Frames with an unexplained blob.
+    pub frames_unexplained: usize,
+    /// Example of an unexplained blob.
+    pub example: Option<Example>,
+    /// Frames with unexplained blobs, those with the most first.
+    #[serde(skip)]
+    pub missed_frames: Vec<u64>,
+    /// Mean time of a frame, ms.
+    #[serde(skip)]
+    pub frame_ms: f64,
+}
+
+/// Place of an unexplained blob.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Example {
+    /// Index of the frame.
+    pub frame: u64,
+    /// Distance from the camera on the floor, m.
+    pub range_m: f64,
+    /// Bearing, positive to the left, degrees.
+    pub bearing_deg: f64,
+    /// Height of its highest point, m.
+    pub top_m: f64,
+}
+
+impl Coverage {
+    /// Compares the tracks of a pipeline with what comes and goes.
+    pub fn of(course: &Course, scenery: &Scenery) -> Self {
+        let has_depth = !scenery.moments.is_empty();
+        let mut out = Self { has_depth, frames: course.moments.len(), ..Self::default() };
+        out.frame_ms = course.spent_ms / out.frames.max(1) as f64;
+        let lives = course.lives();
+        out.add_tracks(&lives);
+        let mut missed: Vec<(usize, u64)> = Vec::new();
+        for moment in &course.moments {
+            let seen = scenery.moment(moment.index);
+            out.add_boxes(moment, &lives, seen);
+            missed.extend(seen.map(|seen| (out.add_blobs(moment, seen), moment.index)));
+        }
+        missed.retain(|(count, _)| *count > 0);
+        // Stable: of equal ones the earlier frame comes first.
+        missed.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+        out.frames_unexplained = missed.len();
+        out.missed_frames = missed.into_iter().map(|(_, index)| index).collect();
+        out
+    }
+
+    /// Counts the tracks by their motion.
+    fn add_tracks(&mut self, lives: &Lives) {
+        let count = |life: Life| lives.values().filter(|other| **other == life).count();
+        self.moving = count(Life::Moved);
+        self.still = count(Life::Still);
+        self.unclear = count(Life::Unclear);
+    }
+
+    /// Counts the boxes of a frame: of tracks that never moved, and at idle places.
+    fn add_boxes(&mut self, moment: &Moment, lives: &Lives, seen: Option<&scenery::Moment>) {
+        let boxes = self.boxes;
+        for track in moment.tracks.iter().filter(|track| track.seen) {
+            let is_still = lives.get(&track.id) == Some(&Life::Still);
+            let share = seen.and_then(|seen| seen.plan.changed_share(track.place, STIRS_M));
+            let is_idle = share.map_or(is_still, |share| share < STIRS_SHARE);
+            self.boxes += 1;
+            self.still_boxes += usize::from(is_still);
+            self.idle_boxes += usize::from(is_idle);
+        }
+        self.frames_with_people += usize::from(self.boxes > boxes);
+    }
+
+    /// Compares the tracks of a frame with the blobs in its depth image; returns the number of blobs
+    /// without a track.
+    fn add_blobs(&mut self, moment: &Moment, seen: &scenery::Moment) -> usize {
+        self.blobs += seen.blobs.len();
+        let missed: Vec<_> =
+            seen.blobs.iter().filter(|blob| !is_explained(blob.place, &moment.tracks)).collect();
+        self.unexplained += missed.len();
+        let examples = missed.iter().map(|blob| {
+            let (range_m, bearing_deg) = seen.bearing_of(blob.place);
+            Example { frame: moment.index, range_m, bearing_deg, top_m: blob.top_m }
+        });
+        // The nearest one is the easiest to see in the picture of its frame.
+        let nearer = |a: &Example, b: &Example| a.range_m.total_cmp(&b.range_m);
+        self.example = self.example.into_iter().chain(examples).min_by(nearer);
+        missed.len()
+    }
+
+    /// Returns the share of the blobs that a track explains; `None` without blobs.
+    pub fn found(&self) -> Option<f64> {
+        (self.blobs > 0).then(|| 1.0 - self.unexplained as f64 / self.blobs as f64)
+    }
+
+    /// Returns the share of the boxes where nothing ever comes or goes.
+    pub fn idle(&self) -> f64 {
+        self.idle_boxes as f64 / self.boxes.max(1) as f64
+    }
+
+    /// Returns a figure by which settings can be ranked, 0 to 1: the F1 measure with blobs that come
+    /// and go in place of people, and boxes where nothing ever does in place of false ones. It is no
+    /// truth: people who never stir count as false.
+    pub fn worth(&self) -> f64 {
+        let found = (self.blobs - self.unexplained) as f64;
+        let wrong = (self.unexplained + self.idle_boxes) as f64;
+        2.0 * found / (2.0 * found + wrong).max(1.0)
+    }
+
+    /// Returns the boxes of a frame on average.
+    pub fn boxes_a_frame(&self) -> f64 {
+        self.boxes as f64 / self.frames.max(1) as f64
+    }
+}
+
+fn is_explained(blob: Point2<f64>, tracks: &[Placed]) -> bool {
+    tracks.iter().any(|track| (track.place - blob).norm() <= EXPLAINS_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::Stamp;
+
+    use super::*;
+    use crate::scenery::testing::{PILLAR, Room, Thing};
+
+    const FRAMES: u64 = 40;
+
+    /// Tracks at places by the time, in all frames.
+    fn course(tracks: &[&dyn Fn(f64) -> Point2<f64>]) -> Course {
+        let moment = |number: u64| {
+            let seconds = 0.1 * number as f64;
+            let placed = |(id, place): (u32, &&dyn Fn(f64) -> Point2<f64>)| {
+                let place = place(seconds);
+                Placed { id, place, range_m: place.coords.norm(), sigma_m: 0.05, seen: true }
+            };
+            let stamp = Stamp::default().plus_seconds(seconds);
+            let tracks = (1..).zip(tracks).map(placed).collect();
+            Moment { index: number + 1, stamp, tracks }
+        };
+        Course { moments: (0..FRAMES).map(moment).collect(), spent_ms: 80.0 }
+    }
+
+    fn scenery() -> Scenery {
+        Room::default().with(Thing::walking()).seen(FRAMES, 0.0).judge()
+    }
+
+    #[test]
+    fn a_tracked_pillar_and_an_untracked_walker_are_told() {
+        let found = Coverage::of(&course(&[&|_| PILLAR]), &scenery());
+        assert_eq!((found.moving, found.still, found.unclear), (0, 1, 0));
+        assert_eq!((found.boxes, found.still_boxes), (40, 40));
+        assert_eq!((found.frames, found.frames_with_people), (40, 40));
+        assert!(found.idle() > 0.8, "{found:?}");
+        assert!(found.found().unwrap() < 0.2, "{found:?}");
+        assert!(found.worth() < 0.2, "{found:?}");
+        assert_eq!(found.frames_unexplained, found.missed_frames.len());
+        assert_eq!(found.frame_ms, 2.0);
+        let example = found.example.unwrap();
+        assert!((example.range_m - 3.0).abs() < 0.3, "{example:?}");
+        // Frames count from one, and the walker crosses the middle after 1.8 s.
+        let side = 0.9 - 0.05 * (example.frame - 1) as f64;
+        assert_eq!(example.bearing_deg > 0.0, side > 0.0, "{example:?}");
+    }
+
+    #[test]
+    fn a_track_of_the_walker_explains_it() {
+        let walker = Thing::walking();
+        let found = Coverage::of(&course(&[&|seconds| walker.place(seconds)]), &scenery());
+        assert_eq!((found.moving, found.still), (1, 0));
+        assert!(found.found().unwrap() > 0.95 && found.idle() < 0.05, "{found:?}");
+        assert!(found.worth() > 0.95, "{found:?}");
+        let beside = |seconds| walker.place(seconds) + nalgebra::Vector2::new(0.0, 0.8);
+        let found = Coverage::of(&course(&[&beside]), &scenery());
+        assert!(found.found().unwrap() < 0.2, "a track 0.8 m beside explains nothing: {found:?}");
+    }
+
+    #[test]
+    fn without_depth_the_motion_of_tracks_is_all_there_is() {
+        let found = Coverage::of(&course(&[&|_| PILLAR]), &Scenery::default());
+        assert_eq!((found.found(), found.idle()), (None, 1.0));
+        assert!(!found.has_depth && found.boxes_a_frame() == 1.0);
+    }
+}

@@ -1,0 +1,116 @@
+//! Result of the doctor, as it is printed.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use tagalong_app::outcome::{Failure, make_folder};
+
+use super::alternatives::Alternative;
+use super::comparison::Row;
+use super::coverage::Coverage;
+use super::finding::Finding;
+use super::visit::Visit;
+use super::{DoctorArgs, checks, present, remedies, sheets};
+
+/// Complete result of the doctor.
+#[derive(Debug, Serialize)]
+pub struct Diagnosis {
+    /// The config, or its name.
+    pub config: PathBuf,
+    /// The log.
+    pub log: PathBuf,
+    /// Number of examined frames.
+    pub frames: u64,
+    /// All pipelines that fit the log, where no config was given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pipelines: Vec<Row>,
+    /// Results of the checks.
+    pub findings: Vec<Finding>,
+    /// Figures of the pipeline.
+    pub coverage: Coverage,
+    /// Other settings, tried on the log.
+    pub alternatives: Vec<Alternative>,
+    /// Folder of the pictures of frames, or of a folder for each pipeline.
+    pub pictures: Option<PathBuf>,
+    /// Tests of the rejection funnel.
+    pub funnel: Vec<Drop>,
+}
+
+/// Line of the rejection funnel.
+#[derive(Debug, Serialize)]
+pub struct Drop {
+    /// Name of the test.
+    pub test: &'static str,
+    /// Number of candidates that it dropped.
+    pub count: u64,
+    /// Advice on the test.
+    pub look: Option<String>,
+    /// Settings that belong to it, with their present values.
+    pub settings: Vec<String>,
+    /// Pictures of the dropped candidates.
+    pub pictures: Option<PathBuf>,
+}
+
+impl Diagnosis {
+    /// Runs the checks on the measurements of a visit, and writes pictures into a folder.
+    ///
+    /// # Errors
+    /// A folder or a picture that cannot be written.
+    pub fn of(
+        visit: &Visit,
+        config: PathBuf,
+        args: &DoctorArgs,
+        folder: Option<&Path>,
+    ) -> Result<Self, Failure> {
+        let evidence = &visit.evidence;
+        let resolved = format!("{}\n{}", visit.pipeline.resolved(), visit.outer.resolved()?);
+        let resolved: toml::Table = toml::from_str(&resolved).unwrap_or_default();
+        let found = checks::ALL.iter().filter_map(|check| check(evidence));
+        let findings = found.map(|finding| Finding {
+            remedy: finding.remedy.as_deref().and_then(|text| present::differing(text, &resolved)),
+            ..finding
+        });
+        Ok(Self {
+            config,
+            log: args.log.clone(),
+            frames: evidence.trial.frames,
+            pipelines: Vec::new(),
+            findings: findings.collect(),
+            coverage: evidence.coverage.clone(),
+            alternatives: evidence.alternatives.clone(),
+            pictures: None,
+            funnel: funnel(visit, &resolved, folder)?,
+        })
+    }
+}
+
+/// Returns the tests by the number of dropped candidates, most first, with the remedies.
+fn funnel(
+    visit: &Visit,
+    resolved: &toml::Table,
+    folder: Option<&Path>,
+) -> Result<Vec<Drop>, Failure> {
+    let trial = &visit.evidence.trial;
+    let mut pictures = match folder {
+        None => Default::default(),
+        Some(folder) => {
+            make_folder(folder)?;
+            sheets::write(trial, folder).map_err(Failure::failed)?
+        }
+    };
+    let entries = trial.funnel.entries().iter();
+    let mut drops: Vec<Drop> = entries
+        .map(|entry| {
+            let remedy = remedies::of(entry.test);
+            Drop {
+                test: entry.test,
+                count: entry.count,
+                settings: remedy.as_ref().map_or_else(Vec::new, |remedy| remedy.lines(resolved)),
+                look: remedy.map(|remedy| remedy.look),
+                pictures: pictures.remove(entry.test),
+            }
+        })
+        .collect();
+    drops.sort_by_key(|drop| std::cmp::Reverse(drop.count));
+    Ok(drops)
+}

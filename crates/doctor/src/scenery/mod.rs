@@ -1,0 +1,207 @@
+//! Things that came or went in the depth images of a log, whatever a pipeline makes of them.
+//!
+//! A point has come or gone if other views of the log look through its place. Furniture and walls
+//! were there all the time; people were not, but for those that never stir. Ego-motion is taken out
+//! by the odometry, so that a driven log can be judged, too.
+
+mod plan;
+#[cfg(test)]
+pub mod testing;
+mod view;
+
+use std::ops::RangeInclusive;
+
+use nalgebra::{Point2, Point3};
+pub use plan::{Blob, Plan};
+use tagalong_log::LogFrame;
+use view::{Look, View};
+
+/// Most views that are kept: some 100 kB each.
+const MOST_VIEWS: u64 = 400;
+
+/// Views with which each one is compared.
+const COMPARED: usize = 24;
+
+/// Time between two views that are compared, at most, s: odometry drifts.
+const COMPARED_S: f64 = 30.0;
+
+/// Heights of the points that are used, m: people, but neither floor nor ceiling.
+const HEIGHTS_M: RangeInclusive<f64> = 0.5..=2.1;
+
+/// Number and share of views through a point that has changed.
+const MIN_THROUGH: u32 = 2;
+const MIN_SHARE: f64 = 0.3;
+
+/// Reduced depth images of a log.
+pub struct Views {
+    every: u64,
+    views: Vec<View>,
+}
+
+/// Judged depth images of a log.
+#[derive(Default)]
+pub struct Scenery {
+    /// One for each view, by the time.
+    pub moments: Vec<Moment>,
+    /// Share of all points that came or went.
+    pub changed: f64,
+}
+
+/// Judged depth image.
+pub struct Moment {
+    /// Index of the frame.
+    pub index: u64,
+    /// Points from above.
+    pub plan: Plan,
+    /// Groups of changed points of the size of a person.
+    pub blobs: Vec<Blob>,
+    view: View,
+}
+
+impl Views {
+    /// Returns an empty collection for about so many frames.
+    pub fn of(frames: u64) -> Self {
+        Self { every: frames / MOST_VIEWS + 1, views: Vec::new() }
+    }
+
+    /// Takes the depth image of a frame if it is its turn.
+    pub fn take(&mut self, number: u64, item: &LogFrame) {
+        if number.is_multiple_of(self.every) {
+            self.views.extend(View::of(item));
+        }
+    }
+
+    /// Compares the views with each other.
+    pub fn judge(self) -> Scenery {
+        let (mut points, mut changed) = (0u64, 0u64);
+        let plans: Vec<Plan> = (0..self.views.len())
+            .map(|at| {
+                let others = self.others(at);
+                let mut plan = Plan::default();
+                for point in self.views[at].points().filter(|p| HEIGHTS_M.contains(&p.z)) {
+                    let is_changed = has_changed(&point, &others);
+                    plan.add(&point, is_changed);
+                    points += 1;
+                    changed += u64::from(is_changed);
+                }
+                plan
+            })
+            .collect();
+        let judged = self.views.into_iter().zip(plans);
+        let moments = judged.map(|(view, plan)| Moment {
+            index: view.index,
+            blobs: plan.blobs(&view),
+            plan,
+            view,
+        });
+        Scenery { moments: moments.collect(), changed: changed as f64 / points.max(1) as f64 }
+    }
+
+    /// Returns some views near one in time, spread evenly.
+    fn others(&self, at: usize) -> Vec<&View> {
+        let now = self.views[at].stamp;
+        let near = |view: &&View| view.stamp.seconds_since(now).abs() <= COMPARED_S;
+        let near: Vec<&View> = self.views.iter().filter(near).collect();
+        let every = near.len() as f64 / COMPARED as f64;
+        if every <= 1.0 {
+            return near;
+        }
+        (0..COMPARED).map(|i| near[(i as f64 * every) as usize]).collect()
+    }
+}
+
+impl Scenery {
+    /// Returns the judged image of a frame.
+    pub fn moment(&self, index: u64) -> Option<&Moment> {
+        let at = self.moments.binary_search_by_key(&index, |moment| moment.index).ok()?;
+        self.moments.get(at)
+    }
+}
+
+impl Moment {
+    /// Returns the distance from the camera and the bearing (positive to the left) of a place of
+    /// the odometry frame, m and degrees.
+    pub fn bearing_of(&self, place: Point2<f64>) -> (f64, f64) {
+        self.view.bearing_of(place)
+    }
+}
+
+/// Returns true if other views look through a point.
+fn has_changed(point: &Point3<f64>, others: &[&View]) -> bool {
+    let (mut through, mut onto) = (0, 0);
+    for view in others {
+        match view.look_at(point) {
+            Look::Through => through += 1,
+            Look::Onto => onto += 1,
+            Look::Unknown => {}
+        }
+    }
+    through >= MIN_THROUGH && f64::from(through) >= MIN_SHARE * f64::from(through + onto)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{PILLAR, Room, Thing};
+    use super::*;
+
+    fn blobs(scenery: &Scenery) -> usize {
+        scenery.moments.iter().map(|moment| moment.blobs.len()).sum()
+    }
+
+    #[test]
+    fn walkers_come_and_go_and_pillars_do_not() {
+        let scenery = Room::default().with(Thing::walking()).seen(40, 0.0).judge();
+        let found = blobs(&scenery);
+        assert!((35..=42).contains(&found), "{found}");
+        for moment in &scenery.moments {
+            for blob in &moment.blobs {
+                assert!((blob.place.x - 3.0).abs() < 0.3, "the walker is 3 m away: {blob:?}");
+                assert!((1.4..1.85).contains(&blob.top_m), "{blob:?}");
+            }
+        }
+        assert_eq!(blobs(&Room::default().seen(40, 0.0).judge()), 0);
+        assert!(scenery.changed < 0.3, "{}", scenery.changed);
+    }
+
+    #[test]
+    fn the_place_of_a_pillar_is_idle_and_that_of_a_walker_is_not() {
+        let scenery = Room::default().with(Thing::walking()).seen(40, 0.0).judge();
+        let (first, walker) = (&scenery.moments[2], Thing::walking().place(0.2));
+        let share = |place| first.plan.changed_share(place, 0.4).unwrap();
+        assert!(share(PILLAR) < 0.05, "{}", share(PILLAR));
+        assert!(share(walker) > 0.5, "{}", share(walker));
+        assert_eq!(first.plan.changed_share(Point2::new(1.5, 6.0), 0.4), None, "out of view");
+    }
+
+    /// With the odometry the pillar stays where it is; without it everything seems to move.
+    #[test]
+    fn ego_motion_is_taken_out() {
+        let known = Room::default().seen(40, 0.3).judge();
+        assert!(known.changed < 0.05, "{}", known.changed);
+        assert_eq!(blobs(&known), 0);
+        let unknown = Room { odometry: false, ..Room::default() }.seen(40, 0.3).judge();
+        assert!(unknown.changed > 0.2, "{}", unknown.changed);
+    }
+
+    #[test]
+    fn things_of_another_size_are_no_people() {
+        for (width_m, top_m) in [(1.6, 1.7), (0.1, 1.7), (0.5, 0.9)] {
+            // Fast, because the middle of a slow wide board hides the wall nearly all the time.
+            let start = Point2::new(3.0, 4.0);
+            let thing = Thing { start, speed_mps: 2.0, width_m, top_m };
+            let scenery = Room::default().with(thing).seen(40, 0.0).judge();
+            // Cut by the image border, a wide board is as narrow as a person.
+            let place = |moment: &Moment| thing.place(0.1 * (moment.index - 1) as f64);
+            let whole = |moment: &&Moment| place(moment).y.abs() < 0.9;
+            let count: usize = scenery.moments.iter().filter(whole).map(|m| m.blobs.len()).sum();
+            assert_eq!(count, 0, "{thing:?}");
+        }
+    }
+
+    #[test]
+    fn of_many_frames_some_are_kept() {
+        let mut views = Views::of(MOST_VIEWS * 3);
+        (0..9).for_each(|number| views.take(number, &Room::default().frame(number, 0.0)));
+        assert_eq!(views.judge().moments.len(), 3);
+    }
+}

@@ -1,0 +1,142 @@
+//! One pass of a pipeline over a log, with all measurements.
+
+use std::path::Path;
+
+use tagalong_app::choice::{CHOICES, fitting};
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::outcome::Failure;
+use tagalong_app::progress::Progress;
+use tagalong_config::Registry;
+use tagalong_log::{FrameSource, Input, Inspection, examine};
+use tagalong_pipeline::{Pipeline, Tunable};
+
+use super::coverage::Coverage;
+use super::evidence::{Driven, Evidence, Reading, Samples};
+use super::scenery::{Scenery, Views};
+use super::trial::Trial;
+use super::{Trying, alternatives, checks};
+
+/// A pipeline after its pass over a log.
+pub struct Visit {
+    /// The config.
+    pub config: ConfigFile,
+    /// The pipeline.
+    pub pipeline: Pipeline,
+    /// Tables of the config that are not the pipeline's.
+    pub outer: OuterSettings,
+    /// Settings that the config offers for tuning.
+    pub tunables: Vec<Tunable>,
+    /// Everything that was measured.
+    pub evidence: Evidence,
+    /// Things that come and go.
+    pub scenery: Scenery,
+}
+
+/// Log to look at, and the extent of the look.
+#[derive(Clone, Copy)]
+pub struct Scope<'a> {
+    /// The log.
+    pub log: &'a Path,
+    /// Number of frames.
+    pub frames: u64,
+    /// True if pictures are wanted.
+    pub with_pictures: bool,
+}
+
+impl Visit {
+    /// Passes a log through the pipeline of a config, and measures both.
+    ///
+    /// # Errors
+    /// A config or a log that cannot be read.
+    pub fn make(config: ConfigFile, scope: Scope, registry: &Registry) -> Result<Self, Failure> {
+        let (mut pipeline, settings) = config.pipeline(registry, None)?;
+        let outer = config.outer()?;
+        let inputs = pipeline.inputs();
+        // Light and coverage are judged, and pictures are rendered, also where the pipeline does
+        // not use colour or depth.
+        let read = inputs.accept(Input::Colour).accept(Input::Depth);
+        let found = examine(scope.log, &outer.input, &outer.limits, read)?;
+        let expected = expected_frames(&found.inspection).min(scope.frames);
+        let mut evidence = Evidence {
+            config: config.stem(),
+            samples: Samples::of(expected),
+            inspection: found.inspection,
+            refusal: found.refusal,
+            input: outer.input.clone(),
+            suits: settings.suits,
+            inputs,
+            reading: Reading::default(),
+            driven: Driven::default(),
+            trial: Trial::default(),
+            coverage: Coverage::default(),
+            changed: None,
+            fitting: Vec::new(),
+            alternatives: Vec::new(),
+        };
+        let mut views = Views::of(expected);
+        if let Some(frames) = found.frames {
+            let progress = Progress::titled(&config.stem());
+            look(frames, &mut pipeline, scope, &mut evidence, &mut views, &progress);
+        }
+        let scenery = views.judge();
+        evidence.changed = (!scenery.moments.is_empty()).then_some(scenery.changed);
+        evidence.coverage = Coverage::of(&evidence.trial.course, &scenery);
+        Ok(Self { config, pipeline, outer, tunables: settings.tune, evidence, scenery })
+    }
+
+    /// Looks for other settings and other configs where the findings ask for them.
+    pub fn ask_further(&mut self, when: Trying, scope: Scope, registry: &Registry) {
+        if self.evidence.refusal.is_some() {
+            let found = fitting(scope.log, registry, CHOICES.len()).fitting;
+            self.evidence.fitting = found.iter().map(|other| other.choice.config).collect();
+            return;
+        }
+        let is_wanted = match when {
+            Trying::Never => false,
+            Trying::Always => true,
+            Trying::Auto => checks::asks_for_settings(&self.evidence),
+        };
+        if is_wanted && self.evidence.trial.failure.is_none() {
+            self.evidence.alternatives = alternatives::tried(self, scope, registry);
+        }
+    }
+}
+
+/// Returns the number of images, or scans, on the topic that makes the frames.
+fn expected_frames(inspection: &Inspection) -> u64 {
+    let facts = &inspection.facts;
+    let topics = [&facts.colour_topic, &facts.depth_topic, &facts.laser_topic];
+    let first = topics.into_iter().flatten().next();
+    first.and_then(|topic| inspection.topic(topic)).map_or(0, |topic| topic.count)
+}
+
+/// Makes one pass over the frames.
+fn look(
+    mut frames: FrameSource,
+    pipeline: &mut Pipeline,
+    scope: Scope,
+    out: &mut Evidence,
+    views: &mut Views,
+    progress: &Progress,
+) {
+    // Cut short by the user, the images behind the last frame are no loss.
+    out.reading.wanted = expected_frames(&out.inspection);
+    for number in 0..scope.frames {
+        let Some(item) = frames.next_frame() else { break };
+        out.reading.made += 1;
+        if out.reading.made == scope.frames {
+            out.reading.wanted = item.frame.index;
+        }
+        out.samples.take(number, &item);
+        out.driven.take(&item.frame);
+        views.take(number, &item);
+        // Without its inputs the pipeline cannot run, but the images can still be measured.
+        if out.refusal.is_none() {
+            out.trial.step(pipeline, &item, scope.with_pictures);
+        }
+        progress.show(frames.progress(), number, out.trial.in_view());
+    }
+    out.inspection.counters = frames.counters().clone();
+    out.inspection.notes = frames.notes().to_vec();
+    out.inspection.data_lost = frames.data_lost();
+}
