@@ -112,7 +112,7 @@ impl Trainer for PatchTrainer {
         (model.slope, model.offset) = (slope, offset);
         progress(1.0);
         let figures = self.figures(&trials, best, &model, fitted);
-        Ok(Fitted { model: model.to_text(), figures })
+        Ok(Fitted { model: model.to_text().map_err(Error::Other)?, figures })
     }
 }
 
