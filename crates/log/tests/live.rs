@@ -6,7 +6,7 @@ mod common;
 use std::io::Cursor;
 
 use common::{LogWriter, SavedLog, at, camera, level_pose};
-use tagalong_log::mcap_walk::Walker;
+use tagalong_log::LogWalker;
 use tagalong_log::{
     FrameSource, Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
 };
@@ -35,7 +35,7 @@ fn drive(log: &mut LogWriter, frames: i32) {
 
 /// Calls `hear` with topic, type and bytes of all messages of a log.
 fn replay(log: &[u8], mut hear: impl FnMut(&str, &str, &[u8])) {
-    let mut walker = Walker::new(Cursor::new(log), &Limits::default()).unwrap();
+    let mut walker = LogWalker::new(Cursor::new(log), &Limits::default()).unwrap();
     while let Some(message) = walker.next() {
         hear(&message.channel.topic, &message.channel.schema_name, message.data);
     }

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::{Failure, say};
-use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_log::FrameSource;
 
@@ -68,7 +67,6 @@ const CHOICES: [Choice; 8] = [
 /// # Errors
 /// A log that cannot be read, or that no pipeline fits: the reasons of each.
 pub(super) fn choose(log: &Path, registry: &Registry) -> Result<ConfigFile, Failure> {
-    check_log_path(log)?;
     let mut refusals = String::new();
     for Choice { config: name, has, reason } in CHOICES {
         let Some(config) = ConfigFile::named(name) else { continue };

@@ -69,14 +69,15 @@ struct Job {
 
 impl Job {
     fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
-        let config = match args.config() {
-            Some(config) => ConfigFile::read(config)?,
+        let named = args.config().map(ConfigFile::read).transpose()?;
+        check_log_path(args.log())?;
+        let config = match named {
+            Some(config) => config,
             None if !args.has_log() => ConfigFile::built_in(),
             None => choice::choose(args.log(), registry)?,
         };
         let (pipeline, settings) = config.pipeline(registry, args.seed)?;
         let outer = config.outer()?;
-        check_log_path(args.log())?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
