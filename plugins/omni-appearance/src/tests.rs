@@ -15,7 +15,7 @@ const ROWS: usize = 120;
 
 fn camera(height_m: f64) -> Arc<Camera> {
     let d = [67.5_f64.to_radians(), 0.05, 2.0_f64.to_radians().tan(), 53.0_f64.to_radians().tan()];
-    let mirror = ConicalMirror::from_coefficients(1.0, [0.0; 2], &d).unwrap();
+    let mirror = ConicalMirror::new(1.0, [0.0; 2], d).unwrap();
     Arc::new(Camera {
         lens: Lens::Panorama(Panorama { mirror, columns: COLUMNS, rows: ROWS }),
         width: COLUMNS,

@@ -49,7 +49,7 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let mut pictures = Pictures::new(desk.overlay.take(), threads);
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
-    pipeline.sketch(args.overlay);
+    pipeline.visualise(args.overlay);
     let stopped = work(&mut pipeline, &mut frames, &mut desk, &mut pictures, &signals);
     // An error of the run is returned only after the threads have finished.
     pictures.finish()?;
