@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Detection, Track};
+use tagalong_core::{Detection, Gate, Track};
 use tagalong_geometry::Rect;
 
 use crate::assign;
@@ -93,6 +93,21 @@ impl PairCost {
         let is_near = cost <= self.gate && log_volume.is_finite();
         is_near.then_some(Fit { cost, log_volume })
     }
+}
+
+/// Returns the fits of all pairs, with a row for each track: `None` for a pair that the tracker's
+/// gate does not admit or that `fit` gives none.
+pub fn fit_pairs(
+    tracks: &[&Track],
+    detections: &[&Detection],
+    gate: &Gate,
+    fit: impl Fn(&Track, &Detection) -> Option<Fit>,
+) -> Vec<Vec<Option<Fit>>> {
+    let admitted = |track: &Track, detection: &Detection| {
+        gate.admits(track, detection).then(|| fit(track, detection)).flatten()
+    };
+    let row = |track: &&Track| detections.iter().map(|found| admitted(track, found)).collect();
+    tracks.iter().map(row).collect()
 }
 
 /// Assigns detections to tracks so that the sum of the negative log-likelihoods d² + ln |S| is

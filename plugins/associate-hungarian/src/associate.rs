@@ -1,4 +1,4 @@
-use tagalong_assignment::{Cost, Fit, assign_fits};
+use tagalong_assignment::{Cost, Fit, assign_fits, fit_pairs};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -38,11 +38,9 @@ impl Associator for Hungarian {
         detections: &[Detection],
         gate: &Gate,
     ) -> Associations {
-        let fit = |track: &Track, detection: &Detection| {
-            gate.admits(track, detection).then(|| self.fit(track, detection, gate)).flatten()
-        };
-        let row = |track| detections.iter().map(|detection| fit(track, detection)).collect();
-        let fits: Vec<Vec<Option<Fit>>> = tracks.iter().map(row).collect();
+        let (rows, columns): (Vec<_>, Vec<_>) =
+            (tracks.iter().collect(), detections.iter().collect());
+        let fits = fit_pairs(&rows, &columns, gate, |track, found| self.fit(track, found, gate));
         let at_gate = self.config.pair_cost().at_gate();
         let given = assign_fits(&fits, detections.len(), at_gate, self.config.miss_factor);
         Associations::one_to_one(given)

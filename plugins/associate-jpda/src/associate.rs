@@ -1,6 +1,6 @@
 use std::f64::consts::TAU;
 
-use tagalong_assignment::Fit;
+use tagalong_assignment::{Fit, fit_pairs};
 use tagalong_core::{Association, Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -76,13 +76,13 @@ impl Associator for Jpda {
         gate: &Gate,
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
-        let ratio = |track: &Track, detection: &Detection| {
-            let admitted = gate.admits(track, detection);
-            let fit = admitted.then(|| pair_cost.fit(track, detection, gate.dt_s)).flatten();
-            fit.map_or(0.0, |fit| self.likelihood_ratio(&fit))
-        };
-        let row = |track| detections.iter().map(|detection| ratio(track, detection)).collect();
-        let ratios: Vec<Vec<f64>> = tracks.iter().map(row).collect();
+        let (rows, columns): (Vec<_>, Vec<_>) =
+            (tracks.iter().collect(), detections.iter().collect());
+        let fit = |track: &Track, found: &Detection| pair_cost.fit(track, found, gate.dt_s);
+        let ratio = |fit: Option<Fit>| fit.map_or(0.0, |fit| self.likelihood_ratio(&fit));
+        let fits = fit_pairs(&rows, &columns, gate, fit);
+        let ratios: Vec<Vec<f64>> =
+            fits.into_iter().map(|row| row.into_iter().map(ratio).collect()).collect();
         let together = clusters(tracks.len(), detections.len(), |t, d| ratios[t][d] > 0.0);
         let pairs = together.iter().flat_map(|cluster| self.weigh_cluster(cluster, &ratios));
         Associations { pairs: pairs.collect(), spent: Vec::new() }

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Fit, assign_fits};
+use tagalong_assignment::{Fit, assign_fits, fit_pairs};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -42,14 +42,9 @@ impl TwoStage {
         let rows: Vec<usize> = (0..tracks.len()).filter(|i| given[*i].is_none()).collect();
         let columns: Vec<usize> =
             (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
-        let fit = |row: usize, column: usize| {
-            let (track, detection) = (&tracks[row], &detections[column]);
-            gate.admits(track, detection).then(|| self.fit(track, detection, gate)).flatten()
-        };
-        let fits: Vec<Vec<Option<Fit>>> = rows
-            .iter()
-            .map(|row| columns.iter().map(|column| fit(*row, *column)).collect())
-            .collect();
+        let free: Vec<&Track> = rows.iter().map(|row| &tracks[*row]).collect();
+        let found: Vec<&Detection> = columns.iter().map(|column| &detections[*column]).collect();
+        let fits = fit_pairs(&free, &found, gate, |track, found| self.fit(track, found, gate));
         let at_gate = self.config.pair_cost().at_gate();
         let assigned = assign_fits(&fits, columns.len(), at_gate, self.config.miss_factor);
         for (row, column) in rows.into_iter().zip(assigned) {
