@@ -70,6 +70,14 @@ impl PairCost {
         }
     }
 
+    /// Adds the log-likelihood ratio of the appearances to the cost of a pair, in the unit of the
+    /// cost. Positions alone decide about the gate.
+    pub fn with_appearance(&self, fit: Fit, log_ratio: f64) -> Fit {
+        // d² + ln |S| is twice a negative log-likelihood.
+        let unit = if self.cost == Cost::Mahalanobis { 2.0 } else { 1.0 };
+        Fit { cost: fit.cost - unit * log_ratio, ..fit }
+    }
+
     /// Returns the largest cost within the gate.
     pub fn at_gate(&self) -> f64 {
         match self.cost {
@@ -95,19 +103,46 @@ impl PairCost {
     }
 }
 
-/// Returns the fits of all pairs, with a row for each track: `None` for a pair that the tracker's
-/// gate does not admit or that `fit` gives none.
-pub fn fit_pairs(
-    tracks: &[&Track],
-    detections: &[&Detection],
-    gate: &Gate,
-    fit: impl Fn(&Track, &Detection) -> Option<Fit>,
-) -> Vec<Vec<Option<Fit>>> {
-    let admitted = |track: &Track, detection: &Detection| {
-        gate.admits(track, detection).then(|| fit(track, detection)).flatten()
-    };
-    let row = |track: &&Track| detections.iter().map(|found| admitted(track, found)).collect();
-    tracks.iter().map(row).collect()
+/// Tracks and detections of one frame.
+#[derive(Clone, Copy)]
+pub struct Pairs<'a> {
+    /// The tracks.
+    pub tracks: &'a [Track],
+    /// The detections.
+    pub detections: &'a [Detection],
+    /// The tracker's gate, with the appearances of the pairs.
+    pub gate: &'a Gate<'a>,
+}
+
+impl Pairs<'_> {
+    /// Returns the numbers of all tracks.
+    pub fn rows(&self) -> Vec<usize> {
+        (0..self.tracks.len()).collect()
+    }
+
+    /// Returns the numbers of all detections.
+    pub fn columns(&self) -> Vec<usize> {
+        (0..self.detections.len()).collect()
+    }
+
+    /// Returns the fits of these tracks and detections, by their numbers, with a row for each
+    /// track: `None` for a pair that the tracker's gate does not admit, or that `fit` gives none.
+    /// The appearance of a pair takes part as `pair_cost` weighs it.
+    pub fn fits(
+        &self,
+        rows: &[usize],
+        columns: &[usize],
+        pair_cost: &PairCost,
+        fit: impl Fn(&Track, &Detection) -> Option<Fit>,
+    ) -> Vec<Vec<Option<Fit>>> {
+        let pair = |row: usize, column: usize| {
+            let (track, detection) = (&self.tracks[row], &self.detections[column]);
+            let fit = self.gate.admits(track, detection).then(|| fit(track, detection)).flatten();
+            let look = self.gate.appearance_of(row, column);
+            fit.map(|fit| pair_cost.with_appearance(fit, look))
+        };
+        rows.iter().map(|row| columns.iter().map(|column| pair(*row, *column)).collect()).collect()
+    }
 }
 
 /// Assigns detections to tracks so that the sum of the negative log-likelihoods d² + ln |S| is
@@ -158,6 +193,14 @@ mod tests {
         min_overlap: 0.3,
         overlap: Overlap::Iou,
     };
+
+    #[test]
+    fn appearance_counts_in_the_unit_of_the_cost() {
+        let fit = Fit { cost: 3.0, log_volume: -1.0 };
+        let overlap = PairCost { cost: Cost::Overlap, ..DEFAULT };
+        assert_eq!(DEFAULT.with_appearance(fit, 0.5), Fit { cost: 2.0, ..fit });
+        assert_eq!(overlap.with_appearance(fit, 0.5), Fit { cost: 2.5, ..fit });
+    }
 
     fn fit(track: &Track, detection: &Detection, dt_s: f64, settings: &PairCost) -> Option<Fit> {
         settings.fit(track, detection, dt_s)

@@ -31,6 +31,8 @@ pub struct Fitted {
     /// Figures for the model card: counts, and the table of the tried settings with their
     /// cross-validated figures.
     pub figures: toml::Table,
+    /// Content of further model files, each by the name of the real room that it has not seen.
+    pub without: Vec<(String, String)>,
 }
 
 /// Trains the model file of a plugin from labelled candidates ([`crate::Registry::trainer`]).

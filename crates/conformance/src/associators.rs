@@ -18,7 +18,7 @@ pub(crate) const CHECKS: &[Check] = &[
     ("far detections are left alone", far_detections),
 ];
 
-const GATE: Gate = Gate { dt_s: DT_S, start_log_odds: 0.0 };
+const GATE: Gate<'_> = Gate { dt_s: DT_S, start_log_odds: 0.0, appearance: &[] };
 
 fn detection(x: f64, y: f64, random: &mut SplitMix64) -> Detection {
     sighting(&Point3::new(x, y, 1.6), &level(), 0.05, random)

@@ -1,20 +1,39 @@
 use crate::{Detection, Track};
 
-/// Limits on the pairs of a track and a detection that are considered in one frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gate {
+/// Limits on the pairs of a track and a detection that are considered in one frame, and what is
+/// known of a pair beside its place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gate<'a> {
     /// Time since the frame before, s.
     pub dt_s: f64,
     /// Log-odds at and above which a detection may start a track
     /// ([`crate::TrackManager::start_log_odds`]).
     pub start_log_odds: f64,
+    /// Log-likelihood ratios of the appearances, by track and detection: above 0 for a detection
+    /// that looks like the person of the track. Empty without an appearance memory.
+    pub appearance: &'a [Vec<f64>],
 }
 
-impl Gate {
+impl Gate<'_> {
     /// Returns false for a pair that is probably no person. A detection that alone would start no
     /// track still supports a track that probably is a person, because log-odds add up.
     pub fn admits(&self, track: &Track, detection: &Detection) -> bool {
         detection.score >= self.start_log_odds || track.score + detection.score >= 0.0
+    }
+
+    /// Returns the log-likelihood ratio of the appearances of a pair, by the indices of the track
+    /// and the detection; 0 if nothing is known.
+    ///
+    /// ```
+    /// use tagalong_core::Gate;
+    /// let appearance = [vec![0.5, -2.0]];
+    /// let gate = Gate { appearance: &appearance, ..Gate::default() };
+    /// assert_eq!(gate.appearance_of(0, 1), -2.0);
+    /// assert_eq!(Gate::default().appearance_of(0, 1), 0.0);
+    /// ```
+    pub fn appearance_of(&self, track: usize, detection: usize) -> f64 {
+        let row = self.appearance.get(track);
+        row.and_then(|row| row.get(detection)).copied().unwrap_or(0.0)
     }
 }
 

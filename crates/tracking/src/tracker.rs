@@ -223,9 +223,10 @@ impl Tracker {
         Ok(self.table.tracks(estimates, &frame.camera))
     }
 
-    fn gate(&self, motion: Option<EgoMotion>) -> Gate {
+    fn gate(&self, motion: Option<EgoMotion>) -> Gate<'static> {
         let start_log_odds = self.manager.plugin().start_log_odds();
-        Gate { dt_s: motion.map_or(0.0, |motion| motion.dt), start_log_odds }
+        let dt_s = motion.map_or(0.0, |motion| motion.dt);
+        Gate { dt_s, start_log_odds, appearance: &[] }
     }
 
     /// Searches for each track, from near to far, except for those that a nearer, detected person
@@ -296,12 +297,14 @@ impl Tracker {
         &mut self,
         frame: &Frame,
         predicted: &[Track],
-        gate: &Gate,
+        gate: &Gate<'_>,
         detections: &mut DetectionSet,
         log: &mut StageLog,
     ) -> Result<(), StepError> {
         detections.merge(&self.settings.merge);
         let (open, found) = (detections.undecided(), detections.undecided_detections());
+        let appearance = self.reidentifier.compare(frame, predicted, &found);
+        let gate = &Gate { appearance: &appearance, ..*gate };
         let mut answer = self
             .associator
             .ask(frame.index, |associator| associator.associate(predicted, &found, gate))?;

@@ -1,7 +1,7 @@
 //! Training of detectors on whole frames: simulated depth, and annotated logs of real rooms, each
 //! of which is left out once.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Point2, Point3};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
@@ -71,9 +71,18 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let path = session.model.with_extension("card.toml");
     let card = card(args, scenes, &fitted.figures)?;
     write(&path, &card)?;
+    for (room, model) in &fitted.without {
+        write(&without(&session.model, room), model)?;
+    }
     print(&card)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)
+}
+
+/// Returns the path of the model that has not seen a room.
+fn without(model: &Path, room: &str) -> PathBuf {
+    let stem = model.file_stem().unwrap_or_default().to_string_lossy();
+    model.with_file_name(format!("{stem}.without-{}.toml", room.replace(' ', "-")))
 }
 
 fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {

@@ -10,4 +10,4 @@ mod rooms;
 
 pub use candidates::{Candidate, candidates};
 pub use choice::{Choice, Figures, Objective, leave_one_out, mean};
-pub use rooms::{Room, RoomLog, Rooms};
+pub use rooms::{Room, RoomFile, Rooms};

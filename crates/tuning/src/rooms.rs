@@ -24,13 +24,15 @@ pub struct Room {
     /// Description.
     pub about: String,
     /// Its logs.
-    pub logs: Vec<RoomLog>,
+    pub logs: Vec<RoomFile>,
+    /// Models that have not seen this room, by the plugin that reads them.
+    pub models: BTreeMap<String, RoomFile>,
 }
 
-/// A log, and where the text names it.
+/// A file, and where the text names it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RoomLog {
-    /// The log.
+pub struct RoomFile {
+    /// The file.
     pub path: PathBuf,
     /// Its place in the text.
     pub place: Range<usize>,
@@ -51,13 +53,16 @@ struct Entry {
     #[serde(default)]
     about: String,
     logs: Spanned<Vec<Spanned<PathBuf>>>,
+    #[serde(default)]
+    models: BTreeMap<String, Spanned<PathBuf>>,
 }
 
 impl Rooms {
     /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`; or at
-    /// `logs_dir`, if there is one.
+    /// `logs_dir`, if there is one. Paths of models start at `base_dir`.
     ///
-    /// # Errors The fault in the text, with its place.
+    /// # Errors
+    /// The fault in the text, with its place.
     pub fn parse(
         text: &str,
         base_dir: &Path,
@@ -66,7 +71,7 @@ impl Rooms {
         let File { folder, rooms } = toml::from_str(text)?;
         let folder = logs_dir.map_or_else(|| base_dir.join(folder), Path::to_owned);
         let whole = rooms.span();
-        let room = |(name, entry): (String, Entry)| Room::read(name, entry, &folder);
+        let room = |(name, entry): (String, Entry)| Room::read(name, entry, &folder, base_dir);
         let rooms: Vec<Room> =
             rooms.into_inner().into_iter().map(room).collect::<Result<_, _>>()?;
         if rooms.len() < FEWEST {
@@ -79,22 +84,30 @@ impl Rooms {
 }
 
 impl Room {
-    fn read(name: String, entry: Entry, folder: &Path) -> Result<Self, ConfigError> {
+    fn read(
+        name: String,
+        entry: Entry,
+        folder: &Path,
+        base_dir: &Path,
+    ) -> Result<Self, ConfigError> {
         let place = entry.logs.span();
-        let log = |log: Spanned<PathBuf>| {
-            let place = log.span();
-            RoomLog { path: folder.join(log.into_inner()), place }
-        };
-        let logs: Vec<RoomLog> = entry.logs.into_inner().into_iter().map(log).collect();
+        let log = |log| RoomFile::new(log, folder);
+        let logs: Vec<RoomFile> = entry.logs.into_inner().into_iter().map(log).collect();
+        let model = |(plugin, path)| (plugin, RoomFile::new(path, base_dir));
+        let models = entry.models.into_iter().map(model).collect();
         if logs.is_empty() {
             let message = format!("room `{name}` has no log");
             return Err(ConfigError { message, span: Some(place) });
         }
-        Ok(Self { name, about: entry.about, logs })
+        Ok(Self { name, about: entry.about, logs, models })
     }
 }
 
-impl RoomLog {
+impl RoomFile {
+    fn new(path: Spanned<PathBuf>, folder: &Path) -> Self {
+        Self { place: path.span(), path: folder.join(path.into_inner()) }
+    }
+
     /// Returns its name, as tables have it.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
@@ -143,6 +156,14 @@ mod tests {
     fn logs_may_lie_elsewhere() {
         let rooms = Rooms::parse(TWO, Path::new("home"), Some(Path::new("there"))).unwrap();
         assert_eq!(rooms.rooms[1].logs[0].path, Path::new("there/b.mcap"));
+    }
+
+    #[test]
+    fn models_lie_beside_the_file_of_the_rooms() {
+        let text = TWO.replace("[\"b.mcap\"]\n", "[\"b.mcap\"]\nmodels = { net = 'b.toml' }\n");
+        let rooms = Rooms::parse(&text, Path::new("home"), Some(Path::new("there"))).unwrap();
+        assert_eq!(rooms.rooms[1].models["net"].path, Path::new("home/b.toml"));
+        assert!(rooms.rooms[0].models.is_empty());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Appearance of a person: colours of upper body and legs, and directions of edges.
 
+use nalgebra::Point3;
 use tagalong_core::{Estimate, Frame};
 use tagalong_geometry::{HEAD_BELOW_TOP_M, Rect, UPPER_BODY_SIDE_M};
 
@@ -65,12 +66,17 @@ impl AppearanceDifference {
 impl Appearance {
     /// Returns the appearance of a tracked person.
     pub fn of(estimate: &Estimate, frame: &Frame) -> Self {
-        let height_m = estimate.person.position.z;
-        let torso = Patch::of(estimate, frame, TORSO);
+        Self::at(&estimate.region, &estimate.person.position, frame)
+    }
+
+    /// Returns the appearance of a person with the upper body in a region of the image, pixels, and
+    /// the head at a position, robot frame, m.
+    pub fn at(upper_body: &Rect, head: &Point3<f64>, frame: &Frame) -> Self {
+        let torso = Patch::of(upper_body, head, frame, TORSO);
         Self {
-            height_m,
+            height_m: head.z,
             torso: torso.colours(),
-            legs: Patch::of(estimate, frame, LEGS).colours(),
+            legs: Patch::of(upper_body, head, frame, LEGS).colours(),
             texture: torso.edges(),
         }
     }
@@ -111,8 +117,12 @@ struct Patch<'f> {
 }
 
 impl<'f> Patch<'f> {
-    fn of(estimate: &Estimate, frame: &'f Frame, [from_m, to_m, half_m]: [f64; 3]) -> Self {
-        let region = &estimate.region;
+    fn of(
+        region: &Rect,
+        head: &Point3<f64>,
+        frame: &'f Frame,
+        [from_m, to_m, half_m]: [f64; 3],
+    ) -> Self {
         let px = region.height / UPPER_BODY_SIDE_M;
         let (centre, head_y) = (region.centre().x, region.y + HEAD_BELOW_TOP_M * px);
         let whole = Rect::new(
@@ -128,7 +138,7 @@ impl<'f> Patch<'f> {
         Self {
             frame,
             area: if is_most { area } else { Rect::default() },
-            depth_m: camera.depth_of(&estimate.person.position),
+            depth_m: camera.depth_of(head),
         }
     }
 

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Cost, Fit, assign_fits, fit_pairs};
+use tagalong_assignment::{Cost, Fit, Pairs, assign_fits};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -38,10 +38,12 @@ impl Associator for Hungarian {
         detections: &[Detection],
         gate: &Gate,
     ) -> Associations {
-        let (rows, columns): (Vec<_>, Vec<_>) =
-            (tracks.iter().collect(), detections.iter().collect());
-        let fits = fit_pairs(&rows, &columns, gate, |track, found| self.fit(track, found, gate));
-        let at_gate = self.config.pair_cost().at_gate();
+        let pair_cost = self.config.pair_cost();
+        let pairs = Pairs { tracks, detections, gate };
+        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &pair_cost, |track, found| {
+            self.fit(track, found, gate)
+        });
+        let at_gate = pair_cost.at_gate();
         let given = assign_fits(&fits, detections.len(), at_gate, self.config.miss_factor);
         Associations::one_to_one(given)
     }
@@ -86,7 +88,7 @@ mod tests {
         }
     }
 
-    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     #[test]
     fn the_promises_of_associators_are_kept() {
@@ -106,6 +108,21 @@ mod tests {
             hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
         };
         assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");
+    }
+
+    #[test]
+    fn appearance_decides_between_detections_that_fit_equally_well() {
+        let mut hungarian = Hungarian::new(Config::default()).unwrap();
+        let tracks =
+            [0.1, -0.1].map(|y| track(Point3::new(3.0, y, 1.6), SMatrix::identity() * 0.02));
+        let seen = [person(3.0, 0.11), person(3.0, -0.11)];
+        let mut given = |appearance: &[Vec<f64>]| {
+            let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });
+            answer.pairs.iter().map(|pair| pair.detection).collect::<Vec<_>>()
+        };
+        assert_eq!(given(&[]), [0, 1]);
+        assert_eq!(given(&[vec![-4.0, 4.0], vec![4.0, -4.0]]), [1, 0]);
+        assert_eq!(given(&[vec![-0.1, 0.1], vec![0.1, -0.1]]), [0, 1], "places still count");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use std::f64::consts::TAU;
 
-use tagalong_assignment::{Fit, fit_pairs};
+use tagalong_assignment::{Fit, Pairs};
 use tagalong_core::{Association, Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -76,11 +76,11 @@ impl Associator for Jpda {
         gate: &Gate,
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
-        let (rows, columns): (Vec<_>, Vec<_>) =
-            (tracks.iter().collect(), detections.iter().collect());
-        let fit = |track: &Track, found: &Detection| pair_cost.fit(track, found, gate.dt_s);
+        let pairs = Pairs { tracks, detections, gate };
+        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &pair_cost, |track, found| {
+            pair_cost.fit(track, found, gate.dt_s)
+        });
         let ratio = |fit: Option<Fit>| fit.map_or(0.0, |fit| self.likelihood_ratio(&fit));
-        let fits = fit_pairs(&rows, &columns, gate, fit);
         let ratios: Vec<Vec<f64>> =
             fits.into_iter().map(|row| row.into_iter().map(ratio).collect()).collect();
         let together = clusters(tracks.len(), detections.len(), |t, d| ratios[t][d] > 0.0);
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     fn detection(y: f64) -> Detection {
         Detection {

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Fit, assign_fits, fit_pairs};
+use tagalong_assignment::{Fit, Pairs, assign_fits};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -42,10 +42,11 @@ impl TwoStage {
         let rows: Vec<usize> = (0..tracks.len()).filter(|i| given[*i].is_none()).collect();
         let columns: Vec<usize> =
             (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
-        let free: Vec<&Track> = rows.iter().map(|row| &tracks[*row]).collect();
-        let found: Vec<&Detection> = columns.iter().map(|column| &detections[*column]).collect();
-        let fits = fit_pairs(&free, &found, gate, |track, found| self.fit(track, found, gate));
-        let at_gate = self.config.pair_cost().at_gate();
+        let pair_cost = self.config.pair_cost();
+        let pairs = Pairs { tracks, detections, gate };
+        let fits =
+            pairs.fits(&rows, &columns, &pair_cost, |track, found| self.fit(track, found, gate));
+        let at_gate = pair_cost.at_gate();
         let assigned = assign_fits(&fits, columns.len(), at_gate, self.config.miss_factor);
         for (row, column) in rows.into_iter().zip(assigned) {
             given[row] = column.map(|column| columns[column]);
@@ -83,7 +84,7 @@ mod tests {
 
     use super::*;
 
-    const GATE: Gate = Gate { dt_s: 0.1, start_log_odds: 0.0 };
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     fn detection(y: f64, score: f64) -> Detection {
         Detection {

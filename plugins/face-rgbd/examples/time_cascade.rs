@@ -1,5 +1,5 @@
 //! Scans an image with a cascade repeatedly: `time_cascade CASCADE.xml PICTURE RUNS`. For the
-//! comparison with OpenCV in `benches/peers/`.
+//! comparisons with OpenCV in `benches/peers/`. Prints the boxes, too: x, y, width, height.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
 use tagalong_core::GreyImage;
@@ -18,9 +18,13 @@ fn main() {
     let (mut scanner, mut found): (_, Vec<Rect>) = (Scanner::default(), Vec::new());
     for _ in 0..runs {
         let mut hits = Vec::new();
-        let sizes = scales(&cascade, 0.0, width.min(height) as f64, 1.1);
+        let sizes = scales(&cascade, 0.0, width as f64, 1.1)
+            .take_while(|scale| (cascade.height as f64 * scale).round() <= height as f64);
         scanner.scan(&image, &cascade, sizes, &mut hits);
         found = grouped(&hits, 3).iter().map(|group| group.region).collect();
     }
     println!("{} faces, {} windows a run", found.len(), scanner.looked_at() / runs.max(1) as u64);
+    for Rect { x, y, width, height } in found {
+        println!("{x} {y} {width} {height}");
+    }
 }

@@ -19,6 +19,9 @@ pub enum Feature {
     /// Two or three rectangles and their weights: the weighted sum of their grey values, divided by
     /// the contrast of the window (Viola and Jones 2001).
     Haar(Vec<(Part, f32)>),
+    /// The same with rectangles turned by 45 degrees: from the upper corner at (x, y), `width`
+    /// pixels down to the right and `height` down to the left (Lienhart and Maydt 2002).
+    Tilted(Vec<(Part, f32)>),
     /// Comparison of eight neighbours with the block between them, all of the same size: a bit is
     /// set if the neighbour is at least as bright; from the upper left clockwise, highest bit
     /// first. The part is the upper left block.
@@ -91,7 +94,12 @@ impl Cascade {
 
     /// Returns true if windows are normalised by their contrast.
     pub fn is_normalised(&self) -> bool {
-        self.features.iter().any(|feature| matches!(feature, Feature::Haar(_)))
+        self.features.iter().any(|feature| !matches!(feature, Feature::Binary(_)))
+    }
+
+    /// Returns true if some features are tilted.
+    pub fn is_tilted(&self) -> bool {
+        self.features.iter().any(|feature| matches!(feature, Feature::Tilted(_)))
     }
 
     /// Returns the part of a window in which the contrast is measured: all but a border of a pixel.
@@ -115,11 +123,19 @@ impl Cascade {
             let bottom = part.height.checked_mul(times).and_then(|h| h.checked_add(part.y));
             right.is_some_and(|x| x <= self.width) && bottom.is_some_and(|y| y <= self.height)
         };
+        let fits_tilted = |part: &Part| {
+            let down = part.width.checked_add(part.height);
+            let (right, bottom) = (part.x.checked_add(part.width), down.map(|down| down + part.y));
+            let is_inside = right.is_some_and(|x| x <= self.width) && part.x >= part.height;
+            is_inside && bottom.is_some_and(|y| y <= self.height)
+        };
+        let are_right = |parts: &[(Part, f32)], fits: &dyn Fn(&Part) -> bool| {
+            (2..=3).contains(&parts.len())
+                && parts.iter().all(|(part, weight)| fits(part) && weight.is_finite())
+        };
         let is_right = |feature: &Feature| match feature {
-            Feature::Haar(parts) => {
-                (2..=3).contains(&parts.len())
-                    && parts.iter().all(|(part, weight)| fits(part, 1) && weight.is_finite())
-            }
+            Feature::Haar(parts) => are_right(parts, &|part| fits(part, 1)),
+            Feature::Tilted(parts) => are_right(parts, &fits_tilted),
             Feature::Binary(part) => fits(part, 3),
         };
         if let Some(bad) = self.features.iter().position(|feature| !is_right(feature)) {
@@ -144,7 +160,7 @@ impl Cascade {
     /// Returns true if the question of a node is one for its kind of feature.
     fn is_asked(&self, node: &Node) -> bool {
         match (self.features.get(node.feature), node.split) {
-            (Some(Feature::Haar(_)), Split::Below(value)) => value.is_finite(),
+            (Some(Feature::Haar(_) | Feature::Tilted(_)), Split::Below(value)) => value.is_finite(),
             (Some(Feature::Binary(_)), Split::Among(_)) => true,
             _ => false,
         }

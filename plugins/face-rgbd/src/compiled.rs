@@ -99,7 +99,7 @@ struct Stage {
 /// A cascade with features as offsets for one layout of sums.
 #[derive(Clone, Debug)]
 pub struct Compiled {
-    layout: (usize, usize),
+    layout: (usize, usize, usize),
     looks: Vec<WindowFeature>,
     stages: Vec<Stage>,
     middle: Corners,
@@ -124,7 +124,10 @@ impl Compiled {
     /// Computes the offsets for the sums of a level; `cascade` was checked.
     pub fn new(cascade: &Cascade, level: &Level) -> Self {
         let look = |feature: &Feature| match feature {
-            Feature::Haar(parts) => WindowFeature::Haar(rectangles(parts, level)),
+            Feature::Haar(parts) => WindowFeature::Haar(rectangles(parts, |p| corners(p, level))),
+            Feature::Tilted(parts) => {
+                WindowFeature::Haar(rectangles(parts, |part| tilted_corners(part, level)))
+            }
             Feature::Binary(part) => {
                 let at = |k: usize| {
                     let (x, y) = (part.x + k % 4 * part.width, part.y + k / 4 * part.height);
@@ -295,16 +298,29 @@ impl Block {
     }
 }
 
-fn corners(part: &Part, level: &Level) -> Corners {
+pub(crate) fn corners(part: &Part, level: &Level) -> Corners {
     let (right, bottom) = (part.x + part.width, part.y + part.height);
     [(part.x, part.y), (right, part.y), (part.x, bottom), (right, bottom)]
         .map(|(x, y)| level.offset(x, y) as u32)
 }
 
-pub(crate) fn rectangles(parts: &[(Part, f32)], level: &Level) -> Haar {
+/// Returns the corners of a rectangle that is turned by 45 degrees: the uppermost, left, right and
+/// lowest one, whose sums add up with the same signs as those of an upright rectangle.
+fn tilted_corners(part: &Part, level: &Level) -> Corners {
+    let Part { x, y, width, height } = *part;
+    [
+        (x, y),
+        (x - height, y + height),
+        (x + width, y + width),
+        (x + width - height, y + width + height),
+    ]
+    .map(|(x, y)| level.tilted_offset(x, y) as u32)
+}
+
+pub(crate) fn rectangles(parts: &[(Part, f32)], corners: impl Fn(&Part) -> Corners) -> Haar {
     let mut out = [([0; 4], 0.0); 3];
     for (out, (part, weight)) in out.iter_mut().zip(parts) {
-        *out = (corners(part, level), *weight);
+        *out = (corners(part), *weight);
     }
     out
 }

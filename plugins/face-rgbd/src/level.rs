@@ -18,8 +18,13 @@ pub struct Level {
     stride: usize,
     step: usize,
     pixels: Vec<u8>,
+    /// Upright sums, and after them the tilted ones, if a cascade has tilted features.
     sums: Vec<u32>,
     squares: Vec<u32>,
+    /// Offset of the tilted sums.
+    tilted_from: usize,
+    /// The last two rows of tilted sums.
+    tilted_rows: [Vec<u32>; 3],
     /// For each column: its first source column, and the share of the next one in 256ths.
     columns: Vec<(usize, u32)>,
     /// A row between two rows of the source, in 256ths.
@@ -37,10 +42,10 @@ impl Level {
         self.height
     }
 
-    /// Returns the numbers on which offsets depend: sums in a row, and columns from window to
-    /// window.
-    pub fn layout(&self) -> (usize, usize) {
-        (self.stride, self.step)
+    /// Returns the numbers on which offsets depend: sums in a row, columns from window to window,
+    /// and the offset of the tilted sums.
+    pub fn layout(&self) -> (usize, usize, usize) {
+        (self.stride, self.step, self.tilted_from)
     }
 
     /// Returns the offset of the sum above and left of the upper left corner of pixel (x, y).
@@ -48,6 +53,12 @@ impl Level {
     pub fn offset(&self, x: usize, y: usize) -> usize {
         let step = self.step.max(1);
         y * self.stride + x % step * (self.stride / step) + x / step
+    }
+
+    /// Returns the offset of a tilted sum: of all pixels above the two diagonals that go up from the
+    /// upper left corner of pixel (x, y).
+    pub fn tilted_offset(&self, x: usize, y: usize) -> usize {
+        self.tilted_from + self.offset(x, y)
     }
 
     /// Returns the values, row by row.
@@ -79,6 +90,7 @@ impl Level {
         (self.width, self.height, self.step) = (part.width, part.height, step.clamp(1, 2));
         // Even, so that sums of even and of odd columns have equal room in a row.
         self.stride = (image.width().max(size.0) + 1).next_multiple_of(2);
+        self.tilted_from = self.stride * (image.height().max(size.1) + 1) + LANES;
         self.pixels.resize((part.width * part.height).max(self.pixels.len()), 0);
         if part.width * part.height == 0 || image.width() * image.height() == 0 {
             (self.width, self.height) = (0, 0);
@@ -86,6 +98,38 @@ impl Level {
         }
         self.resample(image, size, part);
         self.sum_up();
+    }
+
+    /// Computes the tilted sums of the level: T(x, y) = T(x - 1, y - 1) + T(x + 1, y - 1)
+    /// - T(x, y - 2) + the two pixels at (x - 1, y - 1) and (x - 1, y - 2).
+    pub fn add_tilted(&mut self) {
+        let (width, height) = (self.width, self.height);
+        let length = self.tilted_from + self.stride * (height + 1) + LANES;
+        self.sums.resize(length.max(self.sums.len()), 0);
+        let [mut before, mut above, mut row] = std::mem::take(&mut self.tilted_rows);
+        for sums in [&mut before, &mut above, &mut row] {
+            sums.clear();
+            sums.resize(width + 1, 0);
+        }
+        for y in 0..=height {
+            for x in 0..=width {
+                let pixel = |up: usize| match (x.checked_sub(1), y.checked_sub(up)) {
+                    (Some(x), Some(y)) => u32::from(self.pixels[y * width + x]),
+                    _ => 0,
+                };
+                // Beside the image a diagonal meets what it meets at the border two rows above.
+                let left = if x == 0 { before[0] } else { above[x - 1] };
+                let right = if x == width { before[width] } else { above[x + 1] };
+                let upper = left.wrapping_add(right).wrapping_sub(before[x]);
+                row[x] = upper.wrapping_add(pixel(1)).wrapping_add(pixel(2));
+            }
+            for (x, sum) in row.iter().enumerate() {
+                let at = self.tilted_offset(x, y);
+                self.sums[at] = *sum;
+            }
+            (before, above, row) = (above, row, before);
+        }
+        self.tilted_rows = [before, above, row];
     }
 
     fn resample(&mut self, image: &GreyImage, size: (usize, usize), part: Part) {

@@ -118,6 +118,9 @@ impl Scanner {
         };
         let Self { level, compiled, wanted, looked_at } = self;
         level.fill_part(image, size.into(), part, step);
+        if cascade.is_tilted() {
+            level.add_tilted();
+        }
         let compiled = &mut compiled[step - 1];
         // A larger image makes rows of sums longer, and compiled offsets invalid.
         compiled.take_if(|compiled| !compiled.fits(level));

@@ -48,6 +48,32 @@ fn binary() -> Cascade {
     Cascade { width: 12, height: 12, features, stages, calibration: None }
 }
 
+/// [`small`] with rectangles that are turned by 45 degrees.
+fn tilted() -> Cascade {
+    let mut cascade = small();
+    let pair = |at: Part, half: Part| Feature::Tilted(vec![(at, -1.0), (half, 2.0)]);
+    cascade.features[0] = pair(part(5, 1, 4, 5), part(5, 1, 2, 5));
+    cascade.features[1] = pair(part(6, 0, 6, 6), part(6, 0, 6, 3));
+    cascade.stages[0].trees[0][0].split = Split::Below(0.02);
+    cascade
+}
+
+/// The sum of the values in a turned part of a window: those above the diagonals from its lowest
+/// corner, without those above the diagonals from its left and its right one.
+fn slow_tilted(image: &GreyImage, (left, top): (usize, usize), part: &Part) -> f64 {
+    let [x, y, width, height] =
+        [left + part.x, top + part.y, part.width, part.height].map(|v| v as i64);
+    let is_above = |px: i64, py: i64, (x, y): (i64, i64)| (px - x + 1).abs() < y - py;
+    let count = |px: i64, py: i64| {
+        let corners = [(x, y), (x - height, y + height), (x + width, y + width)];
+        let [upper, left, right] = corners.map(|at| i64::from(is_above(px, py, at)));
+        let lowest = is_above(px, py, (x + width - height, y + width + height));
+        upper - left - right + i64::from(lowest)
+    };
+    let pixels = (0..image.height()).flat_map(|y| (0..image.width()).map(move |x| (x, y)));
+    pixels.map(|(x, y)| count(x as i64, y as i64) as f64 * f64::from(image.row(y)[x])).sum()
+}
+
 /// The sum of the values in a part of a window, pixel by pixel.
 fn slow_sum(image: &GreyImage, (x, y): (usize, usize), part: &Part, value: fn(f64) -> f64) -> f64 {
     let rows = y + part.y..y + part.y + part.height;
@@ -59,14 +85,18 @@ fn slow_sum(image: &GreyImage, (x, y): (usize, usize), part: &Part, value: fn(f6
 
 fn slow_answer(image: &GreyImage, at: (usize, usize), cascade: &Cascade, node: &Node) -> bool {
     match (&cascade.features[node.feature], node.split) {
-        (Feature::Haar(parts), Split::Below(limit)) => {
+        (Feature::Haar(parts) | Feature::Tilted(parts), Split::Below(limit)) => {
             let middle = cascade.middle();
             let area = (middle.width * middle.height) as f64;
             let sum = slow_sum(image, at, &middle, |v| v);
             let squares = slow_sum(image, at, &middle, |v| v * v);
             let contrast = (area * squares - sum * sum).sqrt();
-            let value: f64 =
-                parts.iter().map(|(p, w)| f64::from(*w) * slow_sum(image, at, p, |v| v)).sum();
+            let is_tilted = matches!(cascade.features[node.feature], Feature::Tilted(_));
+            let of = |part: &Part| match is_tilted {
+                true => slow_tilted(image, at, part),
+                false => slow_sum(image, at, part, |v| v),
+            };
+            let value: f64 = parts.iter().map(|(part, w)| f64::from(*w) * of(part)).sum();
             value / contrast < f64::from(limit)
         }
         (Feature::Binary(first), Split::Among(bits)) => {
@@ -135,7 +165,7 @@ proptest! {
         let mut level = Level::default();
         level.fill(&image, (width, height), step);
         let shrunk = GreyImage::from_pixels(width, height, level.pixels().to_vec()).unwrap();
-        for cascade in [small(), binary()] {
+        for cascade in [small(), binary(), tilted()] {
             let (mut scanner, mut found) = (Scanner::default(), Vec::new());
             let mut take = |seen: PassedWindow<'_>| found.push((seen.x, seen.y));
             scanner.size(&image, &cascade, scale, &whole(&image), &|_, _| true, &mut take);
@@ -162,7 +192,7 @@ proptest! {
 
 #[test]
 fn the_small_cascades_pass_some_windows_and_not_all() {
-    for cascade in [small(), binary()] {
+    for cascade in [small(), binary(), tilted()] {
         let found = slow_scan(&noise(60, 60, 3), &cascade, 2).len();
         assert!((5..300).contains(&found), "{found}");
     }
@@ -230,7 +260,7 @@ fn windows_without_contrast_are_left_out() {
 
 #[test]
 fn a_cascade_survives_its_file() {
-    for cascade in [small(), binary()] {
+    for cascade in [small(), binary(), tilted()] {
         let read = Cascade::from_xml(&cascade.to_xml()).unwrap();
         let without = |cascade: &Cascade| Cascade {
             stages: cascade.stages.iter().map(|s| Stage { threshold: 0.0, ..s.clone() }).collect(),
@@ -251,7 +281,8 @@ fn broken_files_are_refused() {
         Cascade::from_xml(&text.replace(from, to)).unwrap_err()
     };
     assert!(why("<width>12", "<width>11").contains("feature"));
-    assert!(why("<tilted>0", "<tilted>1").contains("tilted"));
+    // Turned, the rectangle from (1, 1) on reaches beyond the left border.
+    assert!(why("<tilted>0", "<tilted>1").contains("feature 0"));
     assert!(why("<_>1 1 8 6 -1.0</_>", "<_>1 1 8</_>").contains("rectangle"));
     assert!(!why("<stages>", "<stage>").is_empty());
     assert!(why("<width>12", "<width>twelve").contains("twelve"));

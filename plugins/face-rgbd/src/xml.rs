@@ -19,7 +19,7 @@ type XmlResult<T> = Result<T, String>;
 impl Cascade {
     /// Parses a file of either layout.
     ///
-    /// Text that is not XML, not a cascade, has tilted or unknown features, or is inconsistent; the
+    /// Text that is not XML, not a cascade, has unknown features, or is inconsistent; the
     /// message is one sentence.
     pub fn from_xml(text: &str) -> XmlResult<Self> {
         let options =
@@ -100,10 +100,11 @@ fn write_feature(feature: &Feature, out: &mut String) -> std::fmt::Result {
     let text = |p: &Part| format!("{} {} {} {}", p.x, p.y, p.width, p.height);
     match feature {
         Feature::Binary(part) => writeln!(out, "<_><rect>{}</rect></_>", text(part)),
-        Feature::Haar(parts) => {
+        Feature::Haar(parts) | Feature::Tilted(parts) => {
             write!(out, "<_><rects>")?;
             parts.iter().try_for_each(|(p, w)| write!(out, "<_>{} {w:?}</_>", text(p)))?;
-            writeln!(out, "</rects><tilted>0</tilted></_>")
+            let tilted = i32::from(matches!(feature, Feature::Tilted(_)));
+            writeln!(out, "</rects><tilted>{tilted}</tilted></_>")
         }
     }
 }
@@ -166,9 +167,6 @@ fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> XmlResult<Tree> {
 }
 
 fn feature(feature: Element<'_, '_>) -> XmlResult<Feature> {
-    if child(feature, "tilted").is_some_and(|t| t.text().is_some_and(|t| t.trim() == "1")) {
-        return Err("it has tilted features, which are not supported".into());
-    }
     if let Some(rect) = child(feature, "rect") {
         return Ok(Feature::Binary(part(&numbers::<f64>(rect)?)?));
     }
@@ -178,7 +176,10 @@ fn feature(feature: Element<'_, '_>) -> XmlResult<Feature> {
         Ok((part(&words)?, *weight as f32))
     };
     let parts = elements(wanted(feature, "rects")?).map(weighted).collect::<XmlResult<Vec<_>>>()?;
-    Ok(Feature::Haar(parts.into_iter().filter(|(_, weight)| *weight != 0.0).collect()))
+    let parts = parts.into_iter().filter(|(_, weight)| *weight != 0.0).collect();
+    let tilted = child(feature, "tilted").and_then(|tilted| tilted.text());
+    let is_tilted = tilted.is_some_and(|tilted| tilted.trim() == "1");
+    Ok(if is_tilted { Feature::Tilted(parts) } else { Feature::Haar(parts) })
 }
 
 fn part(words: &[f64]) -> XmlResult<Part> {

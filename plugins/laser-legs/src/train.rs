@@ -148,7 +148,7 @@ impl Trainer for LegTrainer {
         let model = Model { trees: self.grow(best.trees, |_| true), slope, offset };
         progress(1.0);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { figures: self.figures(&trials, &model), model: text })
+        Ok(Fitted { figures: self.figures(&trials, &model), model: text, ..Fitted::default() })
     }
 }
 

@@ -400,6 +400,7 @@ impl Trainer for DistanceTrainer {
         Ok(Fitted {
             model: model.to_text().map_err(Error::Other)?,
             figures: figures(&self.collector, &self.training, self.seed)?,
+            ..Fitted::default()
         })
     }
 }

@@ -1,3 +1,6 @@
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
@@ -12,6 +15,8 @@ pub struct Location {
     pub name: String,
     pub about: String,
     pub logs: Vec<Annotated>,
+    /// Models that have not seen it, by the plugin that reads them.
+    pub models: BTreeMap<String, PathBuf>,
 }
 
 /// Pipeline with all settings that are tried.
@@ -29,6 +34,13 @@ pub struct Setting {
     /// Values in the order of the tunables.
     pub values: Vec<toml::Value>,
     /// Config with these values.
+    as_is: Variant,
+    /// The same, with models that have not seen a room, by its name.
+    unseen: BTreeMap<String, Variant>,
+}
+
+/// Config to run.
+pub struct Variant {
     pub file: ConfigFile,
     /// Hash of the config with all defaults, and of the files that it names.
     hash: String,
@@ -42,6 +54,7 @@ impl Contestant {
     pub fn new(
         config: PlannedConfig,
         args: &RoomsArgs,
+        locations: &[Location],
         registry: &Registry,
     ) -> Result<Self, Failure> {
         config.file.check_tuning(registry)?;
@@ -49,7 +62,7 @@ impl Contestant {
         let (resolved, budget) = (pipeline.resolved(), usize::from(args.budget));
         let (mut settings, mut refused) = (Vec::new(), 0);
         for values in candidates(&config.tune, budget, args.seed) {
-            match Setting::new(&config, &resolved, values, registry)? {
+            match Setting::new(&config, &resolved, values, locations, registry)? {
                 Some(setting) => settings.push(setting),
                 None => refused += 1,
             }
@@ -87,19 +100,47 @@ impl Setting {
         config: &PlannedConfig,
         resolved: &str,
         values: Vec<toml::Value>,
+        locations: &[Location],
         registry: &Registry,
     ) -> Result<Option<Self>, Failure> {
         let keys = config.tune.iter().map(|tunable| tunable.key.as_str());
         let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
         let text = with_values(resolved, &named).map_err(|error| Failure::usage(error.message))?;
-        let file = config.file.with_text(text);
+        let file = config.file.with_text(text.clone());
         // `check_tuning` has accepted each value alone, so the combination is at fault.
-        let Ok((pipeline, _)) = file.pipeline(registry, None) else { return Ok(None) };
+        if file.pipeline(registry, None).is_err() {
+            return Ok(None);
+        }
+        let as_is = Variant::new(config, file, registry)?;
+        let mut unseen = BTreeMap::new();
+        for Location { name, models, .. } in locations {
+            if let Some(text) = with_models(&text, models)? {
+                let variant = Variant::new(config, config.file.with_text(text), registry)?;
+                unseen.insert(name.clone(), variant);
+            }
+        }
+        Ok(Some(Self { values, as_is, unseen }))
+    }
+
+    /// Tells whether some model of the config has seen a room.
+    pub fn has_seen(&self, room: &str) -> bool {
+        self.unseen.contains_key(room)
+    }
+
+    /// Returns the config to run in a room, with models that have not seen it or as it is.
+    pub fn variant(&self, room: &str, unseen: bool) -> &Variant {
+        let variant = self.unseen.get(room).filter(|_| unseen);
+        variant.unwrap_or(&self.as_is)
+    }
+}
+
+impl Variant {
+    fn new(config: &PlannedConfig, file: ConfigFile, registry: &Registry) -> Result<Self, Failure> {
+        let (pipeline, _) = file.pipeline(registry, None)?;
         let outer = config.outer.resolved()?;
         let files = plan::file_hashes(&file)?;
         let everything = format!("{}\n{outer}\n{files:?}", pipeline.resolved());
-        let hash = sha256(everything.as_bytes());
-        Ok(Some(Self { values, file, hash }))
+        Ok(Self { file, hash: sha256(everything.as_bytes()) })
     }
 
     /// Returns the name of its result on a log: a hash of everything that it depends on.
@@ -107,5 +148,57 @@ impl Setting {
         let Annotated { sha256: log, truth_sha256, whole_bodies, .. } = log;
         let everything = format!("{version}\n{}\n{log}\n{truth_sha256}\n{whole_bodies}", self.hash);
         sha256(everything.as_bytes())[..32].to_owned()
+    }
+}
+
+/// Returns the config with a room's models where it has the built-in ones; `None` if it has none
+/// of these. `resolved` has every setting.
+fn with_models(
+    resolved: &str,
+    models: &BTreeMap<String, PathBuf>,
+) -> Result<Option<String>, Failure> {
+    let mut root: toml::Table = resolved.parse().map_err(Failure::failed)?;
+    let mut changed = false;
+    for (_, section) in &mut root {
+        let slots = match section {
+            toml::Value::Array(slots) => slots.as_mut_slice(),
+            one => std::slice::from_mut(one),
+        };
+        for slot in slots {
+            let plugin = slot.get("plugin").and_then(toml::Value::as_str);
+            let Some(path) = plugin.and_then(|plugin| models.get(plugin)) else { continue };
+            let model = slot.get_mut("config").and_then(|config| config.get_mut("model"));
+            if let Some(model) = model.filter(|model| model.as_str() == Some("")) {
+                *model = path.display().to_string().into();
+                changed = true;
+            }
+        }
+    }
+    if !changed {
+        return Ok(None);
+    }
+    toml::to_string(&root).map(Some).map_err(Failure::failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_room_replaces_built_in_models_of_its_plugins_alone() {
+        let models = BTreeMap::from([("net".to_owned(), PathBuf::from("/without.toml"))]);
+        let text = "seed = 1\n[[detectors]]\nplugin = 'net'\nconfig = { model = '' }\n\
+                    [[detectors]]\nplugin = 'net'\nconfig = { model = 'mine.toml' }\n\
+                    [[verifiers]]\nplugin = 'other'\nconfig = { model = '' }\n\
+                    [filter]\nplugin = 'net'\nconfig = { model = '' }\n";
+        let text = with_models(text, &models).unwrap().unwrap();
+        let root: toml::Table = text.parse().unwrap();
+        let model = |slot: &toml::Value| slot["config"]["model"].as_str().unwrap().to_owned();
+        assert_eq!(model(&root["detectors"][0]), "/without.toml");
+        assert_eq!(model(&root["detectors"][1]), "mine.toml");
+        assert_eq!(model(&root["verifiers"][0]), "");
+        assert_eq!(model(&root["filter"]), "/without.toml");
+        let none = "[[verifiers]]\nplugin = 'other'\nconfig = { model = '' }\n";
+        assert!(with_models(none, &models).unwrap().is_none());
     }
 }

@@ -28,11 +28,9 @@ use super::store::Store;
 /// Files that cannot be read; a pipeline that fails on some log.
 pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
     let locations = locations(args)?;
-    let contestants = contestants(args, registry)?;
-    let logs = locations.iter().flat_map(|room| &room.logs);
-    let logs: Vec<_> = logs.collect();
+    let contestants = contestants(args, &locations, registry)?;
     let store = Store::new(&args.folder.output);
-    let desk = Desk::new(&store, registry, &contestants, &logs)?;
+    let desk = Desk::new(&store, registry, &contestants, &locations)?;
     let done = desk.work(usize::from(args.jobs))?;
     say(&format!("{} runs done, {} had their results", done.ran, done.asked - done.ran));
     if let Some(signal) = done.signal {
@@ -68,13 +66,26 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
             check_log_path(&log.path).map_err(here)?;
             logs.push(plan::with_truth(&log.path).map_err(here)?);
         }
-        locations.push(Location { name: room.name, about: room.about, logs });
+        let models = room.models.into_iter().map(|(plugin, model)| {
+            let path = std::path::absolute(&model.path).map_err(Failure::failed)?;
+            if path.is_file() {
+                return Ok((plugin, path));
+            }
+            let message = format!("there is no model {}", model.path.display());
+            Err(at(tagalong_config::ConfigError { message, span: Some(model.place) }))
+        });
+        let models = models.collect::<Result<_, Failure>>()?;
+        locations.push(Location { name: room.name, about: room.about, logs, models });
     }
     Ok(locations)
 }
 
 /// Returns the pipelines with all settings that are tried.
-fn contestants(args: &RoomsArgs, registry: &Registry) -> Result<Vec<Contestant>, Failure> {
+fn contestants(
+    args: &RoomsArgs,
+    locations: &[Location],
+    registry: &Registry,
+) -> Result<Vec<Contestant>, Failure> {
     let named = &args.configs;
     let mut configs = match named.is_empty() {
         true => plan::shipped(registry)?,
@@ -91,5 +102,5 @@ fn contestants(args: &RoomsArgs, registry: &Registry) -> Result<Vec<Contestant>,
         let why = "no config in the folder configs has a table [tune]; name some with --configs";
         return Err(Failure::usage(why));
     }
-    configs.into_iter().map(|config| Contestant::new(config, args, registry)).collect()
+    configs.into_iter().map(|config| Contestant::new(config, args, locations, registry)).collect()
 }

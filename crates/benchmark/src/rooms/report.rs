@@ -141,8 +141,9 @@ impl Report {
         let rooms: Vec<String> = self.rooms.iter().map(About::words).collect();
         let mut notes = vec![
             format!("Rooms: {}.", rooms.join("; ")),
-            "w/o: in each room, with the settings that the other rooms chose; all: with those \
-             that all rooms chose, this one among them; gap: HOTA of all less that of w/o; as is: \
+            "w/o: in each room, with the settings that the other rooms chose, and with models \
+             that have not seen it where the rooms name such; all: with those \
+             that all rooms chose, this one among them, and the shipped models; gap: HOTA of all less that of w/o; as is: \
              with the settings of the config; false: false people in a frame. A room's figure is \
              the mean over its logs, and the means here are over rooms."
                 .to_owned(),
@@ -210,16 +211,20 @@ impl Scorer<'_> {
             rooms.clear();
         }
         let settings = self.contestant.settings.len();
-        let table = (0..settings)
-            .map(|setting| rooms.iter().map(|(_, logs)| self.room(setting, logs)).collect())
-            .collect::<Result<Vec<Vec<Figures>>, Failure>>()?;
-        let Choice { without, with_all } = leave_one_out(&table, objective);
+        let table = |unseen: bool| {
+            (0..settings)
+                .map(|at| rooms.iter().map(|(_, logs)| self.room(at, unseen, logs)).collect())
+                .collect::<Result<Vec<Vec<Figures>>, Failure>>()
+        };
+        let (unseen, seen) = (table(true)?, table(false)?);
+        // A model that has seen a room would make any setting look good there.
+        let Choice { without, with_all } = leave_one_out(&unseen, objective);
         let in_room = |(at, (location, _)): (usize, &(&Location, Vec<usize>))| InRoom {
             room: location.name.clone(),
             chosen_without: self.values(without[at]),
-            without: table[without[at]][at],
-            with_all: table[with_all][at],
-            shipped: table[0][at],
+            without: unseen[without[at]][at],
+            with_all: seen[with_all][at],
+            shipped: seen[0][at],
         };
         Ok(Fitted {
             name: self.contestant.name(),
@@ -233,9 +238,9 @@ impl Scorer<'_> {
         })
     }
 
-    fn room(&self, setting: usize, logs: &[usize]) -> Result<Figures, Failure> {
+    fn room(&self, setting: usize, unseen: bool, logs: &[usize]) -> Result<Figures, Failure> {
         let of = |log: &usize| {
-            let run = Run { contestant: self.at, setting, log: *log };
+            let run = Run { contestant: self.at, setting, log: *log, unseen };
             let missing = || Failure::failed("a result went missing; run the command again");
             self.desk.result(run).map(|result| result.figures).ok_or_else(missing)
         };

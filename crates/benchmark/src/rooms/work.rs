@@ -14,7 +14,7 @@ use tagalong_report::TaskResult;
 use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_tuning::Figures;
 
-use super::contest::Contestant;
+use super::contest::{Contestant, Location, Variant};
 use crate::plan::{self, Annotated, version};
 use crate::store::Store;
 use crate::work::{Lane, bar, spread};
@@ -28,6 +28,8 @@ pub struct Run {
     pub contestant: usize,
     pub setting: usize,
     pub log: usize,
+    /// With models that have not seen the room.
+    pub unseen: bool,
 }
 
 /// Stored result of a run.
@@ -53,7 +55,8 @@ pub struct Desk<'a> {
     store: &'a Store,
     registry: &'a Registry,
     contestants: &'a [Contestant],
-    logs: &'a [&'a Annotated],
+    /// Logs with their rooms.
+    logs: Vec<(&'a str, &'a Annotated)>,
     version: String,
     /// Reasons for which a contestant cannot run on a log.
     skips: BTreeMap<(usize, usize), String>,
@@ -68,11 +71,13 @@ impl<'a> Desk<'a> {
         store: &'a Store,
         registry: &'a Registry,
         contestants: &'a [Contestant],
-        logs: &'a [&'a Annotated],
+        locations: &'a [Location],
     ) -> Result<Self, Failure> {
+        let of_room = |room: &'a Location| room.logs.iter().map(|log| (room.name.as_str(), log));
+        let logs: Vec<(&str, &Annotated)> = locations.iter().flat_map(of_room).collect();
         let (mut skips, mut tried) = (BTreeMap::new(), BTreeMap::new());
         for (contestant, about) in contestants.iter().enumerate() {
-            for (log, annotated) in logs.iter().enumerate() {
+            for (log, (_, annotated)) in logs.iter().enumerate() {
                 let key = (log, about.config.reading());
                 let why = match tried.get(&key) {
                     Some(known) => Option::clone(known),
@@ -90,14 +95,19 @@ impl<'a> Desk<'a> {
         self.skips.get(&(contestant, log)).map(String::as_str)
     }
 
+    /// Returns the config of a run.
+    fn variant(&self, run: Run) -> &Variant {
+        let setting = &self.contestants[run.contestant].settings[run.setting];
+        setting.variant(self.logs[run.log].0, run.unseen)
+    }
+
     /// Returns the result of a run, if it exists.
     pub fn result(&self, run: Run) -> Option<RoomResult> {
         self.store.get(&self.name(run))
     }
 
     fn name(&self, run: Run) -> String {
-        let setting = &self.contestants[run.contestant].settings[run.setting];
-        format!("rooms/{}.json", setting.run_hash(self.logs[run.log], &self.version))
+        format!("rooms/{}.json", self.variant(run).run_hash(self.logs[run.log].1, &self.version))
     }
 
     /// Does the runs that have no result yet.
@@ -128,11 +138,15 @@ impl<'a> Desk<'a> {
 
     fn runs(&self) -> Vec<Run> {
         let mut runs = Vec::new();
-        for log in 0..self.logs.len() {
+        for (log, (room, _)) in self.logs.iter().enumerate() {
             for (contestant, about) in self.contestants.iter().enumerate() {
-                if self.skip(contestant, log).is_none() {
-                    let settings = 0..about.settings.len();
-                    runs.extend(settings.map(|setting| Run { contestant, setting, log }));
+                if self.skip(contestant, log).is_some() {
+                    continue;
+                }
+                for (setting, values) in about.settings.iter().enumerate() {
+                    let run = |unseen| Run { contestant, setting, log, unseen };
+                    runs.push(run(false));
+                    runs.extend(values.has_seen(room).then(|| run(true)));
                 }
             }
         }
@@ -197,8 +211,8 @@ impl Shift<'_> {
     /// others.
     fn pass(&self, pass: &[Run]) -> Result<(), Failure> {
         let Some(first) = pass.first() else { return Ok(()) };
-        let Desk { contestants, logs, .. } = self.desk;
-        let log = logs[first.log];
+        let Desk { contestants, logs, .. } = &self.desk;
+        let (_, log) = logs[first.log];
         self.bar.set_message(log.name.clone());
         let options = TruthOptions { upper_body: log.whole_bodies, ..TruthOptions::default() };
         let truth = TruthFile::read(&log.truth, options)?;
@@ -226,8 +240,8 @@ impl Shift<'_> {
     }
 
     fn pipeline(&self, run: Run) -> Result<tagalong_pipeline::Pipeline, Failure> {
-        let setting = &self.desk.contestants[run.contestant].settings[run.setting];
-        let (mut pipeline, _) = setting.file.pipeline(self.desk.registry, None)?;
+        let file = &self.desk.variant(run).file;
+        let (mut pipeline, _) = file.pipeline(self.desk.registry, None)?;
         // The settings of a pass differ mostly behind the detectors, so detections can be shared.
         pipeline.share_findings();
         Ok(pipeline)
@@ -249,7 +263,7 @@ impl Shift<'_> {
             "{} runs failed; the first is {} on {}, with {}: {why}",
             failed.len(),
             contestant.name(),
-            self.desk.logs[run.log].name,
+            self.desk.logs[run.log].1.name,
             contestant.words(run.setting)
         )))
     }

@@ -68,6 +68,25 @@ fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
 }
 
 #[test]
+fn a_sweep_rides_each_scene_with_each_value_as_a_row_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = ["--sweep", "camera.height_m=0.9, 1.2", "--format", "json", "-o", "rides"];
+    let found = json(&follow(folder.path(), "follow-best.toml", &sweep));
+    let suites = found["rides"].as_array().unwrap().iter().map(|ride| ride["suite"].clone());
+    assert_eq!(suites.collect::<Vec<_>>(), ["walk 0.9", "walk 1.2"]);
+    assert_ne!(found["rides"][0]["distance_kept_s"], Value::Null);
+    let log = |height: &str| format!("rides/walk-{height}-follow-best-2000000000.mcap");
+    let inspected = |height: &str| {
+        let output = tagalong().arg("inspect").arg(folder.path().join(log(height))).output();
+        text(&output.unwrap().stdout)
+    };
+    assert!(inspected("0.9").contains("0.90 m above the floor"), "{}", inspected("0.9"));
+    assert!(inspected("1.2").contains("1.20 m above the floor"));
+    let wrong = follow(folder.path(), "follow-best.toml", &["--sweep", "camera.height=1.0"]);
+    assert_eq!(code(&wrong), 2, "{}", text(&wrong.stderr));
+}
+
+#[test]
 fn the_log_of_a_ride_has_commands_and_their_reasons() {
     let folder = tempfile::tempdir().unwrap();
     let output = follow(folder.path(), "follow-as-printed.toml", &["-o", "rides"]);

@@ -60,6 +60,10 @@ pub struct FollowArgs {
     /// Replace a value in each scene: a dotted key, like `crowd=5`.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
     pub set: Vec<(String, String)>,
+    /// Ride each scene with each of these values instead of one, a row each:
+    /// `camera.height_m=0.3,0.5`.
+    #[arg(long, value_name = "KEY=VALUES", value_parser = tagalong_simulate::key_and_value)]
+    pub sweep: Option<(String, String)>,
     /// Rides at once; the results are the same [default: as many as there are
     /// cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
@@ -153,15 +157,27 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
     let mut jobs = Vec::new();
     let contenders = contenders(args, registry)?;
     for path in scenes(args)? {
-        let suite = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        for contender in &contenders {
-            for seed in seeds.numbers() {
-                let scene = tagalong_simulate::read(&path, &variant(args, seed))?;
-                jobs.push(Job { suite: suite.clone(), scene, contender: contender.clone() });
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        for value in swept(args) {
+            let suite = [&name].into_iter().chain(value.as_ref().map(|(_, value)| value));
+            let suite = suite.map(String::as_str).collect::<Vec<_>>().join(" ");
+            for contender in &contenders {
+                for seed in seeds.numbers() {
+                    let mut variant = variant(args, seed);
+                    variant.set.extend(value.clone());
+                    let scene = tagalong_simulate::read(&path, &variant)?;
+                    jobs.push(Job { suite: suite.clone(), scene, contender: contender.clone() });
+                }
             }
         }
     }
     Ok(jobs)
+}
+
+/// Returns the values of `--sweep` with their key; `None` once without it.
+fn swept(args: &FollowArgs) -> Vec<Option<(String, String)>> {
+    let Some((key, values)) = &args.sweep else { return vec![None] };
+    values.split(',').map(|value| Some((key.clone(), value.trim().to_owned()))).collect()
 }
 
 fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, Failure> {
@@ -226,7 +242,8 @@ fn ride(
 }
 
 fn log_file(folder: &Path, job: &Job) -> PathBuf {
-    folder.join(format!("{}-{}-{}.mcap", job.suite, job.contender.name, job.scene.seed))
+    let suite = job.suite.replace(' ', "-");
+    folder.join(format!("{suite}-{}-{}.mcap", job.contender.name, job.scene.seed))
 }
 
 fn bar(rides: usize) -> ProgressBar {

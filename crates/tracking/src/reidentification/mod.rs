@@ -16,7 +16,8 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point2;
-use tagalong_core::{EgoMotion, Frame, Track, TrackId};
+use tagalong_core::{Detection, EgoMotion, Frame, Track, TrackId};
+use tagalong_geometry::{Extent, Rect};
 use tagalong_vision::Appearance;
 
 use person::{Identity, Person};
@@ -80,6 +81,40 @@ impl Reidentifier {
         let numbers = self.tracks.iter().map(|(id, identity)| (*id, identity.person.number));
         let numbers = numbers.filter(|(id, number)| id != number).collect();
         People { numbers, given_up }
+    }
+
+    /// Returns the log-likelihood ratios of the appearances of tracks and detections, for the
+    /// associator; none if positions alone decide.
+    pub(crate) fn compare(
+        &self,
+        frame: &Frame,
+        tracks: &[Track],
+        detections: &[Detection],
+    ) -> Vec<Vec<f64>> {
+        let weight = self.settings.association_weight;
+        // Between one track and one detection there is nothing to choose.
+        if weight == 0.0
+            || self.settings.remember_s == 0.0
+            || tracks.len().max(detections.len()) < 2
+        {
+            return Vec::new();
+        }
+        let seen: Vec<Option<Appearance>> = detections
+            .iter()
+            .map(|detection| upper_body(detection).map(|region| (region, &detection.position)))
+            .map(|at| at.map(|(region, head)| Appearance::at(region, head, frame)))
+            .collect();
+        let ratio = |known: Option<&Identity>, seen: &Option<Appearance>| {
+            let difference =
+                known.zip(seen.as_ref()).and_then(|(known, seen)| known.difference(seen));
+            let fit = |difference: f64| 1.0 - difference / self.settings.max_difference.max(1e-3);
+            difference.map_or(0.0, |difference| weight * fit(difference).max(-1.0))
+        };
+        let row = |track: &Track| {
+            let known = self.tracks.get(&track.id);
+            seen.iter().map(|seen| ratio(known, seen)).collect()
+        };
+        tracks.iter().map(row).collect()
     }
 
     /// Takes in a jump of the clock, which ended all tracks.
@@ -288,6 +323,11 @@ impl Reidentifier {
             }
         }
     }
+}
+
+fn upper_body(detection: &Detection) -> Option<&Rect> {
+    let image = detection.image.as_ref()?;
+    (image.extent == Extent::UpperBody).then_some(&image.rect)
 }
 
 fn place(track: &Track) -> Point2<f64> {

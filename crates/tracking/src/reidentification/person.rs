@@ -127,6 +127,16 @@ impl Identity {
         }
     }
 
+    /// Returns the difference of an appearance from the nearest one of the track's person; `None` if
+    /// there is none to compare.
+    pub(crate) fn difference(&self, appearance: &Appearance) -> Option<f64> {
+        // The appearances of a new track are its own; those after a contact may be of another person.
+        let unsure: &[Appearance] = if self.is_new { &self.unsure } else { &[] };
+        let known = self.person.gallery.nearest(appearance).and_then(|nearest| nearest.mean());
+        let new = unsure.iter().filter_map(|own| own.difference(appearance).mean());
+        known.into_iter().chain(new).min_by(f64::total_cmp)
+    }
+
     /// Decides that the track is of its person.
     pub(crate) fn settle(&mut self) {
         self.is_new = false;

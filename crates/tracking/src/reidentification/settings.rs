@@ -30,6 +30,11 @@ pub struct ReidentificationSettings {
     /// after they part.
     #[schemars(range(min = 0.0))]
     pub alone_m: f64,
+    /// Log-likelihood ratio of equal appearances, by which the associator prefers a detection that
+    /// looks like the person of a track: it falls with the difference, to 0 at `max_difference`, and
+    /// is bounded by minus the same. 0: positions alone decide.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub association_weight: f64,
     /// Number of appearances by which tracks that parted are compared.
     #[schemars(range(min = 1))]
     pub appearances: u32,
@@ -45,6 +50,7 @@ impl Default for ReidentificationSettings {
             max_speed_mps: 3.0,
             decide_s: 2.0,
             alone_m: 0.6,
+            association_weight: 0.0,
             appearances: 2,
         }
     }

@@ -1,8 +1,8 @@
 use std::sync::Arc;
 
-use nalgebra::{Point3, SMatrix, Vector2};
+use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_core::{Estimate, Images, Person, RgbImage, Stamp};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
 use super::*;
 
@@ -131,4 +131,39 @@ fn after_a_jump_of_the_clock_the_appearance_is_remembered() {
         scene.show(1, &red, &[track(2, -2.0, 1.6)])[0]
     });
     assert_eq!(numbers, [1, 2]);
+}
+
+/// A detection where a track would be seen.
+fn detection(y_m: f64) -> Detection {
+    let Track { estimate, .. } = track(0, y_m, 1.7);
+    Detection {
+        image: Some(ImageBox::upper_body(estimate.region)),
+        position: estimate.person.position,
+        covariance: Matrix3::identity() * 0.01,
+        score: 1.0,
+        source: "test",
+    }
+}
+
+#[test]
+fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
+    let mut scene = Scene::new();
+    let tracks = [track(1, 0.8, 1.7), track(2, -0.8, 1.7)];
+    scene.show(3, &frame(RED, BLUE), &tracks);
+    let detections = [detection(0.8), detection(-0.8)];
+    let compare = |scene: &Scene, image: &Frame| scene.stage.compare(image, &tracks, &detections);
+    assert!(compare(&scene, &frame(RED, BLUE)).is_empty(), "positions alone decide by default");
+    scene.stage.settings.association_weight = 5.0;
+    let [same, changed] = [frame(RED, BLUE), frame(BLUE, RED)].map(|image| compare(&scene, &image));
+    assert!(same[0][0] > 4.9 && same[1][1] > 4.9, "{same:?}");
+    assert!(same[0][1] < 0.0 && same[1][0] < 0.0, "{same:?}");
+    assert!(same.iter().flatten().all(|ratio| ratio.abs() <= 5.0), "{same:?}");
+    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        assert_eq!(changed[row][column], same[row][1 - column], "the colours changed places");
+    }
+    let stranger = scene.stage.compare(&frame(RED, BLUE), &[track(9, 0.8, 1.7)], &detections);
+    assert_eq!(stranger, [[0.0, 0.0]], "nothing is known of a new track");
+    let whole = Detection { image: None, ..detection(0.8) };
+    let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole]);
+    assert_eq!(unseen, [[0.0], [0.0]], "without an image box there is no appearance");
 }

@@ -154,7 +154,11 @@ impl Trainer for NetTrainer {
         let Line { slope, offset } = platt(&said);
         let thousandths = |value: f64| (value * 1e3).round() / 1e3;
         let model = Model { net, slope: thousandths(slope), offset: thousandths(offset) };
-        Ok(Fitted { model: model.to_text(), figures: self.figures(&said, &model) })
+        Ok(Fitted {
+            model: model.to_text(),
+            figures: self.figures(&said, &model),
+            ..Fitted::default()
+        })
     }
 }
 

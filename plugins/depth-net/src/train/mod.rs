@@ -147,66 +147,120 @@ impl Trainer for DepthNetTrainer {
     }
 
     fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
-        let rooms = self.rooms();
         let is_test = |sample: &Sample| sample.group % TEST_SHARE == TEST_SHARE - 1;
         let simulated = self.chosen(|sample| sample.room.is_none() && !is_test(sample));
         let test = self.chosen(|sample| sample.room.is_none() && is_test(sample));
-        let real = self.chosen(|sample| sample.room.is_some());
         if simulated.is_empty() {
             return Err(Error::Other("there are no simulated rooms to begin with".into()));
         }
-        let Training { steps, real_steps, rate, .. } = self.training;
-        let further = if real.is_empty() { 0 } else { rooms.len() + 1 };
-        let total = (steps + further * real_steps) as f64;
-        let mut done = 0.0;
-        let mut part_of = |steps: usize, part: f64| progress((done + part * steps as f64) / total);
-        let none = Chosen::new();
-        let begun =
-            self.trained(start(self.seed), steps, [&simulated, &none], rate, &mut |part| {
-                part_of(steps, part);
-            })?;
-        done += steps as f64;
-        let mut figures = toml::Table::new();
-        let mut held_out = Score::default();
-        let mut report = |name: String, score: &Score| figures.insert(name, score.figures().into());
+        let mut steps = Steps::new(&self.training, self.rooms().len(), progress);
+        let begun = self.begun(&simulated, &mut steps)?;
         let in_simulation = self.scored(&begun, &test);
-        report("simulated, never seen".into(), &in_simulation);
-        let mut net = begun.clone();
-        for room in &rooms {
-            let out = self.chosen(|sample| sample.room.as_ref() == Some(room));
-            let others = self.chosen(|sample| sample.room.as_ref().is_some_and(|r| r != room));
-            report(format!("{room}: simulation only"), &self.scored(&begun, &out));
-            let left = self.trained(
-                begun.clone(),
-                real_steps,
-                [&simulated, &others],
-                0.5 * rate,
-                &mut |part| {
-                    progress((done + part * real_steps as f64) / total);
-                },
-            )?;
-            done += real_steps as f64;
-            let score = self.scored(&left, &out);
-            report(format!("{room}: left out"), &score);
-            held_out.extend(score);
+        let mut figures = toml::Table::new();
+        figures.insert("simulated, never seen".into(), in_simulation.figures().into());
+        let folds = self.folds(&begun, &simulated, &mut steps)?;
+        if folds.is_empty() {
+            let model = finished(begun, &in_simulation);
+            return Ok(Fitted { model: model.to_text(), figures, ..Fitted::default() });
         }
-        if !rooms.is_empty() {
-            net =
-                self.trained(begun, real_steps, [&simulated, &real], 0.5 * rate, &mut |part| {
-                    progress((done + part * real_steps as f64) / total);
-                })?;
-            report("all rooms left out".into(), &held_out);
-        } else {
-            held_out = in_simulation;
+        for fold in &folds {
+            let before = self.scored(&begun, &self.in_room(&fold.room));
+            figures.insert(format!("{}: simulation only", fold.room), before.figures().into());
+            figures.insert(format!("{}: left out", fold.room), fold.score.figures().into());
         }
-        let Line { slope, offset } = platt(&held_out.answers());
-        let thousandths = |value: f64| (value * 1e3).round() / 1e3;
-        for value in net.parts_mut().into_iter().flatten() {
-            *value = (*value * STEPS).round() / STEPS;
-        }
-        let model = Model::new(net, thousandths(slope).max(1e-3), thousandths(offset));
-        Ok(Fitted { model: model.to_text(), figures })
+        let held_out = Score::all(&folds.iter().map(|fold| &fold.score).collect::<Vec<_>>());
+        figures.insert("all rooms left out".into(), held_out.figures().into());
+        let real = self.chosen(|sample| sample.room.is_some());
+        let net = self.further(begun, [&simulated, &real], &mut steps)?;
+        let model = finished(net, &held_out).to_text();
+        Ok(Fitted { model, figures, without: models_without(folds, &in_simulation) })
     }
+}
+
+/// A real room, the network that has seen all other rooms, and its answers in this one.
+struct Fold {
+    room: String,
+    net: Net,
+    score: Score,
+}
+
+impl DepthNetTrainer {
+    fn in_room(&self, room: &str) -> Chosen {
+        self.chosen(|sample| sample.room.as_deref() == Some(room))
+    }
+
+    /// Trains on simulated rooms alone.
+    fn begun(&self, simulated: &Chosen, steps: &mut Steps<'_>) -> Result<Net> {
+        let Training { steps: count, rate, .. } = self.training;
+        let first = start(self.seed);
+        self.trained(first, count, [simulated, &Chosen::new()], rate, &mut |part| {
+            steps.tell(count, part);
+        })
+    }
+
+    /// Trains on simulated and real rooms.
+    fn further(&self, net: Net, samples: [&Chosen; 2], steps: &mut Steps<'_>) -> Result<Net> {
+        let Training { real_steps: count, rate, .. } = self.training;
+        self.trained(net, count, samples, 0.5 * rate, &mut |part| steps.tell(count, part))
+    }
+
+    /// Leaves out each real room once.
+    fn folds(&self, begun: &Net, simulated: &Chosen, steps: &mut Steps<'_>) -> Result<Vec<Fold>> {
+        let mut folds = Vec::new();
+        for room in self.rooms() {
+            let others =
+                self.chosen(|sample| sample.room.as_ref().is_some_and(|other| *other != room));
+            let net = self.further(begun.clone(), [simulated, &others], steps)?;
+            let score = self.scored(&net, &self.in_room(&room));
+            folds.push(Fold { room, net, score });
+        }
+        Ok(folds)
+    }
+}
+
+/// Progress over all trainings, in steps.
+struct Steps<'a> {
+    done: usize,
+    all: usize,
+    progress: &'a mut dyn FnMut(f64),
+}
+
+impl<'a> Steps<'a> {
+    fn new(training: &Training, rooms: usize, progress: &'a mut dyn FnMut(f64)) -> Self {
+        let further = if rooms == 0 { 0 } else { (rooms + 1) * training.real_steps };
+        Self { done: 0, all: training.steps + further, progress }
+    }
+
+    /// Tells how much of a training of `count` steps is done; the next one follows after all of it.
+    fn tell(&mut self, count: usize, part: f64) {
+        (self.progress)((self.done as f64 + part * count as f64) / self.all as f64);
+        if part >= 1.0 {
+            self.done += count;
+        }
+    }
+}
+
+/// Returns the models of the folds. Each is calibrated by the answers of the other folds, because
+/// those in its own room would tell it about that room; a single one by those in simulation.
+fn models_without(folds: Vec<Fold>, in_simulation: &Score) -> Vec<(String, String)> {
+    let others = |own: usize| {
+        let others = folds.iter().enumerate().filter(|(at, _)| *at != own);
+        let scores: Vec<&Score> = others.map(|(_, fold)| &fold.score).collect();
+        if scores.is_empty() { in_simulation.clone() } else { Score::all(&scores) }
+    };
+    let calibrations: Vec<Score> = (0..folds.len()).map(others).collect();
+    let model = |(fold, score): (Fold, Score)| (fold.room, finished(fold.net, &score).to_text());
+    folds.into_iter().zip(calibrations).map(model).collect()
+}
+
+/// Rounds the weights as in a file and calibrates the log-odds by answers that were held out.
+fn finished(mut net: Net, held_out: &Score) -> Model {
+    let Line { slope, offset } = platt(&held_out.answers());
+    let thousandths = |value: f64| (value * 1e3).round() / 1e3;
+    for value in net.parts_mut().into_iter().flatten() {
+        *value = (*value * STEPS).round() / STEPS;
+    }
+    Model::new(net, thousandths(slope).max(1e-3), thousandths(offset))
 }
 
 /// Returns weights by chance, as large as keeps the signal (He, Zhang, Ren and Sun, ICCV 2015).

@@ -63,11 +63,13 @@ impl Score {
         }
     }
 
-    /// Adds the answers of another score.
-    pub fn extend(&mut self, other: Self) {
-        self.frames += other.frames;
-        self.people += other.people;
-        self.found.extend(other.found);
+    /// Joins the answers of several scores.
+    pub fn all(scores: &[&Self]) -> Self {
+        Self {
+            frames: scores.iter().map(|score| score.frames).sum(),
+            people: scores.iter().map(|score| score.people).sum(),
+            found: scores.iter().flat_map(|score| score.found.iter().copied()).collect(),
+        }
     }
 
     /// Returns uncalibrated log-odds, and whether they are of a person.
@@ -117,7 +119,7 @@ mod tests {
     #[test]
     fn recall_and_false_people_depend_on_the_threshold() {
         let found = vec![(3.0, true, 0.1), (2.0, false, 0.0), (1.0, true, 0.3), (-1.0, true, 0.0)];
-        let mut score = Score { frames: 10, people: 4, found };
+        let score = Score { frames: 10, people: 4, found };
         assert_eq!(score.at(0.0), (0.5, 0.1));
         assert_eq!(score.at(-2.0), (0.75, 0.1));
         // One false person in ten frames is too many.
@@ -125,8 +127,8 @@ mod tests {
         let figures = score.figures();
         assert_eq!(figures["recall"].as_float(), Some(0.5));
         assert_eq!(figures["off_m"].as_float(), Some(0.2));
-        score.extend(Score { frames: 10, people: 0, found: Vec::new() });
-        assert_eq!(score.best_recall(), 0.75);
-        assert_eq!(score.answers().len(), 4);
+        let empty = Score { frames: 10, people: 0, found: Vec::new() };
+        let both = Score::all(&[&score, &empty]);
+        assert_eq!((both.best_recall(), both.answers().len()), (0.75, 4));
     }
 }

@@ -4,7 +4,7 @@ use tagalong_learn::boost::{self, Boosting, Levels, Question};
 use tagalong_learn::mix;
 
 use super::patch::Patch;
-use crate::compiled::{haar, rectangles};
+use crate::compiled::{corners, haar, rectangles};
 use crate::{Cascade, Feature, Next, Node, Part, Split, Stage, Training, Tree};
 
 /// Columns and rows of the kinds of features: pairs, triples, chequered.
@@ -32,7 +32,7 @@ fn drawn_features(samples: &Samples<'_>, training: &Training, seed: u64) -> (Vec
     let mut table = Levels::new(patches.len());
     for feature in &drawn {
         if let (Feature::Haar(parts), Some(any)) = (feature, patches.first()) {
-            let parts = rectangles(parts, &any.level);
+            let parts = rectangles(parts, |part| corners(part, &any.level));
             table.push(patches.iter().map(|p| haar(&parts, p.level.sums()) * p.contrast));
         }
     }
