@@ -161,6 +161,20 @@ fn what_is_missing_is_named_until_it_comes() {
 }
 
 #[test]
+fn an_input_that_no_topic_can_carry_is_refused_before_the_first_frame() {
+    const RADAR: Input = Input::Named("radar");
+    let mut log = started();
+    drive(&mut log, 3);
+    let log = log.finish();
+    let listening = |inputs| listen(&log, &InputSettings::default(), inputs);
+    let refusal = listening(DEPTH.require(RADAR)).start().err().map(|error| error.to_string());
+    let refusal = refusal.unwrap_or_default();
+    assert!(refusal.contains("has no input `radar`, because no topic is read for it"), "{refusal}");
+    assert!(refusal.contains("`inputs.relax(..)`"), "{refusal}");
+    assert!(listening(DEPTH.require(RADAR).relax(RADAR)).start().is_ok());
+}
+
+#[test]
 fn our_own_tracks_are_nobodys_detections_unless_named() {
     let named = Some("/people/tracks".to_owned());
     for (detections_topic, wanted) in [(None, false), (named, true)] {
