@@ -11,8 +11,8 @@ use std::fs::File;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use tagalong_log::LogWalker;
 use tagalong_log::images::{decode_compressed, decode_raw};
-use tagalong_log::mcap_walk::Walker;
 use tagalong_log::msgs::{CompressedImage, Image, decode};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 
@@ -20,7 +20,7 @@ use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 fn walk(path: &Path, images: bool) -> usize {
     let limits = Limits::default();
     let mut walker =
-        Walker::new(File::open(path).expect("the log"), &limits).expect("an MCAP file");
+        LogWalker::new(File::open(path).expect("the log"), &limits).expect("an MCAP file");
     let mut messages = 0;
     while let Some(message) = walker.next() {
         messages += 1;

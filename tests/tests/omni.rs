@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use tagalong_config::Registry;
 use tagalong_core::{RgbImage, Stamp};
-use tagalong_geometry::{ConicalMirror, Panorama};
-use tagalong_log::camera_info::UNWRAPPED;
+use tagalong_geometry::Panorama;
+use tagalong_log::camera_info::{CONICAL_MIRROR, UNWRAPPED, mirror_coefficients};
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
@@ -161,10 +161,11 @@ fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
     let circles: Vec<_> = shots.iter().map(colour).collect();
     let side = [circles[0].1.width(), circles[0].1.height()];
     let centre = mirror.centre_px.into();
-    let circular = info(ConicalMirror::MODEL, side, mirror.focal_px, centre, mirror.coefficients());
+    let circular =
+        info(CONICAL_MIRROR, side, mirror.focal_px, centre, mirror_coefficients(&mirror));
     write(&raw, &simulation, &circular, &circles);
     let (panoramas, from_circles) = seen(&raw);
-    let [half_angle, apex, inner, outer] = mirror.coefficients();
+    let [half_angle, apex, inner, outer] = mirror_coefficients(&mirror);
     let tangents = [half_angle, apex, inner / mirror.focal_px, outer / mirror.focal_px];
     let size = [panoramas[0].1.width(), panoramas[0].1.height()];
     assert_eq!(size, [480, 120]);

@@ -8,4 +8,4 @@ mod assign;
 mod pair;
 
 pub use assign::assign;
-pub use pair::{Cost, Fit, Overlap, PairCost, assign_fits};
+pub use pair::{Cost, Fit, Overlap, PairCost, Pairs, assign_fits};

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Detection, Track};
+use tagalong_core::{Detection, Gate, Track};
 use tagalong_geometry::Rect;
 
 use crate::assign;
@@ -100,6 +100,48 @@ impl PairCost {
         let log_volume = 2.0 * spread.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
         let is_near = cost <= self.gate && log_volume.is_finite();
         is_near.then_some(Fit { cost, log_volume })
+    }
+}
+
+/// Tracks and detections of one frame.
+#[derive(Clone, Copy)]
+pub struct Pairs<'a> {
+    /// The tracks.
+    pub tracks: &'a [Track],
+    /// The detections.
+    pub detections: &'a [Detection],
+    /// The tracker's gate, with the appearances of the pairs.
+    pub gate: &'a Gate<'a>,
+}
+
+impl Pairs<'_> {
+    /// Returns the numbers of all tracks.
+    pub fn rows(&self) -> Vec<usize> {
+        (0..self.tracks.len()).collect()
+    }
+
+    /// Returns the numbers of all detections.
+    pub fn columns(&self) -> Vec<usize> {
+        (0..self.detections.len()).collect()
+    }
+
+    /// Returns the fits of these tracks and detections, by their numbers, with a row for each
+    /// track: `None` for a pair that the tracker's gate does not admit, or that `fit` gives none.
+    /// The appearance of a pair takes part as `pair_cost` weighs it.
+    pub fn fits(
+        &self,
+        rows: &[usize],
+        columns: &[usize],
+        pair_cost: &PairCost,
+        fit: impl Fn(&Track, &Detection) -> Option<Fit>,
+    ) -> Vec<Vec<Option<Fit>>> {
+        let pair = |row: usize, column: usize| {
+            let (track, detection) = (&self.tracks[row], &self.detections[column]);
+            let fit = self.gate.admits(track, detection).then(|| fit(track, detection)).flatten();
+            let look = self.gate.appearance_of(row, column);
+            fit.map(|fit| pair_cost.with_appearance(fit, look))
+        };
+        rows.iter().map(|row| columns.iter().map(|column| pair(*row, *column)).collect()).collect()
     }
 }
 

@@ -1,7 +1,8 @@
 use nalgebra::Point3;
 
-use crate::{Capabilities, Detection, Error, Frame, Funnel, Inputs, Person, Result, Track};
-use tagalong_geometry::Rect;
+use crate::{
+    Capabilities, Detection, Error, Frame, Funnel, Inputs, Person, Result, Track, Visualisation,
+};
 
 /// Query to a detector.
 #[derive(Clone, Copy)]
@@ -94,7 +95,7 @@ pub trait Detector: Send {
     }
 }
 
-/// Weighs hypothetical scenes against an image (P3: overlapping silhouettes).
+/// Weighs hypothetical scenes against an image.
 ///
 /// ```
 /// # use tagalong_core::*;
@@ -154,14 +155,14 @@ pub trait Likelihood: Send + Sync {
         Ok(())
     }
 
-    /// Returns, for each person of the scene, the runs of pixels that are compared with the depth
-    /// of the person, nearer people in front of farther ones. For visualisation; empty by default.
+    /// Returns a picture of a scene as it is compared with the frame, if the likelihood has one.
+    /// Called for visualisation only.
     ///
     /// # Errors
     /// As [`Likelihood::log_likelihood`].
-    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
-        let _ = frame;
-        Ok(vec![Vec::new(); scene.len()])
+    fn visualise(&self, frame: &Frame, scene: &[Person]) -> Result<Option<Visualisation>> {
+        let _ = (frame, scene);
+        Ok(None)
     }
 }
 
@@ -309,6 +310,6 @@ mod tests {
         Count.log_likelihoods(&frame, &people[..1], 0, &mut out).unwrap();
         assert_eq!(out, [1.0]);
         assert!(Count.log_likelihoods(&frame, &people, 3, &mut out).is_err());
-        assert_eq!(Count.silhouettes(&frame, &people[..2]), Ok(vec![vec![]; 2]));
+        assert!(Count.visualise(&frame, &people[..2]).unwrap().is_none());
     }
 }

@@ -37,13 +37,12 @@ mod funnel;
 mod image;
 mod inputs;
 mod manager;
-mod mixture;
 mod motion;
 mod scan;
 mod sensors;
-mod sketch;
 mod time;
 mod track;
+mod visualisation;
 
 pub use associator::{Association, Associations, Associator, Gate};
 pub use command_history::CommandHistory;
@@ -52,10 +51,7 @@ pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Query, ScoreCalibration, Verifier};
 pub use error::{Error, Result};
 pub use external::ExternalDetection;
-pub use filter::{
-    Estimate, Evidence, Filter, FilterRequirements, Matched, PerPerson, Person, PersonFilter,
-    Update,
-};
+pub use filter::{Estimate, Evidence, Filter, FilterRequirements, Matched, Person, Update};
 pub use frame::{Derived, Frame, Images};
 pub use funnel::{Dropped, Funnel};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
@@ -63,10 +59,9 @@ pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
-pub use mixture::match_moments;
 pub use motion::{DiffDrive, EgoMotion, planar_pose};
 pub use scan::LaserScan;
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
-pub use sketch::{Silhouette, Sketch, SketchMap, SketchPoint};
 pub use time::Stamp;
 pub use track::{Track, TrackId};
+pub use visualisation::Visualisation;

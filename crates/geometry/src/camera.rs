@@ -377,7 +377,7 @@ mod tests {
 
     fn around() -> Camera {
         let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
-        let mirror = ConicalMirror::from_coefficients(175.0, [241.3, 238.0], &d).unwrap();
+        let mirror = ConicalMirror::new(175.0, [241.3, 238.0], d).unwrap();
         Camera {
             lens: Lens::Panorama(Panorama { mirror, columns: 480, rows: 120 }),
             width: 480,

@@ -16,14 +16,10 @@ use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 /// all bearings these images form a ring beyond the axis. There is no single viewpoint. A ray at
 /// the angle `phi` from the axis leaves at the elevation `phi + 90 deg - 2 * half_angle`.
 ///
-/// In a `sensor_msgs/CameraInfo`, K holds the focal length and the centre, `distortion_model` is
-/// [`MODEL`](Self::MODEL), and D the [`coefficients`](Self::coefficients).
-///
 /// ```
 /// use tagalong_geometry::ConicalMirror;
-/// let mirror = ConicalMirror::from_coefficients(
-///     170.0, [239.5, 239.5], &[67.5_f64.to_radians(), 0.05, 8.0, 230.0],
-/// ).unwrap();
+/// let shape = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
+/// let mirror = ConicalMirror::new(170.0, [239.5, 239.5], shape).unwrap();
 /// // 20 degrees from the axis, the floor is seen 3.5 m away.
 /// let elevation = mirror.elevation(170.0 * 20f64.to_radians().tan());
 /// assert!((elevation.to_degrees() + 25.0).abs() < 1e-9);
@@ -46,18 +42,10 @@ pub struct ConicalMirror {
 }
 
 impl ConicalMirror {
-    /// Value of `distortion_model` in the calibration message.
-    pub const MODEL: &str = "conical_mirror";
-
-    /// Returns D of the calibration message: half angle (rad), height of the apex (m), inner and
-    /// outer radius (pixels).
-    pub fn coefficients(&self) -> [f64; 4] {
-        [self.half_angle_rad, self.apex_m, self.inner_px, self.outer_px]
-    }
-
-    /// Returns the mirror of a calibration message; `None` if the numbers describe no valid mirror.
-    pub fn from_coefficients(focal_px: f64, centre_px: [f64; 2], d: &[f64]) -> Option<Self> {
-        let &[half_angle_rad, apex_m, inner_px, outer_px] = d else { return None };
+    /// Creates a mirror of this shape: half angle (rad), height of the apex (m), inner and outer
+    /// radius (pixels). `None` if the numbers describe no valid mirror.
+    pub fn new(focal_px: f64, centre_px: [f64; 2], shape: [f64; 4]) -> Option<Self> {
+        let [half_angle_rad, apex_m, inner_px, outer_px] = shape;
         let centre_px = Point2::from(centre_px);
         let mirror = Self { focal_px, centre_px, half_angle_rad, apex_m, inner_px, outer_px };
         mirror.is_sane().then_some(mirror)
@@ -247,7 +235,7 @@ mod tests {
 
     fn mirror(half_angle_deg: f64) -> ConicalMirror {
         let d = [half_angle_deg.to_radians(), 0.05, 8.0, 230.0];
-        ConicalMirror::from_coefficients(175.0, [241.3, 238.0], &d).unwrap()
+        ConicalMirror::new(175.0, [241.3, 238.0], d).unwrap()
     }
 
     fn panorama() -> Panorama {
@@ -292,13 +280,9 @@ mod tests {
     #[test]
     fn what_is_no_mirror_is_refused() {
         for d in [[0.5, 0.05, 8.0, 230.0], [1.2, 0.05, 230.0, 8.0], [1.2, f64::NAN, 8.0, 230.0]] {
-            assert_eq!(ConicalMirror::from_coefficients(175.0, [0.0, 0.0], &d), None, "{d:?}");
+            assert_eq!(ConicalMirror::new(175.0, [0.0, 0.0], d), None, "{d:?}");
         }
-        assert_eq!(
-            ConicalMirror::from_coefficients(0.0, [0.0, 0.0], &[1.2, 0.05, 8.0, 230.0]),
-            None
-        );
-        assert_eq!(ConicalMirror::from_coefficients(175.0, [0.0, 0.0], &[]), None);
+        assert_eq!(ConicalMirror::new(0.0, [0.0, 0.0], [1.2, 0.05, 8.0, 230.0]), None);
     }
 
     proptest! {
@@ -320,17 +304,6 @@ mod tests {
             prop_assert!((panorama.column(panorama.bearing(column)) - column).abs() < 1e-9);
             prop_assert!((panorama.row(panorama.elevation(row)) - row).abs() < 1e-9);
         }
-    }
-
-    #[test]
-    fn a_mirror_survives_its_calibration_message() {
-        let mirror = mirror(67.5);
-        let again = ConicalMirror::from_coefficients(
-            mirror.focal_px,
-            [mirror.centre_px.x, mirror.centre_px.y],
-            &mirror.coefficients(),
-        );
-        assert_eq!(again, Some(mirror));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! [`accepted`]) and log-odds ([`platt`], [`logistic`]), and each picture yields variants
 //! ([`mirrored`], [`shifted`]). Boosted trees are grown here, too ([`boost`]), and experiments run
 //! on all cores ([`side_by_side`]). Small convolutional networks are made of the layers of [`conv`],
-//! forwards and backwards, and trained by the steps of [`Adam`].
+//! forwards and backwards, trained by the steps of [`Adam`] and written as a [`NetworkFile`].
 //!
 //! The features are defined by the plugins.
 
@@ -16,6 +16,7 @@ mod held_out;
 mod logistic;
 mod parallel;
 mod variants;
+mod weights;
 
 pub use adam::{Adam, pace};
 pub use calibrate::{Line, platt};
@@ -25,3 +26,4 @@ pub use logistic::{Example, logistic};
 pub use parallel::side_by_side;
 pub use tagalong_stats::mix;
 pub use variants::{mirrored, shifted};
+pub use weights::NetworkFile;

@@ -22,12 +22,21 @@ pub struct Intrinsics {
 /// Image of a camera with a conical mirror.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mirrored {
-    /// Circular image: `distortion_model` is [`ConicalMirror::MODEL`], K and D are those of the
-    /// mirror.
+    /// Circular image: `distortion_model` is [`CONICAL_MIRROR`].
     Raw(ConicalMirror),
     /// Unwrapped image: `distortion_model` is [`UNWRAPPED`], and D is that of the mirror with both
     /// radii in focal lengths.
     Unwrapped(Panorama),
+}
+
+/// `distortion_model` of a circular image of a conical mirror. K holds the focal length and the
+/// centre, D the [`mirror_coefficients`].
+pub const CONICAL_MIRROR: &str = "conical_mirror";
+
+/// Returns D of a mirror's calibration: half angle (rad), height of the apex (m), inner and outer
+/// radius (pixels).
+pub fn mirror_coefficients(mirror: &ConicalMirror) -> [f64; 4] {
+    [mirror.half_angle_rad, mirror.apex_m, mirror.inner_px, mirror.outer_px]
 }
 
 /// `distortion_model` of an image of a conical mirror that was unwrapped before it was recorded,
@@ -129,7 +138,7 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     } else {
         check_lens(info, ["K[0]", "K[4]", "K[2]", "K[5]"], [k[0], k[4], k[2], k[5]])?
     };
-    if [ConicalMirror::MODEL, UNWRAPPED].contains(&info.distortion_model.as_str()) {
+    if [CONICAL_MIRROR, UNWRAPPED].contains(&info.distortion_model.as_str()) {
         let seen = delivered(info, full, Distortion::None);
         let mirror = Some(mirrored(info, &seen)?);
         return Ok(Intrinsics { mirror, ..seen });
@@ -145,13 +154,13 @@ fn mirrored(info: &CameraInfo, seen: &Intrinsics) -> Result<Mirrored, Calibratio
         count: info.d[..].len(),
     };
     let &[half_angle, apex_m, inner, outer] = &info.d[..] else { return Err(unusable) };
-    let raw = info.distortion_model == ConicalMirror::MODEL;
+    let raw = info.distortion_model == CONICAL_MIRROR;
     // K may be all zero here, because P is used for a rectified image.
     let scale = if raw { seen.lens.fx / info.k[0].max(f64::MIN_POSITIVE) } else { 1.0 };
     let d = [half_angle, apex_m, scale * inner, scale * outer];
     let (focal, centre) =
         if raw { (seen.lens.fx, [seen.lens.cx, seen.lens.cy]) } else { (1.0, [0.0; 2]) };
-    let mirror = ConicalMirror::from_coefficients(focal, centre, &d).ok_or(unusable)?;
+    let mirror = ConicalMirror::new(focal, centre, d).ok_or(unusable)?;
     Ok(if raw {
         Mirrored::Raw(mirror)
     } else {

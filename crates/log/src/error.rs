@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use crate::camera_info::CalibrationError;
-use crate::mcap_walk::NotMcap;
+use crate::mcap::NotMcap;
 
 /// Reason for which a log cannot be used at all. Damage inside a log is no error: it is skipped and
 /// counted.

@@ -6,9 +6,9 @@ use nalgebra::{Isometry2, Isometry3, Point2};
 use tagalong_core::LaserScan as CoreScan;
 
 use crate::log_files::open_file;
-use crate::log_walk::LogWalker;
 use crate::msgs::{LaserScan, PoseArray, decode};
 use crate::source::{scan_is_sane, scan_seen_from};
+use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
 /// Topic suffix of annotated legs.

@@ -9,12 +9,11 @@
 //! Messages that arrive live, over a network, take the same way: [`Listening`] is the first pass,
 //! [`LiveSource`] the second.
 //!
-//! The contents of a file are not trusted: see [`mcap_walk`] and
-//! [`bag_walk`] for the containers, [`msgs`] for
+//! The contents of a file are not trusted: see [`LogWalker`] for the containers, [`msgs`] for
 //! messages, [`images`] for pictures and [`Limits`] for sizes. Intact data is used; lost data is
 //! counted under a name.
 
-pub mod bag_walk;
+mod bag;
 pub mod camera_info;
 mod error;
 pub mod images;
@@ -23,8 +22,7 @@ mod inspect;
 mod leg_scans;
 mod limits;
 mod log_files;
-mod log_walk;
-pub mod mcap_walk;
+mod mcap;
 pub mod msgs;
 pub mod odometry;
 pub mod register;
@@ -34,6 +32,8 @@ pub mod tf;
 mod timing;
 mod topics;
 mod truth;
+mod walk;
+mod walker;
 pub mod write;
 
 pub use error::LogError;
@@ -42,8 +42,10 @@ pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, insp
 pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;
 pub use log_files::LogFiles;
-pub use log_walk::LogWalker;
+pub use mcap::NotMcap;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};
 pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
+pub use walk::{Channel, Counters, LOSSES, Message};
+pub use walker::LogWalker;

@@ -10,12 +10,12 @@ use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
 use crate::log_files::{LogFiles, open_file};
-use crate::log_walk::LogWalker;
-use crate::mcap_walk::{Channel, Counters, Message};
 use crate::msgs::{
     CameraInfo, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
 };
 use crate::tf::TfBuffer;
+use crate::walk::{Channel, Counters, Message};
+use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
 /// Maximum number of image stamps kept per topic, to measure rate and skew.

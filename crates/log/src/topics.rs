@@ -1,7 +1,7 @@
 //! Choice of the topics of a log: colour images, depth images, and so on.
 
 use tagalong_config::nearest;
-use tagalong_core::{Input, Inputs};
+use tagalong_core::{Input, Inputs, Usage};
 
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
@@ -94,6 +94,9 @@ pub(crate) fn choose(
 }
 
 fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
+    if let Some(Input::Named(name)) = inputs.of(Usage::Required).find(is_named) {
+        return Err(missing(scan, format!("input `{name}`"), UNREADABLE.to_owned()));
+    }
     let lacks = |input, topic: &Option<String>| inputs.requires(input) && topic.is_none();
     let wanted = [
         (lacks(Input::Colour, &chosen.colour), "colour images", "colour_topic", COLOUR),
@@ -136,6 +139,14 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
     }
 }
 
+fn is_named(input: &Input) -> bool {
+    matches!(input, Input::Named(_))
+}
+
+/// Remedy for an input of a sensor that another crate defines.
+const UNREADABLE: &str = ", because no topic is read for it: a program that adds it to each frame \
+                          with `Frame::with_sensor` opens the log with `inputs.relax(..)`; \
+                          otherwise leave out the plugin that requires it";
 const COLOUR: &str = "sensor_msgs/Image with rgb8, bgr8, rgba8, bgra8 or mono8, or \
                       sensor_msgs/CompressedImage with jpeg or png";
 const LASER: &str = "sensor_msgs/LaserScan";

@@ -14,8 +14,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::log_files::{LogFiles, open_file};
-use crate::log_walk::LogWalker;
 use crate::msgs::{StringMsg, decode};
+use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
 /// Topic of the truth.

@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 use tagalong_log::Limits;
+use tagalong_log::LogWalker;
 use tagalong_log::images::{decode_compressed, decode_raw};
-use tagalong_log::mcap_walk::Walker;
 use tagalong_log::msgs::{CompressedImage, Image, StringMsg, decode};
 
 fn folder() -> Option<PathBuf> {
     tagalong_testdata::find("mcap")
 }
 
-fn walker(path: &Path) -> Walker<BufReader<std::fs::File>> {
-    Walker::new(BufReader::new(std::fs::File::open(path).unwrap()), &Limits::default()).unwrap()
+fn walker(path: &Path) -> LogWalker<BufReader<std::fs::File>> {
+    LogWalker::new(BufReader::new(std::fs::File::open(path).unwrap()), &Limits::default()).unwrap()
 }
 
 fn sha256(bytes: &[u8]) -> String {

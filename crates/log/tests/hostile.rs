@@ -8,7 +8,7 @@ use std::io::{Read, Write};
 
 use common::{LogWriter, SavedLog, at, compressions};
 use mcap::{Compression, WriteOptions};
-use tagalong_log::mcap_walk::Walker;
+use tagalong_log::LogWalker;
 use tagalong_log::msgs::StringMsg;
 use tagalong_log::{FrameSource, InputSettings, Inputs, Limits};
 use tagalong_stats::{RandomSource, XorShift64};
@@ -31,7 +31,7 @@ impl Walk {
 }
 
 fn walk_with(reader: impl Read, limits: &Limits) -> Option<Walk> {
-    let mut walker = Walker::new(reader, limits).ok()?;
+    let mut walker = LogWalker::new(reader, limits).ok()?;
     let mut numbers = Vec::new();
     while let Some(message) = walker.next() {
         let text = std::str::from_utf8(message.data).ok();
@@ -194,9 +194,9 @@ fn the_chunk_that_was_changed_is_the_one_that_is_missing() {
         let faults = found.count("crc_failed_chunks") + found.count("damaged_chunks");
         assert_eq!(faults, 1, "{name}: {:?}", found.counters);
         // The changed chunk introduced the channel, which the index repeats.
-        let mut first = Walker::new(&bytes[..], &Limits::default()).unwrap();
+        let mut first = LogWalker::new(&bytes[..], &Limits::default()).unwrap();
         while first.next().is_some() {}
-        let again = Walker::new(&bytes[..], &Limits::default()).unwrap();
+        let again = LogWalker::new(&bytes[..], &Limits::default()).unwrap();
         let mut again = again.knowing(first.channels().cloned());
         let mut count = 0;
         while again.next().is_some() {

@@ -6,7 +6,7 @@ mod common;
 use std::io::Cursor;
 
 use common::{LogWriter, SavedLog, at, camera, level_pose};
-use tagalong_log::mcap_walk::Walker;
+use tagalong_log::LogWalker;
 use tagalong_log::{
     FrameSource, Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
 };
@@ -35,7 +35,7 @@ fn drive(log: &mut LogWriter, frames: i32) {
 
 /// Calls `hear` with topic, type and bytes of all messages of a log.
 fn replay(log: &[u8], mut hear: impl FnMut(&str, &str, &[u8])) {
-    let mut walker = Walker::new(Cursor::new(log), &Limits::default()).unwrap();
+    let mut walker = LogWalker::new(Cursor::new(log), &Limits::default()).unwrap();
     while let Some(message) = walker.next() {
         hear(&message.channel.topic, &message.channel.schema_name, message.data);
     }
@@ -158,6 +158,20 @@ fn what_is_missing_is_named_until_it_comes() {
     let named = InputSettings { odometry_topic: Some("/odometry".into()), ..input };
     let text = missing(&listen(&log, &named, DEPTH));
     assert!(text.contains("did you mean `/odom`?"), "{text}");
+}
+
+#[test]
+fn an_input_that_no_topic_can_carry_is_refused_before_the_first_frame() {
+    const RADAR: Input = Input::Named("radar");
+    let mut log = started();
+    drive(&mut log, 3);
+    let log = log.finish();
+    let listening = |inputs| listen(&log, &InputSettings::default(), inputs);
+    let refusal = listening(DEPTH.require(RADAR)).start().err().map(|error| error.to_string());
+    let refusal = refusal.unwrap_or_default();
+    assert!(refusal.contains("has no input `radar`, because no topic is read for it"), "{refusal}");
+    assert!(refusal.contains("`inputs.relax(..)`"), "{refusal}");
+    assert!(listening(DEPTH.require(RADAR).relax(RADAR)).start().is_ok());
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use common::{LogWriter, at, camera, info_of};
 use nalgebra::Point3;
 use tagalong_geometry::{ConicalMirror, Panorama};
-use tagalong_log::camera_info::UNWRAPPED;
+use tagalong_log::camera_info::{CONICAL_MIRROR, UNWRAPPED, mirror_coefficients};
 use tagalong_log::msgs::{CameraInfo, Header, Image};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 
@@ -18,15 +18,15 @@ const SIDE: u32 = 120;
 
 fn mirror() -> ConicalMirror {
     let d = [67.5_f64.to_radians(), 0.05, 2.0, 57.0];
-    ConicalMirror::from_coefficients(44.0, [60.1, 58.7], &d).unwrap()
+    ConicalMirror::new(44.0, [60.1, 58.7], d).unwrap()
 }
 
 fn raw_info() -> CameraInfo {
     let mirror = mirror();
     let (f, c) = (mirror.focal_px, mirror.centre_px);
     CameraInfo {
-        distortion_model: ConicalMirror::MODEL.into(),
-        d: mirror.coefficients().to_vec(),
+        distortion_model: CONICAL_MIRROR.into(),
+        d: mirror_coefficients(&mirror).to_vec(),
         k: [f, 0.0, c.x, 0.0, f, c.y, 0.0, 0.0, 1.0],
         ..info_of("colour", &camera(SIDE as usize, SIDE as usize, f))
     }

@@ -107,10 +107,10 @@ impl Pipeline {
         }
     }
 
-    /// Turns the filter's visualisation in [`FrameReport::sketch`] on or off. It takes time, which
-    /// counts as that of the stage `update`, and changes nothing else.
-    pub fn sketch(&mut self, wanted: bool) {
-        self.tracker.sketch(wanted);
+    /// Turns [`FrameReport::visualisation`] on or off. It takes time, which counts as that of the
+    /// stage `update`, and changes nothing else.
+    pub fn visualise(&mut self, wanted: bool) {
+        self.tracker.visualise(wanted);
     }
 
     /// Shares the answers of detectors and verifiers with other sharing pipelines that process the

@@ -1,4 +1,4 @@
-use tagalong_core::{Command, EgoMotion, Funnel, Sketch, Stamp, Track, TrackId};
+use tagalong_core::{Command, EgoMotion, Funnel, Stamp, Track, TrackId, Visualisation};
 use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing};
 
 use crate::LockReport;
@@ -34,8 +34,8 @@ pub struct FrameReport {
     pub nis: Vec<(TrackId, f64, u32)>,
     /// Likelihood evaluations of the frame.
     pub weighing: Weighing,
-    /// Visualisation of the filter, where [`crate::Pipeline::sketch`] asks for it.
-    pub sketch: Sketch,
+    /// Visualisation of the filter, where [`crate::Pipeline::visualise`] asks for it.
+    pub visualisation: Option<Visualisation>,
     /// Milliseconds per stage. With those of `weighing` and of the plugins the only part that
     /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
@@ -56,7 +56,8 @@ impl From<TrackingReport> for FrameReport {
     fn from(tracking: TrackingReport) -> Self {
         let TrackingReport { index, stamp, outcome, motion, candidates, funnel, tracks, .. } =
             tracking;
-        let TrackingReport { nis, weighing, sketch, timings, plugin_timings, ended, .. } = tracking;
+        let TrackingReport { nis, weighing, visualisation, timings, plugin_timings, ended, .. } =
+            tracking;
         Self {
             index,
             stamp,
@@ -70,7 +71,7 @@ impl From<TrackingReport> for FrameReport {
             command: None,
             nis,
             weighing,
-            sketch,
+            visualisation,
             timings,
             plugin_timings,
             ended,

@@ -1,7 +1,8 @@
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, Images, RgbImage, Sketch, SketchMap, SketchPoint, Track};
+use tagalong_core::{DepthImage, Images, RgbImage, Track};
 use tagalong_geometry::Rect;
 use tagalong_pipeline::Fate;
+use tagalong_vision::{Sketch, SketchMap, SketchPoint};
 
 use super::canvas::{Canvas, Ink, LINE_PX};
 use super::trails::Trails;
@@ -21,7 +22,10 @@ pub fn draw(scene: &OverlayData, trails: &Trails) -> Canvas {
         canvas.paste(&picture, 0, 0);
     }
     // Tracks come last, so that nothing hides them.
-    draw_sketch(&mut canvas, &scene.report.sketch);
+    let shown = scene.report.visualisation.as_ref();
+    if let Some(sketch) = shown.and_then(|shown| shown.downcast_ref::<Sketch>()) {
+        draw_sketch(&mut canvas, sketch);
+    }
     draw_rejected(&mut canvas, scene);
     draw_trails(&mut canvas, scene, trails);
     // Far to near, so that near people cover far ones.
@@ -59,7 +63,7 @@ fn title(scene: &OverlayData) -> String {
     format!("frame {}  {} s  {people} seen", scene.report.index, scene.report.stamp)
 }
 
-/// Renders the state of the filter (P3, Figures 5 to 7): bodies, particles, and maps in the lower
+/// Renders the state of the filter: bodies, particles, and maps in the lower
 /// left corner.
 fn draw_sketch(canvas: &mut Canvas, sketch: &Sketch) {
     for body in &sketch.silhouettes {

@@ -1,10 +1,8 @@
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
-use tagalong_core::{
-    DepthImage, Detection, Estimate, Person, Silhouette, Sketch, SketchMap, SketchPoint, Stamp,
-    Track, TrackId,
-};
+use tagalong_core::{DepthImage, Detection, Estimate, Person, Stamp, Track, TrackId};
 use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 use tagalong_pipeline::{Candidate, Fate};
+use tagalong_vision::{Silhouette, Sketch, SketchMap, SketchPoint};
 
 use super::canvas::LINE_PX;
 use super::*;
@@ -53,11 +51,11 @@ fn what_the_filter_imagines_shows_in_the_image() {
     let without = picture(&scene(&[], Vec::new()), &Trails::default());
     let mut scene = scene(&[], Vec::new());
     let run = Rect::new(100.0, 60.0, 30.0, 2.0);
-    scene.report.sketch = Sketch {
+    scene.report.visualisation = Some(Arc::new(Sketch {
         points: vec![SketchPoint { id: TrackId(1), pixel: Point2::new(200.5, 90.5), weight: 1.0 }],
         silhouettes: vec![Silhouette { id: TrackId(1), runs: vec![run] }],
         maps: vec![SketchMap { title: String::new(), columns: 10, values: vec![0.5; 50] }],
-    };
+    }));
     let with = picture(&scene, &Trails::default());
     assert_eq!(changed(&without, &with, 100..130), 60, "a run");
     assert!(changed(&without, &with, 195..206) > 0, "a particle");

@@ -7,6 +7,7 @@ use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::Serialize;
 use tagalong_core::{DepthImage, GreyImage, RgbImage, Stamp};
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
+use tagalong_log::camera_info::{CONICAL_MIRROR, mirror_coefficients};
 use tagalong_log::msgs::{
     CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry, PoseStamped,
     StringMsg, TFMessage, TransformStamped, TwistStamped,
@@ -205,8 +206,8 @@ impl Recorder {
     ) -> Result<(), WriteError> {
         let Some(mut info) = info(&self.camera, header, aside_m) else { return Ok(()) };
         if let Some(mirror) = &self.mirror {
-            info.distortion_model = ConicalMirror::MODEL.into();
-            info.d = mirror.coefficients().to_vec();
+            info.distortion_model = CONICAL_MIRROR.into();
+            info.d = mirror_coefficients(mirror).to_vec();
         }
         self.log.send(&format!("/camera/{name}/camera_info"), at, &info)
     }

@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn people_hide_each_other_across_the_seam_of_a_panorama() {
         let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
-        let mirror = ConicalMirror::from_coefficients(175.0, [240.0; 2], &d).unwrap();
+        let mirror = ConicalMirror::new(175.0, [240.0; 2], d).unwrap();
         let camera = Camera {
             lens: Lens::Panorama(Panorama { mirror, columns: 480, rows: 120 }),
             width: 480,

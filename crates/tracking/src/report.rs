@@ -1,4 +1,4 @@
-use tagalong_core::{Detection, EgoMotion, Funnel, Sketch, Stamp, Track, TrackId};
+use tagalong_core::{Detection, EgoMotion, Funnel, Stamp, Track, TrackId, Visualisation};
 
 use crate::Weighing;
 
@@ -78,8 +78,8 @@ pub struct TrackingReport {
     pub nis: Vec<(TrackId, f64, u32)>,
     /// Cost of the scene likelihood.
     pub weighing: Weighing,
-    /// Visualisation of the filter, if [`crate::Tracker::sketch`] requests it.
-    pub sketch: Sketch,
+    /// Visualisation of the filter, if [`crate::Tracker::visualise`] requests it.
+    pub visualisation: Option<Visualisation>,
     /// Milliseconds by stage. With those of `weighing` and of the plugins the only part that
     /// differs between two runs.
     pub timings: Vec<(&'static str, f64)>,
@@ -102,7 +102,7 @@ impl TrackingReport {
             tracks: Vec::new(),
             nis: Vec::new(),
             weighing: Weighing::default(),
-            sketch: Sketch::default(),
+            visualisation: None,
             timings: Vec::new(),
             plugin_timings: Vec::new(),
             ended: Vec::new(),

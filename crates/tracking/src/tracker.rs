@@ -62,7 +62,7 @@ pub struct Tracker {
     last: Vec<Track>,
     /// Processed frames.
     frames: u64,
-    sketches: bool,
+    visualises: bool,
 }
 
 /// Result of one frame.
@@ -97,7 +97,7 @@ impl Tracker {
             duplicates: DuplicateFinder::default(),
             last: Vec::new(),
             frames: 0,
-            sketches: false,
+            visualises: false,
         }
     }
 
@@ -145,10 +145,10 @@ impl Tracker {
         Ok(Tracked { report, completed })
     }
 
-    /// Switches the visualisation in [`TrackingReport::sketch`] on or off. Its time counts as that
-    /// of the stage `update`; it changes no other result.
-    pub fn sketch(&mut self, wanted: bool) {
-        self.sketches = wanted;
+    /// Switches [`TrackingReport::visualisation`] on or off. Its time counts as that of the stage
+    /// `update`; it changes no other result.
+    pub fn visualise(&mut self, wanted: bool) {
+        self.visualises = wanted;
     }
 
     /// Shares the results of detectors and verifiers with other trackers that process the very same
@@ -329,8 +329,9 @@ impl Tracker {
         let evidence = Evidence { frame, matched: &matched, unmatched: &unmatched, likelihood };
         let mut supports = self.filter.call(frame.index, |filter| filter.update(&evidence))?;
         log.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
-        if self.sketches {
-            report.sketch = self.filter.call(frame.index, |filter| filter.sketch(&evidence))?;
+        if self.visualises {
+            let shown = self.filter.call(frame.index, |filter| filter.visualise(&evidence))?;
+            report.visualisation = shown;
         }
         // The filter is a plugin; it may report tracks that have ended or never existed.
         let before = supports.len();
@@ -515,7 +516,7 @@ impl Tracker {
     /// Returns true if the detector that found the track last, or the filter itself, processed this
     /// frame. A frame on which a detector does not run is no miss for its tracks.
     fn was_searched(&self, due: &[usize], id: TrackId) -> bool {
-        let by_filter = self.filter.plugin().requirements().likelihood;
+        let by_filter = self.filter.plugin().requirements().searches;
         by_filter || self.table.detector(id).is_none_or(|detector| due.contains(&detector))
     }
 

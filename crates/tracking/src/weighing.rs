@@ -1,8 +1,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use tagalong_core::{Frame, Likelihood, Person, Result};
-use tagalong_geometry::Rect;
+use tagalong_core::{Frame, Likelihood, Person, Result, Visualisation};
 
 /// Cost of the scene likelihood in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,8 +55,8 @@ impl Likelihood for Metered<'_> {
         self.timed(scenes, || self.inner.log_likelihoods(frame, people, people_per_scene, out))
     }
 
-    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
-        self.inner.silhouettes(frame, scene)
+    fn visualise(&self, frame: &Frame, scene: &[Person]) -> Result<Option<Visualisation>> {
+        self.inner.visualise(frame, scene)
     }
 }
 
@@ -101,19 +100,19 @@ mod tests {
     }
 
     #[test]
-    fn silhouettes_are_those_of_the_likelihood() {
+    fn the_picture_is_that_of_the_likelihood() {
         struct Round;
         impl Likelihood for Round {
             fn log_likelihood(&self, _: &Frame, _: &[Person]) -> Result<f64> {
                 Ok(0.0)
             }
 
-            fn silhouettes(&self, _: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
-                Ok(vec![vec![Rect::new(1.0, 2.0, 3.0, 4.0)]; scene.len()])
+            fn visualise(&self, _: &Frame, scene: &[Person]) -> Result<Option<Visualisation>> {
+                Ok(Some(Arc::new(scene.len())))
             }
         }
         let people = [standing(); 2];
-        let shapes = Metered::new(&Round).silhouettes(&frame(), &people).unwrap();
-        assert_eq!(shapes, vec![vec![Rect::new(1.0, 2.0, 3.0, 4.0)]; 2]);
+        let shown = Metered::new(&Round).visualise(&frame(), &people).unwrap().unwrap();
+        assert_eq!(shown.downcast_ref(), Some(&2_usize));
     }
 }

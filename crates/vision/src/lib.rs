@@ -11,6 +11,7 @@ mod panorama;
 pub mod quality;
 pub mod registration;
 mod row_sums;
+mod sketch;
 mod upright;
 
 pub use appearance::{Appearance, AppearanceDifference};
@@ -19,4 +20,5 @@ pub use integral::Integral;
 pub use islands::islands;
 pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};
+pub use sketch::{ComparedPixels, Silhouette, Sketch, SketchMap, SketchPoint};
 pub use upright::{Upright, UprightGrey};

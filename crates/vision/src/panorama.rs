@@ -97,7 +97,7 @@ impl Level {
 /// use tagalong_geometry::{ConicalMirror, Panorama};
 /// use tagalong_vision::Unwrapper;
 /// let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
-/// let mirror = ConicalMirror::from_coefficients(175.0, [239.5, 239.5], &d).unwrap();
+/// let mirror = ConicalMirror::new(175.0, [239.5, 239.5], d).unwrap();
 /// let panorama = Panorama { mirror, columns: 480, rows: 120 };
 /// let mut unwrapper = Unwrapper::new(&panorama, 480, 480).unwrap();
 /// let mut out = GreyImage::default();
@@ -279,7 +279,7 @@ mod tests {
         let side = side as f64;
         let d = [67.5_f64.to_radians(), 0.05, 0.02 * side, 0.46 * side];
         let centre = [0.5 * side + centre[0], 0.5 * side + centre[1]];
-        let mirror = ConicalMirror::from_coefficients(0.36 * side, centre, &d).unwrap();
+        let mirror = ConicalMirror::new(0.36 * side, centre, d).unwrap();
         Panorama { mirror, columns, rows }
     }
 

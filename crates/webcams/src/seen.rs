@@ -9,8 +9,8 @@ use tagalong_app::outcome::Failure;
 use tagalong_core::{Stamp, planar_pose};
 use tagalong_log::Limits;
 use tagalong_log::images::{Pixels, decode_compressed, decode_raw};
-use tagalong_log::mcap_walk::{Message, Walker};
 use tagalong_log::msgs::{CameraInfo, CompressedImage, Image, PoseStamped, decode};
+use tagalong_log::{LogWalker, Message};
 use tagalong_sim::WebcamSettings;
 use tagalong_triangulate::{HatColour, Sight, Station, find_hat};
 
@@ -37,7 +37,8 @@ impl CameraSightings {
         let failed = |why: String| Failure::failed(format!("{}: {why}", log.display()));
         let file = File::open(log).map_err(|error| failed(error.to_string()))?;
         let limits = Limits::default();
-        let mut walker = Walker::new(file, &limits).map_err(|error| failed(error.to_string()))?;
+        let mut walker =
+            LogWalker::new(file, &limits).map_err(|error| failed(error.to_string()))?;
         let mut seen = Self::default();
         while let Some(message) = walker.next() {
             seen.take(&message, cameras, colour, &limits);

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Cost, Fit, assign_fits};
+use tagalong_assignment::{Cost, Fit, Pairs, assign_fits};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -39,14 +39,10 @@ impl Associator for Hungarian {
         gate: &Gate,
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
-        let fit = |row: usize, column: usize| {
-            let (track, detection) = (&tracks[row], &detections[column]);
-            let fit = gate.admits(track, detection).then(|| self.fit(track, detection, gate));
-            let look = gate.appearance_of(row, column);
-            fit.flatten().map(|fit| pair_cost.with_appearance(fit, look))
-        };
-        let row = |row| (0..detections.len()).map(|column| fit(row, column)).collect();
-        let fits: Vec<Vec<Option<Fit>>> = (0..tracks.len()).map(row).collect();
+        let pairs = Pairs { tracks, detections, gate };
+        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &pair_cost, |track, found| {
+            self.fit(track, found, gate)
+        });
         let at_gate = pair_cost.at_gate();
         let given = assign_fits(&fits, detections.len(), at_gate, self.config.miss_factor);
         Associations::one_to_one(given)

@@ -1,6 +1,6 @@
 use std::f64::consts::TAU;
 
-use tagalong_assignment::Fit;
+use tagalong_assignment::{Fit, Pairs};
 use tagalong_core::{Association, Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -76,16 +76,13 @@ impl Associator for Jpda {
         gate: &Gate,
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
-        let ratio = |row: usize, column: usize| {
-            let (track, detection) = (&tracks[row], &detections[column]);
-            let admitted = gate.admits(track, detection);
-            let fit = admitted.then(|| pair_cost.fit(track, detection, gate.dt_s)).flatten();
-            let look = gate.appearance_of(row, column);
-            let fit = fit.map(|fit| pair_cost.with_appearance(fit, look));
-            fit.map_or(0.0, |fit| self.likelihood_ratio(&fit))
-        };
-        let row = |row| (0..detections.len()).map(|column| ratio(row, column)).collect();
-        let ratios: Vec<Vec<f64>> = (0..tracks.len()).map(row).collect();
+        let pairs = Pairs { tracks, detections, gate };
+        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &pair_cost, |track, found| {
+            pair_cost.fit(track, found, gate.dt_s)
+        });
+        let ratio = |fit: Option<Fit>| fit.map_or(0.0, |fit| self.likelihood_ratio(&fit));
+        let ratios: Vec<Vec<f64>> =
+            fits.into_iter().map(|row| row.into_iter().map(ratio).collect()).collect();
         let together = clusters(tracks.len(), detections.len(), |t, d| ratios[t][d] > 0.0);
         let pairs = together.iter().flat_map(|cluster| self.weigh_cluster(cluster, &ratios));
         Associations { pairs: pairs.collect(), spent: Vec::new() }

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Fit, assign_fits};
+use tagalong_assignment::{Fit, Pairs, assign_fits};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -42,17 +42,11 @@ impl TwoStage {
         let rows: Vec<usize> = (0..tracks.len()).filter(|i| given[*i].is_none()).collect();
         let columns: Vec<usize> =
             (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
-        let fit = |row: usize, column: usize| {
-            let (track, detection) = (&tracks[row], &detections[column]);
-            let fit = gate.admits(track, detection).then(|| self.fit(track, detection, gate));
-            let look = gate.appearance_of(row, column);
-            fit.flatten().map(|fit| self.config.pair_cost().with_appearance(fit, look))
-        };
-        let fits: Vec<Vec<Option<Fit>>> = rows
-            .iter()
-            .map(|row| columns.iter().map(|column| fit(*row, *column)).collect())
-            .collect();
-        let at_gate = self.config.pair_cost().at_gate();
+        let pair_cost = self.config.pair_cost();
+        let pairs = Pairs { tracks, detections, gate };
+        let fits =
+            pairs.fits(&rows, &columns, &pair_cost, |track, found| self.fit(track, found, gate));
+        let at_gate = pair_cost.at_gate();
         let assigned = assign_fits(&fits, columns.len(), at_gate, self.config.miss_factor);
         for (row, column) in rows.into_iter().zip(assigned) {
             given[row] = column.map(|column| columns[column]);

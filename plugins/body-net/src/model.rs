@@ -1,4 +1,4 @@
-use std::fmt::Write;
+use tagalong_learn::{Line, NetworkFile};
 
 use crate::{Net, NetworkInput, Pass};
 
@@ -13,29 +13,17 @@ pub struct Model {
     pub offset: f64,
 }
 
-const FORMAT: &str = "body-net 1";
-/// Numbers in a line of the file.
-const LINE: usize = 16;
+const FILE: NetworkFile<'static> = NetworkFile { format: "body-net 1", parts: &Net::PARTS };
 
 impl Model {
-    /// Log-odds that the view is of a person, with even priors.
+    /// Returns the log-odds that the view is of a person, with even priors.
     pub fn log_odds(&self, view: &NetworkInput, pass: &mut Pass) -> f64 {
         self.slope * f64::from(self.net.look(view, pass)) + self.offset
     }
 
-    /// The model file.
+    /// Returns the model file.
     pub fn to_text(&self) -> String {
-        let Self { slope, offset, net } = self;
-        let mut text =
-            format!("format = \"{FORMAT}\"\nslope = {slope:?}\noffset = {offset:?}\n\n[net]\n");
-        for (name, part) in Net::PARTS.iter().zip(net.parts()) {
-            let lines = part.chunks(LINE).map(|line| {
-                line.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
-            });
-            let lines: Vec<String> = lines.collect();
-            let _ = writeln!(text, "{name} = [\n  {},\n]", lines.join(",\n  "));
-        }
-        text
+        FILE.write(Line { slope: self.slope, offset: self.offset }, &self.net.parts())
     }
 
     /// Reads a model file.
@@ -43,33 +31,9 @@ impl Model {
     /// # Errors
     /// Text that is no model, in a sentence.
     pub fn from_text(text: &str) -> Result<Self, String> {
-        let table: toml::Table =
-            toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
-        let format = table.get("format").and_then(|format| format.as_str()).unwrap_or_default();
-        if format != FORMAT {
-            return Err(format!("the format is `{format}`, not `{FORMAT}`"));
-        }
-        let number = |name: &str| {
-            let value = table.get(name).and_then(|value| value.as_float());
-            value.filter(|v| v.is_finite()).ok_or_else(|| format!("`{name}` is no finite number"))
-        };
-        let mut model =
-            Self { net: Net::default(), slope: number("slope")?, offset: number("offset")? };
-        for (name, part) in Net::PARTS.iter().zip(model.net.parts_mut()) {
-            let values = table.get("net").and_then(|net| net.get(name)?.as_array());
-            let values = values.ok_or_else(|| format!("it has no `{name}`"))?;
-            if values.len() != part.len() {
-                let (has, needs) = (values.len(), part.len());
-                return Err(format!("`{name}` has {has} numbers and needs {needs}"));
-            }
-            for (to, value) in part.iter_mut().zip(values) {
-                *to = value.as_float().unwrap_or(f64::NAN) as f32;
-            }
-            if !part.iter().all(|value| value.is_finite()) {
-                return Err(format!("`{name}` has numbers that are not finite"));
-            }
-        }
-        Ok(model)
+        let mut net = Net::default();
+        let Line { slope, offset } = FILE.read(text, &mut net.parts_mut())?;
+        Ok(Self { net, slope, offset })
     }
 }
 

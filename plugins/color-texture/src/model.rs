@@ -130,8 +130,11 @@ impl Model {
         self.trees.iter().map(|tree| f64::from(tree.vote(values))).sum()
     }
 
-    /// The model file.
-    pub fn to_text(&self) -> String {
+    /// Formats the model file.
+    ///
+    /// # Errors
+    /// Numbers that TOML cannot express.
+    pub fn to_text(&self) -> Result<String, String> {
         let file = File {
             format: FORMAT.into(),
             features: COUNT,
@@ -139,7 +142,8 @@ impl Model {
             offset: self.offset,
             trees: self.trees.clone(),
         };
-        toml::to_string(&file).unwrap_or_default().replace("]], [", "]],\n  [")
+        let text = toml::to_string(&file).map_err(|why| format!("the model is no TOML: {why}"))?;
+        Ok(text.replace("]], [", "]],\n  ["))
     }
 
     /// Reads a model file.
@@ -213,12 +217,12 @@ mod tests {
 
     #[test]
     fn a_model_survives_its_file() {
-        assert_eq!(Model::from_text(&model().to_text()).unwrap(), model());
+        assert_eq!(Model::from_text(&model().to_text().unwrap()).unwrap(), model());
     }
 
     #[test]
     fn broken_files_are_refused_in_a_sentence() {
-        let good = model().to_text();
+        let good = model().to_text().unwrap();
         let refusal = |from: &str, to: &str| {
             assert!(good.contains(from), "{good}");
             Model::from_text(&good.replace(from, to)).unwrap_err()

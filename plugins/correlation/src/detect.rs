@@ -157,6 +157,8 @@ pub(crate) fn sighting(
     let region = Rect { x: square.x + aside, y: square.y + down, ..*square };
     let position = camera.head_of(&region, head_m - HEAD_RADIUS_M);
     let sigma_px = config.sigma_place_m * camera.focal_px() / head_m;
+    // Not `Camera::locate_head`: its covariance is that of a point in the middle of the square, and
+    // here it is that of the head.
     let pixel = camera.project(&position).unwrap_or(region.centre());
     let covariance = camera.covariance(pixel, head_m, sigma_px, config.sigma_distance_m);
     Detection {

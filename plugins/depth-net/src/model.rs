@@ -1,7 +1,7 @@
-use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use tagalong_core::{Derived, Frame, Result};
+use tagalong_learn::{Line, NetworkFile};
 
 use crate::{FloorMap, Net, Pass};
 
@@ -18,9 +18,7 @@ pub struct Model {
     mark: u64,
 }
 
-const FORMAT: &str = "depth-net 1";
-/// Numbers in a line of the file.
-const LINE: usize = 16;
+const FILE: NetworkFile<'static> = NetworkFile { format: "depth-net 1", parts: &Net::PARTS };
 
 /// Answers of networks to a frame, by the fingerprint of the model: several plugins and several
 /// queries ask for the same one.
@@ -70,17 +68,7 @@ impl Model {
 
     /// Returns the model file.
     pub fn to_text(&self) -> String {
-        let Self { slope, offset, net, .. } = self;
-        let mut text =
-            format!("format = \"{FORMAT}\"\nslope = {slope:?}\noffset = {offset:?}\n\n[net]\n");
-        for (name, part) in Net::PARTS.iter().zip(net.parts()) {
-            let lines = part.chunks(LINE).map(|line| {
-                line.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
-            });
-            let lines: Vec<String> = lines.collect();
-            let _ = writeln!(text, "{name} = [\n  {},\n]", lines.join(",\n  "));
-        }
-        text
+        FILE.write(Line { slope: self.slope, offset: self.offset }, &self.net.parts())
     }
 
     /// Reads a model file.
@@ -88,34 +76,10 @@ impl Model {
     /// # Errors
     /// Text that is no model, in a sentence.
     pub fn from_text(text: &str) -> std::result::Result<Self, String> {
-        let table: toml::Table =
-            toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
-        let format = table.get("format").and_then(|format| format.as_str()).unwrap_or_default();
-        if format != FORMAT {
-            return Err(format!("the format is `{format}`, not `{FORMAT}`"));
-        }
-        let number = |name: &str| {
-            let value = table.get(name).and_then(|value| value.as_float());
-            value.filter(|v| v.is_finite()).ok_or_else(|| format!("`{name}` is no finite number"))
-        };
-        let (slope, offset) = (number("slope")?, number("offset")?);
+        let mut net = Net::default();
+        let Line { slope, offset } = FILE.read(text, &mut net.parts_mut())?;
         if slope <= 0.0 {
             return Err("`slope` is not above zero".into());
-        }
-        let mut net = Net::default();
-        for (name, part) in Net::PARTS.iter().zip(net.parts_mut()) {
-            let values = table.get("net").and_then(|net| net.get(name)?.as_array());
-            let values = values.ok_or_else(|| format!("it has no `{name}`"))?;
-            if values.len() != part.len() {
-                let (has, needs) = (values.len(), part.len());
-                return Err(format!("`{name}` has {has} numbers and needs {needs}"));
-            }
-            for (to, value) in part.iter_mut().zip(values) {
-                *to = value.as_float().unwrap_or(f64::NAN) as f32;
-            }
-            if !part.iter().all(|value| value.is_finite()) {
-                return Err(format!("`{name}` has numbers that are not finite"));
-            }
         }
         Ok(Self::new(net, slope, offset))
     }

@@ -289,6 +289,8 @@ impl DepthTemplate {
         let pixel = scene.view.full_pixel(person.x, person.y);
         let px_per_m = frame.camera.focal_px() / person.depth_m;
         let depth_m = head_depth_m(frame.depth()?, pixel.x, pixel.y, px_per_m, person.depth_m);
+        // Not `Camera::locate_head`, which inverts an upper-body square: here the head itself was
+        // fitted, its centre lies behind the surface by a setting, and the noise is the surface's.
         let position = frame.camera.back_project(pixel, depth_m + c.centre_behind_m);
         let sigma_depth_m = c.sigma_depth_m + c.sigma_depth_per_m2 * depth_m * depth_m;
         let sigma_px = c.sigma_across_m * px_per_m;

@@ -1,8 +1,9 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tagalong_core::{Frame, Likelihood, Person, Result};
+use tagalong_core::{Frame, Likelihood, Person, Result, Visualisation};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_vision::ComparedPixels;
 
 use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
 use crate::config::DepthTemplateConfig;
@@ -185,9 +186,9 @@ impl Likelihood for Weigher {
         Ok(())
     }
 
-    fn silhouettes(&self, frame: &Frame, scene: &[Person]) -> Result<Vec<Vec<Rect>>> {
+    fn visualise(&self, frame: &Frame, scene: &[Person]) -> Result<Option<Visualisation>> {
         let image = frame.derived::<Working>()?;
-        Ok(self.tools().silhouettes(frame, &image, scene))
+        Ok(Some(Arc::new(ComparedPixels(self.tools().silhouettes(frame, &image, scene)))))
     }
 }
 

@@ -18,7 +18,7 @@ mod tests;
 pub use config::Config;
 pub use filter::{Ekf, State};
 use tagalong_config::Registry;
-use tagalong_core::PerPerson;
+use tagalong_filtering::PerPerson;
 
 /// Registers the filter `ekf`.
 pub fn register(registry: &mut Registry) {

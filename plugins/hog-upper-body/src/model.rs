@@ -136,7 +136,10 @@ impl Model {
     }
 
     /// Formats the model file.
-    pub fn to_text(&self) -> String {
+    ///
+    /// # Errors
+    /// Numbers that TOML cannot express.
+    pub fn to_text(&self) -> Result<String, String> {
         let (levels, bytes) = match &self.machine {
             Machine::Linear { weights, bias } => {
                 (vec![*bias], weights.iter().flat_map(|w| w.to_le_bytes()).collect())
@@ -151,7 +154,7 @@ impl Model {
             offset: self.offset,
             numbers: BASE64_STANDARD.encode(bytes),
         };
-        toml::to_string(&kept).unwrap_or_default()
+        toml::to_string(&kept).map_err(|why| format!("the model is no TOML: {why}"))
     }
 
     /// Parses a model file.

@@ -217,9 +217,9 @@ fn two_people_one_behind_the_other_both_stay() {
 #[test]
 fn a_model_survives_its_file_and_a_wrong_one_is_refused() {
     let kept = Model { slope: 3.0, offset: -1.0, ..trees() };
-    assert_eq!(Model::from_text(&kept.to_text()).unwrap(), kept);
+    assert_eq!(Model::from_text(&kept.to_text().unwrap()).unwrap(), kept);
     let model = Model { slope: 2.5, offset: -1.5, ..linear() };
-    let text = model.to_text();
+    let text = model.to_text().unwrap();
     assert_eq!(Model::from_text(&text).unwrap(), model);
     assert!((model.log_odds(model.sum_at(0.5)) - 0.5).abs() < 1e-5);
     let wrong = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();

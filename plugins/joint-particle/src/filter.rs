@@ -1,11 +1,13 @@
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use nalgebra::{Point3, Vector2};
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Input, Inputs, Person,
-    Result, Sketch, TrackId, Update,
+    Result, TrackId, Update, Visualisation,
 };
 use tagalong_geometry::Camera;
+use tagalong_vision::Sketch;
 
 use crate::config::{Config, Method};
 use crate::group::Group;
@@ -190,7 +192,7 @@ fn ids(group: &Group) -> BTreeSet<TrackId> {
 impl Filter for JointParticle {
     fn requirements(&self) -> FilterRequirements {
         let inputs = Inputs::NONE.accept(Input::Colour);
-        FilterRequirements { inputs, likelihood: true, image_box: false }
+        FilterRequirements { inputs, likelihood: true, searches: true, image_box: false }
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
@@ -242,13 +244,13 @@ impl Filter for JointParticle {
         Ok(seen)
     }
 
-    fn sketch(&self, evidence: &Evidence<'_>) -> Result<Sketch> {
+    fn visualise(&self, evidence: &Evidence<'_>) -> Result<Option<Visualisation>> {
         let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
-        let Some(likelihood) = evidence.likelihood else { return Ok(shown) };
+        let Some(likelihood) = evidence.likelihood else { return Ok(None) };
         let mut look =
             WeighingInput::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
         self.groups.iter().try_for_each(|group| sketch(group, &mut look, &mut shown))?;
-        Ok(shown)
+        Ok(Some(Arc::new(shown)))
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
@@ -351,7 +353,8 @@ mod tests {
         let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
         filter.update(&evidence).unwrap();
         let before = filter.estimates(&frame.camera);
-        let sketch = filter.sketch(&evidence).unwrap();
+        let shown = filter.visualise(&evidence).unwrap().unwrap();
+        let sketch: &Sketch = shown.downcast_ref().unwrap();
         assert_eq!(filter.estimates(&frame.camera), before, "looking changes nothing");
         let of = |id| sketch.points.iter().filter(|point| point.id == TrackId(id)).count();
         let rows = config.joint_side * config.joint_side;

@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2, Vector3, Vector5};
-use tagalong_core::{
-    Frame, Likelihood, Person, Result, Silhouette, Sketch, SketchMap, SketchPoint, TrackId,
-};
+use tagalong_core::{Frame, Likelihood, Person, Result, TrackId};
+use tagalong_vision::{ComparedPixels, Silhouette, Sketch, SketchMap, SketchPoint};
 
 use crate::config::{Chosen, Config, Method};
 use crate::group::Group;
@@ -425,9 +424,12 @@ pub(crate) fn sketch(
     }
     let people = group.row(best).iter().zip(&group.ids);
     let scene: Vec<Person> = people.map(|(particle, id)| look.person(*id, particle)).collect();
-    let bodies = look.likelihood.silhouettes(look.frame, &scene)?;
-    let bodies = group.ids.iter().zip(bodies).map(|(id, runs)| Silhouette { id: *id, runs });
-    sketch.silhouettes.extend(bodies);
+    let shown = look.likelihood.visualise(look.frame, &scene)?;
+    if let Some(ComparedPixels(bodies)) = shown.as_ref().and_then(|shown| shown.downcast_ref()) {
+        let bodies = group.ids.iter().zip(bodies);
+        let bodies = bodies.map(|(id, runs)| Silhouette { id: *id, runs: runs.clone() });
+        sketch.silhouettes.extend(bodies);
+    }
     if group.people() == 2 {
         sketch_maps(group, look, sketch)?;
     }

@@ -197,7 +197,7 @@ mod tests {
     fn camera() -> Camera {
         let d =
             [67.5_f64.to_radians(), 0.05, 2.0_f64.to_radians().tan(), 53.0_f64.to_radians().tan()];
-        let mirror = ConicalMirror::from_coefficients(1.0, [0.0; 2], &d).unwrap();
+        let mirror = ConicalMirror::new(1.0, [0.0; 2], d).unwrap();
         let panorama = Panorama { mirror, columns: 480, rows: 120 };
         let mut robot_from_camera = ConicalMirror::upright(1.5);
         robot_from_camera.translation.vector.x = 0.3;

@@ -280,7 +280,10 @@ impl Model {
     }
 
     /// Formats the model file.
-    pub fn to_text(&self) -> String {
+    ///
+    /// # Errors
+    /// Numbers that TOML cannot express.
+    pub fn to_text(&self) -> Result<String, String> {
         let file = File {
             format: FORMAT.into(),
             features: FEATURES.map(String::from).to_vec(),
@@ -288,7 +291,7 @@ impl Model {
             general: self.general.clone(),
             people: self.people.clone(),
         };
-        toml::to_string(&file).unwrap_or_default()
+        toml::to_string(&file).map_err(|why| format!("the model is no TOML: {why}"))
     }
 
     /// Parses a model file.

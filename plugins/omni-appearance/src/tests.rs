@@ -15,7 +15,7 @@ const ROWS: usize = 120;
 
 fn camera(height_m: f64) -> Arc<Camera> {
     let d = [67.5_f64.to_radians(), 0.05, 2.0_f64.to_radians().tan(), 53.0_f64.to_radians().tan()];
-    let mirror = ConicalMirror::from_coefficients(1.0, [0.0; 2], &d).unwrap();
+    let mirror = ConicalMirror::new(1.0, [0.0; 2], d).unwrap();
     Arc::new(Camera {
         lens: Lens::Panorama(Panorama { mirror, columns: COLUMNS, rows: ROWS }),
         width: COLUMNS,
@@ -141,7 +141,7 @@ fn a_model_of_another_camera_is_refused_in_words() {
 fn the_shipped_model_is_one() {
     let text = include_str!("../../../configs/models/omni-distance.toml");
     let model = Model::from_text(text).unwrap();
-    assert_eq!(Model::from_text(&model.to_text()).unwrap(), model);
+    assert_eq!(Model::from_text(&model.to_text().unwrap()).unwrap(), model);
     assert_eq!(model.people.len(), 2);
     let refused = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();
     assert!(refused("distance 2", "distance 9").contains("distance 9"));

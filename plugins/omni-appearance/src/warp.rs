@@ -274,7 +274,7 @@ mod tests {
 
     fn camera() -> Camera {
         let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
-        let mirror = ConicalMirror::from_coefficients(175.0, [240.0; 2], &d).unwrap();
+        let mirror = ConicalMirror::new(175.0, [240.0; 2], d).unwrap();
         Camera {
             lens: Lens::Panorama(Panorama { mirror, columns: COLUMNS, rows: ROWS }),
             width: COLUMNS,

@@ -124,7 +124,10 @@ impl Model {
     }
 
     /// Formats the model file.
-    pub fn to_text(&self) -> String {
+    ///
+    /// # Errors
+    /// Numbers that TOML cannot express.
+    pub fn to_text(&self) -> Result<String, String> {
         let file = File {
             format: FORMAT.into(),
             scaling: self.sampler.scaling,
@@ -135,7 +138,7 @@ impl Model {
             offset: self.offset,
             vectors: self.vectors.chunks_exact(PIXELS).zip(&self.weights).map(entry).collect(),
         };
-        toml::to_string(&file).unwrap_or_default()
+        toml::to_string(&file).map_err(|why| format!("the model is no TOML: {why}"))
     }
 
     /// Parses a model file.
@@ -249,7 +252,7 @@ mod tests {
         #[test]
         fn a_model_survives_its_file(seed: u64, vectors in 0u64..8) {
             let model = Model { slope: 1.75, offset: -0.5, ..model(seed, vectors, 2.0) };
-            let read = Model::from_text(&model.to_text()).unwrap();
+            let read = Model::from_text(&model.to_text().unwrap()).unwrap();
             let x = patch(seed ^ 5);
             prop_assert!((model.log_odds(&x) - read.log_odds(&x)).abs() < 1e-4);
             prop_assert_eq!(read.to_text(), model.to_text());
@@ -265,7 +268,7 @@ mod tests {
 
     #[test]
     fn broken_files_are_refused_in_a_sentence() {
-        let good = model(1, 2, 1.0).to_text();
+        let good = model(1, 2, 1.0).to_text().unwrap();
         let format = good.replace("svm-patch 1", "svm-patch 9");
         assert!(Model::from_text(&format).unwrap_err().contains("svm-patch 9"));
         let bytes = good.replacen("bytes = \"", "bytes = \"AAAA", 1);

@@ -3,7 +3,6 @@ use std::path::Path;
 use tagalong_app::choice::{Choice, Fitting, fitting};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::{Failure, say};
-use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 
 /// Returns the pipeline for a log, and says which and why.
@@ -11,7 +10,6 @@ use tagalong_config::Registry;
 /// # Errors
 /// A log that cannot be read, or that no pipeline fits: the reasons of each.
 pub(super) fn choose(log: &Path, registry: &Registry) -> Result<ConfigFile, Failure> {
-    check_log_path(log)?;
     let mut found = fitting(log, registry, 1);
     let Some(Fitting { choice, config }) = found.fitting.pop() else {
         return Err(found.none_fits(log));

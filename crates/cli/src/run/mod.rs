@@ -49,7 +49,7 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let mut pictures = Pictures::new(desk.overlay.take(), threads);
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
-    pipeline.sketch(args.overlay);
+    pipeline.visualise(args.overlay);
     let stopped = work(&mut pipeline, &mut frames, &mut desk, &mut pictures, &signals);
     // An error of the run is returned only after the threads have finished.
     pictures.finish()?;
@@ -69,14 +69,15 @@ struct Job {
 
 impl Job {
     fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
-        let config = match args.config() {
-            Some(config) => ConfigFile::read(config)?,
+        let named = args.config().map(ConfigFile::read).transpose()?;
+        check_log_path(args.log())?;
+        let config = match named {
+            Some(config) => config,
             None if !args.has_log() => ConfigFile::built_in(),
             None => choice::choose(args.log(), registry)?,
         };
         let (pipeline, settings) = config.pipeline(registry, args.seed)?;
         let outer = config.outer()?;
-        check_log_path(args.log())?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();

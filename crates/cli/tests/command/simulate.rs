@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tagalong_geometry::ConicalMirror;
+use tagalong_log::camera_info::CONICAL_MIRROR;
 use tagalong_log::msgs::{CameraInfo, PoseStamped, TFMessage, decode};
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::Scene;
@@ -121,9 +122,10 @@ fn a_mirror_and_webcams_are_in_the_log_as_they_are_described() {
     let log = fs::read(&path).unwrap();
 
     let info: CameraInfo = decode(&first(&log, "/camera/color/camera_info")).unwrap();
-    assert_eq!(info.distortion_model, ConicalMirror::MODEL);
-    let mirror = ConicalMirror::from_coefficients(info.k[0], [info.k[2], info.k[5]], &info.d);
-    assert!(mirror.is_some_and(|m| (m.half_angle_rad - 67.5_f64.to_radians()).abs() < 1e-9));
+    assert_eq!(info.distortion_model, CONICAL_MIRROR);
+    let shape: [f64; 4] = info.d[..].try_into().unwrap();
+    assert!(ConicalMirror::new(info.k[0], [info.k[2], info.k[5]], shape).is_some());
+    assert!((shape[0] - 67.5_f64.to_radians()).abs() < 1e-9);
 
     let mounts = first(&log, "/truth/tf_static");
     let mounts: TFMessage = decode(&mounts).unwrap();

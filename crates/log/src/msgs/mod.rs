@@ -61,7 +61,7 @@ pub enum CdrError {
 pub(crate) const ROS1_MARK: [u8; 4] = *b"ros1";
 
 /// Reads a message with its four-byte encapsulation header, or one of a ROS 1 bag as
-/// [`crate::bag_walk`] delivers it.
+/// [`crate::LogWalker`] delivers it.
 ///
 /// # Errors
 /// [`CdrError`]. Bytes after the message are allowed, because some writers pad.

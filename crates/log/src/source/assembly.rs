@@ -9,8 +9,8 @@ use super::plan::Plan;
 use super::tally::Tally;
 use super::{LogFacts, LogFrame};
 use crate::camera_info::CalibrationError;
-use crate::mcap_walk::{Channel, Message};
 use crate::scan::Type;
+use crate::walk::{Channel, Message};
 
 /// Sequence of messages.
 pub(super) trait Messages {

@@ -7,7 +7,6 @@ use super::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use super::plan::Plan;
 use super::tally::Tally;
 use crate::InputSettings;
-use crate::mcap_walk::Message;
 use crate::msgs::{
     CameraInfo, CdrError, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
 };
@@ -15,6 +14,7 @@ use crate::odometry::PoseBuffer;
 use crate::scan::{Scan, Type, is_static};
 use crate::tf::TfBuffer;
 use crate::topics::Chosen;
+use crate::walk::Message;
 
 /// Messages that have been read and not yet become a frame.
 pub(super) struct Intake {

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use super::assembly::{Assembly, Messages};
 use super::plan::{plan, tally_of};
 use super::{LogFacts, LogFrame};
-use crate::mcap_walk::{Channel, Message};
 use crate::scan::{Gathering, Type};
+use crate::walk::{Channel, Message};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
 /// Number of messages kept of each topic, to fit the floor to.

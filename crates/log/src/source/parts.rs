@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::assembly::Messages;
 use crate::log_files::open_file;
-use crate::log_walk::LogWalker;
-use crate::mcap_walk::Message;
 use crate::scan::{LogPart, Scan};
+use crate::walk::Message;
+use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
 /// Messages of all files of a log, in the order of recording.

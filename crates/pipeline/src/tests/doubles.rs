@@ -11,9 +11,10 @@ use tagalong_config::Registry;
 use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
     EgoMotion, Error, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images,
-    Input, Inputs, Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene, Stamp, Track,
-    TrackId, Twist, Update, Verifier, WheelSpeeds,
+    Input, Inputs, Likelihood, Person, Query, Result, Scene, Stamp, Track, TrackId, Twist, Update,
+    Verifier, WheelSpeeds,
 };
+use tagalong_filtering::{PerPerson, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
 use crate::{FrameReport, Pipeline};
@@ -253,7 +254,8 @@ impl Filter for Odd {
     fn requirements(&self) -> FilterRequirements {
         let how = self.config.how.as_str();
         let (image_box, likelihood) = (how == "boxes", how == "weighs");
-        FilterRequirements { inputs: Inputs::NONE, image_box, likelihood }
+        let searches = likelihood;
+        FilterRequirements { inputs: Inputs::NONE, image_box, likelihood, searches }
     }
 
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {

@@ -14,6 +14,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("config", &[]),
     ("vision", &[]),
     ("learn", &[]),
+    ("filtering", &[]),
     ("stereo", &["vision"]),
     ("odometry", &[]),
     ("assignment", &[]),
@@ -48,7 +49,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("conformance", &[]),
     ("catalog", &["plugins"]),
     ("app", &["pipeline", "log"]),
-    ("render", &["pipeline"]),
+    ("render", &["pipeline", "vision"]),
     ("scoring", &["app", "log", "eval"]),
     (
         "simulate",
@@ -92,11 +93,11 @@ const ARROWS: &[(&str, &[&str])] = &[
 const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
 
 /// Crates that a plugin may depend on.
-const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment"];
+const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment", "filtering"];
 
 /// Crates that the tests of any crate may depend on in addition.
 const FOR_TESTS: &[&str] =
-    &["vision", "learn", "sim", "conformance", "testdata", "catalog", "plugins"];
+    &["vision", "learn", "filtering", "sim", "conformance", "testdata", "catalog", "plugins"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {

@@ -150,7 +150,8 @@ impl Trainer for TreeTrainer {
         let model = Model { trees, slope: thousandths(slope), offset: thousandths(offset) };
         progress(1.0);
         let figures = self.figures(&trials, &model);
-        Ok(Fitted { model: model.to_text(), figures, ..Fitted::default() })
+        let text = model.to_text().map_err(Error::Other)?;
+        Ok(Fitted { model: text, figures, ..Fitted::default() })
     }
 }
 

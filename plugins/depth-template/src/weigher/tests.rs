@@ -199,7 +199,8 @@ fn what_is_shown_of_somebody_is_what_nobody_hides() {
     let frame = painted(&[near, far]);
     let weigher = Weigher::new(&DepthTemplateConfig::default());
     let area = |scene: &[Person]| -> Vec<f64> {
-        let runs = weigher.silhouettes(&frame, scene).unwrap();
+        let shown = weigher.visualise(&frame, scene).unwrap().unwrap();
+        let ComparedPixels(runs) = shown.downcast_ref().unwrap();
         runs.iter().map(|runs| runs.iter().map(Rect::area).sum()).collect()
     };
     let (alone, together) = (area(&[far])[0], area(&[far, near]));

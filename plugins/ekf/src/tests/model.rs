@@ -3,7 +3,8 @@
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, SMatrix, Vector2, Vector3, Vector5};
 use proptest::prelude::*;
 use tagalong_config::{Context, Registry};
-use tagalong_core::{DiffDrive, EgoMotion, PersonFilter};
+use tagalong_core::{DiffDrive, EgoMotion};
+use tagalong_filtering::PersonFilter;
 
 use super::world::{DT_S, World, camera, detection, normal3};
 use crate::filter::{motion_jacobian, state_jacobian};

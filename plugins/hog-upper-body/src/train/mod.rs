@@ -266,7 +266,8 @@ impl Trainer for HogTrainer {
         model = Model { slope: slope.max(1e-3), offset, ..model };
         progress(1.0);
         let figures = self.figures(&model, &mined);
-        Ok(Fitted { model: model.to_text(), figures, ..Fitted::default() })
+        let text = model.to_text().map_err(Error::Other)?;
+        Ok(Fitted { model: text, figures, ..Fitted::default() })
     }
 }
 

@@ -3,9 +3,10 @@ use std::sync::{Arc, Mutex};
 use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
-    Result, RgbImage, Sketch, Stamp, TrackId, Update,
+    Result, RgbImage, Stamp, TrackId, Update,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
+use tagalong_vision::Sketch;
 
 use crate::{Config, JointParticle};
 
@@ -119,7 +120,8 @@ impl Rig {
         let frame = frame(EgoMotion::at_rest(0.1), None);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
         let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
-        self.filter.sketch(&evidence).unwrap()
+        let shown = self.filter.visualise(&evidence).unwrap().unwrap();
+        shown.downcast_ref::<Sketch>().unwrap().clone()
     }
 
     /// Returns the image columns of the particles of a person.

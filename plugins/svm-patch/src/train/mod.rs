@@ -112,7 +112,8 @@ impl Trainer for PatchTrainer {
         (model.slope, model.offset) = (slope, offset);
         progress(1.0);
         let figures = self.figures(&trials, best, &model, fitted);
-        Ok(Fitted { model: model.to_text(), figures, ..Fitted::default() })
+        let text = model.to_text().map_err(Error::Other)?;
+        Ok(Fitted { model: text, figures, ..Fitted::default() })
     }
 }
 

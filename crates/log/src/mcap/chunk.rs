@@ -3,8 +3,8 @@
 use std::io::Read;
 
 use super::record;
-use super::source::Source;
 use crate::Limits;
+use crate::walk::Source;
 
 /// Reason for which a chunk delivers no records.
 pub(super) enum ChunkFault {

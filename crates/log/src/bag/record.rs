@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::mcap_walk::record::{u32_at, u64_at};
+use crate::mcap::record::{u32_at, u64_at};
 
 /// Kind of a record, the field `op` of its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

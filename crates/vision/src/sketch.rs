@@ -1,9 +1,9 @@
 use nalgebra::Point2;
-
-use crate::TrackId;
+use tagalong_core::TrackId;
 use tagalong_geometry::Rect;
 
-/// Visualisation of a plugin's inner state. It is made on request only.
+/// Visualisation of a filter's state, as [`tagalong_core::Filter::visualise`] may return it. Pictures
+/// show it over the image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sketch {
     /// Points in the image: particles.
@@ -44,3 +44,9 @@ pub struct SketchMap {
     /// Values, 0 (dark) to 1 (bright).
     pub values: Vec<f64>,
 }
+
+/// Visualisation of a likelihood, as [`tagalong_core::Likelihood::visualise`] may return it: for each
+/// person of a scene the runs of pixels that are compared with the depth of the person, nearer
+/// people in front of farther ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ComparedPixels(pub Vec<Vec<Rect>>);

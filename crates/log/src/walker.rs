@@ -1,0 +1,112 @@
+use std::io::Read;
+use std::sync::Arc;
+
+use crate::Limits;
+use crate::bag::{self, Bag};
+use crate::mcap::{Mcap, NotMcap};
+use crate::walk::{Channel, Counters, LOSSES, Message, Source, Walk};
+
+/// Robust reader of an MCAP file or of a ROS 1 bag, which trusts nothing in it. The container is
+/// told apart by its first bytes.
+///
+/// The file is read once from front to back through a small buffer, so that a pipe of any length
+/// can be read, and a file that shrinks meanwhile is only a truncated file. The index at its end is
+/// never needed, hence a file without it (because its writer was killed) is read like any other, up
+/// to its last complete chunk. Sizes are bounded by [`Limits`]. A part that cannot be used is
+/// counted and the walk goes on behind it; a part without an end (a record longer than the rest of
+/// the file) ends the walk. Once ended, it stays ended.
+pub struct LogWalker<R> {
+    walk: Walk<R>,
+    container: Container,
+}
+
+/// Container of the messages.
+enum Container {
+    Mcap(Mcap),
+    Bag(Bag),
+}
+
+impl<R: Read> LogWalker<R> {
+    /// Starts a walk.
+    ///
+    /// # Errors
+    /// [`NotMcap`] if the file starts as neither container does.
+    pub fn new(reader: R, limits: &Limits) -> Result<Self, NotMcap> {
+        let mut source = Source::new(reader);
+        let mut magic = [0; 13];
+        let got = source.fill(&mut magic[..8]);
+        // The magic of a bag is longer than that of MCAP, and no more may be read of the latter.
+        let may_be_bag = magic[..got] == bag::MAGIC[..8];
+        let is_bag = may_be_bag && source.fill(&mut magic[8..]) == 5 && magic[..] == *bag::MAGIC;
+        let container = match is_bag {
+            true => Container::Bag(Bag::default()),
+            false => Container::Mcap(Mcap::behind(&magic[..got])?),
+        };
+        Ok(Self { walk: Walk::new(source, limits), container })
+    }
+
+    /// Adds the channels of an earlier walk through the same file. The index of an MCAP file
+    /// repeats them at its end, which helps where the chunk with their first record is damaged.
+    #[must_use]
+    pub fn knowing(mut self, channels: impl IntoIterator<Item = Arc<Channel>>) -> Self {
+        self.walk.channels.extend(channels.into_iter().map(|channel| (channel.id, channel)));
+        self
+    }
+
+    /// Returns the next message in the order of the file; `None` at the end, and from then on.
+    #[expect(clippy::should_implement_trait, reason = "the message borrows the walker's buffer")]
+    pub fn next(&mut self) -> Option<Message<'_>> {
+        self.advance();
+        self.message()
+    }
+
+    /// Goes on to the next message; returns false at the end.
+    pub(crate) fn advance(&mut self) -> bool {
+        let Self { walk, container } = self;
+        walk.located = None;
+        while walk.located.is_none() && !walk.ended {
+            match (&mut *container, walk.rest.is_empty()) {
+                (Container::Mcap(mcap), true) => mcap.step_in_file(walk),
+                (Container::Mcap(mcap), false) => mcap.step_in_buffer(walk),
+                (Container::Bag(bag), true) => bag.step_in_file(walk),
+                (Container::Bag(_), false) => bag::step_in_buffer(walk),
+            }
+        }
+        walk.located.is_some()
+    }
+
+    /// Returns the message that [`LogWalker::advance`] reached.
+    pub(crate) fn message(&self) -> Option<Message<'_>> {
+        self.walk.message()
+    }
+
+    /// Returns the channels found so far.
+    pub fn channels(&self) -> impl Iterator<Item = &Arc<Channel>> {
+        self.walk.channels.values()
+    }
+
+    /// Returns the numbers of records read, skipped and lost, by name.
+    pub fn counters(&self) -> &Counters {
+        &self.walk.counters
+    }
+
+    /// Returns true if some part of the file could not be used.
+    pub fn data_lost(&self) -> bool {
+        self.walk.counters.keys().any(|name| LOSSES.contains(name))
+    }
+
+    /// Returns sentences about the damage, each with its offset in the file; only the first few.
+    pub fn notes(&self) -> &[String] {
+        &self.walk.notes
+    }
+
+    /// Returns the number of bytes of the file consumed so far.
+    pub fn position(&self) -> u64 {
+        self.walk.source.position()
+    }
+
+    /// Returns the reader, behind the buffered part of the file.
+    pub fn into_reader(self) -> R {
+        self.walk.source.into_inner()
+    }
+}
