@@ -73,8 +73,7 @@ impl Bench {
 
     fn offer(&mut self, x: f64, log_odds: f64) -> Initiation {
         let seen = detection(x, log_odds);
-        let new =
-            Unassociated { detection: &seen, detector_log_odds: log_odds, discovered: true };
+        let new = Unassociated { detection: &seen, detector_log_odds: log_odds, discovered: true };
         self.manager.initiate(ID, &new)
     }
 
