@@ -298,6 +298,8 @@ fn the_best_place_must_be_good_and_better_than_all_others() {
     let (below, above) =
         (Placed { down: 6, ..best }, Placed { down: -6, ..placed(3, 0.85, 1.0, 0.0) });
     assert_eq!(chosen(&[below, above]), Err("correlation: two places"), "one above the other");
+    let beside = Placed { down: 3, ..placed(3, 0.89, 1.0, 0.0) };
+    assert_eq!(chosen(&[below, beside]), Ok(3), "that is the same place");
     assert_eq!(chosen(&[placed(-8, 0.95, 0.3, 0.0), best]), Ok(3), "that place is hidden");
     assert_eq!(chosen(&[placed(0, 0.77, 1.0, 0.0)]), Err("correlation: too low"));
     assert_eq!(chosen(&[placed(0, 0.9, 0.39, 0.0)]), Err("correlation: hidden"));
