@@ -372,6 +372,8 @@ fn a_rectangle_takes_its_part_of_a_box_and_a_pixel_at_least() {
     assert_eq!(rectangle.pixels(40, 20), [10, 10, 30, 15]);
     let narrow = Rectangle { left: 0.98, width: 0.01, ..rectangle };
     assert_eq!(narrow.pixels(10, 20), [9, 10, 10, 15]);
+    let line = Rectangle { left: 0.5, width: 0.001, ..rectangle };
+    assert_eq!(line.pixels(10, 20), [5, 10, 6, 15]);
     assert_eq!(rectangle.pixels(1, 1), [0, 0, 1, 1]);
 }
 
