@@ -126,6 +126,22 @@ fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
     assert!(back.region.iou(&person(place).rect().unwrap()) > 0.9);
 }
 
+/// The robot turns by 3 rad within 20 frames, the person walks on to the left at half a metre a
+/// second.
+#[test]
+fn a_person_behind_the_robot_walks_on() {
+    let (config, camera) = (Config::default(), camera());
+    let at = |frame: usize| Point3::new(3.0, -0.5 + 0.5 * DT_S * frame as f64, 1.6);
+    let sightings: Vec<Detection> = (0..40).map(|frame| person(at(frame))).collect();
+    let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
+    let motion = EgoMotion { turn: 0.15, ..EgoMotion::at_rest(DT_S) };
+    (0..20).for_each(|_| state.predict(&config, &motion, &camera));
+    let place = state.estimate(&camera).person.position;
+    assert!(place.x < 0.0, "{place}");
+    let in_old_frame = nalgebra::Rotation2::new(20.0 * 0.15) * place.xy();
+    assert!((in_old_frame - at(59).xy()).norm() < 0.1, "{in_old_frame} {}", at(59));
+}
+
 /// A change of any of the six numbers, by much more than the step of the derivative.
 #[test]
 fn the_jacobian_foretells_the_point_in_space() {

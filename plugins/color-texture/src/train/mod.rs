@@ -272,6 +272,8 @@ mod tests {
         let found = weights([3, 1, 2, 4]);
         let expected = [&[1.25 / 3.0; 3][..], &[3.75], &[0.625; 2], &[0.9375; 4]].concat();
         assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        // Depth on one side alone would tell the classes apart: it has no share.
+        assert_eq!(weights([2, 1, 3, 0]), [1.5, 1.5, 0.0, 1.0, 1.0, 1.0]);
         // Without depth there is nothing to share.
         assert_eq!(weights([3, 0, 1, 0]), [2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 2.0]);
     }
