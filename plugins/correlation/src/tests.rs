@@ -187,7 +187,7 @@ fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
         funnel.count("correlation: not seen well yet") == 0
     };
     let (lost, other) = (track(HEAD, false), Track { id: TrackId(4), ..track(HEAD, false) });
-    assert!(detected(&[lost.clone()]) && detected(&[lost, other.clone()]));
+    assert!(detected(std::slice::from_ref(&lost)) && detected(&[lost, other.clone()]));
     assert!(!detected(&[other]));
 }
 

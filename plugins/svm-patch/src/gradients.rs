@@ -107,7 +107,7 @@ mod tests {
             f64::from(grey[(row.clamp(0, last) * SIDE as i64 + column.clamp(0, last)) as usize])
         };
         let mut cells = vec![vec![0.0; DIRECTIONS]; CELLS * CELLS];
-        let mut strengths = vec![0.0; CELLS * CELLS];
+        let mut strengths = [0.0; CELLS * CELLS];
         for row in 0..SIDE as i64 {
             for column in 0..SIDE as i64 {
                 let dx = (at(row, column + 1) - at(row, column - 1)) / 2.0;
