@@ -111,14 +111,6 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_fits_within_the_gate_alone() {
-        let hungarian = Hungarian::new(Config::default()).unwrap();
-        let track = track(Point3::new(3.0, 0.0, 1.6), SMatrix::identity() * 0.01);
-        assert!(hungarian.fits(&track, &person(3.0, 0.1), &GATE));
-        assert!(!hungarian.fits(&track, &person(3.0, 4.0), &GATE));
-    }
-
-    #[test]
     fn settings_that_cannot_work_are_refused() {
         for config in [
             Config { gate: 0.0, ..Config::default() },
@@ -129,6 +121,14 @@ mod tests {
         ] {
             assert!(Hungarian::new(config.clone()).is_err(), "{config:?}");
         }
+    }
+
+    #[test]
+    fn a_pair_fits_within_the_gate_alone() {
+        let hungarian = Hungarian::new(Config::default()).unwrap();
+        let track = track(Point3::new(3.0, 0.0, 1.6), SMatrix::identity() * 0.01);
+        assert!(hungarian.fits(&track, &person(3.0, 0.1), &GATE));
+        assert!(!hungarian.fits(&track, &person(3.0, 4.0), &GATE));
     }
 
     /// P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
