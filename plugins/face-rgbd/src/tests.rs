@@ -300,6 +300,19 @@ fn a_smaller_group_inside_a_stronger_one_goes() {
     assert_eq!(grouped(&[&large[..3], &[small[0]; 5]].concat(), 2).len(), 2);
 }
 
+/// Compiled cascades hold offsets, which are those of one layout.
+#[test]
+fn all_sizes_of_an_image_share_a_layout_and_other_images_and_steps_do_not() {
+    let layout = |image_width: usize, width: usize, step: usize| {
+        let mut level = Level::default();
+        level.fill(&noise(image_width, 60, 1), (width, 30), step);
+        level.layout()
+    };
+    assert_eq!(layout(60, 40, 1), layout(60, 50, 1));
+    assert_ne!(layout(60, 40, 1), layout(80, 40, 1));
+    assert_ne!(layout(60, 40, 1), layout(60, 40, 2));
+}
+
 #[cfg(feature = "train")]
 mod training {
     use tagalong_config::{Example, Fitted, Trainer};
