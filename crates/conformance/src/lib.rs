@@ -108,10 +108,15 @@ impl<'a> Suite<'a> {
     }
 
     /// Returns all failures of all plugins; a demand on a detector that is not registered is one,
-    /// too.
+    /// too, and so is a registry without plugins.
     #[must_use = "broken promises are returned, not asserted"]
     pub fn check_all(&self) -> Vec<Failure> {
         let mut failures = self.unmet_demands();
+        // A `register` that does nothing would keep every promise.
+        if self.registry.plugins().next().is_none() {
+            let what = "the registry has no plugin to check".to_owned();
+            failures.push(failure("(none)", "is registered", what));
+        }
         for info in self.registry.plugins() {
             failures.extend(self.check(info.name));
         }
@@ -218,4 +223,15 @@ fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
 /// Fails with a sentence unless `holds`.
 fn demand(holds: bool, otherwise: impl FnOnce() -> String) -> Verdict {
     if holds { Ok(()) } else { Err(otherwise()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_registry_without_plugins_fails() {
+        let failures = check_all(&Registry::default());
+        assert_eq!(failures.len(), 1, "{failures:?}");
+    }
 }

@@ -107,6 +107,10 @@ fn settings_that_cannot_work_are_refused() {
     assert!(unfit.contains("`max_deceleration` must be positive"), "{unfit}");
     let angles = refused(Config { turn_in_place_deg: [60.0, 30.0], ..Config::default() });
     assert!(angles.contains("`turn_in_place_deg`"), "{angles}");
+    for bounds in [[0.0, 12.0], [3.0, 180.0]] {
+        let angles = refused(Config { align_deg: bounds, ..Config::default() });
+        assert!(angles.contains("`align_deg`"), "{angles}");
+    }
     let printed = refused(Config { as_printed: true, path: Path::B, ..Config::default() });
     assert!(printed.contains("path A or C"), "{printed}");
 }

@@ -138,6 +138,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_pair_fits_within_the_gate_alone() {
+        let hungarian = Hungarian::new(Config::default()).unwrap();
+        let track = track(Point3::new(3.0, 0.0, 1.6), SMatrix::identity() * 0.01);
+        assert!(hungarian.fits(&track, &person(3.0, 0.1), &GATE));
+        assert!(!hungarian.fits(&track, &person(3.0, 4.0), &GATE));
+    }
+
     /// P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
     #[test]
     fn who_overlaps_is_given_what_overlaps_but_in_print_whatever_does_not() {

@@ -174,6 +174,13 @@ mod tests {
     }
 
     #[test]
+    fn a_pair_fits_within_the_gate_alone() {
+        let jpda = Jpda::new(Config::default()).unwrap();
+        assert!(jpda.fits(&track(1, 0.0), &detection(0.1), &GATE));
+        assert!(!jpda.fits(&track(1, 0.0), &detection(4.0), &GATE));
+    }
+
+    #[test]
     fn settings_that_cannot_work_are_refused() {
         for config in [
             Config { detection_probability: 1.0, ..Config::default() },

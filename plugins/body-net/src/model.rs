@@ -68,4 +68,12 @@ mod tests {
         assert!(refusal("first = [\n  -0.15", "first = [\n  nan").contains("not finite"));
         assert!(Model::from_text("nonsense").is_err());
     }
+
+    #[test]
+    fn the_line_turns_outputs_into_log_odds() {
+        let view = NetworkInput { grey: vec![128; 80 * 36], behind: vec![0; 40 * 18] };
+        let net = Net { bias: vec![0.5], ..Net::default() };
+        let model = Model { net, slope: 2.0, offset: -0.25 };
+        assert_eq!(model.log_odds(&view, &mut Pass::default()), 0.75);
+    }
 }

@@ -207,3 +207,21 @@ fn backward(net: &Net, pass: &Pass, of_output: f32, gradient: &mut Net, of: &mut
     }
     net.first.backward(&pass.grey, &of.first, &mut gradient.first, None);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half of the cells at 100 and half at 140: a deviation of 20, and 8 more.
+    #[test]
+    fn a_view_is_shown_by_its_contrast_and_its_depth() {
+        let grey = (0..80 * 36).map(|k| if k % 2 == 0 { 100 } else { 140 }).collect();
+        let behind = vec![50; 40 * 18];
+        let mut pass = Pass::default();
+        pass.show(&NetworkInput { grey, behind });
+        assert!((pass.grey.values[0] + 20.0 / 28.0).abs() < 1e-5, "{}", pass.grey.values[0]);
+        assert!((pass.grey.values[1] - 20.0 / 28.0).abs() < 1e-5);
+        let [.., metres, is_known] = pass.joined.values.as_chunks::<JOINED>().0[0];
+        assert!((metres - 1.5).abs() < 1e-5 && is_known == 1.0);
+    }
+}

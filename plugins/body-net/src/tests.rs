@@ -197,6 +197,10 @@ mod training {
             let log_odds = model.log_odds(&view, &mut pass);
             assert!((log_odds > 0.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }
+        let figure = |name: &str| fitted.figures[name].as_float().unwrap();
+        assert!((0.9..=1.0).contains(&figure("area_under_roc")), "{:?}", fitted.figures);
+        assert!(figure("people_accepted") > 0.8 && figure("others_accepted") < 0.2);
+        assert!((0.05..50.0).contains(&model.slope), "{}", model.slope);
         let count = |name: &str| fitted.figures[name].as_integer();
         assert_eq!(
             [count("people"), count("others"), count("without_depth")].map(Option::unwrap),

@@ -122,6 +122,12 @@ mod tests {
     }
 
     #[test]
+    fn a_walker_goes_on_at_its_velocity() {
+        let walker = Walker { at: Point2::new(1.0, 2.0), velocity: Vector2::new(0.5, -1.0) };
+        assert_eq!(walker.after(3.0), Point2::new(2.5, -1.0));
+    }
+
+    #[test]
     fn an_empty_room_changes_nothing() {
         assert_eq!(planned(&[], &[]), AHEAD);
         assert_eq!(planned(&[Point2::new(1.0, 1.5)], &[]), AHEAD);

@@ -130,6 +130,48 @@ fn it_turns_by_the_bearing_and_as_fast_as_the_person_walks_around_it() {
     assert!((turn(-2.0, 0.3, Vector2::zeros()) - 1.2).abs() < 1e-9, "no faster than it may");
 }
 
+/// Half a second to come: the person, 0.4 m/s, will be 0.2 m farther away.
+#[test]
+fn the_person_is_where_the_wheels_will_find_them() {
+    let config = Config { latency_s: 0.5, max_acceleration: 1e3, ..Config::default() };
+    let mut controller = ClearFollow::new(config).unwrap();
+    let person = target(1.5, 0.0, Vector2::new(0.4, 0.0));
+    let wheels = command(&mut controller, EgoMotion::at_rest(0.1), None, Some(&person));
+    assert!((0.5 * (wheels.left + wheels.right) - 0.7).abs() < 1e-9, "{wheels:?}");
+}
+
+/// 60 degrees to the side, the speed is a quarter.
+#[test]
+fn it_drives_the_more_slowly_the_more_it_has_to_turn() {
+    let config = Config { max_acceleration: 1e3, ..prompt() };
+    let mut controller = ClearFollow::new(config).unwrap();
+    let bearing = 60_f64.to_radians();
+    let person = target(2.0 * bearing.cos(), 2.0 * bearing.sin(), Vector2::zeros());
+    let wheels = command(&mut controller, EgoMotion::at_rest(0.1), None, Some(&person));
+    assert!((0.5 * (wheels.left + wheels.right) - 0.6 * 0.25).abs() < 1e-9, "{wheels:?}");
+}
+
+/// The person is straight ahead, so that all of the turn is the detour around the post.
+#[test]
+fn a_detour_keeps_its_curvature_while_the_robot_speeds_up() {
+    let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
+    let depth = DepthImage::from_fn(40, 30, post);
+    let person = target(4.0, 0.0, Vector2::zeros());
+    let first = |max_acceleration: f64| {
+        let config = Config { max_acceleration, ..prompt() };
+        let mut controller = ClearFollow::new(config).unwrap();
+        let still = EgoMotion::at_rest(0.1);
+        let wheels = command(&mut controller, still, Some(depth.clone()), Some(&person));
+        let (speed, turn) = (wheels.left + wheels.right, wheels.right - wheels.left);
+        (0.5 * speed, turn / (2.0 * WHEELS.half_separation_m))
+    };
+    let (at_once, slowly) = (first(1e3), first(0.5));
+    // The post is to the left of the middle.
+    assert!(at_once.0 > 0.2 && at_once.1 < -0.2, "{at_once:?}");
+    assert!((slowly.0 - 0.05).abs() < 1e-9, "{slowly:?}");
+    assert!((slowly.1 / slowly.0 - at_once.1 / at_once.0).abs() < 1e-6, "{slowly:?} {at_once:?}");
+}
+
 #[test]
 fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
     let speed = |unseen_s: f64| {
@@ -143,6 +185,11 @@ fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
     for unseen_s in [1.0, 30.0, f64::NAN] {
         assert_eq!(speed(unseen_s), 0.0);
     }
+    let patient = Config { max_unseen_s: 2.0, max_acceleration: 1e3, ..prompt() };
+    let mut controller = ClearFollow::new(patient).unwrap();
+    let person = Track { seen: false, unseen_s: 1.5, ..target(4.0, 0.0, Vector2::zeros()) };
+    let wheels = command(&mut controller, EgoMotion::at_rest(0.1), None, Some(&person));
+    assert!((wheels.left - 0.45).abs() < 1e-9, "three quarters of the time");
 }
 
 #[test]

@@ -82,6 +82,9 @@ mod training {
             assert!((log_odds > 1.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }
         assert_eq!(fitted.figures["people"].as_integer(), Some(30));
+        assert_eq!(fitted.figures["others"].as_integer(), Some(30));
+        let slope = fitted.figures["slope"].as_float().unwrap();
+        assert!((slope - model.slope).abs() < 1e-3 && model.slope > 0.01, "{slope}");
         assert_eq!(fitted.figures["cross_validation"].as_array().unwrap().len(), 2);
     }
 
@@ -106,6 +109,11 @@ mod training {
         for training in [
             Training { trees: vec![], ..small() },
             Training { rate: f64::NAN, ..small() },
+            Training { rate: 1.1, ..small() },
+            Training { features: 1.1, ..small() },
+            Training { features: 0.0, ..small() },
+            Training { caution: 0.0, ..small() },
+            Training { trees: vec![0], ..small() },
             Training { folds: 1, ..small() },
         ] {
             assert!(TreeTrainer::new(training, 1).is_err());

@@ -11,7 +11,7 @@ use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
-use crate::{Appearance, Compressive, Config, Features};
+use crate::{Appearance, Compressive, Config, Features, Rectangle};
 
 const SIZE: (usize, usize) = (320, 240);
 
@@ -129,6 +129,20 @@ fn a_person_is_followed_who_moves_by_a_third_of_their_width() {
     }
 }
 
+/// The coarse search looks at every third pixel.
+#[test]
+fn the_fine_search_finds_the_pixel() {
+    let before = place(3.0, 0.0);
+    for step in 0..8 {
+        let after = place(3.0, 0.1 + 0.01 * f64::from(step));
+        let (found, _) =
+            near(&mut taught(Config::default(), before), &World::at(after).frame(), before);
+        let truth = camera().upper_body(&after);
+        let off = found.unwrap().rect().unwrap().centre() - truth.centre();
+        assert!(off.x.abs() < 1.3, "{step}: {off}");
+    }
+}
+
 #[test]
 fn somebody_who_goes_a_long_way_is_kept_and_the_box_has_their_size() {
     let mut here = place(3.0, -0.6);
@@ -212,7 +226,10 @@ fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
     let frame = World::at(now).frame();
     let search = Query::Track(&expected);
     let found = detector.detect(&frame, &search, &mut Funnel::default()).unwrap();
-    found[0].rect().unwrap().width / camera().upper_body(&before).width
+    let (found, before) = (found[0].rect().unwrap(), camera().upper_body(&before));
+    let stretched = found.height / found.width / (before.height / before.width);
+    assert!((stretched - 1.0).abs() < 0.021, "{stretched}");
+    found.width / before.width
 }
 
 #[test]
@@ -279,6 +296,10 @@ fn nobody_learns_from_the_board_that_hides_a_person_but_in_print() {
         (before.is_some(), near(&mut detector, &hidden, head).0.is_some())
     };
     assert_eq!(takes_the_board(Config::default()), (false, false));
+    let mut detector = taught(Config::default(), head);
+    (0..20).for_each(|_| detector.learn(&hidden, &[track(head, true)]).unwrap());
+    let (found, funnel) = near(&mut detector, &World::at(head).frame(), head);
+    assert!(found.is_some(), "the person is still known: {funnel:?}");
     let printed = Config {
         compat_always_learn: true,
         depth_filter: false,
@@ -324,6 +345,36 @@ fn two_to_four_rectangles_are_drawn_and_four_as_well() {
     let count = |n: usize| features.lists().iter().filter(|list| list.len() == n).count();
     assert_eq!(count(2) + count(3) + count(4), 300);
     assert!([2, 3, 4].iter().all(|n| count(*n) > 60));
+}
+
+#[test]
+fn rectangles_lie_inside_and_are_a_twentieth_to_a_half_of_the_box() {
+    let features = Features::draw(300, 4, 1);
+    let all: Vec<&Rectangle> = features.lists().iter().flatten().collect();
+    for sides in [
+        all.iter().map(|r| (r.left, r.width)).collect::<Vec<_>>(),
+        all.iter().map(|r| (r.top, r.height)).collect(),
+    ] {
+        assert!(sides.iter().all(|(from, _)| *from >= 0.0));
+        assert!(sides.iter().all(|(from, length)| from + length <= 1.0 + 1e-12));
+        assert!(sides.iter().all(|(_, length)| (0.05..=0.5).contains(length)));
+        let (short, long) = (|v: f64| v < 0.1, |v: f64| v > 0.45);
+        assert!(sides.iter().any(|s| short(s.1)) && sides.iter().any(|s| long(s.1)));
+        assert!(sides.iter().any(|s| s.0 + s.1 > 0.95), "up to the border");
+    }
+    let positive = all.iter().filter(|r| r.weight > 0.0).count();
+    assert!((0.4..0.6).contains(&(positive as f64 / all.len() as f64)));
+}
+
+#[test]
+fn a_rectangle_takes_its_part_of_a_box_and_a_pixel_at_least() {
+    let rectangle = Rectangle { left: 0.25, top: 0.5, width: 0.5, height: 0.25, weight: 1.0 };
+    assert_eq!(rectangle.pixels(40, 20), [10, 10, 30, 15]);
+    let narrow = Rectangle { left: 0.98, width: 0.01, ..rectangle };
+    assert_eq!(narrow.pixels(10, 20), [9, 10, 10, 15]);
+    let line = Rectangle { left: 0.5, width: 0.001, ..rectangle };
+    assert_eq!(line.pixels(10, 20), [5, 10, 6, 15]);
+    assert_eq!(rectangle.pixels(1, 1), [0, 0, 1, 1]);
 }
 
 #[test]

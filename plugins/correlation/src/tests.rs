@@ -9,6 +9,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
 
+use crate::detect::Placed;
 use crate::picture::{CELLS, Distance, SIDE};
 use crate::strip::Lattice;
 use crate::{Config, Correlation, Fit, Picture, Strip};
@@ -175,6 +176,21 @@ fn who_left_is_forgotten() {
     assert!(funnel.count("correlation: not seen well yet") == 1);
 }
 
+#[test]
+fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
+    let detected = |later: &[Track]| {
+        let mut detector = Correlation::new(Config::default()).unwrap();
+        detector.learn(&World::at(HEAD).frame(), &[track(HEAD, true)]).unwrap();
+        detector.learn(&in_shadow().frame(), later).unwrap();
+        let (expected, mut funnel) = (track(HEAD, false), Funnel::default());
+        detector.detect(&in_shadow().frame(), &Query::Track(&expected), &mut funnel).unwrap();
+        funnel.count("correlation: not seen well yet") == 0
+    };
+    let (lost, other) = (track(HEAD, false), Track { id: TrackId(4), ..track(HEAD, false) });
+    assert!(detected(std::slice::from_ref(&lost)) && detected(&[lost, other.clone()]));
+    assert!(!detected(&[other]));
+}
+
 /// The definition, in double precision, cell by cell.
 fn slow_fit(strip: [&[f32]; 3], columns: usize, picture: &Picture, at: (usize, usize)) -> Fit {
     let cell =
@@ -205,7 +221,8 @@ proptest! {
         seed in 0.0..100.0f64, holes in 2..9usize, column in 0..8usize, row in 0..5usize,
     ) {
         let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
-            pattern(x as f64 / 30.0, y as f64 / 30.0, seed).clamp(0.0, 255.0) as u8
+            // Brighter than the middle, so that the means count.
+            (100.0 + 0.5 * pattern(x as f64 / 30.0, y as f64 / 30.0, seed)).clamp(0.0, 255.0) as u8
         });
         let depth = DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| match (x * 7 + y * 13) % holes {
             0 => f32::NAN,
@@ -221,7 +238,7 @@ proptest! {
         let own = |i: usize| pattern((i % SIDE) as f64 / 6.0, (i / SIDE) as f64 / 9.0, seed) as f32;
         let body: [f32; CELLS] = std::array::from_fn(|i| f32::from(i % holes != 1));
         let count = body.iter().sum();
-        let picture = Picture { grey: std::array::from_fn(|i| own(i) - 128.0), body, count };
+        let picture = Picture { grey: std::array::from_fn(|i| own(i) - 100.0), body, count };
         let cells = strip.cells();
         let slow = slow_fit(cells, lattice.columns, &picture, (column, row));
         let fast = strip.fit(&picture, column, row);
@@ -233,6 +250,25 @@ proptest! {
     }
 }
 
+/// Chequers of two brightnesses, 2.0 and more from their mean.
+#[test]
+fn without_contrast_there_is_no_correlation() {
+    let sign = |x: usize, y: usize| if (x + y).is_multiple_of(2) { 1.0 } else { -1.0 };
+    let correlation = |own: f32, seen: f64| {
+        let grey = GreyImage::from_fn(64, 64, |x, y| (128.0 + seen * sign(x, y)) as u8);
+        let depth = DepthImage::filled(64, 64, 2.5);
+        let corner = Point2::new(10.0, 10.0);
+        let lattice = Lattice { corner, step: 1.0, columns: SIDE, rows: SIDE };
+        let mut strip = Strip::default();
+        strip.read(&grey, &depth, &lattice, &Distance { ahead_m: 2.5, tolerance_m: 0.5 });
+        let cell = |i: usize| own * sign(i % SIDE, i / SIDE) as f32;
+        let (body, count) = ([1.0; CELLS], CELLS as f32);
+        strip.fit(&Picture { grey: std::array::from_fn(cell), body, count }, 0, 0).correlation
+    };
+    assert!((correlation(2.5, 3.0) - 1.0).abs() < 1e-3);
+    assert_eq!([correlation(1.5, 9.0), correlation(9.0, 1.0), correlation(0.0, 0.0)], [0.0; 3]);
+}
+
 #[test]
 fn it_conforms() {
     let mut registry = Registry::default();
@@ -242,11 +278,11 @@ fn it_conforms() {
 }
 
 /// A picture laid somewhere, so many cells from the expected place.
-fn placed(aside: i64, correlation: f64, shown: f64, known: f64) -> crate::detect::Placed {
-    crate::detect::Placed { aside, down: 0, fit: Fit { correlation, shown, known } }
+fn placed(aside: i64, correlation: f64, shown: f64, known: f64) -> Placed {
+    Placed { aside, down: 0, fit: Fit { correlation, shown, known } }
 }
 
-fn chosen(fits: &[crate::detect::Placed]) -> Result<i64, &'static str> {
+fn chosen(fits: &[Placed]) -> Result<i64, &'static str> {
     crate::detect::choose(&Config::default(), fits).map(|best| best.aside)
 }
 
@@ -259,6 +295,11 @@ fn the_best_place_must_be_good_and_better_than_all_others() {
     assert_eq!(chosen(&[placed(-8, 0.82, 1.0, 0.0), best]), Err("correlation: two places"));
     assert_eq!(chosen(&[placed(14, 0.82, 1.0, 0.0), best]), Err("correlation: two places"));
     assert_eq!(chosen(&[placed(-8, 0.79, 1.0, 0.0), best]), Ok(3), "0.1 worse");
+    let (below, above) =
+        (Placed { down: 6, ..best }, Placed { down: -6, ..placed(3, 0.85, 1.0, 0.0) });
+    assert_eq!(chosen(&[below, above]), Err("correlation: two places"), "one above the other");
+    let beside = Placed { down: 3, ..placed(3, 0.89, 1.0, 0.0) };
+    assert_eq!(chosen(&[below, beside]), Ok(3), "that is the same place");
     assert_eq!(chosen(&[placed(-8, 0.95, 0.3, 0.0), best]), Ok(3), "that place is hidden");
     assert_eq!(chosen(&[placed(0, 0.77, 1.0, 0.0)]), Err("correlation: too low"));
     assert_eq!(chosen(&[placed(0, 0.9, 0.39, 0.0)]), Err("correlation: hidden"));
@@ -282,6 +323,24 @@ fn people_are_searched_as_far_as_they_can_have_got_but_not_farther() {
     assert_eq!(reach(0.1, 0.05), (13, 7));
     assert_eq!(reach(1.0, 1.0), (26, 9), "0.6 m aside, 0.2 m up and down");
     assert_eq!(reach(0.0, 0.0), (0, 0));
+}
+
+/// A camera 2.5 m to the right sees the person at 45 degrees: uncertain along that ray alone, the
+/// person is not aside of it.
+#[test]
+fn aside_is_across_the_ray_of_the_camera() {
+    let mut camera = camera().as_ref().clone();
+    camera.robot_from_camera.translation.vector.y = -2.5;
+    let reach = |slant: f64| {
+        let mut track = track(HEAD, false);
+        track.estimate.covariance = SMatrix::zeros();
+        for (row, column, value) in [(0, 0, 0.01), (0, 1, slant), (1, 0, slant), (1, 1, 0.01)] {
+            track.estimate.covariance[(row, column)] = value;
+        }
+        crate::detect::reach(&Config::default(), &camera, &track).0
+    };
+    // Across: three times 0.14 m, in cells of 2.375 cm.
+    assert_eq!((reach(0.01), reach(-0.01)), (0, 18));
 }
 
 #[test]
@@ -318,7 +377,7 @@ fn a_sighting_says_where_by_its_cells_and_how_sure_it_is() {
     let config = Config { score: 0.7, ..Config::default() };
     let (camera, expected) = (camera(), track(HEAD, false));
     let square = expected.estimate.region;
-    let best = crate::detect::Placed { down: -6, ..placed(12, 0.9, 1.0, 0.0) };
+    let best = Placed { down: -6, ..placed(12, 0.9, 1.0, 0.0) };
     let found = crate::detect::sighting(&config, &camera, &expected, &square, best);
     assert!((found.rect().unwrap().x - square.x - 0.5 * square.width).abs() < 1e-9);
     assert!((found.rect().unwrap().y - square.y + 0.25 * square.width).abs() < 1e-9);
@@ -339,6 +398,9 @@ fn brightness_is_that_between_four_pixels_and_depth_that_of_the_nearest() {
     assert_eq!((at(0.5, 0.5), at(0.9, 0.5), at(0.5, 0.75)), (Some(0.0), Some(4.0), Some(5.0)));
     assert_eq!(at(1.0, 1.0), Some(20.0), "the mean of all");
     assert_eq!((at(0.4, 0.6), at(0.6, 1.6), at(1.6, 0.6)), (None, None, None));
+    let grey = GreyImage::from_fn(4, 4, |x, y| (128 + 10 * x + 3 * y) as u8);
+    let sloped = brightness(&grey, Point2::new(2.75, 1.75)).unwrap();
+    assert!((sloped - (22.5 + 3.75)).abs() < 1e-4, "{sloped}");
     let depth = DepthImage::from_pixels(2, 1, vec![1.0, 2.0]).unwrap();
     let at = |x: f64| nearest(&depth, Point2::new(x, 0.9));
     assert_eq!([-0.1, 0.0, 0.9, 1.1, 2.0].map(at), [None, Some(1.0), Some(1.0), Some(2.0), None]);

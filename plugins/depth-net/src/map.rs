@@ -255,4 +255,27 @@ mod tests {
         let [a, b] = [&a, &b].map(|map| map.fine.at(46, 64)[4]);
         assert!((a - b).abs() < 0.2, "{a} {b}");
     }
+
+    #[cfg(feature = "train")]
+    #[test]
+    fn a_mirrored_map_has_left_and_right_exchanged() {
+        let depth = DepthImage::from_fn(80, 60, |x, _| if x < 25 { 2.0 } else { 4.0 });
+        let map = FloorMap::new(&camera(1.1), &depth);
+        let mirrored = FloorMap::new(&camera(1.1), &depth).mirrored();
+        let (mut differ, side) = (0, FloorMap::CELLS);
+        for row in 0..side {
+            for column in 0..side {
+                let other = side - 1 - column;
+                assert_eq!(mirrored.coarse.at(row, column), map.coarse.at(row, other));
+                assert_eq!(mirrored.in_view[row * side + column], map.in_view[row * side + other]);
+                let fine = [2 * row, 2 * row + 1];
+                for row in fine {
+                    let other = 2 * side - 1 - 2 * column;
+                    assert_eq!(mirrored.fine.at(row, 2 * column), map.fine.at(row, other));
+                }
+                differ += usize::from(map.coarse.at(row, column) != map.coarse.at(row, other));
+            }
+        }
+        assert!(differ > 50, "the map itself is not symmetric: {differ}");
+    }
 }

@@ -192,6 +192,19 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_is_the_nearest_of_the_bank() {
+        let steps = |pitch: f64, roll: f64| {
+            let (pitch, roll) = (pitch * PITCH_STEP_DEG, roll * ROLL_STEP_DEG);
+            let pose =
+                Pose::nearest(Direction::Along, pitch.to_radians(), roll.to_radians(), 100.0);
+            (pose.pitch, pose.roll)
+        };
+        assert_eq!(steps(0.4, -0.4), (0, 0));
+        assert_eq!(steps(0.6, -0.6), (1, -1));
+        assert_eq!([steps(-3.0, -20.0), steps(9.0, 20.0)], [(-1, -15), (4, 15)]);
+    }
+
+    #[test]
     fn the_head_is_narrower_than_the_shoulders() {
         let template = widths(Direction::Along, 0.0);
         let width = |dy| {

@@ -183,3 +183,44 @@ impl MetricImage {
         self.camera.upper_body(&self.head(x, y, depth_m))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera(pitch_rad: f64) -> Arc<Camera> {
+        let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, distortion: Distortion::None };
+        Arc::new(Camera::mounted(lens, 64, 48, 1.2, pitch_rad, 0.1))
+    }
+
+    fn rows(scale: usize) -> RowSums {
+        RowSums::new(&DepthImage::filled(64, 48, 2.0), scale)
+    }
+
+    #[test]
+    fn the_height_from_the_table_is_that_of_the_point() {
+        let view = MetricImage::new(&camera(0.3), &rows(2));
+        for (x, y) in [(0, 0), (30, 2), (4, 22), (16, 12)] {
+            let head = view.head(x as f64, y as f64, 2.5);
+            assert!((view.head_height_m(x, y, 2.5) - head.z).abs() < 1e-5, "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn a_reduced_pixel_is_the_middle_of_its_block() {
+        let view = MetricImage::new(&camera(0.3), &rows(4));
+        assert_eq!(view.full_pixel(3.0, 5.0), Point2::new(13.5, 21.5));
+        let back = view.reduced_pixel(&view.head(3.0, 5.0, 2.5)).unwrap();
+        assert!((back - Point2::new(3.0, 5.0)).norm() < 1e-9, "{back}");
+    }
+
+    #[test]
+    fn a_view_is_of_one_camera_and_one_reduction() {
+        let view = MetricImage::new(&camera(0.3), &rows(2));
+        assert!(view.is_of(&camera(0.3), &rows(2)));
+        assert!(!view.is_of(&camera(0.2), &rows(2)));
+        assert!(!view.is_of(&camera(0.3), &rows(4)));
+    }
+}

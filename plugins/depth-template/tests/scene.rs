@@ -145,13 +145,38 @@ fn track_at(position: Point3<f64>, camera: &Camera) -> Track {
 
 #[test]
 fn following_finds_the_person_near_the_prediction_and_nobody_else() {
-    let (near, far) = (Point3::new(2.5, 0.5, 1.6), Point3::new(2.5, -0.7, 1.6));
-    let scene = frame(640, 6.0, &[near, far]);
+    let heads = [Point3::new(2.5, 0.5, 1.6), Point3::new(2.5, -0.7, 1.6)];
+    let scene = frame(640, 6.0, &heads);
     let mut detector = DepthTemplate::new(DepthTemplateConfig::default()).unwrap();
-    let track = track_at(near + nalgebra::Vector3::new(0.1, -0.1, 0.0), &scene.camera);
-    let found = detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap();
-    assert_eq!(found.len(), 1);
-    assert!((found[0].position - near).norm() < HEAD_RADIUS_M + 0.05);
+    for head in heads {
+        let track = track_at(head + nalgebra::Vector3::new(0.1, -0.1, 0.0), &scene.camera);
+        let found = detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap();
+        assert_eq!(found.len(), 1);
+        assert!((found[0].position - head).norm() < HEAD_RADIUS_M + 0.05);
+    }
+}
+
+/// A head without a body below it, as a ball on a string.
+#[test]
+fn a_head_alone_is_no_person() {
+    let head = Point3::new(2.5, 0.0, 1.6);
+    let person = frame(640, 6.0, &[head]);
+    let chin = person.camera.project(&Point3::new(2.5, 0.0, 1.45)).unwrap().y as usize;
+    let whole = person.depth().unwrap();
+    let ball = DepthImage::from_fn(640, 480, |x, y| if y > chin { 6.0 } else { whole.row(y)[x] });
+    let images = Images { depth: Some(Arc::new(ball)), ..Images::default() };
+    let still = EgoMotion::at_rest(0.1);
+    let scene = Frame::new(1, Stamp::from_nanos(1), camera(640), still, images);
+    // The silhouette alone must not decide.
+    let config = DepthTemplateConfig { discover_cost: 10.0, ..Default::default() };
+    let (found, funnel) = discover(config, &scene);
+    assert!(found.is_empty() && funnel.count("body below") > 0, "{found:?} {funnel:?}");
+}
+
+#[test]
+fn it_weighs_scenes_for_filters() {
+    let detector = DepthTemplate::new(DepthTemplateConfig::default()).unwrap();
+    assert!(detector.likelihood().is_some());
 }
 
 #[test]

@@ -330,3 +330,112 @@ fn a_smaller_group_inside_a_stronger_one_goes() {
     assert_eq!(grouped(&[&large[..], &small].concat(), 2).len(), 1);
     assert_eq!(grouped(&[&large[..3], &[small[0]; 5]].concat(), 2).len(), 2);
 }
+
+/// Compiled cascades hold offsets, which are those of one layout.
+#[test]
+fn all_sizes_of_an_image_share_a_layout_and_other_images_and_steps_do_not() {
+    let layout = |image_width: usize, width: usize, step: usize| {
+        let mut level = Level::default();
+        level.fill(&noise(image_width, 60, 1), (width, 30), step);
+        level.layout()
+    };
+    assert_eq!(layout(60, 40, 1), layout(60, 50, 1));
+    assert_ne!(layout(60, 40, 1), layout(80, 40, 1));
+    assert_ne!(layout(60, 40, 1), layout(60, 40, 2));
+}
+
+#[cfg(feature = "train")]
+mod training {
+    use tagalong_config::{Example, Fitted, Trainer};
+    use tagalong_conformance::patch::{candidate, frame};
+    use tagalong_core::Detection;
+    use tagalong_geometry::ImageBox;
+
+    use super::*;
+    use crate::train::CascadeTrainer;
+    use crate::{Config, Training};
+
+    const FACE: Rect = Rect { x: 28.0, y: 28.0, width: 40.0, height: 40.0 };
+
+    /// A bright disc with two dark eyes and a mouth before a wall, or stripes; both noisy.
+    fn picture(is_face: bool, seed: u64) -> GreyImage {
+        let mut random = XorShift64::new(seed + 1);
+        GreyImage::from_fn(96, 96, |x, y| {
+            let (dx, dy) = (x as f64 - 48.0, y as f64 - 48.0);
+            let eye = (dx.abs() - 8.0).hypot(dy + 6.0) < 4.0;
+            let mouth = dx.abs() < 8.0 && (dy - 10.0).abs() < 2.5;
+            let grey = match is_face {
+                true if eye || mouth => 40.0,
+                true if dx.hypot(dy) < 19.0 => 200.0,
+                true => 110.0,
+                false if ((x + y * (seed as usize % 3)) / 6).is_multiple_of(2) => 60.0,
+                false => 180.0,
+            };
+            (grey + 25.0 * random.uniform()) as u8
+        })
+    }
+
+    fn settings(stages: usize) -> Config {
+        let training = Training {
+            stages,
+            features: 300,
+            others: 150,
+            fewest_others: 10,
+            max_trees: 6,
+            ..Training::default()
+        };
+        Config { min_neighbours: 2, training, ..Config::default() }
+    }
+
+    fn fitted(config: Config, begun: Option<Cascade>) -> (Fitted, Vec<f64>) {
+        let mut trainer = CascadeTrainer::new(config, begun, 3).unwrap();
+        for group in 0..40 {
+            for is_person in [true, false] {
+                let at = Detection { image: Some(ImageBox::upper_body(FACE)), ..candidate() };
+                let frame = frame(picture(is_person, group));
+                trainer.add(&frame, &at, Example { is_person, group }).unwrap();
+            }
+        }
+        let mut parts = vec![0.0];
+        let fitted = trainer.fit(&mut |part| parts.push(part)).unwrap();
+        (fitted, parts)
+    }
+
+    #[test]
+    fn a_cascade_learns_faces_and_goes_on_where_it_ended() {
+        let (fitted, parts) = fitted(settings(2), None);
+        assert!(parts.is_sorted() && parts.last() == Some(&1.0), "{parts:?}");
+        let figures = &fitted.figures;
+        let count = |key: &str| figures[key].as_integer().unwrap();
+        let part = |key: &str| figures[key].as_float().unwrap();
+        // Each face in four variants, mirrored and not.
+        let faces = count("windows_of_faces");
+        assert!(faces % 8 == 0 && (8 * 20..8 * 36).contains(&faces), "{figures}");
+        let [held_out, validation] = ["held_out", "validation"].map(|name| {
+            assert_eq!(
+                count(&format!("{name}_faces")),
+                count(&format!("{name}_pictures_with_faces"))
+            );
+            assert!(part(&format!("{name}_found_at_1_false_alarms_a_picture")) > 0.7, "{figures}");
+            count(&format!("{name}_faces"))
+        });
+        assert_eq!(faces / 8 + held_out + validation, 40);
+        assert_eq!(count("held_out_pictures_without"), held_out, "the same groups");
+        let cascade = Cascade::from_xml(&fitted.model).unwrap();
+        assert_eq!(figures["trees"].as_array().unwrap().len(), cascade.stages.len());
+        // A complete cascade is measured again, and a longer one is cut.
+        let again = self::fitted(settings(cascade.stages.len()), Some(cascade.clone())).0;
+        assert_eq!(Cascade::from_xml(&again.model).unwrap().stages, cascade.stages);
+        let cut = self::fitted(settings(1), Some(cascade.clone())).0;
+        assert_eq!(Cascade::from_xml(&cut.model).unwrap().stages, cascade.stages[..1]);
+    }
+
+    #[test]
+    fn faces_alone_and_other_sizes_are_refused() {
+        let mut trainer = CascadeTrainer::new(settings(2), None, 3).unwrap();
+        let error = trainer.fit(&mut |_| {}).unwrap_err().to_string();
+        assert!(error.contains("both are needed"), "{error}");
+        let other = Cascade::without_stages(24);
+        assert!(CascadeTrainer::new(settings(2), Some(other), 3).is_err());
+    }
+}

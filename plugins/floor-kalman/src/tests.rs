@@ -114,6 +114,30 @@ fn the_noise_of_u_makes_the_prediction_less_certain() {
 }
 
 #[test]
+fn the_process_noise_grows_with_the_time_between_images() {
+    let config = Config { step_s: 0.2, process_m2: [0.02, -0.01, 0.04], ..Config::default() };
+    let expected = Matrix2::new(0.06, -0.03, -0.03, 0.12);
+    assert!((config.process(0.6) - expected).norm() < 1e-12, "{}", config.process(0.6));
+}
+
+/// The X axis of the room lies 45 degrees to the left: R is wide along it, so that an error
+/// ahead comes with one to the left.
+#[test]
+fn noise_in_room_axes_is_turned_by_the_heading_of_the_room() {
+    let config = Config {
+        measurement: Measurement::Fixed,
+        measurement_m2: [1.0, 0.0, 0.01],
+        room_heading_deg: 45.0,
+        ..Config::default()
+    };
+    let mut filter = FloorKalman::new(config).unwrap();
+    filter.start(ID, &sighting(3.0, 1.0), &camera());
+    let covariance = estimate(&filter).covariance;
+    assert!((covariance[(0, 1)] - 0.495).abs() < 1e-9, "{covariance}");
+    assert!((covariance[(0, 0)] - 0.505).abs() < 1e-9, "{covariance}");
+}
+
+#[test]
 fn a_polar_measurement_is_wide_where_it_is_far() {
     let spread = |range: f64| {
         let config = Config { measurement: Measurement::Polar, ..Config::default() };

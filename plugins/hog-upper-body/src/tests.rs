@@ -278,3 +278,111 @@ proptest! {
         }
     }
 }
+
+#[cfg(feature = "train")]
+mod training {
+    use tagalong_config::{Example, Trainer};
+    use tagalong_conformance::patch::{candidate, frame};
+    use tagalong_core::Detection;
+    use tagalong_geometry::ImageBox;
+
+    use super::*;
+    use crate::train::HogTrainer;
+    use crate::{Kind, Training};
+
+    const SQUARE: Rect = Rect { x: 28.0, y: 24.0, width: 40.0, height: 40.0 };
+
+    /// A dark head above dark shoulders, or bars of a width that depends on the seed; both noisy.
+    fn picture(is_person: bool, seed: u64) -> GreyImage {
+        let mut random = XorShift64::new(seed + 1);
+        GreyImage::from_fn(96, 96, |x, y| {
+            let (dx, dy) = (x as f64 - 48.0, y as f64 - 38.0);
+            let dark = match is_person {
+                true => dx.hypot(dy) < 9.0 || (dy > 12.0 && dx.abs() < 19.0),
+                false => (x / (5 + seed as usize % 9)).is_multiple_of(2),
+            };
+            (if dark { 60.0 } else { 150.0 } + 20.0 * random.uniform()) as u8
+        })
+    }
+
+    fn at(square: Rect) -> Detection {
+        Detection { image: Some(ImageBox::upper_body(square)), ..candidate() }
+    }
+
+    fn trainer(kind: Kind) -> HogTrainer {
+        let training = Training {
+            epochs: 10,
+            trees: 64,
+            numbers: 64,
+            random_windows: 3,
+            mining_rounds: 1,
+            mined_per_picture: 5,
+            ..Training::default()
+        };
+        let mut trainer = HogTrainer::new(kind, training, 3).unwrap();
+        for group in 0..40 {
+            for is_person in [true, false] {
+                let frame = frame(picture(is_person, group));
+                trainer.add(&frame, &at(SQUARE), Example { is_person, group }).unwrap();
+            }
+        }
+        // Half of this window is beside the picture.
+        let cut_off = at(Rect { x: -20.0, ..SQUARE });
+        let example = Example { is_person: true, group: 99 };
+        trainer.add(&frame(picture(true, 99)), &cut_off, example).unwrap();
+        trainer
+    }
+
+    #[test]
+    fn both_machines_learn_to_tell_heads_from_bars() {
+        for kind in [Kind::Linear, Kind::Trees] {
+            let mut parts = vec![0.0];
+            let fitted = trainer(kind).fit(&mut |part| parts.push(part)).unwrap();
+            assert!(parts.is_sorted() && parts.last() == Some(&1.0), "{parts:?}");
+            let figures = &fitted.figures;
+            let count = |key: &str| figures[key].as_integer().unwrap();
+            let part = |key: &str| figures[key].as_float().unwrap();
+            // Eight windows of each person that is fitted; a tenth and a fifth are held out.
+            let people = count("windows_of_people");
+            assert!(people % 8 == 0 && (8 * 22..8 * 35).contains(&people), "{figures}");
+            // One window of each small picture of the same groups, and the mined ones.
+            let mined = figures["mined"].as_array().unwrap()[0].as_integer().unwrap();
+            assert_eq!(count("windows_of_others"), people / 8 + mined);
+            assert!(mined <= 5 * people / 8, "{figures}");
+            assert_eq!((count("pictures_without_people"), count("people_cut_off")), (40, 1));
+            assert!((1..18).contains(&count("held_out_people")), "{figures}");
+            assert!(count("held_out_windows_of_others") > 100, "{figures}");
+            assert!(part("held_out_people_accepted") > 0.9, "{figures}");
+            assert!((0.5..=1.0).contains(&part("area_under_roc_of_near_misses")), "{figures}");
+            let model = Model::from_text(&fitted.model).unwrap();
+            for seed in 100..110 {
+                let log_odds = |is_person: bool| {
+                    let numbers = window_numbers(&picture(is_person, seed), &SQUARE, kind);
+                    model.log_odds(model.sum_of(&numbers))
+                };
+                let (person, bars) = (log_odds(true), log_odds(false));
+                assert!(person > 0.0 && bars < person, "{kind:?} {seed}: {person} {bars}");
+            }
+        }
+    }
+
+    #[test]
+    fn people_alone_are_no_training_set() {
+        let mut trainer = HogTrainer::new(Kind::Linear, Training::default(), 3).unwrap();
+        for group in 0..10 {
+            let example = Example { is_person: true, group };
+            trainer.add(&frame(picture(true, group)), &at(SQUARE), example).unwrap();
+        }
+        assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("both are needed"));
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        let of = |training| HogTrainer::new(Kind::Linear, training, 1).is_ok();
+        assert!(of(Training::default()));
+        assert!(!of(Training { person_penalty: 0.0, ..Training::default() }));
+        assert!(!of(Training { other_penalty: f64::INFINITY, ..Training::default() }));
+        assert!(!of(Training { epochs: 0, ..Training::default() }));
+        assert!(!of(Training { trees: 0, ..Training::default() }));
+    }
+}

@@ -107,3 +107,27 @@ pub(crate) fn from_bytes(bytes: &[u8], least: Vec<f32>) -> Result<Trees, String>
     }
     Ok(Trees { trees, least })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TREE: Tree = Tree { numbers: [0, 1, 2], below: [0.5; 3], values: [1.0, 2.0, 3.0, 4.0] };
+
+    #[test]
+    fn the_second_question_is_that_of_the_first_answer() {
+        let value = |numbers: [f32; 3]| TREE.value(&numbers);
+        assert_eq!([value([0.0, 0.0, 1.0]), value([0.0, 1.0, 0.0])], [1.0, 2.0]);
+        assert_eq!([value([1.0, 1.0, 0.0]), value([1.0, 0.0, 1.0])], [3.0, 4.0]);
+        assert_eq!(value([0.5, 0.0, 0.5]), 4.0, "the threshold itself is not below");
+    }
+
+    #[test]
+    fn a_tree_that_asks_beyond_the_window_is_refused() {
+        let read = |number: usize| {
+            let tree = Tree { numbers: [number as u16, 0, 0], ..TREE };
+            from_bytes(&to_bytes(&[tree]), vec![0.0])
+        };
+        assert!(read(CHANNEL_NUMBERS - 1).is_ok() && read(CHANNEL_NUMBERS).is_err());
+    }
+}

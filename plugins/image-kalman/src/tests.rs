@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3, Point3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point2, Point3, Vector2, Vector3, Vector5};
 use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::{
@@ -8,7 +8,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
-use crate::space::{RobotPoint, pixel_covariance};
+use crate::space::{ImagePoint, RobotPoint, pixel_covariance};
 use crate::{Config, ImageKalman, State};
 
 const DT_S: f64 = 1.0 / 23.0;
@@ -124,6 +124,63 @@ fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
     let back = state.estimate(&camera);
     assert!((back.person.position - place).norm() < 0.05, "{back:?}");
     assert!(back.region.iou(&person(place).rect().unwrap()) > 0.9);
+}
+
+/// The robot turns by 3 rad within 20 frames, the person walks on to the left at half a metre a
+/// second.
+#[test]
+fn a_person_behind_the_robot_walks_on() {
+    let (config, camera) = (Config::default(), camera());
+    let at = |frame: usize| Point3::new(3.0, -0.5 + 0.5 * DT_S * frame as f64, 1.6);
+    let sightings: Vec<Detection> = (0..40).map(|frame| person(at(frame))).collect();
+    let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
+    let motion = EgoMotion { turn: 0.15, ..EgoMotion::at_rest(DT_S) };
+    (0..20).for_each(|_| state.predict(&config, &motion, &camera));
+    let place = state.estimate(&camera).person.position;
+    assert!(place.x < 0.0, "{place}");
+    let in_old_frame = nalgebra::Rotation2::new(20.0 * 0.15) * place.xy();
+    assert!((in_old_frame - at(59).xy()).norm() < 0.1, "{in_old_frame} {}", at(59));
+}
+
+/// A change of any of the six numbers, by much more than the step of the derivative.
+#[test]
+fn the_jacobian_foretells_the_point_in_space() {
+    let here = ImagePoint {
+        pixel: Point2::new(420.0, 180.0),
+        velocity: Vector2::new(60.0, -25.0),
+        range: Vector2::new(4.0, 0.3),
+    };
+    let (camera, jacobian) = (camera(), here.jacobian(&camera()));
+    let before = here.in_space(&camera);
+    for (column, by) in [0.5, 0.5, 5.0, 5.0, 0.05, 0.05].into_iter().enumerate() {
+        let mut there = here;
+        match column {
+            0 | 1 => there.pixel[column] += by,
+            2 | 3 => there.velocity[column - 2] += by,
+            _ => there.range[column - 4] += by,
+        }
+        let after = there.in_space(&camera);
+        let (place, pace) = (after.position - before.position, after.velocity - before.velocity);
+        let moved = Vector5::new(place.x, place.y, place.z, pace.x, pace.y);
+        let foretold = jacobian.column(column) * by;
+        assert!((foretold - moved).norm() < 0.01 * moved.norm(), "{column}: {foretold} {moved}");
+    }
+}
+
+/// Coasting towards the camera ends in front of it.
+#[test]
+fn a_person_who_came_near_is_not_foreseen_behind_the_camera() {
+    let config = Config::default();
+    let at = |i: usize| person(Point3::new(4.0 - 2.0 * DT_S * i as f64, 0.0, 1.4));
+    let sightings: Vec<Detection> = (0..30).map(at).collect();
+    let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
+    let camera = camera();
+    for _ in 0..60 {
+        state.predict(&config, &EgoMotion::at_rest(DT_S), &camera);
+    }
+    let place = state.estimate(&camera).person.position;
+    let ahead = camera.depth_of(&place);
+    assert!(ahead > 0.1 && ahead < 1.0, "{place}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use nalgebra::{Point2, center};
+use nalgebra::Point2;
 use tagalong_core::LaserScan;
 
 use crate::Segmentation;
@@ -72,10 +72,5 @@ impl Beams {
         let count = segment.len().max(1) as f64;
         let sum: nalgebra::Vector2<f64> = self.points[segment].iter().map(|p| p.coords).sum();
         Point2::from(sum / count)
-    }
-
-    /// Returns the middle between the two ends of a segment.
-    pub fn between_ends(&self, segment: Segment) -> Point2<f64> {
-        center(&self.points[segment.start], &self.points[segment.end - 1])
     }
 }

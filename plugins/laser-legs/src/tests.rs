@@ -86,6 +86,88 @@ fn two_legs_make_a_person_and_one_makes_a_less_certain_one() {
     assert!(pair.covariance[(2, 2)] >= 100.0, "a scan contains no height");
 }
 
+/// By a model that gives each segment log-odds of 2.0.
+#[test]
+fn the_log_odds_of_a_person_are_those_of_the_legs_and_a_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    let leaf = Node { feature: 0, below: 0.0, next: [0, 0], leaves: [0.5, 0.5] };
+    let model = Model { trees: vec![vec![leaf]], slope: 2.0, offset: 1.0 };
+    let path = folder.path().join("model.toml");
+    std::fs::write(&path, model.to_text().unwrap()).unwrap();
+    let config = Config {
+        model: path.to_string_lossy().into_owned(),
+        pair_log_odds: 0.7,
+        single_log_odds: -0.9,
+        limit: 100.0,
+        ..Config::default()
+    };
+    let of = |config: &Config, things: &Rounds| {
+        let found = detections(config.clone(), scan(720, things, Isometry3::identity()));
+        let [one] = &found[..] else { panic!("{found:?}") };
+        one.clone()
+    };
+    let (pair, single) = (of(&config, &LEGS), of(&config, &LEGS[..1]));
+    assert!((pair.score - 4.7).abs() < 1e-9 && (single.score - 1.1).abs() < 1e-9);
+    for (found, sigma_m) in [(&pair, 0.08), (&single, 0.16)] {
+        assert!((found.covariance[(1, 1)] - sigma_m * sigma_m).abs() < 1e-12);
+        assert_eq!(found.position.z, 1.6);
+    }
+    assert_eq!(of(&Config { limit: 3.0, ..config }, &LEGS).score, 3.0);
+}
+
+/// A wall is no leg however likely, and a leg that is none is counted.
+#[test]
+fn wide_things_and_unlikely_legs_are_left_out() {
+    let wide = [LEGS[0], ([3.0, -2.0], 0.5)];
+    assert_eq!(detections(all(), scan(720, &wide, Isometry3::identity())).len(), 1);
+    let config = Config { min_leg_log_odds: 100.0, ..Config::default() };
+    let mut detector = LaserLegs::new(config, &context()).unwrap();
+    let camera = Arc::new(Camera::blind(Isometry3::identity()));
+    let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
+        .with_laser(Some(scan(720, &LEGS, Isometry3::identity())));
+    let mut funnel = Funnel::default();
+    let query = Query::Discover { occupied: &[] };
+    assert!(detector.detect(&frame, &query, &mut funnel).unwrap().is_empty());
+    assert_eq!(funnel.count("no leg"), 2);
+}
+
+/// Of three legs in a row the nearer two are a person.
+#[test]
+fn the_nearest_legs_make_a_pair() {
+    let three = [([2.0, 0.5], 0.06), ([2.0, 0.0], 0.06), ([2.0, -0.3], 0.06)];
+    let found = detections(all(), scan(1440, &three, Isometry3::identity()));
+    let mut sides: Vec<f64> = found.iter().map(|d| d.position.y).collect();
+    sides.sort_by(f64::total_cmp);
+    assert!((sides[0] + 0.15).abs() < 0.03 && (sides[1] - 0.5).abs() < 0.03, "{sides:?}");
+    assert_eq!(sides.len(), 2);
+}
+
+/// Where nothing was for a second, a person is more likely than where something stands.
+#[test]
+fn a_place_that_was_free_speaks_for_a_person() {
+    let config = Config { free_log_odds: 2.0, limit: 100.0, ..all() };
+    let mut detector = LaserLegs::new(config.clone(), &context()).unwrap();
+    assert!(detector.remembers() && !LaserLegs::new(all(), &context()).unwrap().remembers());
+    let camera = Arc::new(Camera::blind(Isometry3::identity()));
+    let mut see = |things: &Rounds| {
+        let still = EgoMotion::at_rest(0.1);
+        let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), still, Images::default())
+            .with_laser(Some(scan(720, things, Isometry3::identity())));
+        let query = Query::Discover { occupied: &[] };
+        detector.detect(&frame, &query, &mut Funnel::default()).unwrap()
+    };
+    let thing = [([2.0, 1.5], 0.06)];
+    let first = see(&thing)[0].score;
+    let later = (0..10).map(|_| see(&thing)[0].score).last().unwrap();
+    assert!((later - first + 2.0).abs() < 1e-9, "it stood there: {first} {later}");
+    let came = see(&[thing[0], ([2.0, -1.5], 0.06)]);
+    let new = came.iter().find(|d| d.position.y < 0.0).unwrap();
+    let unknown =
+        detections(config, scan(720, &[thing[0], ([2.0, -1.5], 0.06)], Isometry3::identity()));
+    let alone = unknown.iter().find(|d| d.position.y < 0.0).unwrap();
+    assert!(new.score >= alone.score, "{} {}", new.score, alone.score);
+}
+
 #[test]
 fn legs_far_apart_belong_to_two_people() {
     let apart = [([2.0, 0.5], 0.06), ([2.0, -0.5], 0.06)];
@@ -115,6 +197,19 @@ fn the_segments_are_those_of_the_things_at_any_resolution() {
     assert_ne!(far.segments(&strict).len(), 1);
 }
 
+/// 2 m away, with 1.5 rays of 0.1 rad: 0.1 m and 0.3 m more.
+#[test]
+fn a_segment_ends_at_a_jump_of_so_many_rays() {
+    let count = |places: &[(u32, [f64; 2])]| {
+        let settings = Segmentation { min_points: 1, ..Segmentation::default() };
+        reflections(places).segments(&settings).len()
+    };
+    assert_eq!(count(&[(0, [2.0, 0.0]), (1, [2.0, 0.39])]), 1);
+    assert_eq!(count(&[(0, [2.0, 0.0]), (1, [2.0, 0.41])]), 2);
+    assert_eq!(count(&[(0, [2.0, 0.0]), (2, [2.0, 0.1])]), 1, "one ray without a reflection");
+    assert_eq!(count(&[(0, [2.0, 0.0]), (3, [2.0, 0.1])]), 2);
+}
+
 #[test]
 fn every_second_ray_is_a_scanner_of_half_the_resolution() {
     let whole = scan(720, &LEGS, Isometry3::identity());
@@ -142,6 +237,85 @@ fn features_measure_the_thing_in_metres() {
     assert_eq!((of("smaller_jump"), of("occluded_sides")), (0.5, 0.0));
 }
 
+/// Returns reflections at places, all 0.1 rad apart, by the numbers of their rays.
+fn reflections(places: &[(u32, [f64; 2])]) -> Beams {
+    let points: Vec<Point2<f64>> = places.iter().map(|(_, at)| Point2::from(*at)).collect();
+    let ranges = points.iter().map(|point| point.coords.norm()).collect();
+    let rays = places.iter().map(|(ray, _)| *ray).collect();
+    Beams { points, ranges, rays, step_rad: 0.1 }
+}
+
+#[track_caller]
+fn assert_features(of: &Features, expected: &[(&str, f64)]) {
+    for (name, value) in expected {
+        let at = FEATURES.iter().position(|feature| feature == name).unwrap();
+        let found = f64::from(of[at]);
+        assert!((found - value).abs() < 1e-4, "{name}: {found} instead of {value}");
+    }
+}
+
+/// Three points on a right angle, between two other small things and before a wide one.
+#[test]
+fn each_feature_is_that_of_its_definition() {
+    let mut places = vec![
+        (0, [1.8, -0.2]),
+        (1, [1.8, -0.1]),
+        (2, [2.0, 0.0]),
+        (3, [2.0, 0.2]),
+        (4, [2.3, 0.2]),
+        (7, [2.4, 0.5]),
+        (8, [2.4, 0.6]),
+        (9, [2.6, 0.8]),
+        (10, [2.6, 1.3]),
+    ];
+    let segments = [0..2, 2..5, 5..7, 7..9];
+    // The middle is (2.1, 0.1333), 2.1042 away: rays are 0.21042 apart there.
+    let expected = [
+        ("width", 0.360555),
+        ("deviation", 0.208167),
+        ("deviation_from_median", (0.2 + 0.3) / 3.0),
+        // Half of the hypotenuse.
+        ("radius", 0.180278),
+        ("circularity", 0.0),
+        ("linearity", 0.0759368),
+        ("length", 0.5),
+        ("regularity", 0.05 / 0.210423),
+        ("curvature", 1.0 / 0.180278),
+        ("depth", 0.143363),
+        ("aspect", 0.499384),
+        ("span", 3.0 * 0.210423),
+        ("smaller_jump", 0.05_f64.sqrt()),
+        ("larger_jump", 0.1_f64.sqrt()),
+        ("occluded_sides", 1.0),
+        ("points", 3.0),
+        ("neighbour", 0.412645),
+        ("second_neighbour", 0.513431),
+        ("neighbours", 2.0),
+        ("wall", 0.833333),
+    ];
+    let of = |places: &[(u32, [f64; 2])]| features(&reflections(places), &segments[1], &segments);
+    assert_features(&of(&places), &expected);
+    // Four rays without a reflection: that side is open.
+    places[5..].iter_mut().for_each(|(ray, _)| *ray += 1);
+    assert_features(&of(&places), &[("larger_jump", 0.5), ("smaller_jump", 0.05_f64.sqrt())]);
+    // The neighbours at both ends of a scan are those that there are.
+    let first = features(&reflections(&places), &segments[0], &segments);
+    assert_features(&first, &[("smaller_jump", 0.05_f64.sqrt()), ("larger_jump", 0.5)]);
+    let last = features(&reflections(&places), &segments[3], &segments);
+    assert_features(&last, &[("larger_jump", 0.5), ("smaller_jump", 0.08_f64.sqrt())]);
+}
+
+/// Four points that lie on no circle, by the normal equations.
+#[test]
+fn the_circle_is_that_of_least_squares() {
+    let beams = reflections(&[(0, [2.0, 0.0]), (1, [2.0, 0.2]), (2, [2.2, 0.2]), (3, [2.2, 0.1])]);
+    let whole = 0..4;
+    let found = features(&beams, &whole, std::slice::from_ref(&whole));
+    assert_features(&found, &[("radius", 0.131624), ("circularity", 0.0120996)]);
+    let two = features(&beams, &(0..2), &[0..2, 2..4]);
+    assert_features(&two, &[("radius", 1.0), ("circularity", 0.0), ("curvature", 0.0)]);
+}
+
 #[test]
 fn a_model_survives_its_file_and_a_broken_one_is_refused() {
     let leaf = |value: f32| Node { feature: 3, below: 0.5, next: [0, 0], leaves: [value, -value] };
@@ -165,6 +339,7 @@ fn a_model_survives_its_file_and_a_broken_one_is_refused() {
     // A way back to a node before it would have no end.
     assert!(refusal("[0, 0.25, 1,", "[0, 0.25, 7,").contains("hang together"));
     assert!(refusal("[0, 0.25, 1,", "[99, 0.25, 1,").contains("hang together"));
+    assert!(refusal("[3, 0.5, 0,", "[3, 0.5, 1,").contains("hang together"), "to itself");
 }
 
 #[test]
@@ -240,7 +415,19 @@ mod training {
         };
         let fitted = fit();
         assert_eq!(fitted, fit(), "the same bytes");
+        // One leg and two poles in each of 24 scans, with all rays and with every second one.
+        let number = |key: &str| fitted.figures[key].as_integer();
+        assert_eq!(
+            (number("legs"), number("others"), number("trees")),
+            (Some(48), Some(96), Some(10))
+        );
         let model = Model::from_text(&fitted.model).unwrap();
+        let figure = |key: &str| fitted.figures[key].as_float().unwrap();
+        assert!((figure("slope") - model.slope).abs() < 1e-4 && model.slope > 0.01);
+        let row = fitted.figures["cross_validation"].as_array().unwrap()[0].as_table().unwrap();
+        let part = |key: &str| row[key].as_float().unwrap();
+        assert!(part("legs_accepted") > 0.9 && part("others_accepted") < 0.1, "{row:?}");
+        assert!(part("area_under_roc") > 0.99);
         let beams = Beams::new(
             &scan(720, &[([2.05, 0.1], 0.06), ([2.0, 2.0], 0.2)], Isometry3::identity()),
             1,

@@ -180,3 +180,43 @@ fn tree(questions: &[Question]) -> Tree {
 fn rounded(value: f64) -> toml::Value {
     ((value * 1e4).round() / 1e4).into()
 }
+
+#[cfg(test)]
+mod tests {
+    use tagalong_stats::{RandomSource, SplitMix64};
+
+    use super::*;
+
+    /// Returns a trainer with so many legs and others, of features that say nothing.
+    fn trainer(legs: usize, others: usize) -> LegTrainer {
+        let training = Training { trees: vec![30], ..Training::default() };
+        let mut trainer = LegTrainer::new(&Config { training, ..Config::default() }, 1).unwrap();
+        let mut random = SplitMix64::new(5);
+        trainer.samples = (0..legs + others)
+            .map(|k| Sample {
+                features: std::array::from_fn(|_| random.uniform() as f32),
+                example: Example { is_person: k < legs, group: k as u64 % 12 },
+            })
+            .collect();
+        trainer
+    }
+
+    /// Fitted to what they are judged by, the trees would know all of it by heart.
+    #[test]
+    fn trials_are_judged_by_samples_that_they_were_not_fitted_to() {
+        let mut parts = vec![0.0];
+        let trainer = trainer(60, 60);
+        let trials = trainer.trials(&mut |part| parts.push(part));
+        assert_eq!(trials[0].held_out.len(), 120, "each sample once");
+        let found = area(&trials[0].held_out);
+        assert!((0.3..0.7).contains(&found), "{found}");
+        assert!(parts.is_sorted() && parts.iter().all(|part| *part <= 1.0), "{parts:?}");
+    }
+
+    #[test]
+    fn ten_of_each_are_enough() {
+        assert!(trainer(10, 10).fit(&mut |_| ()).is_ok());
+        assert!(trainer(9, 20).fit(&mut |_| ()).is_err());
+        assert!(trainer(20, 9).fit(&mut |_| ()).is_err());
+    }
+}

@@ -139,6 +139,16 @@ mod tests {
     }
 
     #[test]
+    fn a_candidate_at_the_bound_is_not_remembered() {
+        let mut clutter = ClutterMap::default();
+        let settings = Config { start_score: -1.0, ..settings() };
+        for _ in 0..2 {
+            let seen = scored(-1.0, person(3.0, 0.0));
+            assert_eq!(clutter.add_evidence(&seen, &settings), -1.0);
+        }
+    }
+
+    #[test]
     fn faint_clutter_are_forgotten() {
         let mut clutter = ClutterMap::default();
         clutter.add_evidence(&scored(-0.06, person(3.0, 0.0)), &settings());

@@ -1,4 +1,5 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+use tagalong_config::Registry;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track,
     TrackChanges, TrackId, TrackManager, Unassociated,
@@ -102,6 +103,14 @@ fn confirmed(config: Config, score: f64, observations: &[Observation]) -> bool {
 }
 
 #[test]
+fn the_promises_of_track_managers_are_kept() {
+    let mut registry = Registry::default();
+    crate::register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
 fn hits_confirm_only_if_they_are_close_to_each_other() {
     use Observation::{Missed, NotSearched, Occluded, OutOfView};
     let config =
@@ -124,6 +133,8 @@ fn hits_that_are_probably_no_person_confirm_no_track() {
     let sure = Observation::Detected { log_odds: 4.0 };
     assert!(confirmed(config(), 0.1, &[sure]), "at once");
     assert!(confirmed(config(), 4.0, &[]), "at once");
+    let many = Config { confirm_hits: 3, ..config() };
+    assert!(confirmed(many, 4.0, &[DETECTED]), "and for good");
 }
 
 #[test]
@@ -145,6 +156,15 @@ fn a_track_ends_by_its_score_only_below_the_limit() {
         live(config, 5.0, &[Observation::Detected { log_odds }]).1
     };
     assert_eq!((ends(-2.0), ends(-2.1)), (vec![], vec!["track: score"]));
+}
+
+#[test]
+fn a_track_that_is_not_confirmed_ends_at_its_second_miss() {
+    let after =
+        |score, misses| live(Config::default(), score, &vec![Observation::Missed; misses]).1;
+    assert_eq!(after(0.5, 1), Vec::<&str>::new());
+    assert_eq!(after(0.5, 2), ["track: not confirmed"]);
+    assert_eq!(after(5.0, 2), Vec::<&str>::new());
 }
 
 #[test]
@@ -192,6 +212,11 @@ fn candidates_are_dropped_by_the_test_that_they_fail() {
     assert_eq!(test(-1.0, -1.0, true), "score");
     assert_eq!(test(-1.0, 1.0, true), "verifier");
     assert_eq!(test(1.0, 1.0, false), "no track fits");
+    // The bound itself is enough.
+    assert_eq!(test(0.0, 0.0, true), "started");
+    assert_eq!(test(-1.0, 0.0, true), "verifier");
+    let manager = MOfN::new(Config { start_score: 0.5, ..Config::default() }).unwrap();
+    assert_eq!(manager.start_log_odds(), 0.5);
 }
 
 #[test]
@@ -204,6 +229,7 @@ fn a_place_that_was_rejected_is_doubted_until_a_reset() {
     };
     assert_eq!(initiate(&mut manager, -4.0), Initiation::Drop("verifier"));
     assert_eq!(initiate(&mut manager, 1.0), Initiation::Drop("doubt"));
+    assert_eq!(initiate(&mut manager, 0.0), Initiation::Drop("doubt"));
     manager.reset();
     assert!(matches!(initiate(&mut manager, 1.0), Initiation::Start(_)));
 }
@@ -226,6 +252,7 @@ fn settings_that_cannot_work_are_refused() {
         let message = refusal(config).unwrap_or_default();
         assert!(message.contains(key), "{key}: {message}");
     }
+    assert_eq!(refusal(Config { confirm_hits: 3, confirm_within: 3, ..default() }), None);
     let lenient = Config { drop_score: -1e9, confirm_score: 1e9, ..default() };
     assert_eq!(refusal(lenient), None);
 }

@@ -1,3 +1,5 @@
+mod arithmetic;
+
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_config::Registry;
 use tagalong_core::{
@@ -201,6 +203,7 @@ fn settings_that_cannot_work_are_refused() {
     for config in [
         Config { confirm_log_odds: -1.0, ..Config::default() },
         Config { end_log_odds: 0.5, ..Config::default() },
+        Config { end_log_odds: 0.0, ..Config::default() },
         Config { max_log_odds: 1.0, ..Config::default() },
         Config { usual: 1.1, ..Config::default() },
         Config { miss_log_odds: 0.1, ..Config::default() },

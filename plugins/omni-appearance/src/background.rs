@@ -188,4 +188,13 @@ mod tests {
         }
         assert_eq!(background.level, [120; 6], "what stands there for half a minute is furniture");
     }
+
+    #[test]
+    fn while_the_robot_moves_the_first_image_counts_fully_and_others_in_part() {
+        let mut background = Background::new(2, 1);
+        background.add_moving(&[100; 6], &config());
+        assert_eq!(background.level, [100; 6]);
+        background.add_moving(&[200; 6], &config());
+        assert_eq!(background.level, [(100.0 + 100.0 * MOVING_PART).round() as u8; 6]);
+    }
 }

@@ -180,4 +180,11 @@ mod tests {
         let hidden = divided(run(80, 41), 480, &[expected(118.0, 6.0, 3.0), near]);
         assert_eq!(hidden, [Part { run: run(80, 41), visible: 1.0 }]);
     }
+
+    #[test]
+    fn a_run_is_of_the_people_whose_middle_it_holds_also_across_the_seam() {
+        let holds = |column: f64| shares(&expected(column, 8.0, 2.0), run(470, 20), 480);
+        assert_eq!([469.0, 470.0, 479.0, 5.0, 9.0].map(holds), [false, true, true, true, true]);
+        assert_eq!([10.0, 100.0].map(holds), [false, false]);
+    }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix5, Point3, Vector2};
 use tagalong_config::{Context, Registry};
 use tagalong_core::{
     DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, ExternalDetection, Frame,
-    Funnel, Images, Person, Query, Stamp, Track, TrackId,
+    Funnel, Images, Input, Person, Query, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
 
@@ -107,6 +107,18 @@ fn low_scores_are_dropped_and_counted() {
     let log_odds = Config { score: ScoreScale::LogOdds, min_score: -5.0, ..Config::default() };
     let mut detector = of_file(text, log_odds).unwrap();
     assert_eq!(detect(&mut detector, &frame(1, None))[0].score, 0.2);
+}
+
+#[test]
+fn boxes_come_from_the_log_unless_a_file_has_them() {
+    let of_log = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
+    let of_file = of_file("1,-1,100,100,50,170,0.2\n", Config::default()).unwrap();
+    let inputs = [of_log.capabilities().inputs, of_file.capabilities().inputs];
+    assert_eq!(inputs.map(|inputs| inputs.requires(Input::Detections)), [true, false]);
+    assert!(
+        inputs.iter().all(|inputs| inputs.uses(Input::Depth) && !inputs.requires(Input::Depth))
+    );
+    assert!(of_file.capabilities().discovers && of_file.capabilities().tracks);
 }
 
 #[test]

@@ -99,4 +99,55 @@ mod tests {
             assert_eq!(shows, cell % CELLS == 2, "cell {cell}");
         }
     }
+
+    /// The descriptor by its definition, cell by cell, in double precision.
+    fn slow(grey: &Patch) -> Vec<f64> {
+        let last = SIDE as i64 - 1;
+        let at = |row: i64, column: i64| -> f64 {
+            f64::from(grey[(row.clamp(0, last) * SIDE as i64 + column.clamp(0, last)) as usize])
+        };
+        let mut cells = vec![vec![0.0; DIRECTIONS]; CELLS * CELLS];
+        let mut strengths = [0.0; CELLS * CELLS];
+        for row in 0..SIDE as i64 {
+            for column in 0..SIDE as i64 {
+                let dx = (at(row, column + 1) - at(row, column - 1)) / 2.0;
+                let dy = (at(row + 1, column) - at(row - 1, column)) / 2.0;
+                let cell = (row / 4 * 5 + column / 4) as usize;
+                let strength = (dx * dx + dy * dy).sqrt();
+                strengths[cell] += strength;
+                let turn = dy.atan2(dx).to_degrees().rem_euclid(360.0) / 22.5;
+                let part = turn.fract();
+                cells[cell][turn as usize % 16] += (1.0 - part) * strength;
+                cells[cell][(turn as usize + 1) % 16] += part * strength;
+            }
+        }
+        let around = |cell: usize| {
+            let near = |other: &usize| {
+                (other / 5).abs_diff(cell / 5) <= 1 && (other % 5).abs_diff(cell % 5) <= 1
+            };
+            let near: Vec<f64> = (0..25).filter(near).map(|other| strengths[other]).collect();
+            near.iter().sum::<f64>() / near.len() as f64
+        };
+        // The noise: one grey value per pixel in each of the 16 pixels.
+        let root = |cell: usize, own: &f64| (own / (around(cell) + 16.0)).sqrt();
+        let all =
+            cells.iter().enumerate().flat_map(|(cell, own)| own.iter().map(move |v| (cell, v)));
+        let all: Vec<f64> = all.map(|(cell, own)| root(cell, own)).collect();
+        let length = all.iter().map(|v| v * v).sum::<f64>().sqrt();
+        all.iter().map(|v| v / length).collect()
+    }
+
+    #[test]
+    fn the_histograms_are_those_of_the_definition() {
+        let mut state = 1_u32;
+        // Strong in one part and weak in the others, so that the noise counts.
+        let grey: Patch = std::array::from_fn(|at| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let weight = if at < PIXELS / 3 { 1.0 } else { 0.02 };
+            weight * (state >> 24) as f32
+        });
+        for (fast, slow) in of(&grey).iter().zip(slow(&grey)) {
+            assert!((f64::from(*fast) - slow).abs() < 1e-4, "{fast} {slow}");
+        }
+    }
 }

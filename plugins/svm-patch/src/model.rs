@@ -277,4 +277,10 @@ mod tests {
         assert!(Model::from_text(&infinite).unwrap_err().contains("not finite"));
         assert!(Model::from_text("nonsense").is_err());
     }
+
+    #[test]
+    fn a_model_knows_its_number_of_vectors() {
+        assert!(model(1, 0, 1.0).is_empty() && !model(1, 2, 1.0).is_empty());
+        assert_eq!(model(1, 2, 1.0).len(), 2);
+    }
 }

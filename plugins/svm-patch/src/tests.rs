@@ -79,6 +79,19 @@ mod training {
     }
 
     #[test]
+    fn the_card_holds_the_rounded_line_and_progress_rises_to_one() {
+        let mut parts = vec![0.0];
+        let fitted = trainer(small(), 40).fit(&mut |part| parts.push(part)).unwrap();
+        assert!(parts.is_sorted() && parts.last() == Some(&1.0), "{parts:?}");
+        let model = Model::from_text(&fitted.model).unwrap();
+        for (key, value) in [("slope", model.slope), ("offset", model.offset)] {
+            let written = fitted.figures[key].as_float().unwrap();
+            assert!(value.abs() > 1e-3 && (written - value).abs() <= 5e-5, "{written} {value}");
+            assert!((written * 1e4 - (written * 1e4).round()).abs() < 1e-6, "{written}");
+        }
+    }
+
+    #[test]
     fn the_same_samples_give_the_same_bytes() {
         let [first, second] = [(); 2].map(|()| trainer(small(), 40).fit(&mut |_| {}).unwrap());
         assert_eq!(first, second);

@@ -158,6 +158,38 @@ fn it_turns_to_whoever_is_behind_where_the_printed_law_drives_away() {
 }
 
 #[test]
+fn it_speeds_up_and_slows_down_no_faster_than_it_may() {
+    let config = Config { latency_s: 0.0, ..Config::default() };
+    let mut controller = ArcFollow::new(config).unwrap();
+    assert_eq!(controller.stand_off_m(), Some(1.4));
+    let mut speed_to = |x: f64| {
+        let person = target(x, 0.0, Vector2::zeros());
+        speed(command(&mut controller, EgoMotion::at_rest(0.1), Some(&person)))
+    };
+    for expected in [0.05, 0.1, 0.15] {
+        assert!((speed_to(4.0) - expected).abs() < 1e-9);
+    }
+    assert!((speed_to(1.4) - 0.05).abs() < 1e-9, "1 m/s²");
+}
+
+/// The arc of path A, and on the spot the more the slower it drives, 20 degrees to the side.
+#[test]
+fn the_turn_is_that_of_the_arc_and_of_the_bearing() {
+    let bearing = 20_f64.to_radians();
+    let of = |range_m: f64| {
+        let config = Config { path: Path::A, latency_s: 0.0, ..Config::default() };
+        settled(config, &target(range_m * bearing.cos(), range_m * bearing.sin(), Vector2::zeros()))
+    };
+    let wheels = of(2.0);
+    let driven = 0.8 * 0.6 * bearing.cos().powi(2);
+    assert!((speed(wheels) - driven).abs() < 1e-9, "{wheels:?}");
+    let turned = driven * bearing.sin() + (1.0 - driven / MAX_MPS) * bearing;
+    assert!((turn_rate(wheels) - turned).abs() < 1e-9, "{wheels:?}");
+    // At half the least range, half the rate.
+    assert!((turn_rate(of(0.25)) - 0.5 * bearing).abs() < 1e-9);
+}
+
+#[test]
 fn it_goes_on_turning_the_way_it_began() {
     let mut controller = ArcFollow::new(Config::default()).unwrap();
     let mut rate = |y: f64| {

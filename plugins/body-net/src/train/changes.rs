@@ -96,4 +96,34 @@ mod tests {
         assert!(all.iter().sum::<f32>().abs() < 60.0);
         assert!(all.iter().any(|v| *v < -0.95) && all.iter().any(|v| *v > 0.95));
     }
+
+    #[test]
+    fn half_are_mirrored_and_all_moves_are_made() {
+        let mut view = NetworkInput { grey: vec![128; 80 * 36], behind: vec![0; 40 * 18] };
+        view.behind[20 * 18 + 5] = 90;
+        let (mut mirrored, mut moves) = (0, std::collections::BTreeMap::new());
+        for seed in 0..300 {
+            let other = changed(&view, &mut Draws(1000 * seed));
+            let at = other.behind.iter().position(|v| *v == 90).unwrap();
+            let (row, column) = (at / 18, at % 18);
+            let is_mirrored = column > 8;
+            mirrored += usize::from(is_mirrored);
+            let column = if is_mirrored { 17 - column } else { column };
+            *moves.entry((row, column)).or_insert(0) += 1;
+        }
+        assert!((110..190).contains(&mirrored), "{mirrored}");
+        let places =
+            moves.keys().all(|(row, column)| row.abs_diff(20) <= 1 && column.abs_diff(5) <= 1);
+        assert!(places && moves.len() == 9 && moves.values().all(|n| *n > 12), "{moves:?}");
+    }
+
+    /// At 128 the contrast changes nothing, so that all of the change is noise.
+    #[test]
+    fn noise_is_around_zero_and_bounded() {
+        let view = NetworkInput { grey: vec![128; 80 * 36], behind: vec![0; 40 * 18] };
+        let grey = changed(&view, &mut Draws(7)).grey;
+        let mean = grey.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.len() as f64;
+        assert!((mean - 128.0).abs() < 0.3, "{mean}");
+        assert_eq!((grey.iter().min(), grey.iter().max()), (Some(&124), Some(&132)));
+    }
 }

@@ -190,3 +190,40 @@ fn check(training: &Training) -> Result<()> {
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a trainer with so many people and then others, each in a group of its own.
+    fn trainer(people: usize, others: usize) -> NetTrainer {
+        let training = Training { epochs: 1, batch: 4, folds: 3, ..Training::default() };
+        let mut trainer = NetTrainer::new(training, 1).unwrap();
+        for k in 0..people + others {
+            let grey = (0..80 * 36).map(|cell| (cell * (k + 7) % 251) as u8).collect();
+            trainer.views.push(NetworkInput { grey, behind: vec![0; 40 * 18] });
+            trainer.examples.push(Example { is_person: k < people, group: k as u64 });
+        }
+        trainer
+    }
+
+    /// A network that is undecided about all of them: its error is `SURE - 0.5`.
+    #[test]
+    fn people_and_others_weigh_the_same_whatever_their_number() {
+        let trainer = trainer(3, 1);
+        let bias = |batch: &[usize], share: f32| {
+            trainer.gradient(&Net::default(), batch, share, 1).unwrap().bias[0]
+        };
+        assert!(bias(&[0, 1, 2, 3], 0.75).abs() < 1e-6);
+        assert!((bias(&[0], 0.5) + SURE - 0.5).abs() < 1e-6, "a person");
+        assert!((bias(&[3], 0.5) - SURE + 0.5).abs() < 1e-6, "another thing");
+        assert!((bias(&[3], 0.75) - 2.0 * (SURE - 0.5)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn each_example_is_held_out_once() {
+        let said = trainer(4, 5).held_out(&mut |_| ()).unwrap();
+        assert_eq!(said.len(), 9);
+        assert_eq!(said.iter().filter(|(_, is_person)| *is_person).count(), 4);
+    }
+}

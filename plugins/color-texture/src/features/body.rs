@@ -110,4 +110,19 @@ mod tests {
         assert!(strength[feet].is_nan() && strength[BLOCKS + feet].is_nan());
         assert!(strength[chest].is_finite() && strength[BLOCKS + chest].is_finite());
     }
+
+    #[test]
+    fn each_block_has_the_intensity_of_its_part_of_the_plane() {
+        let found = numbers(6.0, |left, _| if left > 0.0 { 180 } else { 40 });
+        let intensity = &found[BLOCKS * (DIRECTIONS + 1)..];
+        for (block, found) in intensity.iter().enumerate() {
+            let expected = if block % (COLUMNS / BLOCK[1]) < 3 { 70.0 } else { -70.0 };
+            // The middle lies between two pixels.
+            assert!((found - expected).abs() < 6.0, "{block}: {found}");
+        }
+        let found = numbers(6.0, |_, up| if up > 1.0 { 180 } else { 40 });
+        let intensity = &found[BLOCKS * (DIRECTIONS + 1)..];
+        let [head, feet] = [0, BLOCKS - 1].map(|block| intensity[block]);
+        assert!((head - feet - 140.0).abs() < 6.0, "{head} {feet}");
+    }
 }

@@ -134,4 +134,30 @@ mod tests {
         assert!(out[0] > 0.8 && out[1] == 0.0, "red: {:?}", &out[..HUES]);
         assert!(out[2 * OF_ZONE].abs() < 1e-4, "head and torso have the same hues");
     }
+
+    /// A red cell and a nearly black one.
+    #[test]
+    fn the_numbers_of_a_zone_are_those_of_their_definitions() {
+        let numbers = zone_numbers(&[[200.0, 50.0, 50.0], [10.0, 10.0, 10.0]]);
+        let (red, green) = ([201.0 / 303.0, 11.0 / 33.0], [51.0 / 303.0, 11.0 / 33.0]);
+        let expected = [
+            0.5 * (red[0] + red[1]),
+            0.5 * (red[0] - red[1]),
+            0.5 * (green[0] + green[1]),
+            0.5 * (green[1] - green[0]),
+            // Saturations of 150 / 201 and 0.
+            75.0 / 201.0,
+            75.0 / 201.0,
+            // Intensities of 100 and 10.
+            45.0 / 64.0,
+            0.0,
+            0.5,
+        ];
+        for (found, expected) in numbers[HUES..].iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-4, "{numbers:?}");
+        }
+        assert!((numbers[0] - 75.0 / 201.0).abs() < 1e-4 && numbers[1..HUES] == [0.0; 5]);
+        assert_eq!(saturation([0.0; 3]), 0.0);
+        assert_eq!(chromaticity([0.0; 3]), [1.0 / 3.0; 2], "black is grey");
+    }
 }

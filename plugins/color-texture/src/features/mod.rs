@@ -141,3 +141,39 @@ fn spread(values: impl Iterator<Item = f32>) -> [f32; 2] {
     // Rounding may bring the variance of an even zone below 0.
     [mean, (squares / count - mean * mean).max(0.0).sqrt()]
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tagalong_conformance::patch::{candidate, frame, picture};
+    use tagalong_core::{EgoMotion, Images, RgbImage, Stamp};
+
+    use super::*;
+
+    #[test]
+    fn the_spread_is_mean_and_standard_deviation() {
+        assert_eq!(spread([1.0, 3.0, 1.0, 3.0].into_iter()), [2.0, 1.0]);
+        assert!(spread(std::iter::empty())[0].is_nan());
+    }
+
+    /// A colour image is looked at where its pixels are those of the grey one.
+    #[test]
+    fn a_colour_image_of_another_size_is_unknown() {
+        let known = |side: usize| {
+            let grey = frame(picture(true, 1));
+            let images = Images {
+                grey: Some(Arc::new(picture(true, 1))),
+                colour: Some(Arc::new(RgbImage::filled(side, side, [200, 90, 60]))),
+                ..Images::default()
+            };
+            let still = EgoMotion::at_rest(0.1);
+            let frame = Frame::new(1, Stamp::default(), Arc::clone(&grey.camera), still, images);
+            let mut features = Features::default();
+            features.look(&frame, &candidate()).unwrap();
+            assert!(!features.has_depth());
+            features.values()[Family::Colour.range()].iter().all(|v| v.is_finite())
+        };
+        assert!(known(64) && !known(32));
+    }
+}

@@ -174,4 +174,21 @@ mod tests {
         push(&surface(|x, _| if x > 3.0 { 0.0 } else { f32::NAN }), &mut out);
         assert_eq!(out.len(), COUNT);
     }
+
+    #[test]
+    fn bends_shares_and_changes_are_counted() {
+        let curved = surface(|x, _| 0.0005 * (x - 15.5).powi(2));
+        assert!((roughness(&curved, TORSO) - 0.001).abs() < 1e-6);
+        // Quarters of the window: no reading, on the candidate, nearer, farther.
+        let quarters = surface(|x, _| match x as usize / 8 {
+            0 => f32::NAN,
+            1 => 0.1,
+            2 => -3.0,
+            _ => 3.0,
+        });
+        assert_eq!(shares(&quarters), [0.25; 3]);
+        // Onto the candidate and off it.
+        assert_eq!(changes(&quarters), 2.0);
+        assert_eq!(changes(&surface(|_, _| 0.0)), 0.0);
+    }
 }

@@ -79,4 +79,33 @@ mod tests {
         assert_eq!(out.len(), COUNT);
         assert!(out.iter().all(|v| v.is_finite()), "{out:?}");
     }
+
+    #[test]
+    fn an_edge_has_its_pattern_whatever_its_direction() {
+        let middle = 16 * SIDE + 16;
+        let across = std::array::from_fn(|c| if c / SIDE < 16 { 90.0 } else { 10.0 });
+        assert_eq!(pattern(&across, middle), 3);
+        let patterns = patterns(&across, TORSO);
+        assert!((patterns.iter().sum::<f32>() - 1.0).abs() < 1e-5 && patterns[0] > 0.9);
+    }
+
+    /// Stripes of 10 about their means: 150 in the head, 50 in the torso and elsewhere.
+    #[test]
+    fn contrasts_are_those_of_head_and_torso() {
+        let mut grey = [50.0; SIDE * SIDE];
+        for (zone, mean) in [(HEAD, 150.0), (TORSO, 50.0)] {
+            zone.cells().for_each(|c| grey[c] = mean + if c % 2 == 0 { 10.0 } else { -10.0 });
+        }
+        let (head, torso, count) = (110.0_f64, 300.0_f64, (SIDE * SIDE) as f64);
+        let mean = (150.0 * head + 50.0 * (count - head)) / count;
+        let squares = head * (150.0 - mean).powi(2) + (count - head) * (50.0 - mean).powi(2);
+        let all = ((squares + 100.0 * (head + torso)) / count).sqrt();
+        let mut out = Vec::new();
+        push(&grey, &mut out);
+        let unit = all + 2.0;
+        let expected = [10.0 / unit, 10.0 / unit, 100.0 / unit, all / 64.0, 10.0 / 12.0];
+        for (found, expected) in out[2 * PATTERNS..].iter().zip(expected) {
+            assert!((f64::from(*found) - expected).abs() < 1e-3, "{out:?} {expected}");
+        }
+    }
 }

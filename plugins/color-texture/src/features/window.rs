@@ -164,4 +164,20 @@ mod tests {
         let blind = DepthImage::filled(64, 64, f32::NAN);
         assert!(Surface::new(&blind, &Rect::new(5.0, 5.0, 50.0, 50.0)).is_none());
     }
+
+    #[test]
+    fn depth_is_that_of_the_middle_of_a_cell_and_zero_is_no_reading() {
+        // The window of 64 pixels: two in a cell.
+        let square = Rect::new(0.0, 0.0, 64.0, 64.0).inflated(1.0 / 1.1 - 1.0);
+        let depth = DepthImage::from_fn(64, 96, |x, y| match (x, y) {
+            (60.., 20..) => 0.0,
+            (60.., _) => f32::INFINITY,
+            _ => 2.0 + 0.02 * (x / 2) as f32,
+        });
+        let surface = Surface::new(&depth, &square).unwrap();
+        let relative = |column: usize, row: usize| surface.0[row * SIDE + column];
+        assert!((relative(20, 4) - relative(10, 4) - 0.2).abs() < 1e-5);
+        assert_eq!(relative(20, 4), relative(20, 40));
+        assert!(relative(31, 2).is_nan() && relative(31, 30).is_nan());
+    }
 }

@@ -238,4 +238,30 @@ mod tests {
         let right = (0..60).filter(|k| (sum(*k) > 0.0) == examples.is_person[*k]).count();
         assert!(right >= 57, "{right}");
     }
+
+    #[test]
+    fn slope_and_curvature_are_those_of_the_weighted_logistic_loss() {
+        let mut examples = examples(3, 2).1;
+        (examples.weights, examples.is_person) = (vec![2.0, 2.0], vec![true, false]);
+        let [person, other] = [0, 1].map(|k| loss(&examples, k, 3.0_f64.ln()));
+        // The probability is 3/4.
+        assert!((person.slope - 0.5).abs() < 1e-12 && (other.slope + 1.5).abs() < 1e-12);
+        assert!((person.curvature - 0.375).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_tree_adds_its_votes_to_the_sums() {
+        let (values, examples) = examples(3, 60);
+        let chosen: Vec<usize> = (0..60).collect();
+        let losses: Vec<Sums> = chosen.iter().map(|k| loss(&examples, *k, 0.0)).collect();
+        let (training, tried) = (Training::default(), [5, 7, 9]);
+        let grower =
+            Grower { examples: &examples, losses: &losses, tried: &tried, training: &training };
+        let mut sums = vec![0.0; 60];
+        let tree = grower.tree(&chosen, &mut sums).unwrap();
+        for (k, sum) in sums.iter().enumerate() {
+            let vote = f64::from(tree.vote(&values[k * COUNT..(k + 1) * COUNT]));
+            assert!((sum - vote).abs() < 1e-6, "{k}: {sum} {vote}");
+        }
+    }
 }

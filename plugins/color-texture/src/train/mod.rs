@@ -247,3 +247,69 @@ fn check(training: &Training) -> Result<()> {
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labelled(is_person: bool, has_depth: bool) -> Labelled {
+        Labelled { example: Example { is_person, group: 1 }, has_depth }
+    }
+
+    fn weights(counts: [usize; 4]) -> Vec<f64> {
+        let kinds = [(true, false), (true, true), (false, false), (false, true)];
+        let each = kinds.into_iter().zip(counts);
+        let examples = each.flat_map(|((is_person, has_depth), count)| {
+            std::iter::repeat_n(labelled(is_person, has_depth), count)
+        });
+        let training = Training { without_depth: 0.25, ..Training::default() };
+        let mut trainer = TreeTrainer::new(training, 1).unwrap();
+        trainer.examples = examples.collect();
+        trainer.weights()
+    }
+
+    #[test]
+    fn people_and_others_weigh_the_same_and_depth_has_its_share() {
+        let found = weights([3, 1, 2, 4]);
+        let expected = [&[1.25 / 3.0; 3][..], &[3.75], &[0.625; 2], &[0.9375; 4]].concat();
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        // Depth on one side alone would tell the classes apart: it has no share.
+        assert_eq!(weights([2, 1, 3, 0]), [1.5, 1.5, 0.0, 1.0, 1.0, 1.0]);
+        // Without depth there is nothing to share.
+        assert_eq!(weights([3, 0, 1, 0]), [2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 2.0]);
+    }
+
+    #[test]
+    fn the_loss_is_the_weighted_cross_entropy() {
+        let judged = |sum: f64, is_person: bool, weight: f64| Judged {
+            sum,
+            is_person,
+            has_depth: true,
+            weight,
+        };
+        let held_out = vec![judged(2.0, true, 1.0), judged(1.0, false, 3.0)];
+        let expected = ((1.0 + (-2.0_f64).exp()).ln() + 3.0 * (1.0 + 1.0_f64.exp()).ln()) / 4.0;
+        let loss = Trial { trees: 1, held_out }.loss();
+        assert!((loss - expected).abs() < 1e-12, "{loss} {expected}");
+    }
+
+    #[test]
+    fn influence_is_the_share_of_the_votes() {
+        let gradients = Family::Gradients.range().start;
+        let texture = Family::Texture.range().start;
+        let stump = |feature: usize, below: f32, above: f32| Stump {
+            feature,
+            threshold: 0.0,
+            below,
+            above,
+        };
+        let (below, above) = (stump(texture, -1.0, 1.0), stump(gradients, 0.0, 1.0));
+        let tree = Tree { feature: gradients, threshold: 0.0, below, above };
+        let model = Model { trees: vec![tree], slope: 1.0, offset: 0.0 };
+        // 2 by texture, 1 and a half by gradients.
+        let table = influence(&model);
+        assert_eq!(table["texture"].as_float(), Some(0.5714));
+        assert_eq!(table["gradients"].as_float(), Some(0.4286));
+        assert_eq!(table["shape"].as_float(), Some(0.0));
+    }
+}

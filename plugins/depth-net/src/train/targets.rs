@@ -183,4 +183,41 @@ mod tests {
         assert_eq!(mirrored.cells[128 + 61], Target::Person([0.01, -0.02, 0.3]));
         assert_eq!(mirrored.mirrored(), targets);
     }
+
+    /// An empty cell, one of a person, one that may answer anything, and cells out of view.
+    #[test]
+    fn each_cell_is_drawn_to_its_target() {
+        let mut cells = vec![Target::Empty; 64 * 64];
+        (cells[1], cells[2]) = (Target::Person([0.1, -0.2, 0.3]), Target::Any);
+        let (mut pass, mut of) = (Pass::default(), Pass::default());
+        let answers = [[1.0, 0.5, 0.5, 0.5], [0.7, 0.2, -0.3, 0.4], [1.0; 4]];
+        pass.answer.values[..12].copy_from_slice(&answers.concat());
+        assert_eq!(Targets { cells }.slopes(&pass, &mut of), 1.0, "one cell of a person");
+        let slopes = of.answer.values.as_chunks::<4>().0;
+        assert_eq!(slopes[0], [-DOUBT * focal(-1.0), 0.0, 0.0, 0.0]);
+        assert_eq!(slopes[1], [DOUBT * focal(0.7), PLACE, -PLACE, HEIGHT]);
+        assert!(slopes[2..].iter().all(|slope| *slope == [0.0; 4]));
+    }
+
+    /// A wall through the axes of two people: 0.6 m of it are theirs, from the feet to above the head.
+    #[test]
+    fn the_surface_of_a_person_is_what_the_camera_sees_of_it() {
+        let lens = tagalong_geometry::Pinhole {
+            fx: 120.0,
+            fy: 120.0,
+            cx: 159.5,
+            cy: 119.5,
+            distortion: tagalong_geometry::Distortion::None,
+        };
+        let camera = Camera::mounted(lens, 320, 240, 1.1, 0.0, 0.0);
+        let person = |x: f64, y: f64| AnnotatedPerson {
+            head: nalgebra::Point3::new(x, y, 1.6),
+            counts: true,
+            visible: 1.0,
+        };
+        let people = [person(3.0, 0.0), person(3.0, 1.5), person(5.0, 0.0)];
+        let found = surfaces_m2(&people, &camera, &DepthImage::filled(320, 240, 3.0));
+        assert!((found[0] - 0.9).abs() < 0.1 && (found[1] - 0.9).abs() < 0.1, "{found:?}");
+        assert_eq!(found[2], 0.0, "hidden");
+    }
 }

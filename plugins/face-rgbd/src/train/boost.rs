@@ -117,3 +117,58 @@ fn passed_by(sums: &[f32], part: f64) -> f32 {
     // The scanner may add the values in another order, with other rounding errors.
     sorted[may_fail.min(sorted.len() - 1)] - 1e-4
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(x: usize, y: usize, width: usize, height: usize) -> Part {
+        Part { x, y, width, height }
+    }
+
+    #[test]
+    fn the_blocks_of_a_feature_lie_side_by_side_and_balance() {
+        let of = |kind: (usize, usize)| match haar_feature(kind, part(1, 2, 3, 4)) {
+            Feature::Haar(parts) => parts,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(of((2, 1)), [(part(1, 2, 6, 4), -1.0), (part(4, 2, 3, 4), 2.0)]);
+        assert_eq!(of((1, 2)), [(part(1, 2, 3, 8), -1.0), (part(1, 6, 3, 4), 2.0)]);
+        assert_eq!(of((3, 1)), [(part(1, 2, 9, 4), -1.0), (part(4, 2, 3, 4), 3.0)]);
+        assert_eq!(of((1, 3)), [(part(1, 2, 3, 12), -1.0), (part(1, 6, 3, 4), 3.0)]);
+        let crosswise =
+            [(part(1, 2, 6, 8), -1.0), (part(1, 2, 3, 4), 2.0), (part(4, 6, 3, 4), 2.0)];
+        assert_eq!(of((2, 2)), crosswise);
+    }
+
+    #[test]
+    fn drawn_features_are_everywhere_in_the_window_and_of_all_kinds() {
+        let (mut triples, mut crosswise, mut borders) = (0, 0, [0; 4]);
+        for seed in 0..1000 {
+            let Feature::Haar(parts) = drawn(20, mix(seed)) else { panic!() };
+            let (whole, block) = (parts[0].0, parts[1].0);
+            assert!(whole.x + whole.width <= 20 && whole.y + whole.height <= 20, "{whole:?}");
+            assert!(block.width * block.height >= LEAST_BLOCK, "{block:?}");
+            triples += usize::from(parts[1].1 == 3.0);
+            crosswise += usize::from(parts.len() == 3);
+            let at = [
+                whole.x == 0,
+                whole.y == 0,
+                whole.x + whole.width == 20,
+                whole.y + whole.height == 20,
+            ];
+            at.iter().zip(&mut borders).for_each(|(is, count)| *count += usize::from(*is));
+        }
+        // Two of the five kinds have three blocks, and one has four.
+        assert!((300..500).contains(&triples) && (130..270).contains(&crosswise));
+        assert!(borders.iter().all(|count| *count > 50), "{borders:?}");
+    }
+
+    #[test]
+    fn a_threshold_lets_the_wanted_part_pass() {
+        let sums = [5.0, 1.0, 3.0, 2.0];
+        assert!((passed_by(&sums, 1.0) - 0.9999).abs() < 1e-6);
+        assert!((passed_by(&sums, 0.75) - 1.9999).abs() < 1e-6);
+        assert!((passed_by(&sums, 0.0) - 4.9999).abs() < 1e-6);
+    }
+}

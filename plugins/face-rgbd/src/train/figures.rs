@@ -143,3 +143,18 @@ fn by_stages(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::
 fn rounded(part: f64) -> toml::Value {
     toml::Value::Float((part * 1e4).round() / 1e4)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faces_are_counted_up_to_the_allowed_false_alarms() {
+        let groups = vec![(3.0, true), (0.0, false), (1.0, true), (2.0, false), (-1.0, true)];
+        let counts = GroupCounts { groups, faces: 4, pictures: 2 };
+        // None, one and two false alarms in two pictures.
+        let found = [0.3, 0.5, 1.0].map(|rate| counts.found_at(rate));
+        assert_eq!(found, [0.25, 0.5, 0.75]);
+        assert_eq!(GroupCounts::default().found_at(1.0), 0.0);
+    }
+}

@@ -263,4 +263,14 @@ mod tests {
             prop_assert_eq!(trainer.faces.len(), 2 * VARIANTS.len() + 2);
         }
     }
+
+    #[test]
+    fn a_region_is_inside_up_to_the_border() {
+        let picture = GreyImage::filled(40, 30, 0);
+        let inside = |x, y, width, height| is_inside(&picture, &Rect::new(x, y, width, height));
+        assert!(inside(0.0, 0.0, 40.0, 30.0));
+        for (x, y) in [(-0.1, 0.0), (0.0, -0.1), (0.1, 0.0), (0.0, 0.1)] {
+            assert!(!inside(x, y, 40.0, 30.0), "{x} {y}");
+        }
+    }
 }

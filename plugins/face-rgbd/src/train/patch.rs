@@ -87,4 +87,17 @@ mod tests {
             }
         }
     }
+
+    /// The contrast is that of the window without its border: 324 times the deviation.
+    #[test]
+    fn a_patch_has_contrast_or_is_none() {
+        let chequers = |bright: u8| {
+            GreyImage::from_fn(20, 20, |x, y| if (x + y).is_multiple_of(2) { 100 } else { bright })
+        };
+        let contrast = Patch::new(&chequers(140), 20).unwrap().contrast;
+        assert!((contrast * 324.0 * 20.0 - 1.0).abs() < 1e-4, "{contrast}");
+        assert!(
+            Patch::new(&chequers(122), 20).is_some() && Patch::new(&chequers(118), 20).is_none()
+        );
+    }
 }

@@ -44,3 +44,20 @@ fn flat(questions: &[Question]) -> Tree {
     }
     tree
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_leaf_in_place_of_a_question_answers_both_ways_alike() {
+        let second = Question { feature: 5, below: 0.1, next: [Next::Leaf(-1.0), Next::Leaf(2.0)] };
+        let grown = |next: [Next; 2]| flat(&[Question { feature: 3, below: 0.5, next }, second]);
+        let tree = grown([Next::Question(1), Next::Leaf(0.75)]);
+        assert_eq!((tree.numbers, tree.below), ([3, 5, 0], [0.5, 0.1, 0.0]));
+        assert_eq!(tree.values, [-1.0, 2.0, 0.75, 0.75]);
+        let tree = grown([Next::Leaf(0.75), Next::Question(1)]);
+        assert_eq!((tree.numbers, tree.below), ([3, 0, 5], [0.5, 0.0, 0.1]));
+        assert_eq!(tree.values, [0.75, 0.75, -1.0, 2.0]);
+    }
+}

@@ -335,4 +335,15 @@ mod tests {
         assert_eq!(least_on_the_way(&ways), [-5.0, -6.0, -2.0]);
         assert!(least_on_the_way(&[]).is_empty());
     }
+
+    /// With the near miss at -1.0, and a thousand windows.
+    #[test]
+    fn the_miss_rate_is_that_at_the_allowed_number_of_false_alarms() {
+        let people = [6.0, 4.0, 2.0, 0.0].map(|sum| (sum, true));
+        let sums = [&people[..], &[5.0, 3.0, 1.0].map(|sum| (sum, false))].concat();
+        let missed = |rate: f64| miss_rate(&sums, 1000, rate, -1.0);
+        // The second, the first and none of the others is the limit.
+        assert_eq!([missed(1e-3), missed(1e-5), missed(1e-2)], [0.5, 0.75, 0.0]);
+        assert_eq!(miss_rate(&[], 1000, 1e-3, -1.0), 0.0);
+    }
 }

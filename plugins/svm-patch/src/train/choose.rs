@@ -145,4 +145,27 @@ mod tests {
         assert_eq!(left([0, 5], 1).len(), 65, "0 is all");
         assert_eq!(left([1000, 1000], 1).len(), 100);
     }
+
+    #[test]
+    fn a_subset_is_drawn_from_all_of_a_class() {
+        let samples: Vec<Sample> = (0..100).map(|k| sample(k, k < 10)).collect();
+        let chosen = |seed| {
+            let others = subset(&samples, 40, seed).into_iter().filter(|s| !s.example.is_person);
+            others.map(|s| s.example.group).collect::<Vec<u64>>()
+        };
+        let odd = chosen(1).iter().filter(|k| **k % 2 == 1).count();
+        assert!((5..=25).contains(&odd), "{odd} of 30");
+        assert_ne!(chosen(1), chosen(2));
+    }
+
+    #[test]
+    fn accepted_is_what_lies_above_zero() {
+        let held_out = vec![(1.0, true), (-1.0, true), (2.0, false), (-1.0, false), (-2.0, false)];
+        let trial = Trial { gamma: 1.0, penalty: 1.0, held_out };
+        assert_eq!(trial.accepted(true), 0.5);
+        assert!((trial.accepted(false) - 1.0 / 3.0).abs() < 1e-12);
+        // Six pairs: the person at 1.0 is above two others, the one at -1.0 above one, and once
+        // they are equal.
+        assert!((trial.area() - 3.5 / 6.0).abs() < 1e-12);
+    }
 }

@@ -72,4 +72,27 @@ mod tests {
         assert!((10.0 * for_people - 30.0 * for_others).abs() < 1e-9);
         assert!(penalties(&all[..10], 1.0).unwrap_err().to_string().starts_with("10 people and 0"));
     }
+
+    /// With a large penalty all samples lie at the margin or beyond it, by the kernel of the model:
+    /// the solver's own has another parameter.
+    #[test]
+    fn the_model_separates_what_it_was_fitted_to() {
+        let patch = |k: usize| {
+            let mut patch = Box::new([0.0; PIXELS]);
+            patch[k] = 1.0;
+            patch[(7 * k + 3) % PIXELS] += 0.5;
+            patch
+        };
+        let example = |k: usize| Example { is_person: k.is_multiple_of(3), group: k as u64 };
+        let samples: Vec<Sample> =
+            (0..24).map(|k| Sample { patch: patch(k), example: example(k) }).collect();
+        let of: Vec<&Sample> = samples.iter().collect();
+        let sampler = Sampler { grow: 0.0, scaling: crate::Scaling::Unit };
+        let model = fit(&of, sampler, 2.0, 1e3).unwrap();
+        for sample in &samples {
+            let decision = model.decision(&sample.patch);
+            let margin = if sample.example.is_person { decision } else { -decision };
+            assert!((margin - 1.0).abs() < 0.01, "all are support vectors: {margin}");
+        }
+    }
 }
