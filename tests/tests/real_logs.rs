@@ -1,5 +1,5 @@
-//! The shipped `depth-ekf` config, unchanged, on every real log with depth, and `particle-best` and
-//! `rgbd-best` on a log with occlusions. Without `../shared/data/logs` each test reports that it
+//! The shipped `depth-ekf` config, unchanged, on every real log with depth, and `joint-particle` and
+//! `rgbd-ekf` on a log with occlusions. Without `../shared/data/logs` each test reports that it
 //! skips.
 #![allow(
     clippy::unwrap_used,
@@ -111,8 +111,8 @@ fn surplus(score: &Score) -> usize {
 #[test]
 fn particles_find_as_many_people_in_filinha_as_the_ekf_with_few_false_boxes() {
     let Some((_, ekf)) = scored("filinha") else { return };
-    let Some((_, particles)) = scored_with("filinha", "particle-best") else { return };
-    for (name, score) in [("depth-ekf", &ekf), ("particle-best", &particles)] {
+    let Some((_, particles)) = scored_with("filinha", "joint-particle") else { return };
+    for (name, score) in [("depth-ekf", &ekf), ("joint-particle", &particles)] {
         let Score { covered, rows, false_boxes, .. } = score;
         let surplus = surplus(score);
         println!(
@@ -127,9 +127,9 @@ fn particles_find_as_many_people_in_filinha_as_the_ekf_with_few_false_boxes() {
 #[test]
 fn gradients_beside_silhouettes_find_no_fewer_people_of_filinha() {
     let Some((_, ekf)) = scored("filinha") else { return };
-    let Some((_, best)) = scored_with("filinha", "rgbd-best") else { return };
+    let Some((_, best)) = scored_with("filinha", "rgbd-ekf") else { return };
     println!("depth-ekf: {} of {} covered", ekf.covered, ekf.rows);
-    println!("rgbd-best: {} of {} covered, {} false", best.covered, best.rows, best.false_boxes);
+    println!("rgbd-ekf: {} of {} covered, {} false", best.covered, best.rows, best.false_boxes);
     assert!(best.covered >= ekf.covered, "{best:?} {ekf:?}");
     assert!(best.false_boxes <= ekf.false_boxes + 2, "{best:?} {ekf:?}");
 }

@@ -32,7 +32,7 @@ fn pipelines() -> Vec<Pipeline> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let mut all = Vec::new();
-    for name in ["depth-ekf", "depth-color-ekf", "depth-svm-ekf", "rgbd-best"] {
+    for name in ["depth-ekf", "depth-color-ekf", "depth-svm-ekf", "rgbd-ekf"] {
         let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
         let build = |text: &str| {
             let contender = Contender { folder: folder.clone(), ..Contender::new(name, text) };

@@ -58,6 +58,6 @@ fn the_naive_baseline_is_clearly_worse() {
 
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
-    let all = ["depth-ekf", "particle-best"];
+    let all = ["depth-ekf", "joint-particle"];
     assert_eq!(tallies(&all, 3, 1.0, 1), tallies(&all, 3, 1.0, 3));
 }

@@ -76,7 +76,7 @@ const METHODS: [&str; 7] = [
     "joint-particle-kde50",
     "joint-particle-kde30",
     PRINTED,
-    "particle-best",
+    "joint-particle",
     "depth-ekf",
 ];
 
@@ -107,19 +107,19 @@ fn parallel(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
 
 fn hidden(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let names =
-        ["joint-particle-all", "joint-particle-kde50", PRINTED, "particle-best", "depth-ekf"];
+        ["joint-particle-all", "joint-particle-kde50", PRINTED, "joint-particle", "depth-ekf"];
     let title = "One of two people turns back, stops, passes or walks along while hidden";
     compare(lab, "crossing-hidden", 84, title, lab.contenders(&names)?)
 }
 
 fn oblique(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
-    let names = ["joint-particle-all", "joint-particle-kde50", "particle-best", "depth-ekf"];
+    let names = ["joint-particle-all", "joint-particle-kde50", "joint-particle", "depth-ekf"];
     let title = "Two people cross and change depth (P3, Fig. 9)";
     compare(lab, "crossing-oblique", 28, title, lab.contenders(&names)?)
 }
 
 fn three(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
-    let names = ["joint-particle-all", "particle-best", "depth-ekf"];
+    let names = ["joint-particle-all", "joint-particle", "depth-ekf"];
     let title = "Three people cross, one of whom may turn back, stop or swap places while hidden";
     compare(lab, "crossing-three", 28, title, lab.contenders(&names)?)
 }
@@ -170,7 +170,7 @@ fn misprints(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
         name: "and weighed by a likelihood ratio (joint-particle-kde50)".into(),
         ..lab.contender("joint-particle-kde50")?
     });
-    contenders.push(lab.contender("particle-best")?);
+    contenders.push(lab.contender("joint-particle")?);
     let title = "What the misprints of P3 cost, and what the method lacks";
     compare(lab, "crossing-parallel", 28, title, contenders)
 }

@@ -63,7 +63,7 @@ const PIPELINES: [&str; 9] = [
     "rgbd-follow",
     "rgbd-compressive",
     "rgbd-compressive-as-printed",
-    "rgbd-best",
+    "rgbd-ekf",
     "depth-ekf",
 ];
 /// Pipelines for logs without depth.
@@ -83,7 +83,7 @@ const GROWING_LOGS: u64 = 4;
 const GROWING_S: &str = "48";
 /// Durations of the parts that are judged.
 const LENGTHS_S: [f64; 5] = [48.0, 24.0, 12.0, 6.0, 3.0];
-const GROWING: [&str; 2] = ["rgbd-compressive", "rgbd-best"];
+const GROWING: [&str; 2] = ["rgbd-compressive", "rgbd-ekf"];
 
 /// Number of logs of one person each, in which boxes around the person are counted, and their
 /// duration.
@@ -107,7 +107,7 @@ const COMPARED: &str = "box: another is surer";
 /// Numbers of people in the table of times.
 const CROWDS: [&str; 4] = ["1", "2", "4", "8"];
 /// Pipelines that are timed.
-const TIMED: [&str; 3] = ["rgbd-compressive", "rgbd-compressive-as-printed", "rgbd-best"];
+const TIMED: [&str; 3] = ["rgbd-compressive", "rgbd-compressive-as-printed", "rgbd-ekf"];
 /// Number of scenes of each crowd, and their duration.
 const TIMED_SCENES: u64 = 3;
 const TIMED_S: &str = "4";

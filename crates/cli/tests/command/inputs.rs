@@ -127,7 +127,7 @@ fn check_says_what_is_needed_and_what_is_used() {
     assert!(mono.contains("right; needs colour\n"), "{mono}");
     let both = said(&config("rgbd-compressive"));
     assert!(both.contains("needs colour; uses depth where the log has it"), "{both}");
-    let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-best")));
+    let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-ekf")));
     assert!(refused.contains("`depth-template` requires depth images"), "{refused}");
 }
 
