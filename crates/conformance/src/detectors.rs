@@ -263,7 +263,11 @@ fn near_stays_near(subject: &Subject<'_>) -> Verdict {
             for found in people(detector, &frame, &Query::Track(&search))? {
                 let away = (found.position.xy() - wanted.xy()).norm();
                 demand(away <= window_m, || {
-                    format!("camera {name}: {away:.2} m away from a track known to {sigma_m} m")
+                    format!(
+                        "camera {name}: {away:.2} m away from a track known to {sigma_m} m; \
+                         `Query::Track` asks for this one person, and a detector that only \
+                         discovers answers it with no detection"
+                    )
                 })?;
             }
         }

@@ -4,7 +4,7 @@
 //! it on small simulated scenes (see [`figure`]) and checks the contracts of the traits of
 //! `tagalong_core`. A crate outside the workspace runs the same suite over its own registry:
 //!
-//! ```
+//! ```no_run
 //! # fn register(_: &mut tagalong_config::Registry) {}
 //! let mut registry = tagalong_config::Registry::default();
 //! register(&mut registry);

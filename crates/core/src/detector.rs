@@ -34,7 +34,16 @@ pub enum Query<'a> {
 ///         Capabilities { inputs, discovers: true, ..Capabilities::default() }
 ///     }
 ///
-///     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+///     fn detect(
+///         &mut self,
+///         frame: &Frame,
+///         query: &Query<'_>,
+///         _: &mut Funnel,
+///     ) -> Result<Vec<Detection>> {
+///         // It finds new people only, and knows nothing of tracks.
+///         if matches!(query, Query::Track(_)) {
+///             return Ok(Vec::new());
+///         }
 ///         let points = frame.scan()?.points.iter();
 ///         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
 ///         let covariance = nalgebra::Matrix3::identity() * 0.04;

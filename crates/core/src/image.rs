@@ -1,9 +1,13 @@
-use tagalong_geometry::Rect;
+use tagalong_geometry::{HEAD_BELOW_TOP_M, Rect, UPPER_BODY_SIDE_M};
 
 /// Samples per side of a region at which its depth is read.
 const TAPS: usize = 5;
 /// Least number of readings for a region to have a depth.
 const LEAST_READINGS: usize = 8;
+/// Half the side of the square of the face in which depth is read, m.
+const HALF_FACE_M: f64 = 0.07;
+/// Fewest readings from which the depth of a face is computed.
+const LEAST_OF_FACE: usize = 4;
 
 /// A dense image, row by row, without padding.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -107,6 +111,36 @@ impl DepthImage {
         let shown = (count >= LEAST_READINGS).then_some(&mut sorted[..count])?;
         let (_, median, _) = shown.select_nth_unstable_by(count / 2, f32::total_cmp);
         Some(f64::from(*median))
+    }
+
+    /// Returns the depth of the face in a square around head and shoulders, m: the median of the
+    /// readings around the middle of the head, of which there must be some. It is what
+    /// [`tagalong_geometry::FaceDepth::or_measured`] takes.
+    ///
+    /// ```
+    /// use tagalong_core::DepthImage;
+    /// use tagalong_geometry::Rect;
+    /// // A head before a chest.
+    /// let depth = DepthImage::from_fn(100, 100, |_, y| if y < 50 { 2.0 } else { 2.2 });
+    /// let square = Rect::new(10.0, 10.0, 80.0, 80.0);
+    /// assert_eq!(depth.face_m(&square), Some(2.0));
+    /// ```
+    pub fn face_m(&self, upper_body: &Rect) -> Option<f64> {
+        let px_per_m = upper_body.width / UPPER_BODY_SIDE_M;
+        let half = HALF_FACE_M * px_per_m;
+        let (x, y) = (upper_body.centre().x, upper_body.y + HEAD_BELOW_TOP_M * px_per_m);
+        let face = Rect::new(x - half, y - half, 2.0 * half, 2.0 * half);
+        let face = face.clipped(self.width(), self.height());
+        let (left, right) = (face.x as usize, face.right() as usize);
+        let rows = face.y as usize..face.bottom() as usize;
+        let mut readings: Vec<f32> = rows
+            .flat_map(|y| self.row(y)[left..right.max(left)].iter().copied())
+            .filter(|metres| metres.is_finite())
+            .collect();
+        // The median ignores the background that shows beside a narrow face.
+        readings.sort_by(f32::total_cmp);
+        let enough = readings.len() >= LEAST_OF_FACE;
+        enough.then(|| f64::from(readings[readings.len() / 2]))
     }
 
     /// Returns the depths of a row at the given columns; NaN outside of the image.

@@ -1,22 +1,14 @@
 use nalgebra::Matrix3;
 use tagalong_config::Context;
 use tagalong_core::{
-    Capabilities, DepthImage, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs,
-    Query, Result, Track,
+    Capabilities, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs, Query,
+    Result, Track,
 };
-use tagalong_geometry::{
-    FaceDepth, HEAD_BELOW_TOP_M, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M,
-};
+use tagalong_geometry::{FaceDepth, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};
 use crate::config::{Body, Config, ScoreScale};
-
-/// Half the side of the square of the face in which depth is read, m.
-const HALF_FACE_M: f64 = 0.07;
-
-/// Fewest depth readings from which the depth of a face is computed.
-const LEAST_READINGS: usize = 4;
 
 /// Distance of probabilities from 0 and 1 at least.
 const SURE: f64 = 1e-3;
@@ -90,7 +82,7 @@ impl RecordedDetections {
     /// image where that shows the face, otherwise from the size of the square.
     fn located(&self, frame: &Frame, region: &Rect) -> Option<PointEstimate> {
         let (camera, config) = (&*frame.camera, &self.config);
-        let measured = frame.depth().ok().and_then(|depth| face_depth(depth, region));
+        let measured = frame.depth().ok().and_then(|depth| depth.face_m(region));
         let face =
             FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, region.width, config.sigma_distance)
                 .or_measured(measured, config.sigma_depth_m);
@@ -119,25 +111,6 @@ impl RecordedDetections {
         let near = away_m <= self.config.near_m || guessed && overlap >= self.config.near_overlap;
         near.then_some(overlap - away_m)
     }
-}
-
-/// Returns the median depth of the face in an upper-body square, if there are enough readings.
-fn face_depth(depth: &DepthImage, region: &Rect) -> Option<f64> {
-    let px_per_m = region.width / UPPER_BODY_SIDE_M;
-    let half = HALF_FACE_M * px_per_m;
-    let (x, y) = (region.centre().x, region.y + HEAD_BELOW_TOP_M * px_per_m);
-    let face = Rect::new(x - half, y - half, 2.0 * half, 2.0 * half);
-    let face = face.clipped(depth.width(), depth.height());
-    let (left, right) = (face.x as usize, face.right() as usize);
-    let rows = face.y as usize..face.bottom() as usize;
-    let mut readings: Vec<f32> = rows
-        .flat_map(|y| depth.row(y)[left..right.max(left)].iter().copied())
-        .filter(|metres| metres.is_finite())
-        .collect();
-    // The median ignores the background that shows beside a narrow face.
-    readings.sort_by(f32::total_cmp);
-    let enough = readings.len() >= LEAST_READINGS;
-    enough.then(|| f64::from(readings[readings.len() / 2]))
 }
 
 impl Detector for RecordedDetections {

@@ -402,7 +402,7 @@ fn without_a_config_each_pipeline_that_fits_is_tried() {
     let said: Value = serde_json::from_slice(&output.stdout).expect("a diagnosis");
     let rows = said["pipelines"].as_array().unwrap();
     let names: Vec<&str> = rows.iter().map(|row| row["config"].as_str().unwrap()).collect();
-    assert_eq!(names, ["depth-verified", "depth-ekf", "depth-net-ekf", "mono"]);
+    assert_eq!(names, ["depth-verified", "depth-alone", "depth-net-ekf", "mono"]);
     let taken: Vec<bool> = rows.iter().map(|row| row["taken"].as_bool().unwrap()).collect();
     assert_eq!(taken, [true, false, false, false]);
     assert_eq!(rows[0]["coverage"]["moving"], 2, "{said:#}");
