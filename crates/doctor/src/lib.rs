@@ -1,9 +1,9 @@
 //! `tagalong doctor`: explains missing or false detections.
 //!
-//! A [`visit`] passes a log through a pipeline and measures both; the [`checks`] turn the
-//! measurements into findings. [`scenery`] holds things that come and go in depth, whatever a
-//! pipeline makes of them, and [`coverage`] compares them with its tracks. Where those disagree,
-//! [`alternatives`] tries other settings on the same frames. Without a config, [`comparison`]
+//! A `visit` passes a log through a pipeline and measures both; the `checks` turn the
+//! measurements into findings. `scenery` holds things that come and go in depth, whatever a
+//! pipeline makes of them, and `coverage` compares them with its tracks. Where those disagree,
+//! `alternatives` tries other settings on the same frames. Without a config, `comparison`
 //! visits the log with each built-in pipeline that fits it.
 
 mod alternatives;

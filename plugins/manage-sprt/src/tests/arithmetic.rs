@@ -360,7 +360,7 @@ fn candidates_are_dropped_by_the_test_that_speaks_against_them() {
     assert!(matches!(offer(0.5, 0.5, true), Initiation::Start(_)));
 }
 
-/// What the thing showed, 1.0, and 3.0 more.
+/// The looks of the thing, 1.0, and 3.0 more.
 #[test]
 fn clutter_outweighs_the_thing_that_left_it() {
     let mut bench = Bench::clutter(looks_only(), 4.0, 1.0);
