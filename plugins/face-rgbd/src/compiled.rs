@@ -105,6 +105,7 @@ pub struct Compiled {
     middle: Corners,
     area: f64,
     is_normalised: bool,
+    is_tilted: bool,
 }
 
 /// Neighbouring windows, and those of them that are not rejected yet.
@@ -151,7 +152,13 @@ impl Compiled {
             middle: corners(&middle, level),
             area: (middle.width * middle.height) as f64,
             is_normalised: cascade.is_normalised(),
+            is_tilted: cascade.is_tilted(),
         }
+    }
+
+    /// Returns true if features read the tilted sums of a level.
+    pub fn is_tilted(&self) -> bool {
+        self.is_tilted
     }
 
     /// Returns true if the offsets are those of a level's sums.

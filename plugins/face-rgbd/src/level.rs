@@ -23,7 +23,7 @@ pub struct Level {
     squares: Vec<u32>,
     /// Offset of the tilted sums.
     tilted_from: usize,
-    /// The last two rows of tilted sums.
+    /// Memory for three rows of tilted sums.
     tilted_rows: [Vec<u32>; 3],
     /// For each column: its first source column, and the share of the next one in 256ths.
     columns: Vec<(usize, u32)>,

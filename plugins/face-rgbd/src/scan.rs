@@ -118,13 +118,13 @@ impl Scanner {
         };
         let Self { level, compiled, wanted, looked_at } = self;
         level.fill_part(image, size.into(), part, step);
-        if cascade.is_tilted() {
-            level.add_tilted();
-        }
         let compiled = &mut compiled[step - 1];
         // A larger image makes rows of sums longer, and compiled offsets invalid.
         compiled.take_if(|compiled| !compiled.fits(level));
         let compiled = compiled.get_or_insert_with(|| Compiled::new(cascade, level));
+        if compiled.is_tilted() {
+            level.add_tilted();
+        }
         for y in (top..=bottom).step_by(step) {
             wanted.clear();
             wanted.extend((left..=right).step_by(step).map(|x| propose(x, y)));

@@ -108,15 +108,14 @@ impl Setting {
         let text = with_values(resolved, &named).map_err(|error| Failure::usage(error.message))?;
         let file = config.file.with_text(text.clone());
         // `check_tuning` has accepted each value alone, so the combination is at fault.
-        if file.pipeline(registry, None).is_err() {
-            return Ok(None);
-        }
-        let as_is = Variant::new(config, file, registry)?;
+        let Ok((pipeline, _)) = file.pipeline(registry, None) else { return Ok(None) };
+        let as_is = Variant::new(config, file, pipeline.resolved())?;
         let mut unseen = BTreeMap::new();
         for Location { name, models, .. } in locations {
             if let Some(text) = with_models(&text, models)? {
-                let variant = Variant::new(config, config.file.with_text(text), registry)?;
-                unseen.insert(name.clone(), variant);
+                let file = config.file.with_text(text);
+                let (pipeline, _) = file.pipeline(registry, None)?;
+                unseen.insert(name.clone(), Variant::new(config, file, pipeline.resolved())?);
             }
         }
         Ok(Some(Self { values, as_is, unseen }))
@@ -135,11 +134,11 @@ impl Setting {
 }
 
 impl Variant {
-    fn new(config: &PlannedConfig, file: ConfigFile, registry: &Registry) -> Result<Self, Failure> {
-        let (pipeline, _) = file.pipeline(registry, None)?;
+    /// `resolved` is the config with every default.
+    fn new(config: &PlannedConfig, file: ConfigFile, resolved: String) -> Result<Self, Failure> {
         let outer = config.outer.resolved()?;
         let files = plan::file_hashes(&file)?;
-        let everything = format!("{}\n{outer}\n{files:?}", pipeline.resolved());
+        let everything = format!("{resolved}\n{outer}\n{files:?}");
         Ok(Self { file, hash: sha256(everything.as_bytes()) })
     }
 

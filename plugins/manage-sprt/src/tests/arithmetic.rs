@@ -1,12 +1,13 @@
 //! Log-odds, bounds and limits, against values worked out by hand.
 
-use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
+    EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
-use tagalong_geometry::{ImageBox, Rect};
+use tagalong_geometry::Rect;
 
+use super::detection;
 use crate::{Config, Sprt};
 
 const ID: TrackId = TrackId(1);
@@ -28,16 +29,6 @@ fn looks_only() -> Config {
         left_drop_after_s: 1e3,
         occluded_drop_after_s: 1e3,
         ..Config::default()
-    }
-}
-
-fn detection(x: f64, log_odds: f64) -> Detection {
-    Detection {
-        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
-        position: Point3::new(x, 0.0, 1.6),
-        covariance: Matrix3::identity() * 0.01,
-        score: log_odds,
-        source: "test",
     }
 }
 
