@@ -56,6 +56,7 @@ mod scores;
 mod sets;
 mod times;
 mod types;
+mod visibility;
 
 pub use assign::{Edge, Matcher};
 pub use clear::{Clear, MATCH_SIMILARITY, Match};
@@ -76,7 +77,8 @@ pub use tagalong_stats::{
     mean_interval, paired_gain, percentile, sign_flip, wilson,
 };
 pub use times::{Following, Times};
-pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};
+pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth, View};
+pub use visibility::{FREE, Found, NEAR_M, PARTLY, VisibilityTally};
 
 /// A ratio of counts, with a denominator of at least one.
 fn ratio(part: f64, whole: f64) -> f64 {

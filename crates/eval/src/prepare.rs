@@ -283,7 +283,7 @@ impl From<&Report> for Someone {
             id: report.id,
             region: report.region,
             floor_m: report.floor_m,
-            role: Role::Counts,
+            ..Truth::default()
         };
         let mut someone = Self::from(&place);
         someone.sane &= !report.score.is_nan();

@@ -11,6 +11,7 @@ use crate::prepare::{Comparison, Prepared};
 use crate::sets::{SetDistance, SetTally};
 use crate::times::Times;
 use crate::types::Sequence;
+use crate::visibility::VisibilityTally;
 
 /// Everything counted on one or several sequences, before the figures are
 /// formed: tallies add up, figures do not.
@@ -30,6 +31,9 @@ pub struct Tally {
     pub position_errors_m: Vec<f64>,
     /// Times.
     pub times: Times,
+    /// Recall by how much of a person shows.
+    #[serde(default)]
+    pub visibility: VisibilityTally,
     /// Truths that count, over all frames.
     pub truths: u64,
     /// Reports that count, over all frames.
@@ -63,6 +67,7 @@ impl Tally {
             detections: DetectionTally::measure(sequence, similarity, 0.5),
             position_errors_m: position_errors_m(sequence, &prepared, &matches),
             times: Times::measure(&prepared, &matches),
+            visibility: VisibilityTally::measure(sequence, &prepared, &matches),
             truths: prepared.truth_count(),
             reports: prepared.report_count(),
             truth_ids: prepared.truth_ids.len() as u64,
@@ -82,6 +87,7 @@ impl Tally {
             detections: DetectionTally::combine(all.iter().map(|t| &t.detections)),
             position_errors_m: all.iter().flat_map(|t| &t.position_errors_m).copied().collect(),
             times: Times::combine(all.iter().map(|t| &t.times)),
+            visibility: VisibilityTally::combine(all.iter().map(|t| &t.visibility)),
             truths: sum(|t| t.truths),
             reports: sum(|t| t.reports),
             truth_ids: sum(|t| t.truth_ids),
@@ -138,6 +144,8 @@ impl Tally {
         scores.idp = any.then(|| self.identity.idp());
         scores.idr = any.then(|| self.identity.idr());
         scores.recall = any.then(|| self.clear.recall());
+        scores.recall_free = self.visibility.free.recall();
+        scores.recall_partly_hidden = self.visibility.partly_hidden.recall();
         scores.precision = (self.reports > 0).then(|| self.clear.precision());
         scores.fp_per_frame = (self.clear.frames > 0).then(|| self.clear.fp_per_frame());
         scores.lamr = self.detections.log_average_miss_rate();
@@ -244,6 +252,13 @@ pub struct Scores {
     pub ml: u64,
     /// Fraction of the truths that were matched.
     pub recall: Option<f64>,
+    /// The same of people within 5 m of the camera of whom at least 90 % shows; absent where the
+    /// truth does not say.
+    #[serde(default)]
+    pub recall_free: Option<f64>,
+    /// The same of those of whom 60 to 90 % shows.
+    #[serde(default)]
+    pub recall_partly_hidden: Option<f64>,
     /// Fraction of the reports that were matched.
     pub precision: Option<f64>,
     /// Wrong reports per frame.

@@ -84,6 +84,18 @@ pub struct Truth {
     pub floor_m: Option<[f64; 2]>,
     /// Whether it counts.
     pub role: Role,
+    /// How the camera sees the person, where that is annotated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<View>,
+}
+
+/// How the camera sees a person.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct View {
+    /// Fraction that shows, 0 to 1.
+    pub visible: f64,
+    /// Distance from the camera to the head, m.
+    pub distance_m: f64,
 }
 
 /// A reported person in one frame.

@@ -369,7 +369,7 @@ fn a_frame() -> impl Strategy<Value = Frame> {
     (truths, reports).prop_map(|(truths, reports)| Frame {
         truths: (1..)
             .zip(truths)
-            .map(|(id, (r, role))| Truth { id, region: Some(r), floor_m: None, role })
+            .map(|(id, (r, role))| Truth { id, region: Some(r), role, ..Truth::default() })
             .collect(),
         reports: (1..)
             .zip(reports)

@@ -59,6 +59,7 @@ fn a_truth() -> impl Strategy<Value = Truth> {
         region: Some(region),
         floor_m: Some(floor),
         role,
+        view: None,
     })
 }
 

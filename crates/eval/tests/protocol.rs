@@ -5,7 +5,7 @@
 use tagalong_eval::{
     Clear, Comparison, DetectionTally, EvalError, EventKind, Following, Frame, GospaParts, Hota,
     HotaLevel, Identity, Prepared, Region, Report, Role, Scores, Sequence, SetDistance, SetTally,
-    Similarity, Tally, Times, Truth, Verdict, events,
+    Similarity, Tally, Times, Truth, Verdict, View, events,
 };
 
 const SECOND_NS: i64 = 1_000_000_000;
@@ -16,7 +16,7 @@ fn region(x: f64) -> Region {
 }
 
 fn truth(id: i64, x: f64) -> Truth {
-    Truth { id, region: Some(region(x)), floor_m: Some([x, 0.0]), role: Role::Counts }
+    Truth { id, region: Some(region(x)), floor_m: Some([x, 0.0]), role: Role::Counts, view: None }
 }
 
 fn report(id: i64, x: f64) -> Report {
@@ -507,4 +507,34 @@ fn reports_at_the_limits_of_what_is_excused() {
     // Half inside of a region that is not annotated, and a little more.
     let region = |x: f64| Some(Region::new(x, 0.0, 100.0, 100.0));
     assert_eq!((kept(50.0, region(5.0), 0.0), kept(50.0, region(4.9), 0.0)), (1, 0));
+}
+
+#[test]
+fn recall_is_told_apart_by_what_shows_of_a_person() {
+    let view = |visible, distance_m| Some(View { visible, distance_m });
+    let seen = |id, x, view| Truth { view, ..truth(id, x) };
+    let people = vec![
+        seen(1, 0.0, view(1.0, 2.0)),
+        seen(2, 5.0, view(0.9, 5.0)),
+        seen(3, 10.0, view(0.89, 3.0)),
+        seen(4, 15.0, view(0.6, 3.0)),
+        // In neither figure: most of it is hidden, too far away, not annotated, does not count.
+        seen(5, 20.0, view(0.59, 3.0)),
+        seen(6, 25.0, view(1.0, 5.1)),
+        seen(7, 30.0, None),
+        Truth { role: Role::Ignored, ..seen(8, 35.0, view(1.0, 1.0)) },
+    ];
+    let reports = [2, 3, 4, 5].map(|id| report(id, 5.0 * (id - 1) as f64));
+    let sequence = one_frame(people, reports.to_vec());
+    let tally = Tally::measure(&sequence, &Similarity::Iou.into(), &SetDistance::default());
+    let tally = tally.unwrap();
+    assert_eq!((tally.visibility.free.matched, tally.visibility.free.of), (1, 2));
+    let partly = tally.visibility.partly_hidden;
+    assert_eq!((partly.matched, partly.of), (2, 2));
+    let twice = Tally::combine([&tally, &tally]);
+    assert_eq!(twice.visibility.free.of, 4);
+    let scores = twice.scores();
+    assert_eq!((scores.recall_free, scores.recall_partly_hidden), (Some(0.5), Some(1.0)));
+    let blind = Scores::measure(&one_frame(vec![truth(1, 0.0)], vec![]), Similarity::Iou).unwrap();
+    assert_eq!((blind.recall_free, blind.recall), (None, Some(0.0)));
 }

@@ -272,8 +272,8 @@ fn of_person(person: &TruthPerson) -> (Truth, TruthPosition) {
     let truth = Truth {
         id: person.id,
         region: person.upper_body_px.map(|[x, y, width, height]| Region { x, y, width, height }),
-        floor_m: None,
         role: if person.ignore { Role::Ignored } else { Role::Counts },
+        ..Truth::default()
     };
     (
         truth,

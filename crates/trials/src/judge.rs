@@ -2,7 +2,7 @@ use nalgebra::{Isometry2, Point2};
 use tagalong_core::Track;
 use tagalong_eval::{
     Clear, Comparison, Frame, Match, Prepared, Region, Report, Role, Sequence, SetDistance,
-    Similarity, Tally, Truth,
+    Similarity, Tally, Truth, View,
 };
 use tagalong_geometry::Rect;
 use tagalong_pipeline::FrameReport;
@@ -90,6 +90,7 @@ impl Judge {
             region: person.upper_body.as_ref().map(region),
             floor_m: Some([head.x, head.y]),
             role: if person.ignore || far { Role::Ignored } else { Role::Counts },
+            view: Some(View { visible: person.visible_fraction, distance_m: head.coords.norm() }),
         }
     }
 }

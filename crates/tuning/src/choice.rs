@@ -18,6 +18,12 @@ pub struct Figures {
     pub false_a_frame: f64,
     /// Fraction of the people that were found.
     pub recall: f64,
+    /// The same of people within 5 m of whom at least 90 % shows, where that is annotated.
+    pub recall_free: Option<f64>,
+    /// The same of those of whom 60 to 90 % shows.
+    pub recall_partly_hidden: Option<f64>,
+    /// Mean distance of a track from its person, m, where places are annotated.
+    pub position_error_m: Option<f64>,
 }
 
 /// Figure to maximise.
@@ -53,11 +59,10 @@ impl Figures {
             mota: scores.mota?,
             false_a_frame: scores.fp_per_frame?,
             recall: scores.recall?,
+            recall_free: scores.recall_free,
+            recall_partly_hidden: scores.recall_partly_hidden,
+            position_error_m: scores.position_error_mean_m,
         })
-    }
-
-    fn all(&self) -> [f64; 5] {
-        [self.hota, self.idf1, self.mota, self.false_a_frame, self.recall]
     }
 }
 
@@ -71,16 +76,24 @@ impl Objective {
     }
 }
 
-/// Returns the mean of figures, each of the same weight; zeros of none.
+/// Returns the mean of figures, each of the same weight; zeros of none. Where some lack a figure,
+/// its mean is that of the others.
 pub fn mean<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Figures {
-    let (mut sum, mut count) = ([0.0; 5], 0.0);
-    for figures in figures {
-        sum.iter_mut().zip(figures.all()).for_each(|(sum, figure)| *sum += figure);
-        count += 1.0;
+    let all: Vec<&Figures> = figures.into_iter().collect();
+    let part = |figure: fn(&Figures) -> Option<f64>| {
+        let values: Vec<f64> = all.iter().filter_map(|figures| figure(figures)).collect();
+        tagalong_stats::mean(&values)
+    };
+    Figures {
+        hota: part(|f| Some(f.hota)).unwrap_or(0.0),
+        idf1: part(|f| Some(f.idf1)).unwrap_or(0.0),
+        mota: part(|f| Some(f.mota)).unwrap_or(0.0),
+        false_a_frame: part(|f| Some(f.false_a_frame)).unwrap_or(0.0),
+        recall: part(|f| Some(f.recall)).unwrap_or(0.0),
+        recall_free: part(|f| f.recall_free),
+        recall_partly_hidden: part(|f| f.recall_partly_hidden),
+        position_error_m: part(|f| f.position_error_m),
     }
-    let [hota, idf1, mota, false_a_frame, recall] =
-        sum.map(|sum| if count > 0.0 { sum / count } else { 0.0 });
-    Figures { hota, idf1, mota, false_a_frame, recall }
 }
 
 /// Returns the choice without each room, and the one with all. `figures` has those of each
@@ -114,7 +127,19 @@ mod tests {
     use super::*;
 
     fn of(hota: f64) -> Figures {
-        Figures { hota, idf1: 1.0 - hota, mota: -hota, false_a_frame: hota, recall: 0.5 }
+        Figures {
+            hota,
+            idf1: 1.0 - hota,
+            mota: -hota,
+            false_a_frame: hota,
+            recall: 0.5,
+            ..Figures::default()
+        }
+    }
+
+    fn all(figures: &Figures) -> [f64; 5] {
+        let Figures { hota, idf1, mota, false_a_frame, recall, .. } = *figures;
+        [hota, idf1, mota, false_a_frame, recall]
     }
 
     fn table(rows: &[[f64; 3]]) -> Vec<Vec<Figures>> {
@@ -130,6 +155,16 @@ mod tests {
             let other = figures.map(|[_, b, c]| [value * b, b, c]);
             assert_eq!(leave_one_out(&table(&other), Objective::Hota).without[0], 2);
         }
+    }
+
+    #[test]
+    fn a_figure_that_some_lack_is_the_mean_of_the_others() {
+        let some = Figures { recall_free: Some(0.5), position_error_m: Some(0.1), ..of(0.2) };
+        let other = Figures { recall_free: Some(1.0), ..of(0.4) };
+        let mean = mean([&some, &other, &of(0.6)]);
+        assert!((mean.hota - 0.4).abs() < 1e-12);
+        assert_eq!((mean.recall_free, mean.position_error_m), (Some(0.75), Some(0.1)));
+        assert_eq!(mean.recall_partly_hidden, None);
     }
 
     #[test]
@@ -150,7 +185,7 @@ mod tests {
     fn means_weigh_equally() {
         let m = mean(&[of(0.2), of(0.4)]);
         let expected = [0.3, 0.7, -0.3, 0.3, 0.5];
-        assert!(m.all().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{m:?}");
+        assert!(all(&m).iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{m:?}");
         assert_eq!(mean(&[]), Figures::default());
     }
 
@@ -164,7 +199,7 @@ mod tests {
             recall: Some(0.5),
             ..Scores::default()
         };
-        let figures = Figures::of(&scores).map(|figures| figures.all());
+        let figures = Figures::of(&scores).map(|figures| all(&figures));
         assert_eq!(figures, Some([0.1, 0.2, 0.3, 0.4, 0.5]));
         assert_eq!(Figures::of(&Scores { hota: None, ..scores }), None);
     }

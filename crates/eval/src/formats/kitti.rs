@@ -116,7 +116,7 @@ pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
             frame.ignore_regions.push(label.region);
         } else if let Some(role) = label.pedestrian_role() {
             let (region, floor_m) = (Some(label.region), label.floor_m());
-            frame.truths.push(Truth { id: label.id, region, floor_m, role });
+            frame.truths.push(Truth { id: label.id, region, floor_m, role, view: None });
         }
     }
 }

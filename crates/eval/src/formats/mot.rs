@@ -108,7 +108,7 @@ impl Row {
     /// The row as truth, with the number of its frame.
     pub fn truth(&self, rules: Rules) -> (u32, Truth) {
         let region = Some(self.region);
-        (self.frame, Truth { id: self.id, region, floor_m: None, role: self.role(rules) })
+        (self.frame, Truth { id: self.id, region, role: self.role(rules), ..Truth::default() })
     }
 
     /// The row as a report, with the number of its frame.

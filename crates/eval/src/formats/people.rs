@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 
 use super::{FormatError, Line, Table};
-use crate::types::{Region, Role, Truth};
+use crate::types::{Region, Role, Truth, View};
 
 /// The columns, in the order in which they are written.
 pub const HEADER: &str = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,\
@@ -44,8 +44,13 @@ impl Row {
             region: Some(self.upper_body),
             floor_m: floor_from_camera(self.head_in_camera_m),
             role: if self.ignore { Role::Ignored } else { Role::Counts },
+            view: Some(View { visible: self.visible, distance_m: self.distance_m() }),
         };
         (self.frame, truth)
+    }
+
+    fn distance_m(&self) -> f64 {
+        self.head_in_camera_m.iter().map(|v| v * v).sum::<f64>().sqrt()
     }
 }
 

@@ -1,0 +1,79 @@
+//! Recall by how much of a person the camera sees.
+
+use serde::{Deserialize, Serialize};
+
+use crate::clear::Match;
+use crate::prepare::Prepared;
+use crate::types::{Sequence, Truth};
+
+/// Distance within which people enter these figures, m: farther away depth cameras see little.
+pub const NEAR_M: f64 = 5.0;
+/// Visible fraction from which a person stands free ...
+pub const FREE: f64 = 0.9;
+/// ... and from which more than half of one shows. Fainter ones are in neither figure.
+pub const PARTLY: f64 = 0.6;
+
+/// People found, among those that count.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct Found {
+    /// Matched ...
+    pub matched: u64,
+    /// ... of so many.
+    pub of: u64,
+}
+
+impl Found {
+    /// The fraction, if there is anybody to find.
+    pub fn recall(&self) -> Option<f64> {
+        (self.of > 0).then(|| self.matched as f64 / self.of as f64)
+    }
+}
+
+/// People within [`NEAR_M`] of the camera, over all frames, as far as the truth has their distance
+/// and the fraction of them that shows.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct VisibilityTally {
+    /// At least [`FREE`] of them shows.
+    pub free: Found,
+    /// At least [`PARTLY`] and less than [`FREE`].
+    pub partly_hidden: Found,
+}
+
+impl VisibilityTally {
+    /// Counts on one sequence.
+    pub fn measure(sequence: &Sequence, prepared: &Prepared, matches: &[Vec<Match>]) -> Self {
+        let mut tally = Self::default();
+        for ((of, frame), matches) in sequence.frames.iter().zip(&prepared.frames).zip(matches) {
+            for (row, at) in frame.truth_at.iter().enumerate() {
+                let is_matched = matches.iter().any(|m| m.row as usize == row);
+                tally.add(&of.truths[*at as usize], is_matched);
+            }
+        }
+        tally
+    }
+
+    fn add(&mut self, truth: &Truth, is_matched: bool) {
+        let Some(view) = truth.view.filter(|view| view.distance_m <= NEAR_M) else { return };
+        let found = match view.visible {
+            visible if visible >= FREE => &mut self.free,
+            visible if visible >= PARTLY => &mut self.partly_hidden,
+            _ => return,
+        };
+        found.matched += u64::from(is_matched);
+        found.of += 1;
+    }
+
+    /// The tally of several sequences together.
+    pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut sum = Self::default();
+        for tally in all {
+            for (sum, part) in
+                [(&mut sum.free, tally.free), (&mut sum.partly_hidden, tally.partly_hidden)]
+            {
+                sum.matched += part.matched;
+                sum.of += part.of;
+            }
+        }
+        sum
+    }
+}
