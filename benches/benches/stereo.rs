@@ -26,7 +26,7 @@ const METHODS: [(&str, Method); 2] =
 const CONFIGS: [(&str, &str); 3] = [
     ("stereo-ekf", include_str!("../../configs/stereo-ekf.toml")),
     ("stereo-svm-ekf", include_str!("../../configs/stereo-svm-ekf.toml")),
-    ("stereo-best", include_str!("../../configs/stereo-best.toml")),
+    ("stereo-verified", include_str!("../../configs/stereo-verified.toml")),
 ];
 /// Two people at 2 and 3 m in front of the papers' stereo camera.
 const SCENE: &str = "

@@ -45,7 +45,7 @@ fn contender(name: &str) -> Contender {
 #[test]
 fn a_person_who_crosses_the_seam_keeps_identity_and_place() {
     let scene = Scene::parse(ROOM).unwrap();
-    let contenders = [contender("omni-best"), contender("omni-ekf"), contender("omni-appearance")];
+    let contenders = [contender("omni-rich"), contender("omni-ekf"), contender("omni-appearance")];
     let trial = Trial::new(&scene, &contenders, &registry(), 2).unwrap();
     let sides: BTreeSet<bool> = trial
         .moments

@@ -19,9 +19,9 @@ use crate::{BridgeError, ClockSource};
     after_help = "Examples:
   tagalong-ros2 configs/depth-ekf.toml
         tracks people, moves nothing (the config has no controller)
-  tagalong-ros2 configs/follow-best.toml --namespace /robot1 --domain 7
+  tagalong-ros2 configs/follow-depth.toml --namespace /robot1 --domain 7
         follows somebody; commands go to /robot1/cmd_vel
-  tagalong-ros2 configs/follow-best.toml --command cmd_vel_nav
+  tagalong-ros2 configs/follow-depth.toml --command cmd_vel_nav
         lets another node (a collision monitor, say) pass commands on
 
 Exit codes: 0 ok, 1 failed or a topic is missing, 2 wrong usage or config,

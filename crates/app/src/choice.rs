@@ -9,7 +9,7 @@ use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
 
 /// The config for a camera below a conical mirror.
-const PANORAMIC: &str = "omni-best";
+const PANORAMIC: &str = "omni-rich";
 
 /// The config for laser scans that concludes from motion over ground.
 const BY_MOTION: &str = "laser-legs";
@@ -44,11 +44,15 @@ pub const CHOICES: [Choice; 9] = [
         has: "depth of a camera at an unusual height",
         reason: "it needs no heads, and no settings for the height of the camera",
     },
-    Choice { config: "stereo-best", has: "a stereo pair", reason: "verifiers judge what it finds" },
+    Choice {
+        config: "stereo-verified",
+        has: "a stereo pair",
+        reason: "verifiers judge what it finds",
+    },
     Choice {
         config: "stereo-street",
         has: "a stereo pair with a long base",
-        reason: "stereo-best looks for smaller disparities than such a pair has",
+        reason: "stereo-verified looks for smaller disparities than such a pair has",
     },
     Choice {
         config: PANORAMIC,

@@ -24,9 +24,9 @@ const SECONDS: f64 = 8.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let config = std::fs::read_to_string("configs/follow-best.toml")?;
+    let config = std::fs::read_to_string("configs/follow-depth.toml")?;
     let (mut pipeline, _) = Pipeline::from_toml(&config, Path::new("configs"), &registry)
-        .map_err(|error| error.render("configs/follow-best.toml", &config))?;
+        .map_err(|error| error.render("configs/follow-depth.toml", &config))?;
 
     let scene = std::fs::read_to_string("configs/scenes/follow-passing.toml")?;
     let scene = Scene::parse_with(&scene, &Variant::default())

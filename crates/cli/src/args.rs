@@ -173,9 +173,9 @@ its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames
 
 Examples:
   tagalong follow
-  tagalong follow configs/follow-best.toml configs/scenes/follow-passing.toml -o rides
-  tagalong follow configs/follow-best.toml --seeds 50 --against configs/follow-as-printed.toml
-  tagalong follow configs/follow-best.toml --latency-ms 150 --drop 0.2 --format markdown";
+  tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides
+  tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-as-printed.toml
+  tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown";
 
 const REPRODUCE_HELP: &str = "\
 Everything is drawn with seeds of the test split. The whole of a system takes minutes to an hour.

@@ -31,7 +31,7 @@ pub struct TrainArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=8))]
     pub rounds: Option<u64>,
     /// A config with the detector that proposes the candidates of a verifier, as it is, instead of
-    /// those of `depth-ekf` and `stereo-best` with low thresholds.
+    /// those of `depth-ekf` and `stereo-verified` with low thresholds.
     #[arg(long, value_name = "CONFIG")]
     pub proposes: Option<PathBuf>,
     /// Seed of everything random.

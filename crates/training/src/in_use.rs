@@ -11,7 +11,7 @@ use tagalong_stereo::StereoSettings;
 use toml::{Table, Value};
 
 const RGBD: &str = include_str!("../../../configs/depth-ekf.toml");
-const STEREO: &str = include_str!("../../../configs/stereo-best.toml");
+const STEREO: &str = include_str!("../../../configs/stereo-verified.toml");
 /// Changes of the config for collecting candidates.
 const PROPOSING: &str = include_str!("proposing.toml");
 

@@ -7,7 +7,7 @@ use tagalong_app::format::Format;
 #[derive(Args, Debug)]
 pub struct RunArgs {
     /// The pipeline, a TOML file or the name of a built-in one: depth-verified, depth-ekf,
-    /// depth-net-ekf, stereo-best, stereo-street, omni-best, mono, laser-legs,
+    /// depth-net-ekf, stereo-verified, stereo-street, omni-rich, mono, laser-legs,
     /// laser-follow [default: the one for what the log has].
     pub config: Option<PathBuf>,
     /// The log, an MCAP file with ROS 2 messages [default: a short simulated one, written to

@@ -32,7 +32,7 @@ fn a_person_who_walks_is_followed_the_same_way_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let rides = |jobs| {
         let more = ["--seeds", "2", "--jobs", jobs, "--format", "json"];
-        json(&follow(folder.path(), "follow-best.toml", &more))["rides"].clone()
+        json(&follow(folder.path(), "follow-depth.toml", &more))["rides"].clone()
     };
     let first = rides("1");
     assert_eq!(first, rides("2"));
@@ -49,7 +49,7 @@ fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
     let folder = tempfile::tempdir().unwrap();
     let ride = |first| {
         let more = ["--seeds", "1", "--first-seed", first, "--format", "json"];
-        json(&follow(folder.path(), "follow-best.toml", &more))
+        json(&follow(folder.path(), "follow-depth.toml", &more))
     };
     let (near, far) = (ride("3"), ride("4"));
     assert_eq!(near["seeds"], serde_json::json!({ "split": "test", "first": 3, "count": 1 }));
@@ -71,18 +71,18 @@ fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
 fn a_sweep_rides_each_scene_with_each_value_as_a_row_of_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let sweep = ["--sweep", "camera.height_m=0.9, 1.2", "--format", "json", "-o", "rides"];
-    let found = json(&follow(folder.path(), "follow-best.toml", &sweep));
+    let found = json(&follow(folder.path(), "follow-depth.toml", &sweep));
     let suites = found["rides"].as_array().unwrap().iter().map(|ride| ride["suite"].clone());
     assert_eq!(suites.collect::<Vec<_>>(), ["walk 0.9", "walk 1.2"]);
     assert_ne!(found["rides"][0]["distance_kept_s"], Value::Null);
-    let log = |height: &str| format!("rides/walk-{height}-follow-best-2000000000.mcap");
+    let log = |height: &str| format!("rides/walk-{height}-follow-depth-2000000000.mcap");
     let inspected = |height: &str| {
         let output = tagalong().arg("inspect").arg(folder.path().join(log(height))).output();
         text(&output.unwrap().stdout)
     };
     assert!(inspected("0.9").contains("0.90 m above the floor"), "{}", inspected("0.9"));
     assert!(inspected("1.2").contains("1.20 m above the floor"));
-    let wrong = follow(folder.path(), "follow-best.toml", &["--sweep", "camera.height=1.0"]);
+    let wrong = follow(folder.path(), "follow-depth.toml", &["--sweep", "camera.height=1.0"]);
     assert_eq!(code(&wrong), 2, "{}", text(&wrong.stderr));
 }
 
@@ -110,6 +110,6 @@ fn a_pipeline_that_steers_nothing_is_refused() {
     let output = follow(folder.path(), "depth-ekf.toml", &[]);
     assert_eq!(code(&output), 2);
     assert!(text(&output.stderr).contains("has no [controller]"), "{}", text(&output.stderr));
-    let output = follow(folder.path(), "follow-best.toml", &["--drop", "1.5"]);
+    let output = follow(folder.path(), "follow-depth.toml", &["--drop", "1.5"]);
     assert_eq!(code(&output), 2);
 }

@@ -70,7 +70,7 @@ fn seeds_that_the_split_does_not_have_are_refused() {
         let mut command = tagalong();
         command.args(arguments);
         if arguments[0] == "follow" {
-            command.arg(configs().join("follow-best.toml")).arg(&scene);
+            command.arg(configs().join("follow-depth.toml")).arg(&scene);
         }
         let output = command.output().unwrap();
         let told = text(&output.stderr);

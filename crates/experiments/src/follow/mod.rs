@@ -33,7 +33,7 @@ const SCENES: (&str, &str) = ("configs/scenes", "follow-");
 #[derive(Args, Debug)]
 pub struct FollowArgs {
     /// The pipeline; it needs a `[controller]`.
-    #[arg(default_value = "configs/follow-best.toml")]
+    #[arg(default_value = "configs/follow-depth.toml")]
     pub config: PathBuf,
     /// The scenes; their first person is the one to follow [default: all
     /// follow-*.toml of configs/scenes].

@@ -84,7 +84,7 @@ impl Default for TargetSettings {
 /// Log-odds that two detections are of one person: the sum, over the kinds of difference, of a
 /// weight times the amount by which the difference is below its neutral value. Hellinger distances
 /// lie between 0, the same, and 1. The numbers are those that `tagalong follow
-/// configs/follow-best.toml --split train --seeds 4 --fit` prints, a logistic regression over 60
+/// configs/follow-depth.toml --split train --seeds 4 --fit` prints, a logistic regression over 60
 /// rides; every `tagalong follow` prints the calibration of the probabilities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]

@@ -58,7 +58,7 @@ const SEAMLESS: &str = "model = \"models/omni-distance-as-printed.toml\"\ndistan
 const OURS: &str = "plugin = \"floor-kalman\"";
 /// Config before the first step, and those after the last.
 const PRINTED: &str = "omni-appearance-as-printed";
-const BEYOND: [&str; 2] = ["omni-appearance", "omni-best"];
+const BEYOND: [&str; 2] = ["omni-appearance", "omni-rich"];
 
 /// Errors of the runs of one room.
 struct Walk {

@@ -9,7 +9,7 @@ use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// The printed method, the corrected one, its detector with the filter of P1, and the best.
 const PIPELINES: [&str; 4] =
-    ["omni-appearance-as-printed", "omni-appearance", "omni-ekf", "omni-best"];
+    ["omni-appearance-as-printed", "omni-appearance", "omni-ekf", "omni-rich"];
 /// Number of draws of each scene.
 const SEEDS: u64 = 6;
 /// Duration, s: more draws are more informative than longer ones.

@@ -33,7 +33,7 @@ const VERIFIERS: [(&str, &str, &str); 2] = [
     ("color-texture", "training = { trees = [200] }", "weight = 2.0\nbias = -4.0"),
 ];
 /// Config of the detector, used without its verifiers.
-const DETECTS: &str = "stereo-best";
+const DETECTS: &str = "stereo-verified";
 /// Lowered thresholds, so that training gets many candidates (as by `tagalong train`).
 const LOWERED: [(&str, f64); 9] = [
     ("detectors.0.config.boundary_margin_m", 0.2),
@@ -171,11 +171,11 @@ fn table(
                 2 * seeds * ROOMS.len() as u64,
                 seeds * ROOMS.len() as u64
             ),
-            "Sightings are those that the detector of `stereo-best` believes. People: rejected \
+            "Sightings are those that the detector of `stereo-verified` believes. People: rejected \
              by the models without a kind, all together, and by the one with all."
                 .into(),
             "`svm-patch` with gamma 2 and penalty 3, `color-texture` with 200 trees and asked as \
-             in `stereo-best`: fewer scenes than the shipped models have seen. `body-net`, \
+             in `stereo-verified`: fewer scenes than the shipped models have seen. `body-net`, \
              twenty minutes a model, is left out."
                 .into(),
         ],

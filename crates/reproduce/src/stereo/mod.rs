@@ -103,4 +103,4 @@ pub const STEREO_SVM_EKF: System = System {
 const STEREO: (&str, &str) = ("camera.kind", "stereo");
 
 /// Configs as printed, corrected, and the best.
-const PIPELINES: [&str; 3] = ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-best"];
+const PIPELINES: [&str; 3] = ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-verified"];

@@ -31,7 +31,7 @@ const P1_MS: f64 = 70.0;
 /// # Errors
 /// As [`Lab::contenders`], and a pipeline that fails.
 pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
-    let names = ["stereo-svm-ekf", "stereo-best"];
+    let names = ["stereo-svm-ekf", "stereo-verified"];
     let published = PUBLISHED_MS.map(Some).to_vec();
     times(lab, &names, &published, PUBLISHED_MS.iter().sum(), "P4, Table II")
 }

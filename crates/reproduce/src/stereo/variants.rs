@@ -48,7 +48,7 @@ pub const OF_P1: [Variant; 4] = [
         ],
     },
     Variant { name: "stereo-ekf", of: "stereo-ekf", set: &[] },
-    Variant { name: "stereo-best", of: "stereo-best", set: &[] },
+    Variant { name: "stereo-verified", of: "stereo-verified", set: &[] },
 ];
 
 /// P4, likewise. With the whole filter corrected, the remaining difference to `stereo-svm-ekf` is
@@ -70,7 +70,7 @@ pub const OF_P4: [Variant; 5] = [
         set: &[NO_VELOCITY, NO_NOISE, NO_UPDATE, NO_MEASUREMENT],
     },
     Variant { name: "stereo-svm-ekf", of: "stereo-svm-ekf", set: &[] },
-    Variant { name: "stereo-best", of: "stereo-best", set: &[] },
+    Variant { name: "stereo-verified", of: "stereo-verified", set: &[] },
 ];
 
 impl Variant {

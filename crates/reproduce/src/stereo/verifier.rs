@@ -22,7 +22,7 @@ const SEQUENCES: [Sequence; 3] = [
     ("two people", "square-walk", &[STEREO, ("duration_s", "10"), ("room.clutter", "9")]),
 ];
 /// Pipelines without a verifier, with P4's, and with the better one.
-const PIPELINES: [&str; 3] = ["stereo-ekf", "stereo-svm-ekf", "stereo-best"];
+const PIPELINES: [&str; 3] = ["stereo-ekf", "stereo-svm-ekf", "stereo-verified"];
 
 /// Logs of real rooms, first those in which no shipped verifier was trained.
 const REAL: [(&str, &[&str]); 2] = [
@@ -35,7 +35,7 @@ const REAL_VERIFIERS: [(&str, Option<&str>); 5] = [
     ("with the verifier of stereo-svm-ekf-as-printed", Some("stereo-svm-ekf-as-printed")),
     ("with the verifier of stereo-svm-ekf", Some("stereo-svm-ekf")),
     ("with the verifier of depth-color-ekf", Some("depth-color-ekf")),
-    ("with the verifiers of stereo-best", Some("stereo-best")),
+    ("with the verifiers of stereo-verified", Some("stereo-verified")),
 ];
 
 /// Note on the rows of real rooms.

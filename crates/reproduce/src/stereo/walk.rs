@@ -197,7 +197,7 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
              nobody is believed to be within half a metre of the person in view."
                 .into(),
             "The robot keeps 2 m behind, by the true place: the same way for all, with the \
-             errors of its wheels, which `stereo-best` corrects by what stands still \
+             errors of its wheels, which `stereo-verified` corrects by what stands still \
              (`[odometry]`); the row of the drift is the true place, seen from where the wheels \
              believe the robot to be."
                 .into(),
