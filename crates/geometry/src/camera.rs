@@ -5,55 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector2, Vector3};
 /// Distance below which two pixels count as equal.
 const SAME_PIXEL_PX: f64 = 1e-3;
 
-use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Panorama, Rect, UPPER_BODY_SIDE_M};
-
-/// Lens distortion, as in `sensor_msgs/CameraInfo`.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub enum Distortion {
-    /// No distortion: an ideal or an already rectified image.
-    #[default]
-    None,
-    /// `plumb_bob`: k1, k2, p1, p2, k3.
-    PlumbBob([f64; 5]),
-    /// `rational_polynomial`: k1, k2, p1, p2, k3, k4, k5, k6.
-    Rational([f64; 8]),
-}
-
-impl Distortion {
-    /// Converts ideal normalised coordinates to distorted ones (OpenCV's model).
-    fn apply(&self, x: f64, y: f64) -> (f64, f64) {
-        let (k, p1, p2) = match self {
-            Self::None => return (x, y),
-            // Plumb bob is the rational model with a denominator of 1.
-            Self::PlumbBob([k1, k2, p1, p2, k3]) => ([*k1, *k2, *k3, 0.0, 0.0, 0.0], *p1, *p2),
-            Self::Rational([k1, k2, p1, p2, k3, k4, k5, k6]) => {
-                ([*k1, *k2, *k3, *k4, *k5, *k6], *p1, *p2)
-            }
-        };
-        let r2 = x * x + y * y;
-        let radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2])))
-            / (1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5])));
-        (
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
-    }
-
-    /// Converts distorted normalised coordinates to ideal ones, by fixed-point iteration.
-    fn remove(&self, x_distorted: f64, y_distorted: f64) -> (f64, f64) {
-        if *self == Self::None {
-            return (x_distorted, y_distorted);
-        }
-        let (mut x, mut y) = (x_distorted, y_distorted);
-        // The model has no closed inverse; a fixed number of steps bounds the cost of a pixel.
-        for _ in 0..20 {
-            let (xd, yd) = self.apply(x, y);
-            x += x_distorted - xd;
-            y += y_distorted - yd;
-        }
-        (x, y)
-    }
-}
+use crate::{Distortion, HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Panorama, Rect, UPPER_BODY_SIDE_M};
 
 /// A perspective lens. Pixel (0, 0) is the **centre** of the upper left pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -468,29 +420,6 @@ mod tests {
         assert_eq!(camera.project(&Point3::new(0.0, 0.0, 1.2)), None, "in the lens");
         assert_eq!((camera.focal_px(), camera.height_m()), (500.0, 1.2));
         assert_eq!(camera.panorama(), None);
-    }
-
-    /// The expected values are computed by hand for one direction, by OpenCV's rational model of
-    /// `calib3d`.
-    #[test]
-    fn distortion_is_that_of_the_calibration_message() {
-        let (x, y) = (0.3, -0.2);
-        let r2: f64 = 0.13;
-        let (p1, p2) = (0.002, -0.003);
-        let bent = |radial: f64| {
-            let along = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-            (along, y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)
-        };
-        let above = 1.0 + 0.1 * r2 - 0.2 * r2.powi(2) + 0.05 * r2.powi(3);
-        let below = 1.0 + 0.03 * r2 + 0.4 * r2.powi(2) - 0.6 * r2.powi(3);
-        let plumb_bob = Distortion::PlumbBob([0.1, -0.2, p1, p2, 0.05]);
-        let rational = Distortion::Rational([0.1, -0.2, p1, p2, 0.05, 0.03, 0.4, -0.6]);
-        for (lens, expected) in [(plumb_bob, bent(above)), (rational, bent(above / below))] {
-            let found = lens.apply(x, y);
-            assert!((found.0 - expected.0).abs() < 1e-12 && (found.1 - expected.1).abs() < 1e-12);
-            let back = lens.remove(found.0, found.1);
-            assert!((back.0 - x).abs() < 1e-9 && (back.1 - y).abs() < 1e-9, "{back:?}");
-        }
     }
 
     /// A head 3.08 m ahead has its face at 3 m, where a metre is 500 / 3 pixels wide.

@@ -1,15 +1,17 @@
 //! Cameras with their mounts, the mirror of a panoramic camera, and boxes in images.
 //!
 //! A [`Camera`] translates between the robot frame (X forward, Y left, Z up, m) and pixels,
-//! whatever its [`Lens`]: pinhole with distortion, unwrapped panorama, or none at all for a
+//! whatever its [`Lens`]: pinhole with distortion, fisheye, unwrapped panorama, or none at all for a
 //! robot with a laser scanner only.
 
 mod camera;
+mod distortion;
 mod locate;
 mod panorama;
 mod rect;
 
-pub use camera::{Camera, Distortion, Lens, Pinhole};
+pub use camera::{Camera, Lens, Pinhole};
+pub use distortion::Distortion;
 pub use locate::{FaceDepth, PointEstimate};
 pub use panorama::{ConicalMirror, Panorama};
 pub use rect::{Extent, ImageBox, Rect};

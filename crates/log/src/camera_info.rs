@@ -54,7 +54,12 @@ impl CameraInfo {
         let (model, d) = match distortion {
             Distortion::None => ("plumb_bob", vec![0.0; 5]),
             Distortion::PlumbBob(d) => ("plumb_bob", d.to_vec()),
+            // Drivers write 8 coefficients where the others are zero.
+            Distortion::Rational(d) if d[8..] == [0.0; 6] => {
+                ("rational_polynomial", d[..8].to_vec())
+            }
             Distortion::Rational(d) => ("rational_polynomial", d.to_vec()),
+            Distortion::Equidistant(d) => ("equidistant", d.to_vec()),
         };
         Self {
             header: header.clone(),
@@ -90,7 +95,8 @@ pub enum CalibrationError {
     /// The distortion model is unknown or has the wrong number of coefficients.
     #[error(
         "distortion model `{model}` with {count} coefficients; \
-         known: plumb_bob (4 or 5), rational_polynomial (8), none (0), \
+         known: plumb_bob (4 or 5), rational_polynomial (8, 12 or 14), equidistant or \
+         fisheye (4), none (0), \
          conical_mirror and conical_mirror_unwrapped (4, see `ConicalMirror`)"
     )]
     Distortion {
@@ -241,9 +247,13 @@ fn distortion(info: &CameraInfo) -> Result<Distortion, CalibrationError> {
     match (info.distortion_model.as_str(), d[..].len()) {
         ("plumb_bob", 4) => Ok(Distortion::PlumbBob([d[0], d[1], d[2], d[3], 0.0])),
         ("plumb_bob", 5) => Ok(Distortion::PlumbBob([d[0], d[1], d[2], d[3], d[4]])),
-        ("rational_polynomial", 8) => {
-            Ok(Distortion::Rational([d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]]))
+        ("rational_polynomial", count @ (8 | 12 | 14)) => {
+            let mut all = [0.0; 14];
+            all[..count].copy_from_slice(d);
+            Ok(Distortion::Rational(all))
         }
+        // OpenCV's name, and that of ROS.
+        ("equidistant" | "fisheye", 4) => Ok(Distortion::Equidistant([d[0], d[1], d[2], d[3]])),
         (model, count) => Err(CalibrationError::Distortion { model: model.to_owned(), count }),
     }
 }
@@ -300,10 +310,11 @@ mod tests {
 
     #[test]
     fn what_a_lens_publishes_is_read_back() {
-        use Distortion::{None, PlumbBob, Rational};
+        use Distortion::{Equidistant, None, PlumbBob, Rational};
         let bent = PlumbBob([0.1, -0.2, 0.001, 0.002, 0.05]);
-        let fish = Rational([0.1, -0.2, 0.001, 0.002, 0.05, 0.3, 0.2, 0.1]);
-        for distortion in [None, bent, fish] {
+        let wide = rational(&[0.1, -0.2, 0.001, 0.002, 0.05, 0.3, 0.2, 0.1]);
+        let tilted = Rational(std::array::from_fn(|at| 0.01 * at as f64));
+        for distortion in [None, bent, wide, tilted, Equidistant([0.1, 0.02, -0.01, 0.001])] {
             let lens = Pinhole { fx: 500.0, fy: 510.0, cx: 320.0, cy: 240.0, distortion };
             let info = CameraInfo::of_lens(&Header::default(), &lens, (640, 480), 0.12);
             let read = intrinsics(&info, false).unwrap();
@@ -362,22 +373,34 @@ mod tests {
         assert!(broken(|i| i.k[2] = 900.0).starts_with("K[2] = 900"));
         assert!(broken(|i| i.r[0] = 2.0).starts_with("R ="));
         assert!(broken(|i| i.d.truncate(3)).contains("`plumb_bob` with 3"));
-        assert!(broken(|i| i.distortion_model = "equidistant".into()).contains("`equidistant`"));
+        assert!(
+            broken(|i| i.distortion_model = "equidistant".into()).contains("`equidistant` with 5")
+        );
+        assert!(broken(|i| i.distortion_model = "of my own".into()).contains("`of my own`"));
         assert!(broken(|i| i.p[3] = f64::INFINITY).starts_with("P ="));
     }
 
     #[test]
-    fn four_and_eight_coefficients_are_read() {
-        let four = CameraInfo { d: vec![0.1, 0.2, 0.3, 0.4], ..info() };
-        let lens = intrinsics(&four, false).unwrap().lens;
-        assert_eq!(lens.distortion, Distortion::PlumbBob([0.1, 0.2, 0.3, 0.4, 0.0]));
-        let eight = CameraInfo {
-            d: (1..9).map(f64::from).collect(),
-            distortion_model: "rational_polynomial".into(),
-            ..info()
+    fn models_are_read_with_all_their_numbers_of_coefficients() {
+        let lens = |model: &str, count: u32| {
+            let d = (1..=count).map(f64::from).collect();
+            let info = CameraInfo { d, distortion_model: model.into(), ..info() };
+            intrinsics(&info, false).unwrap().lens.distortion
         };
-        let lens = intrinsics(&eight, false).unwrap().lens;
-        assert_eq!(lens.distortion, Distortion::Rational([1., 2., 3., 4., 5., 6., 7., 8.]));
+        assert_eq!(lens("plumb_bob", 4), Distortion::PlumbBob([1.0, 2.0, 3.0, 4.0, 0.0]));
+        for count in [8, 12, 14] {
+            let expected: Vec<f64> = (1..=count).map(f64::from).collect();
+            assert_eq!(lens("rational_polynomial", count), rational(&expected));
+        }
+        for model in ["equidistant", "fisheye"] {
+            assert_eq!(lens(model, 4), Distortion::Equidistant([1.0, 2.0, 3.0, 4.0]));
+        }
+    }
+
+    fn rational(first: &[f64]) -> Distortion {
+        let mut all = [0.0; 14];
+        all[..first.len()].copy_from_slice(first);
+        Distortion::Rational(all)
     }
 
     #[test]

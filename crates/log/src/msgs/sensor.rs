@@ -62,7 +62,7 @@ pub struct CameraInfo {
     pub height: u32,
     /// Columns of the full image.
     pub width: u32,
-    /// `plumb_bob`, `rational_polynomial` or empty.
+    /// `plumb_bob`, `rational_polynomial`, `equidistant`, `fisheye` or empty.
     pub distortion_model: String,
     /// Distortion coefficients.
     pub d: Vec<f64>,
