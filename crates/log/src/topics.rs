@@ -147,7 +147,7 @@ fn is_named(input: &Input) -> bool {
 const UNREADABLE: &str = ", because no topic is read for it: a program that adds it to each frame \
                           with `Frame::with_sensor` opens the log with `inputs.relax(..)`; \
                           otherwise leave out the plugin that requires it";
-const COLOUR: &str = "sensor_msgs/Image with rgb8, bgr8, rgba8, bgra8 or mono8, or \
+const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels of 8 bits, or \
                       sensor_msgs/CompressedImage with jpeg or png";
 const LASER: &str = "sensor_msgs/LaserScan";
 const DETECTIONS: &str = "vision_msgs/Detection2DArray or Detection3DArray";

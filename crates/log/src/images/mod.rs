@@ -4,9 +4,11 @@
 //! depth, and 0, negative, infinite and NaN values of floating depth (REP 117 and 118 give
 //! infinities a meaning of their own, which no detector here uses).
 
+mod bayer;
 mod compressed;
 mod raw;
 mod rvl;
+mod yuv;
 
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
 pub use raw::{decode_raw, size_of_raw};
@@ -42,10 +44,17 @@ impl Pixels {
 pub enum ImageError {
     /// The encoding is unknown, or unknown for depth.
     #[error(
-        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, 8UC1, 8UC3, 16UC1, 32FC1 \
-         (mono16 only where `depth_unit_m` says that it is depth), jpeg, png, compressedDepth"
+        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, mono16, 8UC1, 8UC3, bayer_*8, \
+         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21, and for depth 16UC1, 32FC1 (mono16 where \
+         `depth_unit_m` is set); jpeg, png, compressedDepth"
     )]
     Encoding(String),
+    /// Colour with 16 bits a channel.
+    #[error(
+        "encoding `{0}` has 16 bits a channel, which no pipeline uses: let the driver publish 8 \
+         bits (rgb8 or bayer_rggb8, say)"
+    )]
+    Deep(String),
     /// The image is larger than the limits allow.
     #[error("{width}x{height} pixels exceed the limit")]
     TooLarge {
@@ -66,7 +75,7 @@ impl ImageError {
     /// Returns the name under which such messages are counted.
     pub fn counter(&self) -> &'static str {
         match self {
-            Self::Encoding(_) => "images_of_unknown_encoding",
+            Self::Encoding(_) | Self::Deep(_) => "images_of_unknown_encoding",
             Self::TooLarge { .. } => "images_too_large",
             Self::Layout(_) => "images_of_wrong_layout",
             Self::Codec(_) => "images_undecodable",
@@ -92,8 +101,18 @@ pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content
         "rgb8" | "bgr8" | "rgba8" | "bgra8" | "mono8" | "8UC1" | "8UC3" => Content::Picture,
         "16UC1" | "32FC1" => Content::Depth,
         "mono16" if depth_unit_m.is_some() => Content::Depth,
+        "mono16" => Content::Picture,
+        // Also those that are refused: the error then names the encoding.
+        _ if is_deep(encoding) || bayer::Pattern::of(encoding).is_some() => Content::Picture,
+        _ if yuv::Order::of(encoding).is_some() => Content::Picture,
         _ => Content::Unknown,
     }
+}
+
+/// Returns true for colour with 16 bits a channel.
+fn is_deep(encoding: &str) -> bool {
+    let colour = ["rgb", "bgr", "bayer_"].iter().any(|start| encoding.starts_with(start));
+    (colour && encoding.ends_with("16")) || ["16UC3", "16UC4"].contains(&encoding)
 }
 
 /// Returns the content of images of a `sensor_msgs/CompressedImage` format.

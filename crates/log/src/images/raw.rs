@@ -2,7 +2,7 @@
 
 use tagalong_core::Image as Plane;
 
-use super::{ImageError, Pixels, check_size, metres, metres_of_float};
+use super::{ImageError, Pixels, bayer, check_size, is_deep, metres, metres_of_float, yuv};
 use crate::Limits;
 use crate::msgs::Image;
 
@@ -16,7 +16,8 @@ pub fn size_of_raw(image: &Image<'_>, limits: &Limits) -> Result<(usize, usize),
 }
 
 /// Decodes an uncompressed image. Depth is scaled by `depth_unit_m` (metres per unit), or by the
-/// convention of the encoding: 1 mm for `16UC1`, 1 m for `32FC1`.
+/// convention of the encoding: 1 mm for `16UC1`, 1 m for `32FC1`. `mono16` is intensity without
+/// `depth_unit_m`, and depth with it.
 ///
 /// # Errors
 /// [`ImageError`]: unknown encoding, size beyond the limits, `step` or data
@@ -26,16 +27,25 @@ pub fn decode_raw(
     depth_unit_m: Option<f64>,
     limits: &Limits,
 ) -> Result<Pixels, ImageError> {
+    size_of_raw(image, limits)?;
+    if let Some(order) = yuv::Order::of(&image.encoding) {
+        return yuv::decode(image, order).map(Pixels::Colour);
+    }
+    if let Some(pattern) = bayer::Pattern::of(&image.encoding) {
+        let rows = Rows::new(image, image.height as usize, image.width as usize)?;
+        return Ok(Pixels::Colour(bayer::interpolate(&rows, pattern)));
+    }
     let bytes_per_pixel = match image.encoding.as_str() {
         "mono8" | "8UC1" => 1,
-        "16UC1" => 2,
-        "mono16" if depth_unit_m.is_some() => 2,
+        "16UC1" | "mono16" => 2,
         "rgb8" | "bgr8" | "8UC3" => 3,
         "rgba8" | "bgra8" | "32FC1" => 4,
-        _ => return Err(ImageError::Encoding(image.encoding.clone())),
+        deep if is_deep(deep) => return Err(ImageError::Deep(deep.to_owned())),
+        other => return Err(ImageError::Encoding(other.to_owned())),
     };
-    check_size(image.width.into(), image.height.into(), bytes_per_pixel.max(3), limits)?;
-    let rows = Rows::new(image, bytes_per_pixel as usize)?;
+    check_size(image.width.into(), image.height.into(), bytes_per_pixel, limits)?;
+    let rows =
+        Rows::new(image, image.height as usize, image.width as usize * bytes_per_pixel as usize)?;
     let big = image.is_bigendian != 0;
     let pixels = match image.encoding.as_str() {
         "rgb8" => Pixels::Colour(rows.plane(|p: [u8; 3]| p)),
@@ -48,6 +58,11 @@ pub fn decode_raw(
             let read = if big { f32::from_be_bytes } else { f32::from_le_bytes };
             Pixels::Depth(rows.plane(|p: [u8; 4]| metres_of_float(read(p), unit)))
         }
+        // 65535 becomes 255, as in cv_bridge.
+        "mono16" if depth_unit_m.is_none() => {
+            let read = if big { u16::from_be_bytes } else { u16::from_le_bytes };
+            Pixels::Grey(rows.plane(|p: [u8; 2]| ((u32::from(read(p)) + 128) / 257) as u8))
+        }
         _ => {
             let unit = depth_unit_m.unwrap_or(0.001) as f32;
             let read = if big { u16::from_be_bytes } else { u16::from_le_bytes };
@@ -58,20 +73,27 @@ pub fn decode_raw(
 }
 
 /// Rows of an image with a checked layout.
-struct Rows<'a> {
+pub(super) struct Rows<'a> {
     data: &'a [u8],
-    width: usize,
-    height: usize,
+    /// Columns of the image.
+    pub(super) width: usize,
+    /// Rows of the image.
+    pub(super) height: usize,
     step: usize,
     row_bytes: usize,
 }
 
 impl<'a> Rows<'a> {
-    fn new(image: &Image<'a>, bytes_per_pixel: usize) -> Result<Self, ImageError> {
+    /// Checks `count` rows of `row_bytes` each, and padding behind them.
+    pub(super) fn new(
+        image: &Image<'a>,
+        count: usize,
+        row_bytes: usize,
+    ) -> Result<Self, ImageError> {
         let (width, height) = (image.width as usize, image.height as usize);
-        let (step, row_bytes) = (image.step as usize, width * bytes_per_pixel);
+        let step = image.step as usize;
         // In 64 bits, where the product of two 32-bit numbers cannot overflow.
-        let expected = u64::from(image.step) * u64::from(image.height);
+        let expected = u64::from(image.step) * count as u64;
         if step < row_bytes {
             return Err(ImageError::Layout(format!(
                 "step {step} is less than a row ({row_bytes})"
@@ -82,6 +104,11 @@ impl<'a> Rows<'a> {
             return Err(ImageError::Layout(format!("{got} bytes of data instead of {expected}")));
         }
         Ok(Self { data: image.data, width, height, step, row_bytes })
+    }
+
+    /// Returns a row without its padding.
+    pub(super) fn row(&self, at: usize) -> &'a [u8] {
+        &self.data[at * self.step..][..self.row_bytes]
     }
 
     fn plane<const N: usize, P: Copy>(&self, pixel: impl Fn([u8; N]) -> P) -> Plane<P> {

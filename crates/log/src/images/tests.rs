@@ -95,11 +95,167 @@ fn the_high_byte_may_come_first() {
 }
 
 #[test]
-fn mono16_is_depth_only_with_a_unit() {
-    let image = raw("mono16", 1, 1, 2, &[0xdc, 0x05]);
-    assert_eq!(decoded(&image), Err(ImageError::Encoding("mono16".into())));
+fn mono16_is_depth_with_a_unit_and_intensity_without() {
+    let mut image = raw("mono16", 3, 1, 6, &[0xdc, 0x05, 0xff, 0xff, 0x80, 0x00]);
+    let expected = GreyImage::from_pixels(3, 1, vec![6, 255, 0]).unwrap();
+    assert_eq!(decoded(&image).unwrap(), Pixels::Grey(expected));
     let scaled = decode_raw(&image, Some(0.0001), &Limits::default()).unwrap();
-    assert!(same_depth(&depth_of(scaled), &[0.15]));
+    assert!(same_depth(&depth_of(scaled), &[0.15, f32::NAN, 0.0128]));
+    image.is_bigendian = 1;
+    let expected = GreyImage::from_pixels(3, 1, vec![219, 255, 128]).unwrap();
+    assert_eq!(decoded(&image).unwrap(), Pixels::Grey(expected));
+}
+
+#[test]
+fn deep_colour_says_so() {
+    for encoding in ["rgb16", "bgra16", "bayer_rggb16", "16UC3"] {
+        let error = decoded(&raw(encoding, 1, 1, 6, &[0; 6])).unwrap_err();
+        assert!(error.to_string().contains("16 bits a channel"), "{error}");
+        assert_eq!(content_of_encoding(encoding, None), Content::Picture);
+    }
+}
+
+/// Pixels as OpenCV 4.10 decodes them: `tests/clients/encodings_opencv.py` prints this table.
+const OPENCV: [(&str, usize, usize, &[u8]); 8] = [
+    (
+        "bayer_rggb8",
+        6,
+        5,
+        &[
+            74, 138, 10, 74, 138, 10, 47, 47, 47, 84, 84, 84, 121, 121, 121, 121, 121, 121, 74,
+            138, 10, 74, 138, 10, 47, 47, 47, 84, 84, 84, 121, 121, 121, 121, 121, 121, 104, 232,
+            104, 104, 232, 104, 13, 141, 77, 50, 50, 50, 87, 87, 87, 87, 87, 87, 134, 198, 198,
+            134, 198, 198, 107, 235, 107, 80, 144, 16, 53, 53, 53, 53, 53, 53, 134, 198, 198, 134,
+            198, 198, 107, 235, 107, 80, 144, 16, 53, 53, 53, 53, 53, 53,
+        ],
+    ),
+    (
+        "bayer_bggr8",
+        6,
+        5,
+        &[
+            10, 138, 74, 10, 138, 74, 47, 47, 47, 84, 84, 84, 121, 121, 121, 121, 121, 121, 10,
+            138, 74, 10, 138, 74, 47, 47, 47, 84, 84, 84, 121, 121, 121, 121, 121, 121, 104, 232,
+            104, 104, 232, 104, 77, 141, 13, 50, 50, 50, 87, 87, 87, 87, 87, 87, 198, 198, 134,
+            198, 198, 134, 107, 235, 107, 16, 144, 80, 53, 53, 53, 53, 53, 53, 198, 198, 134, 198,
+            198, 134, 107, 235, 107, 16, 144, 80, 53, 53, 53, 53, 53, 53,
+        ],
+    ),
+    (
+        "bayer_gbrg8",
+        6,
+        5,
+        &[
+            138, 10, 138, 138, 10, 138, 47, 47, 111, 84, 84, 84, 121, 121, 121, 121, 121, 121, 138,
+            10, 138, 138, 10, 138, 47, 47, 111, 84, 84, 84, 121, 121, 121, 121, 121, 121, 168, 104,
+            232, 168, 104, 232, 141, 13, 141, 114, 50, 50, 87, 87, 87, 87, 87, 87, 198, 198, 198,
+            198, 198, 198, 235, 107, 171, 144, 16, 144, 53, 53, 117, 53, 53, 117, 198, 198, 198,
+            198, 198, 198, 235, 107, 171, 144, 16, 144, 53, 53, 117, 53, 53, 117,
+        ],
+    ),
+    (
+        "bayer_grbg8",
+        6,
+        5,
+        &[
+            138, 10, 138, 138, 10, 138, 111, 47, 47, 84, 84, 84, 121, 121, 121, 121, 121, 121, 138,
+            10, 138, 138, 10, 138, 111, 47, 47, 84, 84, 84, 121, 121, 121, 121, 121, 121, 232, 104,
+            168, 232, 104, 168, 141, 13, 141, 50, 50, 114, 87, 87, 87, 87, 87, 87, 198, 198, 198,
+            198, 198, 198, 171, 107, 235, 144, 16, 144, 117, 53, 53, 117, 53, 53, 198, 198, 198,
+            198, 198, 198, 171, 107, 235, 144, 16, 144, 117, 53, 53, 117, 53, 53,
+        ],
+    ),
+    (
+        "yuv422",
+        4,
+        2,
+        &[
+            0, 118, 0, 44, 204, 0, 255, 112, 255, 161, 0, 54, 68, 117, 0, 154, 203, 2, 68, 255,
+            255, 0, 107, 175,
+        ],
+    ),
+    (
+        "yuv422_yuy2",
+        4,
+        2,
+        &[
+            0, 41, 0, 60, 117, 0, 0, 233, 255, 60, 255, 255, 84, 29, 0, 170, 115, 33, 84, 231, 255,
+            0, 23, 210,
+        ],
+    ),
+    (
+        "nv12",
+        4,
+        4,
+        &[
+            0, 19, 0, 26, 52, 0, 187, 6, 142, 230, 49, 185, 155, 181, 79, 198, 224, 122, 255, 178,
+            255, 112, 0, 67, 0, 85, 252, 0, 128, 255, 62, 182, 0, 105, 226, 14, 30, 255, 255, 73,
+            255, 255, 0, 60, 0, 0, 100, 0,
+        ],
+    ),
+    (
+        "nv21",
+        4,
+        4,
+        &[
+            0, 35, 0, 0, 67, 25, 128, 21, 217, 171, 65, 255, 96, 197, 154, 139, 240, 197, 255, 194,
+            255, 53, 0, 141, 207, 0, 0, 250, 36, 0, 3, 198, 46, 46, 241, 89, 255, 165, 0, 255, 208,
+            25, 0, 76, 0, 0, 115, 0,
+        ],
+    ),
+];
+
+/// The bytes of that script.
+fn noise(count: usize) -> Vec<u8> {
+    (0..count).map(|i| ((7 + 37 * i) % 256) as u8).collect()
+}
+
+/// Bytes of a row and rows of an encoding, for an image of this size.
+fn layout(encoding: &str, width: usize, height: usize) -> (usize, usize) {
+    match encoding {
+        _ if encoding.starts_with("bayer") => (width, height),
+        _ if encoding.starts_with("nv") => (width, height * 3 / 2),
+        _ => (2 * width, height),
+    }
+}
+
+#[test]
+fn mosaics_and_apart_colours_are_decoded_as_opencv_does() {
+    for (encoding, width, height, expected) in OPENCV {
+        let (step, rows) = layout(encoding, width, height);
+        let bytes = noise(step * rows);
+        let image = raw(encoding, width as u32, height as u32, step as u32, &bytes);
+        let expected: Vec<[u8; 3]> = expected.as_chunks().0.to_vec();
+        let expected = Pixels::Colour(RgbImage::from_pixels(width, height, expected).unwrap());
+        assert_eq!(decoded(&image).unwrap(), expected, "{encoding}");
+        assert_eq!(content_of_encoding(encoding, None), Content::Picture);
+        let padded: Vec<u8> =
+            bytes.chunks(step).flat_map(|row| [row, &[9, 9][..]].concat()).collect();
+        let image = raw(encoding, width as u32, height as u32, step as u32 + 2, &padded);
+        assert_eq!(decoded(&image).unwrap(), expected, "{encoding}, padded");
+    }
+}
+
+#[test]
+fn other_names_of_the_same_order_give_the_same_image() {
+    for (name, other) in [("uyvy", "yuv422"), ("yuyv", "yuv422_yuy2")] {
+        let bytes = noise(16);
+        let [a, b] = [name, other].map(|encoding| decoded(&raw(encoding, 4, 2, 8, &bytes)));
+        assert_eq!(a.unwrap(), b.unwrap());
+    }
+}
+
+#[test]
+fn small_and_odd_mosaics_do_no_harm() {
+    for (width, height) in [(1, 1), (1, 3), (2, 1), (2, 2), (3, 2)] {
+        let bytes = noise((width * height) as usize);
+        assert!(decoded(&raw("bayer_rggb8", width, height, width, &bytes)).is_ok());
+    }
+    let layout = |image| decoded(&image).unwrap_err().counter();
+    assert_eq!(layout(raw("yuyv", 3, 2, 6, &[0; 12])), "images_of_wrong_layout");
+    assert_eq!(layout(raw("nv12", 2, 3, 2, &[0; 9])), "images_of_wrong_layout");
+    assert_eq!(layout(raw("nv12", 2, 2, 2, &[0; 4])), "images_of_wrong_layout");
+    assert_eq!(layout(raw("bayer_grbg8", 4, 2, 3, &[0; 6])), "images_of_wrong_layout");
 }
 
 #[test]
@@ -233,7 +389,7 @@ fn what_is_in_an_image_shows_in_its_name() {
     assert_eq!(content_of_format("16UC1; compressedDepth"), Content::Depth);
     assert_eq!(content_of_format("rgb8; jpeg compressed bgr8"), Content::Picture);
     assert_eq!(content_of_format("h264"), Content::Unknown);
-    assert_eq!(content_of_encoding("mono16", None), Content::Unknown);
+    assert_eq!(content_of_encoding("mono16", None), Content::Picture);
     assert_eq!(content_of_encoding("mono16", Some(0.001)), Content::Depth);
 }
 

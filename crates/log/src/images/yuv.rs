@@ -1,0 +1,90 @@
+//! Brightness and colour apart, with fewer samples of colour: BT.601 with 16 to 235, as OpenCV's
+//! `cvtColor`.
+
+use tagalong_core::RgbImage;
+
+use super::ImageError;
+use super::raw::{Rows, exact};
+use crate::msgs::Image;
+
+/// Bits behind the point of the factors.
+const SHIFT: i32 = 20;
+const BRIGHTNESS: i32 = 1_220_542;
+const RED_OF_V: i32 = 1_673_527;
+const GREEN_OF_U: i32 = -409_993;
+const GREEN_OF_V: i32 = -852_492;
+const BLUE_OF_U: i32 = 2_116_026;
+
+/// Order of brightness and colour in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// Four bytes for two pixels, with the places of Y of both, U and V.
+    Packed([usize; 4]),
+    /// All of Y, then a row of colour pairs for each two rows; the place of U in a pair.
+    TwoPlanes(usize),
+}
+
+impl Order {
+    /// Returns the order of an encoding; `None` for any other encoding.
+    pub(super) fn of(encoding: &str) -> Option<Self> {
+        Some(match encoding {
+            // ROS calls it `yuv422`, drivers by the order of the bytes.
+            "yuv422" | "uyvy" => Self::Packed([1, 3, 0, 2]),
+            "yuv422_yuy2" | "yuyv" => Self::Packed([0, 2, 1, 3]),
+            "nv12" => Self::TwoPlanes(0),
+            "nv21" => Self::TwoPlanes(1),
+            _ => return None,
+        })
+    }
+}
+
+/// Decodes an image.
+///
+/// # Errors
+/// An odd size, for which there are no pairs, and a length of the data that contradicts the size.
+pub(super) fn decode(image: &Image<'_>, order: Order) -> Result<RgbImage, ImageError> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let halves_rows = matches!(order, Order::TwoPlanes(_));
+    if !width.is_multiple_of(2) || (halves_rows && !height.is_multiple_of(2)) {
+        let encoding = &image.encoding;
+        return Err(ImageError::Layout(format!("{width}x{height} pixels of {encoding} are odd")));
+    }
+    let pixels = match order {
+        Order::Packed(places) => packed(&Rows::new(image, height, 2 * width)?, places),
+        Order::TwoPlanes(u) => two_planes(&Rows::new(image, height + height / 2, width)?, u),
+    };
+    Ok(exact(width, height, pixels))
+}
+
+fn packed(rows: &Rows<'_>, [first, second, u, v]: [usize; 4]) -> Vec<[u8; 3]> {
+    let mut out = Vec::with_capacity(rows.width * rows.height);
+    for y in 0..rows.height {
+        let (pairs, _) = rows.row(y).as_chunks::<4>();
+        out.extend(
+            pairs
+                .iter()
+                .flat_map(|p| [colour(p[first], p[u], p[v]), colour(p[second], p[u], p[v])]),
+        );
+    }
+    out
+}
+
+fn two_planes(rows: &Rows<'_>, u: usize) -> Vec<[u8; 3]> {
+    let mut out = Vec::with_capacity(rows.width * rows.height);
+    for y in 0..rows.height {
+        let pairs = rows.row(rows.height + y / 2);
+        let bright = rows.row(y).iter().enumerate();
+        out.extend(bright.map(|(x, y)| {
+            let pair = x - x % 2;
+            colour(*y, pairs[pair + u], pairs[pair + 1 - u])
+        }));
+    }
+    out
+}
+
+fn colour(y: u8, u: u8, v: u8) -> [u8; 3] {
+    let (u, v) = (i32::from(u) - 128, i32::from(v) - 128);
+    let bright = (i32::from(y) - 16).max(0) * BRIGHTNESS + (1 << (SHIFT - 1));
+    let tints = [RED_OF_V * v, GREEN_OF_V * v + GREEN_OF_U * u, BLUE_OF_U * u];
+    tints.map(|tint| ((bright + tint) >> SHIFT).clamp(0, 255) as u8)
+}
