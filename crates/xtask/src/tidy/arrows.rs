@@ -14,6 +14,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("config", &[]),
     ("vision", &[]),
     ("learn", &[]),
+    ("network", &[]),
     ("filtering", &[]),
     ("stereo", &["vision"]),
     ("odometry", &[]),
@@ -75,6 +76,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "experiments",
             "import",
             "log",
+            "network",
             "pipeline",
             "render",
             "scoring",
@@ -93,7 +95,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
 
 /// Crates that a plugin may depend on.
-const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment", "filtering"];
+const OF_PLUGINS: &[&str] = &["vision", "learn", "network", "assignment", "filtering"];
 
 /// Crates that the tests of any crate may depend on in addition.
 const FOR_TESTS: &[&str] =

@@ -1,0 +1,334 @@
+//! From the outputs of a family to boxes in pixels of the network's input.
+
+use tagalong_geometry::Rect;
+
+use crate::family::NANODET_BINS;
+use crate::{Family, InputSize, Tensor};
+
+/// Strides of the grids of most families.
+const STRIDES: [usize; 3] = [8, 16, 32];
+/// Strides of NanoDet-Plus.
+const NANODET_STRIDES: [usize; 4] = [8, 16, 32, 64];
+/// Joints of a person in MoveNet.
+const JOINTS: usize = 17;
+/// Part of the height between the highest and the lowest joint by which a person is higher than
+/// the eyes, and lower than the ankles.
+const ABOVE_EYES: f64 = 0.08;
+const BELOW_ANKLES: f64 = 0.05;
+
+/// Box with a score.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScoredBox {
+    /// The whole person.
+    pub rect: Rect,
+    /// Probability of a person, 0 to 1.
+    pub score: f32,
+}
+
+/// Boxes that are searched.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted<'a> {
+    /// Classes of people.
+    pub classes: &'a [usize],
+    /// Boxes with a lower score are left out.
+    pub min_score: f32,
+}
+
+impl Wanted<'_> {
+    /// Returns the highest score of the classes of people.
+    fn best(&self, score: impl Fn(usize) -> Option<f32>) -> f32 {
+        // A maximum over numbers ignores NaN.
+        self.classes.iter().filter_map(|class| score(*class)).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    fn has_label(&self, label: f32) -> bool {
+        self.classes.iter().any(|class| (label - *class as f32).abs() < 0.5)
+    }
+
+    /// Returns the box if it is likely and can be.
+    fn take(&self, score: f32, rect: impl FnOnce() -> Rect) -> Option<ScoredBox> {
+        if score.is_nan() || score < self.min_score {
+            return None;
+        }
+        let rect = rect();
+        (rect.is_sane() && rect.area() > 0.0).then_some(ScoredBox { rect, score: score.min(1.0) })
+    }
+}
+
+/// Returns the boxes of people in outputs whose shapes fit the family ([`Family::classes`]), in
+/// pixels of the input.
+pub(crate) fn decode(
+    family: Family,
+    outputs: &[(&str, &Tensor)],
+    input: InputSize,
+    wanted: Wanted<'_>,
+) -> Vec<ScoredBox> {
+    let named = |name: &str| outputs.iter().find(|(known, _)| *known == name).map(|(_, out)| *out);
+    let first = outputs.first().map(|(_, output)| *output);
+    let found = match family {
+        Family::Yolox => first.map(|output| yolox(output, input, wanted)),
+        Family::YoloV8 => first.map(|output| yolo_v8(output, wanted)),
+        Family::YoloV10 => first.map(|output| yolo_v10(output, wanted)),
+        Family::NanoDet => first.map(|output| nanodet(output, input, wanted)),
+        Family::MoveNet => first.map(|output| movenet(output, input, wanted)),
+        Family::RtDetr => {
+            (|| Some(rt_detr(named("labels")?, named("boxes")?, named("scores")?, wanted)))()
+        }
+        Family::RfDetr => (|| Some(rf_detr(named("dets")?, named("labels")?, input, wanted)))(),
+        Family::RtmDet => (|| Some(rtmdet(named("dets")?, named("labels")?, wanted)))(),
+    };
+    found.unwrap_or_default()
+}
+
+/// Returns column, row and stride of each grid cell, in the order of the outputs.
+fn cells(input: InputSize, strides: &[usize]) -> impl Iterator<Item = [f64; 3]> {
+    strides.iter().flat_map(move |&stride| {
+        let columns = input.width.div_ceil(stride);
+        let rows = input.height.div_ceil(stride);
+        (0..rows * columns)
+            .map(move |cell| [(cell % columns) as f64, (cell / columns) as f64, stride as f64])
+    })
+}
+
+fn around(x: f64, y: f64, width: f64, height: f64) -> Rect {
+    Rect::new(x - 0.5 * width, y - 0.5 * height, width, height)
+}
+
+fn between(corners: &[f32]) -> Rect {
+    let [left, top, right, bottom] = [0, 1, 2, 3].map(|k| f64::from(corners[k]));
+    Rect::new(left, top, right - left, bottom - top)
+}
+
+fn yolox(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let found =
+        output.rows().zip(cells(input, &STRIDES)).filter_map(|(row, [column, line, stride])| {
+            let [x, y, width, height] = [0, 1, 2, 3].map(|k| f64::from(row[k]));
+            let score = row[4] * wanted.best(|class| row.get(5 + class).copied());
+            wanted.take(score, || {
+                let (x, y) = ((x + column) * stride, (y + line) * stride);
+                around(x, y, width.exp() * stride, height.exp() * stride)
+            })
+        });
+    found.collect()
+}
+
+fn yolo_v8(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let rows: Vec<&[f32]> = output.rows().collect();
+    let boxes = rows.first().map_or(0, |row| row.len());
+    let found = (0..boxes).filter_map(|k| {
+        let score = wanted.best(|class| rows.get(4 + class).map(|row| row[k]));
+        let [x, y, width, height] = [0, 1, 2, 3].map(|part| f64::from(rows[part][k]));
+        wanted.take(score, || around(x, y, width, height))
+    });
+    found.collect()
+}
+
+fn yolo_v10(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let people = output.rows().filter(|row| wanted.has_label(row[5]));
+    people.filter_map(|row| wanted.take(row[4], || between(row))).collect()
+}
+
+fn nanodet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let grid = cells(input, &NANODET_STRIDES);
+    let found = output.rows().zip(grid).filter_map(|(row, [column, line, stride])| {
+        let (scores, sides) = row.split_at(row.len() - 4 * NANODET_BINS);
+        let score = wanted.best(|class| scores.get(class).copied());
+        wanted.take(score, || {
+            let side = |k: usize| stride * expectation(&sides[k * NANODET_BINS..][..NANODET_BINS]);
+            let (left, top) = (column * stride - side(0), line * stride - side(1));
+            let (right, bottom) = (column * stride + side(2), line * stride + side(3));
+            Rect::new(left, top, right - left, bottom - top)
+        })
+    });
+    found.collect()
+}
+
+/// Returns the mean index of a distribution with these logits.
+fn expectation(logits: &[f32]) -> f64 {
+    let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let weights = logits.iter().map(|logit| f64::from(logit - highest).exp());
+    let [sum, moment] = weights.enumerate().fold([0.0; 2], |[sum, moment], (index, weight)| {
+        [sum + weight, moment + weight * index as f64]
+    });
+    moment / sum
+}
+
+fn rt_detr(labels: &Tensor, boxes: &Tensor, scores: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let each = labels.values().iter().zip(scores.values()).zip(boxes.rows());
+    let people = each.filter(|((label, _), _)| wanted.has_label(**label));
+    people.filter_map(|((_, score), corners)| wanted.take(*score, || between(corners))).collect()
+}
+
+fn rf_detr(
+    boxes: &Tensor,
+    logits: &Tensor,
+    input: InputSize,
+    wanted: Wanted<'_>,
+) -> Vec<ScoredBox> {
+    let size = [input.width as f64, input.height as f64];
+    let found = boxes.rows().zip(logits.rows()).filter_map(|(part, logits)| {
+        let logit = wanted.best(|class| logits.get(class).copied());
+        let [x, y, width, height] = [0, 1, 2, 3].map(|k| f64::from(part[k]) * size[k % 2]);
+        wanted.take(1.0 / (1.0 + (-logit).exp()), || around(x, y, width, height))
+    });
+    found.collect()
+}
+
+fn rtmdet(boxes: &Tensor, labels: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let each = boxes.rows().zip(labels.values());
+    let people = each.filter(|(_, label)| wanted.has_label(**label));
+    people.filter_map(|(row, _)| wanted.take(row[4], || between(row))).collect()
+}
+
+fn movenet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let one_person = output.values().len() == 3 * JOINTS;
+    let people = output.values().chunks_exact(if one_person { 3 * JOINTS } else { 56 });
+    let found = people.filter_map(|person| {
+        let joints = &person[..3 * JOINTS];
+        let score = match person.get(55) {
+            Some(score) => *score,
+            None => joints.chunks_exact(3).map(|joint| joint[2]).sum::<f32>() / JOINTS as f32,
+        };
+        wanted.take(score, || box_of_joints(joints, input))
+    });
+    found.collect()
+}
+
+/// Returns the box of a standing person with these joints, each as row, column and score.
+fn box_of_joints(joints: &[f32], input: InputSize) -> Rect {
+    let span = |part: usize, size: usize| {
+        let values = joints.chunks_exact(3).map(|joint| f64::from(joint[part]) * size as f64);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
+            [least.min(value), most.max(value)]
+        })
+    };
+    let ([top, bottom], [left, right]) = (span(0, input.height), span(1, input.width));
+    let height = bottom - top;
+    let whole = height * (1.0 + ABOVE_EYES + BELOW_ANKLES);
+    Rect::new(left, top - ABOVE_EYES * height, right - left, whole)
+}
+
+/// Drops the less likely of two boxes that overlap by more than `iou`; the likeliest come first.
+pub(crate) fn suppress(mut boxes: Vec<ScoredBox>, iou: f64) -> Vec<ScoredBox> {
+    // Where scores are equal, the order of the file decides.
+    boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<ScoredBox> = Vec::new();
+    for candidate in boxes {
+        if kept.iter().all(|better| better.rect.iou(&candidate.rect) <= iou) {
+            kept.push(candidate);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INPUT: InputSize = InputSize { width: 64, height: 64, channels_last: false };
+    const PEOPLE: Wanted<'_> = Wanted { classes: &[0], min_score: 0.5 };
+
+    fn tensor(shape: &[usize], values: &[f32]) -> Tensor {
+        Tensor::new(shape.to_vec(), values.to_vec()).unwrap()
+    }
+
+    fn rects(found: &[ScoredBox]) -> Vec<[f64; 4]> {
+        found.iter().map(|found| found.rect).map(|r| [r.x, r.y, r.width, r.height]).collect()
+    }
+
+    #[test]
+    fn yolox_boxes_are_relative_to_their_cells() {
+        // 64 cells of 8 pixels, 16 of 16, 4 of 32.
+        let mut values = vec![0.0; 84 * 7];
+        // Column 2, row 1 of the second grid.
+        let row = &mut values[(64 + 6) * 7..][..7];
+        row.copy_from_slice(&[0.5, 0.25, 0.0, 2.0_f32.ln(), 0.9, 0.8, 1.0]);
+        let found = yolox(&tensor(&[1, 84, 7], &values), INPUT, PEOPLE);
+        assert_eq!(found.len(), 1);
+        let [x, y, width, height] = rects(&found)[0];
+        assert_eq!([x, y, width], [40.0 - 8.0, 20.0 - height / 2.0, 16.0]);
+        assert!((height - 32.0).abs() < 1e-5 && (found[0].score - 0.72).abs() < 1e-6);
+    }
+
+    #[test]
+    fn yolo_v8_has_a_row_for_each_part() {
+        let parts = [10.0, 30.0, 20.0, 40.0, 8.0, 4.0, 16.0, 2.0, 0.9, 0.2, 0.1, 0.8];
+        let found = yolo_v8(&tensor(&[1, 6, 2], &parts), PEOPLE);
+        assert_eq!(rects(&found), [[6.0, 12.0, 8.0, 16.0]]);
+        let both = Wanted { classes: &[0, 1, 7], ..PEOPLE };
+        assert_eq!(yolo_v8(&tensor(&[1, 6, 2], &parts), both).len(), 2);
+    }
+
+    #[test]
+    fn final_boxes_are_taken_by_label_and_score() {
+        let rows = [
+            [1.0, 2.0, 5.0, 10.0, 0.9, 0.0],
+            [1.0, 2.0, 5.0, 10.0, 0.9, 1.0],
+            [1.0, 2.0, 5.0, 10.0, 0.4, 0.0],
+            [5.0, 2.0, 1.0, 10.0, 0.9, 0.0],
+            [f32::NAN, 2.0, 1.0, 10.0, 0.9, 0.0],
+        ];
+        let found = yolo_v10(&tensor(&[1, 5, 6], &rows.concat()), PEOPLE);
+        assert_eq!(rects(&found), [[1.0, 2.0, 4.0, 8.0]]);
+        let boxes = tensor(&[1, 2, 5], &[1.0, 2.0, 5.0, 10.0, 0.9, 0.0, 0.0, 9.0, 9.0, 0.8]);
+        let found = rtmdet(&boxes, &tensor(&[1, 2], &[3.0, 0.0]), PEOPLE);
+        assert_eq!(rects(&found), [[0.0, 0.0, 9.0, 9.0]]);
+    }
+
+    #[test]
+    fn outputs_are_found_by_name_in_any_order() {
+        let (labels, scores) = (tensor(&[1, 2], &[0.0, 0.0]), tensor(&[1, 2], &[0.9, 0.1]));
+        let boxes = tensor(&[1, 2, 4], &[1.0, 2.0, 5.0, 10.0, 0.0, 0.0, 9.0, 9.0]);
+        let outputs = [("scores", &scores), ("labels", &labels), ("boxes", &boxes)];
+        let found = decode(Family::RtDetr, &outputs, INPUT, PEOPLE);
+        assert_eq!(rects(&found), [[1.0, 2.0, 4.0, 8.0]]);
+        assert!(decode(Family::RtDetr, &outputs[..2], INPUT, PEOPLE).is_empty());
+    }
+
+    #[test]
+    fn rf_detr_has_fractions_and_logits() {
+        let boxes = tensor(&[1, 1, 4], &[0.5, 0.5, 0.25, 0.5]);
+        let logits = tensor(&[1, 1, 3], &[-9.0, 3.0_f32.ln(), 9.0]);
+        let found = rf_detr(&boxes, &logits, INPUT, Wanted { classes: &[1], min_score: 0.5 });
+        assert_eq!(rects(&found), [[24.0, 16.0, 16.0, 32.0]]);
+        assert!((found[0].score - 0.75).abs() < 1e-6);
+    }
+
+    #[test]
+    fn nanodet_has_a_distribution_for_each_side() {
+        let (width, cell) = (1 + 32, 9); // Column 1, row 1 of the first grid.
+        let mut values = vec![0.0; 85 * width];
+        let row = &mut values[cell * width..][..width];
+        row[0] = 0.9;
+        for (side, bin) in [1, 0, 2, 3].into_iter().enumerate() {
+            row[1 + 8 * side + bin] = 50.0;
+        }
+        let found = nanodet(&tensor(&[1, 85, width], &values), INPUT, PEOPLE);
+        assert_eq!(rects(&found), [[0.0, 8.0, 24.0, 24.0]]);
+        assert_eq!(expectation(&[1.0, 1.0, 1.0]), 1.0);
+    }
+
+    #[test]
+    fn joints_become_a_person_from_crown_to_sole() {
+        let mut joints = [0.5, 0.5, 0.6].repeat(JOINTS);
+        joints[..3].copy_from_slice(&[0.25, 0.375, 0.6]);
+        joints[48..].copy_from_slice(&[0.75, 0.625, 0.6]);
+        let found = movenet(&tensor(&[1, 1, 17, 3], &joints), INPUT, PEOPLE);
+        let [x, y, width, height] = rects(&found)[0];
+        assert_eq!([x, width], [24.0, 16.0]);
+        assert!((y - (16.0 - 2.56)).abs() < 1e-9 && (height - 32.0 * 1.13).abs() < 1e-9);
+        let mut six = [joints, vec![0.0; 5]].concat();
+        six[55] = 0.7;
+        let six = [six, vec![0.0; 5 * 56]].concat();
+        let found = movenet(&tensor(&[1, 6, 56], &six), INPUT, PEOPLE);
+        assert_eq!((found.len(), found[0].score), (1, 0.7));
+    }
+
+    #[test]
+    fn of_two_boxes_that_overlap_the_likelier_stays() {
+        let scored = |x: f64, score: f32| ScoredBox { rect: Rect::new(x, 0.0, 10.0, 10.0), score };
+        let boxes = vec![scored(0.0, 0.6), scored(1.0, 0.9), scored(20.0, 0.7)];
+        assert_eq!(suppress(boxes.clone(), 0.5), [boxes[1], boxes[2]]);
+        assert_eq!(suppress(boxes, 0.9).len(), 3);
+    }
+}

@@ -1,0 +1,260 @@
+//! Network of one of the families, from a file to boxes in an image.
+
+use std::fs;
+use std::path::Path;
+
+use tagalong_core::RgbImage;
+
+use crate::decode::{Wanted, decode, suppress};
+use crate::family::{OutputShape, recognise};
+use crate::runtime::RtenNetwork;
+use crate::worker::Worker;
+use crate::{Element, Family, InputSize, Limits, Network, Port, Preparation, ScoredBox, Tensor};
+
+/// Columns and rows of an input that the file leaves open.
+const USUAL_SIZE: usize = 640;
+/// Most columns and rows of an input.
+const MAX_SIDE: usize = 4096;
+/// Name of the input for the size of the image.
+const SIZES: &str = "orig_target_sizes";
+
+/// Choices that a file does not make.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choices {
+    /// The family; by default that of the outputs.
+    pub family: Option<Family>,
+    /// Columns and rows of the input, where the file leaves them open.
+    pub size: Option<[usize; 2]>,
+    /// Classes of people; by default that of the family.
+    pub classes: Vec<usize>,
+}
+
+/// Description of a network file.
+#[derive(Clone, Debug)]
+pub struct About {
+    /// Inputs as the file declares them.
+    pub inputs: Vec<Port>,
+    /// Outputs as the file declares them.
+    pub outputs: Vec<Port>,
+    /// Size and layout of the image that it takes; an error is a sentence.
+    pub input: Result<InputSize, String>,
+    /// Outputs of a first call; an error is a sentence.
+    pub run: Result<Vec<OutputShape>, String>,
+}
+
+impl About {
+    /// Describes a network, and runs it once.
+    fn of(network: &mut impl Network, size: Option<[usize; 2]>) -> Self {
+        let (inputs, outputs) = (network.inputs().to_vec(), network.outputs().to_vec());
+        let image = image_port(&inputs).and_then(|image| input_size(&inputs[image], size));
+        let run = image.clone().and_then(|input| first_run(network, input));
+        Self { inputs, outputs, input: image, run }
+    }
+
+    /// Returns the family of the network.
+    ///
+    /// # Errors
+    /// A sentence with the reason why there is none.
+    pub fn family(&self) -> Result<Family, String> {
+        let family = recognise(&self.run.clone()?, self.input.clone()?)?;
+        let has_sizes = self.inputs.iter().any(|port| port.name == SIZES);
+        if family == Family::RtDetr && !has_sizes {
+            return Err(format!(
+                "its outputs are those of {family}, but it has no input `{SIZES}`"
+            ));
+        }
+        Ok(family)
+    }
+}
+
+/// Reads the bytes of a file within the limits.
+fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, String> {
+    let about = fs::metadata(path).map_err(|why| format!("cannot be read: {why}"))?;
+    if !about.is_file() {
+        return Err("is no file".into());
+    }
+    if about.len() > limits.file_bytes {
+        let (has, most) = (about.len(), limits.file_bytes);
+        return Err(format!("has {has} bytes; at most {most} are read: raise `max_file_mb`"));
+    }
+    fs::read(path).map_err(|why| format!("cannot be read: {why}"))
+}
+
+fn start(
+    path: &Path,
+    size: Option<[usize; 2]>,
+    limits: &Limits,
+) -> Result<(Worker, About), String> {
+    let bytes = read(path, limits)?;
+    let own = *limits;
+    let load = move || RtenNetwork::from_onnx(bytes, &own);
+    let about = move |network: &mut RtenNetwork| Ok(About::of(network, size));
+    Worker::start(load, about, limits.load_deadline)
+}
+
+/// Describes the network in a file, and runs it once on a grey image.
+///
+/// # Errors
+/// A file that cannot be read or is beyond the limits; the message is a sentence about the file.
+pub fn inspect(path: &Path, size: Option<[usize; 2]>, limits: &Limits) -> Result<About, String> {
+    start(path, size, limits).map(|(_, about)| about)
+}
+
+/// Returns the index of the input that takes the image.
+fn image_port(inputs: &[Port]) -> Result<usize, String> {
+    let is_image = |port: &Port| port.shape.len() == 4;
+    let images: Vec<usize> = (0..inputs.len()).filter(|k| is_image(&inputs[*k])).collect();
+    let [image] = images[..] else {
+        let count = images.len();
+        return Err(format!("it has {count} inputs of four dimensions; an image is one"));
+    };
+    match inputs.iter().enumerate().find(|(k, port)| *k != image && port.name != SIZES) {
+        Some((_, port)) => Err(format!("its input {port} is not known; export it without")),
+        None => Ok(image),
+    }
+}
+
+fn input_size(port: &Port, chosen: Option<[usize; 2]>) -> Result<InputSize, String> {
+    let [batch, first, second, last] = port.shape[..] else {
+        return Err(format!("its input {port} is no image"));
+    };
+    let channels_last = last == Some(3) && first != Some(3);
+    let (channels, height, width) =
+        if channels_last { (last, first, second) } else { (first, second, last) };
+    if batch.is_some_and(|batch| batch != 1) || channels.is_some_and(|channels| channels != 3) {
+        return Err(format!("its input {port} is not one image of three colours"));
+    }
+    if port.element == Element::Other {
+        return Err(format!("its input {port} must be f32, integers or bytes: export it so"));
+    }
+    let side = |fixed: Option<usize>, chosen: Option<usize>| match (fixed, chosen) {
+        (Some(fixed), Some(chosen)) if fixed != chosen => {
+            Err(format!("its input {port} has a fixed size: remove `size`"))
+        }
+        (fixed, chosen) => Ok(fixed.or(chosen).unwrap_or(USUAL_SIZE)),
+    };
+    let width = side(width, chosen.map(|size| size[0]))?;
+    let height = side(height, chosen.map(|size| size[1]))?;
+    if [width, height].iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
+        return Err(format!("its input is {width} x {height} pixels; a side has 1 to {MAX_SIDE}"));
+    }
+    Ok(InputSize { width, height, channels_last })
+}
+
+/// Adds the other inputs to the image.
+fn with_sizes(inputs: &[Port], input: InputSize, image: Tensor) -> Vec<Tensor> {
+    // The boxes come back in pixels of the input, whatever the image was.
+    let size = vec![input.width as f32, input.height as f32];
+    let sizes = Tensor::new(vec![1, 2], size).unwrap_or_default();
+    let tensor = |port: &Port| if port.name == SIZES { sizes.clone() } else { image.clone() };
+    inputs.iter().map(tensor).collect()
+}
+
+fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<OutputShape>, String> {
+    let shape = input.shape();
+    let values = vec![0.0; shape.iter().product()];
+    let image = Tensor::new(shape, values).unwrap_or_default();
+    let inputs = with_sizes(network.inputs(), input, image);
+    let outputs = network.run(&inputs)?;
+    let names = network.outputs().iter().map(|port| port.name.clone());
+    let shapes = outputs.iter().map(|output| output.shape().to_vec());
+    Ok(names.zip(shapes).map(|(name, shape)| OutputShape { name, shape }).collect())
+}
+
+/// Network that finds people in images.
+pub struct PersonNetwork {
+    worker: Worker,
+    about: About,
+    family: Family,
+    input: InputSize,
+    classes: Vec<usize>,
+    limits: Limits,
+}
+
+impl PersonNetwork {
+    /// Reads a file, and runs it once.
+    ///
+    /// # Errors
+    /// A file that [`inspect`] refuses, outputs of another family than the chosen one or of none,
+    /// and classes that the network does not have; the message is a sentence about the file.
+    pub fn load(path: &Path, choices: &Choices, limits: &Limits) -> Result<Self, String> {
+        let (worker, about) = start(path, choices.size, limits)?;
+        let input = about.input.clone()?;
+        let shapes = about.run.clone()?;
+        let family = match choices.family {
+            Some(family) => family,
+            None => about.family()?,
+        };
+        let Some(known) = family.classes(&shapes, input) else {
+            let shown: Vec<String> = shapes.iter().map(OutputShape::to_string).collect();
+            let (shown, needs) = (shown.join(", "), family.outputs());
+            return Err(format!("is not of the family {family}: it has {shown}, not {needs}"));
+        };
+        let classes = match choices.classes.is_empty() {
+            true => vec![family.person_class()],
+            false => choices.classes.clone(),
+        };
+        if let Some(beyond) = classes.iter().find(|class| known > 0 && **class >= known) {
+            return Err(format!("has {known} classes from 0, and no {beyond}: set `classes`"));
+        }
+        Ok(Self { worker, about, family, input, classes, limits: *limits })
+    }
+
+    /// Returns the description of the file.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// Returns the family.
+    pub fn family(&self) -> Family {
+        self.family
+    }
+
+    /// Finds people in an image: boxes in its pixels, the likeliest first, with a score of at
+    /// least `min_score`, and without those that overlap a likelier one by more than `iou` if the
+    /// family leaves that open. `None`: the call was not done within the deadline.
+    ///
+    /// # Errors
+    /// A failure of the runtime, in a sentence.
+    pub fn find(
+        &mut self,
+        image: &RgbImage,
+        preparation: &Preparation,
+        min_score: f32,
+        iou: f64,
+    ) -> Result<Option<Vec<ScoredBox>>, String> {
+        let Some((tensor, place)) = preparation.apply(image, self.input) else {
+            return Ok(Some(Vec::new()));
+        };
+        let Some(outputs) = self.run(tensor)? else {
+            return Ok(None);
+        };
+        let names = self.about.outputs.iter().map(|port| port.name.as_str());
+        let outputs: Vec<(&str, &Tensor)> = names.zip(&outputs).collect();
+        let shape = |(name, tensor): &(&str, &Tensor)| OutputShape {
+            name: (*name).to_owned(),
+            shape: tensor.shape().to_vec(),
+        };
+        let shapes: Vec<OutputShape> = outputs.iter().map(shape).collect();
+        if self.family.classes(&shapes, self.input).is_none() {
+            return Err("its outputs change their shape from call to call".into());
+        }
+        let wanted = Wanted { classes: &self.classes, min_score };
+        let found = decode(self.family, &outputs, self.input, wanted);
+        // Lists without doubles are sorted all the same.
+        let iou = if self.family.needs_suppression() { iou } else { 1.0 };
+        let mut people = suppress(found, iou);
+        people.iter_mut().for_each(|person| person.rect = place.rect_to_image(&person.rect));
+        Ok(Some(people))
+    }
+
+    /// Runs the network on a prepared image: its outputs in the order of the file, or `None` if
+    /// they were not there within the deadline.
+    ///
+    /// # Errors
+    /// A failure of the runtime, in a sentence.
+    pub fn run(&mut self, image: Tensor) -> Result<Option<Vec<Tensor>>, String> {
+        let inputs = with_sizes(&self.about.inputs, self.input, image);
+        self.worker.run(inputs, self.limits.deadline)
+    }
+}
