@@ -1,0 +1,160 @@
+//! Hand-weighted networks of all families against the outputs of onnxruntime (`make_models.py`),
+//! and files that are refused.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde::Deserialize;
+use tagalong_core::RgbImage;
+use tagalong_geometry::Rect;
+use tagalong_network::{Choices, Family, InputSize, Limits, PersonNetwork, inspect};
+
+/// Output of onnxruntime.
+#[derive(Deserialize)]
+struct Expected {
+    shape: Vec<usize>,
+    values: Vec<f32>,
+}
+
+fn path(name: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "tests", "models", name].iter().collect()
+}
+
+fn network(family: Family) -> PersonNetwork {
+    let file = path(&format!("{family}.onnx"));
+    PersonNetwork::load(&file, &Choices::default(), &Limits::default()).unwrap()
+}
+
+fn is_blob(x: usize, y: usize) -> bool {
+    (32..48).contains(&x) && (16..48).contains(&y)
+}
+
+/// The image of `make_models.py`, with each pixel `scale` times as large.
+fn scene(scale: usize) -> RgbImage {
+    RgbImage::from_fn(64 * scale, 64 * scale, |x, y| {
+        let (x, y) = (x / scale, y / scale);
+        [0, 1, 2].map(|c| match is_blob(x, y) {
+            true => 230 + 10 * c as u8,
+            false => ((x + 2 * y + 7 * c) % 40) as u8,
+        })
+    })
+}
+
+#[test]
+fn outputs_equal_those_of_onnxruntime() {
+    for family in Family::ALL {
+        let text = fs::read_to_string(path(&format!("{family}.json"))).unwrap();
+        let expected: BTreeMap<String, Expected> = serde_json::from_str(&text).unwrap();
+        let mut network = network(family);
+        let channels_last = family == Family::MoveNet;
+        let input = InputSize { width: 64, height: 64, channels_last };
+        let (tensor, _) = family.preparation().apply(&scene(1), input).unwrap();
+        let outputs = network.run(tensor).unwrap().unwrap();
+        assert_eq!(outputs.len(), expected.len(), "{family}");
+        for (port, output) in network.about().outputs.iter().zip(&outputs) {
+            let Expected { shape, values } = &expected[&port.name];
+            assert_eq!(output.shape(), shape, "{family}");
+            let pairs = output.values().iter().zip(values);
+            let worst = pairs.map(|(ours, theirs)| (ours - theirs).abs()).fold(0.0, f32::max);
+            assert!(worst <= 1e-4, "{family}, {}: {worst}", port.name);
+        }
+    }
+}
+
+#[test]
+fn the_box_is_where_the_blob_is() {
+    for family in Family::ALL {
+        let mut network = network(family);
+        assert_eq!(network.family(), family);
+        let preparation = family.preparation();
+        let mut find =
+            |image: &RgbImage| network.find(image, &preparation, 0.5, 0.5).unwrap().unwrap();
+        let found = find(&scene(3));
+        assert_eq!(found.len(), 1, "{family}: {found:?}");
+        let overlap = found[0].rect.iou(&Rect::new(96.0, 48.0, 48.0, 96.0));
+        assert!(overlap > 0.97 && found[0].score > 0.9, "{family}: {:?}", found[0]);
+        assert!(find(&RgbImage::filled(64, 64, [30; 3])).is_empty(), "{family}");
+        assert!(find(&RgbImage::default()).is_empty(), "{family}");
+    }
+}
+
+/// The image is 128 x 64 pixels, so half of the input is padding, or it is stretched.
+#[test]
+fn boxes_return_from_the_padded_input() {
+    for family in [Family::Yolox, Family::YoloV8] {
+        let top = if family == Family::Yolox { 16 } else { 0 };
+        // 32 x 64 pixels become 16 x 32 in the input, which starts 16 rows lower if centred.
+        let image = RgbImage::from_fn(128, 128 - 2 * top, |x, y| {
+            let inside = (64..96).contains(&x) && (32..96).contains(&y);
+            if inside { [240; 3] } else { [10; 3] }
+        });
+        let found = network(family).find(&image, &family.preparation(), 0.5, 0.5);
+        let found = found.unwrap().unwrap();
+        let overlap = found[0].rect.iou(&Rect::new(64.0, 32.0, 32.0, 64.0));
+        assert!(overlap > 0.99, "{family}: {found:?}");
+    }
+}
+
+/// Returns the refusal of these bytes in a file.
+fn refusal(bytes: &[u8], choices: &Choices, limits: &Limits) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("network.onnx");
+    fs::write(&file, bytes).unwrap();
+    let refused = PersonNetwork::load(&file, choices, limits).err();
+    refused.expect("it was not refused")
+}
+
+#[test]
+fn truncated_files_are_refused() {
+    let whole = fs::read(path("nanodet.onnx")).unwrap();
+    for end in (0..whole.len()).step_by(whole.len() / 23) {
+        let why = refusal(&whole[..end], &Choices::default(), &Limits::default());
+        assert!(!why.is_empty(), "{end}");
+    }
+}
+
+#[test]
+fn files_beyond_the_limits_are_refused() {
+    let whole = fs::read(path("yolox.onnx")).unwrap();
+    let refused = |limits: Limits| refusal(&whole, &Choices::default(), &limits);
+    let usual = Limits::default();
+    let why = refused(Limits { file_bytes: 1000, ..usual });
+    assert!(why.contains("at most 1000 are read: raise `max_file_mb`"), "{why}");
+    let why = refused(Limits { operators: 3, ..usual });
+    assert!(why.contains("more than 3 operators"), "{why}");
+    let why = refused(Limits { tensor_values: 2000, ..usual });
+    assert!(why.contains("above 2000 numbers"), "{why}");
+    let why = refused(Limits { load_deadline: Duration::ZERO, ..usual });
+    assert!(why.contains("within 0 s"), "{why}");
+}
+
+#[test]
+fn choices_that_do_not_fit_are_refused() {
+    let whole = fs::read(path("yolox.onnx")).unwrap();
+    let refused = |choices: Choices| refusal(&whole, &choices, &Limits::default());
+    let why = refused(Choices { family: Some(Family::YoloV8), ..Choices::default() });
+    assert!(why.contains("not of the family yolov8") && why.contains("[1, 84, 7]"), "{why}");
+    let why = refused(Choices { size: Some([320, 320]), ..Choices::default() });
+    assert!(why.contains("fixed size: remove `size`"), "{why}");
+    let why = refused(Choices { classes: vec![0, 2], ..Choices::default() });
+    assert!(why.contains("2 classes from 0, and no 2"), "{why}");
+}
+
+#[test]
+fn paths_that_are_no_files_are_refused() {
+    let why = |name: &str| inspect(&path(name), None, &Limits::default()).unwrap_err();
+    assert!(why("none.onnx").contains("cannot be read"));
+    assert!(why("").contains("is no file"));
+    assert!(why("yolox.json").contains("no ONNX file"), "{}", why("yolox.json"));
+}
+
+#[test]
+fn a_call_beyond_its_deadline_is_none() {
+    let limits = Limits { deadline: Duration::ZERO, ..Limits::default() };
+    let mut late = PersonNetwork::load(&path("yolox.onnx"), &Choices::default(), &limits).unwrap();
+    let image = RgbImage::filled(64, 64, [200; 3]);
+    let outcome = late.find(&image, &Family::Yolox.preparation(), 0.5, 0.5);
+    assert_eq!(outcome, Ok(None));
+}

@@ -1,0 +1,226 @@
+"""Writes the hand-weighted networks of these tests, and the outputs of onnxruntime beside them.
+
+Each finds an upright bright blob of 16 x 32 pixels in an image of 64 x 64, with the inputs and
+outputs of one family of detectors.
+
+    pip install onnx onnxruntime numpy
+    python make_models.py
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+from onnx import TensorProto, helper, numpy_helper
+
+SIDE = 64
+FOLDER = Path(__file__).parent / "models"
+IMAGENET = np.array([[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]], np.float32)
+
+
+class Graph:
+    """Operators and constants of a network."""
+
+    def __init__(self):
+        self.nodes, self.constants = [], []
+
+    def constant(self, value, kind=np.float32):
+        name = f"c{len(self.constants)}"
+        self.constants.append(numpy_helper.from_array(np.asarray(value, kind), name))
+        return name
+
+    def add(self, kind, *inputs, outputs=None, **attributes):
+        outputs = outputs or [f"v{len(self.nodes)}"]
+        name = f"{kind}{len(self.nodes)}"
+        self.nodes.append(helper.make_node(kind, inputs, outputs, name, **attributes))
+        return outputs[0]
+
+    def reshape(self, value, shape, **names):
+        return self.add("Reshape", value, self.constant(shape, np.int64), **names)
+
+    def zeros(self, *shape):
+        size = self.constant(shape, np.int64)
+        return self.add("ConstantOfShape", size)
+
+    def margins(self, mean, deviation):
+        """Brightness of each region of 16 x 32 pixels, 0 to 1, minus 0.7, times 20: [1, 1, 4, 4]."""
+        weights = np.asarray(deviation, np.float32).reshape(1, 3, 1, 1) / (3 * 255)
+        bias = np.sum(np.asarray(mean, np.float32)) / (3 * 255)
+        grey = self.add("Conv", "images", self.constant(weights), self.constant([bias]),
+                        kernel_shape=[1, 1], strides=[1, 1])
+        pool = self.add(
+            "AveragePool", grey, kernel_shape=[32, 16], strides=[16, 16], pads=[0, 0, 16, 0],
+            count_include_pad=1)
+        return self.add("Mul", self.add("Sub", pool, self.constant(0.7)), self.constant(20))
+
+    def scores(self, mean, deviation):
+        return self.add("Sigmoid", self.margins(mean, deviation))
+
+
+# Left, top, right and bottom of the region of each cell, in the order of the cells.
+CORNERS = np.array([[16 * x, 16 * y, 16 * x + 16, 16 * y + 32] for y in range(4) for x in range(4)],
+                   np.float32)
+CENTRES = np.stack([(CORNERS[:, 0] + CORNERS[:, 2]) / 2, (CORNERS[:, 1] + CORNERS[:, 3]) / 2,
+                    CORNERS[:, 2] - CORNERS[:, 0], CORNERS[:, 3] - CORNERS[:, 1]], 1)
+
+
+def yolox(graph):
+    scores = graph.reshape(graph.scores([0] * 3, [1] * 3), [1, 16, 1])
+    # The middle of the region is half a cell to the right of its corner and a whole one below.
+    boxes = np.tile(np.array([0.5, 1, 0, np.log(2), 1], np.float32), (1, 16, 1))
+    rows = graph.add("Concat", graph.constant(boxes), scores, graph.zeros(1, 16, 1), axis=2)
+    graph.add("Concat", graph.zeros(1, 64, 7), rows, graph.zeros(1, 4, 7), axis=1,
+              outputs=["output"])
+    return {"output": [1, 84, 7]}
+
+
+def yolov8(graph):
+    scores = graph.reshape(graph.scores([0] * 3, [255] * 3), [1, 1, 16])
+    columns = graph.add("Concat", graph.constant(CENTRES.T[None]), scores, graph.zeros(1, 1, 16),
+                        axis=1)
+    graph.add("Concat", graph.zeros(1, 6, 64), columns, graph.zeros(1, 6, 4), axis=2,
+              outputs=["output0"])
+    return {"output0": [1, 6, 84]}
+
+
+def best(graph, scores, boxes):
+    """Scores [1, 3] and boxes [1, 3, 4] of the three best regions."""
+    flat = graph.reshape(scores, [1, 16])
+    values, indices = f"best{len(graph.nodes)}", f"where{len(graph.nodes)}"
+    graph.add("TopK", flat, graph.constant([3], np.int64), outputs=[values, indices])
+    rows = graph.add("Gather", boxes, graph.reshape(indices, [3]), axis=0)
+    return values, graph.reshape(rows, [1, 3, 4])
+
+
+def yolov10(graph):
+    scores, boxes = best(graph, graph.scores([0] * 3, [255] * 3), graph.constant(CORNERS))
+    graph.add("Concat", boxes, graph.reshape(scores, [1, 3, 1]), graph.zeros(1, 3, 1), axis=2,
+              outputs=["output0"])
+    return {"output0": [1, 3, 6]}
+
+
+def rt_detr(graph):
+    size = graph.add("Cast", "orig_target_sizes", to=TensorProto.FLOAT)
+    scale = graph.reshape(graph.add("Concat", size, size, axis=1), [1, 4])
+    pixels = graph.add("Mul", graph.constant(CORNERS / SIDE), scale)
+    scores, boxes = best(graph, graph.scores([0] * 3, [255] * 3), pixels)
+    graph.add("Identity", scores, outputs=["scores"])
+    graph.add("Identity", boxes, outputs=["boxes"])
+    graph.add("Identity", graph.constant([[0, 0, 0]], np.int64), outputs=["labels"])
+    return {"scores": [1, 3], "boxes": [1, 3, 4], "labels": [1, 3]}
+
+
+def rf_detr(graph):
+    mean, deviation = IMAGENET
+    logits = graph.reshape(graph.margins(mean, deviation), [1, 16, 1])
+    low = graph.constant(np.full((1, 16, 1), -9))
+    graph.add("Concat", low, logits, low, axis=2, outputs=["labels"])
+    graph.add("Identity", graph.constant(CENTRES[None] / SIDE), outputs=["dets"])
+    return {"dets": [1, 16, 4], "labels": [1, 16, 3]}
+
+
+def nanodet(graph):
+    mean, deviation = IMAGENET[:, ::-1]
+    scores = graph.reshape(graph.scores(mean, deviation), [1, 16, 1])
+    sides = np.zeros((1, 16, 4, 8), np.float32)
+    for side, strides in enumerate([0, 0, 1, 2]):
+        sides[:, :, side, strides] = 20
+    rows = graph.add("Concat", scores, graph.zeros(1, 16, 1),
+                     graph.constant(sides.reshape(1, 16, 32)), axis=2)
+    graph.add("Concat", graph.zeros(1, 64, 34), rows, graph.zeros(1, 5, 34), axis=1,
+              outputs=["output"])
+    return {"output": [1, 85, 34]}
+
+
+def rtmdet(graph):
+    mean, deviation = IMAGENET[:, ::-1]
+    scores, boxes = best(graph, graph.scores(mean, deviation), graph.constant(CORNERS))
+    graph.add("Concat", boxes, graph.reshape(scores, [1, 3, 1]), axis=2, outputs=["dets"])
+    graph.add("Identity", graph.constant([[0, 0, 0]], np.int64), outputs=["labels"])
+    return {"dets": [1, 3, 5], "labels": [1, 3]}
+
+
+def movenet(graph):
+    numbers = graph.add("Cast", "images", to=TensorProto.FLOAT)
+    grey = graph.add("ReduceMean", numbers, axes=[3], keepdims=1)
+    bright = graph.add("Relu", graph.add("Sub", grey, graph.constant(128)))
+    total = graph.add("ReduceSum", bright, keepdims=1)
+    total = graph.add("Add", total, graph.constant(1e-3))
+    places = (np.arange(SIDE, dtype=np.float32) + 0.5) / SIDE
+
+    def middle(shape):
+        weighted = graph.add("Mul", bright, graph.constant(places.reshape(shape)))
+        return graph.add("Div", graph.add("ReduceSum", weighted, keepdims=1), total)
+
+    # From the eyes to the ankles of a person of 32 pixels, and 16 wide.
+    down = np.linspace(0.08 / 1.13 - 0.5, 0.5 - 0.05 / 1.13, 17) * 32 / SIDE
+    aside = np.where(np.arange(17) % 2 == 0, -0.5, 0.5) * 16 / SIDE
+    rows = graph.add("Add", middle((1, SIDE, 1, 1)), graph.constant(down.reshape(1, 1, 17, 1)))
+    columns = graph.add("Add", middle((1, 1, SIDE, 1)), graph.constant(aside.reshape(1, 1, 17, 1)))
+    amount = graph.add("Div", total, graph.constant(16 * 32 * 100))
+    margin = graph.add("Mul", graph.add("Sub", amount, graph.constant(0.7)), graph.constant(10))
+    score = graph.add("Sigmoid", margin)
+    each = graph.add("Expand", score, graph.constant([1, 1, 17, 1], np.int64))
+    graph.add("Concat", rows, columns, each, axis=3, outputs=["output_0"])
+    return {"output_0": [1, 1, 17, 3]}
+
+
+FAMILIES = {
+    "yolox": yolox, "yolov8": yolov8, "yolov10": yolov10, "rt-detr": rt_detr, "rf-detr": rf_detr,
+    "nanodet": nanodet, "rtmdet": rtmdet, "movenet": movenet,
+}
+
+
+def scene():
+    """The image of the tests, in red, green and blue: also `scene` in network.rs."""
+    y, x, c = np.meshgrid(np.arange(SIDE), np.arange(SIDE), np.arange(3), indexing="ij")
+    blob = (x >= 32) & (x < 48) & (y >= 16) & (y < 48)
+    return np.where(blob, 230 + 10 * c, (x + 2 * y + 7 * c) % 40).astype(np.float32)
+
+
+def prepared(family):
+    image, (mean, deviation) = scene(), IMAGENET
+    if family == "movenet":
+        return image[None].astype(np.int32)
+    if family in ("yolov8", "yolov10", "rt-detr"):
+        image = image / 255
+    elif family == "rf-detr":
+        image = (image - mean) / deviation
+    elif family in ("nanodet", "rtmdet"):
+        image = ((image - mean) / deviation)[:, :, ::-1]
+    elif family == "yolox":
+        image = image[:, :, ::-1]
+    return np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
+
+
+def write(family, build):
+    graph = Graph()
+    shapes = build(graph)
+    kinds = {"labels": TensorProto.INT64} if family in ("rt-detr", "rtmdet") else {}
+    outputs = [helper.make_tensor_value_info(name, kinds.get(name, TensorProto.FLOAT), shape)
+               for name, shape in shapes.items()]
+    last = family == "movenet"
+    shape = [1, SIDE, SIDE, 3] if last else [1, 3, SIDE, SIDE]
+    kind = TensorProto.INT32 if last else TensorProto.FLOAT
+    inputs = [helper.make_tensor_value_info("images", kind, shape)]
+    feeds = {"images": prepared(family)}
+    if family == "rt-detr":
+        inputs += [helper.make_tensor_value_info("orig_target_sizes", TensorProto.INT64, [1, 2])]
+        feeds["orig_target_sizes"] = np.array([[SIDE, SIDE]], np.int64)
+    body = helper.make_graph(graph.nodes, family, inputs, outputs, graph.constants)
+    model = helper.make_model(body, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+    onnx.checker.check_model(model)
+    (FOLDER / f"{family}.onnx").write_bytes(model.SerializeToString())
+    session = onnxruntime.InferenceSession(model.SerializeToString())
+    results = session.run(list(shapes), feeds)
+    numbers = {name: {"shape": list(result.shape),
+                      "values": [float(f"{value:.7g}") for value in result.ravel()]}
+               for name, result in zip(shapes, results)}
+    (FOLDER / f"{family}.json").write_text(json.dumps(numbers) + "\n")
+
+
+if __name__ == "__main__":
+    for family, build in FAMILIES.items():
+        write(family, build)

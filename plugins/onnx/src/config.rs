@@ -1,0 +1,185 @@
+use std::time::Duration;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_config::check_settings;
+use tagalong_core::{Error, Result};
+use tagalong_network::{Choices, Family, Limits, Preparation};
+
+use crate::choices::{Body, Channels, FamilyChoice, Placing};
+
+/// Settings of `onnx`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// ONNX file, relative to the config. Empty: no one is found, and the funnel says so.
+    pub model: String,
+    /// Family of the network: `auto` (by the file), `yolox`, `yolov8`, `yolov10`, `rt-detr`,
+    /// `rf-detr`, `nanodet`, `rtmdet` or `movenet`.
+    pub family: FamilyChoice,
+    /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
+    /// which is also taken for an empty list.
+    pub size: Vec<usize>,
+    /// Classes of people; empty: that of the family (0, and 1 for `rf-detr`).
+    pub classes: Vec<usize>,
+    /// Probability from which a box is a new person.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub discover_score: f64,
+    /// Probability from which a box near a confirmed track is its person.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub track_score: f64,
+    /// Of two boxes that overlap by more than this (IoU) the less likely one is dropped; only for
+    /// families that leave it open (`yolox`, `yolov8`, `nanodet`).
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub suppress_iou: f64,
+    /// The network runs on every n-th frame, and nothing is found in the others.
+    #[schemars(range(min = 1, max = 1000))]
+    pub every: u64,
+    /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
+    pub colours: Channels,
+    /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
+    /// `top-left`, the latter two with the aspect ratio of the image.
+    pub fit: Placing,
+    /// Value of padded pixels, 0 to 255; -1: that of the family.
+    #[schemars(range(min = -1.0, max = 255.0))]
+    pub padding: f64,
+    /// Three means in the order of the channels, 0 to 255, which are subtracted from pixels; empty:
+    /// those of the family.
+    pub mean: Vec<f32>,
+    /// Three deviations in the order of the channels, by which they are divided; empty: those of
+    /// the family.
+    pub deviation: Vec<f32>,
+    /// Box that is tracked: `full`, the upper body of the person in the box; `full-box`, the box.
+    pub body: Body,
+    /// Assumed height of a person whose whole body is in a box, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub height_m: f64,
+    /// Standard deviation of the position of a box, pixels.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub sigma_px: f64,
+    /// Standard deviation of the depth of a face read from the depth image, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub sigma_depth_m: f64,
+    /// Standard deviation of a distance that is computed from the size of the box alone, as a
+    /// fraction of the distance.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub sigma_distance: f64,
+    /// A search near a track accepts boxes of uncertain distance that overlap the expected box by
+    /// this much (IoU), and ...
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub near_overlap: f64,
+    /// ... positions within this distance on the floor, m.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub near_m: f64,
+    /// Threads of the network.
+    #[schemars(range(min = 1, max = 256))]
+    pub threads: usize,
+    /// A call that takes longer is given up, and its frame has no detections, s. Which calls are
+    /// depends on the machine: with a tight deadline two runs may differ.
+    #[schemars(range(min = 1e-3, max = 3600.0))]
+    pub deadline_s: f64,
+    /// Largest file, MB.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub max_file_mb: u64,
+    /// Most operators of a file.
+    #[schemars(range(min = 1, max = 10_000_000))]
+    pub max_operators: usize,
+    /// Largest tensor, MB, as far as it follows from the file.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub max_tensor_mb: usize,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            model: String::new(),
+            family: FamilyChoice::Auto,
+            size: Vec::new(),
+            classes: Vec::new(),
+            discover_score: 0.5,
+            track_score: 0.2,
+            suppress_iou: 0.6,
+            every: 1,
+            colours: Channels::Auto,
+            fit: Placing::Auto,
+            padding: -1.0,
+            mean: Vec::new(),
+            deviation: Vec::new(),
+            body: Body::Full,
+            height_m: 1.7,
+            sigma_px: 4.0,
+            sigma_depth_m: 0.1,
+            sigma_distance: 0.2,
+            near_overlap: 0.3,
+            near_m: 0.8,
+            threads: 1,
+            deadline_s: 5.0,
+            max_file_mb: 512,
+            max_operators: 20_000,
+            max_tensor_mb: 512,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that cannot work.
+    pub(crate) fn check(&self) -> Result<()> {
+        check_settings(self)?;
+        if !matches!(self.size.len(), 0 | 2) || self.size.contains(&0) {
+            return Err(Error::setting("size", "must be `[columns, rows]`, each above zero"));
+        }
+        triple("mean", &self.mean)?;
+        let deviation = triple("deviation", &self.deviation)?;
+        match deviation.is_some_and(|parts| parts.iter().any(|part| *part <= 0.0)) {
+            true => Err(Error::setting("deviation", "must be above zero")),
+            false => Ok(()),
+        }
+    }
+
+    pub(crate) fn choices(&self) -> Choices {
+        let size = <[usize; 2]>::try_from(&self.size[..]).ok();
+        Choices { family: self.family.family(), size, classes: self.classes.clone() }
+    }
+
+    pub(crate) fn limits(&self) -> Limits {
+        Limits {
+            file_bytes: self.max_file_mb << 20,
+            operators: self.max_operators,
+            tensor_values: self.max_tensor_mb << 18,
+            deadline: Duration::from_secs_f64(self.deadline_s),
+            threads: self.threads,
+            ..Limits::default()
+        }
+    }
+
+    /// Returns the preparation of images: that of the family, but for what is set.
+    pub(crate) fn preparation(&self, family: Family) -> Result<Preparation> {
+        let mut preparation = family.preparation();
+        if let Some(colours) = self.colours.colours()
+            && colours != preparation.colours
+        {
+            preparation.colours = colours;
+            preparation.mean.reverse();
+            preparation.deviation.reverse();
+        }
+        if let Some(fit) = self.fit.fit() {
+            preparation.fit = fit;
+        }
+        if self.padding >= 0.0 {
+            preparation.padding = self.padding as f32;
+        }
+        preparation.mean = triple("mean", &self.mean)?.unwrap_or(preparation.mean);
+        preparation.deviation =
+            triple("deviation", &self.deviation)?.unwrap_or(preparation.deviation);
+        Ok(preparation)
+    }
+}
+
+/// Returns three numbers, one for each channel, or `None` for an empty list.
+fn triple(key: &str, values: &[f32]) -> Result<Option<[f32; 3]>> {
+    if values.is_empty() {
+        return Ok(None);
+    }
+    let triple = <[f32; 3]>::try_from(values);
+    triple.map(Some).map_err(|_| Error::setting(key, "must have a number for each of 3 channels"))
+}

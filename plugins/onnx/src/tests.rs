@@ -1,0 +1,221 @@
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::{Matrix5, Vector2, Vector3};
+use tagalong_config::{Context, Registry};
+use tagalong_core::{
+    DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, Frame, Funnel, GreyImage,
+    Images, Person, Query, RgbImage, Stamp, Track, TrackId,
+};
+use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
+use tagalong_network::{Colours, Family, Fit};
+
+use super::*;
+
+const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
+/// The whole body in the image: 96 x 192 pixels, as the networks of the tests find in a square
+/// image of 384 pixels.
+const BODY: Rect = Rect::new(192.0, 96.0, 96.0, 192.0);
+
+/// Folder of the hand-weighted networks; each finds an upright bright blob.
+fn models() -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "..", "..", "crates", "network", "tests", "models"]
+        .iter()
+        .collect()
+}
+
+fn context() -> Context {
+    let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
+    Context { seed: 1, base_dir: models(), wheels }
+}
+
+fn config(family: Family) -> Config {
+    Config { model: format!("{family}.onnx"), ..Config::default() }
+}
+
+fn detector(config: Config) -> Onnx {
+    Onnx::new(config, &context()).unwrap()
+}
+
+fn camera() -> Arc<Camera> {
+    let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 191.5, cy: 191.5, distortion: Distortion::None };
+    Arc::new(Camera::mounted(lens, 384, 384, 1.0, 0.0, 0.0))
+}
+
+/// Returns an image with a blob of this brightness in place of the body.
+fn image(brightness: u8) -> RgbImage {
+    RgbImage::from_fn(384, 384, |x, y| {
+        let inside = (192..288).contains(&x) && (96..288).contains(&y);
+        if inside { [brightness; 3] } else { [10; 3] }
+    })
+}
+
+fn frame_of(index: u64, images: Images) -> Frame {
+    Frame::new(index, Stamp::from_nanos(index * 100), camera(), EgoMotion::at_rest(0.1), images)
+}
+
+fn frame(index: u64, brightness: u8) -> Frame {
+    let colour = Some(Arc::new(image(brightness)));
+    frame_of(index, Images { colour, ..Images::default() })
+}
+
+fn detect(detector: &mut Onnx, frame: &Frame) -> Vec<Detection> {
+    detector.detect(frame, &EVERYWHERE, &mut Funnel::default()).unwrap()
+}
+
+#[test]
+fn it_conforms() {
+    let mut registry = Registry::default();
+    register(&mut registry);
+    let failures = tagalong_conformance::check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn every_family_finds_the_person_and_the_place() {
+    for family in Family::ALL {
+        let mut whole = detector(Config { body: Body::FullBox, ..config(family) });
+        let found = detect(&mut whole, &frame(1, 240));
+        assert_eq!(found.len(), 1, "{family}");
+        let image = found[0].image.unwrap();
+        assert_eq!(image.extent, Extent::FullBody);
+        assert!(image.rect.iou(&BODY) > 0.97, "{family}: {image:?}");
+        let upper = detect(&mut detector(config(family)), &frame(1, 240)).remove(0);
+        assert!(upper.rect().unwrap().iou(&BODY.upper_body_of_standing(1.7)) > 0.95, "{family}");
+        // 1.7 m in 192 pixels of a lens of 300.
+        let ahead_m = camera().depth_of(&upper.position) - HEAD_RADIUS_M;
+        assert!((ahead_m - 300.0 * 1.7 / 192.0).abs() < 0.05, "{family}: {ahead_m}");
+        assert!(detect(&mut whole, &frame(1, 30)).is_empty(), "{family}");
+    }
+}
+
+#[test]
+fn depth_beats_the_size_of_the_box() {
+    let depth = Some(Arc::new(DepthImage::filled(384, 384, 2.0)));
+    let images = Images { colour: Some(Arc::new(image(240))), depth, ..Images::default() };
+    let found = detect(&mut detector(config(Family::Yolox)), &frame_of(1, images)).remove(0);
+    assert!((camera().depth_of(&found.position) - 2.0 - HEAD_RADIUS_M).abs() < 1e-6);
+    assert!(found.covariance[(0, 0)].sqrt() < 0.15);
+}
+
+#[test]
+fn grey_images_do_as_well() {
+    let grey = Some(Arc::new(GreyImage::from_fn(384, 384, |x, y| image(240).row(y)[x][0])));
+    let found = detect(
+        &mut detector(config(Family::YoloV8)),
+        &frame_of(1, Images { grey, ..Images::default() }),
+    );
+    assert_eq!(found.len(), 1);
+}
+
+fn track(confirmed: bool) -> Track {
+    let found = detect(&mut detector(config(Family::Yolox)), &frame(1, 240)).remove(0);
+    let person = Person { position: found.position, velocity: Vector2::zeros() };
+    let region = found.rect().unwrap();
+    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
+    Track {
+        id: TrackId(1),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed,
+        age: 3,
+        unseen_s: 0.0,
+        score: 2.0,
+    }
+}
+
+/// The scores of the networks rise from 0 to 1 around a brightness of 0.7.
+#[test]
+fn a_weak_box_is_the_person_of_a_confirmed_track_alone() {
+    let (mut detector, weak) = (detector(config(Family::Yolox)), frame(1, 170));
+    let mut count = |query: &Query<'_>| {
+        let mut funnel = Funnel::default();
+        let found = detector.detect(&weak, query, &mut funnel).unwrap();
+        (found.len(), funnel.count("network: score"))
+    };
+    assert_eq!(count(&EVERYWHERE), (0, 1));
+    assert_eq!(count(&Query::Track(&track(false))), (0, 1));
+    assert_eq!(count(&Query::Track(&track(true))), (1, 0));
+    let mut elsewhere = track(true);
+    elsewhere.estimate.person.position += Vector3::new(0.0, 3.0, 0.0);
+    elsewhere.estimate.region.x -= 200.0;
+    assert_eq!(count(&Query::Track(&elsewhere)), (0, 0));
+}
+
+#[test]
+fn the_network_runs_on_every_nth_frame() {
+    let mut third = detector(Config { every: 3, ..config(Family::Yolox) });
+    let counts: Vec<usize> = (1..8).map(|k| detect(&mut third, &frame(k, 240)).len()).collect();
+    assert_eq!(counts, [1, 0, 0, 1, 0, 0, 1]);
+}
+
+#[test]
+fn a_config_without_a_model_says_so_in_the_funnel() {
+    let (mut funnel, frame) = (Funnel::default(), frame(1, 240));
+    let mut none = Onnx::new(Config::default(), &context()).unwrap();
+    assert!(none.detect(&frame, &EVERYWHERE, &mut funnel).unwrap().is_empty());
+    assert_eq!(funnel.count("no model"), 1);
+}
+
+#[test]
+fn the_preparation_is_that_of_the_family_but_for_the_settings() {
+    let prepare = |config: Config| config.preparation(Family::NanoDet).unwrap();
+    assert_eq!(prepare(Config::default()), Family::NanoDet.preparation());
+    let rgb = prepare(Config { colours: Channels::Rgb, ..Config::default() });
+    assert_eq!((rgb.colours, rgb.mean), (Colours::Rgb, [123.675, 116.28, 103.53]));
+    let own = prepare(Config {
+        fit: Placing::TopLeft,
+        padding: 0.0,
+        mean: vec![1.0, 2.0, 3.0],
+        deviation: vec![4.0; 3],
+        ..Config::default()
+    });
+    assert_eq!((own.fit, own.padding, own.colours), (Fit::TopLeft, 0.0, Colours::Bgr));
+    assert_eq!((own.mean, own.deviation), ([1.0, 2.0, 3.0], [4.0; 3]));
+}
+
+fn message(config: Config) -> String {
+    Onnx::new(config, &context()).err().unwrap().to_string()
+}
+
+#[test]
+fn bad_files_are_named_with_the_reason() {
+    let why = message(Config { model: "none.onnx".into(), ..Config::default() });
+    assert!(why.starts_with("model file `none.onnx`: cannot be read"), "{why}");
+    let why = message(Config { model: "yolox.json".into(), ..Config::default() });
+    assert!(why.contains("`yolox.json`: it is truncated or no ONNX file"), "{why}");
+    let wrong = Config { family: FamilyChoice::RfDetr, ..config(Family::Yolox) };
+    assert!(message(wrong).contains("is not of the family rf-detr"));
+    let small = Config { max_operators: 2, ..config(Family::Yolox) };
+    assert!(message(small).contains("raise `max_operators`"));
+}
+
+#[test]
+fn each_setting_that_cannot_work_is_named() {
+    for (key, config) in [
+        ("size", Config { size: vec![640], ..Config::default() }),
+        ("size", Config { size: vec![640, 0], ..Config::default() }),
+        ("mean", Config { mean: vec![1.0], ..Config::default() }),
+        ("deviation", Config { deviation: vec![0.0; 3], ..Config::default() }),
+        ("every", Config { every: 0, ..Config::default() }),
+        ("discover_score", Config { discover_score: 1.5, ..Config::default() }),
+        ("deadline_s", Config { deadline_s: 0.0, ..Config::default() }),
+    ] {
+        let why = message(config);
+        assert!(why.starts_with(&format!("`{key}`")), "{why}");
+    }
+}
+
+#[test]
+fn a_late_call_is_counted_and_is_no_error() {
+    let hurried = Config { deadline_s: 1e-3, ..config(Family::Yolox) };
+    let mut detector = detector(hurried);
+    // Whether a call is late depends on the machine; a frame has people or is counted.
+    for index in 1..20 {
+        let mut funnel = Funnel::default();
+        let frame = frame(index, 240);
+        let found = detector.detect(&frame, &EVERYWHERE, &mut funnel).unwrap();
+        assert_eq!(found.len() as u64 + funnel.count("network: late"), 1);
+    }
+}
