@@ -24,7 +24,7 @@ use super::{faces, rooms, seen};
 const UNSURE: f64 = 1.0;
 
 /// Annotated logs for training ...
-const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
+pub const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
 /// ... and one of another room, which is held out.
 const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 
@@ -73,12 +73,17 @@ impl<'a> Session<'a> {
     pub fn sources(&self) -> Vec<String> {
         let mut names = vec!["drawn rooms".to_owned()];
         if self.args.data.is_some() {
-            names.extend(TRAIN_LOGS.map(|log| format!("logs/{log}.mcap")));
+            names.extend(self.train_logs().map(|log| format!("logs/{log}.mcap")));
             names.extend(
                 ["people/inria-64x128", "people/head-shoulder-50", "negatives"].map(String::from),
             );
         }
         names
+    }
+
+    /// Returns the annotated logs for training.
+    fn train_logs(&self) -> impl Iterator<Item = &'static str> {
+        TRAIN_LOGS.into_iter().filter(|log| !self.args.without.iter().any(|name| name == log))
     }
 
     fn context(&self) -> Context {
@@ -163,7 +168,7 @@ impl<'a> Session<'a> {
         // The logs do not change, so later rounds would repeat their candidates.
         if round == 0 {
             let proposing = self.in_use(CameraKind::Rgbd)?.proposing()?;
-            for log in TRAIN_LOGS {
+            for log in self.train_logs() {
                 let mut pipeline = pipeline(&proposing, self.registry)?;
                 let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
                 self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
